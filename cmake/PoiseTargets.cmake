@@ -1,0 +1,79 @@
+# Options, compile flags and the few target functions every folder uses.
+option(POISE_NATIVE "Compile for this machine's processor (-march=native)" ON)
+option(POISE_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
+option(POISE_BUILD_TESTS "Build tests and benchmarks" ON)
+option(POISE_WERROR "Treat warnings as errors" ON)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+set(CMAKE_CXX_FLAGS_RELEASE "-O3")  # assertions stay on
+
+# One set of code-generation flags for all targets: Eigen's alignment depends on them.
+# -ffp-contract=off: the same source gives the same bits wherever it is inlined.
+add_compile_options(-ffp-contract=off)
+if(POISE_NATIVE)
+  add_compile_options(-march=native)
+endif()
+if(POISE_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
+                      -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
+add_library(poise_options INTERFACE)
+target_include_directories(poise_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+target_compile_options(poise_options INTERFACE -Wall -Wextra -Wconversion)
+if(POISE_WERROR)
+  target_compile_options(poise_options INTERFACE -Werror)
+endif()
+
+# poise_library(name SOURCES ... DEPS ...): a static library of our own code.
+function(poise_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPS" ${ARGN})
+  add_library(${name} STATIC ${A_SOURCES})
+  target_link_libraries(${name} PUBLIC poise_options ${A_DEPS})
+endfunction()
+
+# poise_program(name SOURCES ... DEPS ...): an executable in build/<preset>/bin.
+function(poise_program name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPS" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_link_libraries(${name} PRIVATE poise_options ${A_DEPS})
+endfunction()
+
+# poise_proto_library(name PROTOS ... DEPS ...): C++ of .proto files of this folder, included by their path from the
+# top ("components/robot/robot.pb.h"). Generated code is not held to our warnings.
+function(poise_proto_library name)
+  cmake_parse_arguments(A "" "" "PROTOS;DEPS" ${ARGN})
+  set(sources)
+  foreach(proto ${A_PROTOS})
+    file(RELATIVE_PATH relative ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${proto})
+    string(REGEX REPLACE "\\.proto$" "" stem ${relative})
+    add_custom_command(
+      OUTPUT ${PROJECT_BINARY_DIR}/${stem}.pb.cc ${PROJECT_BINARY_DIR}/${stem}.pb.h
+      COMMAND protobuf::protoc --cpp_out=${PROJECT_BINARY_DIR} -I ${PROJECT_SOURCE_DIR} ${relative}
+      WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+      DEPENDS ${PROJECT_SOURCE_DIR}/${relative} VERBATIM)
+    list(APPEND sources ${PROJECT_BINARY_DIR}/${stem}.pb.cc)
+  endforeach()
+  add_library(${name} STATIC ${sources})
+  target_include_directories(${name} SYSTEM PUBLIC ${PROJECT_BINARY_DIR})
+  target_link_libraries(${name} PUBLIC protobuf::libprotobuf ${A_DEPS})
+endfunction()
+
+# poise_test(name SOURCES ... DEPS ... [ARGS ...] [LABELS ...]): a GoogleTest executable, one ctest entry per test case.
+function(poise_test name)
+  cmake_parse_arguments(A "" "" "SOURCES;DEPS;LABELS" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  target_link_libraries(${name} PRIVATE poise_options ${A_DEPS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE POISE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
+                             POISE_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${A_LABELS}")
+endfunction()

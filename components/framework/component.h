@@ -1,0 +1,126 @@
+// Component: a configuration, typed inputs, typed outputs and stages that are pure functions of both.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <typeindex>
+#include <vector>
+
+#include "components/framework/configuration.h"
+#include "components/framework/ports.h"
+
+namespace poise {
+
+/// The control cycle a stage is run for. Simulated or real: a component never reads a clock.
+struct Tick {
+  int64_t index = 0;
+  int64_t utime = 0;  ///< us since the start of the run, time of validity
+  double time = 0;    ///< s, the same
+};
+
+/// Objects that components inside one process share (e.g. the robot's dynamics of this tick), by type and key.
+/// In a graph of processes each process has its own; a shared object must therefore never carry information
+/// that is not a pure function of the messages its user has seen.
+class SharedObjects {
+ public:
+  /// The object of type T under `key`, made by `make` (returning std::shared_ptr<T>) on first use.
+  template <class T, class Make>
+  std::shared_ptr<T> Get(std::string_view key, Make&& make) {
+    auto& slot = objects_[{std::type_index(typeid(T)), std::string(key)}];
+    if (!slot) slot = make();
+    return std::static_pointer_cast<T>(slot);
+  }
+
+ private:
+  std::map<std::pair<std::type_index, std::string>, std::shared_ptr<void>> objects_;
+};
+
+/// What a component is given when it is configured. Alive only during Configure, except `shared` contents.
+struct ComponentContext {
+  std::string name;          ///< instance name in the graph
+  std::string config_text;   ///< protobuf text of the component's own configuration message
+  double tick_period = 0;    ///< s
+  uint64_t seed = 0;
+  const std::map<std::string, std::string>* resources = nullptr;  ///< "robot", "urdf": text by name
+  SharedObjects* shared = nullptr;
+
+  /// Text of a resource. Throws ConfigError when the run has no such resource.
+  const std::string& resource(const std::string& name) const;
+  /// The configuration as a `Config` message. Throws ConfigError with line and field.
+  template <class Config>
+  Config config() const {
+    Config message;
+    ParseTextProto(config_text, name, &message);
+    return message;
+  }
+};
+
+/// A stage: runs once a tick, after the stages declared before it, as soon as its inputs have joined.
+struct Stage {
+  std::string name;
+  std::vector<InputPort*> inputs;
+  std::vector<OutputPort*> outputs;
+  std::function<void(const Tick&)> run;
+};
+
+/// Collects the ports and stages that a component declares in Configure. Port names are unique per direction.
+class Wiring {
+ public:
+  /// `port` must outlive the wiring (it is a member of the component).
+  void AddInput(InputPort* port, std::string name, MessageCounts counts,
+                InputKind kind = InputKind::kSameTick);
+  void AddOutput(OutputPort* port, std::string name, MessageCounts counts);
+  /// An output belongs to exactly one stage and is sent when that stage returns. An input may serve several.
+  void AddStage(std::string name, std::vector<InputPort*> inputs, std::vector<OutputPort*> outputs,
+                std::function<void(const Tick&)> run);
+
+  const std::vector<InputPort*>& inputs() const { return inputs_; }
+  const std::vector<OutputPort*>& outputs() const { return outputs_; }
+  const std::vector<Stage>& stages() const { return stages_; }
+
+ private:
+  std::vector<InputPort*> inputs_;
+  std::vector<OutputPort*> outputs_;
+  std::vector<Stage> stages_;
+};
+
+/// A component sees no bus, no clock and no file. The same object runs in its own process, inside one process,
+/// under a test and from a log. Stages must not allocate, throw, lock or log.
+class Component {
+ public:
+  virtual ~Component() = default;
+
+  /// Called once, before any tick: reads the configuration, declares ports and stages, allocates everything.
+  /// Throws ConfigError on a configuration it cannot work with.
+  virtual void Configure(const ComponentContext& context, Wiring* wiring) = 0;
+
+  /// Non-empty once the component wants the run to end after the current tick, e.g. "robot fell at 1.234 s".
+  /// Polled by the runner after each stage. Must stay constant once set.
+  virtual std::string_view finished() const { return {}; }
+  /// True when the end that finished() asks for is a failure of the run (a fall) rather than its planned end.
+  virtual bool failed() const { return false; }
+};
+
+/// Makes components by type name. One registration line per component, beside its definition.
+using ComponentFactory = std::function<std::unique_ptr<Component>()>;
+
+class ComponentRegistry {
+ public:
+  void Add(std::string type, std::string summary, ComponentFactory factory);
+  /// nullptr when there is no such type.
+  const ComponentFactory* Find(const std::string& type) const;
+  struct Entry {
+    std::string summary;
+    ComponentFactory factory;
+  };
+  const std::map<std::string, Entry>& entries() const { return entries_; }
+
+ private:
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace poise

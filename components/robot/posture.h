@@ -1,0 +1,25 @@
+// A standing posture by inverse kinematics: soles where they are wanted, COM above a point.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "components/robot/robot_model.h"
+
+namespace poise::robot {
+
+struct PostureGoal {
+  /// Sole frames in the world, right first.
+  std::array<Eigen::Isometry3d, 2> foot;
+  /// Desired COM, m, world.
+  Eigen::Vector2d com_xy = Eigen::Vector2d::Zero();
+  double com_height = 0;  ///< m, world
+  /// Joint positions the solver starts from and, beyond the goal, stays near.
+  Eigen::VectorXd nominal;
+};
+
+/// Solves for base pose (upright, yaw 0: body orientation identity) and joints by damped Gauss–Newton within the joint
+/// limits. Throws RobotError saying what could not be reached and by how much (tolerance 1e-8).
+RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
+
+}  // namespace poise::robot

@@ -1,0 +1,122 @@
+// RobotModel: the constant description of a floating-base robot, from a URDF and a Robot file.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "components/robot/robot.pb.h"
+
+namespace poise::robot {
+
+/// A URDF or robot description that cannot work. what() is one line naming the link, joint or field and the remedy.
+class RobotError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A moving body: a URDF link with every link attached to it by fixed joints merged in. Body 0 is the floating base.
+struct Body {
+  std::string name;  ///< of the URDF link that the moving joint carries (the root link for body 0)
+  int parent = -1;   ///< body index; parents come before children
+  int joint = -1;    ///< index of the joint to the parent; -1 for the base
+  double mass = 0;   ///< kg
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();       ///< m, body frame
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   ///< kg·m², about the COM, body axes
+};
+
+/// A revolute joint. Its index is its place in joint_position, in torque and in every message.
+struct Joint {
+  std::string name;
+  int body = -1;  ///< child body
+  Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< joint frame in the parent body at zero position
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();           ///< unit, joint frame (= child body frame)
+  double lower = 0, upper = 0;   ///< rad
+  double effort = 0;             ///< N·m
+  double velocity_limit = 0;     ///< rad/s
+};
+
+struct MotorModel {
+  double gear_ratio = 1, torque_constant = 0;            ///< (54)
+  double rated_current = 0, peak_current = 0;            ///< A
+  double reflected_inertia = 0;                          ///< kg·m², H² J_m
+  double coulomb_friction = 0, viscous_friction = 0, static_friction = 0, stribeck_velocity = 0;
+  int encoder_counts = 0;                                ///< per motor revolution
+  double torque_per_ampere() const { return gear_ratio * torque_constant; }
+};
+
+struct FootModel {
+  std::string name;
+  int body = -1;
+  Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();  ///< sole frame in the body frame
+  double length = 0, width = 0;                            ///< m
+};
+
+struct ImuModel {
+  int body = -1;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< IMU frame in the body frame
+  double gyro_noise = 0, gyro_bias = 0, accelerometer_noise = 0, accelerometer_bias = 0;
+};
+
+inline constexpr int kRightFoot = 0;
+inline constexpr int kLeftFoot = 1;
+inline constexpr double kGravity = 9.80665;  ///< m/s², standard gravity, along -z of the world
+
+/// Configuration and velocity. Velocity order of the whole project: v = [base linear; base angular; joints], base
+/// linear velocity of the base frame's origin, both base parts in world axes.
+struct RobotState {
+  Eigen::Vector3d base_position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond base_orientation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d base_linear_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d base_angular_velocity = Eigen::Vector3d::Zero();
+  Eigen::VectorXd joint_position;
+  Eigen::VectorXd joint_velocity;
+
+  RobotState() = default;
+  explicit RobotState(int num_joints)
+      : joint_position(Eigen::VectorXd::Zero(num_joints)),
+        joint_velocity(Eigen::VectorXd::Zero(num_joints)) {}
+};
+
+/// Immutable after Load. Joints are in depth-first order of the URDF tree; nothing may assume more than that.
+class RobotModel {
+ public:
+  /// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia, a joint type that
+  /// cannot be controlled, a joint without motor, not exactly two feet, fewer than six joints from base to a foot.
+  /// Warnings (skipped meshes are not even looked at) go to `warnings` when given.
+  static RobotModel Load(const Robot& description, std::string_view urdf_xml,
+                         std::vector<std::string>* warnings = nullptr);
+
+  const std::string& name() const { return name_; }
+  int num_joints() const { return static_cast<int>(joints_.size()); }
+  int num_velocities() const { return num_joints() + 6; }
+  const std::vector<Body>& bodies() const { return bodies_; }
+  const std::vector<Joint>& joints() const { return joints_; }
+  const std::vector<MotorModel>& motors() const { return motors_; }  ///< by joint index
+  const std::vector<FootModel>& feet() const { return feet_; }       ///< right first
+  const ImuModel& imu() const { return imu_; }
+  int body_task_body() const { return body_task_body_; }  ///< body whose orientation the body task controls
+  double total_mass() const { return total_mass_; }
+  double force_noise() const { return force_noise_; }
+  double moment_noise() const { return moment_noise_; }
+  /// Index of a joint by name, -1 when there is none.
+  int FindJoint(std::string_view name) const;
+  /// A copy with one body's mass scaled and COM shifted (m, body frame), for model-error studies. Throws RobotError.
+  RobotModel WithModelError(std::string_view body, double mass_scale,
+                            const Eigen::Vector3d& com_shift) const;
+
+ private:
+  std::string name_;
+  std::vector<Body> bodies_;
+  std::vector<Joint> joints_;
+  std::vector<MotorModel> motors_;
+  std::vector<FootModel> feet_;
+  ImuModel imu_;
+  int body_task_body_ = 0;
+  double total_mass_ = 0, force_noise_ = 0, moment_noise_ = 0;
+};
+
+}  // namespace poise::robot
