@@ -1,0 +1,47 @@
+// Section 4: contact conditions (29)–(33) of a sole, frame O, the resultant (35) and its centre of pressure (37), (38).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+namespace poise::balance {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// Limits of one contact patch, in its own frame.
+struct ContactLimits {
+  double friction = 0.9;      ///< μ_s, (30)
+  double yaw_friction = 0.9;  ///< μ_z, m, (31)
+  double half_length = 0;     ///< l_x/2, m, (33), (37)
+  double half_width = 0;      ///< l_y/2, m, (32), (38)
+};
+
+/// Distance from each condition, positive inside.
+struct ContactMargins {
+  double normal = 0;    ///< N, (29)
+  double friction = 0;  ///< N, (30)
+  double yaw = 0;       ///< N·m, (31)
+  double roll = 0;      ///< N·m, (32)
+  double pitch = 0;     ///< N·m, (33)
+  /// All margins ≥ −tolerance (N and N·m alike). NaN is never met.
+  bool Met(double tolerance = 1e-6) const;
+};
+
+/// Margins of a wrench [F; M] of the robot on the environment in the patch's frame.
+ContactMargins CheckContact(const Vector6d& wrench, const ContactLimits& limits);
+
+/// Centre of pressure (r_x, r_y), m, in the wrench's frame: (−M_y/F_z, M_x/F_z). F_z must not be zero.
+Eigen::Vector2d CenterOfPressure(const Vector6d& wrench);
+
+/// Frame O in the world. Both feet: midway between the soles, y along the line from the right to the left sole centre, z
+/// as near to the soles' mean normal as that allows. One foot: that sole's frame. `in_contact` right first, at least one.
+/// False when the soles' centres coincide or the line is parallel to the normal.
+bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool, 2>& in_contact,
+            Eigen::Isometry3d* frame);
+
+/// K block of one foot, (35) and (44) corrected: wrench in its sole frame → wrench in `frame`, [R 0; P̂R R].
+Matrix6d WrenchTransform(const Eigen::Isometry3d& frame, const Eigen::Isometry3d& sole);
+
+}  // namespace poise::balance
