@@ -5,10 +5,9 @@
 #include <Eigen/Geometry>
 #include <array>
 
-namespace poise::balance {
+#include "components/balance/contact_dynamics.h"
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+namespace poise::balance {
 
 /// Limits of one contact patch, in its own frame.
 struct ContactLimits {
@@ -36,12 +35,14 @@ ContactMargins CheckContact(const Vector6d& wrench, const ContactLimits& limits)
 Eigen::Vector2d CenterOfPressure(const Vector6d& wrench);
 
 /// Frame O in the world. Both feet: midway between the soles, y along the line from the right to the left sole centre, z
-/// as near to the soles' mean normal as that allows. One foot: that sole's frame. `in_contact` right first, at least one.
-/// False when the soles' centres coincide or the line is parallel to the normal.
+/// as near to the soles' mean normal as that allows. One foot: that sole's frame. `in_contact` right first.
+/// False, and `frame` unchanged, without a contact, when the soles' centres coincide (within 1 µm), when the line between
+/// them is parallel to the mean normal or when a pose is not finite.
 bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool, 2>& in_contact,
             Eigen::Isometry3d* frame);
 
 /// K block of one foot, (35) and (44) corrected: wrench in its sole frame → wrench in `frame`, [R 0; P̂R R].
+/// Both frames are given in the same frame, e.g. the world.
 Matrix6d WrenchTransform(const Eigen::Isometry3d& frame, const Eigen::Isometry3d& sole);
 
 }  // namespace poise::balance

@@ -5,36 +5,93 @@
 
 namespace poise::balance {
 
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+/// Read-only arguments. One row of a matrix is passed as middleRows(i, 1): row(i) has another storage order, so that
+/// binding it would copy to the heap.
 using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
+
+/// Joints that the tick path has scratch for.
+inline constexpr int kMaxJoints = 128;
+
+/// The same dynamics with the contacts solved for, in joint coordinates. With the first foot in contact as root, the base
+/// follows the joints, q̈_b = Φ q̈_j + a_b, and a second foot leaves the loop H q̈_j = −γ:
+///   M q̈_j + h + Hᵀ F_2 = Γ_a.
+/// An orthonormal basis V of null(H) makes every matrix of the paper small: with Vᵀ M V = L Lᵀ,
+///   A⁻¹ N_cᵀ = Z Zᵀ, Z = [Φ; I] V L⁻ᵀ,  W = (V L⁻ᵀ)(V L⁻ᵀ)ᵀ,  W⁺ = V Vᵀ M V Vᵀ.
+/// null(W) is the range of Hᵀ: known, not searched for. Without a second foot V = I.
+/// k×k buffers hold their matrix in the top left corner; r = k − (m − 6) is the rank of W.
+struct ReducedDynamics {
+  int num_joints = 0;         ///< k
+  int num_contact_rows = 0;   ///< m
+  Eigen::MatrixXd phi_t;      ///< Φᵀ, k×6
+  Eigen::MatrixXd psi_t;      ///< ([A_bb A_bj] [Φ; I])ᵀ, k×6: base rows of A q̈ = A_bb a_b + Ψ q̈_j
+  Eigen::MatrixXd mass;       ///< M, k×k
+  Eigen::MatrixXd rotation;   ///< [Q₁ V], k×k, of Hᵀ = Q₁ R (two feet only)
+  Eigen::MatrixXd mass_basis; ///< M V, k×r (two feet only)
+  Eigen::MatrixXd factor;     ///< L, r×r, lower
+  Eigen::MatrixXd loop;       ///< Hᵀ's Householder vectors and R, k×6 (two feet only)
+  Matrix6d base_mass;         ///< A_bb
+  Matrix6d root_transfer;     ///< G_1⁻ᵀ: base wrench → wrench of the root foot
+  Matrix6d second_transfer;   ///< G_2ᵀ: wrench of the second foot → base wrench
+
+  /// Terms that do not depend on the torque, linear in (b + g, J̇_c q̇).
+  struct Bias {
+    Eigen::VectorXd joint_torque;        ///< h, k×1, the particular acceleration's inertia included
+    Eigen::VectorXd joint_acceleration;  ///< of the particular solution, k×1
+    Vector6d base_acceleration;          ///< a_b
+    Vector6d base_wrench;                ///< −(A_bb a_b + base rows of b + g)
+  };
+  Bias bias;
+  Eigen::VectorXd gravity_torque;  ///< [Φ; I]ᵀ g, k×1
+
+  bool closed_loop() const { return num_contact_rows == 12; }
+  int rank() const { return num_joints - (num_contact_rows - 6); }
+};
 
 /// Contact-constrained dynamics at one state. n = k + 6 velocities, m = 6 or 12 contact rows (right foot first, each
 /// [force; moment] in its own sole frame, wrench of the robot on the environment). Sized once; Compute never allocates.
 class ContactDynamics {
  public:
-  /// `num_joints` k ≥ 1. Room for two feet.
+  /// `num_joints` k, 6 < k ≤ kMaxJoints (std::invalid_argument otherwise). Room for two feet.
   explicit ContactDynamics(int num_joints);
 
-  /// (4)–(11) and (22). `mass_matrix` n×n, `bias` b and `gravity` g n×1, `contact_jacobian` J_c m×n,
-  /// `contact_bias` J̇_c q̇ m×1. False, and then nothing else is valid, when A or J_c A⁻¹ J_cᵀ is not positive definite
-  /// or an input is not finite.
+  /// (4)–(11) and (22). `mass_matrix` n×n symmetric, `bias` b and `gravity` g n×1, `contact_jacobian` J_c m×n whose base
+  /// columns are rigid transforms [Rᵀ −Rᵀp̂; 0 Rᵀ], `contact_bias` J̇_c q̇ m×1. False, and then nothing else is valid, when
+  /// a size is wrong, J_c is not of that form, A is not positive definite on the motions that the contacts leave, the
+  /// contacts are dependent (J_c A⁻¹ J_cᵀ not positive definite) or an input is not finite.
   bool Compute(const MatrixRef& mass_matrix, const VectorRef& bias, const VectorRef& gravity,
                const MatrixRef& contact_jacobian, const VectorRef& contact_bias);
 
-  int num_joints() const;
-  int num_contact_rows() const;
+  int num_joints() const { return reduced_.num_joints; }
+  int num_contact_rows() const { return reduced_.num_contact_rows; }
+  /// J_c, m×n.
+  MatrixRef contact_jacobian() const { return contact_jacobian_.topRows(num_contact_rows()); }
 
-  Eigen::Ref<const Eigen::MatrixXd> contact_jacobian() const;  ///< J_c, m×n
-  Eigen::Ref<const Eigen::MatrixXd> lambda_c() const;          ///< Λ_c, m×m, (4)
-  Eigen::Ref<const Eigen::VectorXd> mu_c() const;              ///< μ_c, m×1, (5)
-  Eigen::Ref<const Eigen::VectorXd> p_c() const;               ///< p_c, m×1, (6)
-  Eigen::Ref<const Eigen::MatrixXd> jc_bar_transpose() const;  ///< J̄_cᵀ, m×n, (7)
-  Eigen::Ref<const Eigen::MatrixXd> w() const;                 ///< W, k×k, (22)
-  /// W⁺, k×k, from the known null space of W (dimension m − 6), never from a tolerance.
-  Eigen::Ref<const Eigen::MatrixXd> w_pinv() const;
-
-  /// Contact wrenches that joint torques produce, (34), m×1 into `wrench`.
+  /// Contact wrenches that joint torques (k×1) produce, (34), m×1 into `wrench`.
   void ExpectedWrench(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> wrench) const;
+  /// Acceleration q̈ that joint torques (k×1) produce, (9), n×1 into `acceleration`.
+  void Acceleration(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> acceleration) const;
+
+  // The matrices of the paper, formed on demand (they allocate; the tick path needs none of them).
+  Eigen::MatrixXd lambda_c() const;          ///< Λ_c, m×m, (4)
+  Eigen::VectorXd mu_c() const;              ///< μ_c, m×1, (5)
+  Eigen::VectorXd p_c() const;               ///< p_c, m×1, (6)
+  Eigen::MatrixXd jc_bar_transpose() const;  ///< J̄_cᵀ, m×n, (7)
+  Eigen::MatrixXd w() const;                 ///< W, k×k, (22)
+  /// W⁺, k×k, from the known null space of W (dimension m − 6), never from a tolerance.
+  Eigen::MatrixXd w_pinv() const;
+
+  const ReducedDynamics& reduced() const { return reduced_; }
+
+ private:
+  Eigen::VectorXd Wrench(const VectorRef& generalized_force, const VectorRef& contact_bias,
+                         const VectorRef& torque) const;
+
+  ReducedDynamics reduced_;
+  Eigen::MatrixXd contact_jacobian_;  // 12×n
+  Eigen::VectorXd bias_, gravity_, contact_bias_;
 };
 
 }  // namespace poise::balance

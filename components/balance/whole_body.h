@@ -16,18 +16,33 @@ class WholeBody {
  public:
   explicit WholeBody(std::shared_ptr<const robot::RobotModel> model);
 
-  /// Kinematics and feet only (data().foot_*). Enough for redistribution.
+  /// Kinematics and feet only (data().foot_*). Enough for redistribution. `state` sized for the model.
   void UpdateKinematics(const robot::RobotState& state);
-  /// Everything, for the given contacts (right first, at least one). False when the contact dynamics do not exist
-  /// (non-finite state, feet in a singular posture).
+  /// Everything, for the given contacts (right first). False when the contact dynamics do not exist (non-finite state,
+  /// feet in a singular posture, no contact).
   bool Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact);
 
-  const robot::RobotModel& model() const;
-  const robot::RobotData& data() const;
-  const ContactDynamics& contact() const;        ///< valid after Update returned true
-  ContactGeometry geometry() const;              ///< sole frames and contacts of the last Update
-  /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment] right first.
+  const robot::RobotModel& model() const { return *model_; }
+  const robot::RobotData& data() const { return data_; }
+  const ContactDynamics& contact() const { return contact_; }  ///< valid after Update returned true
+  /// Sole frames and contacts of the last Update.
+  ContactGeometry geometry() const;
+  /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment] right first. `jacobian`
+  /// is resized when it does not have the right size already.
   void ContactJacobian(const std::array<bool, 2>& in_contact, Eigen::MatrixXd* jacobian) const;
+
+ private:
+  bool UpdateContacts();
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  robot::RobotData data_;
+  ContactDynamics contact_;
+  robot::RobotState state_;
+  std::array<bool, 2> in_contact_{false, false};
+  bool have_kinematics_ = false, have_dynamics_ = false, have_contacts_ = false;
+  bool contacts_valid_ = false;
+  std::array<Eigen::MatrixXd, 2> contact_jacobian_;  // 6×n for one foot, 12×n for two
+  Eigen::VectorXd contact_bias_;
 };
 
 }  // namespace poise::balance
