@@ -1,4 +1,5 @@
-// Component: a configuration, typed inputs, typed outputs and stages that are pure functions of both.
+// Component: a configuration, typed inputs, typed outputs and stages that are pure functions of
+// both.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +23,9 @@ struct Tick {
   double time = 0;    ///< s, the same
 };
 
-/// Objects that components inside one process share (e.g. the robot's dynamics of this tick), by type and key.
-/// In a graph of processes each process has its own; a shared object must therefore never carry information
-/// that is not a pure function of the messages its user has seen.
+/// Objects that components inside one process share (e.g. the robot's dynamics of this tick), by
+/// type and key. In a graph of processes each process has its own; a shared object must therefore
+/// never carry information that is not a pure function of the messages its user has seen.
 class SharedObjects {
  public:
   /// The object of type T under `key`, made by `make` (returning std::shared_ptr<T>) on first use.
@@ -39,12 +40,13 @@ class SharedObjects {
   std::map<std::pair<std::type_index, std::string>, std::shared_ptr<void>> objects_;
 };
 
-/// What a component is given when it is configured. Alive only during Configure, except `shared` contents.
+/// What a component is given when it is configured. Alive only during Configure, except `shared`
+/// contents.
 struct ComponentContext {
-  std::string name;          ///< instance name in the graph
-  std::string config_text;   ///< protobuf text of the component's own configuration message
-  double tick_period = 0;    ///< s
-  uint64_t seed = 0;
+  std::string name;         ///< instance name in the graph
+  std::string config_text;  ///< protobuf text of the component's own configuration message
+  double tick_period = 0;   ///< s
+  uint64_t seed = 0;        ///< of this instance: the run's seed mixed with `name`
   const std::map<std::string, std::string>* resources = nullptr;  ///< "robot", "urdf": text by name
   SharedObjects* shared = nullptr;
 
@@ -59,7 +61,8 @@ struct ComponentContext {
   }
 };
 
-/// A stage: runs once a tick, after the stages declared before it, as soon as its inputs have joined.
+/// A stage: runs once a tick, after the stages declared before it, as soon as its inputs have
+/// joined.
 struct Stage {
   std::string name;
   std::vector<InputPort*> inputs;
@@ -67,14 +70,17 @@ struct Stage {
   std::function<void(const Tick&)> run;
 };
 
-/// Collects the ports and stages that a component declares in Configure. Port names are unique per direction.
+/// Collects the ports and stages that a component declares in Configure. Port names are unique per
+/// direction. All Add functions throw ConfigError on a declaration that cannot work (wrong number
+/// of counts, a stage without ports of this wiring, an output in two stages).
 class Wiring {
  public:
   /// `port` must outlive the wiring (it is a member of the component).
   void AddInput(InputPort* port, std::string name, MessageCounts counts,
                 InputKind kind = InputKind::kSameTick);
   void AddOutput(OutputPort* port, std::string name, MessageCounts counts);
-  /// An output belongs to exactly one stage and is sent when that stage returns. An input may serve several.
+  /// An output belongs to exactly one stage and is sent when that stage returns. An input may serve
+  /// several.
   void AddStage(std::string name, std::vector<InputPort*> inputs, std::vector<OutputPort*> outputs,
                 std::function<void(const Tick&)> run);
 
@@ -88,20 +94,21 @@ class Wiring {
   std::vector<Stage> stages_;
 };
 
-/// A component sees no bus, no clock and no file. The same object runs in its own process, inside one process,
-/// under a test and from a log. Stages must not allocate, throw, lock or log.
+/// A component sees no bus, no clock and no file. The same object runs in its own process, inside
+/// one process, under a test and from a log. Stages must not allocate, throw, lock or log.
 class Component {
  public:
   virtual ~Component() = default;
 
-  /// Called once, before any tick: reads the configuration, declares ports and stages, allocates everything.
-  /// Throws ConfigError on a configuration it cannot work with.
+  /// Called once, before any tick: reads the configuration, declares ports and stages, allocates
+  /// everything. Throws ConfigError on a configuration it cannot work with.
   virtual void Configure(const ComponentContext& context, Wiring* wiring) = 0;
 
-  /// Non-empty once the component wants the run to end after the current tick, e.g. "robot fell at 1.234 s".
-  /// Polled by the runner after each stage. Must stay constant once set.
+  /// Non-empty once the component wants the run to end after the current tick, e.g. "robot fell
+  /// at 1.234 s". Polled by the runner after each stage. Must stay constant once set.
   virtual std::string_view finished() const { return {}; }
-  /// True when the end that finished() asks for is a failure of the run (a fall) rather than its planned end.
+  /// True when the end that finished() asks for is a failure of the run (a fall) rather than its
+  /// planned end.
   virtual bool failed() const { return false; }
 };
 

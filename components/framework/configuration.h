@@ -11,12 +11,14 @@ class Message;
 
 namespace poise {
 
-/// A configuration that cannot be used. what() is one line: "file:line: field: problem; what to do".
+/// A configuration that cannot be used. what() is one line: "file:line: field: problem; what to
+/// do".
 class ConfigError : public std::runtime_error {
  public:
   explicit ConfigError(const std::string& line) : std::runtime_error(line) {}
   /// For a value that parses but cannot work. `field` is the dotted path inside the component's own
-  /// configuration ("phase[2].duration"); whoever knows the file turns it into file and line (LocateField).
+  /// configuration ("phase[2].duration"); whoever knows the file turns it into file and line
+  /// (LocateField).
   ConfigError(std::string_view field, std::string_view problem);
   const std::string& field() const { return field_; }
   const std::string& problem() const { return problem_; }
@@ -26,7 +28,8 @@ class ConfigError : public std::runtime_error {
   std::string problem_;
 };
 
-/// Parses protobuf text. Throws ConfigError "source:line:column: problem"; unknown fields and enum values are errors.
+/// Parses protobuf text. Throws ConfigError "source:line:column: problem"; unknown fields and enum
+/// values are errors.
 void ParseTextProto(std::string_view text, std::string_view source,
                     google::protobuf::Message* message);
 
@@ -36,13 +39,15 @@ void ReadTextProto(const std::string& path, google::protobuf::Message* message);
 /// Whole file as text. Throws ConfigError naming the file and the reason.
 std::string ReadFile(const std::string& path);
 
-/// Line (from 1) of the field with dotted path `field` ("task_controller.phase[2].duration") in `text`, parsed as a
-/// message of the type of `prototype`; the nearest enclosing field present in the text; 0 when none is.
+/// Line (from 1) of the field with dotted path `field` ("task_controller.phase[2].duration") in
+/// `text`, parsed as a message of the type of `prototype`; the nearest enclosing field present in
+/// the text; 0 when none is.
 int LocateField(std::string_view text, std::string_view field,
                 const google::protobuf::Message& prototype);
 
-/// Sets one field by dotted path from text ("sim_ode.push[0].peak", "120"). Throws ConfigError naming the path,
-/// the nearest valid names and the expected type. Indexes may address an existing element or one past the end.
+/// Sets one field by dotted path from text ("sim_ode.push[0].peak", "120"). Throws ConfigError
+/// naming the path, the nearest valid names and the expected type. Indexes may address an existing
+/// element or one past the end.
 void SetField(google::protobuf::Message* message, std::string_view path, std::string_view value);
 
 }  // namespace poise

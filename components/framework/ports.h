@@ -15,7 +15,8 @@ namespace poise {
 /// How an input takes part in the join of its stage.
 enum class InputKind {
   kSameTick,      ///< the message of this tick
-  kPreviousTick,  ///< the message of the tick before (absent in tick 0): closes the loop through the robot
+  kPreviousTick,  ///< the message of the tick before (absent in tick 0): closes the loop through
+                  ///< the robot
   kLatest,        ///< asynchronous: the latest message, if any; the stage never waits for it
 };
 
@@ -29,16 +30,21 @@ class InputPort {
   virtual ~InputPort() = default;
   virtual const char* type_name() const = 0;
   virtual int64_t fingerprint() const = 0;
+  /// Names of the type's leading counts ("num_joints").
+  virtual std::span<const char* const> count_names() const = 0;
 
   /// A message object of this port's type with its arrays sized; owned by the caller.
   virtual void* NewMessage() const = 0;
   virtual void DeleteMessage(void* message) const = 0;
+  /// Copies between messages of this port's type and counts. Does not allocate.
+  virtual void CopyMessage(const void* from, void* to) const = 0;
   /// Encoded size of every valid message of this port, bytes, fingerprint included.
   virtual int encoded_size() const = 0;
   /// Decodes into `message` (from NewMessage). Precondition: the raw checks of PacketFilter passed.
   /// Returns false when liblcm refuses it or a number in it is not finite. Does not allocate.
   virtual bool Decode(const uint8_t* data, int size, void* message) const = 0;
-  /// Shows `message` to the component until the next call; nullptr: absent. The caller keeps it alive.
+  /// Shows `message` to the component until the next call; nullptr: absent. The caller keeps it
+  /// alive.
   virtual void Bind(const void* message) = 0;
 
   const std::string& name() const { return name_; }
@@ -55,6 +61,9 @@ class InputPort {
 /// A component's view of one input. Declared with Wiring::AddInput.
 template <class T>
 class Input final : public InputPort {
+  static_assert(MessageTraits<T>::kHasHeader && !MessageTraits<T>::kHasStrings,
+                "a port's message has run_id, tick and utime, and one exact size");
+
  public:
   /// True when a message is there. Always true for kSameTick inputs inside their stage.
   bool present() const { return message_ != nullptr; }
@@ -64,12 +73,18 @@ class Input final : public InputPort {
 
   const char* type_name() const override { return T::getTypeName(); }
   int64_t fingerprint() const override { return T::getHash(); }
+  std::span<const char* const> count_names() const override {
+    return MessageTraits<T>::kCountNames;
+  }
   void* NewMessage() const override {
     auto* m = new T();
     MessageTraits<T>::Resize(*m, counts_);
     return m;
   }
   void DeleteMessage(void* message) const override { delete static_cast<T*>(message); }
+  void CopyMessage(const void* from, void* to) const override {
+    *static_cast<T*>(to) = *static_cast<const T*>(from);
+  }
   int encoded_size() const override {
     T m;
     MessageTraits<T>::Resize(m, counts_);
@@ -91,10 +106,14 @@ class OutputPort {
   virtual ~OutputPort() = default;
   virtual const char* type_name() const = 0;
   virtual int64_t fingerprint() const = 0;
+  virtual std::span<const char* const> count_names() const = 0;
   virtual int encoded_size() const = 0;
   /// Encodes the current message; returns the bytes written or < 0. Does not allocate.
   virtual int Encode(uint8_t* buffer, int capacity) const = 0;
   virtual const void* message() const = 0;
+  /// False when a number in the message is not finite: the runner then ends the run as failed,
+  /// since no reader would accept the message.
+  virtual bool Finite() const = 0;
   /// Stamps run, tick and time; the runner calls it before each stage.
   virtual void Stamp(int64_t run_id, int64_t tick, int64_t utime) = 0;
 
@@ -108,21 +127,29 @@ class OutputPort {
   MessageCounts counts_;
 };
 
-/// A component's view of one output: fill `*port` during the stage, the runner sends it when the stage returns.
-/// The message keeps its values between ticks; counts, run_id, tick and utime are set by the runner.
+/// A component's view of one output: fill `*port` during the stage, the runner sends it when the
+/// stage returns. The message keeps its values between ticks; counts, run_id, tick and utime are
+/// set by the runner.
 template <class T>
 class Output final : public OutputPort {
+  static_assert(MessageTraits<T>::kHasHeader && !MessageTraits<T>::kHasStrings,
+                "a port's message has run_id, tick and utime, and one exact size");
+
  public:
   T& operator*() { return message_; }
   T* operator->() { return &message_; }
 
   const char* type_name() const override { return T::getTypeName(); }
   int64_t fingerprint() const override { return T::getHash(); }
+  std::span<const char* const> count_names() const override {
+    return MessageTraits<T>::kCountNames;
+  }
   int encoded_size() const override { return message_.getEncodedSize(); }
   int Encode(uint8_t* buffer, int capacity) const override {
     return message_.encode(buffer, 0, capacity);
   }
   const void* message() const override { return &message_; }
+  bool Finite() const override { return MessageTraits<T>::AllFinite(message_); }
   void Stamp(int64_t run_id, int64_t tick, int64_t utime) override {
     message_.run_id = run_id;
     message_.tick = tick;

@@ -1,0 +1,64 @@
+// Collects every message of a run, in order and without loss: the recorder's ear.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+
+namespace poise {
+
+/// Receives all channels of a run, asks for what is missing and reports its progress to the tick
+/// sources. Also answers for its own process on HEALTH_<name> and follows START and STOP. Not
+/// thread-safe.
+class ChannelCollector {
+ public:
+  struct Callbacks {
+    /// A channel's message: strictly once per tick and in tick order per channel; external channels
+    /// as they come.
+    std::function<void(int channel, int64_t tick, std::span<const uint8_t> data)> message;
+    /// A message of the service port (HEALTH_*, CONTROL), well formed and of this run.
+    std::function<void(std::string_view channel, std::span<const uint8_t> data)> service;
+  };
+
+  /// `spec` must hold the channels' counts (FillCounts). Throws BusError; ConfigError when counts
+  /// are missing.
+  ChannelCollector(const RunSpec& spec, const std::string& name, Callbacks callbacks);
+  ~ChannelCollector();
+
+  /// Receives for up to `timeout_ms`, delivers, requests and reports. Returns after the first
+  /// batch.
+  void Spin(int timeout_ms);
+
+  /// Last tick of which every (not external) channel has been delivered; -1 at first.
+  int64_t recorded_tick() const;
+  /// Earliest final tick that a component reported with its end; -1 while the run goes on.
+  int64_t final_tick() const;
+  /// True once the run has ended and everything up to final_tick() has been delivered.
+  bool complete() const;
+  /// True after COMMAND_STOP.
+  bool stopped() const;
+
+  struct ChannelStatistics {
+    int64_t delivered = 0;
+    int64_t requested = 0;  ///< ticks that had to be asked for again
+    int64_t duplicates = 0;
+    int64_t refused = 0;    ///< failed a check of PacketFilter
+    int64_t next_tick = 0;  ///< first tick not yet delivered
+  };
+  const ChannelStatistics& statistics(int channel) const;
+  /// Messages of ticks <= `last_tick` that were not delivered, over all channels: 0 in a run
+  /// without loss.
+  int64_t missing(int64_t last_tick) const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace poise

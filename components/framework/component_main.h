@@ -1,0 +1,16 @@
+// main() of every component's program.
+#pragma once
+
+#include <string>
+
+#include "components/framework/component.h"
+
+namespace poise {
+
+/// Runs one component of a run as this process: --run FILE (RunSpec as protobuf text), --component
+/// NAME (default: `type`),
+/// --help, --version. Returns the exit code: 0 after a clean stop, 1 when the run failed, 2 for
+/// wrong usage or configuration (one line on stderr). Ends with its parent process.
+int ComponentMain(int argc, char** argv, const std::string& type, const ComponentFactory& factory);
+
+}  // namespace poise

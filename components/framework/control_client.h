@@ -1,0 +1,52 @@
+// The launcher's side of a run: start, stop, and the health of its components.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+#include "poise/health_t.hpp"
+
+namespace poise {
+
+/// Sends commands and collects health. Not thread-safe.
+class ControlClient {
+ public:
+  /// Watches the graph's components and `others` (e.g. {"recorder"}). Throws BusError.
+  explicit ControlClient(const RunSpec& spec, const std::vector<std::string>& others = {});
+  ~ControlClient();
+
+  /// Repeat SendStart until every state is beyond STATE_READY, SendStop until every process has
+  /// gone. False when the system refused to send.
+  bool SendStart();
+  bool SendStop();
+
+  /// Handles what arrives within `timeout_ms`; returns after the first batch.
+  void Spin(int timeout_ms);
+
+  struct Status {
+    bool seen = false;
+    int64_t last_seen = 0;  ///< ns, steady clock
+    health_t health;        ///< valid when seen
+  };
+  /// By component name; holds every watched name from the start.
+  const std::map<std::string, Status>& statuses() const { return statuses_; }
+  /// True when every watched process has been seen in a state >= `state` (health_t::STATE_*).
+  bool AllReached(int8_t state) const;
+  /// Packets refused on the service port.
+  int64_t refused() const { return refused_; }
+
+ private:
+  struct Links;
+  int64_t run_id_;
+  int64_t refused_ = 0;
+  std::map<std::string, Status> statuses_;
+  std::map<std::string, std::string, std::less<>> name_of_channel_;
+  std::unique_ptr<Links> links_;
+};
+
+}  // namespace poise

@@ -1,0 +1,40 @@
+// Runs one component of a run as a process on the bus.
+#pragma once
+
+#include <csignal>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "components/framework/graph.h"
+
+namespace poise {
+
+struct ProcessRunnerOptions {
+  /// Set (by a signal handler) to end the process cleanly.
+  const volatile std::sig_atomic_t* stop = nullptr;
+  /// Tick sources wait for the recorder (COMMAND_RECORDED). Default: RunSpec.recorded.
+  bool wait_for_recorder = false;
+};
+
+/// Lockstep: joins inputs by tick, runs each stage as soon as its inputs are there, sends its
+/// outputs, asks again for what does not come and answers such requests. The start waits for
+/// COMMAND_START, the end for COMMAND_STOP. After the start nothing allocates, throws or locks.
+class ProcessRunner {
+ public:
+  /// Configures component `name` of the run. Throws GraphError, ConfigError or BusError.
+  ProcessRunner(const RunSpec& spec, const std::string& name, const ComponentFactory& factory,
+                const ProcessRunnerOptions& options);
+  ~ProcessRunner();
+
+  /// Runs until COMMAND_STOP or *options.stop. Returns false when the bus failed or the component
+  /// sent a number that is not finite; error() says which.
+  bool Run();
+  const std::string& error() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace poise
