@@ -18,8 +18,9 @@ struct PostureGoal {
   Eigen::VectorXd nominal;
 };
 
-/// Solves for base pose (upright, yaw 0: body orientation identity) and joints by damped Gauss–Newton within the joint
-/// limits. Throws RobotError saying what could not be reached and by how much (tolerance 1e-8).
+/// Solves for base pose (upright, yaw 0: body orientation identity) and joints by damped
+/// Gauss–Newton within the joint limits. Throws RobotError saying what could not be reached and by
+/// how much (tolerance 1e-8).
 RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
 
 }  // namespace poise::robot

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -12,39 +13,42 @@
 
 namespace poise::robot {
 
-/// A URDF or robot description that cannot work. what() is one line naming the link, joint or field and the remedy.
+/// A URDF or robot description that cannot work. what() is one line naming the link, joint or field
+/// and the remedy.
 class RobotError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A moving body: a URDF link with every link attached to it by fixed joints merged in. Body 0 is the floating base.
+/// A moving body: a URDF link with every link attached to it by fixed joints merged in. Body 0 is
+/// the floating base.
 struct Body {
   std::string name;  ///< of the URDF link that the moving joint carries (the root link for body 0)
   int parent = -1;   ///< body index; parents come before children
   int joint = -1;    ///< index of the joint to the parent; -1 for the base
   double mass = 0;   ///< kg
-  Eigen::Vector3d com = Eigen::Vector3d::Zero();       ///< m, body frame
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();   ///< kg·m², about the COM, body axes
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();      ///< m, body frame
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< kg·m², about the COM, body axes
 };
 
 /// A revolute joint. Its index is its place in joint_position, in torque and in every message.
 struct Joint {
   std::string name;
-  int body = -1;  ///< child body
-  Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< joint frame in the parent body at zero position
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();           ///< unit, joint frame (= child body frame)
-  double lower = 0, upper = 0;   ///< rad
-  double effort = 0;             ///< N·m
-  double velocity_limit = 0;     ///< rad/s
+  int body = -1;  ///< child body, always the joint's index + 1
+  Eigen::Isometry3d origin =
+      Eigen::Isometry3d::Identity();  ///< joint frame in the parent body at zero position
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit, joint frame (= child body frame)
+  double lower = 0, upper = 0;                      ///< rad; infinite for a continuous joint
+  double effort = 0;                                ///< N·m
+  double velocity_limit = 0;                        ///< rad/s
 };
 
 struct MotorModel {
-  double gear_ratio = 1, torque_constant = 0;            ///< (54)
-  double rated_current = 0, peak_current = 0;            ///< A
-  double reflected_inertia = 0;                          ///< kg·m², H² J_m
+  double gear_ratio = 1, torque_constant = 0;  ///< (54)
+  double rated_current = 0, peak_current = 0;  ///< A
+  double reflected_inertia = 0;                ///< kg·m², H² J_m
   double coulomb_friction = 0, viscous_friction = 0, static_friction = 0, stribeck_velocity = 0;
-  int encoder_counts = 0;                                ///< per motor revolution
+  int encoder_counts = 0;  ///< per motor revolution
   double torque_per_ampere() const { return gear_ratio * torque_constant; }
 };
 
@@ -65,8 +69,8 @@ inline constexpr int kRightFoot = 0;
 inline constexpr int kLeftFoot = 1;
 inline constexpr double kGravity = 9.80665;  ///< m/s², standard gravity, along -z of the world
 
-/// Configuration and velocity. Velocity order of the whole project: v = [base linear; base angular; joints], base
-/// linear velocity of the base frame's origin, both base parts in world axes.
+/// Configuration and velocity. Velocity order of the whole project: v = [base linear; base angular;
+/// joints], base linear velocity of the base frame's origin, both base parts in world axes.
 struct RobotState {
   Eigen::Vector3d base_position = Eigen::Vector3d::Zero();
   Eigen::Quaterniond base_orientation = Eigen::Quaterniond::Identity();
@@ -81,12 +85,34 @@ struct RobotState {
         joint_velocity(Eigen::VectorXd::Zero(num_joints)) {}
 };
 
-/// Immutable after Load. Joints are in depth-first order of the URDF tree; nothing may assume more than that.
+/// The same tree as flat constants, for the recursions.
+struct KinematicTree {
+  /// Rotation of the child body in its parent = constant + cosine cos q + sine sin q.
+  struct JointTransform {
+    Eigen::Matrix3d constant, cosine, sine;
+    Eigen::Vector3d offset;    ///< m, joint frame's origin in the parent body
+    Eigen::Vector3d axis;      ///< unit, in the parent body
+    double reflected_inertia;  ///< kg·m²
+  };
+  struct BodyMass {
+    int parent;
+    double mass, subtree_mass;  ///< kg, of the body and of everything it carries
+    Eigen::Vector3d com;        ///< m, body frame
+    Eigen::Matrix3d inertia;    ///< kg·m², about the COM, body axes
+  };
+  std::vector<JointTransform> joints;
+  std::vector<BodyMass> bodies;
+  std::vector<std::vector<int>> supporting_joints;  ///< by body, nearest first
+};
+
+/// Immutable after Load. Joints are in depth-first order of the URDF tree; nothing may assume more
+/// than that.
 class RobotModel {
  public:
-  /// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia, a joint type that
-  /// cannot be controlled, a joint without motor, not exactly two feet, fewer than six joints from base to a foot.
-  /// Warnings (skipped meshes are not even looked at) go to `warnings` when given.
+  /// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia,
+  /// a joint type that cannot be controlled, a joint without motor, not exactly two feet, fewer
+  /// than six joints from base to a foot. Visual and collision elements are not looked at, so no
+  /// mesh is ever missed. Warnings go to `warnings` when given.
   static RobotModel Load(const Robot& description, std::string_view urdf_xml,
                          std::vector<std::string>* warnings = nullptr);
 
@@ -98,17 +124,28 @@ class RobotModel {
   const std::vector<MotorModel>& motors() const { return motors_; }  ///< by joint index
   const std::vector<FootModel>& feet() const { return feet_; }       ///< right first
   const ImuModel& imu() const { return imu_; }
-  int body_task_body() const { return body_task_body_; }  ///< body whose orientation the body task controls
+  int body_task_body() const {
+    return body_task_body_;
+  }  ///< body whose orientation the body task controls
   double total_mass() const { return total_mass_; }
   double force_noise() const { return force_noise_; }
   double moment_noise() const { return moment_noise_; }
+  const KinematicTree& tree() const { return tree_; }
+  /// Joints between the base and `body`, nearest to the body first: the columns its Jacobian may
+  /// fill.
+  std::span<const int> supporting_joints(int body) const {
+    return tree_.supporting_joints[static_cast<size_t>(body)];
+  }
   /// Index of a joint by name, -1 when there is none.
   int FindJoint(std::string_view name) const;
-  /// A copy with one body's mass scaled and COM shifted (m, body frame), for model-error studies. Throws RobotError.
+  /// A copy with one body's mass and inertia scaled and its COM shifted (m, body frame), for
+  /// model-error studies. Throws RobotError: no such body, scale not positive, shift not finite.
   RobotModel WithModelError(std::string_view body, double mass_scale,
                             const Eigen::Vector3d& com_shift) const;
 
  private:
+  void BuildTree();
+
   std::string name_;
   std::vector<Body> bodies_;
   std::vector<Joint> joints_;
@@ -116,6 +153,7 @@ class RobotModel {
   std::vector<FootModel> feet_;
   ImuModel imu_;
   int body_task_body_ = 0;
+  KinematicTree tree_;
   double total_mass_ = 0, force_noise_ = 0, moment_noise_ = 0;
 };
 

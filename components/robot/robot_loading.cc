@@ -1,0 +1,220 @@
+// RobotModel::Load: the URDF's tree and the Robot file brought together, and checked against each
+// other.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "components/robot/robot_model.h"
+#include "components/robot/urdf_tree.h"
+
+namespace poise::robot {
+namespace {
+
+constexpr int kContactDimension = 6;
+
+Eigen::Isometry3d ToEigen(const Pose& pose, const std::string& field) {
+  Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
+  result.translation() = Eigen::Vector3d(pose.x(), pose.y(), pose.z());
+  result.linear() = (Eigen::AngleAxisd(pose.yaw(), Eigen::Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd(pose.pitch(), Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(pose.roll(), Eigen::Vector3d::UnitX()))
+                        .toRotationMatrix();
+  if (!result.matrix().allFinite()) {
+    throw RobotError(field + ": a number is not finite: correct it");
+  }
+  return result;
+}
+
+UrdfTree::LinkPlace FindLink(const UrdfTree& tree, const std::string& link,
+                             const std::string& field) {
+  if (link.empty()) throw RobotError(field + " is missing: name a link of the URDF");
+  const auto place = tree.links.find(link);
+  if (place == tree.links.end()) {
+    throw RobotError(
+        fmt::format("{}: the URDF has no link '{}': name one of its links", field, link));
+  }
+  return place->second;
+}
+
+double Positive(double value, const std::string& field) {
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw RobotError(fmt::format("{} is {}: it must be above 0", field, value));
+  }
+  return value;
+}
+
+double NotNegative(double value, const std::string& field) {
+  if (!(value >= 0) || !std::isfinite(value)) {
+    throw RobotError(fmt::format("{} is {}: it must not be negative", field, value));
+  }
+  return value;
+}
+
+MotorModel ToMotor(const Motor& motor, const std::string& field) {
+  MotorModel result;
+  result.gear_ratio = Positive(motor.gear_ratio(), field + ".gear_ratio");
+  result.torque_constant = Positive(motor.torque_constant(), field + ".torque_constant");
+  result.rated_current = Positive(motor.rated_current(), field + ".rated_current");
+  result.peak_current = Positive(motor.peak_current(), field + ".peak_current");
+  if (result.peak_current < result.rated_current) {
+    throw RobotError(fmt::format("{}.peak_current {} A is below rated_current {} A: correct one",
+                                 field, result.peak_current, result.rated_current));
+  }
+  result.reflected_inertia = NotNegative(motor.rotor_inertia(), field + ".rotor_inertia") *
+                             motor.gear_ratio() * motor.gear_ratio();
+  if (motor.encoder_counts() <= 0) {
+    throw RobotError(
+        fmt::format("{}.encoder_counts is {}: it must be above 0", field, motor.encoder_counts()));
+  }
+  result.encoder_counts = motor.encoder_counts();
+  result.coulomb_friction = NotNegative(motor.coulomb_friction(), field + ".coulomb_friction");
+  result.viscous_friction = NotNegative(motor.viscous_friction(), field + ".viscous_friction");
+  result.static_friction = motor.has_static_friction()
+                               ? NotNegative(motor.static_friction(), field + ".static_friction")
+                               : result.coulomb_friction;
+  if (result.static_friction < result.coulomb_friction) {
+    throw RobotError(fmt::format(
+        "{}.static_friction {} N m is below coulomb_friction {} N m: raise it or leave it out",
+        field, result.static_friction, result.coulomb_friction));
+  }
+  result.stribeck_velocity = Positive(motor.stribeck_velocity(), field + ".stribeck_velocity");
+  if (!std::isfinite(result.reflected_inertia) || !std::isfinite(result.torque_per_ampere())) {
+    throw RobotError(field + ": gear_ratio is too large to compute with: correct it");
+  }
+  return result;
+}
+
+std::vector<MotorModel> LoadMotors(const Robot& description, const UrdfTree& tree) {
+  std::vector<MotorModel> motors(tree.joints.size());
+  std::vector<int> motor_of(tree.joints.size(), -1);
+  for (int m = 0; m < description.motor_size(); ++m) {
+    const std::string field = fmt::format("motor[{}]", m);
+    const Motor& motor = description.motor(m);
+    if (motor.joint_size() == 0) {
+      throw RobotError(field + " names no joint: add joint: \"...\" or remove it");
+    }
+    const MotorModel loaded = ToMotor(motor, field);
+    for (const std::string& name : motor.joint()) {
+      if (tree.fixed_joints.contains(name)) {
+        throw RobotError(fmt::format(
+            "{}: joint '{}' is fixed in the URDF: remove it here or make it revolute there", field,
+            name));
+      }
+      size_t j = 0;
+      while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
+      if (j == tree.joints.size()) {
+        throw RobotError(
+            fmt::format("{}: the URDF has no joint '{}': correct the name", field, name));
+      }
+      if (motor_of[j] >= 0) {
+        throw RobotError(fmt::format("{}: joint '{}' already has motor[{}]: remove one", field,
+                                     name, motor_of[j]));
+      }
+      motor_of[j] = m;
+      motors[j] = loaded;
+    }
+  }
+  for (size_t j = 0; j < tree.joints.size(); ++j) {
+    if (motor_of[j] < 0) {
+      throw RobotError(fmt::format(
+          "joint '{}' of the URDF has no motor: add it to a motor or make it fixed in the URDF",
+          tree.joints[j].name));
+    }
+  }
+  return motors;
+}
+
+FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& field) {
+  FootModel result;
+  result.name = foot.name();
+  if (result.name.empty()) throw RobotError(field + ".name is missing: e.g. \"right\"");
+  const UrdfTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
+  result.body = place.body;
+  result.sole = place.pose * ToEigen(foot.sole(), field + ".sole");
+  result.length = Positive(foot.length(), field + ".length");
+  result.width = Positive(foot.width(), field + ".width");
+  int joints = 0;
+  for (int b = place.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++joints;
+  if (joints < kContactDimension) {
+    throw RobotError(
+        fmt::format("{} '{}': only {} joints lie between the base and link '{}': its foot cannot "
+                    "make a six-dimensional contact, a leg needs six joints",
+                    field, result.name, joints, foot.link()));
+  }
+  return result;
+}
+
+// Of the sole, in the base frame, all joints at zero.
+double LateralPlace(const FootModel& foot, const UrdfTree& tree) {
+  Eigen::Vector3d point = foot.sole.translation();
+  for (int b = foot.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) {
+    point = tree.joints[static_cast<size_t>(b) - 1].origin * point;
+  }
+  return point.y();
+}
+
+std::vector<FootModel> LoadFeet(const Robot& description, const UrdfTree& tree) {
+  if (description.foot_size() != 2) {
+    throw RobotError(fmt::format("foot: {} given, exactly two are needed, the right one first",
+                                 description.foot_size()));
+  }
+  std::vector<FootModel> feet;
+  for (int f = 0; f < 2; ++f) {
+    feet.push_back(LoadFoot(description.foot(f), tree, fmt::format("foot[{}]", f)));
+  }
+  if (feet[0].name == feet[1].name) {
+    throw RobotError(
+        fmt::format("foot: both are named '{}': name them apart, right first", feet[0].name));
+  }
+  if (feet[0].body == feet[1].body) {
+    throw RobotError(
+        fmt::format("foot: '{}' and '{}' are parts of one rigid body: name links of two legs",
+                    feet[0].name, feet[1].name));
+  }
+  const double right = LateralPlace(feet[kRightFoot], tree);
+  const double left = LateralPlace(feet[kLeftFoot], tree);
+  if (!(right < left)) {
+    throw RobotError(fmt::format(
+        "foot: with all joints at zero, foot[0] '{}' lies at y = {:.3g} m and foot[1] '{}' at y = "
+        "{:.3g} m: list the right foot (smaller y) first",
+        feet[0].name, right, feet[1].name, left));
+  }
+  return feet;
+}
+
+}  // namespace
+
+RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
+                            std::vector<std::string>* warnings) {
+  UrdfTree tree = LoadUrdfTree(urdf_xml, warnings);
+  RobotModel model;
+  model.name_ = description.name().empty() ? tree.name : description.name();
+  model.motors_ = LoadMotors(description, tree);
+  model.feet_ = LoadFeet(description, tree);
+
+  const Imu& imu = description.imu();
+  const UrdfTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
+  model.imu_.body = imu_place.body;
+  model.imu_.pose = imu_place.pose * ToEigen(imu.pose(), "imu.pose");
+  model.imu_.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");
+  model.imu_.gyro_bias = NotNegative(imu.gyro_bias(), "imu.gyro_bias");
+  model.imu_.accelerometer_noise =
+      NotNegative(imu.accelerometer_noise(), "imu.accelerometer_noise");
+  model.imu_.accelerometer_bias = NotNegative(imu.accelerometer_bias(), "imu.accelerometer_bias");
+  model.force_noise_ = NotNegative(description.force_noise(), "force_noise");
+  model.moment_noise_ = NotNegative(description.moment_noise(), "moment_noise");
+  model.body_task_body_ =
+      FindLink(tree, description.has_body_link() ? description.body_link() : tree.root_link,
+               "body_link")
+          .body;
+
+  model.bodies_ = std::move(tree.bodies);
+  model.joints_ = std::move(tree.joints);
+  model.BuildTree();
+  if (!std::isfinite(model.total_mass_)) {
+    throw RobotError("URDF: the masses add up to more than can be computed with: correct them");
+  }
+  return model;
+}
+
+}  // namespace poise::robot

@@ -1,0 +1,70 @@
+#include "components/robot/robot_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace poise::robot {
+
+void RobotModel::BuildTree() {
+  tree_ = KinematicTree();
+  for (const Body& body : bodies_) {
+    tree_.bodies.push_back({body.parent, body.mass, body.mass, body.com, body.inertia});
+    std::vector<int> support;
+    for (int b = static_cast<int>(tree_.bodies.size()) - 1; b > 0;
+         b = bodies_[static_cast<size_t>(b)].parent) {
+      support.push_back(bodies_[static_cast<size_t>(b)].joint);
+    }
+    tree_.supporting_joints.push_back(std::move(support));
+  }
+  for (size_t b = bodies_.size() - 1; b > 0; --b) {
+    tree_.bodies[static_cast<size_t>(bodies_[b].parent)].subtree_mass +=
+        tree_.bodies[b].subtree_mass;
+  }
+  total_mass_ = tree_.bodies[0].subtree_mass;
+  for (size_t j = 0; j < joints_.size(); ++j) {
+    const Joint& joint = joints_[j];
+    const Eigen::Matrix3d origin = joint.origin.linear();
+    const Eigen::Vector3d& a = joint.axis;
+    Eigen::Matrix3d cross;
+    cross << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+    const Eigen::Matrix3d projection = a * a.transpose();
+    // Rodrigues: R = a aᵀ + (1 - a aᵀ) cos q + [a]ₓ sin q.
+    tree_.joints.push_back({origin * projection,
+                            origin * (Eigen::Matrix3d::Identity() - projection), origin * cross,
+                            joint.origin.translation(), origin * a, motors_[j].reflected_inertia});
+  }
+}
+
+int RobotModel::FindJoint(std::string_view name) const {
+  const auto joint = std::find_if(joints_.begin(), joints_.end(),
+                                  [&](const Joint& other) { return other.name == name; });
+  return joint == joints_.end() ? -1 : static_cast<int>(joint - joints_.begin());
+}
+
+RobotModel RobotModel::WithModelError(std::string_view body, double mass_scale,
+                                      const Eigen::Vector3d& com_shift) const {
+  if (!(mass_scale > 0) || !std::isfinite(mass_scale)) {
+    throw RobotError(
+        fmt::format("model error of '{}': mass scale {} must be above 0", body, mass_scale));
+  }
+  if (!com_shift.allFinite()) {
+    throw RobotError(fmt::format("model error of '{}': COM shift must be finite", body));
+  }
+  RobotModel copy = *this;
+  const auto changed = std::find_if(copy.bodies_.begin(), copy.bodies_.end(),
+                                    [&](const Body& other) { return other.name == body; });
+  if (changed == copy.bodies_.end()) {
+    std::string names;
+    for (const Body& other : bodies_) names += (names.empty() ? "" : ", ") + other.name;
+    throw RobotError(fmt::format("model error: no moving body '{}': use one of {}", body, names));
+  }
+  changed->mass *= mass_scale;
+  changed->inertia *= mass_scale;
+  changed->com += com_shift;
+  copy.BuildTree();
+  return copy;
+}
+
+}  // namespace poise::robot

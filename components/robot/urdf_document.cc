@@ -1,0 +1,260 @@
+#include "components/robot/urdf_document.h"
+
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+#include <tinyxml.h>
+#include <urdf_model/model.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <mutex>
+
+#include "components/robot/robot_model.h"
+
+namespace poise::robot {
+namespace {
+
+// Both parsers recurse over nested elements and chains of links.
+constexpr int kMaxNesting = 64;
+constexpr int kMaxLinks = 1000;
+constexpr size_t kMaxBytes = 16u << 20;
+
+// One line, whatever the file put into a name or a library into a message.
+std::string OneLine(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  }
+  if (text.size() > 300) text = text.substr(0, 300) + "...";
+  return text;
+}
+
+// Depth of open elements, before any parser sees the text.
+int Nesting(std::string_view xml) {
+  int depth = 0, deepest = 0;
+  for (size_t i = xml.find('<'); i != std::string_view::npos; i = xml.find('<', i + 1)) {
+    const std::string_view rest = xml.substr(i + 1);
+    if (rest.starts_with("!--")) {
+      i = xml.find("-->", i);
+      if (i == std::string_view::npos) break;
+    } else if (rest.starts_with("/")) {
+      depth = std::max(0, depth - 1);
+    } else if (!rest.empty() && (std::isalpha(static_cast<unsigned char>(rest[0])) ||
+                                 rest[0] == '_' || static_cast<unsigned char>(rest[0]) >= 0x80)) {
+      const size_t end = xml.find('>', i);
+      if (end == std::string_view::npos || xml[end - 1] != '/') {
+        deepest = std::max(deepest, ++depth);
+      }
+    }
+  }
+  return deepest;
+}
+
+std::string Attribute(const TiXmlElement& element, const char* name) {
+  const char* value = element.Attribute(name);
+  return value ? OneLine(value) : std::string();
+}
+
+std::string RequiredAttribute(const TiXmlElement& element, const char* name,
+                              const std::string& what) {
+  const std::string value = Attribute(element, name);
+  if (value.empty()) {
+    throw RobotError(
+        fmt::format("URDF line {}: {} has no {}: add {}=\"...\"", element.Row(), what, name, name));
+  }
+  if (value != element.Attribute(name)) {
+    throw RobotError(
+        fmt::format("URDF line {}: {} '{}' of {} is too long or has control characters: rename it",
+                    element.Row(), name, value, what));
+  }
+  return value;
+}
+
+void RemoveChildren(TiXmlElement* element, const char* name) {
+  while (TiXmlElement* child = element->FirstChildElement(name)) element->RemoveChild(child);
+}
+
+void CheckLinks(TiXmlElement* robot, std::map<std::string, int>* link_line) {
+  for (TiXmlElement* link = robot->FirstChildElement("link"); link;
+       link = link->NextSiblingElement("link")) {
+    const std::string name = RequiredAttribute(*link, "name", "a link");
+    if (!link_line->emplace(name, link->Row()).second) {
+      throw RobotError(
+          fmt::format("URDF line {}: link '{}' stands already at line {}: rename or remove one",
+                      link->Row(), name, link_line->at(name)));
+    }
+    RemoveChildren(link, "visual");
+    RemoveChildren(link, "collision");
+  }
+  if (link_line->empty()) throw RobotError("URDF has no <link>: a robot needs at least its base");
+  if (link_line->size() > kMaxLinks) {
+    throw RobotError(
+        fmt::format("URDF has {} links, more than {}: simplify it", link_line->size(), kMaxLinks));
+  }
+}
+
+std::vector<std::string> CheckJoints(TiXmlElement* robot,
+                                     const std::map<std::string, int>& link_line) {
+  std::vector<std::string> order;
+  std::map<std::string, int> joint_line;
+  std::map<std::string, std::string> parent_joint;
+  for (TiXmlElement* joint = robot->FirstChildElement("joint"); joint;
+       joint = joint->NextSiblingElement("joint")) {
+    const std::string name = RequiredAttribute(*joint, "name", "a joint");
+    if (!joint_line.emplace(name, joint->Row()).second) {
+      throw RobotError(
+          fmt::format("URDF line {}: joint '{}' stands already at line {}: rename or remove one",
+                      joint->Row(), name, joint_line.at(name)));
+    }
+    for (const char* end : {"parent", "child"}) {
+      const TiXmlElement* element = joint->FirstChildElement(end);
+      if (!element) {
+        throw RobotError(fmt::format("URDF line {}: joint '{}' has no {}: add <{} link=\"...\"/>",
+                                     joint->Row(), name, end, end));
+      }
+      const std::string link =
+          RequiredAttribute(*element, "link", fmt::format("{} of joint '{}'", end, name));
+      if (!link_line.contains(link)) {
+        throw RobotError(
+            fmt::format("URDF line {}: joint '{}' names {} link '{}', which does not exist: "
+                        "correct the name or add the link",
+                        element->Row(), name, end, link));
+      }
+      if (std::string_view(end) == "child" && !parent_joint.emplace(link, name).second) {
+        throw RobotError(fmt::format(
+            "URDF line {}: link '{}' has two parents, through joints '{}' and '{}': closed loops "
+            "are not supported, remove one joint",
+            joint->Row(), link, parent_joint.at(link), name));
+      }
+    }
+    if (const TiXmlElement* mimic = joint->FirstChildElement("mimic")) {
+      throw RobotError(
+          fmt::format("URDF line {}: joint '{}' mimics joint '{}': coupled joints are not "
+                      "supported, make it fixed or remove <mimic>",
+                      mimic->Row(), name, Attribute(*mimic, "joint")));
+    }
+    order.push_back(name);
+  }
+  return order;
+}
+
+void CheckConnected(const std::map<std::string, int>& link_line, TiXmlElement* robot) {
+  std::map<std::string, std::string> parent;
+  for (TiXmlElement* joint = robot->FirstChildElement("joint"); joint;
+       joint = joint->NextSiblingElement("joint")) {
+    parent[Attribute(*joint->FirstChildElement("child"), "link")] =
+        Attribute(*joint->FirstChildElement("parent"), "link");
+  }
+  std::string root;
+  for (const auto& [link, line] : link_line) {
+    std::string top = link;
+    for (size_t steps = 0; parent.contains(top); ++steps) {
+      top = parent.at(top);
+      if (steps > link_line.size()) {
+        throw RobotError(fmt::format(
+            "URDF line {}: link '{}' hangs on a closed loop of joints: closed loops are not "
+            "supported, remove one joint of the loop",
+            line, link));
+      }
+    }
+    if (root.empty()) root = top;
+    if (top != root) {
+      throw RobotError(fmt::format(
+          "URDF: links '{}' and '{}' have no parent and are not connected: join them with a "
+          "joint, fixed if need be",
+          root, top));
+    }
+  }
+}
+
+// urdfdom reports through a global handler: taken over while it runs, one parse at a time.
+class CapturedConsole : public console_bridge::OutputHandler {
+ public:
+  CapturedConsole() : level_(console_bridge::getLogLevel()) {
+    console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_WARN);
+    console_bridge::useOutputHandler(this);
+  }
+  ~CapturedConsole() override {
+    console_bridge::restorePreviousOutputHandler();
+    console_bridge::setLogLevel(level_);
+  }
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR) {
+      errors.push_back(OneLine(text));
+    } else {
+      warnings.push_back(OneLine(text));
+    }
+  }
+  std::vector<std::string> errors, warnings;
+
+ private:
+  console_bridge::LogLevel level_;
+};
+
+urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& xml,
+                                               std::vector<std::string>* warnings) {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  CapturedConsole console;
+  urdf::ModelInterfaceSharedPtr model;
+  std::string thrown;
+  try {
+    model = urdf::parseURDF(xml);
+  } catch (const std::exception& error) {
+    thrown = OneLine(error.what());
+  }
+  // urdfdom goes on with defaults after some errors: an error is a refusal here.
+  if (!console.errors.empty() || !thrown.empty() || !model) {
+    std::string text = thrown;
+    for (const std::string& error : console.errors) {
+      if (text.size() < 300) text += (text.empty() ? "" : "; ") + error;
+    }
+    throw RobotError(fmt::format("URDF: {}: correct that element",
+                                 text.empty() ? "refused by urdfdom" : OneLine(text)));
+  }
+  if (warnings) {
+    for (const std::string& warning : console.warnings) warnings->push_back("URDF: " + warning);
+  }
+  return model;
+}
+
+}  // namespace
+
+UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings) {
+  if (xml.size() > kMaxBytes) {
+    throw RobotError(
+        fmt::format("URDF has {} bytes, more than {}: is it a URDF?", xml.size(), kMaxBytes));
+  }
+  if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
+    throw RobotError(fmt::format("URDF has a NUL byte at offset {}: is it a text file?", nul));
+  }
+  if (Nesting(xml) > kMaxNesting) {
+    throw RobotError(fmt::format("URDF nests elements more than {} deep: is an element not closed?",
+                                 kMaxNesting));
+  }
+  TiXmlDocument document;
+  document.Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
+  if (document.Error()) {
+    throw RobotError(fmt::format("URDF line {}: not XML ({}): correct the text there",
+                                 document.ErrorRow(), OneLine(document.ErrorDesc())));
+  }
+  TiXmlElement* robot = document.FirstChildElement("robot");
+  if (!robot) throw RobotError("URDF has no <robot> element: is it a URDF (xacro expanded)?");
+
+  UrdfDocument result;
+  std::map<std::string, int> link_line;
+  CheckLinks(robot, &link_line);
+  result.joint_order = CheckJoints(robot, link_line);
+  CheckConnected(link_line, robot);
+  RemoveChildren(robot, "material");
+  RemoveChildren(robot, "gazebo");
+  RemoveChildren(robot, "transmission");
+
+  TiXmlPrinter printer;
+  document.Accept(&printer);
+  result.model = ParseWithUrdfdom(printer.CStr(), warnings);
+  return result;
+}
+
+}  // namespace poise::robot
