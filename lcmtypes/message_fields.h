@@ -37,6 +37,8 @@ struct MessageType {
   bool has_header;    ///< has run_id, tick, utime right after the counts
   bool has_strings;   ///< encoded size depends on more than the counts
   int run_id_offset;  ///< bytes from the start of the encoded message; tick at +8, utime at +16
+  /// Size of every message with these counts; -1 when has_strings.
+  int64_t (*encoded_size)(std::span<const int32_t> counts);
   /// Size of the message that `data` starts with, from its counts and string lengths; -1 when it
   /// does not fit in `size` bytes or is malformed. Bounds-checked, allocates nothing, does not look
   /// at the fingerprint.

@@ -94,6 +94,29 @@ int64_t ElementSize(const std::string& type, const std::map<std::string, LcmStru
   return size;
 }
 
+/// Encoded size as an expression of counts[i].
+std::string EncodedSizeFormula(const Message& message,
+                               const std::map<std::string, LcmStruct>& all) {
+  if (message.has_strings) return "-1";
+  int64_t fixed = 8;
+  std::vector<int64_t> per_count(message.counts.size(), 0);
+  for (const LcmField& f : message.lcm.fields) {
+    const int64_t size = ElementSize(f.type, all);
+    if (f.dimension.empty() || f.literal_dimension()) {
+      fixed += size * (f.dimension.empty() ? 1 : std::stoll(f.dimension));
+    } else {
+      const auto at = std::find(message.counts.begin(), message.counts.end(), f.dimension);
+      per_count[static_cast<size_t>(at - message.counts.begin())] += size;
+    }
+  }
+  std::string formula = std::to_string(fixed);
+  for (size_t i = 0; i < per_count.size(); ++i) {
+    formula +=
+        " + " + std::to_string(per_count[i]) + " * int64_t{counts[" + std::to_string(i) + "]}";
+  }
+  return formula;
+}
+
 void WriteTraits(const Message& message, const std::map<std::string, LcmStruct>& all,
                  std::ostream& out) {
   const std::string& name = message.lcm.name;
@@ -138,6 +161,9 @@ void WriteTraits(const Message& message, const std::map<std::string, LcmStruct>&
     }
   }
   out << ";\n  }\n\n"
+      << "  // See MessageType::encoded_size.\n"
+      << "  static int64_t EncodedSize([[maybe_unused]] std::span<const int32_t> counts) {\n"
+      << "    return " << EncodedSizeFormula(message, all) << ";\n  }\n\n"
       << "  // See MessageType::well_formed_size.\n"
       << "  static int64_t WellFormedSize(const uint8_t* data, int64_t size) {\n"
       << "    message_internal::SizeWalker walk(data, size);\n    walk.Skip(8);\n";
@@ -205,7 +231,7 @@ int Generate(const std::string& output_dir, const std::vector<std::string>& file
         << "  using Traits = MessageTraits<T>;\n"
         << "  return {Traits::kName, T::getHash(), Traits::kCountNames, Traits::kHasHeader, "
            "Traits::kHasStrings,\n"
-        << "          Traits::kRunIdOffset, &Traits::WellFormedSize, "
+        << "          Traits::kRunIdOffset, &Traits::EncodedSize, &Traits::WellFormedSize, "
            "&message_internal::DecodeAndVisit<T>};\n}\n\n"
         << "}  // namespace\n\nstd::span<const MessageType> MessageTypes() {\n"
         << "  static const MessageType types[] = {\n";

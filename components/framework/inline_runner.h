@@ -57,7 +57,8 @@ class InlineRunner {
   struct Delayed;
   struct External;
 
-  void RunStage(BoundStage& stage, const Tick& tick);
+  /// False when an output is not finite: the tick ends there.
+  bool RunStage(BoundStage& stage, const Tick& tick);
 
   int64_t run_id_ = 0;
   double period_ = 0;

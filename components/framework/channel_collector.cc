@@ -1,0 +1,287 @@
+#include "components/framework/channel_collector.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+
+#include "components/framework/clock.h"
+#include "components/framework/run.h"
+#include "components/framework/service_link.h"
+#include "fmt/format.h"
+#include "poise/message_traits.hpp"
+
+namespace poise {
+namespace {
+
+constexpr int64_t kMillisecond = 1'000'000;
+constexpr int64_t kHealthInterval = 50 * kMillisecond;
+constexpr int64_t kFirstRequest = 2 * kMillisecond;
+constexpr int64_t kLastRequest = 50 * kMillisecond;
+constexpr int kBatch = 64;  // packets of a channel handled before the next channel's turn
+
+/// One channel: packets by tick until their turn comes.
+struct Lane {
+  Lane(const RunSpec& spec, int index, const MessageType& type, const std::vector<int32_t>& counts)
+      : channel(index),
+        name(spec.graph().channel(index).name()),
+        external(spec.graph().channel(index).external()),
+        size(static_cast<size_t>(type.encoded_size(counts))),
+        filter(type.fingerprint, static_cast<int>(size), counts, spec.run_id()),
+        receiver(ChannelUrl(spec, index)),
+        bytes(external ? 0 : size * kSentHistory),
+        ticks(external ? 0 : kSentHistory, -1) {}
+
+  int channel;
+  std::string name;
+  bool external;
+  size_t size;
+  PacketFilter filter;
+  BusReceiver receiver;
+  std::vector<uint8_t> bytes;
+  std::vector<int64_t> ticks;
+  PacketCounters counters;
+  int64_t foreign = 0;
+  ChannelCollector::ChannelStatistics statistics;
+  int64_t waiting_since = 0;  // ns; of next_tick
+  int64_t wait = kFirstRequest;
+  bool asked = false;  // for next_tick
+};
+
+}  // namespace
+
+class ChannelCollector::Impl {
+ public:
+  Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks);
+  void Spin(int timeout_ms);
+
+  int64_t recorded_tick() const;
+  int64_t final_tick() const { return final_tick_; }
+  bool complete() const { return final_tick_ >= 0 && recorded_tick() >= final_tick_; }
+  bool stopped() const { return stopped_; }
+  const std::vector<std::unique_ptr<Lane>>& lanes() const { return lanes_; }
+
+ private:
+  void Receive(Lane& lane, int64_t now);
+  void Keep(Lane& lane, const BusReceiver::Packet& packet);
+  void Deliver(Lane& lane, int64_t now);
+  void ReceiveService();
+  void Request(int64_t now);
+  void PublishHealth(int64_t now);
+
+  int64_t run_id_;
+  Callbacks callbacks_;
+  ServiceLink service_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+  std::vector<pollfd> poll_fds_;
+  std::map<std::string, std::string, std::less<>> component_of_channel_;
+  int64_t newest_tick_ = -1;  // seen on any channel
+  int64_t final_tick_ = -1;
+  int64_t reported_ = -1;
+  int64_t next_health_ = 0;
+  bool started_ = false;
+  bool stopped_ = false;
+};
+
+ChannelCollector::Impl::Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks)
+    : run_id_(spec.run_id()), callbacks_(std::move(callbacks)), service_(spec, name) {
+  poll_fds_.push_back({service_.fd(), POLLIN, 0});
+  for (int i = 0; i < spec.graph().channel_size(); ++i) {
+    const Channel& channel = spec.graph().channel(i);
+    const MessageType* type = FindMessageType(channel.type());
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    if (type == nullptr || type->has_strings) {
+      throw ConfigError(fmt::format("channel {}: '{}' is no message type of a channel",
+                                    channel.name(), channel.type()));
+    }
+    if (counts.size() != type->count_names.size()) {
+      throw ConfigError(fmt::format(
+          "channel {}: the run gives {} counts, {} has {}; fill them in from the checked graph",
+          channel.name(), counts.size(), channel.type(), type->count_names.size()));
+    }
+    lanes_.push_back(std::make_unique<Lane>(spec, i, *type, counts));
+    poll_fds_.push_back({lanes_.back()->receiver.fd(), POLLIN, 0});
+  }
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    component_of_channel_[HealthChannel(instance.name())] = instance.name();
+  }
+  service_.health().state = health_t::STATE_READY;
+}
+
+int64_t ChannelCollector::Impl::recorded_tick() const {
+  int64_t recorded = INT64_MAX;
+  for (const auto& lane : lanes_) {
+    if (!lane->external) recorded = std::min(recorded, lane->statistics.next_tick - 1);
+  }
+  return recorded == INT64_MAX ? -1 : recorded;
+}
+
+void ChannelCollector::Impl::Spin(int timeout_ms) {
+  const int64_t now = NowNanoseconds();
+  // Wakes in time to ask, to report and to answer.
+  const int64_t due = std::max<int64_t>(0, next_health_ - now) / kMillisecond;
+  const int64_t patience =
+      newest_tick_ > recorded_tick() || final_tick_ > recorded_tick() ? 2 : due;
+  poll(poll_fds_.data(), poll_fds_.size(),
+       static_cast<int>(std::min<int64_t>({timeout_ms, due, patience})));
+  const int64_t arrival = NowNanoseconds();
+  for (size_t i = 0; i < lanes_.size(); ++i) {
+    if (poll_fds_[i + 1].revents != 0) Receive(*lanes_[i], arrival);
+  }
+  if (poll_fds_[0].revents != 0) ReceiveService();
+  Request(arrival);
+  const int64_t recorded = recorded_tick();
+  if (recorded >= reported_ + kProgressInterval) {
+    reported_ = recorded;
+    service_.SendControl(run_control_t::COMMAND_RECORDED, recorded, -1);
+  }
+  if (arrival >= next_health_) PublishHealth(arrival);
+}
+
+void ChannelCollector::Impl::Receive(Lane& lane, int64_t now) {
+  BusReceiver::Packet packet;
+  for (int i = 0; i < kBatch && lane.receiver.Receive(&packet); ++i) {
+    if (packet.channel == lane.name) {
+      Keep(lane, packet);
+    } else if (packet.channel != "LCM_SELF_TEST") {
+      ++lane.foreign;
+    }
+    if (!lane.external) Deliver(lane, now);
+  }
+  lane.statistics.refused = lane.counters.refused() + lane.foreign + lane.receiver.malformed();
+}
+
+void ChannelCollector::Impl::Keep(Lane& lane, const BusReceiver::Packet& packet) {
+  if (lane.external) {
+    const PacketVerdict verdict = lane.filter.Check(packet.data, packet.size, INT64_MIN, INT64_MAX);
+    lane.counters.Count(verdict);
+    if (verdict != PacketVerdict::kAccepted) return;
+    ++lane.statistics.delivered;
+    callbacks_.message(lane.channel, lane.filter.tick(packet.data), {packet.data, packet.size});
+    return;
+  }
+  const int64_t next = lane.statistics.next_tick;
+  PacketVerdict verdict =
+      lane.filter.Check(packet.data, packet.size, std::max<int64_t>(0, next - kReceiveWindow),
+                        next + kReceiveWindow - 1);
+  if (verdict == PacketVerdict::kAccepted) {
+    const int64_t tick = lane.filter.tick(packet.data);
+    const auto slot = static_cast<size_t>(tick % kSentHistory);
+    uint8_t* const kept = lane.bytes.data() + slot * lane.size;
+    if (lane.ticks[slot] == tick) {
+      if (std::memcmp(kept, packet.data, lane.size) == 0) {
+        ++lane.statistics.duplicates;
+      } else {
+        verdict = PacketVerdict::kConflicting;
+      }
+    } else if (tick < next) {
+      verdict = PacketVerdict::kStaleTick;
+    } else {
+      std::memcpy(kept, packet.data, lane.size);
+      lane.ticks[slot] = tick;
+      newest_tick_ = std::max(newest_tick_, tick);
+    }
+  }
+  lane.counters.Count(verdict);
+}
+
+void ChannelCollector::Impl::Deliver(Lane& lane, int64_t now) {
+  while (true) {
+    const int64_t next = lane.statistics.next_tick;
+    const auto slot = static_cast<size_t>(next % kSentHistory);
+    if (lane.ticks[slot] != next) return;
+    callbacks_.message(lane.channel, next, {lane.bytes.data() + slot * lane.size, lane.size});
+    ++lane.statistics.delivered;
+    ++lane.statistics.next_tick;
+    lane.waiting_since = now;
+    lane.wait = kFirstRequest;
+    lane.asked = false;
+  }
+}
+
+void ChannelCollector::Impl::Request(int64_t now) {
+  const int64_t expected = std::max(newest_tick_, final_tick_);
+  for (const auto& lane : lanes_) {
+    if (lane->external || lane->statistics.next_tick > expected) {
+      lane->waiting_since = now;
+      continue;
+    }
+    if (now - lane->waiting_since < lane->wait) continue;
+    service_.SendControl(run_control_t::COMMAND_RESEND, lane->statistics.next_tick, lane->channel);
+    if (!lane->asked) ++lane->statistics.requested;
+    lane->asked = true;
+    lane->waiting_since = now;
+    lane->wait = std::min(2 * lane->wait, kLastRequest);
+  }
+}
+
+void ChannelCollector::Impl::ReceiveService() {
+  BusReceiver::Packet packet;
+  for (int i = 0; i < kBatch && service_.receiver().Receive(&packet); ++i) {
+    bool good = false;
+    if (packet.channel == kControlChannel) {
+      run_control_t control;
+      good = service_.DecodeControl(packet, &control);
+      if (good && control.command == run_control_t::COMMAND_START) started_ = true;
+      if (good && control.command == run_control_t::COMMAND_STOP) stopped_ = true;
+    } else if (packet.channel.starts_with("HEALTH_")) {
+      health_t health;
+      good = DecodeChecked(packet.data, static_cast<int64_t>(packet.size), &health) &&
+             health.run_id == run_id_;
+      const auto component = component_of_channel_.find(packet.channel);
+      if (good && component != component_of_channel_.end() &&
+          component->second == health.component && health.state >= health_t::STATE_FINISHED &&
+          health.tick >= 0) {
+        final_tick_ = final_tick_ < 0 ? health.tick : std::min(final_tick_, health.tick);
+      }
+    }
+    if (good && callbacks_.service) callbacks_.service(packet.channel, {packet.data, packet.size});
+  }
+}
+
+void ChannelCollector::Impl::PublishHealth(int64_t now) {
+  next_health_ = now + kHealthInterval;
+  health_t& health = service_.health();
+  health.state = complete() ? health_t::STATE_FINISHED
+                 : started_ ? health_t::STATE_RUNNING
+                            : health_t::STATE_READY;
+  health.tick = recorded_tick();
+  health.ticks_completed = recorded_tick() + 1;
+  health.messages_received = health.messages_duplicate = health.gaps = 0;
+  health.messages_refused = service_.refused();
+  for (const auto& lane : lanes_) {
+    health.messages_received += lane->statistics.delivered;
+    health.messages_duplicate += lane->statistics.duplicates;
+    health.messages_refused += lane->statistics.refused;
+    health.gaps += lane->statistics.requested;
+  }
+  service_.SendHealth();
+  // Also covers a report that was lost.
+  service_.SendControl(run_control_t::COMMAND_RECORDED, recorded_tick(), -1);
+}
+
+ChannelCollector::ChannelCollector(const RunSpec& spec, const std::string& name,
+                                   Callbacks callbacks)
+    : impl_(std::make_unique<Impl>(spec, name, std::move(callbacks))) {}
+ChannelCollector::~ChannelCollector() = default;
+void ChannelCollector::Spin(int timeout_ms) { impl_->Spin(timeout_ms); }
+int64_t ChannelCollector::recorded_tick() const { return impl_->recorded_tick(); }
+int64_t ChannelCollector::final_tick() const { return impl_->final_tick(); }
+bool ChannelCollector::complete() const { return impl_->complete(); }
+bool ChannelCollector::stopped() const { return impl_->stopped(); }
+
+const ChannelCollector::ChannelStatistics& ChannelCollector::statistics(int channel) const {
+  return impl_->lanes()[static_cast<size_t>(channel)]->statistics;
+}
+
+int64_t ChannelCollector::missing(int64_t last_tick) const {
+  int64_t missing = 0;
+  for (const auto& lane : impl_->lanes()) {
+    if (!lane->external)
+      missing += std::max<int64_t>(0, last_tick + 1 - lane->statistics.next_tick);
+  }
+  return missing;
+}
+
+}  // namespace poise

@@ -1,0 +1,70 @@
+#include "components/framework/component_main.h"
+
+#include <sys/prctl.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+
+#include "components/framework/process_runner.h"
+#include "components/framework/run.h"
+#include "components/framework/udp_bus.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+volatile std::sig_atomic_t stop_asked = 0;
+
+void OnSignal(int) { stop_asked = 1; }
+
+void CatchSignals() {
+  struct sigaction action {};
+  action.sa_handler = OnSignal;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  prctl(PR_SET_TIMERSLACK, 1000);  // ns: deadlines of a tick are not to be rounded to 50 us
+}
+
+}  // namespace
+
+int ComponentMain(int argc, char** argv, const std::string& type, const ComponentFactory& factory) {
+  CatchSignals();
+  std::string run_file;
+  std::string name = type;
+  CLI::App app{
+      fmt::format("One process of a Poise run: component {}. Usually started by `poise run`.",
+                  type),
+      type};
+  app.set_version_flag("--version", fmt::format("{} {}", type, PoiseVersion()));
+  app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
+  app.add_option("--component", name, "name of this component in the run's graph")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr, "{}: {}; see {} --help\n", type, error.what(), type);
+    return 2;
+  }
+  try {
+    RunSpec spec;
+    ReadTextProto(run_file, &spec);
+    ProcessRunnerOptions options;
+    options.stop = &stop_asked;
+    ProcessRunner runner(spec, name, factory, options);
+    if (runner.Run()) return 0;
+    fmt::print(stderr, "{}: {}\n", name, runner.error());
+    return 1;
+  } catch (const ConfigError& error) {
+    fmt::print(stderr, "{}: {}\n", name, error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}: {}\n", name, error.what());
+    return 1;
+  }
+}
+
+}  // namespace poise

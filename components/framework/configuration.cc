@@ -1,0 +1,76 @@
+#include "components/framework/configuration.h"
+
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+/// Keeps the first error: later ones are mostly its consequences.
+class FirstError final : public google::protobuf::io::ErrorCollector {
+ public:
+  void AddError(int line, google::protobuf::io::ColumnNumber column,
+                const std::string& message) override {
+    if (any_) return;
+    any_ = true;
+    line_ = line;
+    column_ = column;
+    message_ = message;
+  }
+  bool any() const { return any_; }
+  std::string Describe(std::string_view source) const {
+    std::string text = message_;
+    for (char& c : text) {
+      if (c == '\n') c = ' ';
+    }
+    if (line_ < 0) return fmt::format("{}: {}", source, text);
+    return fmt::format("{}:{}:{}: {}", source, line_ + 1, column_ + 1, text);
+  }
+
+ private:
+  bool any_ = false;
+  int line_ = -1;
+  int column_ = 0;
+  std::string message_;
+};
+
+}  // namespace
+
+ConfigError::ConfigError(std::string_view field, std::string_view problem)
+    : std::runtime_error(fmt::format("{}: {}", field, problem)), field_(field), problem_(problem) {}
+
+void ParseTextProto(std::string_view text, std::string_view source,
+                    google::protobuf::Message* message) {
+  FirstError errors;
+  google::protobuf::TextFormat::Parser parser;
+  parser.RecordErrorsTo(&errors);
+  google::protobuf::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
+  if (!parser.Parse(&stream, message) || errors.any()) throw ConfigError(errors.Describe(source));
+}
+
+void ReadTextProto(const std::string& path, google::protobuf::Message* message) {
+  ParseTextProto(ReadFile(path), path, message);
+}
+
+std::string ReadFile(const std::string& path) {
+  if (std::filesystem::is_directory(path)) {
+    throw ConfigError(fmt::format("{}: is a folder, not a file", path));
+  }
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw ConfigError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (in.bad()) throw ConfigError(fmt::format("{}: cannot be read", path));
+  return text;
+}
+
+}  // namespace poise

@@ -1,0 +1,304 @@
+// Dotted paths into protobuf messages: LocateField and SetField.
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+struct Step {
+  std::string name;
+  int index = -1;  ///< -1: none given
+};
+
+/// nullopt when the path is not NAME or NAME[INDEX], joined by dots.
+std::optional<std::vector<Step>> SplitPath(std::string_view path) {
+  std::vector<Step> steps;
+  while (true) {
+    const size_t dot = path.find('.');
+    std::string_view part = path.substr(0, dot);
+    Step step;
+    const size_t bracket = part.find('[');
+    if (bracket != std::string_view::npos) {
+      const std::string_view index = part.substr(bracket + 1);
+      const auto [end, error] =
+          std::from_chars(index.data(), index.data() + index.size(), step.index);
+      if (error != std::errc() || step.index < 0 || end + 1 != index.data() + index.size() ||
+          *end != ']') {
+        return std::nullopt;
+      }
+      part = part.substr(0, bracket);
+    }
+    if (part.empty()) return std::nullopt;
+    step.name = part;
+    steps.push_back(step);
+    if (dot == std::string_view::npos) return steps;
+    path.remove_prefix(dot + 1);
+  }
+}
+
+size_t EditDistance(std::string_view a, std::string_view b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), size_t{0});
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t above = row[j + 1];
+      row[j + 1] = std::min({above + 1, row[j] + 1, diagonal + (a[i] == b[j] ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row.back();
+}
+
+/// "did you mean 'x' or 'y'?", or all names when none is near.
+std::string Suggest(std::string_view name, std::vector<std::string> names) {
+  std::sort(names.begin(), names.end());
+  std::vector<std::string> near;
+  for (const std::string& candidate : names) {
+    if (EditDistance(name, candidate) <= std::max<size_t>(2, name.size() / 3))
+      near.push_back(candidate);
+  }
+  std::stable_sort(near.begin(), near.end(), [&](const std::string& a, const std::string& b) {
+    return EditDistance(name, a) < EditDistance(name, b);
+  });
+  if (near.size() > 3) near.resize(3);
+  if (near.empty()) return fmt::format("it has {}", fmt::join(names, ", "));
+  return fmt::format("did you mean {}?", fmt::join(near, " or "));
+}
+
+std::vector<std::string> FieldNames(const Descriptor& type) {
+  std::vector<std::string> names;
+  for (int i = 0; i < type.field_count(); ++i) names.push_back(type.field(i)->name());
+  return names;
+}
+
+std::string TypeName(const FieldDescriptor& field) {
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_ENUM: {
+      std::vector<std::string> values;
+      for (int i = 0; i < field.enum_type()->value_count(); ++i) {
+        values.push_back(field.enum_type()->value(i)->name());
+      }
+      return fmt::format("one of {}", fmt::join(values, ", "));
+    }
+    case FieldDescriptor::CPPTYPE_BOOL:
+      return "true or false";
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+    case FieldDescriptor::CPPTYPE_FLOAT:
+      return "a number";
+    case FieldDescriptor::CPPTYPE_STRING:
+      return "text";
+    default:
+      return fmt::format("a whole number ({})", field.cpp_type_name());
+  }
+}
+
+template <class Number>
+std::optional<Number> ParseNumber(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+/// Appends an element to be overwritten, so that the rest of SetField sees one that exists.
+void AppendDefault(Message* message, const FieldDescriptor* field) {
+  const Reflection* r = message->GetReflection();
+  switch (field->cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      r->AddMessage(message, field);
+      break;
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      r->AddDouble(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_FLOAT:
+      r->AddFloat(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_INT32:
+      r->AddInt32(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_INT64:
+      r->AddInt64(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_UINT32:
+      r->AddUInt32(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_UINT64:
+      r->AddUInt64(message, field, 0);
+      break;
+    case FieldDescriptor::CPPTYPE_BOOL:
+      r->AddBool(message, field, false);
+      break;
+    case FieldDescriptor::CPPTYPE_STRING:
+      r->AddString(message, field, "");
+      break;
+    case FieldDescriptor::CPPTYPE_ENUM:
+      r->AddEnum(message, field, field->enum_type()->value(0));
+      break;
+  }
+}
+
+/// Sets a scalar; index -1 for a field that is not repeated. False when `text` is no value of its
+/// type.
+bool SetScalar(Message* message, const FieldDescriptor* field, int index, std::string_view text) {
+  const Reflection* r = message->GetReflection();
+  const auto set = [&](auto value, auto single, auto repeated) {
+    if (!value.has_value()) return false;
+    if (index < 0) {
+      (r->*single)(message, field, *value);
+    } else {
+      (r->*repeated)(message, field, index, *value);
+    }
+    return true;
+  };
+  switch (field->cpp_type()) {
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return set(ParseNumber<double>(text), &Reflection::SetDouble, &Reflection::SetRepeatedDouble);
+    case FieldDescriptor::CPPTYPE_FLOAT:
+      return set(ParseNumber<float>(text), &Reflection::SetFloat, &Reflection::SetRepeatedFloat);
+    case FieldDescriptor::CPPTYPE_INT32:
+      return set(ParseNumber<int32_t>(text), &Reflection::SetInt32, &Reflection::SetRepeatedInt32);
+    case FieldDescriptor::CPPTYPE_INT64:
+      return set(ParseNumber<int64_t>(text), &Reflection::SetInt64, &Reflection::SetRepeatedInt64);
+    case FieldDescriptor::CPPTYPE_UINT32:
+      return set(ParseNumber<uint32_t>(text), &Reflection::SetUInt32,
+                 &Reflection::SetRepeatedUInt32);
+    case FieldDescriptor::CPPTYPE_UINT64:
+      return set(ParseNumber<uint64_t>(text), &Reflection::SetUInt64,
+                 &Reflection::SetRepeatedUInt64);
+    case FieldDescriptor::CPPTYPE_BOOL: {
+      std::optional<bool> value;
+      if (text == "true" || text == "1") value = true;
+      if (text == "false" || text == "0") value = false;
+      return set(value, &Reflection::SetBool, &Reflection::SetRepeatedBool);
+    }
+    case FieldDescriptor::CPPTYPE_ENUM: {
+      const auto* value = field->enum_type()->FindValueByName(std::string(text));
+      return set(value != nullptr ? std::optional(value) : std::nullopt, &Reflection::SetEnum,
+                 &Reflection::SetRepeatedEnum);
+    }
+    case FieldDescriptor::CPPTYPE_STRING:
+      if (index < 0) {
+        r->SetString(message, field, std::string(text));
+      } else {
+        r->SetRepeatedString(message, field, index, std::string(text));
+      }
+      return true;
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      return false;
+  }
+  return false;
+}
+
+/// Text format's errors are of no interest where the text was parsed before.
+class IgnoreErrors final : public google::protobuf::io::ErrorCollector {
+ public:
+  void AddError(int, google::protobuf::io::ColumnNumber, const std::string&) override {}
+};
+
+}  // namespace
+
+int LocateField(std::string_view text, std::string_view field, const Message& prototype) {
+  const auto steps = SplitPath(field);
+  if (!steps.has_value()) return 0;
+  using google::protobuf::TextFormat;
+  TextFormat::ParseInfoTree tree;
+  TextFormat::Parser parser;
+  IgnoreErrors errors;
+  parser.RecordErrorsTo(&errors);
+  parser.WriteLocationsTo(&tree);
+  parser.AllowPartialMessage(true);
+  const std::unique_ptr<Message> message(prototype.New());
+  parser.ParseFromString(std::string(text), message.get());
+
+  const TextFormat::ParseInfoTree* level = &tree;
+  const Descriptor* type = prototype.GetDescriptor();
+  int line = 0;
+  for (const Step& step : *steps) {
+    const FieldDescriptor* descriptor = type->FindFieldByName(step.name);
+    if (descriptor == nullptr) break;
+    // Without an index a repeated field means its first element.
+    const int index = descriptor->is_repeated() ? std::max(step.index, 0) : -1;
+    const auto location = level->GetLocation(descriptor, index);
+    if (location.line < 0) break;
+    line = location.line + 1;
+    if (descriptor->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) break;
+    level = level->GetTreeForNested(descriptor, index);
+    if (level == nullptr) break;
+    type = descriptor->message_type();
+  }
+  return line;
+}
+
+void SetField(Message* message, std::string_view path, std::string_view value) {
+  const auto steps = SplitPath(path);
+  const auto fail = [&](const std::string& problem) { throw ConfigError(path, problem); };
+  if (!steps.has_value()) fail("not a path; write name.name[index].name=value");
+  std::string walked;
+  Message* level = message;
+  for (size_t i = 0; i < steps->size(); ++i) {
+    const Step& step = (*steps)[i];
+    const bool last = i + 1 == steps->size();
+    const Descriptor& type = *level->GetDescriptor();
+    const FieldDescriptor* field = type.FindFieldByName(step.name);
+    if (field == nullptr) {
+      fail(fmt::format("{} has no field '{}'; {}", walked.empty() ? type.name() : walked, step.name,
+                       Suggest(step.name, FieldNames(type))));
+    }
+    walked += (walked.empty() ? "" : ".") + step.name;
+    const Reflection* reflection = level->GetReflection();
+    int index = -1;
+    if (field->is_repeated()) {
+      const int size = reflection->FieldSize(*level, field);
+      if (step.index < 0) {
+        fail(fmt::format("{} is a list of {}; write {}[0] to {}[{}]", walked, size, walked, walked,
+                         size));
+      }
+      if (step.index > size) {
+        fail(fmt::format("{} has {} elements; the index may be 0 to {}", walked, size, size));
+      }
+      index = step.index;
+      walked.append("[").append(std::to_string(index)).append("]");
+    } else if (step.index >= 0) {
+      fail(fmt::format("{} is not a list; leave out the index", walked));
+    }
+    const bool is_message = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+    if (last == is_message) {
+      fail(last ? fmt::format("{} is a group of fields; name one of them: {}", walked,
+                              fmt::join(FieldNames(*field->message_type()), ", "))
+                : fmt::format("{} is {}, not a group of fields", walked, TypeName(*field)));
+    }
+    const bool append = index >= 0 && index == reflection->FieldSize(*level, field);
+    if (append) AppendDefault(level, field);
+    if (last) {
+      if (!SetScalar(level, field, index, value)) {
+        if (append) reflection->RemoveLast(level, field);
+        fail(fmt::format("'{}' is not {}", value, TypeName(*field)));
+      }
+      return;
+    }
+    level = index < 0 ? reflection->MutableMessage(level, field)
+                      : reflection->MutableRepeatedMessage(level, field, index);
+  }
+}
+
+}  // namespace poise
