@@ -30,8 +30,8 @@ add_library(poise_options INTERFACE)
 target_include_directories(poise_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
 target_compile_options(poise_options INTERFACE -Wall -Wextra -Wconversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # GCC 12's own AVX-512 headers raise it falsely wherever Eigen meets them (GCC bug 105593).
-  target_compile_options(poise_options INTERFACE -Wno-maybe-uninitialized)
+  # GCC 12's own AVX-512 headers raise them falsely wherever Eigen meets them (GCC bug 105593).
+  target_compile_options(poise_options INTERFACE -Wno-uninitialized -Wno-maybe-uninitialized -Wno-array-bounds)
 endif()
 if(POISE_WERROR)
   target_compile_options(poise_options INTERFACE -Werror)
