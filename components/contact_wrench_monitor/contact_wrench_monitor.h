@@ -1,0 +1,56 @@
+// The contact wrench monitor: expected wrenches (34), resultant (35), conditions (29)–(38),
+// balancing (39)–(46).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "components/balance/balance_control.h"
+#include "components/balance/task_dynamics.h"
+#include "components/balance/whole_body.h"
+#include "components/framework/component.h"
+#include "components/robot/robot_model.h"
+#include "poise/balance_torque_t.hpp"
+#include "poise/robot_state_t.hpp"
+#include "poise/task_torque_t.hpp"
+
+namespace poise {
+
+/// ROBOT_STATE, TASK_TORQUE -> BALANCE_TORQUE. The protected task is the COM's height. When the
+/// task torque is held from an earlier tick, or the dynamics do not exist, it is passed on without
+/// a balancing part and the status says so; the contact quantities are then those of the last good
+/// tick.
+class ContactWrenchMonitor : public Component {
+ public:
+  void Configure(const ComponentContext& context, Wiring* wiring) override;
+
+ private:
+  void Prepare();
+  void Balance();
+  /// Dynamics and protected task for these contacts; STATUS_*.
+  int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
+  int8_t ComputeBalance(const std::array<bool, 2>& in_contact);
+  void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
+              const std::array<bool, 2>& in_contact);
+
+  Input<robot_state_t> robot_state_;
+  Input<task_torque_t> task_torque_;
+  Output<balance_torque_t> balance_torque_;
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  std::shared_ptr<balance::WholeBody> whole_body_;
+  std::optional<balance::TaskDynamics> com_height_;
+  std::optional<balance::BalanceControl> balance_control_;
+  bool balancing_ = true;
+  balance::ContactLimits double_support_, single_support_;
+  robot::RobotState state_;
+  bool state_valid_ = false;
+  std::array<bool, 2> in_contact_{true, true};  // of the last tick
+  Eigen::MatrixXd height_jacobian_;             // 1×n
+  Eigen::VectorXd height_bias_;                 // 1×1
+  Eigen::VectorXd torque_;
+  Eigen::VectorXd foot_wrench_;  // room for both feet
+};
+
+}  // namespace poise

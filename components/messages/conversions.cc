@@ -1,0 +1,92 @@
+#include "components/messages/conversions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "components/framework/configuration.h"
+
+namespace poise {
+namespace {
+
+double Positive(bool present, double value, const std::string& field) {
+  if (!present) throw ConfigError(field, "is missing; give a positive number");
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw ConfigError(field, "must be a positive number");
+  }
+  return value;
+}
+
+}  // namespace
+
+bool ReadState(const robot_state_t& message, robot::RobotState* state) {
+  state->base_position = GetVector3(message.base_position);
+  const double* q = message.base_orientation;
+  state->base_orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  state->base_linear_velocity = GetVector3(message.base_linear_velocity);
+  state->base_angular_velocity = GetVector3(message.base_angular_velocity);
+  std::copy_n(message.joint_position.begin(), state->joint_position.size(),
+              state->joint_position.data());
+  std::copy_n(message.joint_velocity.begin(), state->joint_velocity.size(),
+              state->joint_velocity.data());
+  return state->base_position.allFinite() &&
+         std::abs(state->base_orientation.squaredNorm() - 1.0) < 2e-6 &&
+         state->base_linear_velocity.allFinite() && state->base_angular_velocity.allFinite() &&
+         state->joint_position.allFinite() && state->joint_velocity.allFinite();
+}
+
+void SetPose(const Eigen::Isometry3d& pose, pose_t* message) {
+  SetVector3(pose.translation(), message->position);
+  const Eigen::Quaterniond q(pose.linear());
+  message->orientation[0] = q.w();
+  message->orientation[1] = q.x();
+  message->orientation[2] = q.y();
+  message->orientation[3] = q.z();
+}
+
+Eigen::Isometry3d GetPose(const pose_t& message) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const double* q = message.orientation;
+  pose.linear() = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  pose.translation() = GetVector3(message.position);
+  return pose;
+}
+
+void SetWrench(const Eigen::Ref<const balance::Vector6d>& wrench, wrench_t* message) {
+  SetVector3(wrench.head<3>(), message->force);
+  SetVector3(wrench.tail<3>(), message->moment);
+}
+
+balance::Vector6d GetWrench(const wrench_t& message) {
+  balance::Vector6d wrench;
+  wrench << GetVector3(message.force), GetVector3(message.moment);
+  return wrench;
+}
+
+void SetMargins(const balance::ContactMargins& margins, contact_margins_t* message) {
+  message->normal = margins.normal;
+  message->friction = margins.friction;
+  message->yaw = margins.yaw;
+  message->roll = margins.roll;
+  message->pitch = margins.pitch;
+}
+
+void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]) {
+  std::copy_n(vector.data(), 3, array);
+}
+
+Eigen::Vector3d GetVector3(const double (&array)[3]) {
+  return Eigen::Map<const Eigen::Vector3d>(array);
+}
+
+balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field) {
+  balance::ContactLimits limits;
+  limits.half_length =
+      Positive(config.has_half_length(), config.half_length(), field + ".half_length");
+  limits.half_width = Positive(config.has_half_width(), config.half_width(), field + ".half_width");
+  limits.friction = Positive(true, config.friction(), field + ".friction");
+  limits.yaw_friction = Positive(true, config.yaw_friction(), field + ".yaw_friction");
+  return limits;
+}
+
+}  // namespace poise

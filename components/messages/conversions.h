@@ -1,0 +1,37 @@
+// Messages of the bus to and from the types of robot and balance.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "components/balance/contact_conditions.h"
+#include "components/balance/contact_limits.pb.h"
+#include "components/robot/robot_model.h"
+#include "poise/contact_margins_t.hpp"
+#include "poise/pose_t.hpp"
+#include "poise/robot_state_t.hpp"
+#include "poise/wrench_t.hpp"
+
+namespace poise {
+
+/// Copies the configuration and velocity. `state` must be sized. False, and `state` is then not to
+/// be used, when a number is not finite or the quaternion is not of unit length (to 1e-6).
+bool ReadState(const robot_state_t& message, robot::RobotState* state);
+
+void SetPose(const Eigen::Isometry3d& pose, pose_t* message);
+Eigen::Isometry3d GetPose(const pose_t& message);
+
+/// [force; moment]; frame and sign as the field says.
+void SetWrench(const Eigen::Ref<const balance::Vector6d>& wrench, wrench_t* message);
+balance::Vector6d GetWrench(const wrench_t& message);
+
+void SetMargins(const balance::ContactMargins& margins, contact_margins_t* message);
+
+void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]);
+Eigen::Vector3d GetVector3(const double (&array)[3]);
+
+/// Limits of a contact patch. Throws ConfigError "<field>.half_length" ...: missing, not positive
+/// or not finite.
+balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field);
+
+}  // namespace poise

@@ -1,0 +1,171 @@
+#include "components/redistributor/redistributor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_transition.h"
+#include "components/balance/redistribution.h"
+#include "components/messages/conversions.h"
+#include "components/messages/robot_resource.h"
+#include "components/redistributor/redistributor.pb.h"
+
+namespace poise {
+namespace {
+
+using balance::Vector6d;
+
+constexpr std::array<bool, 2> kBoth{true, true};
+
+void CheckRatio(double value, const char* field) {
+  if (!(value >= 0 && value <= 1)) throw ConfigError(field, "must lie between 0 and 1");
+}
+
+bool AllFinite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
+}
+
+}  // namespace
+
+void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
+  const auto config = context.config<RedistributorConfig>();
+  redistribution_ = config.redistribution();
+  transition_ = config.transition();
+  double_support_ = ReadLimits(config.double_support(), "double_support");
+  single_support_ = ReadLimits(config.single_support(), "single_support");
+  eta_min_ = config.eta_min();
+  eta_max_ = config.eta_max();
+  CheckRatio(eta_min_, "eta_min");
+  CheckRatio(eta_max_, "eta_max");
+  if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
+
+  model_ = LoadRobot(context);
+  whole_body_ = context.shared->Get<balance::WholeBody>(
+      "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
+  state_ = robot::RobotState(model_->num_joints());
+  contact_jacobian_ = Eigen::MatrixXd::Zero(12, model_->num_velocities());
+  torque_ = Eigen::VectorXd::Zero(model_->num_joints());
+
+  const MessageCounts counts = JointAndFootCounts(*model_);
+  wiring->AddInput(&robot_state_, "robot_state", counts);
+  wiring->AddInput(&task_torque_, "task_torque", counts);
+  wiring->AddInput(&balance_torque_, "balance_torque", counts);
+  wiring->AddOutput(&joint_command_, "joint_command", counts);
+  wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
+  wiring->AddStage("redistribute", {&robot_state_, &task_torque_, &balance_torque_},
+                   {&joint_command_}, [this](const Tick&) { Redistribute(); });
+}
+
+void Redistributor::Prepare() {
+  state_valid_ = ReadState(*robot_state_, &state_);
+  if (!state_valid_) return;
+  whole_body_->UpdateKinematics(state_);
+  whole_body_->ContactJacobian(kBoth, &contact_jacobian_);
+}
+
+void Redistributor::Redistribute() {
+  const balance_torque_t& balance = *balance_torque_;
+  joint_command_t& out = *joint_command_;
+  const int8_t task = task_torque_->status;
+  const bool held = task == task_torque_t::STATUS_SINGULAR ||
+                    task == task_torque_t::STATUS_INVALID_STATE ||
+                    balance.status == balance_torque_t::STATUS_INVALID_STATE;
+  const std::array<bool, 2> in_contact{task_torque_->in_contact[0] != 0,
+                                       task_torque_->in_contact[1] != 0};
+  if (held || !state_valid_ || !AllFinite(balance.torque) || !(in_contact[0] || in_contact[1])) {
+    out.status = joint_command_t::STATUS_INVALID_INPUT;
+    return;
+  }
+  for (size_t i = 0; i < 2; ++i) out.in_contact[i] = in_contact[i] ? 1 : 0;
+  if (balance.status == balance_torque_t::STATUS_SINGULAR) {
+    PassTorqueThrough();
+    out.status = joint_command_t::STATUS_INVALID_INPUT;
+    return;
+  }
+  out.status = in_contact[0] && in_contact[1] ? ComputeDouble() : ComputeSingle(in_contact);
+}
+
+int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
+  joint_command_t& out = *joint_command_;
+  PassTorqueThrough();
+  out.eta = out.eta_optimal = in_contact[0] ? 1.0 : 0.0;
+  out.eta_min = out.eta_max = out.eta;
+  out.eta_feasible = 1;
+  Report({GetWrench(balance_torque_->foot_wrench[0]), GetWrench(balance_torque_->foot_wrench[1])},
+         single_support_, in_contact);
+  return joint_command_t::STATUS_OK;
+}
+
+int8_t Redistributor::ComputeDouble() {
+  joint_command_t& out = *joint_command_;
+  const Vector6d resultant = GetWrench(balance_torque_->resultant);
+  const Eigen::Isometry3d frame_o = GetPose(balance_torque_->frame_o);
+  std::array<Eigen::Isometry3d, 2> sole_in_o;
+  Wrenches wrench;
+  for (size_t i = 0; i < 2; ++i) {
+    sole_in_o[i] = frame_o.inverse() * whole_body_->data().foot_pose[i];
+    wrench[i] = GetWrench(balance_torque_->foot_wrench[i]);
+  }
+  const balance::RatioInterval interval =
+      balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_);
+  const bool pressed = resultant[2] < 0;
+  out.eta_feasible = interval.feasible && pressed ? 1 : 0;
+  out.eta_min = interval.feasible ? interval.min : 0.0;
+  out.eta_max = interval.feasible ? interval.max : 1.0;
+  out.eta_optimal = interval.optimal;
+  if (redistribution_ && pressed) {
+    const double free_ratio =
+        balance::SelectRatio(interval, resultant, sole_in_o, double_support_, eta_min_, eta_max_);
+    out.eta = RampedRatio(free_ratio, resultant, sole_in_o);
+    const Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
+    Eigen::Matrix<double, 12, 1> change;
+    change << desired[0] - wrench[0], desired[1] - wrench[1];
+    balance::RedistributionTorque(contact_jacobian_, change, torque_);
+    for (size_t i = 0; i < out.torque.size(); ++i) {
+      out.redistribution_torque[i] = torque_[static_cast<Eigen::Index>(i)];
+      out.torque[i] = balance_torque_->torque[i] + out.redistribution_torque[i];
+    }
+    wrench = desired;
+  } else {
+    PassTorqueThrough();
+    const double right = (sole_in_o[0].linear() * wrench[0].head<3>()).z();
+    out.eta = pressed ? right / resultant[2] : 0.5;
+  }
+  Report(wrench, double_support_, kBoth);
+  return out.eta_feasible != 0 ? joint_command_t::STATUS_OK : joint_command_t::STATUS_INFEASIBLE;
+}
+
+double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
+                                  std::array<Eigen::Isometry3d, 2> sole_in_o) const {
+  const task_torque_t& task = *task_torque_;
+  if (!transition_ || task.transition == task_torque_t::TRANSITION_NONE) return free_ratio;
+  const bool unloading = task.transition == task_torque_t::TRANSITION_UNLOADING;
+  const double ramped = balance::TransitionRatio(free_ratio, task.transition_foot, unloading,
+                                                 task.transition_progress);
+  // Only the loaded foot's conditions count: both soles turned like it, the other's are the same.
+  const size_t light = task.transition_foot == robot::kRightFoot ? 0 : 1;
+  sole_in_o[light].linear() = sole_in_o[1 - light].linear();
+  const balance::RatioInterval allowed =
+      balance::FeasibleRatio(resultant, sole_in_o, double_support_, 0.0, 1.0);
+  return allowed.feasible ? std::clamp(ramped, allowed.min, allowed.max) : ramped;
+}
+
+void Redistributor::PassTorqueThrough() {
+  joint_command_t& out = *joint_command_;
+  out.torque = balance_torque_->torque;
+  std::fill(out.redistribution_torque.begin(), out.redistribution_torque.end(), 0.0);
+}
+
+void Redistributor::Report(const Wrenches& wrench, const balance::ContactLimits& limits,
+                           const std::array<bool, 2>& in_contact) {
+  joint_command_t& out = *joint_command_;
+  for (size_t i = 0; i < 2; ++i) {
+    const Vector6d value = in_contact[i] ? wrench[i] : Vector6d(Vector6d::Zero());
+    const balance::ContactMargins margins =
+        in_contact[i] ? balance::CheckContact(value, limits) : balance::ContactMargins{};
+    SetWrench(value, &out.foot_wrench[i]);
+    SetMargins(margins, &out.margins[i]);
+    out.conditions_met[i] = !in_contact[i] || margins.Met() ? 1 : 0;
+  }
+}
+
+}  // namespace poise

@@ -1,0 +1,59 @@
+// The redistributor: the ratio η, the contact transition and the torque that moves wrench between
+// the feet, (47)–(53).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "components/balance/contact_conditions.h"
+#include "components/balance/distribution_ratio.h"
+#include "components/balance/whole_body.h"
+#include "components/framework/component.h"
+#include "components/robot/robot_model.h"
+#include "poise/balance_torque_t.hpp"
+#include "poise/joint_command_t.hpp"
+#include "poise/robot_state_t.hpp"
+#include "poise/task_torque_t.hpp"
+
+namespace poise {
+
+/// ROBOT_STATE, TASK_TORQUE, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
+/// through. With STATUS_INVALID_INPUT (a neighbour's torque is held or not finite) the last good
+/// command is sent again; when the neighbours have a fresh torque but no resultant, that torque
+/// passes through undistributed.
+class Redistributor : public Component {
+ public:
+  void Configure(const ComponentContext& context, Wiring* wiring) override;
+
+ private:
+  using Wrenches = std::array<balance::Vector6d, 2>;
+
+  void Prepare();
+  void Redistribute();
+  int8_t ComputeDouble();
+  int8_t ComputeSingle(const std::array<bool, 2>& in_contact);
+  /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
+  double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
+                     std::array<Eigen::Isometry3d, 2> sole_in_o) const;
+  void PassTorqueThrough();
+  void Report(const Wrenches& wrench, const balance::ContactLimits& limits,
+              const std::array<bool, 2>& in_contact);
+
+  Input<robot_state_t> robot_state_;
+  Input<task_torque_t> task_torque_;
+  Input<balance_torque_t> balance_torque_;
+  Output<joint_command_t> joint_command_;
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  std::shared_ptr<balance::WholeBody> whole_body_;
+  bool redistribution_ = true, transition_ = true;
+  double eta_min_ = 0, eta_max_ = 1;
+  balance::ContactLimits double_support_, single_support_;
+  robot::RobotState state_;
+  bool state_valid_ = false;
+  Eigen::MatrixXd contact_jacobian_;  // 12×n
+  Eigen::VectorXd torque_;            // k×1
+};
+
+}  // namespace poise

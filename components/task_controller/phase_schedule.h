@@ -1,0 +1,56 @@
+// The scenario's phases in time: which support, which contact transition, and how far it has come.
+#pragma once
+
+#include <array>
+
+#include "components/task_controller/task_controller.pb.h"
+
+namespace poise {
+
+/// Throws ConfigError naming the field ("phase[2].duration") of a schedule or gain that cannot
+/// work.
+void CheckTaskControllerConfig(const TaskControllerConfig& config);
+
+/// Feet in contact, right first.
+std::array<bool, 2> ContactsOf(Support support);
+
+enum class TransitionKind { kNone, kUnloading, kLoading };
+
+struct ScheduleState {
+  int phase = 0;
+  bool phase_began = false;  ///< the phase's first tick
+  double phase_start = 0;    ///< s, when it really began
+  bool waiting = false;      ///< the unloading is held back: the COM is not above the stance sole
+  TransitionKind transition = TransitionKind::kNone;
+  int transition_foot = -1;
+  double progress = 0;  ///< 0..1
+};
+
+/// Pure function of the calls made so far: no clock. At most one phase begins per call.
+class PhaseSchedule {
+ public:
+  /// `config` must have passed CheckTaskControllerConfig.
+  explicit PhaseSchedule(const TaskControllerConfig& config) : config_(config) {}
+
+  /// `time` in s, not decreasing; `com_over_foot`: the COM's projection lies inside that foot's
+  /// sole. An unloading that is due while the COM is not above the other foot waits, and with it
+  /// everything later in the schedule; the references of the phase under way go on, so that the COM
+  /// can arrive.
+  const ScheduleState& Advance(double time, const std::array<bool, 2>& com_over_foot);
+
+  const Phase& phase() const { return config_.phase(state_.phase); }
+  const ScheduleState& state() const { return state_; }
+
+ private:
+  bool UnloadingPending() const;
+  void AdvanceTransition(double time, const std::array<bool, 2>& com_over_foot);
+
+  TaskControllerConfig config_;
+  ScheduleState state_;
+  bool began_ = false;
+  bool transition_began_ = false;
+  double transition_start_ = 0;
+  double shift_ = 0;  // s, by which waiting has moved the schedule
+};
+
+}  // namespace poise

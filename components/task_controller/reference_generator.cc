@@ -1,0 +1,141 @@
+#include "components/task_controller/reference_generator.h"
+
+#include <algorithm>
+
+#include "components/task_controller/phase_schedule.h"
+
+namespace poise {
+
+void QuinticMove::Hold(const Eigen::Vector3d& position) {
+  coefficient_.fill(Eigen::Vector3d::Zero());
+  coefficient_[0] = position;
+  start_ = duration_ = 0;
+}
+
+void QuinticMove::Begin(const PointMotion& from, const Eigen::Vector3d& target, double start,
+                        double duration) {
+  if (duration <= 0) {
+    Hold(target);
+    return;
+  }
+  const Eigen::Vector3d v = from.velocity * duration;
+  const Eigen::Vector3d a = from.acceleration * (duration * duration);
+  const Eigen::Vector3d d = target - from.position;
+  coefficient_ = {from.position,
+                  v,
+                  0.5 * a,
+                  10.0 * d - 6.0 * v - 1.5 * a,
+                  -15.0 * d + 8.0 * v + 1.5 * a,
+                  6.0 * d - 3.0 * v - 0.5 * a};
+  start_ = start;
+  duration_ = duration;
+}
+
+PointMotion QuinticMove::At(double time) const {
+  const auto& c = coefficient_;
+  PointMotion motion;
+  if (duration_ <= 0) {
+    motion.position = c[0];
+    return motion;
+  }
+  const double s = std::clamp((time - start_) / duration_, 0.0, 1.0);
+  motion.position = c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5]))));
+  if (s >= 1.0) return motion;
+  motion.velocity =
+      (c[1] + s * (2.0 * c[2] + s * (3.0 * c[3] + s * (4.0 * c[4] + s * (5.0 * c[5]))))) /
+      duration_;
+  motion.acceleration = (2.0 * c[2] + s * (6.0 * c[3] + s * (12.0 * c[4] + s * (20.0 * c[5])))) /
+                        (duration_ * duration_);
+  return motion;
+}
+
+void ReferencePoint::Hold(const Eigen::Vector3d& position) {
+  move_.Hold(position);
+  pending_ = false;
+}
+
+void ReferencePoint::Schedule(const Eigen::Vector3d& target, double start, double duration) {
+  target_ = target;
+  start_ = start;
+  duration_ = duration;
+  pending_ = true;
+}
+
+PointMotion ReferencePoint::At(double time) {
+  if (pending_ && time >= start_) {
+    move_.Begin(move_.At(start_), target_, start_, duration_);
+    pending_ = false;
+  }
+  return move_.At(time);
+}
+
+Eigen::Vector3d ReferenceGenerator::ComTarget(const ComReference& com,
+                                              const EstimatedPose& estimate,
+                                              const Eigen::Vector3d& standing) const {
+  const Eigen::Vector3d right = estimate.sole[0].translation();
+  const Eigen::Vector3d left = estimate.sole[1].translation();
+  Eigen::Vector3d target = standing;
+  switch (com.target()) {
+    case ComReference::HOLD:
+      return standing;
+    case ComReference::OVER_RIGHT:
+      target.head<2>() = right.head<2>();
+      break;
+    case ComReference::OVER_LEFT:
+      target.head<2>() = left.head<2>();
+      break;
+    case ComReference::OVER_MIDDLE:
+      target.head<2>() = 0.5 * (right + left).head<2>();
+      break;
+    case ComReference::SHIFT:
+      break;
+  }
+  return target + Eigen::Vector3d(com.x(), com.y(), com.z());
+}
+
+void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& estimate,
+                                    double time) {
+  if (!anchored_) {
+    com_.Hold(estimate.com);
+    references_.body_rotation = estimate.body_rotation;
+    foot_free_ = {false, false};
+    anchored_ = true;
+  }
+  if (phase.gravity_compensation()) {
+    anchored_ = false;  // the posture is free from here on
+    return;
+  }
+  if (phase.has_com()) {
+    const ComReference& com = phase.com();
+    com_.Schedule(ComTarget(com, estimate, com_.At(time).position), time + com.delay(),
+                  com.duration());
+  }
+  const std::array<bool, 2> in_contact = ContactsOf(phase.support());
+  for (size_t i = 0; i < 2; ++i) {
+    if (!in_contact[i] && !foot_free_[i]) {
+      foot_[i].Hold(estimate.sole[i].translation());
+      references_.foot_rotation[i] = estimate.sole[i].linear();
+    }
+    foot_free_[i] = !in_contact[i];
+  }
+  if (phase.has_foot()) {
+    const FootReference& foot = phase.foot();
+    const auto swing = static_cast<size_t>(foot.foot());
+    Eigen::Vector3d target =
+        foot_[swing].At(time).position + Eigen::Vector3d(foot.x(), foot.y(), foot.z());
+    if (foot.has_height_above_support()) {
+      target.z() = estimate.sole[1 - swing].translation().z() + foot.height_above_support();
+    }
+    foot_[swing].Schedule(target, time + foot.delay(), foot.duration());
+  }
+}
+
+const References& ReferenceGenerator::Update(double time) {
+  references_.com = com_.At(time);
+  for (size_t i = 0; i < 2; ++i) {
+    if (foot_free_[i]) references_.foot[i] = foot_[i].At(time);
+  }
+  return references_;
+}
+
+}  // namespace poise

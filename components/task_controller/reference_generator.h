@@ -1,0 +1,87 @@
+// Desired COM, body orientation and foot poses over time.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/task_controller/task_controller.pb.h"
+
+namespace poise {
+
+/// Position, velocity and acceleration of a point, m and s.
+struct PointMotion {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+};
+
+/// Quintic in time from a given motion to rest at a target; from rest it is the minimum-jerk line.
+/// Holds before and after.
+class QuinticMove {
+ public:
+  /// At rest at `position` for all time.
+  void Hold(const Eigen::Vector3d& position);
+  /// From `from` at `start` to rest at `target` at start + duration, s. Duration 0 is a step.
+  void Begin(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
+  PointMotion At(double time) const;
+
+ private:
+  std::array<Eigen::Vector3d, 6> coefficient_;  // of powers of (time − start) / duration
+  double start_ = 0;
+  double duration_ = 0;
+};
+
+/// A move that begins after its phase's delay; until then the one before it goes on.
+class ReferencePoint {
+ public:
+  void Hold(const Eigen::Vector3d& position);
+  /// Replaces a move that has not begun yet.
+  void Schedule(const Eigen::Vector3d& target, double start, double duration);
+  /// `time` must not decrease from call to call.
+  PointMotion At(double time);
+
+ private:
+  QuinticMove move_;
+  bool pending_ = false;
+  Eigen::Vector3d target_ = Eigen::Vector3d::Zero();
+  double start_ = 0, duration_ = 0;
+};
+
+/// What the references are anchored to: the robot as it is estimated, world frame, m.
+struct EstimatedPose {
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d body_rotation = Eigen::Matrix3d::Identity();
+  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
+                                        Eigen::Isometry3d::Identity()};  ///< right first
+};
+
+struct References {
+  PointMotion com;
+  Eigen::Matrix3d body_rotation = Eigen::Matrix3d::Identity();
+  std::array<PointMotion, 2> foot;  ///< sole centre; meaningful for a foot out of contact
+  std::array<Eigen::Matrix3d, 2> foot_rotation{Eigen::Matrix3d::Identity(),
+                                               Eigen::Matrix3d::Identity()};
+};
+
+/// References start from the estimated pose, and at each phase from where they stand, in position,
+/// velocity and acceleration. A phase without a COM reference lets the motion under way end. After
+/// a phase of gravity compensation they start from the estimated pose again.
+class ReferenceGenerator {
+ public:
+  /// First tick: everything holds where it is. COM targets of the phase are set relative to that.
+  void BeginPhase(const Phase& phase, const EstimatedPose& estimate, double time);
+  const References& Update(double time);
+
+ private:
+  Eigen::Vector3d ComTarget(const ComReference& com, const EstimatedPose& estimate,
+                            const Eigen::Vector3d& standing) const;
+
+  bool anchored_ = false;
+  std::array<bool, 2> foot_free_{false, false};
+  ReferencePoint com_;
+  std::array<ReferencePoint, 2> foot_;
+  References references_;
+};
+
+}  // namespace poise

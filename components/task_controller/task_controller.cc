@@ -1,0 +1,186 @@
+#include "components/task_controller/task_controller.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "components/messages/robot_resource.h"
+
+namespace poise {
+namespace {
+
+PdGains ReadGains(const Gains& gains) { return {gains.kp(), gains.kd()}; }
+
+int8_t TransitionCode(TransitionKind kind) {
+  switch (kind) {
+    case TransitionKind::kUnloading:
+      return task_torque_t::TRANSITION_UNLOADING;
+    case TransitionKind::kLoading:
+      return task_torque_t::TRANSITION_LOADING;
+    case TransitionKind::kNone:
+      break;
+  }
+  return task_torque_t::TRANSITION_NONE;
+}
+
+// Rows that the tasks and contacts of a support determine; every velocity is determined when they
+// are n.
+int DeterminedRows(const std::array<bool, 2>& in_contact) {
+  return TaskStack::NumRows(in_contact) + (in_contact[0] ? 6 : 0) + (in_contact[1] ? 6 : 0);
+}
+
+}  // namespace
+
+void TaskController::Configure(const ComponentContext& context, Wiring* wiring) {
+  const auto config = context.config<TaskControllerConfig>();
+  CheckTaskControllerConfig(config);
+  model_ = LoadRobot(context);
+  const int num_joints = model_->num_joints();
+  for (int i = 0; i < config.phase_size(); ++i) {
+    const std::array<bool, 2> in_contact = ContactsOf(config.phase(i).support());
+    const int free = model_->num_velocities() - DeterminedRows(in_contact);
+    if (config.phase(i).gravity_compensation()) continue;
+    if (free < 0) {
+      throw ConfigError(fmt::format("phase[{}].support", i),
+                        fmt::format("needs {} joints, robot '{}' has {}", num_joints - free,
+                                    model_->name(), num_joints));
+    }
+    if (free > 0 && !config.has_posture()) {
+      throw ConfigError("posture", fmt::format("is missing; the tasks of phase[{}] leave {} joint "
+                                               "motions of robot '{}' free: give kp and kd",
+                                               i, free, model_->name()));
+    }
+  }
+
+  whole_body_ = context.shared->Get<balance::WholeBody>(
+      "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
+  schedule_.emplace(config);
+  tasks_.emplace(*model_, ReadGains(config.com()), ReadGains(config.orientation()),
+                 ReadGains(config.foot()));
+  task_dynamics_.emplace(num_joints, TaskStack::kMaxRows);
+  posture_ = ReadGains(config.posture());
+  state_ = robot::RobotState(num_joints);
+  in_contact_ = ContactsOf(config.phase(0).support());
+  posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ =
+      Eigen::VectorXd::Zero(num_joints);
+
+  const MessageCounts counts = JointAndFootCounts(*model_);
+  wiring->AddInput(&robot_state_, "robot_state", counts);
+  wiring->AddOutput(&task_torque_, "task_torque", counts);
+  wiring->AddStage("control", {&robot_state_}, {&task_torque_},
+                   [this](const Tick& tick) { Step(tick); });
+  task_torque_->transition_foot = -1;
+  for (size_t i = 0; i < 2; ++i) {
+    task_torque_->in_contact[i] = in_contact_[i] ? 1 : 0;
+    SetPose(Eigen::Isometry3d::Identity(), &task_torque_->foot_pose[i]);
+    SetPose(Eigen::Isometry3d::Identity(), &task_torque_->foot_desired[i]);
+  }
+}
+
+void TaskController::Step(const Tick& tick) { task_torque_->status = Control(tick.time); }
+
+int8_t TaskController::Control(double time) {
+  if (!ReadState(*robot_state_, &state_)) return task_torque_t::STATUS_INVALID_STATE;
+  // The schedule needs the COM, which comes with the dynamics of the contacts so far; they seldom
+  // change.
+  if (!whole_body_->Update(state_, in_contact_)) return task_torque_t::STATUS_SINGULAR;
+  if (!started_) {
+    started_ = true;
+    posture_reference_ = state_.joint_position;
+  }
+  const ScheduleState& schedule = schedule_->Advance(time, ComOverFoot());
+  const Phase& phase = schedule_->phase();
+  if (schedule.phase_began) {
+    references_.BeginPhase(phase, Estimate(), time);
+    in_contact_ = ContactsOf(phase.support());
+    if (!whole_body_->Update(state_, in_contact_)) return task_torque_t::STATUS_SINGULAR;
+  }
+  const References& references = references_.Update(time);
+  if (phase.gravity_compensation()) {
+    balance::GravityCompensation(whole_body_->contact(), torque_);
+    posture_reference_ = state_.joint_position;
+  } else if (!ComputeTorque(references, in_contact_)) {
+    return task_torque_t::STATUS_SINGULAR;
+  }
+  if (!torque_.allFinite()) return task_torque_t::STATUS_SINGULAR;
+  Report(references, in_contact_);
+  return schedule.waiting ? task_torque_t::STATUS_WAITING : task_torque_t::STATUS_OK;
+}
+
+EstimatedPose TaskController::Estimate() const {
+  const robot::RobotData& data = whole_body_->data();
+  return {.com = data.com,
+          .body_rotation = data.body_rotation[static_cast<size_t>(model_->body_task_body())],
+          .sole = {data.foot_pose[0], data.foot_pose[1]}};
+}
+
+std::array<bool, 2> TaskController::ComOverFoot() const {
+  const robot::RobotData& data = whole_body_->data();
+  std::array<bool, 2> over{};
+  for (size_t i = 0; i < 2; ++i) {
+    const Eigen::Isometry3d& sole = data.foot_pose[i];
+    // Along the vertical onto the sole's plane, then into its axes.
+    const Eigen::Vector3d normal = sole.linear().col(2);
+    Eigen::Vector3d offset = data.com - sole.translation();
+    offset.z() -= offset.dot(normal) / normal.z();
+    const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
+    const robot::FootModel& foot = model_->feet()[i];
+    over[i] = std::abs(at.x()) <= 0.5 * foot.length && std::abs(at.y()) <= 0.5 * foot.width;
+  }
+  return over;
+}
+
+bool TaskController::ComputeTorque(const References& references,
+                                   const std::array<bool, 2>& in_contact) {
+  const balance::ContactDynamics& contact = whole_body_->contact();
+  tasks_->Update(*model_, whole_body_->data(), references, in_contact);
+  if (!task_dynamics_->Compute(contact, tasks_->jacobian(), tasks_->bias_acceleration())) {
+    return false;
+  }
+  task_dynamics_->TaskTorque(tasks_->acceleration(), torque_);
+  if (DeterminedRows(in_contact) < model_->num_velocities()) {
+    // (28): what the tasks leave free is held up against gravity and drawn to the posture of the
+    // start, the joints' own inertia as weight.
+    posture_acceleration_ = posture_.kp * (posture_reference_ - state_.joint_position) -
+                            posture_.kd * state_.joint_velocity;
+    balance::GravityCompensation(contact, posture_torque_);
+    const Eigen::Index k = posture_torque_.size();
+    posture_torque_.noalias() +=
+        whole_body_->data().mass_matrix.bottomRightCorner(k, k) * posture_acceleration_;
+    task_dynamics_->ProjectIntoNullSpace(posture_torque_);
+    torque_ += posture_torque_;
+  }
+  return true;
+}
+
+void TaskController::Report(const References& references, const std::array<bool, 2>& in_contact) {
+  task_torque_t& out = *task_torque_;
+  const robot::RobotData& data = whole_body_->data();
+  const ScheduleState& schedule = schedule_->state();
+  const bool controlled = !schedule_->phase().gravity_compensation();
+  std::copy_n(torque_.data(), torque_.size(), out.torque.begin());
+  out.phase = schedule.phase;
+  out.transition = TransitionCode(schedule.transition);
+  out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
+  out.transition_progress = schedule.progress;
+  SetVector3(data.com, out.com_position);
+  SetVector3(data.com_velocity, out.com_velocity);
+  SetVector3(controlled ? references.com.position : data.com, out.com_desired);
+  SetVector3(controlled ? tasks_->body_orientation_error() : Eigen::Vector3d::Zero(),
+             out.body_orientation_error);
+  for (size_t i = 0; i < 2; ++i) {
+    out.in_contact[i] = in_contact[i] ? 1 : 0;
+    SetPose(data.foot_pose[i], &out.foot_pose[i]);
+    out.foot_desired[i] = out.foot_pose[i];
+    if (controlled && !in_contact[i]) {
+      Eigen::Isometry3d desired = Eigen::Isometry3d::Identity();
+      desired.linear() = references.foot_rotation[i];
+      desired.translation() = references.foot[i].position;
+      SetPose(desired, &out.foot_desired[i]);
+    }
+  }
+}
+
+}  // namespace poise

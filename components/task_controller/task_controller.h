@@ -1,0 +1,53 @@
+// The task controller: scenario phases, references and the task torque (24).
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+
+#include "components/balance/task_dynamics.h"
+#include "components/balance/whole_body.h"
+#include "components/framework/component.h"
+#include "components/robot/robot_model.h"
+#include "components/task_controller/phase_schedule.h"
+#include "components/task_controller/reference_generator.h"
+#include "components/task_controller/task_stack.h"
+#include "poise/robot_state_t.hpp"
+#include "poise/task_torque_t.hpp"
+
+namespace poise {
+
+/// ROBOT_STATE -> TASK_TORQUE. When a state is invalid or its dynamics are singular the message of
+/// the last good tick is sent again with the status set: its torque is what held the robot a moment
+/// ago, and no better one is known.
+class TaskController : public Component {
+ public:
+  void Configure(const ComponentContext& context, Wiring* wiring) override;
+
+ private:
+  void Step(const Tick& tick);
+  /// Fills contacts, phase, references and torque; STATUS_* of the message.
+  int8_t Control(double time);
+  EstimatedPose Estimate() const;
+  std::array<bool, 2> ComOverFoot() const;
+  bool ComputeTorque(const References& references, const std::array<bool, 2>& in_contact);
+  void Report(const References& references, const std::array<bool, 2>& in_contact);
+
+  Input<robot_state_t> robot_state_;
+  Output<task_torque_t> task_torque_;
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  std::shared_ptr<balance::WholeBody> whole_body_;
+  std::optional<PhaseSchedule> schedule_;
+  std::optional<TaskStack> tasks_;
+  std::optional<balance::TaskDynamics> task_dynamics_;
+  ReferenceGenerator references_;
+  robot::RobotState state_;
+  std::array<bool, 2> in_contact_{true, true};
+  bool started_ = false;
+  PdGains posture_;
+  Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
+  Eigen::VectorXd torque_;
+};
+
+}  // namespace poise
