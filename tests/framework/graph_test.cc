@@ -1,0 +1,265 @@
+// Every way a graph can be wrong, each with the line its author sees.
+#include "components/framework/graph.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "components/framework/run.h"
+#include "tests/framework/toy_components.h"
+
+namespace poise {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class GraphTest : public ::testing::Test {
+ protected:
+  GraphTest() { AddToyComponents(&registry_); }
+
+  /// All problems of the graph, one a line; "" when it is right.
+  std::string Problems(const Graph& graph, const std::string& controller_config = "",
+                       const std::string& filter_config = "") {
+    RunSpec spec = ToyRun(graph, 10);
+    Configure(&spec, "controller", controller_config);
+    Configure(&spec, "filter", filter_config);
+    try {
+      BoundGraph bound(spec, registry_);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  static void Configure(RunSpec* spec, const std::string& name, const std::string& text) {
+    ComponentConfig* config = spec->add_config();
+    config->set_component(name);
+    config->set_text(text);
+  }
+  static Connection* FindPort(google::protobuf::RepeatedPtrField<Connection>* connections,
+                              const std::string& port) {
+    for (Connection& connection : *connections) {
+      if (connection.port() == port) return &connection;
+    }
+    return nullptr;
+  }
+
+  ComponentRegistry registry_;
+  Graph graph_ = ToyLoop();  // component 0: controller, 1: filter, 2: plant
+};
+
+TEST_F(GraphTest, ARightGraphIsPlanned) {
+  const BoundGraph bound(ToyRun(graph_, 10), registry_);
+  const GraphPlan& plan = bound.plan();
+  std::vector<std::pair<int, int>> order;
+  for (const GraphPlan::StageRef& ref : plan.order) order.emplace_back(ref.component, ref.stage);
+  EXPECT_THAT(order,
+              ElementsAre(std::pair(2, 0), std::pair(0, 0), std::pair(1, 0), std::pair(0, 1)));
+  EXPECT_THAT(plan.tick_sources, ElementsAre(2));
+  EXPECT_EQ(plan.channels[0].writer.component, 2);
+  EXPECT_EQ(plan.channels[0].readers.size(), 2u);
+  EXPECT_THAT(plan.channels[0].counts, ElementsAre(3, 2));
+  EXPECT_EQ(plan.channels[5].writer.component, -1);
+  FillCounts(plan, &graph_);
+  EXPECT_THAT(graph_.channel(0).count(), ElementsAre(3, 2));
+  EXPECT_EQ(graph_.channel(4).count_size(), 0);
+}
+
+TEST_F(GraphTest, UnknownComponentType) {
+  graph_.mutable_component(1)->set_type("toy_filtre");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: component[1].type: component filter: unknown component type "
+            "'toy_filtre'; types: toy_clock, "
+            "toy_controller, toy_filter, toy_plant, toy_sink");
+}
+
+TEST_F(GraphTest, TheTypeDefaultsToTheName) {
+  graph_.mutable_component(1)->clear_type();
+  EXPECT_THAT(Problems(graph_),
+              HasSubstr("component[1].name: component filter: unknown component type 'filter'"));
+  graph_.mutable_component(1)->set_name("toy_filter");
+  EXPECT_EQ(Problems(graph_), "");
+}
+
+TEST_F(GraphTest, NamesMustBeUniqueAndWellFormed) {
+  graph_.mutable_component(1)->set_name("plant");
+  EXPECT_EQ(
+      Problems(graph_),
+      "graph toy_loop: component[2].name: component plant: named twice; names must be unique");
+  graph_.mutable_component(1)->set_name("Filter 2");
+  EXPECT_THAT(Problems(graph_), HasSubstr("'Filter 2' is no component name"));
+  graph_ = ToyLoop();
+  *graph_.add_channel() = graph_.channel(0);
+  EXPECT_THAT(Problems(graph_), HasSubstr("channel[6].name: channel SENSORS: named twice"));
+  graph_.mutable_channel(6)->set_name("sensors");
+  EXPECT_THAT(Problems(graph_), HasSubstr("'sensors' is no channel name"));
+  for (const char* name : {"CONTROL", "HEALTH_X", "LCM_SELF_TEST"}) {
+    graph_.mutable_channel(6)->set_name(name);
+    EXPECT_THAT(Problems(graph_), HasSubstr("the name is taken by the framework"));
+  }
+}
+
+TEST_F(GraphTest, UnknownMessageType) {
+  graph_.mutable_channel(0)->set_type("robot_sensor_t");
+  EXPECT_THAT(Problems(graph_),
+              HasSubstr("channel[0].type: channel SENSORS: 'robot_sensor_t' is no message type"));
+  graph_.mutable_channel(0)->set_type("health_t");  // holds strings: no exact size
+  EXPECT_THAT(Problems(graph_), HasSubstr("'health_t' is no message type of a channel"));
+}
+
+TEST_F(GraphTest, UnknownChannel) {
+  graph_.mutable_component(1)->mutable_input(0)->set_channel("SENSOR");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: component[1].input[0].channel: component filter: input sensors: "
+            "unknown channel 'SENSOR'; "
+            "declare it with channel { }");
+}
+
+TEST_F(GraphTest, UnknownAndUnconnectedPorts) {
+  graph_.mutable_component(1)->mutable_input(0)->set_port("sensor");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: component[1]: component filter: input sensors is not connected; add "
+            "input { port: \"sensors\" "
+            "channel: ... }\n"
+            "graph toy_loop: component[1].input[0].port: component filter: input 'sensor' does not "
+            "exist; it has: sensors");
+  graph_ = ToyLoop();
+  graph_.mutable_component(2)->mutable_output()->RemoveLast();
+  graph_.mutable_channel()->DeleteSubrange(4, 1);
+  EXPECT_THAT(Problems(graph_), HasSubstr("component plant: output push is not connected"));
+}
+
+TEST_F(GraphTest, APortConnectedTwice) {
+  *graph_.mutable_component(1)->add_input() = graph_.component(1).input(0);
+  EXPECT_THAT(
+      Problems(graph_),
+      HasSubstr("component[1].input[1].port: component filter: input sensors is connected twice"));
+}
+
+TEST_F(GraphTest, TypeMismatch) {
+  graph_.mutable_component(1)->mutable_input(0)->set_channel("TORQUE");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: component[1].input[0]: component filter: input sensors carries "
+            "robot_sensors_t, but channel "
+            "TORQUE is task_torque_t");
+}
+
+TEST_F(GraphTest, CountsMismatch) {
+  EXPECT_EQ(Problems(graph_, "", "wrong_counts: true"),
+            "graph toy_loop: component[1].input[0]: component filter: input sensors expects "
+            "num_joints = 4, num_feet = 2, but "
+            "plant has num_joints = 3, num_feet = 2 on channel SENSORS");
+}
+
+TEST_F(GraphTest, AnInputNobodyWrites) {
+  graph_.mutable_channel(5)->set_external(false);
+  EXPECT_THAT(Problems(graph_),
+              HasSubstr("channel[5]: channel STOP: controller reads it, but nobody writes it"));
+  graph_ = ToyLoop();
+  Channel* channel = graph_.add_channel();
+  channel->set_name("SPARE");
+  channel->set_type("external_push_t");
+  EXPECT_EQ(
+      Problems(graph_),
+      "graph toy_loop: channel[6]: channel SPARE: nobody writes it; remove it or mark it external");
+}
+
+TEST_F(GraphTest, TwoWriters) {
+  *graph_.add_component() = graph_.component(1);
+  graph_.mutable_component(3)->set_name("filter_2");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: channel[1]: channel STATE has 2 writers (filter, filter_2); one only");
+}
+
+TEST_F(GraphTest, AnExternalChannelWithAWriter) {
+  graph_.mutable_channel(4)->set_external(true);
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: channel[4]: channel PUSH is external, but plant writes it");
+}
+
+TEST_F(GraphTest, KindsOfInputsMustFitTheirChannels) {
+  graph_ = ToyChain();
+  graph_.mutable_channel(0)->set_external(true);
+  graph_.mutable_component()->DeleteSubrange(0, 1);
+  EXPECT_THAT(
+      Problems(graph_),
+      HasSubstr("component sink: input push waits for its message, but channel PUSH is external"));
+}
+
+TEST_F(GraphTest, ALoopInsideATickIsNamed) {
+  EXPECT_EQ(Problems(graph_, "mode: LOOP"),
+            "graph toy_loop: component: loop inside one tick: controller -COMMAND-> controller; "
+            "one input of it must read the "
+            "message of the tick before");
+  // Two filters that feed each other: nobody starts the tick.
+  Graph ring;
+  ParseTextProto(R"(name: "ring"
+                    channel { name: "A" type: "external_push_t" }
+                    channel { name: "B" type: "external_push_t" }
+                    component { name: "a" type: "toy_sink" input { port: "push" channel: "B" } output { port: "sum" channel: "A" } }
+                    component { name: "b" type: "toy_sink" input { port: "push" channel: "A" } output { port: "sum" channel: "B" } })",
+                 "ring", &ring);
+  EXPECT_EQ(Problems(ring),
+            "graph ring: component: no component starts the tick: the first stage of one must read "
+            "only messages of the tick "
+            "before (or none)\n"
+            "graph ring: component: loop inside one tick: a -A-> b -B-> a; one input of it must "
+            "read the message of the tick "
+            "before");
+}
+
+TEST_F(GraphTest, SeveralProblemsAtOnce) {
+  graph_.mutable_component(1)->set_type("none");
+  graph_.mutable_component(2)->mutable_output(0)->set_channel("NOWHERE");
+  const std::string problems = Problems(graph_);
+  EXPECT_THAT(problems, HasSubstr("unknown component type 'none'"));
+  EXPECT_THAT(problems, HasSubstr("unknown channel 'NOWHERE'"));
+  EXPECT_THAT(problems, HasSubstr("controller, filter reads it, but nobody writes it"));
+}
+
+TEST_F(GraphTest, ConfigurationErrorsNameComponentAndLine) {
+  EXPECT_THAT(Problems(graph_, "gains {\n kq: 3 }"), HasSubstr("controller:2:"));
+  EXPECT_EQ(Problems(graph_, "joints: -3"),
+            "controller: input sensors: num_joints = -3 is outside 0 to 4096");
+}
+
+TEST_F(GraphTest, EmptyGraph) {
+  EXPECT_EQ(Problems(Graph()), "graph : component: the graph has no component");
+}
+
+TEST(Progress, OnlyWhoDoesNotLeadBackReports) {
+  EXPECT_TRUE(ProgressReporters(ToyLoop(), 2).empty());
+  EXPECT_FALSE(MustReportProgress(ToyLoop(), 0));
+  EXPECT_THAT(ProgressReporters(ToyChain(), 0), ElementsAre(1));
+  EXPECT_FALSE(MustReportProgress(ToyChain(), 0));
+  EXPECT_TRUE(MustReportProgress(ToyChain(), 1));
+}
+
+TEST(WiringTest, RefusesWhatCannotWork) {
+  Input<robot_sensors_t> input;
+  Output<robot_state_t> output;
+  Wiring wiring;
+  const auto error_of = [](auto&& f) -> std::string {
+    try {
+      f();
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(error_of([&] { wiring.AddInput(&input, "in", {12}); }),
+            "input in: its type has 2 counts, 1 given");
+  EXPECT_EQ(error_of([&] { wiring.AddStage("s", {&input}, {}, {}); }),
+            "stage s: an input of it was not added before");
+  wiring.AddInput(&input, "in", {12, 2});
+  EXPECT_EQ(error_of([&] {
+              wiring.AddInput(&input, "in", {12, 2});
+            }),
+            "input in is declared twice");
+  wiring.AddOutput(&output, "out", {12, 2});
+  wiring.AddStage("s", {&input}, {&output}, [](const Tick&) {});
+  EXPECT_EQ(error_of([&] { wiring.AddStage("t", {}, {&output}, {}); }),
+            "output out belongs to the stages s and t; one only");
+}
+
+}  // namespace
+}  // namespace poise
