@@ -1,4 +1,5 @@
-// Section 5: the centre of pressure kept inside its region by torque in the null space of the COM's height.
+// Section 5: the centre of pressure kept inside its region by torque in the null space of the COM's
+// height.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,17 +13,20 @@ namespace poise::balance {
 
 /// The contacts of one tick, right foot first.
 struct ContactGeometry {
-  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
-                                        Eigen::Isometry3d::Identity()};  ///< sole frames in the world
+  std::array<Eigen::Isometry3d, 2> sole{
+      Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};  ///< sole frames in the world
   std::array<bool, 2> in_contact{true, true};
 };
 
 struct BalanceResult {
-  bool active_x = false, active_y = false;  ///< which coordinate of the task torque's CoP left its bounds
+  bool active_x = false,
+       active_y = false;  ///< which coordinate of the task torque's CoP left its bounds
   Eigen::Isometry3d frame_o = Eigen::Isometry3d::Identity();  ///< in the world
-  Vector6d resultant_task = Vector6d::Zero();  ///< robot on environment, frame O, of the task torque alone
-  Vector6d resultant = Vector6d::Zero();       ///< after balancing
-  Eigen::Vector2d cop_task = Eigen::Vector2d::Zero(), cop = Eigen::Vector2d::Zero();  ///< m, frame O
+  Vector6d resultant_task =
+      Vector6d::Zero();  ///< robot on environment, frame O, of the task torque alone
+  Vector6d resultant = Vector6d::Zero();  ///< after balancing
+  Eigen::Vector2d cop_task = Eigen::Vector2d::Zero(),
+                  cop = Eigen::Vector2d::Zero();          ///< m, frame O
   Eigen::Vector2d cop_desired = Eigen::Vector2d::Zero();  ///< O_d in frame O, m
 };
 
@@ -35,13 +39,15 @@ enum class BalanceStatus {
 /// (35)–(46). Sized once; never allocates afterwards.
 class BalanceControl {
  public:
-  /// `max_protected_rows`: rows of the high-priority task (1: the COM's height). std::invalid_argument when < 1.
+  /// `max_protected_rows`: rows of the high-priority task (1: the COM's height).
+  /// std::invalid_argument when < 1.
   BalanceControl(int num_joints, int max_protected_rows);
 
-  /// Adds to `torque` (k×1, the task torque on entry) the null-space torque Ñ_hᵀ Γ_{a,c} that puts the centre of pressure
-  /// of the resultant on the nearest point of the rectangle |r_x| ≤ half_length, |r_y| ≤ half_width of frame O.
-  /// `protected_task` is the high-priority task h (e.g. COM height), computed for the same `contact`; `geometry` has the
-  /// feet that `contact` was computed for. Not `enabled`: evaluates only.
+  /// Adds to `torque` (k×1, the task torque on entry) the null-space torque Ñ_hᵀ Γ_{a,c} that puts
+  /// the centre of pressure of the resultant on the nearest point of the rectangle |r_x| ≤
+  /// half_length, |r_y| ≤ half_width of frame O. `protected_task` is the high-priority task h (e.g.
+  /// COM height), computed for the same `contact`; `geometry` has the feet that `contact` was
+  /// computed for. Not `enabled`: evaluates only.
   BalanceStatus Compute(const ContactDynamics& contact, const TaskDynamics& protected_task,
                         const ContactGeometry& geometry, const ContactLimits& limits, bool enabled,
                         Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result);

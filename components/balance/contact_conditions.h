@@ -1,4 +1,5 @@
-// Section 4: contact conditions (29)–(33) of a sole, frame O, the resultant (35) and its centre of pressure (37), (38).
+// Section 4: contact conditions (29)–(33) of a sole, frame O, the resultant (35) and its centre of
+// pressure (37), (38).
 #pragma once
 
 #include <Eigen/Core>
@@ -31,18 +32,20 @@ struct ContactMargins {
 /// Margins of a wrench [F; M] of the robot on the environment in the patch's frame.
 ContactMargins CheckContact(const Vector6d& wrench, const ContactLimits& limits);
 
-/// Centre of pressure (r_x, r_y), m, in the wrench's frame: (−M_y/F_z, M_x/F_z). F_z must not be zero.
+/// Centre of pressure (r_x, r_y), m, in the wrench's frame: (−M_y/F_z, M_x/F_z). F_z must not be
+/// zero.
 Eigen::Vector2d CenterOfPressure(const Vector6d& wrench);
 
-/// Frame O in the world. Both feet: midway between the soles, y along the line from the right to the left sole centre, z
-/// as near to the soles' mean normal as that allows. One foot: that sole's frame. `in_contact` right first.
-/// False, and `frame` unchanged, without a contact, when the soles' centres coincide (within 1 µm), when the line between
-/// them is parallel to the mean normal or when a pose is not finite.
+/// Frame O in the world. Both feet: midway between the soles, y along the line from the right to
+/// the left sole centre, z as near to the soles' mean normal as that allows. One foot: that sole's
+/// frame. `in_contact` right first. False, and `frame` unchanged, without a contact, when the
+/// soles' centres coincide (within 1 µm), when the line between them is parallel to the mean normal
+/// or when a pose is not finite.
 bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool, 2>& in_contact,
             Eigen::Isometry3d* frame);
 
-/// K block of one foot, (35) and (44) corrected: wrench in its sole frame → wrench in `frame`, [R 0; P̂R R].
-/// Both frames are given in the same frame, e.g. the world.
+/// K block of one foot, (35) and (44) corrected: wrench in its sole frame → wrench in `frame`, [R
+/// 0; P̂R R]. Both frames are given in the same frame, e.g. the world.
 Matrix6d WrenchTransform(const Eigen::Isometry3d& frame, const Eigen::Isometry3d& sole);
 
 }  // namespace poise::balance

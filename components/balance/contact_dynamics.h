@@ -7,38 +7,39 @@ namespace poise::balance {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
-/// Read-only arguments. One row of a matrix is passed as middleRows(i, 1): row(i) has another storage order, so that
-/// binding it would copy to the heap.
+/// Read-only arguments. One row of a matrix is passed as middleRows(i, 1): row(i) has another
+/// storage order, so that binding it would copy to the heap.
 using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
 
 /// Joints that the tick path has scratch for.
 inline constexpr int kMaxJoints = 128;
 
-/// The same dynamics with the contacts solved for, in joint coordinates. With the first foot in contact as root, the base
-/// follows the joints, q̈_b = Φ q̈_j + a_b, and a second foot leaves the loop H q̈_j = −γ:
+/// The same dynamics with the contacts solved for, in joint coordinates. With the first foot in
+/// contact as root, the base follows the joints, q̈_b = Φ q̈_j + a_b, and a second foot leaves the
+/// loop H q̈_j = −γ:
 ///   M q̈_j + h + Hᵀ F_2 = Γ_a.
 /// An orthonormal basis V of null(H) makes every matrix of the paper small: with Vᵀ M V = L Lᵀ,
 ///   A⁻¹ N_cᵀ = Z Zᵀ, Z = [Φ; I] V L⁻ᵀ,  W = (V L⁻ᵀ)(V L⁻ᵀ)ᵀ,  W⁺ = V Vᵀ M V Vᵀ.
 /// null(W) is the range of Hᵀ: known, not searched for. Without a second foot V = I.
 /// k×k buffers hold their matrix in the top left corner; r = k − (m − 6) is the rank of W.
 struct ReducedDynamics {
-  int num_joints = 0;         ///< k
-  int num_contact_rows = 0;   ///< m
-  Eigen::MatrixXd phi_t;      ///< Φᵀ, k×6
-  Eigen::MatrixXd psi_t;      ///< ([A_bb A_bj] [Φ; I])ᵀ, k×6: base rows of A q̈ = A_bb a_b + Ψ q̈_j
-  Eigen::MatrixXd mass;       ///< M, k×k
-  Eigen::MatrixXd rotation;   ///< [Q₁ V], k×k, of Hᵀ = Q₁ R (two feet only)
-  Eigen::MatrixXd mass_basis; ///< M V, k×r (two feet only)
-  Eigen::MatrixXd factor;     ///< L, r×r, lower
-  Eigen::MatrixXd loop;       ///< Hᵀ's Householder vectors and R, k×6 (two feet only)
-  Matrix6d base_mass;         ///< A_bb
-  Matrix6d root_transfer;     ///< G_1⁻ᵀ: base wrench → wrench of the root foot
-  Matrix6d second_transfer;   ///< G_2ᵀ: wrench of the second foot → base wrench
+  int num_joints = 0;        ///< k
+  int num_contact_rows = 0;  ///< m
+  Eigen::MatrixXd phi_t;     ///< Φᵀ, k×6
+  Eigen::MatrixXd psi_t;  ///< ([A_bb A_bj] [Φ; I])ᵀ, k×6: base rows of A q̈ = A_bb a_b + Ψ q̈_j
+  Eigen::MatrixXd mass;        ///< M, k×k
+  Eigen::MatrixXd rotation;    ///< [Q₁ V], k×k, of Hᵀ = Q₁ R (two feet only)
+  Eigen::MatrixXd mass_basis;  ///< M V, k×r (two feet only)
+  Eigen::MatrixXd factor;      ///< L, r×r, lower
+  Eigen::MatrixXd loop;        ///< Hᵀ's Householder vectors and R, k×6 (two feet only)
+  Matrix6d base_mass;          ///< A_bb
+  Matrix6d root_transfer;      ///< G_1⁻ᵀ: base wrench → wrench of the root foot
+  Matrix6d second_transfer;    ///< G_2ᵀ: wrench of the second foot → base wrench
 
   /// Terms that do not depend on the torque, linear in (b + g, J̇_c q̇).
   struct Bias {
-    Eigen::VectorXd joint_torque;        ///< h, k×1, the particular acceleration's inertia included
+    Eigen::VectorXd joint_torque;  ///< h, k×1, the particular acceleration's inertia included
     Eigen::VectorXd joint_acceleration;  ///< of the particular solution, k×1
     Vector6d base_acceleration;          ///< a_b
     Vector6d base_wrench;                ///< −(A_bb a_b + base rows of b + g)
@@ -50,16 +51,19 @@ struct ReducedDynamics {
   int rank() const { return num_joints - (num_contact_rows - 6); }
 };
 
-/// Contact-constrained dynamics at one state. n = k + 6 velocities, m = 6 or 12 contact rows (right foot first, each
-/// [force; moment] in its own sole frame, wrench of the robot on the environment). Sized once; Compute never allocates.
+/// Contact-constrained dynamics at one state. n = k + 6 velocities, m = 6 or 12 contact rows (right
+/// foot first, each [force; moment] in its own sole frame, wrench of the robot on the environment).
+/// Sized once; Compute never allocates.
 class ContactDynamics {
  public:
-  /// `num_joints` k, 6 < k ≤ kMaxJoints (std::invalid_argument otherwise). Room for two feet.
+  /// `num_joints` k, 1 ≤ k ≤ kMaxJoints; two feet need k > 6 (std::invalid_argument otherwise).
+  /// Room for two feet.
   explicit ContactDynamics(int num_joints);
 
-  /// (4)–(11) and (22). `mass_matrix` n×n symmetric, `bias` b and `gravity` g n×1, `contact_jacobian` J_c m×n whose base
-  /// columns are rigid transforms [Rᵀ −Rᵀp̂; 0 Rᵀ], `contact_bias` J̇_c q̇ m×1. False, and then nothing else is valid, when
-  /// a size is wrong, J_c is not of that form, A is not positive definite on the motions that the contacts leave, the
+  /// (4)–(11) and (22). `mass_matrix` n×n symmetric, `bias` b and `gravity` g n×1,
+  /// `contact_jacobian` J_c m×n whose base columns are rigid transforms [Rᵀ −Rᵀp̂; 0 Rᵀ],
+  /// `contact_bias` J̇_c q̇ m×1. False, and then nothing else is valid, when a size is wrong, J_c is
+  /// not of that form, A is not positive definite on the motions that the contacts leave, the
   /// contacts are dependent (J_c A⁻¹ J_cᵀ not positive definite) or an input is not finite.
   bool Compute(const MatrixRef& mass_matrix, const VectorRef& bias, const VectorRef& gravity,
                const MatrixRef& contact_jacobian, const VectorRef& contact_bias);
@@ -91,7 +95,7 @@ class ContactDynamics {
 
   ReducedDynamics reduced_;
   Eigen::MatrixXd contact_jacobian_;  // 12×n
-  Eigen::VectorXd bias_, gravity_, contact_bias_;
+  Eigen::VectorXd bias_, gravity_, force_, contact_bias_;
 };
 
 }  // namespace poise::balance

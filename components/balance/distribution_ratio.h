@@ -1,8 +1,9 @@
 // Appendix: the ratio η = F_z,r / F_z that shares the resultant between the feet, and its bounds.
 //
-// Each foot takes its share of the force and of the moments about the soles' own centres, which are linear in η; so a
-// condition on a moment is |a η + b| < |c|, the same for both feet when they are parallel to frame O. Everywhere,
-// `resultant` is the robot's on the environment in frame O, and arrays hold the right foot first.
+// Each foot takes its share of the force and of the moments about the soles' own centres, which are
+// linear in η; so a condition on a moment is |a η + b| < |c|, the same for both feet when they are
+// parallel to frame O. Everywhere, `resultant` is the robot's on the environment in frame O, and
+// arrays hold the right foot first.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,23 +18,27 @@ namespace poise::balance {
 struct RatioInterval {
   bool feasible = false;
   double min = 0, max = 1;  ///< valid when feasible
-  double optimal = 0.5;     ///< η* = −b/a of (71), (72): M_x of both feet zero; unbounded; 0.5 when a = 0
-  /// Which condition left no η ("normal", "friction", "roll", "pitch", "yaw"), for messages; nullptr when feasible.
+  double optimal =
+      0.5;  ///< η* = −b/a of (71), (72): M_x of both feet zero; unbounded; 0.5 when a = 0
+  /// Which condition left no η ("normal", "friction", "roll", "pitch", "yaw"), for messages;
+  /// nullptr when feasible.
   const char* limiting_condition = nullptr;
 };
 
-/// Bounds of η from |a η + b| < |c| for M_x, M_y, M_z, (70)–(79), intersected with [eta_min, eta_max] and [0, 1]. (29) and
-/// (30) do not depend on η: broken, no η is feasible. `foot_in_o`: sole centres in O, m; feet parallel to O.
+/// Bounds of η from |a η + b| < |c| for M_x, M_y, M_z, (70)–(79), intersected with [eta_min,
+/// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot_in_o`:
+/// sole centres in O, m; feet parallel to O.
 RatioInterval FeasibleRatio(const Vector6d& resultant,
                             const std::array<Eigen::Vector3d, 2>& foot_in_o,
                             const ContactLimits& limits, double eta_min, double eta_max);
-/// The same for feet turned or tilted in O: each foot's conditions hold in its own sole frame. `foot`: soles in O.
+/// The same for feet turned or tilted in O: each foot's conditions hold in its own sole frame.
+/// `foot`: soles in O.
 RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
                             const ContactLimits& limits, double eta_min, double eta_max);
 
-/// The ratio to use: η* clipped to a feasible interval. Infeasible: the ratio in [eta_min, eta_max] that minimises the
-/// largest violation |a η + b| − |c| (N·m, per unit of load share) of the moment conditions. Always finite and within
-/// [eta_min, eta_max], which lie in [0, 1].
+/// The ratio to use: η* clipped to a feasible interval. Infeasible: the ratio in [eta_min, eta_max]
+/// that minimises the largest violation |a η + b| − |c| (N·m, per unit of load share) of the moment
+/// conditions. Always finite and within [eta_min, eta_max], which lie in [0, 1].
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
                    double eta_min, double eta_max);
@@ -41,9 +46,10 @@ double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Isometry3d, 2>& foot, const ContactLimits& limits,
                    double eta_min, double eta_max);
 
-/// (62)–(67): each foot's share of the resultant, in its own sole frame. `foot`: sole frames in O. The shares' resultant is
-/// `resultant` for every η.
+/// (62)–(67): each foot's share of the resultant, in its own sole frame. `foot`: sole frames in O.
+/// The shares' resultant is `resultant` for every η.
 std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,
-                                            const std::array<Eigen::Isometry3d, 2>& foot, double eta);
+                                            const std::array<Eigen::Isometry3d, 2>& foot,
+                                            double eta);
 
 }  // namespace poise::balance

@@ -7,9 +7,10 @@
 
 namespace poise::balance {
 
-/// Γ_{a,n} of (52) in closed form: S J_cᵀ ΔF, for a change ΔF (12×1, right foot first, sole frames) of the contact
-/// wrenches with zero resultant. It produces exactly ΔF and no acceleration. `contact_jacobian` 12×n; k×1 into `torque`.
-/// Returns the norm of the base rows of J_cᵀ ΔF (zero when the resultant is): the caller's check. NaN for wrong sizes.
+/// Γ_{a,n} of (52) in closed form: S J_cᵀ ΔF, for a change ΔF (12×1, right foot first, sole frames)
+/// of the contact wrenches with zero resultant. It produces exactly ΔF and no acceleration.
+/// `contact_jacobian` 12×n; k×1 into `torque`. Returns the norm of the base rows of J_cᵀ ΔF (zero
+/// when the resultant is): the caller's check. NaN for wrong sizes.
 double RedistributionTorque(const MatrixRef& contact_jacobian, const VectorRef& wrench_change,
                             Eigen::Ref<Eigen::VectorXd> torque);
 

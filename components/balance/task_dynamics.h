@@ -7,22 +7,23 @@
 
 namespace poise::balance {
 
-/// Operational-space dynamics of t stacked task rows, t ≤ rank of W. Sized once; never allocates afterwards.
+/// Operational-space dynamics of t stacked task rows, t ≤ rank of W. Sized once; never allocates
+/// afterwards.
 class TaskDynamics {
  public:
   /// `max_task_rows` ≥ 1; std::invalid_argument for sizes that cannot work.
   TaskDynamics(int num_joints, int max_task_rows);
 
-  /// (14)–(17), (23), (27) for J t×n and J̇q̇ t×1. `contact` must hold the same state and outlive the use of the results.
-  /// False, and then nothing else is valid, when a size is wrong, the tasks are not independent under the contacts or an
-  /// input is not finite.
+  /// (14)–(17), (23), (27) for J t×n and J̇q̇ t×1. `contact` must hold the same state and outlive the
+  /// use of the results. False, and then nothing else is valid, when a size is wrong, the tasks are
+  /// not independent under the contacts or an input is not finite.
   bool Compute(const ContactDynamics& contact, const MatrixRef& jacobian,
                const VectorRef& bias_acceleration);
 
   int num_rows() const { return rows_; }
 
-  /// (24), corrected: Γ = J̃ᵀ (Λ f* + μ + p), gravity and velocity terms included. `acceleration` is f*, t×1; k×1 into
-  /// `torque`. For no task at all see GravityCompensation.
+  /// (24), corrected: Γ = J̃ᵀ (Λ f* + μ + p), gravity and velocity terms included. `acceleration` is
+  /// f*, t×1; k×1 into `torque`. For no task at all see GravityCompensation.
   void TaskTorque(const VectorRef& acceleration, Eigen::Ref<Eigen::VectorXd> torque) const;
   /// Projects a torque into the tasks' null space, Ñᵀ Γ of (26), k×1, in place.
   void ProjectIntoNullSpace(Eigen::Ref<Eigen::VectorXd> torque) const;
@@ -34,7 +35,8 @@ class TaskDynamics {
   Eigen::MatrixXd JBarTranspose() const;    ///< J̄ᵀ, t×n, (15)
   Eigen::MatrixXd JTildeTranspose() const;  ///< J̃ᵀ, k×t, (23)
 
-  // What Compute kept, in the reduced coordinates y = Lᵀ Vᵀ q̈_j of ReducedDynamics, where ẍ = T y + drift.
+  // What Compute kept, in the reduced coordinates y = Lᵀ Vᵀ q̈_j of ReducedDynamics, where ẍ = T y +
+  // drift.
   /// T = J A⁻¹ N_cᵀ Sᵀ (W⁺)^½, t×r: T Tᵀ = Λ⁻¹.
   MatrixRef reduced_jacobian() const { return reduced_jacobian_.topLeftCorner(rows_, rank_); }
   /// Lower Cholesky factor of Λ⁻¹, t×t.
@@ -50,8 +52,8 @@ class TaskDynamics {
   Eigen::VectorXd load_;              // Λ⁻¹ (μ + p), t×1
 };
 
-/// Minimum-norm joint torques that hold a robot at rest still against gravity (section 7.1: no task):
-/// Γ = W⁺ S A⁻¹ N_cᵀ g, the solution of N_cᵀ (Sᵀ Γ − g) = 0; k×1 into `torque`.
+/// Minimum-norm joint torques that hold a robot at rest still against gravity (section 7.1: no
+/// task): Γ = W⁺ S A⁻¹ N_cᵀ g, the solution of N_cᵀ (Sᵀ Γ − g) = 0; k×1 into `torque`.
 void GravityCompensation(const ContactDynamics& contact, Eigen::Ref<Eigen::VectorXd> torque);
 
 }  // namespace poise::balance

@@ -1,4 +1,5 @@
-// The robot's dynamics with its contacts at one state, computed once for everybody who asks in one process.
+// The robot's dynamics with its contacts at one state, computed once for everybody who asks in one
+// process.
 #pragma once
 
 #include <array>
@@ -10,16 +11,18 @@
 
 namespace poise::balance {
 
-/// Kinematics, dynamics and contact dynamics of a state. A pure function of its arguments: asking again with equal
-/// arguments costs a comparison, so components of one process may share one object. Never allocates after construction.
+/// Kinematics, dynamics and contact dynamics of a state. A pure function of its arguments: asking
+/// again with equal arguments costs a comparison, so components of one process may share one
+/// object. Never allocates after construction.
 class WholeBody {
  public:
   explicit WholeBody(std::shared_ptr<const robot::RobotModel> model);
 
-  /// Kinematics and feet only (data().foot_*). Enough for redistribution. `state` sized for the model.
+  /// Kinematics and feet only (data().foot_*). Enough for redistribution. `state` sized for the
+  /// model.
   void UpdateKinematics(const robot::RobotState& state);
-  /// Everything, for the given contacts (right first). False when the contact dynamics do not exist (non-finite state,
-  /// feet in a singular posture, no contact).
+  /// Everything, for the given contacts (right first). False when the contact dynamics do not exist
+  /// (non-finite state, feet in a singular posture, no contact).
   bool Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact);
 
   const robot::RobotModel& model() const { return *model_; }
@@ -27,8 +30,8 @@ class WholeBody {
   const ContactDynamics& contact() const { return contact_; }  ///< valid after Update returned true
   /// Sole frames and contacts of the last Update.
   ContactGeometry geometry() const;
-  /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment] right first. `jacobian`
-  /// is resized when it does not have the right size already.
+  /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment]
+  /// right first. `jacobian` is resized when it does not have the right size already.
   void ContactJacobian(const std::array<bool, 2>& in_contact, Eigen::MatrixXd* jacobian) const;
 
  private:

@@ -1,0 +1,88 @@
+#include "components/balance/whole_body.h"
+
+namespace poise::balance {
+namespace {
+
+bool Same(const robot::RobotState& a, const robot::RobotState& b) {
+  return a.base_position == b.base_position &&
+         a.base_orientation.coeffs() == b.base_orientation.coeffs() &&
+         a.base_linear_velocity == b.base_linear_velocity &&
+         a.base_angular_velocity == b.base_angular_velocity &&
+         a.joint_position == b.joint_position && a.joint_velocity == b.joint_velocity;
+}
+
+}  // namespace
+
+WholeBody::WholeBody(std::shared_ptr<const robot::RobotModel> model)
+    : model_(std::move(model)),
+      data_(*model_),
+      contact_(model_->num_joints()),
+      state_(model_->num_joints()) {
+  contact_jacobian_[0].setZero(6, model_->num_velocities());
+  contact_jacobian_[1].setZero(12, model_->num_velocities());
+  contact_bias_.setZero(12);
+}
+
+void WholeBody::UpdateKinematics(const robot::RobotState& state) {
+  if (have_kinematics_ && Same(state, state_)) return;
+  state_ = state;
+  have_kinematics_ = true;
+  have_dynamics_ = have_contacts_ = false;
+  robot::ComputeKinematics(*model_, state_, &data_);
+  robot::ComputeFeet(*model_, &data_);
+}
+
+bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact) {
+  UpdateKinematics(state);
+  if (!have_dynamics_) {
+    robot::ComputeDynamics(*model_, state_, &data_);
+    have_dynamics_ = true;
+  }
+  if (!have_contacts_ || in_contact != in_contact_) {
+    in_contact_ = in_contact;
+    contacts_valid_ = UpdateContacts();
+    have_contacts_ = true;
+  }
+  return contacts_valid_;
+}
+
+bool WholeBody::UpdateContacts() {
+  const int feet = in_contact_[0] + in_contact_[1];
+  if (feet == 0) return false;
+  Eigen::MatrixXd& jacobian = contact_jacobian_[feet - 1];
+  ContactJacobian(in_contact_, &jacobian);
+  int row = 0;
+  for (int i = 0; i < 2; ++i) {
+    if (!in_contact_[i]) continue;
+    // The sole stands still, so that turning J̇ v into its axes is all that its rotation asks for.
+    const auto to_sole = data_.foot_pose[i].linear().transpose();
+    contact_bias_.segment<3>(row) = to_sole * data_.foot_bias_acceleration[i].head<3>();
+    contact_bias_.segment<3>(row + 3) = to_sole * data_.foot_bias_acceleration[i].tail<3>();
+    row += 6;
+  }
+  return contact_.Compute(data_.mass_matrix, data_.bias, data_.gravity, jacobian,
+                          contact_bias_.head(6 * feet));
+}
+
+ContactGeometry WholeBody::geometry() const {
+  return {{data_.foot_pose[0], data_.foot_pose[1]}, in_contact_};
+}
+
+void WholeBody::ContactJacobian(const std::array<bool, 2>& in_contact,
+                                Eigen::MatrixXd* jacobian) const {
+  const Eigen::Index n = model_->num_velocities();
+  jacobian->resize(6 * (in_contact[0] + in_contact[1]), n);
+  Eigen::Index row = 0;
+  for (int i = 0; i < 2; ++i) {
+    if (!in_contact[i]) continue;
+    const Eigen::Matrix3d to_sole = data_.foot_pose[i].linear().transpose();
+    const robot::Matrix6X& world = data_.foot_jacobian[i];
+    for (Eigen::Index j = 0; j < n; ++j) {
+      jacobian->block<3, 1>(row, j) = to_sole * world.block<3, 1>(0, j);
+      jacobian->block<3, 1>(row + 3, j) = to_sole * world.block<3, 1>(3, j);
+    }
+    row += 6;
+  }
+}
+
+}  // namespace poise::balance
