@@ -1,0 +1,164 @@
+#include "logging/analysis.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_conditions.h"
+#include "components/messages/conversions.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr double kWrenchTolerance = 1e-6;  // N, N·m
+constexpr double kCopTolerance = 1e-9;     // m
+
+Eigen::Quaterniond Rotation(const double (&q)[4]) {
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+}
+
+bool InContact(const task_torque_t& task, int foot) {
+  return task.in_contact[static_cast<size_t>(foot)] != 0;
+}
+
+Answer Fold(const RunRecord& run, const std::function<Answer(int64_t)>& value,
+            const std::function<double(double, double)>& join) {
+  Answer result;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (const Answer v = value(tick)) result = result ? join(*result, *v) : *v;
+  }
+  return result;
+}
+
+}  // namespace
+
+Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, [](double a, double b) { return std::max(a, b); });
+}
+
+Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, [](double a, double b) { return std::min(a, b); });
+}
+
+Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  int64_t count = 0;
+  const Answer sum = Fold(
+      run,
+      [&](int64_t tick) -> Answer {
+        const Answer v = value(tick);
+        if (!v) return {};
+        ++count;
+        return *v * *v;
+      },
+      [](double a, double b) { return a + b; });
+  if (!sum) return {};
+  return std::sqrt(*sum / static_cast<double>(count));
+}
+
+Answer CountTicks(const RunRecord& run, const std::function<std::optional<bool>(int64_t)>& holds) {
+  return Fold(
+      run,
+      [&](int64_t tick) -> Answer {
+        const std::optional<bool> h = holds(tick);
+        if (!h) return {};
+        return *h ? 1.0 : 0.0;
+      },
+      [](double a, double b) { return a + b; });
+}
+
+std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
+  if (run.balance.empty()) return {};
+  BalancingIntervals result;
+  bool before = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const balance_torque_t* balance = run.balance.at(tick);
+    const bool on = balance != nullptr && (balance->active_x != 0 || balance->active_y != 0);
+    if (on && !before && result.activations++ == 0) result.first = run.time(tick);
+    if (on) {
+      result.last = run.time(tick);
+      result.active += run.spec.tick_period();
+    }
+    before = on;
+  }
+  return result;
+}
+
+std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  const task_torque_t* task = run.task.at(tick - 1);
+  const balance_torque_t* balance = run.balance.at(tick - 1);
+  if (sensors == nullptr || task == nullptr || balance == nullptr) return {};
+  const Eigen::Isometry3d frame = GetPose(balance->frame_o);
+  balance::Vector6d resultant = balance::Vector6d::Zero();
+  for (int foot = 0; foot < task->num_feet; ++foot) {
+    if (!InContact(*task, foot)) continue;
+    const auto f = static_cast<size_t>(foot);
+    resultant += balance::WrenchTransform(frame, GetPose(task->foot_pose[f])) *
+                 GetWrench(sensors->foot_wrench[f]);
+  }
+  if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
+  return balance::CenterOfPressure(resultant);
+}
+
+std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
+                                                       int64_t tick) {
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  const task_torque_t* task = run.task.at(tick - 1);
+  const joint_command_t* command = run.command.at(tick - 1);
+  if (sensors == nullptr || task == nullptr || command == nullptr) return {};
+  if (!InContact(*task, foot)) return {};
+  const auto f = static_cast<size_t>(foot);
+  return GetWrench(sensors->foot_wrench[f]) - GetWrench(command->foot_wrench[f]);
+}
+
+Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {
+  const joint_command_t* command = run.command.at(tick);
+  const auto f = static_cast<size_t>(foot);
+  if (command == nullptr || command->in_contact[f] == 0) return {};
+  const contact_margins_t& m = command->margins[f];
+  const std::array<double, 5> margins = {m.normal, m.friction, m.yaw, m.roll, m.pitch};
+  return margins[static_cast<size_t>(margin)];
+}
+
+std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
+  const joint_command_t* command = run.command.at(tick);
+  const balance_torque_t* balance = run.balance.at(tick);
+  if (command == nullptr || balance == nullptr) return {};
+  for (int foot = 0; foot < command->num_feet; ++foot) {
+    if (command->conditions_met[static_cast<size_t>(foot)] == 0) return true;
+    for (int margin = 0; margin < 5; ++margin) {
+      const Answer m = FootMargin(run, foot, margin, tick);
+      if (m && !(*m >= -kWrenchTolerance)) return true;
+    }
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!(std::abs(balance->cop[axis]) <= balance->cop_limit[axis] + kCopTolerance)) return true;
+  }
+  return false;
+}
+
+double JointTorqueLimit(const RunRecord& run, size_t joint) {
+  const robot::MotorModel& motor = run.robot.motors()[joint];
+  return std::min(run.robot.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
+}
+
+std::optional<EstimatorError> BaseError(const RunRecord& run, int64_t tick) {
+  const robot_state_t* state = run.state.at(tick);
+  const ground_truth_t* truth = run.truth.at(tick);
+  if (state == nullptr || truth == nullptr) return {};
+  EstimatorError error;
+  error.position = (GetVector3(state->base_position) - GetVector3(truth->base_position)).norm();
+  error.velocity =
+      (GetVector3(state->base_linear_velocity) - GetVector3(truth->base_linear_velocity)).norm();
+  const Eigen::Quaterniond estimated = Rotation(state->base_orientation);
+  const Eigen::Quaterniond actual = Rotation(truth->base_orientation);
+  // The world's vertical seen from the base.
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d a = estimated.conjugate() * up;
+  const Eigen::Vector3d b = actual.conjugate() * up;
+  error.tilt = std::atan2(a.cross(b).norm(), a.dot(b));
+  error.rotation = estimated.angularDistance(actual);
+  return error;
+}
+
+}  // namespace poise::logging

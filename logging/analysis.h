@@ -1,0 +1,64 @@
+// Questions to a run's record, answered over the ticks from RunRecord::first_tick on. An empty
+// optional: the record holds nothing to answer with.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <optional>
+
+#include "logging/run_record.h"
+
+namespace poise::logging {
+
+using Answer = std::optional<double>;
+
+/// Largest and root-mean-square of what `value` gives, over the ticks where it gives something.
+Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t tick)>& value);
+Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t tick)>& value);
+Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t tick)>& value);
+/// Number of ticks for which `holds` is true; empty when it is empty for all.
+Answer CountTicks(const RunRecord& run,
+                  const std::function<std::optional<bool>(int64_t tick)>& holds);
+
+/// Balancing, section 5: on at a tick when the CoP is controlled along x or y.
+struct BalancingIntervals {
+  int activations = 0;
+  double first = 0;   ///< s, first tick on
+  double last = 0;    ///< s, last tick on
+  double active = 0;  ///< s, in sum
+};
+/// Empty without BALANCE_TORQUE messages; activations 0 when it was never on.
+std::optional<BalancingIntervals> Balancing(const RunRecord& run);
+
+/// m, centre of pressure (r_x, r_y) in frame O, (37), (38), of what the feet's sensors read at
+/// `tick`, of the feet in contact. A reading shows the command of the tick before, so frame O and
+/// the soles' poses are those of the tick before.
+std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick);
+
+/// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
+/// frame; empty for a foot out of contact.
+std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
+                                                       int64_t tick);
+
+/// Margin 0..4 (normal, friction, yaw, roll, pitch) of a foot's computed wrench; empty out of
+/// contact.
+Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick);
+
+/// True when a computed wrench of a foot in contact, or the computed resultant's CoP, breaks its
+/// conditions at `tick`: (29)-(33) by more than 1e-6 N or N·m; (37), (38) by more than 1 nm.
+std::optional<bool> Violated(const RunRecord& run, int64_t tick);
+
+/// N·m, smaller of the URDF's effort and what the motor gives at peak current.
+double JointTorqueLimit(const RunRecord& run, size_t joint);
+
+/// Estimate less truth of the base.
+struct EstimatorError {
+  double position = 0;  ///< m
+  double velocity = 0;  ///< m/s, linear
+  double tilt = 0;      ///< rad, angle between estimated and true vertical
+  double rotation = 0;  ///< rad, whole rotation, heading included
+};
+std::optional<EstimatorError> BaseError(const RunRecord& run, int64_t tick);
+
+}  // namespace poise::logging

@@ -1,0 +1,138 @@
+#include "logging/compare.h"
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "components/framework/packet_filter.h"
+#include "fmt/format.h"
+#include "logging/run_record.h"
+#include "poise/message_traits.hpp"
+
+namespace poise::logging {
+namespace {
+
+/// Messages by tick and channel index; the spans live as long as the reader.
+struct Messages {
+  LogReader reader;
+  RunSpec spec;
+  std::map<std::pair<int64_t, int>, std::span<const uint8_t>> by_tick;
+
+  explicit Messages(const std::string& path) : reader(path) {
+    ReadRunInfo(&reader, path, &spec);
+    std::map<std::string, int, std::less<>> index;
+    for (int i = 0; i < spec.graph().channel_size(); ++i) {
+      if (!spec.graph().channel(i).external()) index[spec.graph().channel(i).name()] = i;
+    }
+    LogEvent event;
+    while (reader.Next(&event)) {
+      const auto channel = index.find(event.channel);
+      if (channel == index.end()) continue;
+      const MessageType* type = FindMessageType(spec.graph().channel(channel->second).type());
+      const auto header_end = static_cast<size_t>(type->run_id_offset) + 24;
+      if (event.data.size() < header_end) continue;
+      const int64_t tick = ReadInt64(event.data.data() + type->run_id_offset + 8);
+      by_tick.try_emplace({tick, channel->second}, event.data);
+    }
+  }
+};
+
+class Values final : public ScalarVisitor {
+ public:
+  void Integer(std::string_view path, int64_t value) override {
+    values.emplace_back(path, fmt::format("{}", value));
+  }
+  void Real(std::string_view path, double value) override {
+    values.emplace_back(path, fmt::format("{:.17g}", value));
+  }
+  void Text(std::string_view path, std::string_view value) override {
+    values.emplace_back(path, value);
+  }
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+bool SameBits(std::span<const uint8_t> a, std::span<const uint8_t> b, int run_id_offset) {
+  const auto run_id = static_cast<size_t>(run_id_offset);
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), run_id) == 0 &&
+         std::memcmp(a.data() + run_id + 8, b.data() + run_id + 8, a.size() - run_id - 8) == 0;
+}
+
+void DescribeField(const MessageType& type, std::span<const uint8_t> a, std::span<const uint8_t> b,
+                   LogDifference* difference) {
+  Values first;
+  Values second;
+  if (!type.visit(a.data(), static_cast<int64_t>(a.size()), &first) ||
+      !type.visit(b.data(), static_cast<int64_t>(b.size()), &second)) {
+    difference->field = "(not decodable)";
+    return;
+  }
+  for (size_t i = 0; i < std::min(first.values.size(), second.values.size()); ++i) {
+    if (first.values[i] == second.values[i] || first.values[i].first == "run_id") continue;
+    difference->field = first.values[i].first;
+    difference->first = first.values[i].second;
+    difference->second = second.values[i].second;
+    return;
+  }
+  difference->field = "(number of elements)";
+}
+
+}  // namespace
+
+LogComparison CompareLogs(const std::string& first, const std::string& second) {
+  const Messages a(first);
+  const Messages b(second);
+  const auto& graph = a.spec.graph();
+  bool same_channels = graph.channel_size() == b.spec.graph().channel_size();
+  for (int i = 0; same_channels && i < graph.channel_size(); ++i) {
+    same_channels = graph.channel(i).name() == b.spec.graph().channel(i).name() &&
+                    graph.channel(i).type() == b.spec.graph().channel(i).type();
+    if (FindMessageType(graph.channel(i).type()) == nullptr) {
+      throw LogError(fmt::format("{}: unknown message type {}", first, graph.channel(i).type()));
+    }
+  }
+  if (!same_channels) {
+    throw LogError(fmt::format("{} and {}: their graphs have different channels", first, second));
+  }
+
+  LogComparison result;
+  const auto note = [&](LogDifference difference) {
+    if (!result.earliest) result.earliest = std::move(difference);
+  };
+  auto i = a.by_tick.begin();
+  auto j = b.by_tick.begin();
+  int64_t last_tick = -1;
+  while (i != a.by_tick.end() || j != b.by_tick.end()) {
+    const bool take_a = j == b.by_tick.end() || (i != a.by_tick.end() && i->first <= j->first);
+    const bool take_b = i == a.by_tick.end() || (j != b.by_tick.end() && j->first <= i->first);
+    const auto [tick, index] = take_a ? i->first : j->first;
+    const Channel& channel = graph.channel(index);
+    if (take_a && take_b) {
+      ++result.messages;
+      result.ticks += tick != last_tick ? 1 : 0;
+      last_tick = tick;
+      const MessageType& type = *FindMessageType(channel.type());
+      if (!SameBits(i->second, j->second, type.run_id_offset)) {
+        ++result.differing;
+        if (!result.earliest) {
+          LogDifference difference{tick, channel.name(), {}, {}, {}};
+          DescribeField(type, i->second, j->second, &difference);
+          note(std::move(difference));
+        }
+      }
+    } else if (take_a) {
+      ++result.only_first;
+      note({tick, channel.name(), "", "present", "absent"});
+    } else {
+      ++result.only_second;
+      note({tick, channel.name(), "", "absent", "present"});
+    }
+    if (take_a) ++i;
+    if (take_b) ++j;
+  }
+  return result;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,140 @@
+#include "logging/run_log_writer.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+
+#include "components/framework/configuration.h"
+#include "components/framework/packet_filter.h"
+#include "fmt/chrono.h"
+#include "fmt/format.h"
+#include "poise/message_traits.hpp"
+
+namespace poise::logging {
+
+RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info)
+    : path_(path), log_(lcm_eventlog_create(path.c_str(), "w")) {
+  if (!log_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  health_utime_offset_ = FindMessageType("health_t")->run_id_offset + 16;
+  for (const Channel& channel : spec.graph().channel()) {
+    const MessageType* type = FindMessageType(channel.type());
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    if (type == nullptr || !type->has_header || counts.size() != type->count_names.size()) {
+      throw ConfigError(
+          fmt::format("channel {}: no type and counts of a channel's message; fill "
+                      "them in from the checked graph",
+                      channel.name()));
+    }
+    Lane lane;
+    lane.name = channel.name();
+    lane.external = channel.external();
+    lane.size = static_cast<size_t>(type->encoded_size(counts));
+    lane.utime_offset = type->run_id_offset + 16;
+    if (!lane.external) lane.bytes.resize(lane.size * static_cast<size_t>(capacity_));
+    lanes_.push_back(std::move(lane));
+  }
+  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
+  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  Write(kRunInfoChannel, 0, bytes);
+  Flush();
+}
+
+RunLogWriter::~RunLogWriter() = default;
+
+void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t> data) {
+  Lane& lane = lanes_[static_cast<size_t>(channel)];
+  if (data.size() != lane.size) {
+    throw std::logic_error(
+        fmt::format("{}: {} bytes instead of {}", lane.name, data.size(), lane.size));
+  }
+  if (lane.external) {
+    Write(lane.name, ReadInt64(data.data() + lane.utime_offset), data);
+    return;
+  }
+  if (tick != lane.next_tick) {
+    throw std::logic_error(
+        fmt::format("{}: tick {} where {} was due", lane.name, tick, lane.next_tick));
+  }
+  if (tick - next_tick_ >= capacity_) Grow();
+  std::memcpy(lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size, data.data(),
+              lane.size);
+  ++lane.next_tick;
+  const auto has_next = [&](const Lane& l) { return l.external || l.next_tick > next_tick_; };
+  while (std::all_of(lanes_.begin(), lanes_.end(), has_next)) WriteTick(next_tick_++);
+}
+
+void RunLogWriter::AddHealth(std::string_view channel, std::span<const uint8_t> data) {
+  Write(channel, ReadInt64(data.data() + health_utime_offset_), data);
+}
+
+void RunLogWriter::Grow() {
+  for (Lane& lane : lanes_) {
+    if (lane.external) continue;
+    std::vector<uint8_t> bytes(lane.bytes.size() * 2);
+    for (int64_t tick = next_tick_; tick < lane.next_tick; ++tick) {
+      std::memcpy(bytes.data() + static_cast<size_t>(tick % (2 * capacity_)) * lane.size,
+                  lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size, lane.size);
+    }
+    lane.bytes = std::move(bytes);
+  }
+  capacity_ *= 2;
+}
+
+void RunLogWriter::WriteTick(int64_t tick) {
+  for (const Lane& lane : lanes_) {
+    if (lane.external || lane.next_tick <= tick) continue;
+    const uint8_t* data = lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size;
+    Write(lane.name, ReadInt64(data + lane.utime_offset), {data, lane.size});
+  }
+}
+
+void RunLogWriter::Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
+  std::string name(channel);
+  lcm_eventlog_event_t event{};
+  event.timestamp = utime;
+  event.channellen = static_cast<int32_t>(name.size());
+  event.datalen = static_cast<int32_t>(data.size());
+  event.channel = name.data();
+  event.data = const_cast<uint8_t*>(data.data());  // liblcm only reads it
+  if (lcm_eventlog_write_event(log_.get(), &event) != 0) {
+    throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+  }
+  ++events_;
+}
+
+void RunLogWriter::Flush() {
+  if (log_ && std::fflush(log_->f) != 0) {
+    throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+  }
+}
+
+void RunLogWriter::Close() {
+  if (!log_) return;
+  int64_t last = next_tick_;
+  for (const Lane& lane : lanes_) last = std::max(last, lane.next_tick);
+  for (int64_t tick = next_tick_; tick < last; ++tick) {
+    WriteTick(tick);
+    for (const Lane& lane : lanes_) missing_ += !lane.external && lane.next_tick <= tick ? 1 : 0;
+  }
+  Flush();
+  log_.reset();
+}
+
+run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {
+  run_info_t info{};
+  info.run_id = spec.run_id();
+  google::protobuf::TextFormat::PrintToString(spec, &info.run_spec);
+  info.scenario = scenario;
+  for (const Resource& resource : spec.resource()) {
+    if (resource.name() == "robot") info.robot = resource.text();
+    if (resource.name() == "urdf") info.urdf = resource.text();
+  }
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  info.started_at = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+  return info;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,91 @@
+// A run's log as typed time series.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+#include "components/robot/robot_model.h"
+#include "logging/log_reader.h"
+#include "poise/balance_torque_t.hpp"
+#include "poise/bridge_status_t.hpp"
+#include "poise/drive_command_t.hpp"
+#include "poise/external_push_t.hpp"
+#include "poise/ground_truth_t.hpp"
+#include "poise/health_t.hpp"
+#include "poise/joint_command_t.hpp"
+#include "poise/robot_sensors_t.hpp"
+#include "poise/robot_state_t.hpp"
+#include "poise/run_info_t.hpp"
+#include "poise/task_torque_t.hpp"
+
+namespace poise::logging {
+
+/// Messages of one channel by tick.
+template <class T>
+class Series {
+ public:
+  /// nullptr when the log lacks that tick.
+  const T* at(int64_t tick) const {
+    const auto i = static_cast<size_t>(tick);
+    return tick >= 0 && i < messages_.size() && messages_[i] ? &*messages_[i] : nullptr;
+  }
+  void Set(int64_t tick, T message) {
+    const auto i = static_cast<size_t>(tick);
+    if (i >= messages_.size()) messages_.resize(i + 1);
+    messages_[i] = std::move(message);
+  }
+  bool empty() const { return messages_.empty(); }
+
+ private:
+  std::vector<std::optional<T>> messages_;
+};
+
+/// What a log shows of one channel of the graph.
+struct ChannelCompleteness {
+  std::string name;
+  int64_t messages = 0;
+  int64_t missing = 0;       ///< ticks without a message, up to the run's last tick
+  int64_t duplicate = 0;     ///< messages of a tick that was there already
+  int64_t out_of_order = 0;  ///< messages of an earlier tick than the one before
+  int64_t refused = 0;       ///< wrong size, fingerprint, counts, run or tick
+};
+
+/// All of one run. Of several channels with one type the graph's first is taken.
+struct RunRecord {
+  run_info_t info;
+  RunSpec spec;
+  robot::RobotModel robot;
+  int64_t num_ticks = 0;   ///< last tick of any channel + 1
+  int64_t first_tick = 0;  ///< metrics look at ticks from here on
+
+  Series<robot_sensors_t> sensors;
+  Series<robot_state_t> state;
+  Series<task_torque_t> task;
+  Series<balance_torque_t> balance;
+  Series<joint_command_t> command;
+  Series<drive_command_t> drive;
+  Series<bridge_status_t> bridge;
+  Series<external_push_t> push;
+  Series<ground_truth_t> truth;
+  std::map<std::string, health_t> health;  ///< by component: its last
+
+  std::vector<ChannelCompleteness> channels;  ///< not the external ones
+  int64_t damages = 0;                        ///< places where the file held no record
+  /// Simulated time over wall time; not in the log, set by who ran it.
+  std::optional<double> real_time_factor;
+
+  double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
+};
+
+/// Throws LogError: no file, no RUN_INFO, a RUN_INFO that does not parse; RobotError for its robot.
+RunRecord ReadRun(const std::string& path);
+
+/// RUN_INFO and the spec it holds, the log's first event. Throws LogError.
+run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec);
+
+}  // namespace poise::logging
