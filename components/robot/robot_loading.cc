@@ -38,14 +38,14 @@ UrdfTree::LinkPlace FindLink(const UrdfTree& tree, const std::string& link,
 
 double Positive(double value, const std::string& field) {
   if (!(value > 0) || !std::isfinite(value)) {
-    throw RobotError(fmt::format("{} is {}: it must be above 0", field, value));
+    throw RobotError(fmt::format("{} is {}: it must be finite and above 0", field, value));
   }
   return value;
 }
 
 double NotNegative(double value, const std::string& field) {
   if (!(value >= 0) || !std::isfinite(value)) {
-    throw RobotError(fmt::format("{} is {}: it must not be negative", field, value));
+    throw RobotError(fmt::format("{} is {}: it must be finite and not negative", field, value));
   }
   return value;
 }
@@ -211,9 +211,6 @@ RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
   model.bodies_ = std::move(tree.bodies);
   model.joints_ = std::move(tree.joints);
   model.BuildTree();
-  if (!std::isfinite(model.total_mass_)) {
-    throw RobotError("URDF: the masses add up to more than can be computed with: correct them");
-  }
   return model;
 }
 

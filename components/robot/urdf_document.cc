@@ -147,15 +147,15 @@ void CheckConnected(const std::map<std::string, int>& link_line, TiXmlElement* r
         Attribute(*joint->FirstChildElement("parent"), "link");
   }
   std::string root;
-  for (const auto& [link, line] : link_line) {
-    std::string top = link;
+  for (const auto& entry : link_line) {
+    std::string top = entry.first;
     for (size_t steps = 0; parent.contains(top); ++steps) {
       top = parent.at(top);
       if (steps > link_line.size()) {
         throw RobotError(fmt::format(
-            "URDF line {}: link '{}' hangs on a closed loop of joints: closed loops are not "
+            "URDF line {}: link '{}' is part of a closed loop of joints: closed loops are not "
             "supported, remove one joint of the loop",
-            line, link));
+            link_line.at(top), top));
       }
     }
     if (root.empty()) root = top;
@@ -165,6 +165,35 @@ void CheckConnected(const std::map<std::string, int>& link_line, TiXmlElement* r
           "joint, fixed if need be",
           root, top));
     }
+  }
+}
+
+// Leaves elements and attributes only. urdfdom hands texts to printf as its format: no % may reach
+// it.
+void Strip(TiXmlElement* element) {
+  for (const TiXmlAttribute* a = element->FirstAttribute(); a; a = a->Next()) {
+    if (a->ValueStr().find('%') != std::string::npos) {
+      throw RobotError(fmt::format("URDF line {}: {} '{}' has a '%': remove it", element->Row(),
+                                   a->Name(), OneLine(a->Value())));
+    }
+  }
+  for (TiXmlNode* node = element->FirstChild(); node;) {
+    TiXmlNode* next = node->NextSibling();
+    if (TiXmlElement* child = node->ToElement()) {
+      Strip(child);
+    } else {
+      element->RemoveChild(node);
+    }
+    node = next;
+  }
+}
+
+// What describes no link or joint: materials, simulators' and controllers' extensions.
+void RemoveForeign(TiXmlElement* robot) {
+  for (TiXmlElement* child = robot->FirstChildElement(); child;) {
+    TiXmlElement* next = child->NextSiblingElement();
+    if (child->ValueStr() != "link" && child->ValueStr() != "joint") robot->RemoveChild(child);
+    child = next;
   }
 }
 
@@ -247,12 +276,11 @@ UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings)
   CheckLinks(robot, &link_line);
   result.joint_order = CheckJoints(robot, link_line);
   CheckConnected(link_line, robot);
-  RemoveChildren(robot, "material");
-  RemoveChildren(robot, "gazebo");
-  RemoveChildren(robot, "transmission");
+  RemoveForeign(robot);
+  Strip(robot);
 
   TiXmlPrinter printer;
-  document.Accept(&printer);
+  robot->Accept(&printer);
   result.model = ParseWithUrdfdom(printer.CStr(), warnings);
   return result;
 }
