@@ -1,0 +1,281 @@
+#include "components/state_estimator/base_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace poise {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+// No robot exceeds these: they keep every finite reading from making a number that is not.
+constexpr double kMaxRate = 100;          // rad/s, gyro and joints
+constexpr double kMaxAcceleration = 1e3;  // m/s²
+constexpr double kMaxSpeed = 100;         // m/s
+constexpr double kMaxLoad = 100;          // shares of the robot's weight
+constexpr double kMaxGyroBias = 0.05;     // rad/s: any larger is a broken sensor, not a bias
+// Feet without load at first: beyond this difference of height, m, only the lower one stands.
+constexpr double kLevel = 0.01;
+
+Vector3d Clamp(const Vector3d& v, double limit) { return v.cwiseMin(limit).cwiseMax(-limit); }
+
+// Share of a first-order approach with `time_constant` in one step.
+double Approach(double dt, double time_constant) { return dt / (time_constant + dt); }
+
+Quaterniond Exp(const Vector3d& rotation) {
+  const double angle = rotation.norm();
+  const double half_sinc = angle > 1e-9 ? std::sin(angle / 2) / angle : 0.5;
+  const Vector3d v = half_sinc * rotation;
+  return {std::cos(angle / 2), v.x(), v.y(), v.z()};
+}
+
+// Rotation from `from` to `to`, world axes: axis times the sine of the angle. The angles are small;
+// beyond a right angle it falls off, but stays finite and of the right sign.
+Vector3d RotationError(const Matrix3d& to, const Matrix3d& from) {
+  const Matrix3d e = to * from.transpose();
+  return 0.5 * Vector3d(e(2, 1) - e(1, 2), e(0, 2) - e(2, 0), e(1, 0) - e(0, 1));
+}
+
+// One Newton step to the nearest rotation: undoes the rounding of a step.
+Matrix3d Orthonormal(const Matrix3d& m) {
+  return m * (1.5 * Matrix3d::Identity() - 0.5 * m.transpose() * m);
+}
+
+double SmoothStep(double x) {
+  const double s = std::clamp(x, 0.0, 1.0);
+  return s * s * (3 - 2 * s);
+}
+
+}  // namespace
+
+BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
+                             const BaseEstimatorConfig& config, double period)
+    : model_(std::move(model)),
+      config_(config),
+      period_(period),
+      weight_(model_->total_mass() * robot::kGravity),
+      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff),
+      base_frame_state_(model_->num_joints()),
+      data_(*model_),
+      state_(model_->num_joints()),
+      joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())) {
+  for (Foot& foot : feet_) foot.anchor.setIdentity();
+}
+
+Eigen::Isometry3d BaseEstimator::foot_pose(int foot) const {
+  const Foot& f = feet_[static_cast<size_t>(foot)];
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = orientation_ * f.rotation;
+  pose.translation() = state_.base_position + f.last_offset;
+  return pose;
+}
+
+void BaseEstimator::Update(const BaseSensors& sensors, double dt) {
+  dt = std::clamp(dt, 0.1 * period_, 10 * period_);
+  UpdateJoints(sensors, dt);
+  UpdateKinematics();
+  UpdateWeights(sensors);
+  if (!placed_) {
+    Place(sensors);
+    placed_ = true;
+  } else {
+    UpdateOrientation(sensors, dt);
+    UpdatePosition(dt);
+    UpdateAnchors(dt);
+  }
+  state_.base_angular_velocity = orientation_ * angular_velocity_;
+}
+
+void BaseEstimator::UpdateJoints(const BaseSensors& sensors, double dt) {
+  if (placed_) {
+    joint_rate_ = ((sensors.joint_position - state_.joint_position) / dt)
+                      .cwiseMin(kMaxRate)
+                      .cwiseMax(-kMaxRate);
+    velocity_filter_.Step(joint_rate_, dt);
+  }
+  state_.joint_position = sensors.joint_position;
+  state_.joint_velocity = velocity_filter_.value();
+}
+
+void BaseEstimator::UpdateKinematics() {
+  base_frame_state_.joint_position = state_.joint_position;
+  base_frame_state_.joint_velocity = state_.joint_velocity;
+  robot::ComputeKinematics(*model_, base_frame_state_, &data_);
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    const robot::FootModel& model = model_->feet()[i];
+    const size_t b = static_cast<size_t>(model.body);
+    const Vector3d arm = data_.body_rotation[b] * model.sole.translation();
+    Foot& foot = feet_[i];
+    foot.position = data_.body_position[b] + arm;
+    foot.rotation.noalias() = data_.body_rotation[b] * model.sole.linear();
+    foot.velocity = data_.body_linear_velocity[b] + data_.body_angular_velocity[b].cross(arm);
+  }
+}
+
+void BaseEstimator::UpdateWeights(const BaseSensors& sensors) {
+  std::array<double, 2> pull;
+  double sum = 0, grip = 0;
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    const double load = std::clamp(sensors.foot_load[i] / weight_, 0.0, kMaxLoad);
+    feet_[i].grip =
+        SmoothStep((load - config_.light_load) / (config_.full_load - config_.light_load));
+    pull[i] = feet_[i].grip * load;
+    sum += pull[i];
+    grip += feet_[i].grip;
+  }
+  grip_ = sum > 0 ? std::min(grip, 1.0) : 0.0;
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    feet_[i].weight = sum > 0 ? pull[i] / sum : 0.0;
+    foot_weight_[i] = grip_ * feet_[i].weight;
+  }
+}
+
+void BaseEstimator::Place(const BaseSensors& sensors) {
+  std::array<double, 2> weight = {feet_[0].weight, feet_[1].weight};
+  const auto normal = [&] {
+    return Vector3d(weight[0] * feet_[0].rotation.col(2) + weight[1] * feet_[1].rotation.col(2))
+        .normalized();
+  };
+  if (grip_ == 0) {
+    weight = {0.5, 0.5};
+    const double right_above_left = normal().dot(feet_[0].position - feet_[1].position);
+    if (right_above_left > kLevel) weight = {0, 1};
+    if (right_above_left < -kLevel) weight = {1, 0};
+  }
+  const Vector3d up = normal();
+  Vector3d left = feet_[1].position - feet_[0].position;
+  left -= up.dot(left) * up;
+  if (left.norm() < 1e-6) left = up.cross(Vector3d::UnitX());  // soles over each other
+  if (left.norm() < 1e-6) left = Vector3d::UnitY();
+  left.normalize();
+  orientation_.row(0) = left.cross(up);
+  orientation_.row(1) = left;
+  orientation_.row(2) = up;
+  if (!orientation_.allFinite()) orientation_.setIdentity();  // soles facing each other
+  orientation_ = Orthonormal(orientation_);
+  state_.base_orientation = Quaterniond(orientation_).normalized();
+
+  const Vector3d right_offset = orientation_ * feet_[0].position;
+  const Vector3d left_offset = orientation_ * feet_[1].position;
+  state_.base_position = -0.5 * (right_offset + left_offset);
+  state_.base_position.z() = -(weight[0] * right_offset.z() + weight[1] * left_offset.z());
+  state_.base_linear_velocity.setZero();
+  ReadImu(sensors);
+  imu_orientation_ = Quaterniond(orientation_ * imu_rotation_).normalized();
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    feet_[i].last_offset = orientation_ * feet_[i].position;
+    feet_[i].anchor.linear() = orientation_ * feet_[i].rotation;
+    feet_[i].anchor.translation() = state_.base_position + feet_[i].last_offset;
+  }
+}
+
+void BaseEstimator::ReadImu(const BaseSensors& sensors) {
+  const robot::ImuModel& imu = model_->imu();
+  const size_t b = static_cast<size_t>(imu.body);
+  imu_rotation_.noalias() = data_.body_rotation[b] * imu.pose.linear();
+  const Vector3d arm = data_.body_rotation[b] * imu.pose.translation();
+  const Vector3d& relative_rotation = data_.body_angular_velocity[b];
+  gyro_ = Clamp(sensors.angular_velocity, kMaxRate) - gyro_bias_;
+  angular_velocity_ = imu_rotation_ * gyro_ - relative_rotation;
+  imu_velocity_ = angular_velocity_.cross(data_.body_position[b] + arm) +
+                  data_.body_linear_velocity[b] + relative_rotation.cross(arm);
+  imu_acceleration_ = imu_rotation_ * Clamp(sensors.acceleration, kMaxAcceleration);
+}
+
+void BaseEstimator::UpdateOrientation(const BaseSensors& sensors, double dt) {
+  last_imu_velocity_ = orientation_ * imu_velocity_;
+  last_acceleration_ = orientation_ * imu_acceleration_;
+  // The IMU's own orientation is integrated: the joints below it then enter by their positions
+  // alone. The rate of the step is the mean of the rates at its ends.
+  const Vector3d last_gyro = gyro_;
+  ReadImu(sensors);
+  const Quaterniond predicted = imu_orientation_ * Exp(0.5 * dt * (last_gyro + gyro_));
+  const Matrix3d predicted_rotation = predicted.toRotationMatrix();
+  orientation_.noalias() = predicted_rotation * imu_rotation_.transpose();
+
+  Vector3d error = Vector3d::Zero();  // of the feet, world axes
+  UpdateTrust();
+  for (const Foot& foot : feet_) error += grip_ * foot.weight * foot.trust * foot.turn;
+  Vector3d correction = Approach(dt, config_.orientation_time_constant) * error;
+  const Vector3d up = orientation_ * imu_acceleration_;
+  const double size = up.norm() / robot::kGravity;
+  if (size > 0.5 && size < 1.5) {  // otherwise it is not gravity
+    correction +=
+        Approach(dt, config_.gravity_time_constant) * up.cross(Vector3d::UnitZ()) / up.norm();
+  }
+  // A proportional-integral observer: with this gain its slow pole lies near 1 /
+  // gyro_bias_time_constant.
+  gyro_bias_ -= predicted_rotation.transpose() * correction / config_.gyro_bias_time_constant;
+  gyro_bias_ = Clamp(gyro_bias_, kMaxGyroBias);
+
+  imu_orientation_ = (Exp(correction) * predicted).normalized();
+  orientation_.noalias() = imu_orientation_.toRotationMatrix() * imu_rotation_.transpose();
+  state_.base_orientation = Quaterniond(orientation_).normalized();
+}
+
+void BaseEstimator::UpdateTrust() {
+  for (Foot& foot : feet_) {
+    foot.turn = RotationError(foot.anchor.linear(), orientation_ * foot.rotation);
+  }
+  // Gyro, right and left foot have a vote each: a foot has turned when neither of the others agrees
+  // with it.
+  const bool both = feet_[0].weight > 0 && feet_[1].weight > 0;
+  const double gap = both ? (feet_[0].turn - feet_[1].turn).squaredNorm()
+                          : std::numeric_limits<double>::infinity();
+  const double tolerance = config_.foot_rotation_tolerance * config_.foot_rotation_tolerance;
+  for (Foot& foot : feet_) {
+    foot.trust = tolerance / (tolerance + std::min(foot.turn.squaredNorm(), gap));
+  }
+}
+
+void BaseEstimator::UpdatePosition(double dt) {
+  Vector3d step = Vector3d::Zero(), foot_speed = Vector3d::Zero();
+  for (Foot& foot : feet_) {
+    const Vector3d offset = orientation_ * foot.position;
+    step -= foot.weight * (offset - foot.last_offset);
+    foot_speed +=
+        foot.weight * (orientation_ * (angular_velocity_.cross(foot.position) + foot.velocity));
+    foot.last_offset = offset;
+  }
+  // The IMU's velocity is integrated rather than the base's: that needs no angular acceleration.
+  const Vector3d acceleration = 0.5 * (last_acceleration_ + orientation_ * imu_acceleration_) -
+                                robot::kGravity * Vector3d::UnitZ();
+  const Vector3d last_velocity = state_.base_linear_velocity;
+  const Vector3d falling =
+      last_velocity + last_imu_velocity_ + dt * acceleration - orientation_ * imu_velocity_;
+  state_.base_linear_velocity = Clamp(-grip_ * foot_speed + (1 - grip_) * falling, kMaxSpeed);
+  state_.base_position +=
+      grip_ * step + (1 - grip_) * 0.5 * dt * (last_velocity + state_.base_linear_velocity);
+}
+
+void BaseEstimator::UpdateAnchors(double dt) {
+  const double share = Approach(dt, config_.anchor_time_constant);
+  // How far each foot stands from its anchor, and the weighted mean, which is the base's error.
+  std::array<Vector3d, 2> shift;
+  Vector3d mean_shift = Vector3d::Zero();
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    const Foot& foot = feet_[i];
+    shift[i] = state_.base_position + foot.last_offset - foot.anchor.translation();
+    mean_shift += foot.weight * shift[i];
+  }
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    Foot& foot = feet_[i];
+    if (foot.grip == 0) {
+      foot.anchor.linear() = orientation_ * foot.rotation;
+      foot.anchor.translation() += shift[i];
+      continue;
+    }
+    const double loose = 1 - foot.grip, standing = foot.grip * share;
+    // Less the mean: disagreement vanishes, while the weighted mean of the anchors stays.
+    foot.anchor.translation() += loose * shift[i] + standing * (shift[i] - mean_shift);
+    const Vector3d turn = (loose + standing * (1 - foot.trust)) *
+                          RotationError(orientation_ * foot.rotation, foot.anchor.linear());
+    foot.anchor.linear() = Orthonormal(Exp(turn).toRotationMatrix() * foot.anchor.linear());
+  }
+  state_.base_position -= grip_ * share * mean_shift;
+}
+
+}  // namespace poise

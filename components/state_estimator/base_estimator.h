@@ -1,0 +1,123 @@
+// BaseEstimator: position, orientation and velocity of the floating base from IMU, encoders and the
+// loads of the feet.
+//
+// Orientation integrates the gyro and follows slowly the orientation that the stance feet's
+// kinematics give, and very slowly gravity. Position and velocity follow the loaded feet, which
+// stand; a foot without load moves along with the base estimate and its anchor with it. Only
+// measured load decides: no contact schedule is known. Two loaded feet that disagree share the
+// disagreement between their anchors over anchor_time_constant, without moving the weighted mean:
+// that lets a foot sink into soft ground. A foot that turns by more than foot_rotation_tolerance
+// while the gyro and the other foot do not is re-anchored where it comes to rest. A single loaded
+// foot is the world: its sinking is not observable and shows as the ground rising with it. With no
+// foot loaded the IMU is integrated.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <memory>
+
+#include "components/robot/dynamics.h"
+#include "components/state_estimator/low_pass.h"
+
+namespace poise {
+
+/// See state_estimator.proto for what each means.
+struct BaseEstimatorConfig {
+  double joint_velocity_cutoff = 20;     ///< Hz
+  double orientation_time_constant = 2;  ///< s, as those below
+  double gravity_time_constant = 50;
+  double gyro_bias_time_constant = 10;
+  double anchor_time_constant = 0.5;
+  double foot_rotation_tolerance = 0.003;  ///< rad
+  double light_load = 0.05;                ///< share of the weight
+  double full_load = 0.2;
+};
+
+/// Readings of one instant. Views: nothing is copied.
+struct BaseSensors {
+  Eigen::Map<const Eigen::VectorXd> joint_position;  ///< rad
+  Eigen::Vector3d angular_velocity;                  ///< rad/s, IMU frame
+  Eigen::Vector3d acceleration;                      ///< m/s², IMU frame, specific force
+  std::array<double, 2> foot_load;  ///< N, upward force on the sole (−F_z), right first
+};
+
+class BaseEstimator {
+ public:
+  /// `period` s, nominal, > 0: steps are taken to last between a tenth and ten of it.
+  BaseEstimator(std::shared_ptr<const robot::RobotModel> model, const BaseEstimatorConfig& config,
+                double period);
+
+  /// Takes the next readings, `dt` s after the last. The first call places the robot: loaded feet
+  /// flat on level ground (without load the lower one, or both), z = 0 at their height, the
+  /// midpoint between the soles at x = y = 0, y along the line from the right to the left sole; at
+  /// rest. Any finite input gives a finite state. Allocates nothing.
+  void Update(const BaseSensors& sensors, double dt);
+
+  /// Base and joints; joint velocities filtered.
+  const robot::RobotState& state() const { return state_; }
+  /// Weight of each foot as an anchor, 0..1; their sum falls below 1 as the robot leaves the
+  /// ground.
+  const std::array<double, 2>& foot_weight() const { return foot_weight_; }
+  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< rad/s, IMU frame
+  /// Sole in the world: where the estimator holds it to stand, and where the kinematics see it.
+  const Eigen::Isometry3d& anchor(int foot) const {
+    return feet_[static_cast<size_t>(foot)].anchor;
+  }
+  Eigen::Isometry3d foot_pose(int foot) const;
+
+ private:
+  struct Foot {
+    // In the base frame.
+    Eigen::Vector3d position;
+    Eigen::Matrix3d rotation;
+    Eigen::Vector3d velocity;  ///< of the sole's origin, relative to the base
+    // From the base origin, world axes, of the step before.
+    Eigen::Vector3d last_offset;
+    Eigen::Isometry3d anchor;  ///< in the world
+    Eigen::Vector3d turn;      ///< rad, from its present orientation to the anchor's, world axes
+    double trust = 1;   ///< 1: its orientation agrees with gyro or other foot; 0: it has turned
+    double grip = 0;    ///< 0: light, follows the base; 1: stands
+    double weight = 0;  ///< among the gripping feet, sums to 1; 0 when none grips
+  };
+
+  void UpdateJoints(const BaseSensors& sensors, double dt);
+  void UpdateKinematics();
+  void UpdateWeights(const BaseSensors& sensors);
+  void Place(const BaseSensors& sensors);
+  void ReadImu(const BaseSensors& sensors);
+  void UpdateOrientation(const BaseSensors& sensors, double dt);
+  void UpdateTrust();
+  void UpdatePosition(double dt);
+  void UpdateAnchors(double dt);
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  BaseEstimatorConfig config_;
+  double period_;
+  double weight_;  // N, of the robot
+  LowPass velocity_filter_;
+  robot::RobotState
+      base_frame_state_;  // base at the origin and at rest, for kinematics in the base frame
+  robot::RobotData data_;
+  robot::RobotState state_;
+  Eigen::VectorXd joint_rate_;  // rad/s, unfiltered
+  Eigen::Matrix3d orientation_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond imu_orientation_ = Eigen::Quaterniond::Identity();  // IMU to world
+  Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();  // rad/s, without bias, IMU frame
+  // Of this step, in the base frame: IMU to base; rate of the base, rad/s; velocity of the IMU
+  // relative to the base's origin, m/s; specific force, m/s².
+  Eigen::Matrix3d imu_rotation_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d angular_velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d imu_velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
+  // Of the step before, in world axes.
+  Eigen::Vector3d last_imu_velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d last_acceleration_ = Eigen::Vector3d::Zero();
+  std::array<Foot, 2> feet_;
+  std::array<double, 2> foot_weight_{};
+  double grip_ = 0;  // 0: in flight, 1: standing
+  bool placed_ = false;
+};
+
+}  // namespace poise

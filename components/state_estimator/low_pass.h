@@ -1,0 +1,24 @@
+// Second-order Butterworth low-pass of many signals at once, for steps of any length.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace poise {
+
+/// H(s) = ω²/(s² + √2 ω s + ω²), integrated by the trapezoidal rule with the input held over the
+/// step: stable for every step, unit gain at rest. Never allocates after construction.
+class LowPass {
+ public:
+  /// `cutoff` Hz, > 0: −3 dB.
+  LowPass(int num_signals, double cutoff);
+
+  /// One step of `dt` s with `input`; the output is value().
+  void Step(const Eigen::VectorXd& input, double dt);
+  const Eigen::VectorXd& value() const { return value_; }
+
+ private:
+  double omega_;
+  Eigen::VectorXd value_, rate_, next_rate_;
+};
+
+}  // namespace poise

@@ -1,0 +1,28 @@
+// StateEstimator: the estimated state of the floating-base robot from its sensors.
+#pragma once
+
+#include <memory>
+
+#include "components/framework/component.h"
+#include "components/state_estimator/base_estimator.h"
+#include "poise/robot_sensors_t.hpp"
+#include "poise/robot_state_t.hpp"
+
+namespace poise {
+
+/// Stage "estimate": robot_sensors → robot_state.
+class StateEstimator : public Component {
+ public:
+  /// Resources "robot", "urdf"; configuration StateEstimatorConfig.
+  void Configure(const ComponentContext& context, Wiring* wiring) override;
+
+ private:
+  void Estimate(const Tick& tick);
+
+  Input<robot_sensors_t> robot_sensors_;
+  Output<robot_state_t> robot_state_;
+  std::unique_ptr<BaseEstimator> estimator_;
+  double last_time_ = 0;
+};
+
+}  // namespace poise
