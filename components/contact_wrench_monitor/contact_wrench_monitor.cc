@@ -126,8 +126,8 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
       SetWrench(balance::Vector6d::Zero(), &out.foot_wrench[i]);
     }
   }
-  out.active_x = result.active_x ? 1 : 0;
-  out.active_y = result.active_y ? 1 : 0;
+  out.active_x = balancing_ && result.active_x ? 1 : 0;
+  out.active_y = balancing_ && result.active_y ? 1 : 0;
   SetPose(result.frame_o, &out.frame_o);
   out.cop_limit[0] = limits.half_length;
   out.cop_limit[1] = limits.half_width;

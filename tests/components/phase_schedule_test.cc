@@ -1,0 +1,305 @@
+// Phases, transitions and references, without bus or robot.
+#include "components/task_controller/phase_schedule.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "components/framework/configuration.h"
+#include "components/task_controller/reference_generator.h"
+
+namespace poise {
+namespace {
+
+constexpr std::array<bool, 2> kOverBoth{true, true};
+constexpr std::array<bool, 2> kOverNeither{false, false};
+constexpr double kTick = 0.002;
+
+const std::string kGains =
+    "com { kp: 225 kd: 10 } orientation { kp: 225 kd: 10 } foot { kp: 225 kd: 10 } ";
+
+TaskControllerConfig Parse(const std::string& text) {
+  TaskControllerConfig config;
+  ParseTextProto(text, "test", &config);
+  return config;
+}
+
+PhaseSchedule Schedule(const std::string& phases) {
+  const TaskControllerConfig config = Parse(kGains + phases);
+  CheckTaskControllerConfig(config);
+  return PhaseSchedule(config);
+}
+
+// Section 7.4, then back: unload the left foot in 0.5-1.0 s, stand on the right, load it again
+// from 2.0 s.
+const std::string kThere =
+    "phase { start: 0 transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.5 duration: 0.5 } } "
+    "phase { start: 1 support: RIGHT } "
+    "phase { start: 2 transition { kind: LOAD foot: LEFT_FOOT delay: 0.2 duration: 0.4 } } ";
+
+TEST(PhaseSchedule, FollowsTheScenarioToTheTick) {
+  PhaseSchedule schedule = Schedule(kThere);
+  for (int tick = 0; tick <= 1500; ++tick) {
+    const double time = kTick * tick;
+    const ScheduleState& state = schedule.Advance(time, kOverBoth);
+    SCOPED_TRACE(time);
+    const int phase = tick < 500 ? 0 : tick < 1000 ? 1 : 2;
+    ASSERT_EQ(state.phase, phase);
+    ASSERT_EQ(state.phase_began, tick == 0 || tick == 500 || tick == 1000);
+    ASSERT_FALSE(state.waiting);
+    TransitionKind kind = TransitionKind::kNone;
+    double progress = 0;
+    if (tick >= 250 && tick < 500) {
+      kind = TransitionKind::kUnloading;
+      progress = (time - 0.5) / 0.5;
+    } else if (tick >= 1000 && tick < 1300) {
+      kind = TransitionKind::kLoading;
+      progress = std::max(0.0, (time - 2.2) / 0.4);
+    }
+    ASSERT_EQ(state.transition, kind);
+    ASSERT_NEAR(state.progress, progress, 1e-8);
+    ASSERT_EQ(state.transition_foot, kind == TransitionKind::kNone ? -1 : 1);
+  }
+}
+
+TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
+  PhaseSchedule schedule = Schedule(kThere);
+  // The COM stands above the left foot only: the foot that is to be lifted does not count.
+  const std::array<bool, 2> over_left{false, true};
+  for (int tick = 0; tick < 400; ++tick) {
+    const ScheduleState& state = schedule.Advance(kTick * tick, over_left);
+    ASSERT_EQ(state.waiting, tick >= 250) << tick;
+    ASSERT_EQ(state.transition, TransitionKind::kNone);
+    ASSERT_EQ(state.phase, 0);
+  }
+  // It arrives at tick 400: 149 waiting steps were lost, the rest of the schedule keeps its
+  // distances.
+  int unloading = -1, single = -1, second_double = -1;
+  for (int tick = 400; tick < 1800; ++tick) {
+    const ScheduleState& state = schedule.Advance(kTick * tick, kOverBoth);
+    ASSERT_FALSE(state.waiting);
+    if (unloading < 0 && state.transition == TransitionKind::kUnloading) unloading = tick;
+    if (single < 0 && state.phase == 1) single = tick;
+    if (second_double < 0 && state.phase == 2) second_double = tick;
+  }
+  EXPECT_EQ(unloading, 400);
+  EXPECT_NEAR(single - unloading, 250, 1);
+  EXPECT_EQ(second_double - single, 500);
+}
+
+TEST(PhaseSchedule, NeverLiftsAFootUnderTheCom) {
+  PhaseSchedule schedule = Schedule(kThere);
+  for (int tick = 0; tick < 10000; ++tick) {
+    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither).phase, 0);
+  }
+  EXPECT_TRUE(schedule.state().waiting);
+}
+
+TEST(PhaseSchedule, AnInstantUnloadingIsCheckedToo) {
+  PhaseSchedule schedule = Schedule(
+      "phase { start: 0 transition { kind: UNLOAD foot: RIGHT_FOOT delay: 1 duration: 0 } } "
+      "phase { start: 1 support: LEFT } ");
+  for (int tick = 0; tick < 1000; ++tick) {
+    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither).phase, 0);
+  }
+  EXPECT_EQ(schedule.Advance(kTick * 1000, kOverBoth).progress, 1);
+  EXPECT_EQ(schedule.Advance(kTick * 1001, kOverBoth).phase, 1);
+}
+
+TEST(PhaseSchedule, ContactsOfASupport) {
+  EXPECT_EQ(ContactsOf(DOUBLE), (std::array<bool, 2>{true, true}));
+  EXPECT_EQ(ContactsOf(RIGHT), (std::array<bool, 2>{true, false}));
+  EXPECT_EQ(ContactsOf(LEFT), (std::array<bool, 2>{false, true}));
+}
+
+struct Refused {
+  const char* text;
+  const char* field;
+};
+
+class RefusedConfig : public testing::TestWithParam<Refused> {};
+
+TEST_P(RefusedConfig, NamesTheField) {
+  try {
+    CheckTaskControllerConfig(Parse(GetParam().text));
+    FAIL() << "accepted: " << GetParam().text;
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), GetParam().field) << error.what();
+    EXPECT_FALSE(error.problem().empty());
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+  }
+}
+
+#define GAINS "com { kp: 225 kd: 10 } orientation { kp: 225 kd: 10 } foot { kp: 1 kd: 1 } "
+#define UNLOAD_LEFT "transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.5 duration: 0.5 } "
+
+INSTANTIATE_TEST_SUITE_P(
+    All, RefusedConfig,
+    testing::Values(
+        Refused{"", "com"}, Refused{"com { kp: 1 kd: 1 } phase { start: 0 }", "orientation"},
+        Refused{"com { kp: -1 kd: 1 }", "com.kp"}, Refused{"com { kp: 1 }", "com.kd"},
+        Refused{"com { kp: 1 kd: nan }", "com.kd"},
+        Refused{"com { kp: 1 kd: 1 } orientation { kp: 1 kd: 0 }", "orientation.kd"},
+        Refused{GAINS, "phase"}, Refused{GAINS "phase { }", "phase[0].start"},
+        Refused{GAINS "phase { start: 0.1 }", "phase[0].start"},
+        Refused{GAINS "phase { start: 0 } phase { start: 0 }", "phase[1].start"},
+        Refused{GAINS "phase { start: 0 } phase { start: 2 } phase { start: 1 }", "phase[2].start"},
+        Refused{GAINS "phase { start: 0 } phase { start: inf }", "phase[1].start"},
+        Refused{GAINS "phase { start: 0 support: RIGHT } phase { start: 1 support: LEFT }",
+                "phase[1].support"},
+        Refused{GAINS "phase { start: 0 com { duration: -1 } }", "phase[0].com.duration"},
+        Refused{GAINS "phase { start: 0 com { delay: nan } }", "phase[0].com.delay"},
+        Refused{GAINS "phase { start: 0 com { y: inf } }", "phase[0].com.y"},
+        Refused{GAINS "phase { start: 0 gravity_compensation: true com { x: 0.1 } }",
+                "phase[0].gravity_compensation"},
+        Refused{GAINS "phase { start: 0 support: RIGHT foot { z: 0.1 } }", "phase[0].foot.foot"},
+        Refused{GAINS "phase { start: 0 support: RIGHT foot { foot: RIGHT_FOOT } }",
+                "phase[0].foot.foot"},
+        Refused{GAINS "phase { start: 0 foot { foot: RIGHT_FOOT } }", "phase[0].foot.foot"},
+        Refused{GAINS "phase { start: 0 support: RIGHT foot { foot: LEFT_FOOT duration: -2 } }",
+                "phase[0].foot.duration"},
+        Refused{"com { kp: 1 kd: 1 } orientation { kp: 1 kd: 1 } phase { start: 0 support: LEFT }",
+                "foot"},
+        Refused{GAINS "phase { start: 0 transition { foot: LEFT_FOOT } }",
+                "phase[0].transition.kind"},
+        Refused{GAINS "phase { start: 0 transition { kind: LOAD } }", "phase[0].transition.foot"},
+        Refused{GAINS "phase { start: 0 " UNLOAD_LEFT "}", "phase[0].transition"},
+        Refused{GAINS "phase { start: 0 " UNLOAD_LEFT "} phase { start: 2 }",
+                "phase[0].transition"},
+        Refused{GAINS "phase { start: 0 " UNLOAD_LEFT "} phase { start: 2 support: LEFT }",
+                "phase[0].transition"},
+        Refused{GAINS "phase { start: 0 " UNLOAD_LEFT "} phase { start: 0.9 support: RIGHT }",
+                "phase[0].transition.duration"},
+        Refused{GAINS "phase { start: 0 support: RIGHT " UNLOAD_LEFT
+                      "} phase { start: 2 support: RIGHT }",
+                "phase[0].transition"},
+        Refused{GAINS "phase { start: 0 transition { kind: LOAD foot: LEFT_FOOT } }",
+                "phase[0].transition"},
+        Refused{GAINS "phase { start: 0 support: LEFT } phase { start: 1 transition { kind: LOAD "
+                      "foot: LEFT_FOOT } }",
+                "phase[1].transition"},
+        Refused{GAINS "phase { start: 0 transition { kind: LOAD foot: LEFT_FOOT delay: -1 } }",
+                "phase[0].transition.delay"}));
+
+EstimatedPose Pose() {
+  EstimatedPose pose;
+  pose.com = {0.01, 0.02, 0.7};
+  pose.body_rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  pose.sole[0].translation() = Eigen::Vector3d(0.03, -0.1, 0.001);
+  pose.sole[1].translation() = Eigen::Vector3d(-0.01, 0.11, 0.002);
+  return pose;
+}
+
+Phase ParsePhase(const std::string& text) {
+  Phase phase;
+  ParseTextProto(text, "phase", &phase);
+  return phase;
+}
+
+TEST(ReferenceGenerator, MovesAlongTheMinimumJerkLine) {
+  ReferenceGenerator references;
+  references.BeginPhase(
+      ParsePhase("start: 0 com { target: OVER_RIGHT x: 0.005 z: -0.03 duration: 2 delay: 0.5 }"),
+      Pose(), 0);
+  const Eigen::Vector3d from = Pose().com, to(0.03 + 0.005, -0.1, 0.7 - 0.03);
+  for (double t = 0; t < 3; t += 0.01) {
+    const PointMotion motion = references.Update(t).com;
+    // Flash and Hogan's polynomial.
+    const double s = std::clamp((t - 0.5) / 2, 0.0, 1.0);
+    const double p = 10 * std::pow(s, 3) - 15 * std::pow(s, 4) + 6 * std::pow(s, 5);
+    EXPECT_LT((motion.position - from - p * (to - from)).norm(), 1e-14);
+    const double v = 30 * s * s * (1 - s) * (1 - s) / 2;
+    EXPECT_LT((motion.velocity - v * (to - from)).norm(), 1e-13);
+    const double a = 60 * s * (1 - s) * (1 - 2 * s) / 4;
+    EXPECT_LT((motion.acceleration - a * (to - from)).norm(), 1e-12);
+  }
+}
+
+TEST(ReferenceGenerator, TargetsOfThePhases) {
+  const Eigen::Vector3d middle(0.01, 0.005, 0.7), left(-0.01, 0.11, 0.7), com = Pose().com;
+  const auto end = [](const std::string& target) {
+    ReferenceGenerator references;
+    references.BeginPhase(ParsePhase("start: 0 com { target: " + target + " duration: 1 }"), Pose(),
+                          0);
+    return references.Update(1.5).com.position;
+  };
+  EXPECT_LT((end("OVER_LEFT y: -0.02") - left - Eigen::Vector3d(0, -0.02, 0)).norm(), 1e-15);
+  EXPECT_LT((end("OVER_MIDDLE") - middle).norm(), 1e-15);
+  EXPECT_LT((end("SHIFT y: 0.1 z: 0.02") - com - Eigen::Vector3d(0, 0.1, 0.02)).norm(), 1e-15);
+  EXPECT_LT((end("HOLD x: 3") - com).norm(), 1e-15);
+}
+
+TEST(ReferenceGenerator, PhasesJoinInPositionVelocityAndAcceleration) {
+  ReferenceGenerator references;
+  references.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
+  EstimatedPose moved = Pose();
+  moved.com += Eigen::Vector3d(0.05, 0, 0);  // the estimate must not matter any more
+  const PointMotion before = references.Update(0.7).com;
+  references.BeginPhase(ParsePhase("start: 0.7 com { target: OVER_LEFT duration: 1 }"), moved, 0.7);
+  const PointMotion after = references.Update(0.7).com;
+  EXPECT_LT((after.position - before.position).norm(), 1e-14);
+  EXPECT_LT((after.velocity - before.velocity).norm(), 1e-14);
+  EXPECT_LT((after.acceleration - before.acceleration).norm(), 1e-12);
+  EXPECT_GT(before.velocity.norm(), 0.05);
+  const PointMotion end = references.Update(1.7).com;
+  EXPECT_LT((end.position.head<2>() - moved.sole[1].translation().head<2>()).norm(), 1e-14);
+  EXPECT_EQ(end.velocity.norm(), 0);
+  // Velocity is the derivative of position, acceleration of velocity.
+  const double h = 1e-5;
+  for (double t = 0.75; t < 1.65; t += 0.05) {
+    ReferenceGenerator again;
+    again.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
+    again.Update(0.7);
+    again.BeginPhase(ParsePhase("start: 0.7 com { target: OVER_LEFT duration: 1 }"), moved, 0.7);
+    const PointMotion low = again.Update(t - h).com, mid = again.Update(t).com,
+                      high = again.Update(t + h).com;
+    EXPECT_LT(((high.position - low.position) / (2 * h) - mid.velocity).norm(), 1e-8);
+    EXPECT_LT(((high.velocity - low.velocity) / (2 * h) - mid.acceleration).norm(), 1e-7);
+  }
+}
+
+TEST(ReferenceGenerator, APhaseWithoutComReferenceLetsTheMotionEnd) {
+  ReferenceGenerator references;
+  references.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
+  references.Update(0.7);
+  references.BeginPhase(ParsePhase("start: 0.7"), Pose(), 0.7);
+  EXPECT_NEAR(references.Update(2.5).com.position.y(), 0.22, 1e-14);
+}
+
+TEST(ReferenceGenerator, TheFreeFootStartsWhereItIsWhenItLeavesTheGround) {
+  ReferenceGenerator references;
+  references.BeginPhase(ParsePhase("start: 0"), Pose(), 0);
+  EstimatedPose later = Pose();
+  later.sole[1].translation() = Eigen::Vector3d(0.07, 0.13, 0.004);
+  later.sole[1].linear() = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  references.BeginPhase(ParsePhase("start: 1 support: RIGHT foot { foot: LEFT_FOOT x: 0.05 "
+                                   "height_above_support: 0.12 duration: 2 delay: 0.1 }"),
+                        later, 1);
+  const References at_lift = references.Update(1.0);
+  EXPECT_EQ(at_lift.foot[1].position, later.sole[1].translation());
+  EXPECT_EQ(at_lift.foot_rotation[1], later.sole[1].linear());
+  const References end = references.Update(3.2);
+  EXPECT_LT((end.foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.121)).norm(), 1e-14);
+  EXPECT_EQ(end.foot_rotation[1], later.sole[1].linear());
+  // A second phase in the air goes on from the reference, not from the estimate.
+  references.BeginPhase(
+      ParsePhase("start: 4 support: RIGHT foot { foot: LEFT_FOOT z: -0.05 duration: 1 }"), later,
+      4);
+  EXPECT_LT((references.Update(5).foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.071)).norm(),
+            1e-14);
+}
+
+TEST(ReferenceGenerator, AfterGravityCompensationTheRobotHoldsWhereItWasLeft) {
+  ReferenceGenerator references;
+  references.BeginPhase(ParsePhase("start: 0 gravity_compensation: true"), Pose(), 0);
+  EstimatedPose left = Pose();
+  left.com += Eigen::Vector3d(0.02, -0.03, -0.05);
+  left.body_rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  references.BeginPhase(ParsePhase("start: 5"), left, 5);
+  EXPECT_EQ(references.Update(5).com.position, left.com);
+  EXPECT_EQ(references.Update(5).body_rotation, left.body_rotation);
+}
+
+}  // namespace
+}  // namespace poise

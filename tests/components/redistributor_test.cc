@@ -1,0 +1,401 @@
+// The whole of task controller, monitor and redistributor against the independent route:
+// accelerations from tasks and contacts alone, the resultant from the base rows, the joint torques
+// from the joint rows.
+#include "components/redistributor/redistributor.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+
+#include "components/contact_wrench_monitor/contact_wrench_monitor.h"
+#include "components/messages/conversions.h"
+#include "components/task_controller/task_controller.h"
+#include "tests/components/control_fixture.h"
+
+namespace poise {
+namespace {
+
+using robot::TestRobot;
+
+// The three components in one process with what they share, as the inline graph runs them.
+class Chain {
+ public:
+  Chain(TestRobot robot, const std::string& task, const std::string& monitor,
+        const std::string& redistributor)
+      : model_(robot::LoadTestRobot(robot)),
+        context_(robot),
+        task_(&context_, task),
+        monitor_(&context_, monitor),
+        redistributor_(&context_, redistributor) {
+    task_.Bind("robot_state", &state_);
+    monitor_.Bind("robot_state", &state_);
+    monitor_.Bind("task_torque", &task_.output<task_torque_t>());
+    redistributor_.Bind("robot_state", &state_);
+    redistributor_.Bind("task_torque", &task_.output<task_torque_t>());
+    redistributor_.Bind("balance_torque", &monitor_.output<balance_torque_t>());
+  }
+  const joint_command_t& Run(const robot::RobotState& state, int64_t tick) {
+    state_ = StateMessage(model_, state);
+    return RunMessage(tick);
+  }
+  const joint_command_t& RunMessage(int64_t tick) {
+    task_.Run(TickAt(tick));
+    monitor_.Run(TickAt(tick));
+    redistributor_.Run(TickAt(tick));
+    return redistributor_.output<joint_command_t>();
+  }
+  const robot::RobotModel& model() const { return model_; }
+  const task_torque_t& task() const { return task_.output<task_torque_t>(); }
+  const balance_torque_t& balance() const { return monitor_.output<balance_torque_t>(); }
+  robot_state_t& state() { return state_; }
+
+ private:
+  robot::RobotModel model_;
+  ControlContext context_;
+  robot_state_t state_;
+  Harness<TaskController> task_;
+  Harness<ContactWrenchMonitor> monitor_;
+  Harness<Redistributor> redistributor_;
+};
+
+struct Case {
+  TestRobot robot;
+  const char* support;
+  Contacts in_contact;
+};
+
+class ChainCase : public testing::TestWithParam<Case> {
+ protected:
+  std::string Phases() const {
+    return TaskConfig(std::string("phase { start: 0 support: ") + GetParam().support + " }");
+  }
+  std::mt19937 random_{23};
+};
+
+// EQUATIONS.md, "An independent route to the same torque": no matrix of section 3 is formed.
+class SquareRoute : public ChainCase {};
+
+TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {
+  double worst_torque = 0, worst_wrench = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Chain chain(GetParam().robot, Phases(), MonitorConfig(false), RedistributorText());
+    const robot::RobotModel& model = chain.model();
+    const robot::RobotState first = Disturbed(StandingState(model), 0.03, 0.2, &random_);
+    chain.Run(first, 0);
+    const robot::RobotState now = Disturbed(first, 0.02, 0.2, &random_);
+    const joint_command_t& out = chain.Run(now, 1);
+    ASSERT_NE(out.status, joint_command_t::STATUS_INVALID_INPUT);
+
+    const Dynamics start(model, first, GetParam().in_contact);
+    const Dynamics dynamics(model, now, GetParam().in_contact);
+    const robot::RobotData& d = dynamics.data;
+    const Eigen::Index n = model.num_velocities(), contacts = dynamics.contact_jacobian.rows();
+    // [J; J_c] q̈ = [f* − J̇q̇; −J̇_c q̇]; the body is the base of this robot.
+    Eigen::MatrixXd system = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+    const auto rotation_vector = [](const Eigen::Matrix3d& r) -> Eigen::Vector3d {
+      const Eigen::AngleAxisd a(r);
+      return a.angle() * a.axis();
+    };
+    system.topRows<3>() = d.com_jacobian;
+    right.head<3>() =
+        225 * (start.data.com - d.com) - 10 * d.com_velocity - d.com_bias_acceleration;
+    system.block<3, 3>(3, 3).setIdentity();
+    right.segment<3>(3) =
+        150 * rotation_vector(start.data.body_rotation[0] * d.body_rotation[0].transpose()) -
+        20 * now.base_angular_velocity;
+    Eigen::Index row = 6;
+    for (size_t i = 0; i < 2; ++i) {
+      if (GetParam().in_contact[i]) continue;
+      const Eigen::Isometry3d &at = d.foot_pose[i], &to = start.data.foot_pose[i];
+      Eigen::VectorXd error(6);
+      error << to.translation() - at.translation(),
+          rotation_vector(to.linear() * at.linear().transpose());
+      system.middleRows<6>(row) = d.foot_jacobian[i];
+      right.segment<6>(row) = 100 * error - 15 * d.foot_velocity[i] - d.foot_bias_acceleration[i];
+      row += 6;
+    }
+    ASSERT_EQ(row + contacts, n);
+    system.bottomRows(contacts) = dynamics.contact_jacobian;
+    right.tail(contacts) = -dynamics.contact_bias;
+    const Eigen::VectorXd acceleration = system.fullPivLu().solve(right);
+
+    // Generalised force without torque: its base rows are −J_cᵀ F of the feet together.
+    const Eigen::VectorXd force = d.mass_matrix * acceleration + d.bias + d.gravity;
+    const Eigen::Vector3d f = -force.head<3>();
+    const Eigen::Vector3d m = -force.segment<3>(3);  // about the base's origin
+    Eigen::VectorXd wrench(contacts);
+    const std::array<double, 2> share{GetParam().in_contact[1] ? out.eta : 1.0,
+                                      GetParam().in_contact[0] ? 1 - out.eta : 1.0};
+    // (62)-(67): both feet take their share of the force and of the sum of their own moments.
+    Eigen::Vector3d own = m;
+    for (size_t i = 0; i < 2; ++i) {
+      if (!GetParam().in_contact[i]) continue;
+      own -= (d.foot_pose[i].translation() - now.base_position).cross(share[i] * f);
+    }
+    row = 0;
+    for (size_t i = 0; i < 2; ++i) {
+      if (!GetParam().in_contact[i]) continue;
+      const Eigen::Matrix3d to_sole = d.foot_pose[i].linear().transpose();
+      wrench.segment<3>(row) = to_sole * (share[i] * f);
+      wrench.segment<3>(row + 3) = to_sole * (share[i] * own);
+      worst_wrench =
+          std::max(worst_wrench, (GetWrench(out.foot_wrench[i]) - wrench.segment<6>(row)).norm());
+      row += 6;
+    }
+    const Eigen::VectorXd torque =
+        (force + dynamics.contact_jacobian.transpose() * wrench).tail(model.num_joints());
+    worst_torque = std::max(worst_torque, (torque - ToEigen(out.torque)).norm());
+  }
+  EXPECT_LT(worst_torque, 1e-7);  // N·m, of some 100
+  EXPECT_LT(worst_wrench, 1e-7);  // N, N·m, of some 500
+  RecordProperty("worst_torque", std::to_string(worst_torque));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SquareRoute,
+                         testing::Values(Case{TestRobot::kDyros, "DOUBLE", {true, true}},
+                                         Case{TestRobot::kDyros, "RIGHT", {true, false}},
+                                         Case{TestRobot::kDyros, "LEFT", {false, true}}),
+                         [](const auto& info) { return std::string(info.param.support); });
+
+// With everything switched on, for any robot: the commanded torque gives the wrenches that the
+// command announces, the margins are those wrenches' margins, and moving wrench between the feet
+// moves nothing else.
+TEST_P(ChainCase, TheCommandGivesWhatItAnnounces) {
+  int feasible = 0;
+  double worst = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    Chain chain(GetParam().robot, Phases(), MonitorConfig(true, 0.08, 0.07), RedistributorText());
+    const robot::RobotState first = Disturbed(StandingState(chain.model()), 0.02, 0.1, &random_);
+    chain.Run(first, 0);
+    const robot::RobotState now = Disturbed(first, 0.01, 0.2, &random_);
+    const joint_command_t& out = chain.Run(now, 1);
+    if (chain.balance().status != balance_torque_t::STATUS_OK) continue;
+    const Dynamics dynamics(chain.model(), now, GetParam().in_contact);
+    Eigen::VectorXd before_q, before, after_q, after;
+    dynamics.Forward(ToEigen(chain.balance().torque), &before_q, &before);
+    dynamics.Forward(ToEigen(out.torque), &after_q, &after);
+    worst = std::max(worst, (after_q - before_q).norm());
+    Eigen::Index row = 0;
+    for (size_t i = 0; i < 2; ++i) {
+      const balance::Vector6d wrench = GetWrench(out.foot_wrench[i]);
+      ASSERT_EQ(out.in_contact[i] != 0, GetParam().in_contact[i]);
+      if (!GetParam().in_contact[i]) {
+        EXPECT_EQ(wrench.norm(), 0);
+        EXPECT_EQ(out.conditions_met[i], 1);
+        EXPECT_EQ(out.margins[i].normal, 0);
+        continue;
+      }
+      worst = std::max(worst, (wrench - after.segment<6>(row)).norm());
+      row += 6;
+      const double load = std::abs(wrench[2]);
+      const double width = GetParam().in_contact[0] && GetParam().in_contact[1] ? 0.05 : 0.06;
+      const std::array<double, 5> margins{
+          -wrench[2], 0.9 * load - wrench.head<2>().norm(), 0.9 * load - std::abs(wrench[5]),
+          width * load - std::abs(wrench[3]), 0.12 * load - std::abs(wrench[4])};
+      const contact_margins_t& got = out.margins[i];
+      const std::array<double, 5> announced{got.normal, got.friction, got.yaw, got.roll, got.pitch};
+      for (size_t k = 0; k < 5; ++k) EXPECT_NEAR(announced[k], margins[k], 1e-9);
+      EXPECT_EQ(out.conditions_met[i] != 0,
+                *std::min_element(margins.begin(), margins.end()) >= -1e-6);
+    }
+    if (!GetParam().in_contact[0] || !GetParam().in_contact[1]) {
+      EXPECT_EQ(out.torque, chain.balance().torque);
+      EXPECT_EQ(out.eta, GetParam().in_contact[0] ? 1 : 0);
+      continue;
+    }
+    if (out.eta_feasible != 0) {
+      ++feasible;
+      EXPECT_EQ(out.status, joint_command_t::STATUS_OK);
+      EXPECT_EQ(out.conditions_met[0] + out.conditions_met[1], 2);
+      EXPECT_GE(out.eta, out.eta_min);
+      EXPECT_LE(out.eta, out.eta_max);
+    } else {
+      EXPECT_EQ(out.status, joint_command_t::STATUS_INFEASIBLE);
+      EXPECT_EQ(out.eta_min, 0);
+      EXPECT_EQ(out.eta_max, 1);
+    }
+    EXPECT_GE(out.eta, 0.02);
+    EXPECT_LE(out.eta, 0.98);
+  }
+  EXPECT_LT(worst, 1e-7);
+  if (GetParam().in_contact[0] && GetParam().in_contact[1]) {
+    EXPECT_GT(feasible, 10);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ChainCase,
+                         testing::Values(Case{TestRobot::kDyros, "DOUBLE", {true, true}},
+                                         Case{TestRobot::kDyros, "RIGHT", {true, false}},
+                                         Case{TestRobot::kDyros, "LEFT", {false, true}},
+                                         Case{TestRobot::kMantis, "DOUBLE", {true, true}},
+                                         Case{TestRobot::kMantis, "LEFT", {false, true}}),
+                         [](const auto& info) {
+                           return std::string(info.param.robot == TestRobot::kDyros ? "Dyros"
+                                                                                    : "Mantis") +
+                                  info.param.support;
+                         });
+
+// Level feet and an η between its bounds: neither foot carries a moment about x (figures 11, 12 of
+// the paper).
+TEST(Redistributor, FreesBothFeetOfRollMoment) {
+  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
+              RedistributorText());
+  const robot::RobotState standing = StandingState(chain.model());
+  const joint_command_t& out = chain.Run(standing, 0);
+  ASSERT_EQ(out.status, joint_command_t::STATUS_OK);
+  EXPECT_NEAR(out.eta, 0.5, 1e-6);
+  EXPECT_EQ(out.eta, out.eta_optimal);
+  for (size_t i = 0; i < 2; ++i) EXPECT_NEAR(out.foot_wrench[i].moment[0], 0, 1e-9);
+  EXPECT_NEAR(out.foot_wrench[0].force[2] + out.foot_wrench[1].force[2],
+              -chain.model().total_mass() * robot::kGravity, 1e-6);
+}
+
+TEST(Redistributor, PassesThroughWhenSwitchedOff) {
+  std::mt19937 random(24);
+  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
+              RedistributorText("redistribution: false"));
+  for (int tick = 0; tick < 20; ++tick) {
+    const robot::RobotState now = Disturbed(StandingState(chain.model()), 0.01, 0.1, &random);
+    const joint_command_t& out = chain.Run(now, tick);
+    if (chain.balance().status != balance_torque_t::STATUS_OK) continue;
+    EXPECT_EQ(out.torque, chain.balance().torque);
+    EXPECT_EQ(ToEigen(out.redistribution_torque).norm(), 0);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(GetWrench(out.foot_wrench[i]), GetWrench(chain.balance().foot_wrench[i]));
+    }
+  }
+}
+
+// Section 7.4: the COM near the stance foot but not above its middle, the left foot unloaded in
+// 0.1-0.3 s, single support from 0.3 s. The largest step of a torque from tick to tick, and the
+// left foot's load before the switch.
+struct Switch {
+  double largest_step = 0;  // N·m, at the switch
+  double ramp_step = 0;     // N·m, before it
+  double load_before = 0;   // N
+};
+
+Switch LiftTheLeftFoot(const std::string& redistributor, double com_offset) {
+  Chain chain(TestRobot::kDyros,
+              TaskConfig("phase { start: 0 transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.1 "
+                         "duration: 0.2 } } phase { start: 0.3 support: RIGHT }"),
+              MonitorConfig(false), redistributor);
+  robot::RobotState state = StandingState(chain.model());
+  const robot::RobotData data = robot::Evaluate(chain.model(), state);
+  // The soles stay where they are and the COM moves: inverse kinematics by Newton steps on COM,
+  // body and soles.
+  robot::RobotState posture = state;
+  const double target = data.foot_pose[0].translation().y() + com_offset;
+  for (int iteration = 0; iteration < 30; ++iteration) {
+    const robot::RobotData now = robot::Evaluate(chain.model(), posture);
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(18, 18);
+    Eigen::VectorXd error = Eigen::VectorXd::Zero(18);
+    jacobian.topRows<3>() = now.com_jacobian;
+    error.head<3>() = Eigen::Vector3d(data.com.x(), target, data.com.z()) - now.com;
+    jacobian.block<3, 3>(3, 3).setIdentity();
+    for (size_t i = 0; i < 2; ++i) {
+      const auto row = static_cast<Eigen::Index>(6 + 6 * i);
+      jacobian.middleRows<6>(row) = now.foot_jacobian[i];
+      error.segment<3>(row) = data.foot_pose[i].translation() - now.foot_pose[i].translation();
+      const Eigen::AngleAxisd turn(data.foot_pose[i].linear() *
+                                   now.foot_pose[i].linear().transpose());
+      error.segment<3>(row + 3) = turn.angle() * turn.axis();
+    }
+    posture = robot::Moved(posture, jacobian.fullPivLu().solve(error), 1.0);
+  }
+  Switch result;
+  Eigen::VectorXd last;
+  for (int tick = 0; tick < 160; ++tick) {
+    const joint_command_t& out = chain.Run(posture, tick);
+    EXPECT_EQ(chain.task().status, task_torque_t::STATUS_OK);
+    const Eigen::VectorXd torque = ToEigen(out.torque);
+    if (tick > 0) {
+      const double step = (torque - last).cwiseAbs().maxCoeff();
+      double& largest = tick == 150 ? result.largest_step : result.ramp_step;
+      largest = std::max(largest, step);
+    }
+    if (tick == 149) result.load_before = std::abs(out.foot_wrench[1].force[2]);
+    EXPECT_EQ(out.in_contact[1] != 0, tick < 150);
+    last = torque;
+  }
+  return result;
+}
+
+TEST(Redistributor, TheRampTakesTheTorqueJumpOutOfTheSwitch) {
+  const Switch with = LiftTheLeftFoot(RedistributorText(), 0.03);
+  const Switch without = LiftTheLeftFoot(RedistributorText("transition: false"), 0.03);
+  EXPECT_GT(without.load_before, 50);
+  EXPECT_LT(with.load_before, 0.01);
+  EXPECT_GT(without.largest_step, 5);
+  EXPECT_LT(with.largest_step, 0.01);
+  EXPECT_LT(with.ramp_step, 1.5);  // N·m per tick: 0.2 s for some 30 N·m
+  RecordProperty("jump_with", std::to_string(with.largest_step));
+  RecordProperty("jump_without", std::to_string(without.largest_step));
+}
+
+// The COM further from the stance sole's centre than the sole's reduced half width: the ramp stops
+// at the last ratio that the stance foot can bear.
+TEST(Redistributor, TheRampEndsWhereTheStanceFootWouldTip) {
+  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
+              RedistributorText());
+  const robot::RobotState standing = StandingState(chain.model());
+  chain.Run(standing, 0);
+  ControlContext context(TestRobot::kDyros);
+  Harness<Redistributor> alone(&context, RedistributorText());
+  task_torque_t task = chain.task();
+  task.transition = task_torque_t::TRANSITION_UNLOADING;
+  task.transition_foot = 1;
+  alone.Bind("robot_state", &chain.state());
+  alone.Bind("task_torque", &task);
+  alone.Bind("balance_torque", &chain.balance());
+  double last = 0.5;
+  for (double progress : {0.0, 0.3, 0.6, 1.0}) {
+    task.transition_progress = progress;
+    alone.Run(TickAt(0));
+    const auto& out = alone.output<joint_command_t>();
+    EXPECT_GE(out.eta, last - 1e-9);
+    EXPECT_EQ(out.conditions_met[0], 1);
+    last = out.eta;
+  }
+  // Lever: M_x of the right foot per load = its distance from the CoP, less the left foot's share
+  // of the width.
+  const robot::RobotData data = robot::Evaluate(chain.model(), standing);
+  const double width = (data.foot_pose[1].translation() - data.foot_pose[0].translation()).y();
+  EXPECT_NEAR(last, 0.5 + 0.05 / width, 1e-6);
+}
+
+TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
+  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
+              RedistributorText());
+  const robot::RobotState standing = StandingState(chain.model());
+  const std::vector<double> good = chain.Run(standing, 0).torque;
+  ASSERT_GT(ToEigen(chain.Run(standing, 1).redistribution_torque).norm(), 0);
+  chain.state().joint_position[2] = std::numeric_limits<double>::quiet_NaN();
+  const joint_command_t& out = chain.RunMessage(2);
+  EXPECT_EQ(out.status, joint_command_t::STATUS_INVALID_INPUT);
+  EXPECT_EQ(out.torque, good);
+  EXPECT_TRUE(MessageTraits<joint_command_t>::AllFinite(out));
+  EXPECT_EQ(chain.Run(standing, 3).status, joint_command_t::STATUS_OK);
+}
+
+TEST(Redistributor, RefusesRatiosThatCannotBe) {
+  ControlContext context(TestRobot::kDyros);
+  const auto field_of = [&](const std::string& extra) -> std::string {
+    try {
+      Harness<Redistributor> harness(&context, RedistributorText(extra));
+    } catch (const ConfigError& error) {
+      return error.field();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(field_of("eta_min: -0.1"), "eta_min");
+  EXPECT_EQ(field_of("eta_max: 1.1"), "eta_max");
+  EXPECT_EQ(field_of("eta_max: nan"), "eta_max");
+  EXPECT_EQ(field_of("eta_min: 0.6 eta_max: 0.4"), "eta_min");
+  EXPECT_EQ(field_of("eta_min: 0 eta_max: 1"), "accepted");
+}
+
+}  // namespace
+}  // namespace poise
