@@ -9,7 +9,8 @@ namespace poise {
 
 /// Runs one component of a run as this process: --run FILE (RunSpec as protobuf text), --component
 /// NAME (default: `type`),
-/// --help, --version. Returns the exit code: 0 after a clean stop, 1 when the run failed, 2 for
+/// --help, --version. Returns the exit code: 0 after a clean stop (also of a run that
+/// failed: health says so), 1 when the bus failed or an output was not finite, 2 for
 /// wrong usage or configuration (one line on stderr). Ends with its parent process.
 int ComponentMain(int argc, char** argv, const std::string& type, const ComponentFactory& factory);
 

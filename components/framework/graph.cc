@@ -14,87 +14,72 @@ namespace {
 
 using Problems = std::vector<GraphError::Problem>;
 
-void Throw(const Graph &graph, Problems problems) {
-  if (!problems.empty())
-    throw GraphError(graph.name(), std::move(problems));
+void Throw(const Graph& graph, Problems problems) {
+  if (!problems.empty()) throw GraphError(graph.name(), std::move(problems));
 }
 
-bool IsName(const std::string &name, char first, char last) {
-  return !name.empty() && name.size() <= 48 && name[0] >= first &&
-         name[0] <= last && std::all_of(name.begin(), name.end(), [&](char c) {
-           return (c >= first && c <= last) || (c >= '0' && c <= '9') ||
-                  c == '_';
+bool IsName(const std::string& name, char first, char last) {
+  return !name.empty() && name.size() <= 48 && name[0] >= first && name[0] <= last &&
+         std::all_of(name.begin(), name.end(), [&](char c) {
+           return (c >= first && c <= last) || (c >= '0' && c <= '9') || c == '_';
          });
 }
 
 std::string TypeNames() {
   std::vector<std::string> names;
-  for (const MessageType &type : MessageTypes()) {
-    if (!type.has_strings)
-      names.push_back(type.name);
+  for (const MessageType& type : MessageTypes()) {
+    if (!type.has_strings) names.push_back(type.name);
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-void CheckChannels(const Graph &graph, Problems *problems) {
+void CheckChannels(const Graph& graph, Problems* problems) {
   std::set<std::string> seen;
   for (int i = 0; i < graph.channel_size(); ++i) {
-    const Channel &channel = graph.channel(i);
+    const Channel& channel = graph.channel(i);
     const std::string field = fmt::format("channel[{}]", i);
-    const auto fail = [&](const char *part, const std::string &text) {
-      problems->push_back(
-          {field + part, fmt::format("channel {}: {}", channel.name(), text)});
+    const auto fail = [&](const char* part, const std::string& text) {
+      problems->push_back({field + part, fmt::format("channel {}: {}", channel.name(), text)});
     };
     if (!IsName(channel.name(), 'A', 'Z')) {
-      fail(
-          ".name",
-          fmt::format(
-              "'{}' is no channel name; use capitals, digits and _, at most 48",
-              channel.name()));
+      fail(".name", fmt::format("'{}' is no channel name; use capitals, digits and _, at most 48",
+                                channel.name()));
       continue;
     }
-    if (channel.name() == kControlChannel ||
-        channel.name().starts_with("HEALTH_") ||
+    if (channel.name() == kControlChannel || channel.name().starts_with("HEALTH_") ||
         channel.name() == "LCM_SELF_TEST") {
       fail(".name", "the name is taken by the framework; choose another");
     }
-    if (!seen.insert(channel.name()).second)
-      fail(".name", "named twice; names must be unique");
-    const MessageType *type = FindMessageType(channel.type());
+    if (!seen.insert(channel.name()).second) fail(".name", "named twice; names must be unique");
+    const MessageType* type = FindMessageType(channel.type());
     if (type == nullptr || type->has_strings) {
-      fail(".type",
-           fmt::format("'{}' is no message type of a channel; types: {}",
-                       channel.type(), TypeNames()));
+      fail(".type", fmt::format("'{}' is no message type of a channel; types: {}", channel.type(),
+                                TypeNames()));
     }
   }
 }
 
-void CheckComponents(const Graph &graph, const ComponentRegistry &registry,
-                     Problems *problems) {
-  if (graph.component_size() == 0)
-    problems->push_back({"component", "the graph has no component"});
+void CheckComponents(const Graph& graph, const ComponentRegistry& registry, Problems* problems) {
+  if (graph.component_size() == 0) problems->push_back({"component", "the graph has no component"});
   std::set<std::string> seen;
   for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance &instance = graph.component(i);
+    const ComponentInstance& instance = graph.component(i);
     const std::string field = fmt::format("component[{}]", i);
-    const auto fail = [&](const std::string &part, const std::string &text) {
-      problems->push_back({field + part, fmt::format("component {}: {}",
-                                                     instance.name(), text)});
+    const auto fail = [&](const std::string& part, const std::string& text) {
+      problems->push_back({field + part, fmt::format("component {}: {}", instance.name(), text)});
     };
     if (!IsName(instance.name(), 'a', 'z')) {
       fail(".name", fmt::format("'{}' is no component name; use small letters, "
                                 "digits and _, at most 48",
                                 instance.name()));
     }
-    if (!seen.insert(instance.name()).second)
-      fail(".name", "named twice; names must be unique");
+    if (!seen.insert(instance.name()).second) fail(".name", "named twice; names must be unique");
     if (registry.Find(TypeOf(instance)) == nullptr) {
       std::vector<std::string> types;
-      for (const auto &[type, entry] : registry.entries())
-        types.push_back(type);
+      for (const auto& [type, entry] : registry.entries()) types.push_back(type);
       fail(instance.has_type() ? ".type" : ".name",
-           fmt::format("unknown component type '{}'; types: {}",
-                       TypeOf(instance), fmt::join(types, ", ")));
+           fmt::format("unknown component type '{}'; types: {}", TypeOf(instance),
+                       fmt::join(types, ", ")));
     }
   }
 }
@@ -104,22 +89,20 @@ struct Uses {
   std::vector<std::string> readers;
 };
 
-void CheckConnections(const Graph &graph, Problems *problems) {
+void CheckConnections(const Graph& graph, Problems* problems) {
   std::map<std::string, Uses> uses;
-  for (const Channel &channel : graph.channel())
-    uses[channel.name()];
+  for (const Channel& channel : graph.channel()) uses[channel.name()];
   for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance &instance = graph.component(i);
+    const ComponentInstance& instance = graph.component(i);
     for (const bool is_input : {true, false}) {
       std::set<std::string> ports;
-      const auto &connections = is_input ? instance.input() : instance.output();
+      const auto& connections = is_input ? instance.input() : instance.output();
       for (int k = 0; k < connections.size(); ++k) {
-        const Connection &connection = connections[k];
-        const std::string field = fmt::format("component[{}].{}[{}]", i,
-                                              is_input ? "input" : "output", k);
-        const std::string where =
-            fmt::format("component {}: {} {}", instance.name(),
-                        is_input ? "input" : "output", connection.port());
+        const Connection& connection = connections[k];
+        const std::string field =
+            fmt::format("component[{}].{}[{}]", i, is_input ? "input" : "output", k);
+        const std::string where = fmt::format("component {}: {} {}", instance.name(),
+                                              is_input ? "input" : "output", connection.port());
         if (!ports.insert(connection.port()).second) {
           problems->push_back({field + ".port", where + " is connected twice"});
         }
@@ -127,57 +110,49 @@ void CheckConnections(const Graph &graph, Problems *problems) {
         if (use == uses.end()) {
           problems->push_back(
               {field + ".channel",
-               fmt::format(
-                   "{}: unknown channel '{}'; declare it with channel {{ }}",
-                   where, connection.channel())});
+               fmt::format("{}: unknown channel '{}'; declare it with channel {{ }}", where,
+                           connection.channel())});
           continue;
         }
-        (is_input ? use->second.readers : use->second.writers)
-            .push_back(instance.name());
+        (is_input ? use->second.readers : use->second.writers).push_back(instance.name());
       }
     }
   }
   for (int i = 0; i < graph.channel_size(); ++i) {
-    const Channel &channel = graph.channel(i);
-    const Uses &use = uses[channel.name()];
+    const Channel& channel = graph.channel(i);
+    const Uses& use = uses[channel.name()];
     const std::string field = fmt::format("channel[{}]", i);
     if (channel.external() && !use.writers.empty()) {
-      problems->push_back(
-          {field, fmt::format("channel {} is external, but {} writes it",
-                              channel.name(), fmt::join(use.writers, ", "))});
+      problems->push_back({field, fmt::format("channel {} is external, but {} writes it",
+                                              channel.name(), fmt::join(use.writers, ", "))});
     } else if (use.writers.size() > 1) {
       problems->push_back(
-          {field, fmt::format("channel {} has {} writers ({}); one only",
-                              channel.name(), use.writers.size(),
-                              fmt::join(use.writers, ", "))});
+          {field, fmt::format("channel {} has {} writers ({}); one only", channel.name(),
+                              use.writers.size(), fmt::join(use.writers, ", "))});
     } else if (!channel.external() && use.writers.empty()) {
       problems->push_back(
-          {field,
-           use.readers.empty()
-               ? fmt::format("channel {}: nobody writes it; remove it or mark "
-                             "it external",
-                             channel.name())
-               : fmt::format("channel {}: {} reads it, but nobody writes it",
-                             channel.name(), fmt::join(use.readers, ", "))});
+          {field, use.readers.empty()
+                      ? fmt::format("channel {}: nobody writes it; remove it or mark "
+                                    "it external",
+                                    channel.name())
+                      : fmt::format("channel {}: {} reads it, but nobody writes it", channel.name(),
+                                    fmt::join(use.readers, ", "))});
     }
   }
 }
 
-int ChannelIndex(const Graph &graph, const std::string &name) {
+int ChannelIndex(const Graph& graph, const std::string& name) {
   for (int i = 0; i < graph.channel_size(); ++i) {
-    if (graph.channel(i).name() == name)
-      return i;
+    if (graph.channel(i).name() == name) return i;
   }
   return -1;
 }
 
 /// Index of the connection of `port`, or -1.
-int FindConnection(
-    const google::protobuf::RepeatedPtrField<Connection> &connections,
-    const std::string &port) {
+int FindConnection(const google::protobuf::RepeatedPtrField<Connection>& connections,
+                   const std::string& port) {
   for (int k = 0; k < connections.size(); ++k) {
-    if (connections[k].port() == port)
-      return k;
+    if (connections[k].port() == port) return k;
   }
   return -1;
 }
@@ -185,132 +160,107 @@ int FindConnection(
 /// One direction of a component: every declared port connected, every
 /// connection declared, types equal.
 template <class Port>
-void CheckPorts(
-    const Graph &graph, int component, const char *direction,
-    const google::protobuf::RepeatedPtrField<Connection> &connections,
-    const std::vector<Port *> &ports, Problems *problems) {
-  const std::string prefix = fmt::format(
-      "component {}: {} ", graph.component(component).name(), direction);
+void CheckPorts(const Graph& graph, int component, const char* direction,
+                const google::protobuf::RepeatedPtrField<Connection>& connections,
+                const std::vector<Port*>& ports, Problems* problems) {
+  const std::string prefix =
+      fmt::format("component {}: {} ", graph.component(component).name(), direction);
   const std::string field = fmt::format("component[{}]", component);
-  for (const Port *port : ports) {
+  for (const Port* port : ports) {
     const int k = FindConnection(connections, port->name());
     if (k < 0) {
-      problems->push_back(
-          {field, fmt::format("{0}{1} is not connected; add {2} {{ port: "
-                              "\"{1}\" channel: ... }}",
-                              prefix, port->name(), direction)});
+      problems->push_back({field, fmt::format("{0}{1} is not connected; add {2} {{ port: "
+                                              "\"{1}\" channel: ... }}",
+                                              prefix, port->name(), direction)});
       continue;
     }
     const int channel = ChannelIndex(graph, connections[k].channel());
     if (channel >= 0 && graph.channel(channel).type() != port->type_name()) {
       problems->push_back({fmt::format("{}.{}[{}]", field, direction, k),
-                           fmt::format("{}{} carries {}, but channel {} is {}",
-                                       prefix, port->name(), port->type_name(),
-                                       connections[k].channel(),
+                           fmt::format("{}{} carries {}, but channel {} is {}", prefix,
+                                       port->name(), port->type_name(), connections[k].channel(),
                                        graph.channel(channel).type())});
     }
   }
   for (int k = 0; k < connections.size(); ++k) {
-    const auto same = [&](const Port *port) {
-      return port->name() == connections[k].port();
-    };
-    if (std::any_of(ports.begin(), ports.end(), same))
-      continue;
+    const auto same = [&](const Port* port) { return port->name() == connections[k].port(); };
+    if (std::any_of(ports.begin(), ports.end(), same)) continue;
     std::vector<std::string> names;
-    for (const Port *port : ports)
-      names.push_back(port->name());
+    for (const Port* port : ports) names.push_back(port->name());
     problems->push_back(
         {fmt::format("{}.{}[{}].port", field, direction, k),
-         fmt::format(
-             "{}'{}' does not exist; it has: {}", prefix, connections[k].port(),
-             names.empty() ? "none"
-                           : fmt::format("{}", fmt::join(names, ", ")))});
+         fmt::format("{}'{}' does not exist; it has: {}", prefix, connections[k].port(),
+                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")))});
   }
 }
 
 template <class Port>
-bool InSomeStage(const std::vector<Stage> &stages, const Port *port,
-                 std::vector<Port *> Stage::*ports) {
-  return std::any_of(stages.begin(), stages.end(), [&](const Stage &stage) {
-    return std::find((stage.*ports).begin(), (stage.*ports).end(), port) !=
-           (stage.*ports).end();
+bool InSomeStage(const std::vector<Stage>& stages, const Port* port,
+                 std::vector<Port*> Stage::*ports) {
+  return std::any_of(stages.begin(), stages.end(), [&](const Stage& stage) {
+    return std::find((stage.*ports).begin(), (stage.*ports).end(), port) != (stage.*ports).end();
   });
 }
 
-void CheckComponent(const Graph &graph, int i, const Wiring &wiring,
-                    Problems *problems) {
-  const ComponentInstance &instance = graph.component(i);
+void CheckComponent(const Graph& graph, int i, const Wiring& wiring, Problems* problems) {
+  const ComponentInstance& instance = graph.component(i);
   const std::string field = fmt::format("component[{}]", i);
   CheckPorts(graph, i, "input", instance.input(), wiring.inputs(), problems);
   CheckPorts(graph, i, "output", instance.output(), wiring.outputs(), problems);
   if (wiring.stages().empty()) {
-    problems->push_back(
-        {field, fmt::format("component {}: has no stage", instance.name())});
+    problems->push_back({field, fmt::format("component {}: has no stage", instance.name())});
   }
-  for (const InputPort *input : wiring.inputs()) {
+  for (const InputPort* input : wiring.inputs()) {
     if (!InSomeStage(wiring.stages(), input, &Stage::inputs)) {
-      problems->push_back(
-          {field, fmt::format("component {}: no stage reads input {}",
-                              instance.name(), input->name())});
+      problems->push_back({field, fmt::format("component {}: no stage reads input {}",
+                                              instance.name(), input->name())});
     }
     const int k = FindConnection(instance.input(), input->name());
-    const int channel =
-        k < 0 ? -1 : ChannelIndex(graph, instance.input(k).channel());
-    if (channel < 0)
-      continue;
+    const int channel = k < 0 ? -1 : ChannelIndex(graph, instance.input(k).channel());
+    if (channel < 0) continue;
     const bool external = graph.channel(channel).external();
-    if (external == (input->kind() == InputKind::kLatest))
-      continue;
-    const std::string &name = graph.channel(channel).name();
-    problems->push_back(
-        {fmt::format("{}.input[{}]", field, k),
-         fmt::format("component {}: input {} ", instance.name(),
-                     input->name()) +
-             (external
-                  ? fmt::format("waits for its message, but channel {} is "
-                                "external and does "
-                                "not keep step with the ticks",
-                                name)
-                  : fmt::format("takes the latest message, but channel {} is "
-                                "written inside "
-                                "the graph: the result would depend on timing",
-                                name))});
+    if (external == (input->kind() == InputKind::kLatest)) continue;
+    const std::string& name = graph.channel(channel).name();
+    problems->push_back({fmt::format("{}.input[{}]", field, k),
+                         fmt::format("component {}: input {} ", instance.name(), input->name()) +
+                             (external ? fmt::format("waits for its message, but channel {} is "
+                                                     "external and does "
+                                                     "not keep step with the ticks",
+                                                     name)
+                                       : fmt::format("takes the latest message, but channel {} is "
+                                                     "written inside "
+                                                     "the graph: the result would depend on timing",
+                                                     name))});
   }
-  for (const OutputPort *output : wiring.outputs()) {
+  for (const OutputPort* output : wiring.outputs()) {
     if (!InSomeStage(wiring.stages(), output, &Stage::outputs)) {
-      problems->push_back(
-          {field, fmt::format("component {}: no stage writes output {}",
-                              instance.name(), output->name())});
+      problems->push_back({field, fmt::format("component {}: no stage writes output {}",
+                                              instance.name(), output->name())});
     }
   }
 }
 
-std::string Describe(std::span<const char *const> names,
-                     const MessageCounts &counts) {
+std::string Describe(std::span<const char* const> names, const MessageCounts& counts) {
   std::vector<std::string> parts;
   for (size_t i = 0; i < counts.size(); ++i)
     parts.push_back(fmt::format("{} = {}", names[i], counts[i]));
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-GraphPlan ConnectPorts(const Graph &graph,
-                       const std::vector<const Wiring *> &wirings,
-                       Problems *problems) {
+GraphPlan ConnectPorts(const Graph& graph, const std::vector<const Wiring*>& wirings,
+                       Problems* problems) {
   GraphPlan plan;
-  for (const Channel &channel : graph.channel()) {
-    plan.channels.push_back(
-        {channel.name(), channel.type(), channel.external(), {}, {}, {}, 0});
+  for (const Channel& channel : graph.channel()) {
+    plan.channels.push_back({channel.name(), channel.type(), channel.external(), {}, {}, {}, 0});
   }
   for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance &instance = graph.component(i);
-    const Wiring &wiring = *wirings[static_cast<size_t>(i)];
-    auto &outputs = plan.output_channel.emplace_back();
-    for (const OutputPort *output : wiring.outputs()) {
+    const ComponentInstance& instance = graph.component(i);
+    const Wiring& wiring = *wirings[static_cast<size_t>(i)];
+    auto& outputs = plan.output_channel.emplace_back();
+    for (const OutputPort* output : wiring.outputs()) {
       const int c = ChannelIndex(
-          graph,
-          instance.output(FindConnection(instance.output(), output->name()))
-              .channel());
-      GraphPlan::ChannelPlan &channel = plan.channels[static_cast<size_t>(c)];
+          graph, instance.output(FindConnection(instance.output(), output->name())).channel());
+      GraphPlan::ChannelPlan& channel = plan.channels[static_cast<size_t>(c)];
       channel.writer = {i, static_cast<int>(outputs.size())};
       channel.counts = output->counts();
       channel.encoded_size = output->encoded_size();
@@ -318,29 +268,27 @@ GraphPlan ConnectPorts(const Graph &graph,
     }
   }
   for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance &instance = graph.component(i);
-    const Wiring &wiring = *wirings[static_cast<size_t>(i)];
-    auto &inputs = plan.input_channel.emplace_back();
-    for (const InputPort *input : wiring.inputs()) {
+    const ComponentInstance& instance = graph.component(i);
+    const Wiring& wiring = *wirings[static_cast<size_t>(i)];
+    auto& inputs = plan.input_channel.emplace_back();
+    for (const InputPort* input : wiring.inputs()) {
       const int k = FindConnection(instance.input(), input->name());
       const int c = ChannelIndex(graph, instance.input(k).channel());
-      GraphPlan::ChannelPlan &channel = plan.channels[static_cast<size_t>(c)];
+      GraphPlan::ChannelPlan& channel = plan.channels[static_cast<size_t>(c)];
       if (channel.external && channel.readers.empty()) {
         channel.counts = input->counts();
         channel.encoded_size = input->encoded_size();
       }
       if (input->counts() != channel.counts) {
         const std::string other =
-            channel.external ? "another reader"
-                             : graph.component(channel.writer.component).name();
+            channel.external ? "another reader" : graph.component(channel.writer.component).name();
         problems->push_back(
             {fmt::format("component[{}].input[{}]", i, k),
              fmt::format("component {}: input {} expects {}, but {} has {} on "
                          "channel {}",
                          instance.name(), input->name(),
                          Describe(input->count_names(), input->counts()), other,
-                         Describe(input->count_names(), channel.counts),
-                         channel.name)});
+                         Describe(input->count_names(), channel.counts), channel.name)});
       }
       channel.readers.push_back({i, static_cast<int>(inputs.size())});
       inputs.push_back(c);
@@ -349,21 +297,19 @@ GraphPlan ConnectPorts(const Graph &graph,
   return plan;
 }
 
-} // namespace
+}  // namespace
 
-GraphError::GraphError(const std::string &graph_name,
-                       std::vector<Problem> problems)
+GraphError::GraphError(const std::string& graph_name, std::vector<Problem> problems)
     : ConfigError([&] {
         std::vector<std::string> lines;
-        for (const Problem &problem : problems) {
-          lines.push_back(fmt::format("graph {}: {}: {}", graph_name,
-                                      problem.field, problem.text));
+        for (const Problem& problem : problems) {
+          lines.push_back(fmt::format("graph {}: {}: {}", graph_name, problem.field, problem.text));
         }
         return fmt::format("{}", fmt::join(lines, "\n"));
       }()),
       problems_(std::move(problems)) {}
 
-void CheckGraph(const Graph &graph, const ComponentRegistry &registry) {
+void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   Problems problems;
   CheckChannels(graph, &problems);
   CheckComponents(graph, registry, &problems);
@@ -371,14 +317,13 @@ void CheckGraph(const Graph &graph, const ComponentRegistry &registry) {
   Throw(graph, std::move(problems));
 }
 
-void CheckWiring(const Graph &graph, int component, const Wiring &wiring) {
+void CheckWiring(const Graph& graph, int component, const Wiring& wiring) {
   Problems problems;
   CheckComponent(graph, component, wiring, &problems);
   Throw(graph, std::move(problems));
 }
 
-GraphPlan PlanGraph(const Graph &graph,
-                    const std::vector<const Wiring *> &wirings) {
+GraphPlan PlanGraph(const Graph& graph, const std::vector<const Wiring*>& wirings) {
   Problems problems;
   CheckChannels(graph, &problems);
   CheckConnections(graph, &problems);
@@ -394,59 +339,51 @@ GraphPlan PlanGraph(const Graph &graph,
   return plan;
 }
 
-void FillCounts(const GraphPlan &plan, Graph *graph) {
+void FillCounts(const GraphPlan& plan, Graph* graph) {
   for (int i = 0; i < graph->channel_size(); ++i) {
-    const MessageCounts &counts = plan.channels[static_cast<size_t>(i)].counts;
-    graph->mutable_channel(i)->mutable_count()->Assign(counts.begin(),
-                                                       counts.end());
+    const MessageCounts& counts = plan.channels[static_cast<size_t>(i)].counts;
+    graph->mutable_channel(i)->mutable_count()->Assign(counts.begin(), counts.end());
   }
 }
 
-ConfiguredComponent ConfigureComponent(const RunSpec &spec, int index,
-                                       const ComponentFactory &factory,
-                                       SharedObjects *shared) {
+ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
+                                       const ComponentFactory& factory, SharedObjects* shared) {
   ConfiguredComponent result;
   result.name = spec.graph().component(index).name();
   result.component = factory();
   ComponentContext context;
   context.name = result.name;
-  for (const ComponentConfig &config : spec.config()) {
-    if (config.component() == result.name)
-      context.config_text = config.text();
+  for (const ComponentConfig& config : spec.config()) {
+    if (config.component() == result.name) context.config_text = config.text();
   }
   context.tick_period = spec.tick_period();
   context.seed = InstanceSeed(spec.seed(), result.name);
   std::map<std::string, std::string> resources;
-  for (const Resource &resource : spec.resource())
-    resources[resource.name()] = resource.text();
+  for (const Resource& resource : spec.resource()) resources[resource.name()] = resource.text();
   context.resources = &resources;
   context.shared = shared;
   try {
     result.component->Configure(context, &result.wiring);
-  } catch (const ConfigError &error) {
+  } catch (const ConfigError& error) {
     if (!error.field().empty())
       throw ConfigError(result.name + "." + error.field(), error.problem());
     const std::string what = error.what();
-    if (what.find(result.name) != std::string::npos)
-      throw;
+    if (what.find(result.name) != std::string::npos) throw;
     throw ConfigError(fmt::format("{}: {}", result.name, what));
   }
   return result;
 }
 
-BoundGraph::BoundGraph(const RunSpec &spec, const ComponentRegistry &registry) {
-  if (!(spec.tick_period() > 0))
-    throw ConfigError("run: tick_period must be greater than 0");
+BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry) {
+  if (!(spec.tick_period() > 0)) throw ConfigError("run: tick_period must be greater than 0");
   CheckGraph(spec.graph(), registry);
-  std::vector<const Wiring *> wirings;
+  std::vector<const Wiring*> wirings;
   for (int i = 0; i < spec.graph().component_size(); ++i) {
-    const ComponentFactory *factory =
-        registry.Find(TypeOf(spec.graph().component(i)));
+    const ComponentFactory* factory = registry.Find(TypeOf(spec.graph().component(i)));
     components_.push_back(ConfigureComponent(spec, i, *factory, &shared_));
   }
-  for (const ConfiguredComponent &component : components_)
-    wirings.push_back(&component.wiring);
+  for (const ConfiguredComponent& component : components_) wirings.push_back(&component.wiring);
   plan_ = PlanGraph(spec.graph(), wirings);
 }
 
-} // namespace poise
+}  // namespace poise

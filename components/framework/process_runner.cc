@@ -114,8 +114,8 @@ class ProcessRunner::Impl {
   int64_t num_ticks_;
   int64_t run_id_;
   int index_;
-  ConfiguredComponent configured_;
   SharedObjects shared_;
+  ConfiguredComponent configured_;
   ServiceLink service_;
   FaultInjector faults_;
   std::vector<std::unique_ptr<Inbox>> inboxes_;

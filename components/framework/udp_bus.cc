@@ -23,6 +23,7 @@ constexpr uint32_t kShortMagic = 0x4c433032;  // "LC02": magic, sequence number,
 constexpr size_t kShortHeader = 8;
 constexpr size_t kMaxChannelName = 63;
 constexpr size_t kMaxDatagram = 65536;
+constexpr int kMaxMalformedInARow = 16;
 
 struct Endpoint {
   in_addr group{};
@@ -98,12 +99,14 @@ BusReceiver::BusReceiver(const std::string& url) : buffer_(kMaxDatagram) {
 BusReceiver::~BusReceiver() { close(fd_); }
 
 bool BusReceiver::Receive(Packet* packet) {
-  while (true) {
+  // Bounded: a flood of noise must not keep the caller here.
+  for (int i = 0; i < kMaxMalformedInARow; ++i) {
     const ssize_t size = recv(fd_, buffer_.data(), buffer_.size(), 0);
     if (size < 0) return false;  // nothing there; an error of the network shows at the next packet
     if (ParseDatagram(buffer_.data(), static_cast<size_t>(size), packet)) return true;
     ++malformed_;
   }
+  return false;
 }
 
 bool ParseDatagram(const uint8_t* datagram, size_t size, BusReceiver::Packet* packet) {

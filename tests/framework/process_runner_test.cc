@@ -4,6 +4,8 @@
 
 #include <csignal>
 
+#include "components/framework/channel_collector.h"
+#include "components/framework/configuration.h"
 #include "tests/framework/process_harness.h"
 #include "tests/framework/toy_components.h"
 
@@ -143,6 +145,17 @@ TEST(ProcessRunner, RealTimeGivesTheSameBytes) {
   RunSpec spec = ToyRun(ToyLoop(), 250);
   spec.set_realtime(true);
   ExpectEqualToInline(spec, RunAsProcesses(spec), 250);
+}
+
+TEST(ChannelCollector, NeedsTheCountsOfTheCheckedGraph) {
+  try {
+    ChannelCollector collector(ToyRun(ToyLoop(), 1), "recorder", {nullptr, nullptr});
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "channel SENSORS: the run gives 0 counts, robot_sensors_t has 2; fill them in "
+                 "from the checked graph");
+  }
 }
 
 TEST(ComponentMain, RefusesWrongUsageInOneLine) {

@@ -37,6 +37,11 @@ class Toy : public Component {
   std::string detail_;
 };
 
+/// An object that the components of one process share.
+std::shared_ptr<double> SharedGain(const ComponentContext& context) {
+  return context.shared->Get<double>("gain", [] { return std::make_shared<double>(0.5); });
+}
+
 /// A chaotic map driven by the last command, so that one wrong or missing message changes
 /// everything after it.
 class ToyPlant final : public Toy {
@@ -79,11 +84,12 @@ class ToyFilter final : public Toy {
     Read(context);
     const int32_t n = config_.wrong_counts() ? joints() + 1 : joints();
     filtered_.assign(static_cast<size_t>(n), 0.0);
+    gain_ = SharedGain(context);
     wiring->AddInput(&sensors_, "sensors", {n, 2});
     wiring->AddOutput(&state_, "state", {joints(), 2});
     wiring->AddStage("filter", {&sensors_}, {&state_}, [this](const Tick& tick) {
       for (size_t i = 0; i < filtered_.size(); ++i) {
-        filtered_[i] = 0.5 * filtered_[i] + 0.5 * sensors_->joint_position[i];
+        filtered_[i] = 0.5 * filtered_[i] + *gain_ * sensors_->joint_position[i];
         state_->joint_position[i] = filtered_[i];
       }
       MaybeFinish(tick);
@@ -93,6 +99,7 @@ class ToyFilter final : public Toy {
  private:
   Input<robot_sensors_t> sensors_;
   Output<robot_state_t> state_;
+  std::shared_ptr<double> gain_;
   std::vector<double> filtered_;
 };
 
@@ -101,6 +108,7 @@ class ToyController final : public Toy {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override {
     Read(context);
+    gain_ = SharedGain(context);
     wiring->AddInput(&sensors_, "sensors", {joints(), 2});
     wiring->AddInput(&state_, "state", {joints(), 2});
     wiring->AddInput(
@@ -129,6 +137,7 @@ class ToyController final : public Toy {
   Input<robot_state_t> state_;
   Input<joint_command_t> before_;
   Input<emergency_stop_t> stop_;
+  std::shared_ptr<double> gain_;
   Output<task_torque_t> torque_;
   Output<joint_command_t> command_;
 };
