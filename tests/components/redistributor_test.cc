@@ -150,7 +150,7 @@ TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {
   }
   EXPECT_LT(worst_torque, 1e-7);  // N·m, of some 100
   EXPECT_LT(worst_wrench, 1e-7);  // N, N·m, of some 500
-  RecordProperty("worst_torque", std::to_string(worst_torque));
+  RecordProperty("worst_torque", testing::PrintToString(worst_torque));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SquareRoute,
@@ -331,8 +331,8 @@ TEST(Redistributor, TheRampTakesTheTorqueJumpOutOfTheSwitch) {
   EXPECT_GT(without.largest_step, 5);
   EXPECT_LT(with.largest_step, 0.01);
   EXPECT_LT(with.ramp_step, 1.5);  // N·m per tick: 0.2 s for some 30 N·m
-  RecordProperty("jump_with", std::to_string(with.largest_step));
-  RecordProperty("jump_without", std::to_string(without.largest_step));
+  RecordProperty("jump_with", testing::PrintToString(with.largest_step));
+  RecordProperty("jump_without", testing::PrintToString(without.largest_step));
 }
 
 // The COM further from the stance sole's centre than the sole's reduced half width: the ramp stops

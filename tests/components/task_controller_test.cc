@@ -100,7 +100,7 @@ TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
     }
   }
   EXPECT_LT(worst, 1e-8);  // m/s², rad/s²
-  RecordProperty("worst_residual", std::to_string(worst));
+  RecordProperty("worst_residual", testing::PrintToString(worst));
 }
 
 TEST_P(TaskControllerCase, GravityCompensationHoldsTheRobotStill) {
