@@ -1,0 +1,179 @@
+#include "tests/components/base_motion.h"
+
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "components/robot/posture.h"
+#include "components/robot/robot_files.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+Vector3d RotationVector(const Matrix3d& rotation) {
+  const Eigen::AngleAxisd difference(rotation);
+  return difference.angle() * difference.axis();
+}
+
+// Standing with bent knees, as high as the robot stands with these joint angles.
+robot::RobotState Stand(const robot::RobotModel& model) {
+  robot::RobotState bent(model.num_joints());
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const std::string& name = model.joints()[static_cast<size_t>(j)].name;
+    const auto has = [&](const char* part) { return name.find(part) != std::string::npos; };
+    if (has("hip_pitch") || has("ankle_pitch")) bent.joint_position[j] = -0.4;
+    if (has("knee")) bent.joint_position[j] = 0.8;
+  }
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, bent, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, bent, &data);
+  const Vector3d right = data.foot_pose[0].translation(), left = data.foot_pose[1].translation();
+  robot::PostureGoal goal;
+  const double spacing = left.y() - right.y();
+  goal.foot[0] = goal.foot[1] = Isometry3d::Identity();
+  goal.foot[0].translation().y() = -spacing / 2;
+  goal.foot[1].translation().y() = spacing / 2;
+  goal.com_height = data.com.z() - 0.5 * (right.z() + left.z());
+  goal.nominal = bent.joint_position;
+  return robot::SolvePosture(model, goal);
+}
+
+}  // namespace
+
+SensorErrors TypicalErrors(const robot::RobotModel& model) {
+  const robot::ImuModel& imu = model.imu();
+  SensorErrors errors;
+  errors.gyro_noise = imu.gyro_noise;
+  errors.gyro_bias = imu.gyro_bias * Vector3d(1, -1, 1);
+  errors.accelerometer_noise = imu.accelerometer_noise;
+  errors.accelerometer_bias = imu.accelerometer_bias * Vector3d(1, -1, 1) / std::sqrt(3.0);
+  errors.load_noise = model.force_noise();
+  errors.encoder_steps = true;
+  return errors;
+}
+
+BaseMotion::BaseMotion(const std::string& path)
+    : model_(std::make_shared<const robot::RobotModel>(robot::LoadRobotFiles(path))),
+      data_(*model_),
+      start_(Stand(*model_)),
+      now_(start_),
+      reading_(VectorXd::Zero(model_->num_joints())) {
+  script_.base_position = [p = start_.base_position](double) { return p; };
+  script_.base_orientation = [q = start_.base_orientation](double) { return q; };
+  robot::ComputeKinematics(*model_, start_, &data_);
+  robot::ComputeFeet(*model_, &data_);
+  for (size_t f = 0; f < 2; ++f) {
+    script_.foot[f] = [pose = data_.foot_pose[f]](double) { return pose; };
+    script_.load[f] = [](double) { return 0.5; };
+    const auto joints = model_->supporting_joints(model_->feet()[f].body);
+    leg_[f].assign(joints.begin(), joints.end());
+  }
+}
+
+// Newton's method for the six joints of each leg.
+BaseMotion::Sample BaseMotion::Solve(double time, const VectorXd& guess) {
+  Sample sample;
+  sample.state = robot::RobotState(model_->num_joints());
+  sample.state.base_position = script_.base_position(time);
+  sample.state.base_orientation = script_.base_orientation(time).normalized();
+  VectorXd& q = sample.state.joint_position;
+  q = start_.joint_position.array() + script_.other_joints(time);
+  for (const auto& leg : leg_) {
+    for (const int j : leg) q[j] = guess[j];
+  }
+  double error = 1;
+  for (int iteration = 0; iteration < 50 && error > 1e-14; ++iteration) {
+    robot::ComputeKinematics(*model_, sample.state, &data_);
+    robot::ComputeFeet(*model_, &data_);
+    error = 0;
+    for (size_t f = 0; f < 2; ++f) {
+      const Isometry3d goal = script_.foot[f](time);
+      robot::Vector6d miss;
+      miss << goal.translation() - data_.foot_pose[f].translation(),
+          RotationVector(goal.linear() * data_.foot_pose[f].linear().transpose());
+      Eigen::Matrix<double, 6, 6> jacobian;
+      for (int k = 0; k < 6; ++k) {
+        jacobian.col(k) = data_.foot_jacobian[f].col(6 + leg_[f][static_cast<size_t>(k)]);
+      }
+      const robot::Vector6d step = jacobian.partialPivLu().solve(miss);
+      for (int k = 0; k < 6; ++k) q[leg_[f][static_cast<size_t>(k)]] += step[k];
+      error = std::max(error, miss.cwiseAbs().maxCoeff());
+    }
+  }
+  if (error > 1e-11) throw std::logic_error("the script asks for a pose out of reach");
+  robot::ComputeKinematics(*model_, sample.state, &data_);
+  const robot::ImuModel& imu = model_->imu();
+  const size_t b = static_cast<size_t>(imu.body);
+  sample.imu_rotation = data_.body_rotation[b] * imu.pose.linear();
+  sample.imu_position = sample.state.base_position + data_.body_position[b] +
+                        data_.body_rotation[b] * imu.pose.translation();
+  return sample;
+}
+
+void BaseMotion::Next() {
+  ++sample_;
+  if (sample_ == 0) {
+    before_ = Solve(-kGrid, start_.joint_position);
+  } else {
+    before_ = after_;
+  }
+  at_ = Solve(time(), before_.state.joint_position);
+  after_ = Solve(time() + kGrid, at_.state.joint_position);
+
+  // Central differences over one grid step: errors of kGrid² / 6 times the third derivative.
+  now_ = at_.state;
+  const double two_steps = 2 * kGrid;
+  now_.base_linear_velocity =
+      (after_.state.base_position - before_.state.base_position) / two_steps;
+  now_.base_angular_velocity =
+      RotationVector((after_.state.base_orientation * before_.state.base_orientation.conjugate())
+                         .toRotationMatrix()) /
+      two_steps;
+  now_.joint_velocity = (after_.state.joint_position - before_.state.joint_position) / two_steps;
+}
+
+Vector3d BaseMotion::com() const {
+  robot::RobotData data(*model_);
+  robot::ComputeKinematics(*model_, now_, &data);
+  robot::ComputeDynamics(*model_, now_, &data);
+  return data.com;
+}
+
+BaseSensors BaseMotion::sensors() {
+  std::normal_distribution<double> normal;
+  const auto noise = [&] { return Vector3d(normal(random_), normal(random_), normal(random_)); };
+
+  reading_ = now_.joint_position;
+  if (errors_.encoder_steps) {
+    for (int j = 0; j < model_->num_joints(); ++j) {
+      const robot::MotorModel& motor = model_->motors()[static_cast<size_t>(j)];
+      const double step = 2 * std::numbers::pi / (motor.gear_ratio * motor.encoder_counts);
+      reading_[j] = std::round(reading_[j] / step) * step;
+    }
+  }
+  const Vector3d rate =
+      RotationVector(after_.imu_rotation * before_.imu_rotation.transpose()) / (2 * kGrid);
+  const Vector3d acceleration =
+      (after_.imu_position - 2 * at_.imu_position + before_.imu_position) / (kGrid * kGrid);
+  const Vector3d specific_force = acceleration + robot::kGravity * Vector3d::UnitZ();
+  const Vector3d gyro =
+      at_.imu_rotation.transpose() * rate + errors_.gyro_bias + errors_.gyro_noise * noise();
+  const Vector3d accelerometer = at_.imu_rotation.transpose() * specific_force +
+                                 errors_.accelerometer_bias + errors_.accelerometer_noise * noise();
+  std::array<double, 2> load;
+  for (size_t f = 0; f < 2; ++f) {
+    load[f] = script_.load[f](time()) * model_->total_mass() * robot::kGravity +
+              errors_.load_noise * normal(random_);
+  }
+  return {{reading_.data(), reading_.size()}, gyro, accelerometer, load};
+}
+
+}  // namespace poise

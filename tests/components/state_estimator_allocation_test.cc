@@ -1,0 +1,43 @@
+// The estimator's tick must not touch the heap: malloc itself is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstddef>
+#include <vector>
+
+#include "tests/components/base_motion.h"
+
+extern "C" void* __libc_malloc(size_t size);
+namespace {
+std::atomic<long> allocations{0};
+}
+extern "C" void* malloc(size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+
+namespace poise {
+namespace {
+
+TEST(BaseEstimator, AllocatesNothingPerTick) {
+  for (const char* path :
+       {"/deploy/robots/dyros/dyros_legs.pbtxt", "/tests/robot/data/mantis.pbtxt"}) {
+    BaseMotion motion(POISE_SOURCE_DIR + std::string(path));
+    const long before_construction = allocations;
+    BaseEstimator estimator(motion.model(), {}, BaseMotion::kPeriod);
+    EXPECT_GT(allocations - before_construction, 0);  // the counter counts
+    // Loaded, one foot light, in flight.
+    motion.script().load[0] = [](double t) { return t < 0.02 ? 0.5 : t < 0.04 ? 1.0 : 0.0; };
+    motion.script().load[1] = [](double t) { return t < 0.02 ? 0.5 : 0.0; };
+    for (int i = 0; i < 30; ++i) {
+      motion.Next();
+      const BaseSensors sensors = motion.sensors();
+      const long before = allocations;
+      estimator.Update(sensors, BaseMotion::kPeriod);
+      ASSERT_EQ(allocations - before, 0) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace poise
