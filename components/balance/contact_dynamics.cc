@@ -13,7 +13,7 @@ namespace {
 using Eigen::Dynamic;
 using Eigen::Index;
 
-// A loop whose smallest pivot is this far below its largest leaves no correct digit in Λ_c.
+// A loop whose smallest pivot is this far below its scale leaves no correct digit in Λ_c.
 constexpr double kLoopTolerance = 1e-8;
 // Base columns of J_c must be a rigid transform this closely, or its closed-form inverse would be
 // wrong.
@@ -46,18 +46,18 @@ Matrix6d InverseTransposed(const Eigen::Ref<const Matrix6d, 0, Eigen::OuterStrid
 }
 
 /// Q and R of the k×6 matrix in `loop` by Householder reflections, I − U T Uᵀ. `loop` keeps R in
-/// its upper triangle. False when the columns are dependent or not finite.
+/// its upper triangle. False when the columns are dependent, seen against `scale` (of the terms
+/// they are the sum of), or not finite.
 template <int K>
-bool Factorize(MatrixView<K, 6> loop, MatrixView<K, K> rotation) {
+bool Factorize(double scale, MatrixView<K, 6> loop, MatrixView<K, K> rotation) {
   const Index k = loop.rows();
   Eigen::Matrix<double, K, 6, 0, K == Dynamic ? kMaxJoints : K, 6> u(k, 6);
   Vector6d tau;
-  double largest = 0, smallest = HUGE_VAL;
+  double smallest = HUGE_VAL;
   u.setZero();
   for (Index j = 0; j < 6; ++j) {
     auto column = loop.col(j).tail(k - j);
     const double norm = column.norm();
-    largest = std::max(largest, norm);
     smallest = std::min(smallest, norm);
     if (!(norm > 0 && norm < HUGE_VAL)) return false;
     const double head = column(0);
@@ -72,7 +72,7 @@ bool Factorize(MatrixView<K, 6> loop, MatrixView<K, K> rotation) {
       loop.col(i) -= u.col(j) * w;
     }
   }
-  if (!(smallest > kLoopTolerance * largest)) return false;
+  if (!(smallest > kLoopTolerance * scale)) return false;
   // The reflections' product: T upper triangular with T_jj = τ_j, T_·j = −τ_j T Uᵀ u_j.
   Matrix6d t = Matrix6d::Zero();
   for (Index j = 0; j < 6; ++j) {
@@ -207,8 +207,9 @@ bool Reduce(const MatrixRef& mass_matrix, const MatrixRef& contact_jacobian,
     reduced->second_transfer = second.transpose();
     auto loop = View<K, 6>(reduced->loop, k, 6);
     loop = jc.template block<6, K>(6, 6, 6, k).transpose();
+    const double scale = loop.norm();
     AddProduct<1>(loop, phi_t, reduced->second_transfer);
-    if (!Factorize<K>(loop, View<K, K>(reduced->rotation, k, k))) return false;
+    if (!Factorize<K>(scale, loop, View<K, K>(reduced->rotation, k, k))) return false;
     const auto basis = View<K, R>(std::as_const(reduced->rotation), k, r, 6);
     auto mass_basis = View<K, R>(reduced->mass_basis, k, r);
     SetProduct(mass_basis, mass, basis);

@@ -58,6 +58,7 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
     interval.limiting_condition = condition;
     return interval;
   };
+  if (!(interval.min <= interval.max)) return infeasible("ratio limits");
   for (const Eigen::Matrix3d& r : rotation) {
     const Eigen::Vector3d force = r.transpose() * resultant.head<3>();
     if (!(force.z() < 0)) return infeasible("normal");
@@ -73,7 +74,7 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
     interval.min = std::max(std::min(one, other), interval.min);
     interval.max = std::min(std::max(one, other), interval.max);
     // NaN passes neither std::max nor std::min as written; it is caught here.
-    if (!(std::isfinite(bound.a + bound.b) && interval.min < interval.max))
+    if (!(std::isfinite(bound.a + bound.b) && interval.min <= interval.max))
       return infeasible(bound.name);
   }
   interval.feasible = true;

@@ -20,8 +20,8 @@ struct RatioInterval {
   double min = 0, max = 1;  ///< valid when feasible
   double optimal =
       0.5;  ///< η* = −b/a of (71), (72): M_x of both feet zero; unbounded; 0.5 when a = 0
-  /// Which condition left no η ("normal", "friction", "roll", "pitch", "yaw"), for messages;
-  /// nullptr when feasible.
+  /// Which condition left no η ("ratio limits", "normal", "friction", "roll", "pitch", "yaw"), for
+  /// messages; nullptr when feasible.
   const char* limiting_condition = nullptr;
 };
 

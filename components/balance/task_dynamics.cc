@@ -14,6 +14,8 @@ using Eigen::Index;
 // Smallest share of a task's inverse inertia that the tasks before it may leave (sin² of the angle
 // between them).
 constexpr double kDependence = 1e-12;
+// A task row that the contacts leave less than this of is rounding: the contacts hold it.
+constexpr double kHeld = 1e-10;
 
 /// Calls `function` with joints, support and task rows as compile-time constants where they are
 /// common.
@@ -71,6 +73,7 @@ bool TaskDynamics::Compute(const ContactDynamics& contact, const MatrixRef& jaco
   rank_ = static_cast<int>(r);
   return WithTaskSizes(reduced, t, [&]<int K, bool Loop, int T>() {
     constexpr int R = Rank<K, Loop>();
+    const auto whole = View < T, K == Dynamic ? Dynamic : K + 6 > (jacobian, t, k + 6);
     const auto base = View<T, 6>(jacobian, t, 6);
     const auto joints = View<T, K>(jacobian, t, k, 6);
     auto joint_jacobian = View<T, K>(joint_jacobian_, t, k);
@@ -94,6 +97,12 @@ bool TaskDynamics::Compute(const ContactDynamics& contact, const MatrixRef& jaco
       reduced_jacobian = joint_jacobian;
       torque = bias_torque;
     }
+    StackVector<T> asked(t), left(t);
+    asked.setZero();
+    left.setZero();
+    for (Index j = 0; j < k + 6; ++j) asked += whole.col(j).cwiseAbs2();
+    for (Index j = 0; j < r; ++j) left += reduced_jacobian.col(j).cwiseAbs2();
+    if (!((left - asked * (kHeld * kHeld)).minCoeff() > 0)) return false;
     const auto factor = View<R, R>(reduced.factor, r, r);
     SolveFromRight(factor, reduced_jacobian);
     SolveLower(factor, torque);

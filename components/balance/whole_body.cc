@@ -1,5 +1,8 @@
 #include "components/balance/whole_body.h"
 
+#include <cmath>
+#include <utility>
+
 namespace poise::balance {
 namespace {
 
@@ -48,7 +51,8 @@ bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>
 
 bool WholeBody::UpdateContacts() {
   const int feet = in_contact_[0] + in_contact_[1];
-  if (feet == 0) return false;
+  // A quaternion of zero length would pass for an upright base.
+  if (feet == 0 || !(std::abs(state_.base_orientation.squaredNorm() - 1) < 1e-6)) return false;
   Eigen::MatrixXd& jacobian = contact_jacobian_[feet - 1];
   ContactJacobian(in_contact_, &jacobian);
   int row = 0;

@@ -51,23 +51,26 @@ void Run(benchmark::State& state, std::shared_ptr<const robot::RobotModel> model
     ContactDynamics contact;
     TaskDynamics task, height;
     Eigen::VectorXd torque, wrench;
+    BalanceResult result;
   };
+  BalanceControl balance(k, 1);
+  ContactLimits limits;
+  limits.half_length = 1e-3;  // balancing always acts
+  limits.half_width = 1e-3;
   std::vector<Work> works;
   works.reserve(kStates);
   for (const Tick& tick : ticks) {
     Work& w = works.emplace_back(ContactDynamics(k), TaskDynamics(k, t), TaskDynamics(k, 1),
-                                 Eigen::VectorXd(k), Eigen::VectorXd(m));
+                                 Eigen::VectorXd(k), Eigen::VectorXd(m), BalanceResult{});
     w.contact.Compute(tick.data.mass_matrix, tick.data.bias, tick.data.gravity,
                       tick.contact_jacobian, tick.contact_bias);
     w.task.Compute(w.contact, tick.task.jacobian, tick.task.bias_acceleration);
     w.height.Compute(w.contact, tick.height.jacobian, tick.height.bias_acceleration);
     w.task.TaskTorque(tick.acceleration, w.torque);
+    Eigen::VectorXd torque = w.torque;
+    balance.Compute(w.contact, w.height, tick.geometry, limits, true, torque, &w.result);
+    w.contact.ExpectedWrench(torque, w.wrench);
   }
-  BalanceControl balance(k, 1);
-  BalanceResult result;
-  ContactLimits limits;
-  limits.half_length = 1e-3;  // balancing always acts
-  limits.half_width = 1e-3;
   Eigen::VectorXd torque(k), shift(k), change(12);
   const auto run = [&](const Tick& tick, Work& w, Stage only) {
     const auto on = [only](Stage s) { return only == s || only == kAll; };
@@ -83,17 +86,17 @@ void Run(benchmark::State& state, std::shared_ptr<const robot::RobotModel> model
       w.height.Compute(w.contact, tick.height.jacobian, tick.height.bias_acceleration);
     if (on(kBalance)) {
       torque = w.torque;
-      balance.Compute(w.contact, w.height, tick.geometry, limits, true, torque, &result);
+      balance.Compute(w.contact, w.height, tick.geometry, limits, true, torque, &w.result);
       w.contact.ExpectedWrench(torque, w.wrench);
-      benchmark::DoNotOptimize(result);
+      benchmark::DoNotOptimize(w.result);
     }
     if (on(kRatio) && two_feet) {
       std::array<Eigen::Isometry3d, 2> foot{tick.geometry.sole[0], tick.geometry.sole[1]};
-      for (auto& f : foot) f = result.frame_o.inverse(Eigen::Isometry) * f;
+      for (auto& f : foot) f = w.result.frame_o.inverse(Eigen::Isometry) * f;
       ContactLimits sole{0.9, 0.9, 0.12, 0.05};
-      const RatioInterval interval = FeasibleRatio(result.resultant, foot, sole, 0.02, 0.98);
-      const double eta = SelectRatio(interval, result.resultant, foot, sole, 0.02, 0.98);
-      const auto share = DistributeResultant(result.resultant, foot, eta);
+      const RatioInterval interval = FeasibleRatio(w.result.resultant, foot, sole, 0.02, 0.98);
+      const double eta = SelectRatio(interval, w.result.resultant, foot, sole, 0.02, 0.98);
+      const auto share = DistributeResultant(w.result.resultant, foot, eta);
       change.head<6>() = share[0] - w.wrench.head<6>();
       change.tail<6>() = share[1] - w.wrench.tail<6>();
       benchmark::DoNotOptimize(RedistributionTorque(w.contact.contact_jacobian(), change, shift));

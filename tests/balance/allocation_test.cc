@@ -1,0 +1,90 @@
+// The tick path must not touch the heap: malloc itself is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstddef>
+
+#include "components/balance/contact_transition.h"
+#include "components/balance/distribution_ratio.h"
+#include "components/balance/redistribution.h"
+#include "tests/balance/balance_test_support.h"
+
+extern "C" void* __libc_malloc(size_t size);
+namespace {
+std::atomic<long> allocations{0};
+}
+extern "C" void* malloc(size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+
+namespace poise::balance {
+namespace {
+
+void CountOn(const std::shared_ptr<const robot::RobotModel>& model,
+             const std::array<bool, 2>& in_contact) {
+  StateSampler sampler(model, 41);
+  const int k = model->num_joints();
+  WholeBody body(model);
+  const robot::RobotState first = sampler.Draw(), state = sampler.Draw();
+  ASSERT_TRUE(body.Update(first, in_contact == kDouble ? kRight : kDouble));
+  WholeBody other(model);
+  ASSERT_TRUE(other.Update(state, in_contact));
+  const StackedTask stacked = PaperTask(other, in_contact);
+  const Eigen::Index t = stacked.jacobian.rows();
+  const robot::RobotData& data = body.data();
+  TaskDynamics task(k, static_cast<int>(t)), height(k, 1);
+  BalanceControl balance(k, 1);
+  BalanceResult result;
+  ContactLimits limits;
+  limits.half_length = limits.half_width = 1e-4;
+  const Eigen::VectorXd command = Eigen::VectorXd::Zero(t);
+  Eigen::VectorXd torque(k), shift(k), acceleration(k + 6);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 12, 1> wrench(in_contact == kDouble ? 12 : 6);
+
+  const long before = allocations;
+  const bool updated = body.Update(state, in_contact);
+  const bool again = body.Update(state, in_contact);
+  const ContactDynamics& contact = body.contact();
+  const bool independent = task.Compute(contact, stacked.jacobian, stacked.bias_acceleration);
+  const bool height_exists = height.Compute(contact, data.com_jacobian.middleRows(2, 1),
+                                            data.com_bias_acceleration.tail(1));
+  task.TaskTorque(command, torque);
+  contact.ExpectedWrench(torque, wrench);
+  contact.Acceleration(torque, acceleration);
+  const BalanceStatus status =
+      balance.Compute(contact, height, body.geometry(), limits, true, torque, &result);
+  task.ProjectIntoNullSpace(torque);
+  GravityCompensation(contact, torque);
+  std::array<Eigen::Isometry3d, 2> foot = body.geometry().sole;
+  for (auto& f : foot) f = result.frame_o.inverse(Eigen::Isometry) * f;
+  const RatioInterval interval = FeasibleRatio(result.resultant, foot, limits, 0.02, 0.98);
+  const double eta = SelectRatio(interval, result.resultant, foot, limits, 0.02, 0.98);
+  const auto share =
+      DistributeResultant(result.resultant, foot, TransitionRatio(eta, 0, true, 0.5));
+  if (in_contact == kDouble) {
+    Eigen::Matrix<double, 12, 1> change;
+    change << share[0], share[1];
+    RedistributionTorque(contact.contact_jacobian(), change, shift);
+  }
+  EXPECT_EQ(allocations - before, 0);
+
+  EXPECT_TRUE(updated && again && independent && height_exists);
+  // The state's load decides between balancing and refusing; both are the tick path.
+  EXPECT_NE(status, BalanceStatus::kSingular);
+}
+
+TEST(Allocation, TheTickPathAllocatesNothing) {
+  for (const auto& model : {Biped(), Humanoid()}) {
+    for (const auto& in_contact : {kDouble, kRight, kLeft}) CountOn(model, in_contact);
+  }
+}
+
+TEST(Allocation, TheCounterCounts) {
+  const long before = allocations;
+  const ContactDynamics contact(12);
+  EXPECT_GT(allocations - before, 5);
+}
+
+}  // namespace
+}  // namespace poise::balance
