@@ -1,0 +1,257 @@
+#include "sim_ode/ode_world.h"
+
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <mutex>
+#include <numbers>
+#include <stdexcept>
+
+#include "components/framework/configuration.h"
+#include "components/robot/dynamics.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using std::numbers::pi;
+
+constexpr double kErp = 0.2;   // of the hinges: share of their drift removed per step
+constexpr double kCfm = 1e-9;  // m/(N·s), of the hinges
+static_assert(sizeof(dReal) == sizeof(double), "ODE's headers must be set for double precision");
+
+class OdeError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// ODE reports through process-wide handlers. It goes on after a message, but exits or aborts when
+// the handler of an error returns: throwing through it is the only way to keep the process. The
+// world is then never stepped again.
+thread_local char ode_message[160];
+
+void KeepMessage(int, const char* format, va_list arguments) {
+  if (ode_message[0] == '\0') std::vsnprintf(ode_message, sizeof ode_message, format, arguments);
+}
+
+void ThrowError(int number, const char* format, va_list arguments) {
+  ode_message[0] = '\0';
+  KeepMessage(number, format, arguments);
+  throw OdeError(ode_message);
+}
+
+void StartOde() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    dInitODE2(0);
+    dSetErrorHandler(ThrowError);
+    dSetDebugHandler(ThrowError);
+    dSetMessageHandler(KeepMessage);
+  });
+  if (dCheckConfiguration("ODE_double_precision") == 0) {
+    throw ConfigError("sim_ode: the ODE library is built in single precision; install libode-dev");
+  }
+}
+
+Vector3d ToEigen(const dReal* v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+OdeWorld::OdeWorld(const robot::RobotModel& model, int max_contacts) : model_(model) {
+  StartOde();
+  world_ = dWorldCreate();
+  contacts_ = dJointGroupCreate(0);
+  feedback_.resize(static_cast<size_t>(max_contacts));
+  dWorldSetGravity(world_, 0, 0, -robot::kGravity);
+  dWorldSetERP(world_, kErp);
+  dWorldSetCFM(world_, kCfm);
+
+  // ODE's hinge angles are relative to where the hinge was made: make them in the zero posture.
+  const robot::RobotState zero(model.num_joints());
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, zero, &data);
+  for (const robot::Body& body : model.bodies()) {
+    const dBodyID id = dBodyCreate(world_);
+    dMass mass;
+    const Matrix3d& inertia = body.inertia;
+    dMassSetParameters(&mass, body.mass, 0, 0, 0, inertia(0, 0), inertia(1, 1), inertia(2, 2),
+                       inertia(0, 1), inertia(0, 2), inertia(1, 2));
+    dBodySetMass(id, &mass);
+    const Vector3d com = data.body_position[bodies_.size()] + body.com;
+    dBodySetPosition(id, com.x(), com.y(), com.z());
+    bodies_.push_back(id);
+  }
+  for (size_t j = 0; j < model.joints().size(); ++j) {
+    const auto child = static_cast<size_t>(model.joints()[j].body);
+    const auto parent = static_cast<size_t>(model.bodies()[child].parent);
+    const dJointID hinge = dJointCreateHinge(world_, nullptr);
+    dJointAttach(hinge, bodies_[child], bodies_[parent]);
+    const Vector3d& anchor = data.body_position[child];
+    const Vector3d& axis = data.joint_axis[j];
+    dJointSetHingeAnchor(hinge, anchor.x(), anchor.y(), anchor.z());
+    dJointSetHingeAxis(hinge, axis.x(), axis.y(), axis.z());
+    hinges_.push_back(hinge);
+  }
+  turns_.assign(hinges_.size(), 0);
+  last_angle_.assign(hinges_.size(), 0);
+}
+
+OdeWorld::~OdeWorld() {
+  dJointGroupDestroy(contacts_);
+  dWorldDestroy(world_);
+}
+
+void OdeWorld::SetState(const robot::RobotState& state) {
+  robot::RobotData data(model_);
+  robot::ComputeKinematics(model_, state, &data);
+  for (size_t b = 0; b < bodies_.size(); ++b) {
+    const Matrix3d& r = data.body_rotation[b];
+    const Vector3d arm = r * model_.bodies()[b].com;
+    const Vector3d com = data.base_position + data.body_position[b] + arm;
+    const Vector3d& w = data.body_angular_velocity[b];
+    const Vector3d v = data.body_linear_velocity[b] + w.cross(arm);
+    const dMatrix3 rotation = {r(0, 0), r(0, 1), r(0, 2), 0,       r(1, 0), r(1, 1),
+                               r(1, 2), 0,       r(2, 0), r(2, 1), r(2, 2), 0};
+    dBodySetRotation(bodies_[b], rotation);
+    dBodySetPosition(bodies_[b], com.x(), com.y(), com.z());
+    dBodySetLinearVel(bodies_[b], v.x(), v.y(), v.z());
+    dBodySetAngularVel(bodies_[b], w.x(), w.y(), w.z());
+  }
+  for (size_t j = 0; j < hinges_.size(); ++j) {
+    last_angle_[j] = dJointGetHingeAngle(hinges_[j]);
+    const double q = state.joint_position[static_cast<Eigen::Index>(j)];
+    turns_[j] = 2 * pi * std::round((q - last_angle_[j]) / (2 * pi));
+  }
+}
+
+void OdeWorld::GetState(robot::RobotState* state) const {
+  const Isometry3d base = pose(0);
+  state->base_position = base.translation();
+  const dReal* q = dBodyGetQuaternion(bodies_[0]);
+  state->base_orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  state->base_angular_velocity = angular_velocity(0);
+  state->base_linear_velocity =
+      com_velocity(0) + angular_velocity(0).cross(base.translation() - com_position(0));
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    state->joint_position[j] = joint_position(j);
+    state->joint_velocity[j] = joint_velocity(j);
+  }
+}
+
+double OdeWorld::joint_position(int joint) const {
+  const auto j = static_cast<size_t>(joint);
+  return last_angle_[j] + turns_[j];
+}
+
+double OdeWorld::joint_velocity(int joint) const {
+  return dJointGetHingeAngleRate(hinges_[static_cast<size_t>(joint)]);
+}
+
+Vector3d OdeWorld::com_position(int body) const {
+  return ToEigen(dBodyGetPosition(bodies_[static_cast<size_t>(body)]));
+}
+
+Vector3d OdeWorld::com_velocity(int body) const {
+  return ToEigen(dBodyGetLinearVel(bodies_[static_cast<size_t>(body)]));
+}
+
+Vector3d OdeWorld::angular_velocity(int body) const {
+  return ToEigen(dBodyGetAngularVel(bodies_[static_cast<size_t>(body)]));
+}
+
+Matrix3d OdeWorld::rotation(int body) const {
+  const dReal* r = dBodyGetRotation(bodies_[static_cast<size_t>(body)]);
+  Matrix3d rotation;
+  rotation << r[0], r[1], r[2], r[4], r[5], r[6], r[8], r[9], r[10];
+  return rotation;
+}
+
+Isometry3d OdeWorld::pose(int body) const {
+  Isometry3d pose;
+  pose.linear() = rotation(body);
+  pose.translation() =
+      com_position(body) - pose.linear() * model_.bodies()[static_cast<size_t>(body)].com;
+  pose.makeAffine();
+  return pose;
+}
+
+bool OdeWorld::Finite() const {
+  double sum = 0;  // inf and nan survive every addition
+  for (const dBodyID body : bodies_) {
+    const dReal* position = dBodyGetPosition(body);
+    const dReal* rotation = dBodyGetQuaternion(body);
+    const dReal* linear = dBodyGetLinearVel(body);
+    const dReal* angular = dBodyGetAngularVel(body);
+    for (int i = 0; i < 3; ++i) sum += position[i] + linear[i] + angular[i];
+    for (int i = 0; i < 4; ++i) sum += rotation[i];
+  }
+  return std::isfinite(sum);
+}
+
+void OdeWorld::AddJointTorque(int joint, double torque) {
+  dJointAddHingeTorque(hinges_[static_cast<size_t>(joint)], torque);
+}
+
+void OdeWorld::SetDrivetrain(int joint, const Drivetrain::Row& row) {
+  const dJointID hinge = hinges_[static_cast<size_t>(joint)];
+  // ODE divides cfm by the step, so the row it solves is J v' + cfm lambda = velocity.
+  dJointSetHingeParam(hinge, dParamFMax, row.active ? dInfinity : 0);
+  dJointSetHingeParam(hinge, dParamVel, row.velocity);
+  dJointSetHingeParam(hinge, dParamCFM, row.cfm);
+}
+
+void OdeWorld::AddForce(int body, const Vector3d& force, const Vector3d& point) {
+  dBodyAddForceAtPos(bodies_[static_cast<size_t>(body)], force.x(), force.y(), force.z(), point.x(),
+                     point.y(), point.z());
+}
+
+void OdeWorld::AddContact(int body, const Vector3d& position, const Vector3d& normal, double depth,
+                          const Terrain::Material& material) {
+  if (num_contacts_ == feedback_.size()) return;
+  dContact contact{};
+  contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM;
+  contact.surface.mu = material.friction;
+  contact.surface.soft_erp = material.erp;
+  contact.surface.soft_cfm = material.cfm;
+  for (int i = 0; i < 3; ++i) {
+    contact.geom.pos[i] = position[i];
+    contact.geom.normal[i] = normal[i];
+  }
+  contact.geom.depth = depth;
+  const dJointID joint = dJointCreateContact(world_, contacts_, &contact);
+  dJointAttach(joint, bodies_[static_cast<size_t>(body)], nullptr);
+  dJointSetFeedback(joint, &feedback_[num_contacts_++]);
+}
+
+bool OdeWorld::Step(double h) {
+  ode_message[0] = '\0';
+  try {
+    if (dWorldStep(world_, h) == 0) std::snprintf(message_, sizeof message_, "out of memory");
+  } catch (const OdeError& error) {
+    std::snprintf(message_, sizeof message_, "%s", error.what());
+    return false;
+  }
+  dJointGroupEmpty(contacts_);
+  num_contacts_ = 0;
+  for (size_t j = 0; j < hinges_.size(); ++j) {
+    const double angle = dJointGetHingeAngle(hinges_[j]);
+    if (angle - last_angle_[j] > pi) turns_[j] -= 2 * pi;
+    if (angle - last_angle_[j] < -pi) turns_[j] += 2 * pi;
+    last_angle_[j] = angle;
+  }
+  if (message_[0] == '\0') std::memcpy(message_, ode_message, sizeof message_);
+  return message_[0] == '\0';
+}
+
+Vector3d OdeWorld::contact_force(int index) const {
+  return ToEigen(feedback_[static_cast<size_t>(index)].f1);
+}
+
+Vector3d OdeWorld::contact_moment(int index) const {
+  return ToEigen(feedback_[static_cast<size_t>(index)].t1);
+}
+
+}  // namespace poise

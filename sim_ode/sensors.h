@@ -1,0 +1,48 @@
+// From the truth to what encoders, IMU, foot sensors and the push sensor report.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "components/robot/robot_model.h"
+#include "sim_ode/random.h"
+#include "sim_ode/simulation.h"
+
+namespace poise {
+
+struct SensorReadings {
+  explicit SensorReadings(int num_joints);
+
+  std::vector<int64_t> position_counts;        ///< at the motor shaft, multi-turn
+  Eigen::Vector3d imu_angular_velocity;        ///< rad/s, IMU frame
+  Eigen::Vector3d imu_acceleration;            ///< m/s², IMU frame, specific force
+  std::array<robot::Vector6d, 2> foot_wrench;  ///< environment on robot, sole frame
+  Eigen::Vector3d push_force;                  ///< N, world
+};
+
+/// Gaussian noise of each sample and IMU biases drawn once, as the robot file states them. Every
+/// number is drawn in the same order whatever is switched off, so switching the noise of one sensor
+/// off leaves the others' as they were.
+class Sensors {
+ public:
+  /// `noise` false: only the encoders' quantisation remains. `push_noise`: standard deviation, N.
+  Sensors(const robot::RobotModel& model, bool noise, double push_noise, uint64_t seed);
+
+  /// One sample of every sensor. Does not allocate.
+  void Measure(const SimulationTruth& truth, SensorReadings* readings);
+
+  const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }                    ///< rad/s
+  const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }  ///< m/s²
+
+ private:
+  Eigen::Vector3d Noise(double deviation);
+
+  std::vector<double> counts_per_radian_;
+  double gyro_noise_, accelerometer_noise_, force_noise_, moment_noise_, push_noise_;
+  RandomStream random_;
+  Eigen::Vector3d gyro_bias_, accelerometer_bias_;
+};
+
+}  // namespace poise

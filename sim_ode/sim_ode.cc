@@ -1,0 +1,97 @@
+#include "sim_ode/sim_ode.h"
+
+#include <algorithm>
+
+#include "components/messages/conversions.h"
+#include "components/messages/robot_resource.h"
+#include "sim_ode/config_check.h"
+
+namespace poise {
+
+void SimOde::Configure(const ComponentContext& context, Wiring* wiring) {
+  const auto config = context.config<SimOdeConfig>();
+  const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
+  RequireNotNegative(config.push_sensor_noise(), "push_sensor_noise");
+  simulation_ = std::make_unique<Simulation>(*model, config, context.tick_period, context.seed);
+  sensors_ = std::make_unique<Sensors>(*model, config.sensor_noise(), config.push_sensor_noise(),
+                                       context.seed);
+  readings_ = std::make_unique<SensorReadings>(model->num_joints());
+
+  const MessageCounts counts = JointAndFootCounts(*model);
+  wiring->AddInput(&drive_command_, "drive_command", {model->num_joints()},
+                   InputKind::kPreviousTick);
+  wiring->AddOutput(&drive_feedback_, "drive_feedback", counts);
+  wiring->AddOutput(&external_push_, "external_push", {});
+  wiring->AddOutput(&ground_truth_, "ground_truth", counts);
+  wiring->AddStage("step", {&drive_command_}, {&drive_feedback_, &external_push_, &ground_truth_},
+                   [this](const Tick& tick) { Step(tick); });
+}
+
+std::string_view SimOde::finished() const {
+  return simulation_ ? simulation_->end_reason() : std::string_view{};
+}
+
+void SimOde::Step(const Tick& tick) {
+  if (tick.index > 0) {
+    if (drive_command_.present()) {
+      simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);
+    } else {
+      simulation_->SetCurrents({}, {});
+    }
+    simulation_->Advance();
+  }
+  sensors_->Measure(simulation_->truth(), readings_.get());
+  PublishFeedback();
+  PublishPush();
+  PublishTruth();
+}
+
+void SimOde::PublishFeedback() {
+  drive_feedback_t& message = *drive_feedback_;
+  const SimulationTruth& truth = simulation_->truth();
+  for (size_t j = 0; j < message.current.size(); ++j) {
+    message.position_counts[j] = readings_->position_counts[j];
+    message.current[j] = truth.motor_current[static_cast<Eigen::Index>(j)];
+    message.drive_status[j] = drive_feedback_t::DRIVE_ENABLED;  // simulated drives have no faults
+  }
+  SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);
+  SetVector3(readings_->imu_acceleration, message.imu_acceleration);
+  for (size_t f = 0; f < message.foot_wrench.size(); ++f) {
+    SetWrench(readings_->foot_wrench[f], &message.foot_wrench[f]);
+  }
+}
+
+void SimOde::PublishPush() {
+  SetVector3(readings_->push_force, external_push_->force);
+  SetVector3(simulation_->truth().push_point, external_push_->point);
+}
+
+void SimOde::PublishTruth() {
+  ground_truth_t& message = *ground_truth_;
+  const SimulationTruth& truth = simulation_->truth();
+  const robot::RobotState& state = truth.state;
+  SetVector3(state.base_position, message.base_position);
+  const Eigen::Quaterniond& q = state.base_orientation;
+  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
+  std::copy_n(orientation, 4, message.base_orientation);
+  SetVector3(state.base_linear_velocity, message.base_linear_velocity);
+  SetVector3(state.base_angular_velocity, message.base_angular_velocity);
+  for (size_t j = 0; j < message.joint_position.size(); ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    message.joint_position[j] = state.joint_position[i];
+    message.joint_velocity[j] = state.joint_velocity[i];
+    message.joint_torque[j] = truth.motor_torque[i];
+    message.friction_torque[j] = truth.friction_torque[i];
+  }
+  SetVector3(truth.com, message.com_position);
+  SetVector3(truth.com_velocity, message.com_velocity);
+  for (size_t f = 0; f < message.foot_pose.size(); ++f) {
+    SetPose(truth.foot_pose[f], &message.foot_pose[f]);
+    SetWrench(-truth.foot_wrench[f], &message.foot_wrench[f]);  // robot on environment
+    message.foot_contact_points[f] = truth.contact_points[f];
+  }
+  SetVector3(truth.push_force, message.push_force);
+  message.fallen = simulation_->fallen() ? 1 : 0;
+}
+
+}  // namespace poise

@@ -1,0 +1,320 @@
+#include "sim_ode/simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "sim_ode/config_check.h"
+#include "sim_ode/start_posture.h"
+
+namespace poise {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using robot::kGravity;
+using robot::RobotModel;
+using robot::RobotState;
+
+namespace {
+
+constexpr int kCorners = 4;
+// A corner this far above the ground already rests on it: rounding of the start posture must not
+// let the robot drop.
+constexpr double kContactMargin = 1e-6;  // m
+constexpr double kMaxStartDepth = 5e-3;  // m, of a sole in the block
+
+int StepsPerTick(const SimOdeConfig& config, double tick_period) {
+  RequirePositive(config.step(), "step");
+  const double steps = tick_period / config.step();
+  const double whole = std::round(steps);
+  if (whole < 1 || std::abs(steps - whole) > 1e-6 * whole) {
+    throw ConfigError("step", fmt::format("{} s does not divide the control period of {} s into "
+                                          "whole steps; use {} s divided by a whole number",
+                                          config.step(), tick_period, tick_period));
+  }
+  return static_cast<int>(whole);
+}
+
+RobotModel WithErrors(const RobotModel& model, const SimOdeConfig& config) {
+  RobotModel result = model;
+  for (int i = 0; i < config.model_error_size(); ++i) {
+    const ModelError& error = config.model_error(i);
+    const std::string field = "model_error[" + std::to_string(i) + "]";
+    FindBody(model, error.link(), field + ".link");
+    try {
+      result = result.WithModelError(error.link(), error.mass_scale(),
+                                     {error.com_x(), error.com_y(), error.com_z()});
+    } catch (const robot::RobotError& refused) {
+      throw ConfigError(field, refused.what());
+    }
+  }
+  return result;
+}
+
+Drivetrain::Options DrivetrainOptions(const SimOdeConfig& config) {
+  RequirePositive(config.friction_stiffness(), "friction_stiffness");
+  return {config.rotor_inertia(), config.joint_friction(), config.friction_stiffness()};
+}
+
+}  // namespace
+
+SimulationTruth::SimulationTruth(int num_joints)
+    : state(num_joints),
+      com(Vector3d::Zero()),
+      com_velocity(Vector3d::Zero()),
+      contact_points{0, 0},
+      motor_current(Eigen::VectorXd::Zero(num_joints)),
+      motor_torque(Eigen::VectorXd::Zero(num_joints)),
+      friction_torque(Eigen::VectorXd::Zero(num_joints)),
+      imu_angular_velocity(Vector3d::Zero()),
+      imu_specific_force(Vector3d::Zero()),
+      push_force(Vector3d::Zero()),
+      push_point(Vector3d::Zero()) {
+  foot_pose.fill(Isometry3d::Identity());
+  foot_wrench.fill(robot::Vector6d::Zero());
+}
+
+Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, double tick_period,
+                       uint64_t seed)
+    : model_(WithErrors(model, config)),
+      steps_per_tick_(StepsPerTick(config, tick_period)),
+      step_(tick_period / steps_per_tick_),
+      torque_limits_(config.torque_limits()),
+      fall_height_(config.fall_height()),
+      fall_tilt_(config.fall_tilt()),
+      terrain_(config, step_, seed),
+      world_(model_, kCorners * static_cast<int>(model_.feet().size())),
+      drivetrain_options_(DrivetrainOptions(config)),
+      current_(Eigen::VectorXd::Zero(model_.num_joints())),
+      torque_(Eigen::VectorXd::Zero(model_.num_joints())),
+      truth_(model_.num_joints()) {
+  RequireNotNegative(fall_height_, "fall_height");
+  RequirePositive(fall_tilt_, "fall_tilt");
+  for (int i = 0; i < config.push_size(); ++i) {
+    pushes_.emplace_back(config.push(i), model_, "push[" + std::to_string(i) + "]");
+  }
+  for (const robot::FootModel& foot : model_.feet()) {
+    auto& corners = corners_.emplace_back();
+    for (int c = 0; c < kCorners; ++c) {
+      corners[static_cast<size_t>(c)] = foot.sole * Vector3d((c & 1 ? -0.5 : 0.5) * foot.length,
+                                                             (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+    }
+  }
+  SetState(SolveStart(model_, config.start()));
+  start_com_height_ = truth_.com.z();
+  CheckStart();
+}
+
+void Simulation::CheckStart() const {
+  for (size_t f = 0; f < corners_.size(); ++f) {
+    const Isometry3d body = world_.pose(model_.feet()[f].body);
+    for (const Vector3d& corner : corners_[f]) {
+      const Vector3d p = body * corner;
+      const Terrain::Surface surface = terrain_.At(p.x(), p.y(), 0);
+      if (surface.block && surface.height - p.z() > kMaxStartDepth) {
+        throw ConfigError("block", fmt::format("the {} sole starts {:.3f} m inside it; move it or "
+                                               "set block.start to when it is put in place",
+                                               model_.feet()[f].name, surface.height - p.z()));
+      }
+    }
+  }
+}
+
+void Simulation::SetState(const RobotState& state) {
+  world_.SetState(state);
+  drivetrains_.clear();
+  for (size_t j = 0; j < model_.joints().size(); ++j) {
+    drivetrains_.emplace_back(model_.joints()[j], model_.motors()[j], drivetrain_options_);
+  }
+  std::array<bool, 2> in_contact{};
+  for (size_t f = 0; f < 2; ++f) {
+    truth_.contact_points[f] = CollectContacts(f, false);
+    in_contact[f] = truth_.contact_points[f] > 0;
+  }
+  truth_.foot_wrench = RestWrenches(model_, state, in_contact);
+  imu_acceleration_.setZero();
+  ReadTruth();
+}
+
+void Simulation::SetCurrents(std::span<const double> current, std::span<const int8_t> enabled) {
+  for (size_t j = 0; j < model_.motors().size(); ++j) {
+    const robot::MotorModel& motor = model_.motors()[j];
+    const auto i = static_cast<Eigen::Index>(j);
+    double amperes = j < current.size() && j < enabled.size() && enabled[j] != 0 ? current[j] : 0;
+    if (!std::isfinite(amperes)) {
+      ++refused_currents_;
+      amperes = 0;
+    }
+    if (torque_limits_) {
+      const double effort = model_.joints()[j].effort / motor.torque_per_ampere();
+      const double limit = std::min(motor.peak_current, effort);
+      amperes = std::clamp(amperes, -limit, limit);
+    }
+    current_[i] = amperes;
+    torque_[i] = amperes * motor.torque_per_ampere();
+  }
+}
+
+void Simulation::Step() {
+  StepOnce();
+  if (broken_) return;
+  ReadTruth();
+  DetectFall();
+}
+
+void Simulation::Advance() {
+  for (int i = 0; i < steps_per_tick_; ++i) StepOnce();
+  if (broken_) return;
+  ReadTruth();
+  DetectFall();
+}
+
+void Simulation::StepOnce() {
+  if (broken_) return;
+  const double from = time();
+  const double to = static_cast<double>(steps_ + 1) * step_;
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
+    world_.SetDrivetrain(
+        j, drivetrain.Begin(step_, world_.joint_position(j), world_.joint_velocity(j)));
+    world_.AddJointTorque(j, torque_[j]);
+  }
+  for (const PushProfile& push : pushes_) {
+    const Vector3d force = push.MeanForce(from, to);
+    if (!force.isZero(0)) {
+      world_.AddForce(push.body(), force, world_.pose(push.body()) * push.point());
+    }
+  }
+  std::array<Isometry3d, 2> sole;
+  std::array<Vector3d, 2> com;
+  for (size_t f = 0; f < 2; ++f) {
+    const robot::FootModel& foot = model_.feet()[f];
+    sole[f] = world_.pose(foot.body) * foot.sole;
+    com[f] = world_.com_position(foot.body);
+    truth_.contact_points[f] = CollectContacts(f, true);
+  }
+  const Vector3d imu_velocity = ImuVelocity();
+
+  const bool quiet = world_.Step(step_);
+  ++steps_;
+  if (!quiet) return Break(world_.message());
+  if (!world_.Finite()) return Break("the state is no longer finite");
+
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    drivetrains_[static_cast<size_t>(j)].End(step_, world_.joint_velocity(j));
+  }
+  ReadFootWrenches(sole, com);
+  imu_acceleration_ = (ImuVelocity() - imu_velocity) / step_;
+}
+
+int Simulation::CollectContacts(size_t foot, bool add) {
+  const int body = model_.feet()[foot].body;
+  const Isometry3d pose = world_.pose(body);
+  int count = 0;
+  for (const Vector3d& corner : corners_[foot]) {
+    const Vector3d p = pose * corner;
+    const Terrain::Surface surface = terrain_.At(p.x(), p.y(), time());
+    const double depth = (surface.height - p.z()) * surface.normal.z();
+    if (depth < -kContactMargin) continue;
+    ++count;
+    if (add) {
+      world_.AddContact(body, p, surface.normal, std::max(depth, 0.0),
+                        terrain_.material(surface.block));
+    }
+  }
+  return count;
+}
+
+// An ideal six-axis sensor between the foot and a sole without mass: it reads exactly the contact
+// forces. A plate on a fixed joint would measure its own weight too and cost six constraint rows
+// per foot.
+void Simulation::ReadFootWrenches(const std::array<Isometry3d, 2>& sole,
+                                  const std::array<Vector3d, 2>& com) {
+  int contact = 0;
+  for (size_t f = 0; f < 2; ++f) {
+    Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
+    for (int c = 0; c < truth_.contact_points[f]; ++c, ++contact) {
+      force += world_.contact_force(contact);
+      moment += world_.contact_moment(contact);
+    }
+    // ODE's moments are about the COM where the step began; so are the sole frames used here.
+    const Matrix3d to_sole = sole[f].linear().transpose();
+    truth_.foot_wrench[f] << to_sole * force,
+        to_sole * (moment + (com[f] - sole[f].translation()).cross(force));
+  }
+}
+
+Vector3d Simulation::ImuVelocity() const {
+  const robot::ImuModel& imu = model_.imu();
+  const Vector3d place = world_.pose(imu.body) * imu.pose.translation();
+  return world_.com_velocity(imu.body) +
+         world_.angular_velocity(imu.body).cross(place - world_.com_position(imu.body));
+}
+
+void Simulation::ReadTruth() {
+  world_.GetState(&truth_.state);
+  truth_.com.setZero();
+  truth_.com_velocity.setZero();
+  for (int b = 0; b < static_cast<int>(model_.bodies().size()); ++b) {
+    const double share = model_.bodies()[static_cast<size_t>(b)].mass / model_.total_mass();
+    truth_.com += share * world_.com_position(b);
+    truth_.com_velocity += share * world_.com_velocity(b);
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    truth_.foot_pose[f] = world_.pose(model_.feet()[f].body) * model_.feet()[f].sole;
+  }
+  truth_.motor_current = current_;
+  truth_.motor_torque = torque_;
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    truth_.friction_torque[j] = drivetrains_[static_cast<size_t>(j)].friction_torque();
+  }
+  const robot::ImuModel& imu = model_.imu();
+  const Matrix3d to_imu = (world_.rotation(imu.body) * imu.pose.linear()).transpose();
+  truth_.imu_angular_velocity = to_imu * world_.angular_velocity(imu.body);
+  truth_.imu_specific_force = to_imu * (imu_acceleration_ + kGravity * Vector3d::UnitZ());
+
+  truth_.push_force.setZero();
+  truth_.push_point = truth_.state.base_position;
+  double strongest = -1;
+  for (const PushProfile& push : pushes_) {
+    const Vector3d force = push.Force(time());
+    truth_.push_force += force;
+    if (force.norm() > strongest) {
+      strongest = force.norm();
+      truth_.push_point = world_.pose(push.body()) * push.point();
+    }
+  }
+}
+
+void Simulation::DetectFall() {
+  if (fallen_) return;
+  const double upright = world_.rotation(model_.body_task_body())(2, 2);
+  const double tilt = std::acos(std::clamp(upright, -1.0, 1.0));
+  const double share = truth_.com.z() / start_com_height_;
+  constexpr size_t kRoom = sizeof end_reason_ - 1;
+  if (tilt > fall_tilt_) {
+    fallen_ = true;
+    *fmt::format_to_n(end_reason_, kRoom, "the robot fell at {:.3f} s (body tilt {:.2f} rad)",
+                      time(), tilt)
+         .out = '\0';
+  } else if (share < fall_height_) {
+    fallen_ = true;
+    *fmt::format_to_n(end_reason_, kRoom,
+                      "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)",
+                      time(), 100 * share)
+         .out = '\0';
+  }
+}
+
+void Simulation::Break(std::string_view reason) {
+  broken_ = true;
+  if (fallen_) return;  // why the run ends is already said
+  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
+                    "the simulation broke down at {:.3f} s: {}", time(), reason)
+       .out = '\0';
+}
+
+}  // namespace poise

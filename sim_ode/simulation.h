@@ -1,0 +1,108 @@
+// The simulated robot without a bus: ODE world, drivetrains, terrain, pushes, fall detection.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "components/robot/dynamics.h"
+#include "components/robot/robot_model.h"
+#include "sim_ode/drivetrain.h"
+#include "sim_ode/ode_world.h"
+#include "sim_ode/push.h"
+#include "sim_ode/sim_ode.pb.h"
+#include "sim_ode/terrain.h"
+
+namespace poise {
+
+/// Everything true about the robot at one time. Feet: right first. Always finite.
+struct SimulationTruth {
+  explicit SimulationTruth(int num_joints);
+
+  robot::RobotState state;
+  Eigen::Vector3d com, com_velocity;           ///< m, m/s, world
+  std::array<Eigen::Isometry3d, 2> foot_pose;  ///< of the sole, world
+  /// Environment on robot, [force; moment], sole frame: mean over the last step. Before the first:
+  /// RestWrenches.
+  std::array<robot::Vector6d, 2> foot_wrench;
+  std::array<int, 2> contact_points;
+  Eigen::VectorXd motor_current;         ///< A, applied over the last step
+  Eigen::VectorXd motor_torque;          ///< N·m at the joint, likewise
+  Eigen::VectorXd friction_torque;       ///< N·m on the joint, likewise
+  Eigen::Vector3d imu_angular_velocity;  ///< rad/s, IMU frame
+  /// m/s², IMU frame: velocity gained over the last step divided by the step, minus gravity.
+  Eigen::Vector3d imu_specific_force;
+  Eigen::Vector3d push_force;  ///< N, world, sum of the pushes at this instant
+  Eigen::Vector3d push_point;  ///< m, world, of the strongest push
+};
+
+/// Deterministic: the same configuration, seed and commands give the same bits. After construction
+/// no method allocates (ODE does, inside its step) or throws.
+class Simulation {
+ public:
+  /// `tick_period` (s) must be a whole number of steps. Throws ConfigError (paths inside
+  /// SimOdeConfig).
+  Simulation(const robot::RobotModel& model, const SimOdeConfig& config, double tick_period,
+             uint64_t seed);
+
+  /// Motor currents (A) to hold from now on, limited to the peak current and the joint's effort if
+  /// the configuration says so; `enabled` 0: motor free. A current that is not finite counts as 0 A
+  /// and is counted.
+  void SetCurrents(std::span<const double> current, std::span<const int8_t> enabled);
+  /// One step of ODE.
+  void Step();
+  /// One tick period.
+  void Advance();
+  /// Places the robot anew, joints' friction relaxed. `state` sized for the model.
+  void SetState(const robot::RobotState& state);
+
+  const SimulationTruth& truth() const { return truth_; }
+  double time() const { return static_cast<double>(steps_) * step_; }  ///< s
+  double step() const { return step_; }                                ///< s
+  /// The simulated robot, model error included.
+  const robot::RobotModel& model() const { return model_; }
+  bool fallen() const { return fallen_; }
+  /// True once ODE complained or the state was no longer finite; the truth then stays at the last
+  /// good state.
+  bool broken() const { return broken_; }
+  /// Why fallen or broken, e.g. "the robot fell at 1.234 s (body tilt 0.83 rad)"; empty otherwise.
+  std::string_view end_reason() const { return end_reason_; }
+  int64_t refused_currents() const { return refused_currents_; }
+
+ private:
+  void StepOnce();
+  int CollectContacts(size_t foot, bool add);
+  void ReadFootWrenches(const std::array<Eigen::Isometry3d, 2>& sole,
+                        const std::array<Eigen::Vector3d, 2>& com);
+  Eigen::Vector3d ImuVelocity() const;
+  void ReadTruth();
+  void DetectFall();
+  void Break(std::string_view reason);
+  void CheckStart() const;
+
+  robot::RobotModel model_;
+  int steps_per_tick_ = 1;
+  double step_ = 0;
+  bool torque_limits_;
+  double fall_height_, fall_tilt_;
+  Terrain terrain_;
+  OdeWorld world_;
+  std::vector<PushProfile> pushes_;
+  Drivetrain::Options drivetrain_options_;
+  std::vector<Drivetrain> drivetrains_;
+  std::vector<std::array<Eigen::Vector3d, 4>> corners_;  // m, body frame, by foot
+  int64_t steps_ = 0;
+  Eigen::VectorXd current_, torque_;
+  Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
+  SimulationTruth truth_;
+  double start_com_height_ = 0;
+  bool fallen_ = false, broken_ = false;
+  int64_t refused_currents_ = 0;
+  char end_reason_[200] = "";
+};
+
+}  // namespace poise

@@ -1,0 +1,97 @@
+#include "sim_ode/terrain.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "sim_ode/config_check.h"
+#include "sim_ode/random.h"
+
+namespace poise {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using std::numbers::pi;
+
+namespace {
+
+constexpr double kMaxTilt = 0.8;  // rad
+constexpr int kCorners = 4;       // that share a sole's stiffness
+constexpr uint64_t kTerrainStream = 1;
+
+// A spring k and damper d under implicit Euler with step h: ODE's manual, "ERP and CFM".
+Terrain::Material SpringDamper(double k, double d, double h, double friction) {
+  return {friction, h * k / (h * k + d), 1 / (h * k + d)};
+}
+
+}  // namespace
+
+Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
+  const Ground& ground = config.ground();
+  RequireNotNegative(ground.friction(), "ground.friction");
+  if (!(ground.erp() > 0 && ground.erp() <= 1)) {
+    throw ConfigError("ground.erp", "must be greater than 0 and at most 1");
+  }
+  RequirePositive(ground.cfm(), "ground.cfm");
+  ground_material_ = {ground.friction(), ground.erp(), ground.cfm()};
+  if (!config.has_block()) return;
+
+  const SoftBlock& block = config.block();
+  RequireFinite(block.x(), "block.x");
+  RequireFinite(block.y(), "block.y");
+  RequirePositive(block.length(), "block.length");
+  RequirePositive(block.width(), "block.width");
+  RequirePositive(block.height(), "block.height");
+  RequirePositive(block.stiffness(), "block.stiffness");
+  RequireNotNegative(block.damping(), "block.damping");
+  RequireNotNegative(block.irregularity(), "block.irregularity");
+  RequirePositive(block.irregularity_wavelength(), "block.irregularity_wavelength");
+  RequireNotNegative(block.friction(), "block.friction");
+  RequireNotNegative(block.start(), "block.start");
+  if (!(std::abs(block.tilt_roll()) <= kMaxTilt)) {
+    throw ConfigError("block.tilt_roll", "must be within 0.8 rad of level");
+  }
+  if (!(std::abs(block.tilt_pitch()) <= kMaxTilt)) {
+    throw ConfigError("block.tilt_pitch", "must be within 0.8 rad of level");
+  }
+  has_block_ = true;
+  center_ = {block.x(), block.y()};
+  half_size_ = {block.length() / 2, block.width() / 2};
+  height_ = block.height();
+  start_ = block.start();
+  // The normal is the z axis turned by roll about x, then by pitch about y.
+  const Vector3d normal(std::sin(block.tilt_pitch()) * std::cos(block.tilt_roll()),
+                        -std::sin(block.tilt_roll()),
+                        std::cos(block.tilt_pitch()) * std::cos(block.tilt_roll()));
+  slope_ = -normal.head<2>() / normal.z();
+  block_material_ = SpringDamper(block.stiffness() / kCorners, block.damping() / kCorners, step,
+                                 block.friction());
+
+  RandomStream random(seed, kTerrainStream);
+  wave_amplitude_ = block.irregularity() / kWaves;
+  for (Wave& wave : waves_) {
+    const double direction = 2 * pi * random.Uniform();
+    wave.number = 2 * pi / block.irregularity_wavelength() *
+                  Vector2d(std::cos(direction), std::sin(direction));
+    wave.phase = 2 * pi * random.Uniform();
+  }
+}
+
+Terrain::Surface Terrain::At(double x, double y, double time) const {
+  const Surface ground{0, Vector3d::UnitZ(), false};
+  if (!has_block_ || time < start_) return ground;
+  const Vector2d place = Vector2d(x, y) - center_;
+  if (std::abs(place.x()) > half_size_.x() || std::abs(place.y()) > half_size_.y()) return ground;
+  double height = height_ + slope_.dot(place);
+  Vector2d slope = slope_;
+  if (wave_amplitude_ > 0) {
+    for (const Wave& wave : waves_) {
+      const double angle = wave.number.dot(place) + wave.phase;
+      height += wave_amplitude_ * std::sin(angle);
+      slope += wave_amplitude_ * std::cos(angle) * wave.number;
+    }
+  }
+  if (height <= 0) return ground;
+  return {height, Vector3d(-slope.x(), -slope.y(), 1).normalized(), true};
+}
+
+}  // namespace poise

@@ -1,0 +1,103 @@
+// Every configuration that cannot work is refused, naming its field.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/sim_ode/simulation_fixture.h"
+
+namespace poise {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Refusal {
+  const char* name;
+  const char* text;
+  const char* field;
+  const char* problem;
+};
+
+class Refused : public ::testing::TestWithParam<Refusal> {};
+
+TEST_P(Refused, NamesTheField) {
+  const std::string text = GetParam().text;
+  SimOdeConfig config;
+  if (text.rfind("start {", 0) == 0) {
+    ParseTextProto(text, "test", &config);
+  } else {
+    config = StandingConfig(text);
+  }
+  try {
+    const Simulation simulation(PaperRobot(), config, kTick, 1);
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), GetParam().field);
+    EXPECT_THAT(error.problem(), HasSubstr(GetParam().problem));
+    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Configuration, Refused,
+    ::testing::Values(
+        Refusal{"StepDoesNotDivide", "step: 0.0015", "step", "does not divide"},
+        Refusal{"StepTooLong", "step: 0.004", "step", "does not divide"},
+        Refusal{"StepZero", "step: 0", "step", "greater than 0"},
+        Refusal{"StepNan", "step: nan", "step", "greater than 0"},
+        Refusal{"Joint", "start { nominal { joint: 'elbow' position: 1 } }",
+                "start.nominal[0].joint", "no joint 'elbow'; use one of"},
+        Refusal{"JointPosition",
+                "start { nominal { joint: 'right_hip_yaw' } nominal { joint: 'right_hip_roll' "
+                "position: inf } }",
+                "start.nominal[1].position", "finite"},
+        Refusal{"Spacing", "start { foot_spacing: -0.1 }", "start.foot_spacing", "greater than 0"},
+        Refusal{"ComTooHigh", "start { com_height: 2 }", "start", ""},
+        Refusal{"LeftFoot", "start { left_foot_height: -0.1 }", "start.left_foot_height",
+                "negative"},
+        Refusal{"GroundFriction", "ground { friction: -1 }", "ground.friction", "negative"},
+        Refusal{"GroundErp", "ground { erp: 1.5 }", "ground.erp", "at most 1"},
+        Refusal{"GroundCfm", "ground { cfm: 0 }", "ground.cfm", "greater than 0"},
+        Refusal{"BlockWidth", "block { width: 0 }", "block.width", "greater than 0"},
+        Refusal{"BlockStiffness", "block { stiffness: 0 }", "block.stiffness", "greater than 0"},
+        Refusal{"BlockDamping", "block { damping: -1 }", "block.damping", "negative"},
+        Refusal{"BlockTilt", "block { tilt_pitch: 1.2 }", "block.tilt_pitch", "0.8 rad"},
+        Refusal{"BlockUnderTheFoot", "block { y: -0.1 height: 0.09 }", "block",
+                "the right sole starts 0.090 m inside it"},
+        Refusal{"PushLink", "push { start: 0 duration: 1 peak: 1 direction_x: 1 link: 'tail' }",
+                "push[0].link", "no moving link 'tail'; use one of"},
+        Refusal{"PushDirection", "push { start: 0 duration: 1 peak: 1 }", "push[0].direction_x",
+                "no direction"},
+        Refusal{"PushDuration", "push { start: 0 duration: 0 peak: 1 direction_x: 1 }",
+                "push[0].duration", "greater than 0"},
+        Refusal{"PushStart", "push { duration: 1 peak: 1 direction_x: 1 }", "push[0].start",
+                "missing"},
+        Refusal{"PushPeak", "push { start: 0 duration: 1 peak: nan direction_x: 1 }",
+                "push[0].peak", "finite"},
+        Refusal{"FrictionStiffness", "friction_stiffness: 0", "friction_stiffness",
+                "greater than 0"},
+        Refusal{"FallTilt", "fall_tilt: 0", "fall_tilt", "greater than 0"},
+        Refusal{"ModelErrorLink", "model_error { link: 'tail' }", "model_error[0].link",
+                "no moving link 'tail'"},
+        Refusal{"ModelErrorMass", "model_error { link: 'upper_body' mass_scale: -1 }",
+                "model_error[0]", ""}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+TEST(Configuration, StepsPerTickAreExact) {
+  SimOdeConfig config = StandingConfig();
+  config.set_step(0.0005);
+  Simulation simulation(RigidRobot(), config, kTick, 1);
+  for (int i = 0; i < 1000; ++i) simulation.Advance();
+  EXPECT_NEAR(simulation.time(), 2, 1e-12);
+}
+
+TEST(Configuration, ModelErrorChangesTheSimulatedRobotOnly) {
+  const robot::RobotModel model = PaperRobot();
+  const Simulation simulation(
+      model, StandingConfig("model_error { link: 'upper_body' mass_scale: 1.1 }"), kTick, 1);
+  const double body = model.bodies()[0].mass;
+  EXPECT_NEAR(simulation.model().total_mass(), model.total_mass() + 0.1 * body, 1e-9);
+  EXPECT_NEAR(simulation.truth().foot_wrench[0][2] + simulation.truth().foot_wrench[1][2],
+              simulation.model().total_mass() * robot::kGravity, 1e-8);
+}
+
+}  // namespace
+}  // namespace poise
