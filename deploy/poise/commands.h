@@ -1,0 +1,26 @@
+// The subcommands of `poise`, one file each.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace poise {
+
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitFailed = 1;  ///< a check or the run failed
+inline constexpr int kExitUsage = 2;   ///< wrong usage or configuration
+
+/// What the parsed command line asks for; returns the exit code.
+using Command = std::function<int()>;
+
+/// Each adds its subcommand; parsing it sets `command`, which may throw ConfigError (usage),
+/// anything else (failure).
+void AddRunCommand(CLI::App* app, Command* command);
+void AddReportCommand(CLI::App* app, Command* command);
+void AddCompareCommand(CLI::App* app, Command* command);
+void AddGraphCommand(CLI::App* app, Command* command);
+void AddListCommand(CLI::App* app, Command* command);
+void AddDoctorCommand(CLI::App* app, Command* command);
+void AddEstopCommand(CLI::App* app, Command* command);
+
+}  // namespace poise

@@ -1,0 +1,43 @@
+#include <memory>
+
+#include "deploy/poise/commands.h"
+#include "deploy/poise/run_dir.h"
+#include "fmt/format.h"
+#include "logging/compare.h"
+
+namespace poise {
+namespace {
+
+int Compare(const std::string& first, const std::string& second) {
+  const logging::LogComparison result =
+      logging::CompareLogs(FindLog(first).string(), FindLog(second).string());
+  fmt::print(
+      "{} ticks, {} messages compared; {} differ, {} only in the first, {} only in the "
+      "second\n",
+      result.ticks, result.messages, result.differing, result.only_first, result.only_second);
+  if (result.earliest) {
+    const logging::LogDifference& d = *result.earliest;
+    fmt::print("first: tick {}, {}{}{}: {} and {}\n", d.tick, d.channel, d.field.empty() ? "" : ".",
+               d.field, d.first, d.second);
+  }
+  // Nothing to compare is not equality.
+  return result.equal() && result.messages > 0 ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddCompareCommand(CLI::App* app, Command* command) {
+  struct Runs {
+    std::string first;
+    std::string second;
+  };
+  auto runs = std::make_shared<Runs>();
+  CLI::App* compare = app->add_subcommand(
+      "compare", "compare two runs' messages bit for bit (exit code 1 when they differ)");
+  compare->add_option("first", runs->first, "folder of a run or a log")->required();
+  compare->add_option("second", runs->second, "folder of a run or a log")->required();
+  compare->callback(
+      [runs, command] { *command = [runs] { return Compare(runs->first, runs->second); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,93 @@
+#include <filesystem>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "deploy/poise/catalog.h"
+#include "deploy/poise/commands.h"
+#include "deploy/poise/registry.h"
+#include "deploy/poise/run_setup.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files are told apart by what they hold, names by where they lie.
+bool IsScenario(const std::string& name) {
+  if (!name.ends_with(".pbtxt")) {
+    return fs::exists(DeployDir() / "scenarios" / (name + ".pbtxt"));
+  }
+  Scenario scenario;
+  try {
+    ReadTextProto(name, &scenario);
+  } catch (const ConfigError&) {
+    Graph graph;
+    try {
+      ReadTextProto(name, &graph);
+      return false;
+    } catch (const ConfigError&) {
+      // Neither parses: the file's folder decides which error is shown.
+      return fs::path(name).parent_path().filename() != "graphs";
+    }
+  }
+  return true;
+}
+
+void ShowRun(const RunSpec& spec) {
+  BoundGraph bound(spec, Components());
+  const GraphPlan& plan = bound.plan();
+  const auto name_of = [&](const GraphPlan::Endpoint& end) {
+    return spec.graph().component(end.component).name();
+  };
+  for (const GraphPlan::ChannelPlan& channel : plan.channels) {
+    std::string readers;
+    for (const GraphPlan::Endpoint& reader : channel.readers) {
+      readers += (readers.empty() ? "" : ", ") + name_of(reader);
+    }
+    fmt::print("  {:<16} {:<18} {:>5} bytes  {} -> {}\n", channel.name, channel.type,
+               channel.encoded_size, channel.external ? "(operator)" : name_of(channel.writer),
+               readers.empty() ? "(log)" : readers);
+  }
+  fmt::print("one tick:");
+  for (const GraphPlan::StageRef& ref : plan.order) {
+    const ConfiguredComponent& component = bound.component(ref.component);
+    fmt::print(" {}.{}", component.name,
+               component.wiring.stages()[static_cast<size_t>(ref.stage)].name);
+  }
+  fmt::print("\n");
+}
+
+int CheckByName(const std::string& name) {
+  if (!IsScenario(name)) {
+    const std::string file = FindFile("graphs", name, fs::current_path()).string();
+    CheckGraphFile(file);
+    fmt::print(
+        "{}: names, types and connections are good; check a scenario to have the "
+        "configurations checked too\n",
+        file);
+    return kExitOk;
+  }
+  const LoadedScenario loaded = LoadScenario(name, {});
+  RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
+  CheckRun(loaded, &spec);
+  fmt::print("{} with {}: {} components, {} channels, all good\n", loaded.file, loaded.graph_file,
+             spec.graph().component_size(), spec.graph().channel_size());
+  ShowRun(spec);
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddGraphCommand(CLI::App* app, Command* command) {
+  auto name = std::make_shared<std::string>("push_double_support");
+  CLI::App* graph = app->add_subcommand("graph", "look at process graphs");
+  graph->require_subcommand(1);
+  CLI::App* check = graph->add_subcommand(
+      "check", "check a graph, or a scenario with its graph, robot and configurations");
+  check->add_option("name", *name, "graph or scenario: a name or a .pbtxt file")
+      ->capture_default_str();
+  check->callback([name, command] { *command = [name] { return CheckByName(*name); }; });
+}
+
+}  // namespace poise

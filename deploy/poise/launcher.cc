@@ -1,0 +1,225 @@
+#include "deploy/poise/launcher.h"
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+
+#include "components/framework/clock.h"
+#include "components/framework/run.h"
+#include "deploy/poise/signals.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;  // ns
+constexpr int64_t kReadyTimeout = 30 * kSecond;
+constexpr int64_t kStartTimeout = 10 * kSecond;
+constexpr int64_t kStallTimeout = 20 * kSecond;  // of wall time without a tick
+constexpr int64_t kRecordTimeout = 10 * kSecond;
+constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
+constexpr int kSpin = 20;                       // ms
+constexpr size_t kDetailLines = 5;
+constexpr char kRecorder[] = "recorder";
+
+}  // namespace
+
+Launcher::Launcher(const RunSpec& spec, LaunchFiles files, Progress* progress)
+    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorder}) {}
+
+Launcher::~Launcher() = default;
+
+RunOutcome Launcher::Run() {
+  StartProcesses();
+  if (WaitUntilReady() && Start()) Watch();
+  progress_->Clear();
+  StopProcesses();
+  return outcome_;
+}
+
+void Launcher::StartProcesses() {
+  const auto start = [&](const std::string& name, std::vector<std::string> command) {
+    command[0] = files_.program_dir + "/" + command[0];
+    processes_.push_back(std::make_unique<ChildProcess>(
+        name, command, fmt::format("{}/{}.log", files_.run_dir, name)));
+  };
+  start(kRecorder,
+        {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
+         files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
+  for (const ComponentInstance& instance : spec_.graph().component()) {
+    start(instance.name(),
+          {TypeOf(instance), "--run", files_.spec_file, "--component", instance.name()});
+  }
+}
+
+void Launcher::Fail(std::string message, std::vector<std::string> details) {
+  if (!outcome_.message.empty()) return;
+  outcome_.message = std::move(message);
+  outcome_.details = std::move(details);
+}
+
+void Launcher::FailProcess(ChildProcess& process) {
+  const int64_t tick = Tick();
+  Fail(fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
+                   tick < 0 ? " before the start"
+                            : fmt::format(" at {:.3f} s", MakeTick(tick, spec_.tick_period()).time),
+                   process.log_path()),
+       LastLines(process.log_path(), kDetailLines));
+}
+
+bool Launcher::Healthy() {
+  if (StopSignal() != 0) {
+    outcome_.interrupted = true;
+    Fail(fmt::format("interrupted ({})", sigdescr_np(StopSignal())));
+    return false;
+  }
+  // One that died first may have others follow: a non-zero end names the culprit best.
+  ChildProcess* dead = nullptr;
+  for (const auto& process : processes_) {
+    if (process->ended() && (dead == nullptr || dead->succeeded())) dead = process.get();
+  }
+  if (dead != nullptr) FailProcess(*dead);
+  return dead == nullptr;
+}
+
+int64_t Launcher::Tick() const {
+  int64_t tick = -1;
+  for (const ComponentInstance& instance : spec_.graph().component()) {
+    const ControlClient::Status& status = control_.statuses().at(instance.name());
+    if (status.seen) tick = std::max(tick, status.health.tick);
+  }
+  return tick;
+}
+
+bool Launcher::WaitUntilReady() {
+  const int64_t deadline = NowNanoseconds() + kReadyTimeout;
+  while (!control_.AllReached(health_t::STATE_READY)) {
+    if (!Healthy()) return false;
+    if (NowNanoseconds() > deadline) {
+      std::string names;
+      std::vector<std::string> details;
+      for (const auto& process : processes_) {
+        if (control_.statuses().at(process->name()).seen) continue;
+        names += (names.empty() ? "" : ", ") + process->name();
+        for (const std::string& line : LastLines(process->log_path(), 1)) {
+          details.push_back(process->name() + ": " + line);
+        }
+      }
+      Fail(fmt::format("not ready after {} s: {}; run: poise doctor", kReadyTimeout / kSecond,
+                       names),
+           details);
+      return false;
+    }
+    control_.Spin(kSpin);
+  }
+  return true;
+}
+
+bool Launcher::Start() {
+  const int64_t start = NowNanoseconds();
+  int64_t next = 0;
+  // The recorder's first RUNNING is as good as any: it hears START like the others.
+  const auto beyond_ready = [&] { return control_.AllReached(health_t::STATE_RUNNING); };
+  while (!beyond_ready()) {
+    const int64_t now = NowNanoseconds();
+    if (!Healthy()) return false;
+    if (now > start + kStartTimeout) {
+      Fail("the processes did not start together; run: poise doctor");
+      return false;
+    }
+    if (now >= next) {
+      if (!control_.SendStart()) {
+        Fail("the start could not be sent; is the network up? run: poise doctor");
+        return false;
+      }
+      next = now + kSpin * kSecond / 1000;
+    }
+    control_.Spin(kSpin);
+  }
+  outcome_.wall_time = static_cast<double>(start);  // until Watch knows the end
+  return true;
+}
+
+void Launcher::Watch() {
+  const auto start = static_cast<int64_t>(outcome_.wall_time);
+  int64_t last_tick = -1;
+  int64_t last_change = NowNanoseconds();
+  int64_t ended_at = 0;  // all components, or the run by one of them
+  while (true) {
+    control_.Spin(kSpin);
+    const int64_t now = NowNanoseconds();
+    const int64_t tick = Tick();
+    const double time = static_cast<double>(tick + 1) * spec_.tick_period();
+    progress_->Show(time, static_cast<double>(now - start) * 1e-9);
+    outcome_.wall_time = static_cast<double>((ended_at > 0 ? ended_at : now) - start) * 1e-9;
+    if (!Healthy()) return;
+
+    // A component with a reason ends the run for all; without, each has come to the planned end.
+    bool all_ended = true;
+    bool failed = false;
+    std::string reason;
+    for (const ComponentInstance& instance : spec_.graph().component()) {
+      const health_t& health = control_.statuses().at(instance.name()).health;
+      all_ended = all_ended && health.state >= health_t::STATE_FINISHED;
+      if (health.state >= health_t::STATE_FINISHED && !health.detail.empty()) {
+        failed = failed || health.state == health_t::STATE_FAILED;
+        reason = fmt::format("{}: {}", instance.name(), health.detail);
+      }
+    }
+    if (ended_at == 0 && (all_ended || !reason.empty())) ended_at = last_change = now;
+    const bool recorded =
+        control_.statuses().at(kRecorder).health.state == health_t::STATE_FINISHED;
+    if (ended_at > 0 && recorded) {
+      outcome_.completed = !failed;
+      if (!reason.empty()) Fail(reason);
+      return;
+    }
+    if (ended_at > 0 && now > ended_at + kRecordTimeout) {
+      if (!reason.empty()) Fail(reason);
+      Fail(fmt::format("the recorder still lacks messages {} s after the end",
+                       kRecordTimeout / kSecond));
+      return;
+    }
+    if (tick != last_tick) {
+      last_tick = tick;
+      last_change = now;
+    } else if (now > last_change + kStallTimeout) {
+      std::string standing;
+      for (const auto& [name, status] : control_.statuses()) {
+        standing += fmt::format("{}{} {}", standing.empty() ? "" : ", ", name, status.health.tick);
+      }
+      Fail(fmt::format("no tick for {} s; last ticks: {}", kStallTimeout / kSecond, standing));
+      return;
+    }
+  }
+}
+
+void Launcher::StopProcesses() {
+  const auto running = [&] {
+    return std::any_of(processes_.begin(), processes_.end(),
+                       [](const auto& process) { return !process->ended(); });
+  };
+  const int signals = StopSignalCount();
+  const int64_t start = NowNanoseconds();
+  bool terminated = false;
+  while (running()) {
+    const int64_t now = NowNanoseconds();
+    const bool hurry = StopSignalCount() > signals + 1;
+    if (hurry || now > start + 2 * kStopPatience) break;  // their destructors kill
+    if (now > start + kStopPatience && !terminated) {
+      for (const auto& process : processes_) process->Signal(SIGTERM);
+      terminated = true;
+    }
+    control_.SendStop();
+    control_.Spin(kSpin / 2);
+  }
+  for (const auto& process : processes_) {
+    if (process->ended() && !process->succeeded() && outcome_.message.empty()) {
+      outcome_.completed = false;
+      FailProcess(*process);
+    }
+  }
+  processes_.clear();
+}
+
+}  // namespace poise

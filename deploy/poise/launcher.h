@@ -1,0 +1,56 @@
+// Runs a graph as processes: starts, watches and ends them.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "components/framework/control_client.h"
+#include "components/framework/graph.pb.h"
+#include "deploy/poise/child_process.h"
+#include "deploy/poise/progress.h"
+#include "deploy/poise/run_outcome.h"
+
+namespace poise {
+
+struct LaunchFiles {
+  std::string program_dir;  ///< holds the components' programs and the recorder
+  std::string run_dir;      ///< gets run.lcm, recorder.json and each process's output
+  std::string spec_file;
+  std::string scenario_file;
+};
+
+/// One run. Leaves no process behind, whatever happens.
+class Launcher {
+ public:
+  /// `spec` as written to files.spec_file; `progress` outlives the launcher. Throws BusError.
+  Launcher(const RunSpec& spec, LaunchFiles files, Progress* progress);
+  ~Launcher();
+
+  /// Starts everything, waits until it is ready, runs, and ends everything. Throws
+  /// std::system_error when a process cannot be made.
+  RunOutcome Run();
+
+ private:
+  void StartProcesses();
+  bool WaitUntilReady();
+  bool Start();
+  void Watch();
+  void StopProcesses();
+
+  /// Notes the end of the run when a process died or a signal came. True when the run goes on.
+  bool Healthy();
+  void Fail(std::string message, std::vector<std::string> details = {});
+  void FailProcess(ChildProcess& process);
+  int64_t Tick() const;  ///< last tick that any component has completed
+
+  RunSpec spec_;
+  LaunchFiles files_;
+  Progress* progress_;
+  ControlClient control_;
+  std::vector<std::unique_ptr<ChildProcess>> processes_;
+  RunOutcome outcome_;
+};
+
+}  // namespace poise

@@ -1,0 +1,80 @@
+#include <algorithm>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "components/robot/robot.pb.h"
+#include "deploy/poise/catalog.h"
+#include "deploy/poise/commands.h"
+#include "deploy/poise/registry.h"
+#include "deploy/poise/scenario.pb.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+
+namespace poise {
+namespace {
+
+/// One line a file: its name and what `describe` says of the message it holds; a file that does not
+/// parse shows its error.
+template <class Message, class Describe>
+void ListFiles(const std::string& kind, Describe describe) {
+  const std::vector<std::string> names = ListNames(kind);
+  size_t width = 0;
+  for (const std::string& name : names) width = std::max(width, name.size());
+  for (const std::string& name : names) {
+    std::string text;
+    try {
+      Message message;
+      ReadTextProto((DeployDir() / kind / (name + ".pbtxt")).string(), &message);
+      text = describe(message);
+    } catch (const ConfigError& error) {
+      text = error.what();
+    }
+    fmt::print("  {:<{}}  {}\n", name, width, text);
+  }
+}
+
+int List(const std::string& what) {
+  const auto wanted = [&](const char* kind) {
+    const bool all = what.empty();
+    if (all) fmt::print("{}\n", kind);
+    return all || what == kind;
+  };
+  if (wanted("scenarios")) {
+    ListFiles<Scenario>("scenarios", [](const Scenario& s) {
+      return fmt::format("{} ({} s{})", s.description(), s.duration(),
+                         s.has_paper_section() ? ", paper section " + s.paper_section() : "");
+    });
+  }
+  if (wanted("robots")) {
+    ListFiles<Robot>("robots", [](const Robot& r) { return "URDF " + r.urdf(); });
+  }
+  if (wanted("graphs")) {
+    ListFiles<Graph>("graphs", [](const Graph& g) {
+      return fmt::format("{} ({} components, {} channels)", g.description(), g.component_size(),
+                         g.channel_size());
+    });
+  }
+  if (wanted("components")) {
+    for (const auto& [type, entry] : Components().entries()) {
+      fmt::print("  {:<24}{}\n", type, entry.summary);
+    }
+  }
+  if (wanted("metrics")) {
+    for (const logging::Metric& metric : logging::Metrics()) {
+      fmt::print("  {:<28}{:<6}{}\n", metric.name, metric.unit, metric.description);
+    }
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddListCommand(CLI::App* app, Command* command) {
+  auto what = std::make_shared<std::string>();
+  CLI::App* list = app->add_subcommand("list", "what there is to use");
+  list->add_option("what", *what, "scenarios, robots, graphs, components or metrics; default: all")
+      ->check(CLI::IsMember({"scenarios", "robots", "graphs", "components", "metrics"}));
+  list->callback([what, command] { *command = [what] { return List(*what); }; });
+}
+
+}  // namespace poise

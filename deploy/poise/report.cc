@@ -1,0 +1,221 @@
+#include "deploy/poise/report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "components/framework/configuration.h"
+#include "deploy/poise/run_setup.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+
+namespace poise {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Number(double value) {
+  if (value == std::floor(value) && std::abs(value) < 1e15) return fmt::format("{:.0f}", value);
+  return std::abs(value) >= 1e4 ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
+}
+
+std::string WithUnit(double value, const std::string& unit) {
+  return unit.empty() ? Number(value) : Number(value) + " " + unit;
+}
+
+/// Columns that a UTF-8 text takes: its code points.
+size_t Width(const std::string& text) {
+  return static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
+  }));
+}
+
+std::string Limit(const CheckResult& check) {
+  if (check.at_most && check.at_least) {
+    if (*check.at_most == *check.at_least) return "= " + WithUnit(*check.at_most, check.unit);
+    return fmt::format("{} … {}", Number(*check.at_least), WithUnit(*check.at_most, check.unit));
+  }
+  if (check.at_most) return "≤ " + WithUnit(*check.at_most, check.unit);
+  if (check.at_least) return "≥ " + WithUnit(*check.at_least, check.unit);
+  return "";
+}
+
+Json Optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, CheckResult* result) {
+  result->name = metric.name;
+  result->unit = metric.unit;
+  if (result->label.empty()) result->label = metric.description;
+  result->measured = metric.compute(run);
+  if (!result->limited()) return;
+  result->passed = result->measured.has_value() &&
+                   (!result->at_most || *result->measured <= *result->at_most) &&
+                   (!result->at_least || *result->measured >= *result->at_least);
+}
+
+/// "0.1" of the scenario's line that sets `field`.
+std::string ValueOf(const Scenario& scenario, const std::string& field) {
+  const std::string text = ScenarioText(scenario);
+  const int line = LocateField(text, field, scenario);
+  if (line == 0) return "";
+  size_t begin = 0;
+  for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
+  std::string value = text.substr(begin, text.find('\n', begin) - begin);
+  const size_t colon = value.find(": ");
+  return colon == std::string::npos ? "" : value.substr(colon + 2);
+}
+
+}  // namespace
+
+int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run) {
+  return std::llround(std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9));
+}
+
+std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
+  std::vector<CheckResult> results;
+  CheckResult duration;
+  const double planned = static_cast<double>(run.spec.num_ticks()) * run.spec.tick_period();
+  if (run.spec.num_ticks() > 0) duration.at_least = planned;
+  results.push_back(duration);
+  Evaluate(*logging::FindMetric("duration_reached"), run, &results.back());
+  CheckResult defects;
+  defects.at_most = 0;
+  results.push_back(defects);
+  Evaluate(*logging::FindMetric("log_defects"), run, &results.back());
+  for (const Check& check : scenario.check()) {
+    CheckResult result;
+    result.label = check.label();
+    if (check.has_at_most()) result.at_most = check.at_most();
+    if (check.has_at_least()) result.at_least = check.at_least();
+    result.paper = check.paper();
+    if (check.has_paper_value()) result.paper_value = check.paper_value();
+    Evaluate(*logging::FindMetric(check.metric()), run, &result);
+    results.push_back(std::move(result));
+  }
+  return results;
+}
+
+std::string FormatTable(const std::vector<CheckResult>& checks) {
+  using Row = std::array<std::string, 5>;
+  std::vector<Row> rows = {{"what", "measured", "limit", "paper", "verdict"}};
+  for (const CheckResult& check : checks) {
+    rows.push_back({check.label, check.measured ? WithUnit(*check.measured, check.unit) : "none",
+                    Limit(check), check.paper,
+                    !check.limited() ? ""
+                    : check.passed   ? "ok"
+                                     : "FAILED"});
+  }
+  std::array<size_t, 5> widths{};
+  for (const Row& row : rows) {
+    for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], Width(row[i]));
+  }
+  std::string text;
+  for (size_t r = 0; r < rows.size(); ++r) {
+    std::string line;
+    for (size_t i = 0; i < widths.size(); ++i) {
+      if (i > 0) line += "  ";
+      line += rows[r][i] + std::string(widths[i] - Width(rows[r][i]), ' ');
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+    if (r > 0) continue;
+    for (size_t i = 0; i < widths.size(); ++i) {
+      for (size_t k = 0; k < widths[i]; ++k) text += "─";
+      text += i + 1 < widths.size() ? "  " : "\n";
+    }
+  }
+  return text;
+}
+
+std::string FormatAssumptions(const Scenario& scenario) {
+  if (scenario.assumption_size() == 0) return "";
+  std::string text = "Not given by the paper:\n";
+  for (const Assumption& assumption : scenario.assumption()) {
+    const std::string value = ValueOf(scenario, assumption.field());
+    text += fmt::format("  {:<7}  {}{}{}\n", assumption.kind(), assumption.field(),
+                        value.empty() ? "" : " = " + value,
+                        assumption.has_reason() ? ": " + assumption.reason() : "");
+  }
+  return text;
+}
+
+std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
+                        const RunOutcome& outcome, const std::string& mode,
+                        const std::vector<CheckResult>& checks, bool passed) {
+  Json json;
+  json["scenario"] = run.spec.scenario();
+  json["paper_section"] = scenario.paper_section();
+  json["run_id"] = run.spec.run_id();
+  json["started_at"] = run.info.started_at;
+  json["versions"]["poise"] = run.spec.poise_version();
+  for (const std::string& library : run.spec.library_version()) {
+    const size_t space = library.find(' ');
+    json["versions"][library.substr(0, space)] =
+        library.substr(std::min(space, library.size() - 1) + 1);
+  }
+  json["mode"] = mode;
+  json["realtime"] = run.spec.realtime();
+  json["seed"] = run.spec.seed();
+  json["drop_rate"] = run.spec.drop_rate();
+  json["tick_period"] = run.spec.tick_period();
+  json["planned_ticks"] = run.spec.num_ticks();
+  json["ticks"] = run.num_ticks;
+  json["simulated_time"] = run.time(run.num_ticks);
+  json["wall_time"] = outcome.wall_time;
+  json["real_time_factor"] = Optional(run.real_time_factor);
+  json["passed"] = passed;
+  json["end"] = outcome.message.empty() ? "planned end" : outcome.message;
+  json["interrupted"] = outcome.interrupted;
+  json["log"] = "run.lcm";
+  json["components"] = Json::array();
+  for (const auto& [name, health] : run.health) {
+    json["components"].push_back({{"name", name},
+                                  {"ticks", health.ticks_completed},
+                                  {"latency_us",
+                                   {{"median", health.latency_median},
+                                    {"p99", health.latency_p99},
+                                    {"max", health.latency_max}}},
+                                  {"received", health.messages_received},
+                                  {"refused", health.messages_refused},
+                                  {"duplicates", health.messages_duplicate},
+                                  {"dropped", health.messages_dropped},
+                                  {"gaps", health.gaps},
+                                  {"resends", health.resends},
+                                  {"publish_errors", health.publish_errors}});
+  }
+  json["channels"] = Json::array();
+  for (const logging::ChannelCompleteness& channel : run.channels) {
+    json["channels"].push_back({{"name", channel.name},
+                                {"messages", channel.messages},
+                                {"missing", channel.missing},
+                                {"duplicate", channel.duplicate},
+                                {"out_of_order", channel.out_of_order},
+                                {"refused", channel.refused}});
+  }
+  json["checks"] = Json::array();
+  for (const CheckResult& check : checks) {
+    Json limit = nullptr;
+    if (check.limited()) limit = Limit(check);
+    json["checks"].push_back({{"name", check.name},
+                              {"label", check.label},
+                              {"measured", Optional(check.measured)},
+                              {"unit", check.unit},
+                              {"limit", limit},
+                              {"at_most", Optional(check.at_most)},
+                              {"at_least", Optional(check.at_least)},
+                              {"paper", check.paper.empty() ? Json(nullptr) : Json(check.paper)},
+                              {"paper_value", Optional(check.paper_value)},
+                              {"passed", check.passed}});
+  }
+  json["assumptions"] = Json::array();
+  for (const Assumption& assumption : scenario.assumption()) {
+    json["assumptions"].push_back({{"field", assumption.field()},
+                                   {"value", ValueOf(scenario, assumption.field())},
+                                   {"kind", assumption.kind()},
+                                   {"reason", assumption.reason()}});
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace poise

@@ -1,0 +1,73 @@
+#include "deploy/poise/run_dir.h"
+
+#include <chrono>
+#include <ctime>
+#include <fstream>
+
+#include "components/framework/configuration.h"
+#include "deploy/poise/catalog.h"
+#include "fmt/chrono.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFiles[] = {"run.lcm", "summary.json", "recorder.json", "run_spec.pbtxt",
+                                  "scenario.pbtxt"};
+
+}  // namespace
+
+fs::path RunsDir() { return DeployDir().parent_path() / "runs"; }
+
+fs::path MakeRunDir(const std::string& out, const std::string& scenario) {
+  std::error_code error;
+  if (!out.empty()) {
+    const fs::path dir = fs::absolute(out);
+    fs::create_directories(dir, error);
+    if (error || !fs::is_directory(dir)) {
+      throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
+                                    error ? error.message() : "there is a file of that name"));
+    }
+    for (const char* file : kFiles) fs::remove(dir / file, error);
+    return dir;
+  }
+  const std::string name =
+      fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), scenario);
+  fs::create_directories(RunsDir(), error);
+  for (int i = 1; i < 1000 && !error; ++i) {
+    const fs::path dir = RunsDir() / (i == 1 ? name : fmt::format("{}-{}", name, i));
+    if (!fs::create_directory(dir, error)) continue;
+    fs::remove(RunsDir() / "latest", error);
+    fs::create_directory_symlink(dir.filename(), RunsDir() / "latest", error);
+    return dir;
+  }
+  throw ConfigError(fmt::format("{}: cannot be made: {}; choose another folder with --out",
+                                (RunsDir() / name).string(), error.message()));
+}
+
+fs::path FindLog(const std::string& run) {
+  fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
+  if (fs::is_directory(path)) path /= "run.lcm";
+  if (!fs::exists(path)) {
+    throw ConfigError(run.empty() ? "there is no run yet; start one with poise run"
+                                  : fmt::format("{}: no such log or run folder", run));
+  }
+  return path;
+}
+
+RunSpec ReadRunSpec(const std::string& run) {
+  const fs::path path = FindLog(run).parent_path() / "run_spec.pbtxt";
+  RunSpec spec;
+  ReadTextProto(path.string(), &spec);
+  return spec;
+}
+
+void WriteFile(const fs::path& path, const std::string& text) {
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  if (!out.flush()) throw ConfigError(fmt::format("{}: cannot be written", path.string()));
+}
+
+}  // namespace poise

@@ -1,0 +1,275 @@
+#include "deploy/poise/run_setup.h"
+
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "components/framework/configuration.h"
+#include "components/framework/run.h"
+#include "components/robot/robot.pb.h"
+#include "components/robot/robot_files.h"
+#include "deploy/poise/catalog.h"
+#include "deploy/poise/registry.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Below the ephemeral ports that the system gives to sockets of its own choice.
+constexpr int kFirstPort = 12000;
+constexpr int kLastPort = 32000;
+constexpr double kMinRate = 50;     // Hz
+constexpr double kMaxRate = 10000;  // Hz
+
+[[noreturn]] void Fail(const LoadedScenario& loaded, std::string_view field,
+                       std::string_view problem) {
+  const auto set_by = [&](const std::string& path) {
+    return field == path || field.starts_with(path + ".") || path.starts_with(std::string(field));
+  };
+  if (std::any_of(loaded.changed.begin(), loaded.changed.end(), set_by)) {
+    throw ConfigError(fmt::format("--set {}: {}", field, problem));
+  }
+  const int line = LocateField(loaded.source, field, loaded.scenario);
+  if (line > 0) throw ConfigError(fmt::format("{}:{}: {}: {}", loaded.file, line, field, problem));
+  throw ConfigError(fmt::format("{}: {}: {}", loaded.file, field, problem));
+}
+
+void CheckScenario(const LoadedScenario& loaded) {
+  const Scenario& s = loaded.scenario;
+  if (!s.has_robot()) Fail(loaded, "robot", "is missing; name one of deploy/robots");
+  if (!(s.duration() > 0) || s.duration() > 36000) {
+    Fail(loaded, "duration", fmt::format("is {} s; must be in (0, 36000]", s.duration()));
+  }
+  if (!(s.tick_rate() >= kMinRate && s.tick_rate() <= kMaxRate)) {
+    Fail(loaded, "tick_rate",
+         fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
+  }
+  if (!(s.check_from() >= 0 && s.check_from() < s.duration())) {
+    Fail(loaded, "check_from", "must be in [0, duration)");
+  }
+  std::vector<std::string> names;
+  for (const logging::Metric& metric : logging::Metrics()) names.push_back(metric.name);
+  for (int i = 0; i < s.check_size(); ++i) {
+    if (logging::FindMetric(s.check(i).metric()) == nullptr) {
+      Fail(loaded, fmt::format("check[{}].metric", i),
+           fmt::format("no metric named '{}'; near it: {}; see `poise list metrics`",
+                       s.check(i).metric(), Suggest(s.check(i).metric(), names)));
+    }
+    if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
+        s.check(i).at_most() < s.check(i).at_least()) {
+      Fail(loaded, fmt::format("check[{}].at_most", i), "is smaller than at_least");
+    }
+  }
+  for (int i = 0; i < s.assumption_size(); ++i) {
+    const Assumption& assumption = s.assumption(i);
+    if (LocateField(loaded.source, assumption.field(), s) == 0) {
+      Fail(loaded, fmt::format("assumption[{}].field", i),
+           fmt::format("the scenario sets no field '{}'", assumption.field()));
+    }
+    if (assumption.kind() != "fitted" && assumption.kind() != "assumed") {
+      Fail(loaded, fmt::format("assumption[{}].kind", i), "must be \"fitted\" or \"assumed\"");
+    }
+  }
+}
+
+/// The scenario's field with the configuration of a component; nullptr when it has none of that
+/// name.
+const google::protobuf::FieldDescriptor* ConfigField(const Scenario& scenario,
+                                                     const std::string& component) {
+  const auto* field = scenario.GetDescriptor()->FindFieldByName(component);
+  const bool is_config = field != nullptr && !field->is_repeated() &&
+                         field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_MESSAGE;
+  return is_config ? field : nullptr;
+}
+
+std::string ConfigText(const Scenario& scenario, const std::string& component) {
+  const auto* field = ConfigField(scenario, component);
+  if (field == nullptr || !scenario.GetReflection()->HasField(scenario, field)) return "";
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(scenario.GetReflection()->GetMessage(scenario, field),
+                                              &text);
+  return text;
+}
+
+void AddResource(RunSpec* spec, const std::string& name, const fs::path& file) {
+  Resource* resource = spec->add_resource();
+  resource->set_name(name);
+  resource->set_file(file.string());
+  resource->set_text(ReadFile(file.string()));
+}
+
+/// "file:line: field: problem" of a problem in a graph's file.
+std::string GraphLine(const std::string& file, const std::string& text,
+                      const GraphError::Problem& problem) {
+  const int line = LocateField(text, problem.field, Graph());
+  const std::string where = line > 0 ? fmt::format("{}:{}", file, line) : file;
+  return problem.field.empty() ? fmt::format("{}: {}", where, problem.text)
+                               : fmt::format("{}: {}: {}", where, problem.field, problem.text);
+}
+
+[[noreturn]] void FailGraph(const std::string& file, const GraphError& error) {
+  const std::string text = ReadFile(file);
+  std::string lines;
+  for (const GraphError::Problem& problem : error.problems()) {
+    if (!lines.empty()) lines += "\n";
+    lines += GraphLine(file, text, problem);
+  }
+  throw ConfigError(lines);
+}
+
+bool PortsFree(int first, int count) {
+  for (int port = first; port < first + count; ++port) {
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (fd < 0) return false;
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_ANY);
+    const bool free = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
+    close(fd);
+    if (!free) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
+  LoadedScenario loaded;
+  loaded.file = FindFile("scenarios", name, fs::current_path()).string();
+  loaded.source = ReadFile(loaded.file);
+  ParseTextProto(loaded.source, loaded.file, &loaded.scenario);
+  for (const std::string& change : changes.set) {
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
+    }
+    const std::string path = change.substr(0, equals);
+    try {
+      SetField(&loaded.scenario, path, change.substr(equals + 1));
+    } catch (const ConfigError& error) {
+      throw ConfigError(fmt::format("--set {}", error.what()));
+    }
+    loaded.changed.push_back(path);
+  }
+  if (changes.duration) {
+    loaded.scenario.set_duration(*changes.duration);
+    loaded.changed.push_back("duration");
+  }
+  if (changes.seed) loaded.scenario.set_seed(*changes.seed);
+  CheckScenario(loaded);
+  const fs::path folder = fs::path(loaded.file).parent_path();
+  try {
+    loaded.graph_file = FindFile("graphs", loaded.scenario.graph(), folder).string();
+  } catch (const ConfigError& error) {
+    Fail(loaded, "graph", error.what());
+  }
+  try {
+    loaded.robot_file = FindFile("robots", loaded.scenario.robot(), folder).string();
+  } catch (const ConfigError& error) {
+    Fail(loaded, "robot", error.what());
+  }
+  return loaded;
+}
+
+std::string ScenarioText(const Scenario& scenario) {
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(scenario, &text);
+  return text;
+}
+
+RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
+                    std::vector<std::string>* warnings) {
+  const Scenario& scenario = loaded.scenario;
+  RunSpec spec;
+  std::random_device random;
+  spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
+  spec.set_scenario(scenario.has_name() ? scenario.name() : fs::path(loaded.file).stem().string());
+  ReadTextProto(loaded.graph_file, spec.mutable_graph());
+  spec.set_tick_period(1 / scenario.tick_rate());
+  spec.set_seed(scenario.seed());
+  spec.set_num_ticks(
+      std::max<int64_t>(1, std::llround(scenario.duration() * scenario.tick_rate())));
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    ComponentConfig* config = spec.add_config();
+    config->set_component(instance.name());
+    config->set_text(ConfigText(scenario, TypeOf(instance)));
+  }
+  Robot robot;
+  ReadTextProto(loaded.robot_file, &robot);
+  if (!robot.has_urdf()) {
+    throw ConfigError(
+        fmt::format("{}: urdf: is missing; name the robot's URDF, relative to this "
+                    "file",
+                    loaded.robot_file));
+  }
+  robot::LoadRobotFiles(loaded.robot_file, warnings);
+  AddResource(&spec, "robot", loaded.robot_file);
+  AddResource(&spec, "urdf", fs::path(loaded.robot_file).parent_path() / robot.urdf());
+  spec.set_realtime(changes.realtime);
+  spec.set_drop_rate(changes.drop_rate);
+  spec.set_poise_version(PoiseVersion());
+  spec.add_library_version("lcm " POISE_LCM_VERSION);
+  spec.add_library_version("ode " POISE_ODE_VERSION);
+  spec.add_library_version("eigen " POISE_EIGEN_VERSION);
+  spec.add_library_version("protobuf " POISE_PROTOBUF_VERSION);
+  spec.add_library_version("compiler " POISE_COMPILER);
+  return spec;
+}
+
+void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
+  try {
+    CheckGraph(spec->graph(), Components());
+    const BoundGraph bound(*spec, Components());
+    FillCounts(bound.plan(), spec->mutable_graph());
+  } catch (const GraphError& error) {
+    FailGraph(loaded.graph_file, error);
+  } catch (const ConfigError& error) {
+    // The component's own field, below the scenario's field of that component.
+    if (error.field().empty()) throw;
+    std::string field = error.field();
+    for (const ComponentInstance& instance : spec->graph().component()) {
+      if (field == instance.name() || field.starts_with(instance.name() + ".")) {
+        field.replace(0, instance.name().size(), TypeOf(instance));
+        break;
+      }
+    }
+    Fail(loaded, field, error.problem());
+  }
+}
+
+void CheckGraphFile(const std::string& path) {
+  Graph graph;
+  ReadTextProto(path, &graph);
+  try {
+    CheckGraph(graph, Components());
+  } catch (const GraphError& error) {
+    FailGraph(path, error);
+  }
+}
+
+void ChoosePorts(RunSpec* spec) {
+  const int count = 2 + spec->graph().channel_size();
+  std::mt19937_64 random(static_cast<uint64_t>(spec->run_id()));
+  std::uniform_int_distribution<int> first(kFirstPort, kLastPort - count);
+  for (int i = 0; i < 200; ++i) {
+    const int port = first(random);
+    if (!PortsFree(port, count)) continue;
+    spec->set_first_port(port);
+    return;
+  }
+  throw ConfigError(
+      fmt::format("no block of {} free UDP ports between {} and {}", count, kFirstPort, kLastPort));
+}
+
+}  // namespace poise
