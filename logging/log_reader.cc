@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -20,6 +21,23 @@ constexpr int32_t kMaxChannel = 63;  // LCM_MAX_CHANNEL_NAME_LENGTH
 constexpr int32_t kMaxData = 1 << 28;
 
 bool MagicAt(const uint8_t* data) { return static_cast<uint32_t>(ReadInt32(data)) == kMagic; }
+
+/// True when a record that comes after record `number` begins in [data, data + size), before
+/// `end` of the file. The magic alone may stand in a message by chance.
+bool HoldsRecordAfter(int64_t number, const uint8_t* data, size_t size, const uint8_t* end) {
+  constexpr uint8_t kMagicBytes[] = {0xED, 0xA1, 0xDA, 0x01};
+  const uint8_t* const last = std::min(data + size, end - std::min<ptrdiff_t>(12, end - data));
+  while (data < last) {
+    const size_t reach = static_cast<size_t>(last - data) + sizeof(kMagicBytes) - 1;
+    const void* const found = memmem(data, reach, kMagicBytes, sizeof(kMagicBytes));
+    if (found == nullptr) return false;
+    const auto* const at = static_cast<const uint8_t*>(found);
+    const auto ahead = static_cast<uint64_t>(ReadInt64(at + 4)) - static_cast<uint64_t>(number);
+    if (ahead - 1 < (1u << 20)) return true;
+    data = at + 1;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -63,13 +81,9 @@ bool LogReader::ParseAt(size_t position, LogEvent* event, size_t* end) const {
   const size_t body = static_cast<size_t>(channel_length) + static_cast<size_t>(data_length);
   if (size_ - position - kHeaderSize < body) return false;
   *end = position + kHeaderSize + body;
-  if (size_ - *end >= 4 && !MagicAt(data_ + *end)) {
-    // Either the next record is damaged, or this one's lengths are: too long, they swallow a
-    // record.
-    for (size_t i = position + kHeaderSize; i + 4 <= *end; ++i) {
-      if (MagicAt(data_ + i)) return false;
-    }
-  }
+  // Lengths that were damaged may swallow later records.
+  if (HoldsRecordAfter(ReadInt64(header + 4), header + kHeaderSize, body, data_ + size_))
+    return false;
   event->number = ReadInt64(header + 4);
   event->utime = ReadInt64(header + 12);
   event->channel = {reinterpret_cast<const char*>(header + kHeaderSize),

@@ -1,0 +1,285 @@
+#include "logging/analysis.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "logging/metrics.h"
+#include "poise/message_traits.hpp"
+#include "tests/logging/log_test_support.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr int64_t kTicks = 100;
+
+template <class T>
+T Sized(int64_t tick) {
+  T message{};
+  MessageTraits<T>::Resize(message,
+                           MessageTraits<T>::kCountNames.size() == 2   ? std::vector<int32_t>{12, 2}
+                           : MessageTraits<T>::kCountNames.size() == 1 ? std::vector<int32_t>{12}
+                                                                       : std::vector<int32_t>{});
+  SetHeader(tick, &message);
+  return message;
+}
+
+void SetIdentity(pose_t* pose) { pose->orientation[0] = 1; }
+
+/// A run of kTicks with every message at rest, which a test then changes.
+class AnalysisTest : public testing::Test {
+ protected:
+  AnalysisTest() {
+    for (int64_t t = 0; t < kTicks; ++t) {
+      sensors_.push_back(Sized<robot_sensors_t>(t));
+      state_.push_back(Sized<robot_state_t>(t));
+      task_.push_back(Sized<task_torque_t>(t));
+      balance_.push_back(Sized<balance_torque_t>(t));
+      command_.push_back(Sized<joint_command_t>(t));
+      bridge_.push_back(Sized<bridge_status_t>(t));
+      push_.push_back(Sized<external_push_t>(t));
+      truth_.push_back(Sized<ground_truth_t>(t));
+      state_.back().base_orientation[0] = truth_.back().base_orientation[0] = 1;
+      SetIdentity(&balance_.back().frame_o);
+      balance_.back().cop_limit[0] = 0.13;
+      balance_.back().cop_limit[1] = 0.07;
+      for (size_t foot = 0; foot < 2; ++foot) {
+        SetIdentity(&task_.back().foot_pose[foot]);
+        task_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
+        task_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
+        command_.back().conditions_met[foot] = 1;
+        command_.back().margins[foot] = {1, 1, 1, 1, 1};
+      }
+    }
+  }
+
+  RunRecord Read() {
+    std::vector<RawEvent> events = {RunInfoEvent(spec_)};
+    for (size_t t = 0; t < kTicks; ++t) {
+      Add("ROBOT_SENSORS", sensors_[t], &events);
+      Add("ROBOT_STATE", state_[t], &events);
+      Add("TASK_TORQUE", task_[t], &events);
+      Add("BALANCE_TORQUE", balance_[t], &events);
+      Add("JOINT_COMMAND", command_[t], &events);
+      Add("BRIDGE_STATUS", bridge_[t], &events);
+      Add("EXTERNAL_PUSH", push_[t], &events);
+      Add("GROUND_TRUTH", truth_[t], &events);
+    }
+    WriteRawLog(path_, events);
+    return ReadRun(path_);
+  }
+
+  double Measure(const std::string& name, double from = 0) {
+    RunRecord run = Read();
+    run.first_tick = std::llround(from / 0.002);
+    const Metric* metric = FindMetric(name);
+    EXPECT_NE(metric, nullptr) << name;
+    const Answer value = metric->compute(run);
+    EXPECT_TRUE(value.has_value()) << name;
+    return value.value_or(-1e9);
+  }
+
+  template <class T>
+  static void Add(const char* channel, const T& message, std::vector<RawEvent>* events) {
+    events->push_back({channel, message.utime, Encode(message)});
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.path("run.lcm");
+  RunSpec spec_ = MakeTestSpec();
+  std::vector<robot_sensors_t> sensors_;
+  std::vector<robot_state_t> state_;
+  std::vector<task_torque_t> task_;
+  std::vector<balance_torque_t> balance_;
+  std::vector<joint_command_t> command_;
+  std::vector<bridge_status_t> bridge_;
+  std::vector<external_push_t> push_;
+  std::vector<ground_truth_t> truth_;
+};
+
+TEST_F(AnalysisTest, MetricsHaveNamesOfTheirOwn) {
+  std::set<std::string> names;
+  for (const Metric& metric : Metrics()) {
+    EXPECT_TRUE(names.insert(metric.name).second) << metric.name;
+    EXPECT_FALSE(metric.description.empty()) << metric.name;
+  }
+}
+
+TEST_F(AnalysisTest, ComErrorIsTheLargestAfterTheWindowBegins) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    task_[t].com_desired[1] = 0.01;
+    task_[t].com_position[1] = 0.01 - 1e-4 * static_cast<double>(t);
+    truth_[t].com_position[1] = 0.01 + 2e-4 * static_cast<double>(t);
+  }
+  task_[3].com_position[1] = 1;  // before the window
+  EXPECT_NEAR(Measure("com_error_max_y", 0.01), 9.9, 1e-9);
+  EXPECT_NEAR(Measure("com_error_max_y"), 990, 1e-9);
+  EXPECT_NEAR(Measure("com_error_true_max_y"), 19.8, 1e-9);
+  EXPECT_NEAR(Measure("com_error_end"), 19.8, 1e-9);
+  EXPECT_EQ(Measure("com_error_max_x"), 0);
+}
+
+TEST_F(AnalysisTest, BalancingIntervals) {
+  for (size_t t = 20; t < 30; ++t) balance_[t].active_y = 1;
+  for (size_t t = 28; t < 35; ++t) balance_[t].active_x = 1;
+  balance_[50].active_x = 1;
+  EXPECT_NEAR(Measure("balancing_first"), 0.040, 1e-12);
+  EXPECT_NEAR(Measure("balancing_last"), 0.100, 1e-12);
+  EXPECT_NEAR(Measure("balancing_active"), 16 * 0.002, 1e-12);
+  EXPECT_EQ(Measure("balancing_activations"), 2);
+}
+
+TEST_F(AnalysisTest, BalancingThatNeverWasOnHasNoTimes) {
+  const RunRecord run = Read();
+  EXPECT_FALSE(FindMetric("balancing_first")->compute(run).has_value());
+  EXPECT_EQ(FindMetric("balancing_activations")->compute(run), Answer(0));
+}
+
+TEST_F(AnalysisTest, MeasuredCopIsTheLoadsLever) {
+  // 100 N on the right foot at y = -0.105, 300 N on the left at 0.105: the lever rule gives 0.0525,
+  // and a moment of M_x shifts it by M_x / F_z.
+  for (size_t t = 0; t < kTicks; ++t) {
+    sensors_[t].foot_wrench[0].force[2] = -100;
+    sensors_[t].foot_wrench[1].force[2] = -300;
+    sensors_[t].foot_wrench[1].moment[0] = 4;
+  }
+  EXPECT_NEAR(Measure("cop_measured_max_y"), 1e3 * (0.0525 - 4 / 400.0), 1e-9);
+}
+
+TEST_F(AnalysisTest, MeasuredCopUsesTheFrameAndFeetOfTheTickBefore) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    sensors_[t].foot_wrench[0].force[2] = sensors_[t].foot_wrench[1].force[2] = -200;
+  }
+  // Frame O of tick 10 stands 0.02 m to the left: the reading of tick 11 is off by that.
+  balance_[10].frame_o.position[1] = 0.02;
+  const RunRecord run = Read();
+  EXPECT_FALSE(MeasuredCop(run, 0).has_value());
+  EXPECT_NEAR((*MeasuredCop(run, 10))(1), 0, 1e-12);
+  EXPECT_NEAR((*MeasuredCop(run, 11))(1), -0.02, 1e-12);
+  EXPECT_NEAR((*MeasuredCop(run, 12))(1), 0, 1e-12);
+}
+
+TEST_F(AnalysisTest, MeasuredCopTurnsWithTheFrame) {
+  // Turned by 90 degrees about z, O's x is the world's y: what was left is now ahead.
+  for (size_t t = 0; t < kTicks; ++t) {
+    sensors_[t].foot_wrench[1].force[2] = -300;
+    sensors_[t].foot_wrench[0].force[2] = -100;
+    balance_[t].frame_o.orientation[0] = balance_[t].frame_o.orientation[3] = std::sqrt(0.5);
+  }
+  const RunRecord run = Read();
+  EXPECT_NEAR((*MeasuredCop(run, 5))(0), 0.0525, 1e-12);
+  EXPECT_NEAR((*MeasuredCop(run, 5))(1), 0, 1e-12);
+}
+
+TEST_F(AnalysisTest, WrenchErrorPairsAReadingWithTheTickBefore) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    command_[t].foot_wrench[0].force[2] = static_cast<double>(t);
+    command_[t].foot_wrench[1].force[2] = static_cast<double>(t);
+    sensors_[t].foot_wrench[0].force[2] = static_cast<double>(t) - 1 + 3;
+    sensors_[t].foot_wrench[1].force[2] = static_cast<double>(t) - 1 - 4;
+  }
+  // RMS of 3 and 4.
+  EXPECT_NEAR(Measure("foot_force_error_rms"), std::sqrt(12.5), 1e-12);
+  EXPECT_NEAR(Measure("foot_moment_error_rms"), 0, 1e-12);
+}
+
+TEST_F(AnalysisTest, ViolatedTicksCountEveryCondition) {
+  EXPECT_EQ(Measure("violated_ticks"), 0);
+  command_[10].margins[1].roll = -0.001;
+  command_[20].conditions_met[0] = 0;
+  balance_[30].cop[1] = -0.0701;
+  balance_[40].cop[1] = 0.07;  // on the bound
+  command_[50].margins[0].yaw = -1;
+  command_[50].in_contact[0] = 0;  // no foot of the contact model
+  EXPECT_EQ(Measure("violated_ticks"), 3);
+  EXPECT_NEAR(Measure("left_foot_roll_margin"), -0.001, 1e-15);
+  EXPECT_NEAR(Measure("right_foot_yaw_margin"), 1, 1e-15);
+  EXPECT_NEAR(Measure("cop_excess_y"), 0.1, 1e-9);
+}
+
+TEST_F(AnalysisTest, TorquesAndTheirSteps) {
+  command_[40].torque[3] = -60;
+  command_[41].torque[3] = 15;
+  bridge_[kTicks - 1].saturations = 7;
+  EXPECT_EQ(Measure("joint_torque_max"), 60);
+  EXPECT_EQ(Measure("torque_step_max"), 75);
+  // Joint 3 is a knee: 150 N·m by its effort, and 50 * 0.10 * 30 by its motor.
+  EXPECT_NEAR(Measure("joint_torque_share"), 40, 1e-12);
+  EXPECT_EQ(Measure("saturations"), 7);
+}
+
+TEST_F(AnalysisTest, PushPeakAndImpulse) {
+  // A half sine of 25 samples' length: its integral is 2 peak T / pi.
+  const double length = 0.05;
+  for (size_t t = 0; t < kTicks; ++t) {
+    const double time = 0.002 * static_cast<double>(t);
+    if (time < length) push_[t].force[1] = 188.91 * std::sin(std::numbers::pi * time / length);
+  }
+  EXPECT_NEAR(Measure("push_peak"), 188.91, 0.4);  // the peak lies between two samples
+  EXPECT_NEAR(Measure("push_impulse"), 2 * 188.91 * length / std::numbers::pi, 0.01);
+}
+
+TEST_F(AnalysisTest, EstimatorErrors) {
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.01, Eigen::Vector3d(0.6, 0.8, 0)));
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()));
+  const Eigen::Quaterniond estimate = turn * tilt;
+  for (size_t t = 0; t < kTicks; ++t) {
+    truth_[t].base_position[0] = 0.003;
+    truth_[t].base_position[2] = 0.004;
+    truth_[t].base_linear_velocity[1] = t < kTicks / 2 ? 0 : 0.02;
+    state_[t].base_orientation[0] = estimate.w();
+    state_[t].base_orientation[1] = estimate.x();
+    state_[t].base_orientation[2] = estimate.y();
+    state_[t].base_orientation[3] = estimate.z();
+  }
+  EXPECT_NEAR(Measure("estimator_position_max"), 5, 1e-9);
+  EXPECT_NEAR(Measure("estimator_position_rms"), 5, 1e-9);
+  EXPECT_NEAR(Measure("estimator_velocity_max"), 20, 1e-9);
+  EXPECT_NEAR(Measure("estimator_velocity_rms"), 20 * std::sqrt(0.5), 1e-9);
+  EXPECT_NEAR(Measure("estimator_tilt_max"), 10, 1e-9);  // heading is no tilt
+  EXPECT_GT(Measure("estimator_rotation_max"), 300);
+}
+
+TEST_F(AnalysisTest, FallIsSeen) {
+  EXPECT_EQ(Measure("fallen"), 0);
+  truth_[kTicks - 1].fallen = 1;
+  EXPECT_EQ(Measure("fallen"), 1);
+}
+
+TEST_F(AnalysisTest, CompletenessOfTheLog) {
+  std::vector<RawEvent> events = {RunInfoEvent(spec_)};
+  // DRIVE_FEEDBACK and the others are absent: restrict the graph to two channels.
+  const int first = ChannelIndex(spec_, "ROBOT_STATE");
+  const int second = ChannelIndex(spec_, "EXTERNAL_PUSH");
+  RunSpec spec = spec_;
+  spec.mutable_graph()->clear_channel();
+  *spec.mutable_graph()->add_channel() = spec_.graph().channel(first);
+  *spec.mutable_graph()->add_channel() = spec_.graph().channel(second);
+  events = {RunInfoEvent(spec)};
+  for (const size_t t : {0, 1, 2, 4, 3, 5, 5}) Add("ROBOT_STATE", state_[t], &events);
+  for (const size_t t : {0, 1, 3, 4}) Add("EXTERNAL_PUSH", push_[t], &events);
+  state_[5].run_id = 43;
+  Add("ROBOT_STATE", state_[5], &events);
+  WriteRawLog(path_, events);
+  const RunRecord run = ReadRun(path_);
+  EXPECT_EQ(run.num_ticks, 6);
+  ASSERT_EQ(run.channels.size(), 2u);
+  EXPECT_EQ(run.channels[0].messages, 6);
+  EXPECT_EQ(run.channels[0].missing, 0);
+  EXPECT_EQ(run.channels[0].duplicate, 1);
+  EXPECT_EQ(run.channels[0].out_of_order, 1);
+  EXPECT_EQ(run.channels[0].refused, 1);
+  EXPECT_EQ(run.channels[1].missing, 2);  // ticks 2 and 5
+  EXPECT_EQ(FindMetric("log_defects")->compute(run), Answer(5));
+}
+
+TEST_F(AnalysisTest, LogWithoutRunInfoIsRefused) {
+  WriteRawLog(path_, {{"ROBOT_STATE", 0, Encode(state_[0])}});
+  EXPECT_THROW(ReadRun(path_), LogError);
+}
+
+}  // namespace
+}  // namespace poise::logging

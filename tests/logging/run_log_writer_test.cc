@@ -1,0 +1,180 @@
+#include "logging/run_log_writer.h"
+
+#include <gtest/gtest.h>
+#include <lcm/eventlog.h>
+
+#include "logging/log_reader.h"
+#include "poise/drive_command_t.hpp"
+#include "poise/emergency_stop_t.hpp"
+#include "poise/external_push_t.hpp"
+#include "poise/health_t.hpp"
+#include "tests/logging/log_test_support.h"
+
+namespace poise::logging {
+namespace {
+
+/// Two data channels, PUSH before COMMAND, and an external one.
+RunSpec SmallSpec() {
+  RunSpec spec;
+  spec.set_run_id(42);
+  spec.set_tick_period(0.002);
+  const auto add = [&](const char* name, const char* type, bool external) {
+    Channel* channel = spec.mutable_graph()->add_channel();
+    channel->set_name(name);
+    channel->set_type(type);
+    channel->set_external(external);
+    return channel;
+  };
+  add("PUSH", "external_push_t", false);
+  add("COMMAND", "drive_command_t", false)->add_count(12);
+  add("STOP", "emergency_stop_t", true);
+  return spec;
+}
+
+std::vector<uint8_t> Push(int64_t tick) {
+  external_push_t push{};
+  SetHeader(tick, &push);
+  push.force[0] = static_cast<double>(tick) + 0.25;
+  return Encode(push);
+}
+
+std::vector<uint8_t> Command(int64_t tick) {
+  drive_command_t command{};
+  SetHeader(tick, &command);
+  command.num_motors = 12;
+  command.current.assign(12, static_cast<double>(tick));
+  command.enabled.assign(12, 1);
+  return Encode(command);
+}
+
+struct Seen {
+  std::string channel;
+  int64_t utime;
+  std::vector<uint8_t> data;
+  bool operator==(const Seen&) const = default;
+};
+
+/// With liblcm's reader, which shares no code with ours.
+std::vector<Seen> ReadWithLiblcm(const std::string& path) {
+  std::vector<Seen> events;
+  lcm_eventlog_t* log = lcm_eventlog_create(path.c_str(), "r");
+  int64_t number = 0;
+  while (lcm_eventlog_event_t* event = lcm_eventlog_read_next_event(log)) {
+    EXPECT_EQ(event->eventnum, number++);
+    const auto* data = static_cast<const uint8_t*>(event->data);
+    events.push_back({std::string(event->channel, static_cast<size_t>(event->channellen)),
+                      event->timestamp,
+                      {data, data + event->datalen}});
+    lcm_eventlog_free_event(event);
+  }
+  lcm_eventlog_destroy(log);
+  return events;
+}
+
+class RunLogWriterTest : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  RunSpec spec_ = SmallSpec();
+  run_info_t info_ = MakeRunInfo(spec_, "name: \"x\"");
+  std::string path_ = folder_.path("run.lcm");
+};
+
+TEST_F(RunLogWriterTest, LiblcmReadsEveryEventInTheGraphsOrder) {
+  RunLogWriter writer(path_, spec_, info_);
+  std::vector<Seen> expected = {{"RUN_INFO", 0, Encode(info_)}};
+  for (int64_t tick = 0; tick < 5; ++tick) {
+    // COMMAND first, though the graph names it second.
+    writer.AddMessage(1, tick, Command(tick));
+    writer.AddMessage(0, tick, Push(tick));
+    expected.push_back({"PUSH", tick * 2000, Push(tick)});
+    expected.push_back({"COMMAND", tick * 2000, Command(tick)});
+  }
+  writer.Close();
+  EXPECT_EQ(writer.missing(), 0);
+  EXPECT_EQ(writer.complete_ticks(), 5);
+  EXPECT_EQ(ReadWithLiblcm(path_), expected);
+}
+
+TEST_F(RunLogWriterTest, FileDoesNotDependOnWhichChannelRunsAhead) {
+  constexpr int64_t kTicks = 100;  // beyond the first capacity
+  const std::string other = folder_.path("other.lcm");
+  {
+    RunLogWriter writer(path_, spec_, info_);
+    for (int64_t t = 0; t < kTicks; ++t) {
+      writer.AddMessage(0, t, Push(t));
+      writer.AddMessage(1, t, Command(t));
+    }
+    writer.Close();
+  }
+  {
+    RunLogWriter writer(other, spec_, info_);
+    for (int64_t t = 0; t < kTicks; ++t) writer.AddMessage(1, t, Command(t));
+    EXPECT_EQ(writer.complete_ticks(), 0);
+    for (int64_t t = 0; t < kTicks; ++t) writer.AddMessage(0, t, Push(t));
+    writer.Close();
+  }
+  EXPECT_EQ(ReadBytes(path_), ReadBytes(other));
+}
+
+TEST_F(RunLogWriterTest, IncompleteTicksAreWrittenAndCounted) {
+  RunLogWriter writer(path_, spec_, info_);
+  for (int64_t t = 0; t < 3; ++t) writer.AddMessage(0, t, Push(t));
+  writer.AddMessage(1, 0, Command(0));
+  writer.Close();
+  EXPECT_EQ(writer.complete_ticks(), 1);
+  EXPECT_EQ(writer.missing(), 2);
+  EXPECT_EQ(ReadWithLiblcm(path_).size(), 1u + 2u + 2u);
+}
+
+TEST_F(RunLogWriterTest, GapsAndRepetitionsAreRefused) {
+  RunLogWriter writer(path_, spec_, info_);
+  writer.AddMessage(0, 0, Push(0));
+  EXPECT_THROW(writer.AddMessage(0, 0, Push(0)), std::logic_error);
+  EXPECT_THROW(writer.AddMessage(0, 2, Push(2)), std::logic_error);
+  EXPECT_THROW(writer.AddMessage(1, 0, Push(0)), std::logic_error);  // wrong size
+}
+
+TEST_F(RunLogWriterTest, HealthAndExternalMessagesStandWhereTheyCame) {
+  health_t health{};
+  SetHeader(7, &health);
+  health.component = "redistributor";
+  emergency_stop_t stop{};
+  SetHeader(9, &stop);
+  RunLogWriter writer(path_, spec_, info_);
+  writer.AddHealth("HEALTH_REDISTRIBUTOR", Encode(health));
+  writer.AddMessage(2, 9, Encode(stop));
+  writer.AddMessage(0, 0, Push(0));
+  writer.AddMessage(1, 0, Command(0));
+  writer.Close();
+  const std::vector<Seen> expected = {{"RUN_INFO", 0, Encode(info_)},
+                                      {"HEALTH_REDISTRIBUTOR", 14000, Encode(health)},
+                                      {"STOP", 18000, Encode(stop)},
+                                      {"PUSH", 0, Push(0)},
+                                      {"COMMAND", 0, Command(0)}};
+  EXPECT_EQ(ReadWithLiblcm(path_), expected);
+}
+
+TEST_F(RunLogWriterTest, FlushedEventsAreInTheFileBeforeItIsClosed) {
+  RunLogWriter writer(path_, spec_, info_);
+  writer.AddMessage(0, 0, Push(0));
+  writer.AddMessage(1, 0, Command(0));
+  writer.Flush();
+  EXPECT_EQ(ReadWithLiblcm(path_).size(), 3u);
+}
+
+TEST_F(RunLogWriterTest, UnwritableFileIsNamed) {
+  const std::string path = folder_.path("missing") + "/run.lcm";
+  try {
+    RunLogWriter writer(path, spec_, info_);
+    FAIL();
+  } catch (const LogError& error) {
+    EXPECT_EQ(std::string(error.what()).find(path), 0u) << error.what();
+  }
+}
+
+TEST_F(RunLogWriterTest, FullDiskIsAnErrorNotSilence) {
+  EXPECT_THROW(RunLogWriter("/dev/full", spec_, info_), LogError);
+}
+
+}  // namespace
+}  // namespace poise::logging
