@@ -1,0 +1,143 @@
+// Bad input gets one line that names the place, and exit code 2.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "components/framework/configuration.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+class BadInputTest : public testing::Test {
+ protected:
+  /// The scenario with `from` replaced by `to`.
+  std::string Changed(const std::string& from, const std::string& to) {
+    std::string text = ReadFile(StandScenario());
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    line_ = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    text.replace(at, from.size(), to);
+    std::ofstream(file_) << text;
+    return file_;
+  }
+
+  /// One line beginning with "poise: ", holding every one of `parts`; exit code 2; no run folder.
+  void ExpectRefused(const std::vector<std::string>& arguments,
+                     const std::vector<std::string>& parts) {
+    std::vector<std::string> all = arguments;
+    if (arguments[0] == "run") all.insert(all.end(), {"--inline", "--out", folder_ / "run"});
+    const ProgramResult result = RunPoise(all);
+    EXPECT_EQ(result.exit_code, 2) << result.output;
+    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+    EXPECT_EQ(result.output.find("poise: "), 0u) << result.output;
+    for (const std::string& part : parts) {
+      EXPECT_NE(result.output.find(part), std::string::npos) << part << " in " << result.output;
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
+  }
+
+  std::string Line() const { return file_ + ":" + std::to_string(line_); }
+
+  RunFolder folder_;
+  std::string file_ = folder_ / "scenario.pbtxt";
+  std::ptrdiff_t line_ = 0;
+};
+
+TEST_F(BadInputTest, UnknownScenarioNamesWhatThereIs) {
+  ExpectRefused({"run", "push_double_suport"}, {"push_double_suport", "push_double_support"});
+}
+
+TEST_F(BadInputTest, UnknownFlagIsNamed) { ExpectRefused({"run", "--nonsense"}, {"--nonsense"}); }
+
+TEST_F(BadInputTest, NoSubcommand) { ExpectRefused({"--nothing"}, {"--help"}); }
+
+TEST_F(BadInputTest, UnknownFieldHasFileAndLine) {
+  const std::string file = Changed("  push {", "  psuh {");
+  ExpectRefused({"run", file}, {Line(), "psuh"});
+}
+
+TEST_F(BadInputTest, WrongValueOfAComponentHasFileLineAndField) {
+  const std::string file = Changed("half_length: 0.13", "half_length: -1");
+  ExpectRefused({"run", file}, {Line(), "contact_wrench_monitor.double_support.half_length"});
+}
+
+TEST_F(BadInputTest, UnknownJointIsNamed) {
+  const std::string file = Changed("joint: \"left_knee_pitch\"", "joint: \"left_knee\"");
+  ExpectRefused({"run", file}, {file, "sim_ode.start.nominal[4]", "left_knee"});
+}
+
+TEST_F(BadInputTest, UnknownMetricHasNearNames) {
+  const std::string file = Changed("metric: \"violated_ticks\"", "metric: \"violated_tick\"");
+  ExpectRefused({"run", file}, {Line(), "check[2].metric", "violated_ticks"});
+}
+
+TEST_F(BadInputTest, UnknownRobotHasFileAndLine) {
+  const std::string file = Changed("dyros/dyros_legs", "dyros/dyros");
+  ExpectRefused({"run", file}, {Line(), "robot", "dyros/dyros_legs"});
+}
+
+TEST_F(BadInputTest, ImpossibleDuration) {
+  const std::string file = Changed("duration: 0.4", "duration: -1");
+  ExpectRefused({"run", file}, {Line(), "duration"});
+}
+
+TEST_F(BadInputTest, SetNamesItsFlagAndField) {
+  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.push[0].peek=1"},
+                {"--set", "peek", "peak"});
+  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.push[0].peak=much"},
+                {"--set", "sim_ode.push[0].peak"});
+  ExpectRefused({"run", StandScenario(), "--set", "duration"}, {"--set", "value"});
+}
+
+TEST_F(BadInputTest, ValueSetOnTheCommandLineIsNamedAsSuch) {
+  ExpectRefused({"run", StandScenario(), "--set", "redistributor.double_support.half_width=0"},
+                {"--set redistributor.double_support.half_width"});
+}
+
+TEST_F(BadInputTest, GraphProblemsComeAllAtOnceWithLines) {
+  const std::string graph = folder_ / "broken.pbtxt";
+  std::ofstream(graph) << "name: \"broken\"\n"
+                          "channel { name: \"A\" type: \"no_such_t\" }\n"
+                          "channel { name: \"B\" type: \"robot_state_t\" }\n"
+                          "component { name: \"nobody\" }\n";
+  const ProgramResult result = RunPoise({"graph", "check", graph});
+  EXPECT_EQ(result.exit_code, 2) << result.output;
+  EXPECT_NE(result.output.find(graph + ":2"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("no_such_t"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find(graph + ":4"), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("nobody"), std::string::npos) << result.output;
+}
+
+TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
+  const std::filesystem::path folder = POISE_SOURCE_DIR "/deploy/scenarios";
+  int checked = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const ProgramResult result = RunPoise({"graph", "check", entry.path().string()});
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    ++checked;
+  }
+  EXPECT_GT(checked, 0);
+}
+
+TEST_F(BadInputTest, HelpIsThereForEveryCommand) {
+  for (const std::vector<std::string>& command : {std::vector<std::string>{},
+                                                  {"run"},
+                                                  {"report"},
+                                                  {"compare"},
+                                                  {"graph"},
+                                                  {"graph", "check"},
+                                                  {"list"},
+                                                  {"doctor"},
+                                                  {"estop"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.push_back("--help");
+    EXPECT_EQ(RunPoise(arguments).exit_code, 0);
+  }
+  EXPECT_EQ(RunPoise({"--version"}).exit_code, 0);
+  EXPECT_EQ(RunPoise({"list"}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace poise

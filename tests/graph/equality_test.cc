@@ -1,0 +1,95 @@
+// The same scenario gives the same messages, bit for bit, however it runs.
+#include <gtest/gtest.h>
+
+#include "logging/compare.h"
+#include "logging/metrics.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+constexpr int64_t kTicks = 200;    // of the scenario: 0.4 s at 500 Hz
+constexpr int64_t kChannels = 10;  // of the graph, external ones aside
+
+std::string LogOf(const std::string& out, const std::vector<std::string>& flags) {
+  std::vector<std::string> arguments = {"run", StandScenario(), "--out", out};
+  arguments.insert(arguments.end(), flags.begin(), flags.end());
+  const ProgramResult result = RunPoise(arguments);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  return out + "/run.lcm";
+}
+
+void ExpectEqual(const std::string& first, const std::string& second) {
+  const logging::LogComparison result = logging::CompareLogs(first, second);
+  EXPECT_TRUE(result.equal()) << result.earliest->tick << " " << result.earliest->channel << "."
+                              << result.earliest->field << ": " << result.earliest->first << " and "
+                              << result.earliest->second;
+  EXPECT_EQ(result.ticks, kTicks);
+  EXPECT_EQ(result.messages, kTicks * kChannels);
+}
+
+TEST(Equality, ProcessesGiveWhatOneProcessGives) {
+  const RunFolder folder;
+  const std::string inside = LogOf(folder / "inline", {"--inline"});
+  const std::string processes = LogOf(folder / "processes", {});
+  ExpectEqual(inside, processes);
+
+  // Every tick's message of every channel is in the log, once, in order.
+  const logging::RunRecord record = logging::ReadRun(processes);
+  ASSERT_EQ(static_cast<int64_t>(record.channels.size()), kChannels);
+  for (const logging::ChannelCompleteness& channel : record.channels) {
+    EXPECT_EQ(channel.messages, kTicks) << channel.name;
+    EXPECT_EQ(channel.missing + channel.duplicate + channel.out_of_order + channel.refused, 0)
+        << channel.name;
+  }
+}
+
+TEST(Equality, TwoRunsAreEqual) {
+  const RunFolder folder;
+  ExpectEqual(LogOf(folder / "a", {"--inline"}), LogOf(folder / "b", {"--inline"}));
+  ExpectEqual(LogOf(folder / "c", {}), LogOf(folder / "d", {}));
+}
+
+TEST(Equality, DroppedMessagesAreRecovered) {
+  const RunFolder folder;
+  const std::string inside = LogOf(folder / "inline", {"--inline"});
+  const std::string dropping = LogOf(folder / "drop", {"--drop", "0.05"});
+  ExpectEqual(inside, dropping);
+  int64_t dropped = 0;
+  int64_t gaps = 0;
+  const nlohmann::json summary = ReadSummary(folder / "drop");
+  for (const nlohmann::json& component : summary["components"]) {
+    dropped += component["dropped"].get<int64_t>();
+    gaps += component["gaps"].get<int64_t>();
+  }
+  EXPECT_GT(dropped, 20);  // of some 2400 that are received
+  EXPECT_GE(gaps, 20);
+}
+
+TEST(Equality, AnotherSeedIsAnotherRun) {
+  const RunFolder folder;
+  const logging::LogComparison result = logging::CompareLogs(
+      LogOf(folder / "a", {"--inline"}), LogOf(folder / "b", {"--inline", "--seed", "2"}));
+  EXPECT_GT(result.differing, 0);
+}
+
+TEST(Equality, SummaryHoldsEveryRowOfTheTable) {
+  const RunFolder folder;
+  LogOf(folder / "run", {"--inline"});
+  const nlohmann::json summary = ReadSummary(folder / "run");
+  EXPECT_EQ(summary["scenario"], "stand");
+  EXPECT_EQ(summary["mode"], "inline");
+  EXPECT_TRUE(summary["passed"].get<bool>());
+  EXPECT_TRUE(summary["run_id"].is_number_integer());
+  EXPECT_TRUE(summary["versions"].contains("lcm"));
+  ASSERT_EQ(summary["checks"].size(), 5u);  // two of every run, three of the scenario
+  for (const nlohmann::json& check : summary["checks"]) {
+    for (const char* field : {"name", "measured", "unit", "limit", "paper", "passed"}) {
+      EXPECT_TRUE(check.contains(field)) << check << field;
+    }
+    EXPECT_TRUE(check["passed"].get<bool>()) << check;
+  }
+}
+
+}  // namespace
+}  // namespace poise

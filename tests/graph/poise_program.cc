@@ -1,0 +1,112 @@
+#include "tests/graph/poise_program.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadAll(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+PoiseProgram::PoiseProgram(const std::vector<std::string>& arguments) {
+  output_file_ = (fs::temp_directory_path() / "poise_output_XXXXXX").string();
+  const int output = mkstemp(output_file_.data());
+  if (output < 0) throw std::runtime_error("mkstemp failed");
+  std::vector<std::string> copy = {POISE_BIN_DIR "/poise"};
+  copy.insert(copy.end(), arguments.begin(), arguments.end());
+  std::vector<char*> pointers;
+  for (std::string& argument : copy) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  pid_ = fork();
+  if (pid_ == 0) {
+    dup2(output, STDOUT_FILENO);
+    dup2(output, STDERR_FILENO);
+    execv(pointers[0], pointers.data());
+    _exit(127);
+  }
+  close(output);
+}
+
+PoiseProgram::~PoiseProgram() {
+  if (pid_ > 0) {
+    kill(pid_, SIGTERM);
+    Wait();
+  }
+  unlink(output_file_.c_str());
+}
+
+ProgramResult PoiseProgram::Wait() {
+  int status = 0;
+  const auto ended = [&] { return waitpid(pid_, &status, WNOHANG) == pid_; };
+  if (!WaitUntil(ended)) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, &status, 0);
+  }
+  pid_ = -1;
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(output_file_)};
+}
+
+ProgramResult RunPoise(const std::vector<std::string>& arguments) {
+  return PoiseProgram(arguments).Wait();
+}
+
+RunFolder::RunFolder() {
+  std::string name = (fs::temp_directory_path() / "poise_graph_XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp failed");
+  path_ = name;
+}
+
+RunFolder::~RunFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+std::string StandScenario() { return POISE_SOURCE_DIR "/tests/graph/data/stand.pbtxt"; }
+
+nlohmann::json ReadSummary(const std::string& run) {
+  return nlohmann::json::parse(ReadAll(fs::path(run) / "summary.json"));
+}
+
+std::vector<pid_t> ProcessesWith(const std::string& text) {
+  std::vector<pid_t> found;
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const std::string name = entry.path().filename().string();
+    const pid_t pid = static_cast<pid_t>(std::strtol(name.c_str(), nullptr, 10));
+    if (pid <= 0 || pid == getpid()) continue;
+    if (ReadAll(entry.path() / "cmdline").find(text) != std::string::npos) found.push_back(pid);
+  }
+  return found;
+}
+
+pid_t ComponentProcess(const std::string& run, const std::string& component) {
+  for (const pid_t pid : ProcessesWith(run)) {
+    std::string name = ReadAll(fs::path("/proc") / std::to_string(pid) / "cmdline");
+    name = fs::path(name.substr(0, name.find('\0'))).filename().string();
+    if (name == component) return pid;
+  }
+  return -1;
+}
+
+bool WaitForLog(const std::string& run, uintmax_t size) {
+  return WaitUntil([&] {
+    std::error_code error;
+    const uintmax_t now = fs::file_size(fs::path(run) / "run.lcm", error);
+    return !error && now >= size;
+  });
+}
+
+}  // namespace poise
