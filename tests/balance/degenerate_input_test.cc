@@ -182,6 +182,50 @@ TEST(DegenerateState, NonFiniteStatesAreRefused) {
   EXPECT_FALSE(body.Update(good, {false, false}));
 }
 
+// Made-up dynamics of the right structure: any number of joints, from one more than two feet need.
+TEST(Sizes, AnyNumberOfJoints) {
+  StateSampler sampler(Biped(), 23);
+  for (const int k : {7, 8, 13, 33, 64, kMaxJoints}) {
+    for (const int m : {6, 12}) {
+      const int n = k + 6, t = std::min(6, k - (m - 6));
+      const Eigen::MatrixXd root =
+          Eigen::MatrixXd::NullaryExpr(n, n, [&] { return sampler.Uniform(-1, 1); });
+      const Eigen::MatrixXd mass = root * root.transpose() + Eigen::MatrixXd::Identity(n, n);
+      Eigen::MatrixXd jc =
+          Eigen::MatrixXd::NullaryExpr(m, n, [&] { return sampler.Uniform(-1, 1); });
+      for (int row = 0; row < m; row += 6) {
+        Eigen::Isometry3d sole(
+            Eigen::Quaterniond(Eigen::Vector4d(sampler.Vector(4, 1))).normalized());
+        sole.translation() = sampler.Vector(3, 1);
+        jc.block(row, 0, 6, 6) = WrenchTransform(Eigen::Isometry3d::Identity(), sole).transpose();
+      }
+      const Eigen::VectorXd bias = sampler.Vector(n, 5), gravity = sampler.Vector(n, 5),
+                            gamma = sampler.Vector(m, 1);
+      ContactDynamics contact(k);
+      ASSERT_TRUE(contact.Compute(mass, bias, gravity, jc, gamma)) << k << " " << m;
+      const Eigen::MatrixXd jacobian =
+          Eigen::MatrixXd::NullaryExpr(t, n, [&] { return sampler.Uniform(-1, 1); });
+      const Eigen::VectorXd drift = sampler.Vector(t, 1), wanted = sampler.Vector(t, 5);
+      TaskDynamics task(k, t);
+      ASSERT_TRUE(task.Compute(contact, jacobian, drift)) << k << " " << m;
+      Eigen::VectorXd torque(k), wrench(m), acceleration(n);
+      task.TaskTorque(wanted, torque);
+      contact.ExpectedWrench(torque, wrench);
+      contact.Acceleration(torque, acceleration);
+
+      Eigen::MatrixXd kkt = Eigen::MatrixXd::Zero(n + m, n + m);
+      kkt << mass, jc.transpose(), jc, Eigen::MatrixXd::Zero(m, m);
+      Eigen::VectorXd right(n + m);
+      right << -bias - gravity, -gamma;
+      right.segment(6, k) += torque;
+      const Eigen::VectorXd solution = kkt.fullPivLu().solve(right);
+      EXPECT_LT(Residual(acceleration, solution.head(n)), 1e-8) << k << " " << m;
+      EXPECT_LT(Residual(wrench, solution.tail(m)), 1e-8) << k << " " << m;
+      EXPECT_LT(Residual(jacobian * solution.head(n) + drift, wanted), 1e-8) << k << " " << m;
+    }
+  }
+}
+
 TEST(Sizes, ImpossibleOnesThrow) {
   EXPECT_THROW(ContactDynamics(0), std::invalid_argument);
   EXPECT_THROW(ContactDynamics(kMaxJoints + 1), std::invalid_argument);
