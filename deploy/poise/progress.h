@@ -20,7 +20,7 @@ class Progress {
   bool quiet_;
   bool terminal_;
   bool shown_ = false;
-  double next_ = 0;
+  double next_;  // wall time from which to show again
 };
 
 }  // namespace poise
