@@ -191,12 +191,9 @@ bool OdeWorld::Finite() const {
   return std::isfinite(sum);
 }
 
-void OdeWorld::AddJointTorque(int joint, double torque) {
-  dJointAddHingeTorque(hinges_[static_cast<size_t>(joint)], torque);
-}
-
 void OdeWorld::SetDrivetrain(int joint, const Drivetrain::Row& row) {
   const dJointID hinge = hinges_[static_cast<size_t>(joint)];
+  dJointAddHingeTorque(hinge, row.torque);
   // ODE divides cfm by the step, so the row it solves is J v' + cfm lambda = velocity.
   dJointSetHingeParam(hinge, dParamFMax, row.active ? dInfinity : 0);
   dJointSetHingeParam(hinge, dParamVel, row.velocity);

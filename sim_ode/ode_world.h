@@ -42,7 +42,6 @@ class OdeWorld {
   bool Finite() const;
 
   // Before each step:
-  void AddJointTorque(int joint, double torque);
   void SetDrivetrain(int joint, const Drivetrain::Row& row);
   void AddForce(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point);  ///< world
   /// A contact at `position` (world) that pushes `body` along `normal`; `depth` in m.

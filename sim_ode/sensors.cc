@@ -43,7 +43,7 @@ Vector3d Sensors::Noise(double deviation) {
 
 void Sensors::Measure(const SimulationTruth& truth, SensorReadings* readings) {
   for (size_t j = 0; j < counts_per_radian_.size(); ++j) {
-    const double position = truth.state.joint_position[static_cast<Eigen::Index>(j)];
+    const double position = truth.encoder_position[static_cast<Eigen::Index>(j)];
     readings->position_counts[j] = std::llround(position * counts_per_radian_[j]);
   }
   readings->imu_angular_velocity = truth.imu_angular_velocity + gyro_bias_ + Noise(gyro_noise_);

@@ -40,7 +40,7 @@ void SimOde::Step(const Tick& tick) {
     }
     simulation_->Advance();
   }
-  sensors_->Measure(simulation_->truth(), readings_.get());
+  sensors_->Measure(simulation_->measured(), readings_.get());
   PublishFeedback();
   PublishPush();
   PublishTruth();
@@ -48,10 +48,9 @@ void SimOde::Step(const Tick& tick) {
 
 void SimOde::PublishFeedback() {
   drive_feedback_t& message = *drive_feedback_;
-  const SimulationTruth& truth = simulation_->truth();
   for (size_t j = 0; j < message.current.size(); ++j) {
     message.position_counts[j] = readings_->position_counts[j];
-    message.current[j] = truth.motor_current[static_cast<Eigen::Index>(j)];
+    message.current[j] = simulation_->measured().motor_current[static_cast<Eigen::Index>(j)];
     message.drive_status[j] = drive_feedback_t::DRIVE_ENABLED;  // simulated drives have no faults
   }
   SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);

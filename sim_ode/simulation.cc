@@ -54,9 +54,41 @@ RobotModel WithErrors(const RobotModel& model, const SimOdeConfig& config) {
   return result;
 }
 
-Drivetrain::Options DrivetrainOptions(const SimOdeConfig& config) {
+Drivetrain::Options DrivetrainOptions(const RobotModel& model, const SimOdeConfig& config) {
   RequirePositive(config.friction_stiffness(), "friction_stiffness");
-  return {config.rotor_inertia(), config.joint_friction(), config.friction_stiffness()};
+  const DriveTrain& drive = config.drive_train();
+  RequireNotNegative(drive.torque_lag(), "drive_train.torque_lag");
+  RequireNotNegative(drive.current_resolution(), "drive_train.current_resolution");
+  RequireNotNegative(drive.backlash(), "drive_train.backlash");
+  RequireNotNegative(drive.gear_stiffness(), "drive_train.gear_stiffness");
+  RequireNotNegative(drive.gear_damping(), "drive_train.gear_damping");
+  const Drivetrain::Options options{config.rotor_inertia(),      config.joint_friction(),
+                                    config.friction_stiffness(), drive.backlash(),
+                                    drive.gear_stiffness(),      drive.gear_damping()};
+  if (!options.elastic()) return options;
+  const std::string field =
+      drive.gear_stiffness() > 0 ? "drive_train.gear_stiffness" : "drive_train.backlash";
+  if (!options.inertia) {
+    throw ConfigError(field, "needs the rotor as a body; set rotor_inertia: true or this to 0");
+  }
+  for (size_t j = 0; j < model.joints().size(); ++j) {
+    if (model.motors()[j].reflected_inertia > 0) continue;
+    throw ConfigError(field, "needs the rotor as a body, but joint '" + model.joints()[j].name +
+                                 "' has none; give its motor a rotor_inertia in the robot file");
+  }
+  return options;
+}
+
+size_t DelaySteps(const SimOdeConfig& config, double step) {
+  const double delay = config.drive_train().sensor_delay();
+  RequireNotNegative(delay, "drive_train.sensor_delay");
+  const double whole = std::round(delay / step);
+  if (std::abs(delay / step - whole) > 1e-6 * std::max(whole, 1.0) || whole > 1e4) {
+    throw ConfigError(
+        "drive_train.sensor_delay",
+        fmt::format("{} s is not a whole number (at most 10000) of steps of {} s", delay, step));
+  }
+  return static_cast<size_t>(whole);
 }
 
 }  // namespace
@@ -66,6 +98,7 @@ SimulationTruth::SimulationTruth(int num_joints)
       com(Vector3d::Zero()),
       com_velocity(Vector3d::Zero()),
       contact_points{0, 0},
+      encoder_position(Eigen::VectorXd::Zero(num_joints)),
       motor_current(Eigen::VectorXd::Zero(num_joints)),
       motor_torque(Eigen::VectorXd::Zero(num_joints)),
       friction_torque(Eigen::VectorXd::Zero(num_joints)),
@@ -87,14 +120,23 @@ Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, doub
       fall_tilt_(config.fall_tilt()),
       terrain_(config, step_, seed),
       world_(model_, kCorners * static_cast<int>(model_.feet().size())),
-      drivetrain_options_(DrivetrainOptions(config)),
+      drive_train_(config.drive_train()),
+      drivetrain_options_(DrivetrainOptions(model_, config)),
+      current_loop_(drive_train_, step_),
+      command_(Eigen::VectorXd::Zero(model_.num_joints())),
       current_(Eigen::VectorXd::Zero(model_.num_joints())),
+      mean_current_(Eigen::VectorXd::Zero(model_.num_joints())),
       torque_(Eigen::VectorXd::Zero(model_.num_joints())),
-      truth_(model_.num_joints()) {
+      truth_(model_.num_joints()),
+      measured_(truth_),
+      delayed_(DelaySteps(config, step_), truth_) {
   RequireNotNegative(fall_height_, "fall_height");
   RequirePositive(fall_tilt_, "fall_tilt");
   for (int i = 0; i < config.push_size(); ++i) {
     pushes_.emplace_back(config.push(i), model_, "push[" + std::to_string(i) + "]");
+  }
+  for (int i = 0; i < config.hand_size(); ++i) {
+    hands_.emplace_back(config.hand(i), model_, step_, "hand[" + std::to_string(i) + "]");
   }
   for (const robot::FootModel& foot : model_.feet()) {
     auto& corners = corners_.emplace_back();
@@ -136,7 +178,20 @@ void Simulation::SetState(const RobotState& state) {
   }
   truth_.foot_wrench = RestWrenches(model_, state, in_contact);
   imu_acceleration_.setZero();
+  if (current_loop_.lags() || drivetrain_options_.elastic()) {
+    Eigen::VectorXd torque = RestTorques(model_, state, truth_.foot_wrench);
+    if (!in_contact[0] && !in_contact[1]) torque.setZero();  // in flight nothing rests
+    for (int j = 0; j < model_.num_joints(); ++j) {
+      const auto i = static_cast<size_t>(j);
+      drivetrains_[i].Place(state.joint_position[j], state.joint_velocity[j], torque[j]);
+      if (!current_loop_.lags()) continue;
+      current_[j] = mean_current_[j] = torque[j] / model_.motors()[i].torque_per_ampere();
+      torque_[j] = torque[j];
+    }
+  }
   ReadTruth();
+  measured_ = truth_;
+  for (SimulationTruth& past : delayed_) past = truth_;
 }
 
 void Simulation::SetCurrents(std::span<const double> current, std::span<const int8_t> enabled) {
@@ -148,13 +203,13 @@ void Simulation::SetCurrents(std::span<const double> current, std::span<const in
       ++refused_currents_;
       amperes = 0;
     }
+    amperes = current_loop_.Quantise(amperes);
     if (torque_limits_) {
       const double effort = model_.joints()[j].effort / motor.torque_per_ampere();
       const double limit = std::min(motor.peak_current, effort);
       amperes = std::clamp(amperes, -limit, limit);
     }
-    current_[i] = amperes;
-    torque_[i] = amperes * motor.torque_per_ampere();
+    command_[i] = amperes;
   }
 }
 
@@ -172,21 +227,38 @@ void Simulation::Advance() {
   DetectFall();
 }
 
+void Simulation::Delay() {
+  ReadTruth();
+  std::swap(measured_, delayed_[oldest_]);
+  delayed_[oldest_] = truth_;
+  oldest_ = (oldest_ + 1) % delayed_.size();
+  measured_.push_force = truth_.push_force;
+  measured_.push_point = truth_.push_point;
+}
+
 void Simulation::StepOnce() {
   if (broken_) return;
   const double from = time();
   const double to = static_cast<double>(steps_ + 1) * step_;
   for (int j = 0; j < model_.num_joints(); ++j) {
     Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
+    const double gain = model_.motors()[static_cast<size_t>(j)].torque_per_ampere();
+    mean_current_[j] = current_loop_.Advance(command_[j], &current_[j]);
+    torque_[j] = mean_current_[j] * gain;
     world_.SetDrivetrain(
-        j, drivetrain.Begin(step_, world_.joint_position(j), world_.joint_velocity(j)));
-    world_.AddJointTorque(j, torque_[j]);
+        j, drivetrain.Begin(step_, world_.joint_position(j), world_.joint_velocity(j), torque_[j]));
   }
   for (const PushProfile& push : pushes_) {
     const Vector3d force = push.MeanForce(from, to);
     if (!force.isZero(0)) {
       world_.AddForce(push.body(), force, world_.pose(push.body()) * push.point());
     }
+  }
+  for (HandSpring& hand : hands_) {
+    const Vector3d point = world_.pose(hand.body()) * hand.point();
+    hand.Grip(from, point);
+    const Vector3d force = hand.Force(from, point, PointVelocity(hand.body(), point));
+    if (!force.isZero(0)) world_.AddForce(hand.body(), force, point);
   }
   std::array<Isometry3d, 2> sole;
   std::array<Vector3d, 2> com;
@@ -208,6 +280,7 @@ void Simulation::StepOnce() {
   }
   ReadFootWrenches(sole, com);
   imu_acceleration_ = (ImuVelocity() - imu_velocity) / step_;
+  if (!delayed_.empty()) Delay();
 }
 
 int Simulation::CollectContacts(size_t foot, bool add) {
@@ -249,9 +322,12 @@ void Simulation::ReadFootWrenches(const std::array<Isometry3d, 2>& sole,
 
 Vector3d Simulation::ImuVelocity() const {
   const robot::ImuModel& imu = model_.imu();
-  const Vector3d place = world_.pose(imu.body) * imu.pose.translation();
-  return world_.com_velocity(imu.body) +
-         world_.angular_velocity(imu.body).cross(place - world_.com_position(imu.body));
+  return PointVelocity(imu.body, world_.pose(imu.body) * imu.pose.translation());
+}
+
+Vector3d Simulation::PointVelocity(int body, const Vector3d& point) const {
+  return world_.com_velocity(body) +
+         world_.angular_velocity(body).cross(point - world_.com_position(body));
 }
 
 void Simulation::ReadTruth() {
@@ -266,16 +342,24 @@ void Simulation::ReadTruth() {
   for (size_t f = 0; f < 2; ++f) {
     truth_.foot_pose[f] = world_.pose(model_.feet()[f].body) * model_.feet()[f].sole;
   }
-  truth_.motor_current = current_;
+  truth_.motor_current = mean_current_;
   truth_.motor_torque = torque_;
   for (int j = 0; j < model_.num_joints(); ++j) {
-    truth_.friction_torque[j] = drivetrains_[static_cast<size_t>(j)].friction_torque();
+    const Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
+    const bool rotor = drivetrain.elastic() && !drive_train_.link_encoder();
+    truth_.encoder_position[j] =
+        rotor ? drivetrain.rotor_position() : truth_.state.joint_position[j];
+    truth_.friction_torque[j] = drivetrain.friction_torque();
   }
   const robot::ImuModel& imu = model_.imu();
   const Matrix3d to_imu = (world_.rotation(imu.body) * imu.pose.linear()).transpose();
   truth_.imu_angular_velocity = to_imu * world_.angular_velocity(imu.body);
   truth_.imu_specific_force = to_imu * (imu_acceleration_ + kGravity * Vector3d::UnitZ());
 
+  ReadPush();
+}
+
+void Simulation::ReadPush() {
   truth_.push_force.setZero();
   truth_.push_point = truth_.state.base_position;
   double strongest = -1;
@@ -285,6 +369,15 @@ void Simulation::ReadTruth() {
     if (force.norm() > strongest) {
       strongest = force.norm();
       truth_.push_point = world_.pose(push.body()) * push.point();
+    }
+  }
+  for (const HandSpring& hand : hands_) {
+    const Vector3d point = world_.pose(hand.body()) * hand.point();
+    const Vector3d force = hand.Force(time(), point, PointVelocity(hand.body(), point));
+    truth_.push_force += force;
+    if (force.norm() > strongest) {
+      strongest = force.norm();
+      truth_.push_point = point;
     }
   }
 }

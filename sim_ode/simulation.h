@@ -1,4 +1,5 @@
-// The simulated robot without a bus: ODE world, drivetrains, terrain, pushes, fall detection.
+// The simulated robot without a bus: ODE world, drivetrains, terrain, pushes, hands, fall
+// detection.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,7 +12,9 @@
 
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_model.h"
+#include "sim_ode/current_loop.h"
 #include "sim_ode/drivetrain.h"
+#include "sim_ode/hand.h"
 #include "sim_ode/ode_world.h"
 #include "sim_ode/push.h"
 #include "sim_ode/sim_ode.pb.h"
@@ -30,14 +33,15 @@ struct SimulationTruth {
   /// RestWrenches.
   std::array<robot::Vector6d, 2> foot_wrench;
   std::array<int, 2> contact_points;
-  Eigen::VectorXd motor_current;         ///< A, applied over the last step
+  Eigen::VectorXd encoder_position;      ///< rad at the joint, where the encoders sit
+  Eigen::VectorXd motor_current;         ///< A, mean over the last step
   Eigen::VectorXd motor_torque;          ///< N·m at the joint, likewise
   Eigen::VectorXd friction_torque;       ///< N·m on the joint, likewise
   Eigen::Vector3d imu_angular_velocity;  ///< rad/s, IMU frame
   /// m/s², IMU frame: velocity gained over the last step divided by the step, minus gravity.
   Eigen::Vector3d imu_specific_force;
-  Eigen::Vector3d push_force;  ///< N, world, sum of the pushes at this instant
-  Eigen::Vector3d push_point;  ///< m, world, of the strongest push
+  Eigen::Vector3d push_force;  ///< N, world, sum of the pushes and hands at this instant
+  Eigen::Vector3d push_point;  ///< m, world, of the strongest of them
 };
 
 /// Deterministic: the same configuration, seed and commands give the same bits. After construction
@@ -49,18 +53,22 @@ class Simulation {
   Simulation(const robot::RobotModel& model, const SimOdeConfig& config, double tick_period,
              uint64_t seed);
 
-  /// Motor currents (A) to hold from now on, limited to the peak current and the joint's effort if
-  /// the configuration says so; `enabled` 0: motor free. A current that is not finite counts as 0 A
-  /// and is counted.
+  /// Motor currents (A) to follow from now on, rounded to the drives' resolution and limited to the
+  /// peak current and the joint's effort if the configuration says so; `enabled` 0: motor free. A
+  /// current that is not finite counts as 0 A and is counted.
   void SetCurrents(std::span<const double> current, std::span<const int8_t> enabled);
   /// One step of ODE.
   void Step();
   /// One tick period.
   void Advance();
-  /// Places the robot anew, joints' friction relaxed. `state` sized for the model.
+  /// Places the robot anew: joints' friction relaxed, compliant gears wound and lagging currents as
+  /// they hold it at rest. `state` sized for the model.
   void SetState(const robot::RobotState& state);
 
   const SimulationTruth& truth() const { return truth_; }
+  /// What the sensors see: the truth of sensor_delay ago, but for the push, whose sensor is not the
+  /// robot's.
+  const SimulationTruth& measured() const { return delayed_.empty() ? truth_ : measured_; }
   double time() const { return static_cast<double>(steps_) * step_; }  ///< s
   double step() const { return step_; }                                ///< s
   /// The simulated robot, model error included.
@@ -79,7 +87,10 @@ class Simulation {
   void ReadFootWrenches(const std::array<Eigen::Isometry3d, 2>& sole,
                         const std::array<Eigen::Vector3d, 2>& com);
   Eigen::Vector3d ImuVelocity() const;
+  Eigen::Vector3d PointVelocity(int body, const Eigen::Vector3d& point) const;
   void ReadTruth();
+  void ReadPush();
+  void Delay();
   void DetectFall();
   void Break(std::string_view reason);
   void CheckStart() const;
@@ -92,13 +103,19 @@ class Simulation {
   Terrain terrain_;
   OdeWorld world_;
   std::vector<PushProfile> pushes_;
+  std::vector<HandSpring> hands_;
+  DriveTrain drive_train_;
   Drivetrain::Options drivetrain_options_;
   std::vector<Drivetrain> drivetrains_;
+  CurrentLoop current_loop_;
   std::vector<std::array<Eigen::Vector3d, 4>> corners_;  // m, body frame, by foot
   int64_t steps_ = 0;
-  Eigen::VectorXd current_, torque_;
+  // By joint: A commanded, flowing now, mean of the last step, and N·m of that mean.
+  Eigen::VectorXd command_, current_, mean_current_, torque_;
   Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
-  SimulationTruth truth_;
+  SimulationTruth truth_, measured_;
+  std::vector<SimulationTruth> delayed_;  // by step, a ring of sensor_delay
+  size_t oldest_ = 0;
   double start_com_height_ = 0;
   bool fallen_ = false, broken_ = false;
   int64_t refused_currents_ = 0;

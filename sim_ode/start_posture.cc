@@ -101,4 +101,20 @@ std::array<Vector6d, 2> RestWrenches(const RobotModel& model, const RobotState& 
   return result;
 }
 
+Eigen::VectorXd RestTorques(const RobotModel& model, const RobotState& state,
+                            const std::array<Vector6d, 2>& wrenches) {
+  RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  Eigen::VectorXd force = data.gravity;
+  for (size_t f = 0; f < 2; ++f) {
+    const Matrix3d r = data.foot_pose[f].linear();
+    Vector6d wrench;
+    wrench << r * wrenches[f].head<3>(), r * wrenches[f].tail<3>();
+    force -= data.foot_jacobian[f].transpose() * wrench;
+  }
+  return force.tail(model.num_joints());
+}
+
 }  // namespace poise

@@ -21,4 +21,8 @@ std::array<robot::Vector6d, 2> RestWrenches(const robot::RobotModel& model,
                                             const robot::RobotState& state,
                                             const std::array<bool, 2>& in_contact);
 
+/// Joint torques (N·m) that hold the robot at rest under these wrenches.
+Eigen::VectorXd RestTorques(const robot::RobotModel& model, const robot::RobotState& state,
+                            const std::array<robot::Vector6d, 2>& wrenches);
+
 }  // namespace poise

@@ -75,11 +75,45 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"FrictionStiffness", "friction_stiffness: 0", "friction_stiffness",
                 "greater than 0"},
         Refusal{"FallTilt", "fall_tilt: 0", "fall_tilt", "greater than 0"},
+        Refusal{"Lag", "drive_train { torque_lag: -1 }", "drive_train.torque_lag", "negative"},
+        Refusal{"Resolution", "drive_train { current_resolution: nan }",
+                "drive_train.current_resolution", "negative"},
+        Refusal{"Backlash", "drive_train { backlash: -1 }", "drive_train.backlash", "negative"},
+        Refusal{"GearDamping", "drive_train { gear_damping: inf }", "drive_train.gear_damping",
+                "negative"},
+        Refusal{"GearWithoutRotor", "rotor_inertia: false drive_train { gear_stiffness: 2e4 }",
+                "drive_train.gear_stiffness", "set rotor_inertia: true"},
+        Refusal{"BacklashWithoutRotor", "rotor_inertia: false drive_train { backlash: 1e-3 }",
+                "drive_train.backlash", "set rotor_inertia: true"},
+        Refusal{"Delay", "drive_train { sensor_delay: 0.0015 }", "drive_train.sensor_delay",
+                "not a whole number"},
+        Refusal{"DelayEndless", "drive_train { sensor_delay: 1e9 }", "drive_train.sensor_delay",
+                "not a whole number"},
+        Refusal{"HandStart", "hand { move_duration: 1 release: 2 }", "hand[0].start", "missing"},
+        Refusal{"HandRelease", "hand { start: 1 move_duration: 1 release: 1.5 }", "hand[0].release",
+                "before the move ends at 2 s"},
+        Refusal{"HandLink", "hand { start: 1 move_duration: 1 release: 2 link: 'tail' }",
+                "hand[0].link", "no moving link 'tail'"},
+        Refusal{"HandStiffness",
+                "hand { start: 1 move_duration: 1 release: 2 link: 'right_foot' damping: 1000 }",
+                "hand[0].stiffness", "too stiff"},
         Refusal{"ModelErrorLink", "model_error { link: 'tail' }", "model_error[0].link",
                 "no moving link 'tail'"},
         Refusal{"ModelErrorMass", "model_error { link: 'upper_body' mass_scale: -1 }",
                 "model_error[0]", ""}),
     [](const auto& info) { return std::string(info.param.name); });
+
+TEST(Configuration, AnElasticGearNeedsEveryRotorsInertia) {
+  const robot::RobotModel model =
+      EditedRobot([](Robot* r) { r->mutable_motor(0)->set_rotor_inertia(0); });
+  try {
+    const Simulation simulation(model, StandingConfig("drive_train { backlash: 1e-3 }"), kTick, 1);
+    FAIL() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), "drive_train.backlash");
+    EXPECT_THAT(error.problem(), HasSubstr("joint 'right_hip_yaw'"));
+  }
+}
 
 TEST(Configuration, StepsPerTickAreExact) {
   SimOdeConfig config = StandingConfig();

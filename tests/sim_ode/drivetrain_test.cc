@@ -32,16 +32,16 @@ robot::Joint FreeJoint() {
   return joint;
 }
 
-// I qd' = I qd + h (torque + lambda), lambda = (row.velocity - qd') / row.cfm.
+// I qd' = I qd + h (row.torque + lambda), lambda = (row.velocity - qd') / row.cfm.
 struct Load {
   Drivetrain drivetrain;
   double inertia = kInertia, h = kStep;
   double q = 0, qd = 0;
 
   void Step(double torque) {
-    const Drivetrain::Row row = drivetrain.Begin(h, q, qd);
+    const Drivetrain::Row row = drivetrain.Begin(h, q, qd, torque);
     const double gain = row.active ? h / row.cfm : 0;
-    qd = (inertia * qd + h * torque + gain * row.velocity) / (inertia + gain);
+    qd = (inertia * qd + h * row.torque + gain * row.velocity) / (inertia + gain);
     q += h * qd;
     drivetrain.End(h, qd);
   }
@@ -49,12 +49,12 @@ struct Load {
 
 TEST(Drivetrain, NothingToDoMeansNoRow) {
   Drivetrain drivetrain(FreeJoint(), Motor(0, 0, 0), {});
-  EXPECT_FALSE(drivetrain.Begin(kStep, 0.1, 2.0).active);
+  EXPECT_FALSE(drivetrain.Begin(kStep, 0.1, 2.0, 0).active);
 }
 
 TEST(Drivetrain, SwitchesTurnInertiaAndFrictionOff) {
-  Drivetrain drivetrain(FreeJoint(), Motor(0.1, 2, 0.5), {false, false, 1e4});
-  EXPECT_FALSE(drivetrain.Begin(kStep, 0.1, 2.0).active);
+  Drivetrain drivetrain(FreeJoint(), Motor(0.1, 2, 0.5), {.inertia = false, .friction = false});
+  EXPECT_FALSE(drivetrain.Begin(kStep, 0.1, 2.0, 0).active);
 }
 
 TEST(Drivetrain, RotorInertiaAddsToTheLoad) {
@@ -100,7 +100,7 @@ TEST(Drivetrain, SlidingTorqueIsCoulombPlusViscous) {
   for (const double speed : {0.5, -3.0}) {
     Drivetrain drivetrain(FreeJoint(), Motor(0.1, 2, 0.5, 3), {});
     for (int i = 0; i < 2000; ++i) {
-      drivetrain.Begin(kStep, 0, speed);
+      drivetrain.Begin(kStep, 0, speed, 0);
       drivetrain.End(kStep, speed);
     }
     EXPECT_NEAR(drivetrain.friction_torque(), -std::copysign(2 + 0.5 * std::abs(speed), speed),
@@ -112,7 +112,7 @@ TEST(Drivetrain, StribeckPeakAtLowSpeed) {
   Drivetrain drivetrain(FreeJoint(), Motor(0.1, 2, 0, 3), {});
   const double speed = 0.02;
   for (int i = 0; i < 5000; ++i) {
-    drivetrain.Begin(kStep, 0, speed);
+    drivetrain.Begin(kStep, 0, speed, 0);
     drivetrain.End(kStep, speed);
   }
   EXPECT_NEAR(drivetrain.friction_torque(), -(2 + std::exp(-0.16)), 1e-6);
@@ -152,7 +152,7 @@ TEST(Drivetrain, FrictionTakesKineticEnergyAndNeverGives) {
 }
 
 TEST(Drivetrain, StableForAnyStiffnessAndStep) {
-  Load load{Drivetrain(FreeJoint(), Motor(0, 2, 0), {true, true, 1e8})};
+  Load load{Drivetrain(FreeJoint(), Motor(0, 2, 0), {.friction_stiffness = 1e8})};
   load.inertia = 1e-3;
   load.h = 2e-3;
   load.qd = 5;

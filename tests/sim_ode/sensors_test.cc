@@ -55,9 +55,9 @@ class SensorsTest : public ::testing::Test {
 TEST_F(SensorsTest, EncodersCountTurnsOfTheMotor) {
   Sensors sensors(model_, true, 0, 1);
   const double count = 2 * std::numbers::pi / (50.0 * 8192);  // gear and encoder of the robot file
-  truth_.state.joint_position[0] = 1000.4 * count;
-  truth_.state.joint_position[1] = -1000.6 * count;
-  truth_.state.joint_position[2] = 3 * 2 * std::numbers::pi;  // three joint turns
+  truth_.encoder_position[0] = 1000.4 * count;
+  truth_.encoder_position[1] = -1000.6 * count;
+  truth_.encoder_position[2] = 3 * 2 * std::numbers::pi;  // three joint turns
   sensors.Measure(truth_, &readings_);
   EXPECT_EQ(readings_.position_counts[0], 1000);
   EXPECT_EQ(readings_.position_counts[1], -1001);
