@@ -22,6 +22,8 @@ Refusal CommandGate::Find(const joint_command_t& command, int64_t cycle) const {
     return Refusal::kSize;
   }
   if (command.tick <= last_tick_ || command.tick > cycle) return Refusal::kSequence;
+  // With this status the tick is fresh but the torque is not: the controller has none.
+  if (command.status == joint_command_t::STATUS_INVALID_INPUT) return Refusal::kStale;
   if (cycle - command.tick > max_age_) return Refusal::kStale;
   const bool finite = std::all_of(command.torque.begin(), command.torque.end(),
                                   [](double torque) { return std::isfinite(torque); });

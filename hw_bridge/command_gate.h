@@ -13,7 +13,7 @@ enum class Refusal {
   kRun,        ///< of another run
   kSize,       ///< not one torque per joint
   kSequence,   ///< not after the last accepted command, or for a cycle yet to come
-  kStale,      ///< older than the allowed number of cycles
+  kStale,      ///< older than the allowed number of cycles, or one sent again for want of a new one
   kNotFinite,  ///< a torque is NaN or infinite
 };
 inline constexpr int kNumRefusals = 6;

@@ -21,7 +21,8 @@ namespace poise {
 /// ROBOT_STATE, TASK_TORQUE, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
 /// through. With STATUS_INVALID_INPUT (a neighbour's torque is held or not finite) the last good
 /// command is sent again; when the neighbours have a fresh torque but no resultant, that torque
-/// passes through undistributed.
+/// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
+/// it holds its last accepted command for a few cycles, then damps the joints, then stops.
 class Redistributor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;

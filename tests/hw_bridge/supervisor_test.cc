@@ -174,26 +174,29 @@ TEST_P(Refuses, AndTreatsItAsMissing) {
 
 INSTANTIATE_TEST_SUITE_P(
     Command, Refuses,
-    testing::Values(RefusalCase{"Nan", [](joint_command_t* c) { c->torque[1] = kNan; },
-                                Status::REASON_COMMAND_NOT_FINITE, &Status::refused_not_finite},
-                    RefusalCase{"Infinite", [](joint_command_t* c) { c->torque[2] = -kInfinity; },
-                                Status::REASON_COMMAND_NOT_FINITE, &Status::refused_not_finite},
-                    RefusalCase{"OfTheFuture", [](joint_command_t* c) { c->tick += 1; },
-                                Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
-                    RefusalCase{"Repeated", [](joint_command_t* c) { c->tick = 19; },
-                                Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
-                    RefusalCase{
-                        "OfNegativeTick",
-                        [](joint_command_t* c) { c->tick = std::numeric_limits<int64_t>::min(); },
-                        Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
-                    RefusalCase{"Short", [](joint_command_t* c) { c->torque.pop_back(); },
-                                Status::REASON_COMMAND_SIZE, &Status::refused_size},
-                    RefusalCase{"Empty", [](joint_command_t* c) { c->torque.clear(); },
-                                Status::REASON_COMMAND_SIZE, &Status::refused_size},
-                    RefusalCase{"OfWrongCount", [](joint_command_t* c) { c->num_joints = 4; },
-                                Status::REASON_COMMAND_SIZE, &Status::refused_size},
-                    RefusalCase{"OfAnotherRun", [](joint_command_t* c) { c->run_id = kRun + 1; },
-                                Status::REASON_COMMAND_RUN, &Status::refused_run}),
+    testing::Values(
+        RefusalCase{"Nan", [](joint_command_t* c) { c->torque[1] = kNan; },
+                    Status::REASON_COMMAND_NOT_FINITE, &Status::refused_not_finite},
+        RefusalCase{"Infinite", [](joint_command_t* c) { c->torque[2] = -kInfinity; },
+                    Status::REASON_COMMAND_NOT_FINITE, &Status::refused_not_finite},
+        RefusalCase{"Held",
+                    [](joint_command_t* c) { c->status = joint_command_t::STATUS_INVALID_INPUT; },
+                    Status::REASON_COMMAND_STALE, &Status::refused_stale},
+        RefusalCase{"OfTheFuture", [](joint_command_t* c) { c->tick += 1; },
+                    Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
+        RefusalCase{"Repeated", [](joint_command_t* c) { c->tick = 19; },
+                    Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
+        RefusalCase{"OfNegativeTick",
+                    [](joint_command_t* c) { c->tick = std::numeric_limits<int64_t>::min(); },
+                    Status::REASON_COMMAND_SEQUENCE, &Status::refused_sequence},
+        RefusalCase{"Short", [](joint_command_t* c) { c->torque.pop_back(); },
+                    Status::REASON_COMMAND_SIZE, &Status::refused_size},
+        RefusalCase{"Empty", [](joint_command_t* c) { c->torque.clear(); },
+                    Status::REASON_COMMAND_SIZE, &Status::refused_size},
+        RefusalCase{"OfWrongCount", [](joint_command_t* c) { c->num_joints = 4; },
+                    Status::REASON_COMMAND_SIZE, &Status::refused_size},
+        RefusalCase{"OfAnotherRun", [](joint_command_t* c) { c->run_id = kRun + 1; },
+                    Status::REASON_COMMAND_RUN, &Status::refused_run}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(Supervisor, AcceptsCommandsUpToTheAllowedAgeAndRefusesOlderOnes) {
@@ -211,6 +214,15 @@ TEST(Supervisor, AcceptsCommandsUpToTheAllowedAgeAndRefusesOlderOnes) {
   EXPECT_EQ(bench.status().state, Status::STATE_DAMPING);
   EXPECT_EQ(bench.status().reason, Status::REASON_COMMAND_STALE);
   EXPECT_EQ(bench.status().refused_stale, 1);
+}
+
+TEST(Supervisor, AnInfeasibleCommandIsFollowed) {
+  Bench bench;
+  joint_command_t command = Command(0, 10);
+  command.status = joint_command_t::STATUS_INFEASIBLE;  // of the contacts, not of the torque
+  bench.Step(&command);
+  EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);
+  EXPECT_DOUBLE_EQ(bench.drives().current[0], 2);
 }
 
 TEST(Supervisor, OneBadCommandAmongGoodOnesChangesNothingButItsCount) {
