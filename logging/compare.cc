@@ -25,7 +25,13 @@ struct Messages {
     ReadRunInfo(&reader, path, &spec);
     std::map<std::string, int, std::less<>> index;
     for (int i = 0; i < spec.graph().channel_size(); ++i) {
-      if (!spec.graph().channel(i).external()) index[spec.graph().channel(i).name()] = i;
+      const Channel& channel = spec.graph().channel(i);
+      const MessageType* type = FindMessageType(channel.type());
+      if (type == nullptr || type->run_id_offset < 0) {
+        throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' with a header",
+                                   path, channel.name(), channel.type()));
+      }
+      if (!channel.external()) index[channel.name()] = i;
     }
     LogEvent event;
     while (reader.Next(&event)) {
@@ -89,9 +95,6 @@ LogComparison CompareLogs(const std::string& first, const std::string& second) {
   for (int i = 0; same_channels && i < graph.channel_size(); ++i) {
     same_channels = graph.channel(i).name() == b.spec.graph().channel(i).name() &&
                     graph.channel(i).type() == b.spec.graph().channel(i).type();
-    if (FindMessageType(graph.channel(i).type()) == nullptr) {
-      throw LogError(fmt::format("{}: unknown message type {}", first, graph.channel(i).type()));
-    }
   }
   if (!same_channels) {
     throw LogError(fmt::format("{} and {}: their graphs have different channels", first, second));

@@ -32,6 +32,49 @@ void AddOutcome(List* list) {
                        return truth->fallen != 0;
                      });
                    }});
+  const auto count_all = [&](const char* name, const char* text, auto holds) {
+    list->push_back({name, "", text, [holds](const RunRecord& run) -> Answer {
+                       Answer count;
+                       for (int64_t t = 0; t < run.num_ticks; ++t) {
+                         const std::optional<bool> held = holds(run, t);
+                         if (held) count = count.value_or(0) + (*held ? 1 : 0);
+                       }
+                       return count;
+                     }});
+  };
+  count_all("task_not_ok_ticks", "ticks of the whole run without a task torque",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const task_torque_t* task = run.task.at(t);
+              if (task == nullptr) return {};
+              return task->status != task_torque_t::STATUS_OK &&
+                     task->status != task_torque_t::STATUS_WAITING;
+            });
+  count_all("balance_not_ok_ticks",
+            "ticks of the whole run without balance torque for want of state",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const balance_torque_t* balance = run.balance.at(t);
+              if (balance == nullptr) return {};
+              return balance->status == balance_torque_t::STATUS_SINGULAR ||
+                     balance->status == balance_torque_t::STATUS_INVALID_STATE;
+            });
+  count_all("command_not_ok_ticks", "ticks of the whole run with a command of invalid input",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const joint_command_t* command = run.command.at(t);
+              if (command == nullptr) return {};
+              return command->status == joint_command_t::STATUS_INVALID_INPUT;
+            });
+  count_all("waiting_ticks", "ticks of the whole run in which a phase's unloading was held back",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const task_torque_t* task = run.task.at(t);
+              if (task == nullptr) return {};
+              return task->status == task_torque_t::STATUS_WAITING;
+            });
+  list->push_back({"last_phase", "", "index of the scenario's phase at the end, from 0",
+                   [](const RunRecord& run) -> Answer {
+                     const task_torque_t* task = run.task.at(run.num_ticks - 1);
+                     if (task == nullptr) return {};
+                     return task->phase;
+                   }});
   list->push_back({"real_time_factor", "", "simulated time over wall time (informs only)",
                    [](const RunRecord& run) { return run.real_time_factor; }});
 }
@@ -346,7 +389,7 @@ void AddLog(List* list) {
   list->push_back({"log_defects", "",
                    "messages missing, twice, out of order or unreadable, and damaged places",
                    [](const RunRecord& run) -> Answer {
-                     int64_t sum = run.damages;
+                     int64_t sum = run.damages + run.refused_health;
                      for (const ChannelCompleteness& c : run.channels) {
                        sum += c.missing + c.duplicate + c.out_of_order + c.refused;
                      }

@@ -1,10 +1,12 @@
 #include "logging/run_record.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "components/framework/configuration.h"
 #include "components/framework/packet_filter.h"
+#include "components/framework/run.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
@@ -26,7 +28,10 @@ template <class T>
 std::function<bool(int64_t, std::span<const uint8_t>)> AddTo(Series<T>* series) {
   return [series](int64_t tick, std::span<const uint8_t> data) {
     T message;
-    if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &message)) return false;
+    if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &message) ||
+        !MessageTraits<T>::AllFinite(message)) {
+      return false;
+    }
     series->Set(tick, std::move(message));
     return true;
   };
@@ -43,11 +48,45 @@ Adders MakeAdders(RunRecord* run) {
           {"ground_truth_t", AddTo(&run->truth)}};
 }
 
-void AddHealth(std::span<const uint8_t> data, RunRecord* run) {
+void AddHealth(const LogEvent& event, RunRecord* run) {
   health_t health;
-  if (DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &health) &&
-      health.run_id == run->spec.run_id()) {
-    run->health[health.component] = std::move(health);
+  if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &health) ||
+      health.run_id != run->spec.run_id() || HealthChannel(health.component) != event.channel ||
+      !MessageTraits<health_t>::AllFinite(health)) {
+    ++run->refused_health;
+    return;
+  }
+  run->health[health.component] = std::move(health);
+}
+
+/// Metrics index messages by the robot's joints and feet.
+void CheckSpec(const RunRecord& run, const std::string& path) {
+  const double period = run.spec.tick_period();
+  if (!std::isfinite(period) || period <= 0) {
+    throw LogError(
+        fmt::format("{}: RUN_INFO: tick_period is {} s; must be positive", path, period));
+  }
+  if (run.spec.num_ticks() < 0) {
+    throw LogError(fmt::format("{}: RUN_INFO: num_ticks is {}; must not be negative", path,
+                               run.spec.num_ticks()));
+  }
+  for (const Channel& channel : run.spec.graph().channel()) {
+    const MessageType* type = FindMessageType(channel.type());
+    if (type == nullptr || type->has_strings ||
+        static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
+      throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts", path,
+                                 channel.name(), channel.type()));
+    }
+    for (size_t i = 0; i < type->count_names.size(); ++i) {
+      const std::string_view name = type->count_names[i];
+      const int32_t count = channel.count(static_cast<int>(i));
+      const bool joints = name == "num_joints" || name == "num_motors";
+      const auto robots = joints ? run.robot.joints().size() : size_t{2};
+      if ((joints || name == "num_feet") && (count < 0 || static_cast<size_t>(count) != robots)) {
+        throw LogError(fmt::format("{}: RUN_INFO: channel {}: {} is {}; the log's robot has {}",
+                                   path, channel.name(), name, count, robots));
+      }
+    }
   }
 }
 
@@ -85,7 +124,11 @@ run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec
     throw LogError(fmt::format(
         "{}: does not begin with RUN_INFO; is it the log of a Poise run, and whole?", path));
   }
-  ParseTextProto(info.run_spec, path + ": RUN_INFO.run_spec", spec);
+  try {
+    ParseTextProto(info.run_spec, path + ": RUN_INFO.run_spec", spec);
+  } catch (const ConfigError& error) {
+    throw LogError(error.what());
+  }
   return info;
 }
 
@@ -94,6 +137,7 @@ RunRecord ReadRun(const std::string& path) {
   RunRecord run;
   run.info = ReadRunInfo(&reader, path, &run.spec);
   run.robot = robot::LoadRobotTexts(run.info.robot, run.info.urdf);
+  CheckSpec(run, path);
 
   Adders adders = MakeAdders(&run);
   std::vector<Lane> lanes;
@@ -101,10 +145,6 @@ RunRecord ReadRun(const std::string& path) {
   for (const Channel& channel : run.spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    if (type == nullptr || type->has_strings || counts.size() != type->count_names.size()) {
-      throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts", path,
-                                 channel.name(), channel.type()));
-    }
     if (channel.external()) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
@@ -123,7 +163,7 @@ RunRecord ReadRun(const std::string& path) {
     if (lane != lane_of.end()) {
       AddMessage(event, max_ticks, &lanes[lane->second], &run.channels[lane->second]);
     } else if (event.channel.starts_with("HEALTH_")) {
-      AddHealth(event.data, &run);
+      AddHealth(event, &run);
     }
   }
   run.damages = reader.damages();

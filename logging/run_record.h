@@ -52,7 +52,7 @@ struct ChannelCompleteness {
   int64_t missing = 0;       ///< ticks without a message, up to the run's last tick
   int64_t duplicate = 0;     ///< messages of a tick that was there already
   int64_t out_of_order = 0;  ///< messages of an earlier tick than the one before
-  int64_t refused = 0;       ///< wrong size, fingerprint, counts, run or tick
+  int64_t refused = 0;       ///< wrong size, fingerprint, counts, run or tick, or not finite
 };
 
 /// All of one run. Of several channels with one type the graph's first is taken.
@@ -76,13 +76,15 @@ struct RunRecord {
 
   std::vector<ChannelCompleteness> channels;  ///< not the external ones
   int64_t damages = 0;                        ///< places where the file held no record
+  int64_t refused_health = 0;  ///< unreadable, of another run, or under another component's name
   /// Simulated time over wall time; not in the log, set by who ran it.
   std::optional<double> real_time_factor;
 
   double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
 };
 
-/// Throws LogError: no file, no RUN_INFO, a RUN_INFO that does not parse; RobotError for its robot.
+/// Throws LogError: no file, no RUN_INFO, a RUN_INFO that does not parse, whose tick period or
+/// number of ticks is none, or whose channels do not fit its robot; RobotError for its robot.
 RunRecord ReadRun(const std::string& path);
 
 /// RUN_INFO and the spec it holds, the log's first event. Throws LogError.

@@ -128,6 +128,13 @@ Finding CheckTool(const char* tool, const char* use, const char* package) {
           fmt::format("apt-get install {}", package)};
 }
 
+Finding CheckFile(const char* file, const char* use, const char* package) {
+  const std::string name = std::filesystem::path(file).filename().string();
+  if (access(file, R_OK) == 0) return {Level::kGood, name, file, ""};
+  return {Level::kNote, name, fmt::format("not found ({})", use),
+          fmt::format("apt-get install {}", package)};
+}
+
 Finding CheckDisk() {
   std::error_code error;
   const auto space = std::filesystem::space(RunsDir().parent_path(), error);
@@ -149,7 +156,9 @@ int Doctor() {
   findings.push_back(CheckBuffers());
   findings.push_back(CheckDisk());
   findings.push_back(CheckTool("lcm-logger", "to log elsewhere", "liblcm-bin"));
-  findings.push_back(CheckTool("java", "for deploy/spy", "default-jre"));
+  findings.push_back(CheckTool("java", "for deploy/spy, which installs it", "default-jre"));
+  findings.push_back(CheckFile("/usr/share/java/jchart2d.jar", "for deploy/spy, which installs it",
+                               "libjchart2d-java"));
   findings.push_back(CheckScheduler());
   findings.push_back(CheckMemoryLock());
   findings.push_back(CheckKernel());

@@ -205,7 +205,7 @@ void Launcher::StopProcesses() {
   while (running()) {
     const int64_t now = NowNanoseconds();
     const bool hurry = StopSignalCount() > signals + 1;
-    if (hurry || now > start + 2 * kStopPatience) break;  // their destructors kill
+    if (hurry || now > start + 2 * kStopPatience) break;
     if (now > start + kStopPatience && !terminated) {
       for (const auto& process : processes_) process->Signal(SIGTERM);
       terminated = true;
@@ -213,13 +213,25 @@ void Launcher::StopProcesses() {
     control_.SendStop();
     control_.Spin(kSpin / 2);
   }
-  for (const auto& process : processes_) {
-    if (process->ended() && !process->succeeded() && outcome_.message.empty()) {
+  if (outcome_.completed) {
+    for (const auto& process : processes_) {
+      if (process->ended() && process->succeeded()) continue;
       outcome_.completed = false;
-      FailProcess(*process);
+      const std::string reason = outcome_.message;
+      outcome_.message.clear();
+      if (process->ended()) {
+        FailProcess(*process);
+      } else {
+        Fail(fmt::format("{} did not stop after the end and was killed; its output: {}",
+                         process->name(), process->log_path()),
+             LastLines(process->log_path(), kDetailLines));
+      }
+      if (!reason.empty()) outcome_.details.push_back("before that: " + reason);
+      break;
     }
   }
-  processes_.clear();
+  outcome_.refused = control_.refused();
+  processes_.clear();  // kills what has not ended
 }
 
 }  // namespace poise

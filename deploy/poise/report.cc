@@ -69,7 +69,9 @@ std::string ValueOf(const Scenario& scenario, const std::string& field) {
 }  // namespace
 
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run) {
-  return std::llround(std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9));
+  const double tick = std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9);
+  const auto last = static_cast<double>(run.num_ticks);
+  return tick > 0 ? static_cast<int64_t>(std::min(tick, last)) : 0;
 }
 
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
@@ -83,14 +85,29 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   defects.at_most = 0;
   results.push_back(defects);
   Evaluate(*logging::FindMetric("log_defects"), run, &results.back());
-  for (const Check& check : scenario.check()) {
+  // Whatever a scenario checks: each component did its work in every tick.
+  for (const char* name : {"task_not_ok_ticks", "balance_not_ok_ticks", "command_not_ok_ticks"}) {
+    CheckResult not_ok;
+    not_ok.at_most = 0;
+    Evaluate(*logging::FindMetric(name), run, &not_ok);
+    if (not_ok.measured) results.push_back(not_ok);  // else the graph has no such component
+  }
+  for (int i = 0; i < scenario.check_size(); ++i) {
+    const Check& check = scenario.check(i);
+    const logging::Metric* metric = logging::FindMetric(check.metric());
+    if (metric == nullptr) {
+      throw ConfigError(fmt::format("check[{}].metric", i),
+                        fmt::format("this version has no metric named '{}'; see `poise list "
+                                    "metrics`",
+                                    check.metric()));
+    }
     CheckResult result;
     result.label = check.label();
     if (check.has_at_most()) result.at_most = check.at_most();
     if (check.has_at_least()) result.at_least = check.at_least();
     result.paper = check.paper();
     if (check.has_paper_value()) result.paper_value = check.paper_value();
-    Evaluate(*logging::FindMetric(check.metric()), run, &result);
+    Evaluate(*metric, run, &result);
     results.push_back(std::move(result));
   }
   return results;
@@ -167,6 +184,8 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
   json["passed"] = passed;
   json["end"] = outcome.message.empty() ? "planned end" : outcome.message;
   json["interrupted"] = outcome.interrupted;
+  json["launcher"]["refused"] = outcome.refused;
+  json["refused_health"] = run.refused_health;
   json["log"] = "run.lcm";
   json["components"] = Json::array();
   for (const auto& [name, health] : run.health) {
@@ -215,7 +234,8 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
                                    {"kind", assumption.kind()},
                                    {"reason", assumption.reason()}});
   }
-  return json.dump(2) + "\n";
+  // Names and texts of a log may hold any bytes.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace poise

@@ -1,6 +1,8 @@
 #include <google/protobuf/text_format.h>
 
 #include <cstdio>
+#include <cstdlib>
+#include <functional>
 #include <memory>
 
 #include "components/framework/run.h"
@@ -94,25 +96,45 @@ int Run(const RunOptions& options) {
 
 }  // namespace
 
+namespace {
+
+/// "--flag: VALUE: must be RANGE" for what is no number or not `good`; NaN never is.
+std::function<std::string(const std::string&)> Within(const char* range, bool (*good)(double)) {
+  return [=](const std::string& text) -> std::string {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const bool number = !text.empty() && *end == '\0';
+    return number && good(value) ? "" : fmt::format("{}: must be {}", text, range);
+  };
+}
+
+}  // namespace
+
 void AddRunCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<RunOptions>();
   CLI::App* run = app->add_subcommand("run", "run a scenario and check it");
   run->add_option("scenario", options->scenario, "name (poise list scenarios) or .pbtxt file")
       ->capture_default_str();
   run->add_option("--out", options->out, "folder of the run; default: a dated one under runs/");
-  run->add_flag("--inline", options->in_process,
-                "the same graph inside one process, without the network");
+  CLI::Option* in_process = run->add_flag("--inline", options->in_process,
+                                          "the same graph inside one process, without the network");
   run->add_flag("--realtime", options->changes.realtime, "pace the ticks with the wall clock");
   run->add_option("--set", options->changes.set,
                   "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120")
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)
       ->take_all();
-  run->add_option("--duration", options->changes.duration, "simulated time, s");
-  run->add_option("--seed", options->changes.seed, "of all noise");
+  run->add_option("--duration", options->changes.duration, "simulated time, s")
+      ->check(Within("in (0, 36000]", [](double s) { return s > 0 && s <= 36000; }));
+  run->add_option("--seed", options->changes.seed, "of all noise")
+      ->check([](const std::string& text) -> std::string {
+        const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+        return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
+      });
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
+      ->excludes(in_process);
   run->add_flag("--quiet", options->quiet, "only errors and the verdict");
   run->callback([options, command] { *command = [options] { return Run(*options); }; });
 }

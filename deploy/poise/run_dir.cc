@@ -1,6 +1,11 @@
 #include "deploy/poise/run_dir.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 
@@ -17,6 +22,18 @@ namespace fs = std::filesystem;
 constexpr const char* kFiles[] = {"run.lcm", "summary.json", "recorder.json", "run_spec.pbtxt",
                                   "scenario.pbtxt"};
 
+/// Keeps other runs out of `dir` until this program ends; its children do not inherit the lock.
+void Lock(const fs::path& dir) {
+  const int fd = open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0 || flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    throw ConfigError(fmt::format(
+        "{}: {}", dir.string(),
+        errno == EWOULDBLOCK
+            ? "a run is going on in this folder; choose another with --out, or wait for its end"
+            : fmt::format("cannot be locked: {}", std::strerror(errno))));
+  }
+}
+
 }  // namespace
 
 fs::path RunsDir() { return DeployDir().parent_path() / "runs"; }
@@ -30,6 +47,7 @@ fs::path MakeRunDir(const std::string& out, const std::string& scenario) {
       throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
                                     error ? error.message() : "there is a file of that name"));
     }
+    Lock(dir);
     for (const char* file : kFiles) fs::remove(dir / file, error);
     return dir;
   }
@@ -39,6 +57,7 @@ fs::path MakeRunDir(const std::string& out, const std::string& scenario) {
   for (int i = 1; i < 1000 && !error; ++i) {
     const fs::path dir = RunsDir() / (i == 1 ? name : fmt::format("{}-{}", name, i));
     if (!fs::create_directory(dir, error)) continue;
+    Lock(dir);
     fs::remove(RunsDir() / "latest", error);
     fs::create_directory_symlink(dir.filename(), RunsDir() / "latest", error);
     return dir;
