@@ -81,16 +81,17 @@ void CheckTransition(const TaskControllerConfig& config, int index, const std::s
                                            "{}",
                                            Name(foot), Support_Name(single)));
     }
-    const double end = phase.start() + transition.delay() + transition.duration();
-    if (end > config.phase(index + 1).start() + kTimeTolerance) {
-      throw ConfigError(field + ".duration",
-                        fmt::format("ends at {} s, after the next phase's start at {} s; shorten "
-                                    "it or its delay",
-                                    end, config.phase(index + 1).start()));
-    }
   } else if (index == 0 || config.phase(index - 1).support() != single) {
     throw ConfigError(field, fmt::format("loads the {} foot; the phase before must have support {}",
                                          Name(foot), Support_Name(single)));
+  }
+  // A ramp that a phase cuts short would make a step of the load.
+  const double end = phase.start() + transition.delay() + transition.duration();
+  if (index + 1 < config.phase_size() && end > config.phase(index + 1).start() + kTimeTolerance) {
+    throw ConfigError(field + ".duration",
+                      fmt::format("ends at {} s, after the next phase's start at {} s; shorten "
+                                  "it or its delay",
+                                  end, config.phase(index + 1).start()));
   }
 }
 

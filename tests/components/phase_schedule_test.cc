@@ -179,6 +179,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{GAINS "phase { start: 0 support: LEFT } phase { start: 1 transition { kind: LOAD "
                       "foot: LEFT_FOOT } }",
                 "phase[1].transition"},
+        Refused{GAINS "phase { start: 0 support: RIGHT } phase { start: 1 transition { kind: LOAD "
+                      "foot: LEFT_FOOT delay: 0.3 duration: 0.8 } } phase { start: 2 }",
+                "phase[1].transition.duration"},
         Refused{GAINS "phase { start: 0 transition { kind: LOAD foot: LEFT_FOOT delay: -1 } }",
                 "phase[0].transition.delay"}));
 
