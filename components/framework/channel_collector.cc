@@ -3,14 +3,11 @@
 #include <poll.h>
 
 #include <algorithm>
-#include <cstring>
-#include <map>
 
 #include "components/framework/clock.h"
+#include "components/framework/collected_channel.h"
 #include "components/framework/run.h"
 #include "components/framework/service_link.h"
-#include "fmt/format.h"
-#include "poise/message_traits.hpp"
 
 namespace poise {
 namespace {
@@ -21,27 +18,19 @@ constexpr int64_t kFirstRequest = 2 * kMillisecond;
 constexpr int64_t kLastRequest = 50 * kMillisecond;
 constexpr int kBatch = 64;  // packets of a channel handled before the next channel's turn
 
-/// One channel: packets by tick until their turn comes.
 struct Lane {
-  Lane(const RunSpec& spec, int index, const MessageType& type, const std::vector<int32_t>& counts)
+  Lane(const RunSpec& spec, int index)
       : channel(index),
         name(spec.graph().channel(index).name()),
         external(spec.graph().channel(index).external()),
-        size(static_cast<size_t>(type.encoded_size(counts))),
-        filter(type.fingerprint, static_cast<int>(size), counts, spec.run_id()),
-        receiver(ChannelUrl(spec, index)),
-        bytes(external ? 0 : size * kSentHistory),
-        ticks(external ? 0 : kSentHistory, -1) {}
+        packets(spec.graph().channel(index), spec.run_id()),
+        receiver(ChannelUrl(spec, index)) {}
 
   int channel;
   std::string name;
   bool external;
-  size_t size;
-  PacketFilter filter;
+  CollectedChannel packets;
   BusReceiver receiver;
-  std::vector<uint8_t> bytes;
-  std::vector<int64_t> ticks;
-  PacketCounters counters;
   int64_t foreign = 0;
   ChannelCollector::ChannelStatistics statistics;
   int64_t waiting_since = 0;  // ns; of next_tick
@@ -70,12 +59,10 @@ class ChannelCollector::Impl {
   void Request(int64_t now);
   void PublishHealth(int64_t now);
 
-  int64_t run_id_;
   Callbacks callbacks_;
   ServiceLink service_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   std::vector<pollfd> poll_fds_;
-  std::map<std::string, std::string, std::less<>> component_of_channel_;
   int64_t newest_tick_ = -1;  // seen on any channel
   int64_t final_tick_ = -1;
   int64_t reported_ = -1;
@@ -85,26 +72,11 @@ class ChannelCollector::Impl {
 };
 
 ChannelCollector::Impl::Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks)
-    : run_id_(spec.run_id()), callbacks_(std::move(callbacks)), service_(spec, name) {
+    : callbacks_(std::move(callbacks)), service_(spec, name) {
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (int i = 0; i < spec.graph().channel_size(); ++i) {
-    const Channel& channel = spec.graph().channel(i);
-    const MessageType* type = FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    if (type == nullptr || type->has_strings) {
-      throw ConfigError(fmt::format("channel {}: '{}' is no message type of a channel",
-                                    channel.name(), channel.type()));
-    }
-    if (counts.size() != type->count_names.size()) {
-      throw ConfigError(fmt::format(
-          "channel {}: the run gives {} counts, {} has {}; fill them in from the checked graph",
-          channel.name(), counts.size(), channel.type(), type->count_names.size()));
-    }
-    lanes_.push_back(std::make_unique<Lane>(spec, i, *type, counts));
+    lanes_.push_back(std::make_unique<Lane>(spec, i));
     poll_fds_.push_back({lanes_.back()->receiver.fd(), POLLIN, 0});
-  }
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    component_of_channel_[HealthChannel(instance.name())] = instance.name();
   }
   service_.health().state = health_t::STATE_READY;
 }
@@ -149,55 +121,29 @@ void ChannelCollector::Impl::Receive(Lane& lane, int64_t now) {
     }
     if (!lane.external) Deliver(lane, now);
   }
-  lane.statistics.refused = lane.counters.refused() + lane.foreign + lane.receiver.malformed();
+  lane.statistics.duplicates = lane.packets.duplicates();
+  lane.statistics.refused =
+      lane.packets.counters().refused() + lane.foreign + lane.receiver.malformed();
 }
 
 void ChannelCollector::Impl::Keep(Lane& lane, const BusReceiver::Packet& packet) {
-  if (lane.external) {
-    const PacketVerdict verdict = lane.filter.Check(packet.data, packet.size, INT64_MIN, INT64_MAX);
-    lane.counters.Count(verdict);
-    if (verdict != PacketVerdict::kAccepted) return;
-    ++lane.statistics.delivered;
-    callbacks_.message(lane.channel, lane.filter.tick(packet.data), {packet.data, packet.size});
-    return;
-  }
-  const int64_t next = lane.statistics.next_tick;
-  PacketVerdict verdict =
-      lane.filter.Check(packet.data, packet.size, std::max<int64_t>(0, next - kReceiveWindow),
-                        next + kReceiveWindow - 1);
-  if (verdict == PacketVerdict::kAccepted) {
-    const int64_t tick = lane.filter.tick(packet.data);
-    const auto slot = static_cast<size_t>(tick % kSentHistory);
-    uint8_t* const kept = lane.bytes.data() + slot * lane.size;
-    if (lane.ticks[slot] == tick) {
-      if (std::memcmp(kept, packet.data, lane.size) == 0) {
-        ++lane.statistics.duplicates;
-      } else {
-        verdict = PacketVerdict::kConflicting;
-      }
-    } else if (tick < next) {
-      verdict = PacketVerdict::kStaleTick;
-    } else {
-      std::memcpy(kept, packet.data, lane.size);
-      lane.ticks[slot] = tick;
-      newest_tick_ = std::max(newest_tick_, tick);
-    }
-  }
-  lane.counters.Count(verdict);
+  const PacketVerdict verdict = lane.packets.Offer(packet.data, packet.size);
+  newest_tick_ = std::max(newest_tick_, lane.packets.newest_tick());
+  if (!lane.external || verdict != PacketVerdict::kAccepted) return;
+  ++lane.statistics.delivered;
+  callbacks_.message(lane.channel, lane.packets.tick(packet.data), {packet.data, packet.size});
 }
 
 void ChannelCollector::Impl::Deliver(Lane& lane, int64_t now) {
-  while (true) {
-    const int64_t next = lane.statistics.next_tick;
-    const auto slot = static_cast<size_t>(next % kSentHistory);
-    if (lane.ticks[slot] != next) return;
-    callbacks_.message(lane.channel, next, {lane.bytes.data() + slot * lane.size, lane.size});
+  while (const uint8_t* data = lane.packets.Next()) {
+    callbacks_.message(lane.channel, lane.packets.next_tick(), {data, lane.packets.size()});
+    lane.packets.Advance();
     ++lane.statistics.delivered;
-    ++lane.statistics.next_tick;
     lane.waiting_since = now;
     lane.wait = kFirstRequest;
     lane.asked = false;
   }
+  lane.statistics.next_tick = lane.packets.next_tick();
 }
 
 void ChannelCollector::Impl::Request(int64_t now) {
@@ -222,17 +168,15 @@ void ChannelCollector::Impl::ReceiveService() {
     bool good = false;
     if (packet.channel == kControlChannel) {
       run_control_t control;
-      good = service_.DecodeControl(packet, &control);
+      good = service_.filter().DecodeControl(packet, &control);
       if (good && control.command == run_control_t::COMMAND_START) started_ = true;
       if (good && control.command == run_control_t::COMMAND_STOP) stopped_ = true;
-    } else if (packet.channel.starts_with("HEALTH_")) {
+    } else {
       health_t health;
-      good = DecodeChecked(packet.data, static_cast<int64_t>(packet.size), &health) &&
-             health.run_id == run_id_;
-      const auto component = component_of_channel_.find(packet.channel);
-      if (good && component != component_of_channel_.end() &&
-          component->second == health.component && health.state >= health_t::STATE_FINISHED &&
-          health.tick >= 0) {
+      good = service_.filter().DecodeHealth(packet, &health);
+      // Its own reports only repeat what it knows.
+      if (good && health.component != service_.health().component &&
+          health.state >= health_t::STATE_FINISHED && health.tick >= 0) {
         final_tick_ = final_tick_ < 0 ? health.tick : std::min(final_tick_, health.tick);
       }
     }

@@ -6,15 +6,17 @@
 
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
+#include "components/framework/service_filter.h"
 #include "components/framework/udp_bus.h"
-#include "poise/message_traits.hpp"
 
 namespace poise {
 
 struct ControlClient::Links {
-  explicit Links(const RunSpec& spec) : sender(ServiceUrl(spec)), receiver(ServiceUrl(spec)) {}
+  Links(const RunSpec& spec, const std::vector<std::string>& others)
+      : sender(ServiceUrl(spec)), receiver(ServiceUrl(spec)), filter(spec, others) {}
   BusSender sender;
   BusReceiver receiver;
+  ServiceFilter filter;
 
   bool Send(int64_t run_id, int8_t command) {
     run_control_t control{};
@@ -28,14 +30,9 @@ struct ControlClient::Links {
 };
 
 ControlClient::ControlClient(const RunSpec& spec, const std::vector<std::string>& others)
-    : run_id_(spec.run_id()), links_(std::make_unique<Links>(spec)) {
-  std::vector<std::string> names = others;
-  for (const ComponentInstance& instance : spec.graph().component())
-    names.push_back(instance.name());
-  for (const std::string& name : names) {
-    statuses_[name];
-    name_of_channel_[HealthChannel(name)] = name;
-  }
+    : run_id_(spec.run_id()), links_(std::make_unique<Links>(spec, others)) {
+  for (const std::string& name : others) statuses_[name];
+  for (const ComponentInstance& instance : spec.graph().component()) statuses_[instance.name()];
 }
 
 ControlClient::~ControlClient() = default;
@@ -48,19 +45,24 @@ void ControlClient::Spin(int timeout_ms) {
   if (poll(&fd, 1, timeout_ms) <= 0) return;
   BusReceiver::Packet packet;
   while (links_->receiver.Receive(&packet)) {
-    const auto channel = name_of_channel_.find(packet.channel);
-    if (channel == name_of_channel_.end()) continue;
-    health_t health;
-    if (!DecodeChecked(packet.data, static_cast<int64_t>(packet.size), &health) ||
-        health.run_id != run_id_ || health.component != channel->second) {
-      ++refused_;
+    if (packet.channel == kControlChannel) {
+      run_control_t control;
+      links_->filter.DecodeControl(packet, &control);  // only counts what is wrong
       continue;
     }
-    Status& status = statuses_[channel->second];
+    health_t health;
+    if (!links_->filter.DecodeHealth(packet, &health)) continue;
+    const auto watched = statuses_.find(health.component);
+    if (watched == statuses_.end()) continue;
+    Status& status = watched->second;
     status.seen = true;
     status.last_seen = NowNanoseconds();
     status.health = std::move(health);
   }
+}
+
+int64_t ControlClient::refused() const {
+  return links_->filter.refused() + links_->receiver.malformed();
 }
 
 bool ControlClient::AllReached(int8_t state) const {

@@ -38,14 +38,12 @@ class ControlClient {
   /// True when every watched process has been seen in a state >= `state` (health_t::STATE_*).
   bool AllReached(int8_t state) const;
   /// Packets refused on the service port.
-  int64_t refused() const { return refused_; }
+  int64_t refused() const;
 
  private:
   struct Links;
   int64_t run_id_;
-  int64_t refused_ = 0;
   std::map<std::string, Status> statuses_;
-  std::map<std::string, std::string, std::less<>> name_of_channel_;
   std::unique_ptr<Links> links_;
 };
 

@@ -52,6 +52,7 @@ PacketVerdict Inbox::Keep(const uint8_t* data, size_t size) {
 
 void Inbox::Want(int64_t tick) {
   want_ = tick;
+  asked_ = false;
   const auto slot = static_cast<size_t>(tick % kReceiveWindow);
   ready_ = ticks_[slot] == tick &&
            port_->Decode(bytes_.data() + slot * size_, static_cast<int>(size_), message_.get());

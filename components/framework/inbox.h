@@ -26,10 +26,16 @@ class Inbox {
   /// Shows the wanted (or latest) message to the component, or nothing.
   void Show(bool absent);
   void Hide() { port_->Bind(nullptr); }
+  /// The wanted message had to be asked for: counts once for each that is wanted.
+  void CountGap() {
+    gaps_ += asked_ ? 0 : 1;
+    asked_ = true;
+  }
 
   const InputPort& port() const { return *port_; }
   const PacketCounters& counters() const { return counters_; }
   int64_t duplicates() const { return duplicates_; }
+  int64_t gaps() const { return gaps_; }
 
  private:
   PacketVerdict Keep(const uint8_t* data, size_t size);
@@ -43,8 +49,10 @@ class Inbox {
   std::vector<int64_t> ticks_;  // -1: empty
   int64_t want_ = 0;
   bool ready_ = false;
+  bool asked_ = false;
   PacketCounters counters_;
   int64_t duplicates_ = 0;
+  int64_t gaps_ = 0;
 };
 
 }  // namespace poise

@@ -135,11 +135,9 @@ class ProcessRunner::Impl {
   int64_t arrival_ = 0;  // ns, of the last packets
   bool polled_ = false;  // in this tick
   int64_t next_health_ = 0;
-  int64_t last_asked_tick_ = -1;
   int send_failures_ = 0;
   bool started_ = false;
   bool stopped_ = false;
-  int64_t gaps_ = 0;
   int64_t resends_ = 0;
   int64_t dropped_ = 0;
   int64_t publish_errors_ = 0;
@@ -315,11 +313,10 @@ void ProcessRunner::Impl::Ask(const BoundStage& stage) {
   for (const BoundStage::BoundInput& input : stage.inputs) {
     const InputKind kind = input.inbox->port().kind();
     if (input.inbox->ready() || (tick_ == 0 && kind == InputKind::kPreviousTick)) continue;
-    if (last_asked_tick_ != tick_) ++gaps_;
+    input.inbox->CountGap();
     CountSend(
         service_.SendControl(run_control_t::COMMAND_RESEND, input.inbox->wanted(), input.channel));
   }
-  last_asked_tick_ = tick_;
 }
 
 bool ProcessRunner::Impl::RunStage(const BoundStage& bound, const Tick& tick) {
@@ -390,8 +387,11 @@ void ProcessRunner::Impl::ReceiveService(int batch) {
   BusReceiver::Packet packet;
   run_control_t control;
   while (batch-- > 0 && service_.receiver().Receive(&packet)) {
-    if (packet.channel == kControlChannel && service_.DecodeControl(packet, &control))
+    if (packet.channel != kControlChannel) {
+      service_.filter().CheckHealth(packet);  // of no use here, but what is wrong is counted
+    } else if (service_.filter().DecodeControl(packet, &control)) {
       OnControl(control);
+    }
   }
 }
 
@@ -425,17 +425,17 @@ void ProcessRunner::Impl::PublishHealth(int64_t now) {
   const bool running = health.state == health_t::STATE_RUNNING;
   next_health_ = now + (running ? kHealthInterval : kAnnounceInterval);
   health.ticks_completed = tick_;
-  health.messages_received = health.messages_duplicate = 0;
+  health.messages_received = health.messages_duplicate = health.gaps = 0;
   health.messages_refused = service_.refused();
   for (const auto& inbox : inboxes_) {
     health.messages_received += inbox->counters().accepted();
     health.messages_refused += inbox->counters().refused();
     health.messages_duplicate += inbox->duplicates();
+    health.gaps += inbox->gaps();
   }
   for (const auto& link : links_)
     health.messages_refused += link->foreign + link->receiver.malformed();
   health.messages_dropped = dropped_;
-  health.gaps = gaps_;
   health.resends = resends_;
   health.publish_errors = publish_errors_;
   health.latency_median = latency_.median();

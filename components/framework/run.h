@@ -31,6 +31,8 @@ std::string MirrorUrl(const RunSpec& spec);
 std::string ChannelUrl(const RunSpec& spec, int i);
 
 inline constexpr char kControlChannel[] = "CONTROL";
+/// The recorder's place on the service port; no component may have it.
+inline constexpr char kRecorderName[] = "recorder";
 /// "HEALTH_" + NAME in capitals.
 std::string HealthChannel(std::string_view component);
 

@@ -8,20 +8,11 @@ ServiceLink::ServiceLink(const RunSpec& spec, const std::string& component)
     : run_id_(spec.run_id()),
       sender_(ServiceUrl(spec)),
       receiver_(ServiceUrl(spec)),
-      control_filter_(run_control_t::getHash(), control_.getEncodedSize(), {}, run_id_),
+      filter_(spec, {component}),
       health_channel_(HealthChannel(component)),
       control_bytes_(static_cast<size_t>(control_.getEncodedSize())) {
   health_.component = component;
   SetDetail("");
-}
-
-bool ServiceLink::DecodeControl(const BusReceiver::Packet& packet, run_control_t* control) {
-  const bool good = control_filter_.Check(packet.data, packet.size, INT64_MIN, INT64_MAX) ==
-                        PacketVerdict::kAccepted &&
-                    control->decode(packet.data, 0, static_cast<int>(packet.size)) ==
-                        static_cast<int>(packet.size);
-  if (!good) ++refused_;
-  return good;
 }
 
 bool ServiceLink::SendControl(int8_t command, int64_t tick, int32_t channel) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "components/framework/graph.pb.h"
+#include "components/framework/service_filter.h"
 #include "components/framework/udp_bus.h"
 #include "poise/health_t.hpp"
 #include "poise/run_control_t.hpp"
@@ -22,9 +23,9 @@ class ServiceLink {
 
   int fd() const { return receiver_.fd(); }
   BusReceiver& receiver() { return receiver_; }
-  /// Decodes a packet of channel CONTROL. False when it is refused.
-  bool DecodeControl(const BusReceiver::Packet& packet, run_control_t* control);
-  int64_t refused() const { return refused_ + receiver_.malformed(); }
+  /// Checks and decodes what the receiver has got, and counts what it refuses.
+  ServiceFilter& filter() { return filter_; }
+  int64_t refused() const { return filter_.refused() + receiver_.malformed(); }
 
   bool SendControl(int8_t command, int64_t tick, int32_t channel);
   /// Health as it is sent; state, counters and latencies are the caller's to fill in.
@@ -36,13 +37,12 @@ class ServiceLink {
   int64_t run_id_;
   BusSender sender_;
   BusReceiver receiver_;
-  PacketFilter control_filter_;
+  ServiceFilter filter_;
   std::string health_channel_;
   health_t health_{};
   run_control_t control_{};
   std::vector<uint8_t> control_bytes_;
   std::vector<uint8_t> health_bytes_;
-  int64_t refused_ = 0;
 };
 
 }  // namespace poise

@@ -6,9 +6,11 @@
 #include <map>
 #include <random>
 
+#include "components/framework/collected_channel.h"
 #include "components/framework/component.h"
 #include "components/framework/inbox.h"
 #include "components/framework/run.h"
+#include "components/framework/service_filter.h"
 #include "components/framework/udp_bus.h"
 
 namespace poise {
@@ -98,6 +100,7 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
   const int64_t packets_a_type = NumPackets() / static_cast<int64_t>(MessageTypes().size()) + 1;
   int64_t total = 0;
   int64_t total_refused = 0;
+  int64_t total_collected = 0;
   ForEachMessageType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     T message{};
@@ -119,6 +122,11 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
       Wiring wiring;
       wiring.AddInput(&input, "in", SomeCounts<T>());
       Inbox inbox(&input, kRun);
+      Channel channel;
+      channel.set_name("C");
+      channel.set_type(MessageTraits<T>::kName);
+      for (const int32_t count : SomeCounts<T>()) channel.add_count(count);
+      CollectedChannel collected(channel, kRun);
       for (int64_t i = 0; i < packets_a_type; ++i) {
         // Eight packets compete for each tick.
         message.tick = i / 8;
@@ -135,6 +143,21 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
           ASSERT_EQ(bytes.size(), right.size());
           ASSERT_EQ(std::memcmp(bytes.data(), right.data(), MessageTraits<T>::kRunIdOffset + 8), 0);
         }
+        const PacketVerdict verdict = collected.Offer(bytes.data(), bytes.size());
+        if (verdict == PacketVerdict::kAccepted) {
+          ASSERT_EQ(bytes.size(), right.size());
+        }
+        if (i % 8 == 7) {
+          if (const uint8_t* kept = collected.Next()) {
+            T delivered{};
+            ASSERT_TRUE(DecodeChecked(kept, static_cast<int64_t>(collected.size()), &delivered));
+            ASSERT_TRUE(MessageTraits<T>::AllFinite(delivered));
+            ASSERT_EQ(delivered.tick, message.tick);
+            ASSERT_EQ(delivered.run_id, kRun);
+            ++total_collected;
+          }
+          collected.Advance();
+        }
         if (!inbox.ready()) continue;
         inbox.Show(false);
         ASSERT_TRUE(MessageTraits<T>::AllFinite(*input));
@@ -142,6 +165,8 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
         ASSERT_EQ(input->run_id, kRun);
       }
       EXPECT_GT(inbox.counters().accepted(), 0);
+      EXPECT_GT(total_collected, 0);
+      EXPECT_EQ(collected.counters().accepted() + collected.counters().refused(), packets_a_type);
       total_refused += inbox.counters().refused();
     }
   });
@@ -149,6 +174,45 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
   EXPECT_GT(total_refused, NumPackets() / 4);
   std::printf("%lld packets, %lld refused by a port\n", static_cast<long long>(2 * total),
               static_cast<long long>(total_refused));
+}
+
+TEST(PacketFuzz, TheServicePortActsOnlyOnItsOwnRunAndCountsTheRest) {
+  Random random(11);
+  RunSpec spec;
+  spec.set_run_id(kRun);
+  spec.mutable_graph()->add_component()->set_name("plant");
+  ServiceFilter filter(spec);
+  run_control_t control{};
+  control.run_id = kRun;
+  control.command = run_control_t::COMMAND_RESEND;
+  health_t health{};
+  health.run_id = kRun;
+  health.component = "plant";
+  health.detail = "fell at 1.2 s";
+  const Bytes right_control = Encode(control);
+  const Bytes right_health = Encode(health);
+  int64_t accepted = 0;
+  const int64_t rounds = NumPackets() / 4;
+  for (int64_t i = 0; i < rounds; ++i) {
+    const Bytes a = Hostile(right_control, random);
+    run_control_t got{};
+    if (filter.DecodeControl({"CONTROL", a.data(), a.size()}, &got)) {
+      ++accepted;
+      ASSERT_EQ(got.run_id, kRun);
+      ASSERT_EQ(Encode(got), a);
+    }
+    const Bytes b = Hostile(right_health, random);
+    const BusReceiver::Packet packet{"HEALTH_PLANT", b.data(), b.size()};
+    accepted += filter.CheckHealth(packet);
+    health_t seen{};
+    if (filter.DecodeHealth(packet, &seen)) {
+      ++accepted;
+      ASSERT_EQ(seen.run_id, kRun);
+      ASSERT_EQ(seen.component, "plant");
+    }
+  }
+  EXPECT_GT(accepted, 0);
+  EXPECT_EQ(filter.refused(), 3 * rounds - accepted);  // each is counted once
 }
 
 TEST(PacketFuzz, DatagramsOfAnyKindAreReadWithinTheirBounds) {

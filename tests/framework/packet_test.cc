@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "components/framework/collected_channel.h"
 #include "components/framework/component.h"
 #include "components/framework/inbox.h"
 #include "components/framework/run.h"
@@ -119,6 +120,33 @@ TEST_F(InboxTest, AnEarlyMessageDoesNotShowBeforeItsTick) {
   inbox_->Show(false);
   Offer(Packet(1, 6));
   EXPECT_EQ(input_->joint_position[0], 5);
+}
+
+TEST_F(InboxTest, CountsAGapOncePerWantedMessage) {
+  inbox_->Want(0);
+  inbox_->CountGap();
+  inbox_->CountGap();
+  EXPECT_EQ(inbox_->gaps(), 1);
+  inbox_->Want(1);
+  inbox_->CountGap();
+  EXPECT_EQ(inbox_->gaps(), 2);
+}
+
+TEST(CollectedChannelTest, AMessageThatIsNotFiniteDoesNotTakeThePlaceOfTheRightOne) {
+  Channel channel;
+  channel.set_name("SENSORS");
+  channel.set_type("robot_sensors_t");
+  channel.add_count(3);
+  channel.add_count(2);
+  CollectedChannel collected(channel, kRun);
+  const std::vector<uint8_t> bad = Packet(0, NAN);
+  const std::vector<uint8_t> good = Packet(0, 5);
+  EXPECT_EQ(collected.Offer(bad.data(), bad.size()), PacketVerdict::kNotFinite);
+  EXPECT_EQ(collected.Next(), nullptr);
+  EXPECT_EQ(collected.Offer(good.data(), good.size()), PacketVerdict::kAccepted);
+  ASSERT_NE(collected.Next(), nullptr);
+  EXPECT_EQ(std::memcmp(collected.Next(), good.data(), good.size()), 0);
+  EXPECT_EQ(collected.counters().refused(), 1);
 }
 
 TEST_F(InboxTest, CountsDuplicatesAndRefusesASecondDifferentMessage) {
