@@ -52,6 +52,12 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
   try {
     RunSpec spec;
     ReadTextProto(run_file, &spec);
+    for (const ComponentInstance& instance : spec.graph().component()) {
+      if (instance.name() == name && TypeOf(instance) != type) {
+        throw ConfigError(fmt::format("component {} is of type {}; this program is {}", name,
+                                      TypeOf(instance), type));
+      }
+    }
     ProcessRunnerOptions options;
     options.stop = &stop_asked;
     ProcessRunner runner(spec, name, factory, options);

@@ -73,6 +73,8 @@ void CheckComponents(const Graph& graph, const ComponentRegistry& registry, Prob
                                 "digits and _, at most 48",
                                 instance.name()));
     }
+    if (instance.name() == kRecorderName)
+      fail(".name", "the name is taken by the recorder; choose another");
     if (!seen.insert(instance.name()).second) fail(".name", "named twice; names must be unique");
     if (registry.Find(TypeOf(instance)) == nullptr) {
       std::vector<std::string> types;

@@ -26,7 +26,9 @@ bool HasSameTickInput(const Stage& stage) {
                      [](const InputPort* input) { return input->kind() == InputKind::kSameTick; });
 }
 
-std::vector<Node> MakeNodes(const std::vector<const Wiring*>& wirings, const GraphPlan& plan) {
+/// What each stage reads, in this tick or, with `delayed`, in the next one too.
+std::vector<Node> MakeNodes(const std::vector<const Wiring*>& wirings, const GraphPlan& plan,
+                            bool delayed) {
   std::vector<Node> nodes;
   std::vector<size_t> writer(plan.channels.size(), 0);  // node that writes the channel
   for (size_t c = 0; c < wirings.size(); ++c) {
@@ -46,7 +48,8 @@ std::vector<Node> MakeNodes(const std::vector<const Wiring*>& wirings, const Gra
     if (nodes[n].ref.stage > 0) nodes[n].before.push_back({n - 1, -1});
     for (const InputPort* input :
          wirings[c]->stages()[static_cast<size_t>(nodes[n].ref.stage)].inputs) {
-      if (input->kind() != InputKind::kSameTick) continue;
+      if (input->kind() == InputKind::kLatest) continue;
+      if (input->kind() == InputKind::kPreviousTick && !delayed) continue;
       const int channel = plan.input_channel[c][IndexOf(wirings[c]->inputs(), input)];
       nodes[n].before.push_back({writer[static_cast<size_t>(channel)], channel});
     }
@@ -81,6 +84,32 @@ std::string DescribeLoop(const Graph& graph, const GraphPlan& plan, const std::v
   return text;
 }
 
+/// Takes away the tick sources, then all that waits for nothing: what is left holds a loop.
+void CheckDelayedLoops(const Graph& graph, const std::vector<const Wiring*>& wirings,
+                       const GraphPlan& plan, std::vector<GraphError::Problem>* problems) {
+  const std::vector<Node> nodes = MakeNodes(wirings, plan, true);
+  std::vector<bool> done;
+  for (const Node& node : nodes) {
+    done.push_back(std::find(plan.tick_sources.begin(), plan.tick_sources.end(),
+                             node.ref.component) != plan.tick_sources.end());
+  }
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (size_t n = 0; n < nodes.size(); ++n) {
+      const auto& before = nodes[n].before;
+      if (done[n] ||
+          !std::all_of(before.begin(), before.end(), [&](const Edge& e) { return done[e.from]; }))
+        continue;
+      done[n] = changed = true;
+    }
+  }
+  if (std::find(done.begin(), done.end(), false) == done.end()) return;
+  problems->push_back(
+      {"component", fmt::format("loop that does not pass through the robot (a component that "
+                                "starts the tick): {}; remove one input of it",
+                                DescribeLoop(graph, plan, nodes, done))});
+}
+
 }  // namespace
 
 void OrderStages(const Graph& graph, const std::vector<const Wiring*>& wirings, GraphPlan* plan,
@@ -95,7 +124,7 @@ void OrderStages(const Graph& graph, const std::vector<const Wiring*>& wirings, 
          "no component starts the tick: the first stage of one must read only messages of "
          "the tick before (or none)"});
   }
-  const std::vector<Node> nodes = MakeNodes(wirings, *plan);
+  const std::vector<Node> nodes = MakeNodes(wirings, *plan, false);
   std::vector<bool> done(nodes.size(), false);
   for (size_t count = 0; count < nodes.size(); ++count) {
     size_t next = nodes.size();
@@ -116,6 +145,7 @@ void OrderStages(const Graph& graph, const std::vector<const Wiring*>& wirings, 
     done[next] = true;
     plan->order.push_back(nodes[next].ref);
   }
+  CheckDelayedLoops(graph, wirings, *plan, problems);
 }
 
 }  // namespace poise

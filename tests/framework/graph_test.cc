@@ -56,7 +56,7 @@ TEST_F(GraphTest, ARightGraphIsPlanned) {
               ElementsAre(std::pair(2, 0), std::pair(0, 0), std::pair(1, 0), std::pair(0, 1)));
   EXPECT_THAT(plan.tick_sources, ElementsAre(2));
   EXPECT_EQ(plan.channels[0].writer.component, 2);
-  EXPECT_EQ(plan.channels[0].readers.size(), 2u);
+  EXPECT_EQ(plan.channels[0].readers.size(), 3u);
   EXPECT_THAT(plan.channels[0].counts, ElementsAre(3, 2));
   EXPECT_EQ(plan.channels[5].writer.component, -1);
   FillCounts(plan, &graph_);
@@ -69,7 +69,7 @@ TEST_F(GraphTest, UnknownComponentType) {
   EXPECT_EQ(Problems(graph_),
             "graph toy_loop: component[1].type: component filter: unknown component type "
             "'toy_filtre'; types: toy_clock, "
-            "toy_controller, toy_filter, toy_plant, toy_sink");
+            "toy_controller, toy_echo, toy_filter, toy_plant, toy_sink");
 }
 
 TEST_F(GraphTest, TheTypeDefaultsToTheName) {
@@ -85,6 +85,10 @@ TEST_F(GraphTest, NamesMustBeUniqueAndWellFormed) {
   EXPECT_EQ(
       Problems(graph_),
       "graph toy_loop: component[2].name: component plant: named twice; names must be unique");
+  graph_.mutable_component(1)->set_name("recorder");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: component[1].name: component recorder: the name is taken by the "
+            "recorder; choose another");
   graph_.mutable_component(1)->set_name("Filter 2");
   EXPECT_THAT(Problems(graph_), HasSubstr("'Filter 2' is no component name"));
   graph_ = ToyLoop();
@@ -186,10 +190,11 @@ TEST_F(GraphTest, KindsOfInputsMustFitTheirChannels) {
 }
 
 TEST_F(GraphTest, ALoopInsideATickIsNamed) {
-  EXPECT_EQ(Problems(graph_, "mode: LOOP"),
-            "graph toy_loop: component: loop inside one tick: controller -COMMAND-> controller; "
-            "one input of it must read the "
-            "message of the tick before");
+  Graph chain = ToyChain();
+  chain.mutable_component(1)->mutable_input(0)->set_channel("SUM");
+  EXPECT_EQ(Problems(chain),
+            "graph toy_chain: component: loop inside one tick: sink -SUM-> sink; one input of it "
+            "must read the message of the tick before");
   // Two filters that feed each other: nobody starts the tick.
   Graph ring;
   ParseTextProto(R"(name: "ring"
@@ -205,6 +210,27 @@ TEST_F(GraphTest, ALoopInsideATickIsNamed) {
             "graph ring: component: loop inside one tick: a -A-> b -B-> a; one input of it must "
             "read the message of the tick "
             "before");
+}
+
+TEST_F(GraphTest, ADelayedLoopThatLeavesTheRobotOutIsNamed) {
+  const std::string text = R"(name: "two"
+      channel { name: "PUSH" type: "external_push_t" }
+      channel { name: "A" type: "external_push_t" }
+      channel { name: "B" type: "external_push_t" }
+      component { name: "clock" type: "toy_clock" output { port: "push" channel: "PUSH" } }
+      component { name: "a" type: "toy_echo" input { port: "push" channel: "PUSH" }
+                  input { port: "before" channel: "B" } output { port: "sum" channel: "A" } }
+      component { name: "b" type: "toy_sink" input { port: "push" channel: "A" }
+                  output { port: "sum" channel: "B" } })";
+  Graph two;
+  ParseTextProto(text, "two", &two);
+  EXPECT_EQ(Problems(two),
+            "graph two: component: loop that does not pass through the robot (a component that "
+            "starts the tick): a -A-> b -B-> a; remove one input of it");
+  two.mutable_component(1)->mutable_input(1)->set_channel("A");
+  EXPECT_THAT(Problems(two), HasSubstr("(a component that starts the tick): a -A-> a; "));
+  two.mutable_component(1)->mutable_input(1)->set_channel("PUSH");  // delayed, but no loop
+  EXPECT_EQ(Problems(two), "");
 }
 
 TEST_F(GraphTest, SeveralProblemsAtOnce) {

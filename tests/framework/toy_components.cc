@@ -111,16 +111,14 @@ class ToyController final : public Toy {
     gain_ = SharedGain(context);
     wiring->AddInput(&sensors_, "sensors", {joints(), 2});
     wiring->AddInput(&state_, "state", {joints(), 2});
-    wiring->AddInput(
-        &before_, "before", {joints(), 2},
-        config_.mode() == ToyConfig::LOOP ? InputKind::kSameTick : InputKind::kPreviousTick);
+    wiring->AddInput(&before_, "before", {joints(), 2}, InputKind::kPreviousTick);
     wiring->AddInput(&stop_, "stop", {}, InputKind::kLatest);
     wiring->AddOutput(&torque_, "torque", {joints(), 2});
     wiring->AddOutput(&command_, "command", {joints(), 2});
     wiring->AddStage("prepare", {&sensors_, &before_}, {&torque_}, [this](const Tick&) {
       for (size_t i = 0; i < torque_->torque.size(); ++i) {
-        torque_->torque[i] =
-            2 * sensors_->joint_position[i] + (before_.present() ? 0.1 * before_->torque[i] : 0);
+        torque_->torque[i] = 2 * sensors_->joint_position[i] +
+                             (before_.present() ? 0.1 * before_->joint_position[i] : 0);
       }
     });
     wiring->AddStage("control", {&state_, &stop_}, {&command_}, [this](const Tick& tick) {
@@ -135,7 +133,7 @@ class ToyController final : public Toy {
  private:
   Input<robot_sensors_t> sensors_;
   Input<robot_state_t> state_;
-  Input<joint_command_t> before_;
+  Input<robot_sensors_t> before_;
   Input<emergency_stop_t> stop_;
   std::shared_ptr<double> gain_;
   Output<task_torque_t> torque_;
@@ -176,6 +174,26 @@ class ToySink final : public Toy {
   Output<external_push_t> sum_;
 };
 
+/// Adds what came a tick before.
+class ToyEcho final : public Toy {
+ public:
+  void Configure(const ComponentContext& context, Wiring* wiring) override {
+    Read(context);
+    wiring->AddInput(&push_, "push", {});
+    wiring->AddInput(&before_, "before", {}, InputKind::kPreviousTick);
+    wiring->AddOutput(&sum_, "sum", {});
+    wiring->AddStage("add", {&push_, &before_}, {&sum_}, [this](const Tick& tick) {
+      sum_->force[0] = push_->force[0] + (before_.present() ? before_->force[0] : 0);
+      MaybeFinish(tick);
+    });
+  }
+
+ private:
+  Input<external_push_t> push_;
+  Input<external_push_t> before_;
+  Output<external_push_t> sum_;
+};
+
 template <class T>
 std::unique_ptr<Component> Make() {
   return std::make_unique<T>();
@@ -185,6 +203,7 @@ std::unique_ptr<Component> Make() {
 
 void AddToyComponents(ComponentRegistry* registry) {
   registry->Add("toy_plant", "chaotic map", Make<ToyPlant>);
+  registry->Add("toy_echo", "sum with the tick before", Make<ToyEcho>);
   registry->Add("toy_filter", "low-pass", Make<ToyFilter>);
   registry->Add("toy_controller", "two stages", Make<ToyController>);
   registry->Add("toy_clock", "free-running source", Make<ToyClock>);
@@ -205,7 +224,7 @@ Graph ToyLoop() {
       name: "controller" type: "toy_controller"
       input { port: "sensors" channel: "SENSORS" }
       input { port: "state" channel: "STATE" }
-      input { port: "before" channel: "COMMAND" }
+      input { port: "before" channel: "SENSORS" }
       input { port: "stop" channel: "STOP" }
       output { port: "torque" channel: "TORQUE" }
       output { port: "command" channel: "COMMAND" }

@@ -8,7 +8,7 @@
 
 namespace poise {
 
-/// toy_plant, toy_filter, toy_controller (the loop); toy_clock, toy_sink (the chain).
+/// toy_plant, toy_filter, toy_controller (the loop); toy_clock, toy_sink (the chain); toy_echo.
 void AddToyComponents(ComponentRegistry* registry);
 
 /// plant -> filter -> controller -> plant, with channel STOP from outside.
