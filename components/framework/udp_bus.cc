@@ -51,12 +51,27 @@ Endpoint ParseUrl(const std::string& url) {
       url));
 }
 
+/// Asks the kernel, without sending: liblcm would print lines of its own.
+void CheckRoute(const std::string& url, const Endpoint& endpoint) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(endpoint.port);
+  address.sin_addr = endpoint.group;
+  const bool routed =
+      fd >= 0 && connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  const int reason = errno;
+  if (fd >= 0) close(fd);
+  if (!routed)
+    throw BusError(fmt::format("{}: cannot send: {}: {}", url, std::strerror(reason), kAdvice));
+}
+
 }  // namespace
 
 void BusSender::Destroy::operator()(lcm_t* lcm) const { lcm_destroy(lcm); }
 
 BusSender::BusSender(const std::string& url) {
-  ParseUrl(url);
+  CheckRoute(url, ParseUrl(url));
   lcm_.reset(lcm_create(url.c_str()));
   if (lcm_ == nullptr) throw BusError(fmt::format("{}: cannot send: {}", url, kAdvice));
 }
