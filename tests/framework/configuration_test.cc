@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "components/framework/suggest.h"
 #include "tests/framework/toy.pb.h"
 
 namespace poise {
@@ -135,6 +136,13 @@ TEST(SetField, AFailedAppendLeavesTheListAsItWas) {
   ToyConfig config;
   EXPECT_NE(ErrorOf([&] { SetField(&config, "weight[0]", "heavy"); }), "no error");
   EXPECT_EQ(config.weight_size(), 0);
+}
+
+TEST(Suggest, NamesTheNearestThreeOrAll) {
+  EXPECT_EQ(Suggest("kpp", {"kd", "label", "kp", "kq"}), "did you mean kp or kd or kq?");
+  EXPECT_EQ(Suggest("aaaa", {"aaaf", "aaae", "aaad", "aaac"}),
+            "did you mean aaac or aaad or aaae?");
+  EXPECT_EQ(Suggest("temperature", {"b", "a"}), "it has a, b");
 }
 
 }  // namespace

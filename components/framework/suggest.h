@@ -1,0 +1,14 @@
+// What an author may have meant by a name that does not exist.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace poise {
+
+/// "did you mean x or y?": up to three of `names`, nearest first; "it has ..." with all of them
+/// when none is near.
+std::string Suggest(std::string_view name, std::vector<std::string> names);
+
+}  // namespace poise
