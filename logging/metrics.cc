@@ -389,7 +389,7 @@ void AddLog(List* list) {
   list->push_back({"log_defects", "",
                    "messages missing, twice, out of order or unreadable, and damaged places",
                    [](const RunRecord& run) -> Answer {
-                     int64_t sum = run.damages + run.refused_health;
+                     int64_t sum = run.damages;
                      for (const ChannelCompleteness& c : run.channels) {
                        sum += c.missing + c.duplicate + c.out_of_order + c.refused;
                      }
