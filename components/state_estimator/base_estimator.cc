@@ -19,6 +19,11 @@ constexpr double kMaxLoad = 100;          // shares of the robot's weight
 constexpr double kMaxGyroBias = 0.05;     // rad/s: any larger is a broken sensor, not a bias
 // Feet without load at first: beyond this difference of height, m, only the lower one stands.
 constexpr double kLevel = 0.01;
+// At rest: for this long, s, no joint leaves its first position by more, rad (a few encoder
+// counts), and no foot its first load, share of the weight.
+constexpr double kRestTime = 0.2;
+constexpr double kRestJointMotion = 1e-4;
+constexpr double kRestLoadChange = 0.02;
 
 Vector3d Clamp(const Vector3d& v, double limit) { return v.cwiseMin(limit).cwiseMax(-limit); }
 
@@ -61,7 +66,8 @@ BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
       base_frame_state_(model_->num_joints()),
       data_(*model_),
       state_(model_->num_joints()),
-      joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())) {
+      joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
+      rest_position_(Eigen::VectorXd::Zero(model_->num_joints())) {
   for (Foot& foot : feet_) foot.anchor.setIdentity();
 }
 
@@ -82,6 +88,7 @@ void BaseEstimator::Update(const BaseSensors& sensors, double dt) {
     Place(sensors);
     placed_ = true;
   } else {
+    AverageGyroBias(sensors, dt);
     UpdateOrientation(sensors, dt);
     UpdatePosition(dt);
     UpdateAnchors(dt);
@@ -163,6 +170,7 @@ void BaseEstimator::Place(const BaseSensors& sensors) {
   state_.base_position = -0.5 * (right_offset + left_offset);
   state_.base_position.z() = -(weight[0] * right_offset.z() + weight[1] * left_offset.z());
   state_.base_linear_velocity.setZero();
+  StartGyroBias(sensors);
   ReadImu(sensors);
   imu_orientation_ = Quaterniond(orientation_ * imu_rotation_).normalized();
   for (size_t i = 0; i < feet_.size(); ++i) {
@@ -170,6 +178,36 @@ void BaseEstimator::Place(const BaseSensors& sensors) {
     feet_[i].anchor.linear() = orientation_ * feet_[i].rotation;
     feet_[i].anchor.translation() = state_.base_position + feet_[i].last_offset;
   }
+}
+
+void BaseEstimator::StartGyroBias(const BaseSensors& sensors) {
+  // Off the ground or faster than any bias it is no rest: the bias is learned later, slowly.
+  if (grip_ < 1 || !(sensors.angular_velocity.cwiseAbs().maxCoeff() <= kMaxGyroBias)) return;
+  gyro_bias_ = rest_gyro_ = sensors.angular_velocity;
+  rest_position_ = sensors.joint_position;
+  rest_load_ = sensors.foot_load;
+  rest_samples_ = 1;
+  rest_left_ = kRestTime;
+}
+
+void BaseEstimator::AverageGyroBias(const BaseSensors& sensors, double dt) {
+  if (rest_left_ <= 0) return;
+  bool at_rest =
+      (sensors.joint_position - rest_position_).cwiseAbs().maxCoeff() <= kRestJointMotion &&
+      sensors.angular_velocity.cwiseAbs().maxCoeff() <= kMaxGyroBias;
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    at_rest =
+        at_rest && std::abs(sensors.foot_load[i] - rest_load_[i]) <= kRestLoadChange * weight_;
+  }
+  if (!at_rest) {
+    // The mean so far may hold the start of the motion: the first reading does not.
+    rest_left_ = 0;
+    return;
+  }
+  rest_gyro_ += sensors.angular_velocity;
+  ++rest_samples_;
+  rest_left_ -= dt;
+  if (rest_left_ <= 0) gyro_bias_ = rest_gyro_ / rest_samples_;
 }
 
 void BaseEstimator::ReadImu(const BaseSensors& sensors) {

@@ -1,6 +1,8 @@
 // BaseEstimator: position, orientation and velocity of the floating base from IMU, encoders and the
 // loads of the feet.
 //
+// The robot is taken to be at rest at first: what the gyro reads then is its bias, at once from the
+// first reading and, when encoders and loads stay steady, from the mean of the first 0.2 s.
 // Orientation integrates the gyro and follows slowly the orientation that the stance feet's
 // kinematics give, and very slowly gravity. Position and velocity follow the loaded feet, which
 // stand; a foot without load moves along with the base estimate and its anchor with it. Only
@@ -85,6 +87,8 @@ class BaseEstimator {
   void UpdateKinematics();
   void UpdateWeights(const BaseSensors& sensors);
   void Place(const BaseSensors& sensors);
+  void StartGyroBias(const BaseSensors& sensors);
+  void AverageGyroBias(const BaseSensors& sensors, double dt);
   void ReadImu(const BaseSensors& sensors);
   void UpdateOrientation(const BaseSensors& sensors, double dt);
   void UpdateTrust();
@@ -117,6 +121,12 @@ class BaseEstimator {
   std::array<Foot, 2> feet_;
   std::array<double, 2> foot_weight_{};
   double grip_ = 0;  // 0: in flight, 1: standing
+  // The readings at rest: of the first step, and their sum, over `rest_left_` s more.
+  Eigen::VectorXd rest_position_;
+  std::array<double, 2> rest_load_{};
+  Eigen::Vector3d rest_gyro_ = Eigen::Vector3d::Zero();
+  int rest_samples_ = 0;
+  double rest_left_ = 0;
   bool placed_ = false;
 };
 
