@@ -14,8 +14,9 @@
 
 namespace poise {
 
-/// Copies the configuration and velocity. `state` must be sized. False, and `state` is then not to
-/// be used, when a number is not finite or the quaternion is not of unit length (to 1e-6).
+/// Copies the configuration and velocity, the quaternion normalised. `state` must be sized. False,
+/// and `state` is then not to be used, when a number is not finite or the message's quaternion is
+/// not of unit length (to 1e-6).
 bool ReadState(const robot_state_t& message, robot::RobotState* state);
 
 void SetPose(const Eigen::Isometry3d& pose, pose_t* message);
