@@ -138,24 +138,35 @@ std::array<bool, 2> ContactsOf(Support support) { return {support != LEFT, suppo
 const ScheduleState& PhaseSchedule::Advance(double time, const std::array<bool, 2>& com_over_foot) {
   state_.phase_began = false;
   const int next = state_.phase + 1;
+  bool held = false;
   if (!began_) {
     began_ = true;
     state_.phase_began = true;
     state_.phase_start = time;
-  } else if (next < config_.phase_size() && !UnloadingPending() &&
+  } else if (next < config_.phase_size() && !(Unloads() && !transition_began_) &&
              time - shift_ >= config_.phase(next).start() - kTimeTolerance) {
-    state_.phase = next;
-    state_.phase_began = true;
-    state_.phase_start = time;
-    transition_began_ = false;
+    held = LiftOffHeld(com_over_foot);
+    if (held) {
+      shift_ = std::max(shift_, time - config_.phase(next).start());
+    } else {
+      state_.phase = next;
+      state_.phase_began = true;
+      state_.phase_start = time;
+      transition_began_ = false;
+    }
   }
   AdvanceTransition(time, com_over_foot);
+  state_.waiting = state_.waiting || held;
   return state_;
 }
 
-bool PhaseSchedule::UnloadingPending() const {
-  return phase().has_transition() && phase().transition().kind() == ContactTransition::UNLOAD &&
-         !transition_began_;
+bool PhaseSchedule::Unloads() const {
+  return phase().has_transition() && phase().transition().kind() == ContactTransition::UNLOAD;
+}
+
+// The ramp has ended by then: CheckTaskControllerConfig sees to that.
+bool PhaseSchedule::LiftOffHeld(const std::array<bool, 2>& com_over_foot) const {
+  return Unloads() && !com_over_foot[static_cast<size_t>(Other(phase().transition().foot()))];
 }
 
 void PhaseSchedule::AdvanceTransition(double time, const std::array<bool, 2>& com_over_foot) {

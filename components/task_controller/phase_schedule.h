@@ -20,7 +20,7 @@ struct ScheduleState {
   int phase = 0;
   bool phase_began = false;  ///< the phase's first tick
   double phase_start = 0;    ///< s, when it really began
-  bool waiting = false;      ///< the unloading is held back: the COM is not above the stance sole
+  bool waiting = false;      ///< unloading or lift-off is held back: the COM is not above the sole
   TransitionKind transition = TransitionKind::kNone;
   int transition_foot = -1;
   double progress = 0;  ///< 0..1
@@ -32,17 +32,18 @@ class PhaseSchedule {
   /// `config` must have passed CheckTaskControllerConfig.
   explicit PhaseSchedule(const TaskControllerConfig& config) : config_(config) {}
 
-  /// `time` in s, not decreasing; `com_over_foot`: the COM's projection lies inside that foot's
-  /// sole. An unloading that is due while the COM is not above the other foot waits, and with it
-  /// everything later in the schedule; the references of the phase under way go on, so that the COM
-  /// can arrive.
+  /// `time` in s, not decreasing; `com_over_foot`: that foot alone can carry the robot. An
+  /// unloading, or the lift-off after it, that is due while the other foot cannot waits, and with
+  /// it everything later in the schedule; the references of the phase under way go on, so that the
+  /// COM can arrive.
   const ScheduleState& Advance(double time, const std::array<bool, 2>& com_over_foot);
 
   const Phase& phase() const { return config_.phase(state_.phase); }
   const ScheduleState& state() const { return state_; }
 
  private:
-  bool UnloadingPending() const;
+  bool Unloads() const;
+  bool LiftOffHeld(const std::array<bool, 2>& com_over_foot) const;
   void AdvanceTransition(double time, const std::array<bool, 2>& com_over_foot);
 
   TaskControllerConfig config_;

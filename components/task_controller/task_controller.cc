@@ -25,6 +25,18 @@ int8_t TransitionCode(TransitionKind kind) {
   return task_torque_t::TRANSITION_NONE;
 }
 
+// The paper's distance of the limits from the edges of its sole, m.
+constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
+
+double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
+  if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
+  if (!(value > 0 && value <= 0.5 * sole)) {
+    throw ConfigError(field, fmt::format("is {}; must be above 0 and at most the sole's {} m",
+                                         value, 0.5 * sole));
+  }
+  return value;
+}
+
 // Rows that the tasks and contacts of a support determine; every velocity is determined when they
 // are n.
 int DeterminedRows(const std::array<bool, 2>& in_contact) {
@@ -61,6 +73,13 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
                  ReadGains(config.foot()));
   task_dynamics_.emplace(num_joints, TaskStack::kMaxRows);
   posture_ = ReadGains(config.posture());
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    stance_half_[i] = {ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
+                                      foot.length, kLengthReserve, "stance_half_length"),
+                       ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(),
+                                      foot.width, kWidthReserve, "stance_half_width")};
+  }
   state_ = robot::RobotState(num_joints);
   in_contact_ = ContactsOf(config.phase(0).support());
   posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ =
@@ -124,10 +143,11 @@ std::array<bool, 2> TaskController::ComOverFoot() const {
     // Along the vertical onto the sole's plane, then into its axes.
     const Eigen::Vector3d normal = sole.linear().col(2);
     Eigen::Vector3d offset = data.com - sole.translation();
+    if (!(offset.z() > 0)) continue;
+    offset += std::sqrt(offset.z() / robot::kGravity) * data.com_velocity;
     offset.z() -= offset.dot(normal) / normal.z();
     const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
-    const robot::FootModel& foot = model_->feet()[i];
-    over[i] = std::abs(at.x()) <= 0.5 * foot.length && std::abs(at.y()) <= 0.5 * foot.width;
+    over[i] = std::abs(at.x()) <= stance_half_[i].x() && std::abs(at.y()) <= stance_half_[i].y();
   }
   return over;
 }

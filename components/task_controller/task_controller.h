@@ -29,6 +29,8 @@ class TaskController : public Component {
   /// Fills contacts, phase, references and torque; STATUS_* of the message.
   int8_t Control(double time);
   EstimatedPose Estimate() const;
+  /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
+  /// rest, lies inside its reduced rectangle. At rest that is the COM's projection, and the CoP.
   std::array<bool, 2> ComOverFoot() const;
   bool ComputeTorque(const References& references, const std::array<bool, 2>& in_contact);
   void Report(const References& references, const std::array<bool, 2>& in_contact);
@@ -46,6 +48,7 @@ class TaskController : public Component {
   std::array<bool, 2> in_contact_{true, true};
   bool started_ = false;
   PdGains posture_;
+  std::array<Eigen::Vector2d, 2> stance_half_;  // m, of each sole's reduced rectangle
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_;
 };

@@ -88,6 +88,27 @@ TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
   EXPECT_EQ(second_double - single, 500);
 }
 
+TEST(PhaseSchedule, TheLiftOffWaitsWhenTheComLeavesDuringTheRamp) {
+  PhaseSchedule schedule = Schedule(kThere);
+  for (int tick = 0; tick < 400; ++tick) schedule.Advance(kTick * tick, kOverBoth);
+  for (int tick = 400; tick < 600; ++tick) {
+    const ScheduleState& state = schedule.Advance(kTick * tick, kOverNeither);
+    ASSERT_EQ(state.phase, 0) << tick;
+    ASSERT_EQ(state.waiting, tick >= 500) << tick;
+    ASSERT_EQ(state.transition, TransitionKind::kUnloading);
+    if (tick >= 500) {
+      ASSERT_EQ(state.progress, 1) << tick;
+    }
+  }
+  EXPECT_EQ(schedule.Advance(kTick * 600, kOverBoth).phase, 1);
+  EXPECT_FALSE(schedule.state().waiting);
+  int second_double = -1;
+  for (int tick = 601; tick < 1400 && second_double < 0; ++tick) {
+    if (schedule.Advance(kTick * tick, kOverNeither).phase == 2) second_double = tick;
+  }
+  EXPECT_NEAR(second_double - 600, 500, 1);  // later phases keep their distances
+}
+
 TEST(PhaseSchedule, NeverLiftsAFootUnderTheCom) {
   PhaseSchedule schedule = Schedule(kThere);
   for (int tick = 0; tick < 10000; ++tick) {

@@ -204,6 +204,30 @@ TEST(TaskController, FreeJointsAreHeld) {
   EXPECT_LT(acceleration.norm(), 1e-7);
 }
 
+// A quaternion off by less than the message's tolerance gives the torque of its direction; one
+// beyond is refused.
+TEST(TaskController, NormalisesTheOrientationItAccepts) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  ControlContext context(TestRobot::kDyros);
+  Harness<TaskController> harness(&context, TaskConfig("phase { start: 0 }"));
+  const robot_state_t exact = StateMessage(model, StandingState(model));
+  robot_state_t message = exact;
+  harness.Bind("robot_state", &message);
+  harness.Run(TickAt(0));
+  const Eigen::VectorXd torque = ToEigen(harness.output<task_torque_t>().torque);
+  for (const double scale : {1 - 0.9e-6, 1 + 0.9e-6}) {
+    for (int i = 0; i < 4; ++i) message.base_orientation[i] = scale * exact.base_orientation[i];
+    harness.Run(TickAt(1));
+    ASSERT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
+    EXPECT_LT((ToEigen(harness.output<task_torque_t>().torque) - torque).norm(), 1e-9);
+  }
+  for (int i = 0; i < 4; ++i) {
+    message.base_orientation[i] = (1 + 1.1e-6) * exact.base_orientation[i];
+  }
+  harness.Run(TickAt(2));
+  EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_INVALID_STATE);
+}
+
 TEST(TaskController, ReportsAWaitingUnloading) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   ControlContext context(TestRobot::kDyros);
@@ -233,8 +257,16 @@ TEST(TaskController, ReportsAWaitingUnloading) {
   state.base_orientation = lean * state.base_orientation;
   message = StateMessage(model, state);
   const robot::RobotData data = robot::Evaluate(model, state);
-  ASSERT_LT(std::abs(data.com.y() - data.foot_pose[0].translation().y()), 0.07);
+  // Inside the sole (75 mm) is not enough: 25 mm less are its reduced rectangle.
+  ASSERT_LT(std::abs(data.com.y() - data.foot_pose[0].translation().y()), 0.05);
+  // On its way out: the point where it can be brought to rest lies 80 mm further.
+  robot::RobotState moving = state;
+  moving.base_linear_velocity.y() = 0.3;
+  message = StateMessage(model, moving);
   harness.Run(TickAt(101));
+  EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_WAITING);
+  message = StateMessage(model, state);
+  harness.Run(TickAt(102));
   EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
   EXPECT_EQ(harness.output<task_torque_t>().transition, task_torque_t::TRANSITION_UNLOADING);
   EXPECT_EQ(harness.output<task_torque_t>().transition_foot, 1);
