@@ -163,7 +163,7 @@ INSTANTIATE_TEST_SUITE_P(All, SquareRoute,
 // command announces, the margins are those wrenches' margins, and moving wrench between the feet
 // moves nothing else.
 TEST_P(ChainCase, TheCommandGivesWhatItAnnounces) {
-  int feasible = 0;
+  int feasible = 0, checked = 0;
   double worst = 0;
   for (int trial = 0; trial < 100; ++trial) {
     Chain chain(GetParam().robot, Phases(), MonitorConfig(true, 0.08, 0.07), RedistributorText());
@@ -172,6 +172,7 @@ TEST_P(ChainCase, TheCommandGivesWhatItAnnounces) {
     const robot::RobotState now = Disturbed(first, 0.01, 0.2, &random_);
     const joint_command_t& out = chain.Run(now, 1);
     if (chain.balance().status != balance_torque_t::STATUS_OK) continue;
+    ++checked;
     const Dynamics dynamics(chain.model(), now, GetParam().in_contact);
     Eigen::VectorXd before_q, before, after_q, after;
     dynamics.Forward(ToEigen(chain.balance().torque), &before_q, &before);
@@ -219,6 +220,7 @@ TEST_P(ChainCase, TheCommandGivesWhatItAnnounces) {
     EXPECT_GE(out.eta, 0.02);
     EXPECT_LE(out.eta, 0.98);
   }
+  EXPECT_GT(checked, 50);
   EXPECT_LT(worst, 1e-7);
   if (GetParam().in_contact[0] && GetParam().in_contact[1]) {
     EXPECT_GT(feasible, 10);
@@ -256,16 +258,19 @@ TEST(Redistributor, PassesThroughWhenSwitchedOff) {
   std::mt19937 random(24);
   Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
               RedistributorText("redistribution: false"));
+  int checked = 0;
   for (int tick = 0; tick < 20; ++tick) {
     const robot::RobotState now = Disturbed(StandingState(chain.model()), 0.01, 0.1, &random);
     const joint_command_t& out = chain.Run(now, tick);
     if (chain.balance().status != balance_torque_t::STATUS_OK) continue;
+    ++checked;
     EXPECT_EQ(out.torque, chain.balance().torque);
     EXPECT_EQ(ToEigen(out.redistribution_torque).norm(), 0);
     for (size_t i = 0; i < 2; ++i) {
       EXPECT_EQ(GetWrench(out.foot_wrench[i]), GetWrench(chain.balance().foot_wrench[i]));
     }
   }
+  EXPECT_GT(checked, 10);
 }
 
 // Section 7.4: the COM near the stance foot but not above its middle, the left foot unloaded in
