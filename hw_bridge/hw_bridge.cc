@@ -60,6 +60,7 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
           joint.name));
     }
     result.torque_limit.push_back(limit);
+    result.velocity_limit.push_back(joint.velocity_limit);
   }
   result.num_feet = static_cast<int>(model.feet().size());
   result.period = period;

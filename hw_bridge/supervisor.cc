@@ -48,7 +48,9 @@ Supervisor::Supervisor(const SupervisorConfig& config)
       torque_(config.motors.size(), 0.0),
       counts_(config.motors.size(), 0),
       velocity_(config.motors.size(), 0.0),
-      faulted_(config.motors.size(), 0) {
+      faulted_(config.motors.size(), 0),
+      enabled_(config.motors.size(), 0),
+      disabled_cycles_(config.motors.size(), 0) {
   for (size_t j = 0; j < config.motors.size(); ++j) {
     const robot::MotorModel& motor = config.motors[j];
     config_.torque_limit[j] =
@@ -63,16 +65,29 @@ bool Supervisor::Usable(const drive_feedback_t& feedback) const {
       feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet)) {
     return false;
   }
-  return AllPlausible(feedback.current) && AllPlausible(feedback.imu_angular_velocity) &&
-         AllPlausible(feedback.imu_acceleration) &&
+  return PlausibleCounts(feedback) && AllPlausible(feedback.current) &&
+         AllPlausible(feedback.imu_angular_velocity) && AllPlausible(feedback.imu_acceleration) &&
          std::all_of(feedback.foot_wrench.begin(), feedback.foot_wrench.end(),
                      [](const wrench_t& wrench) {
                        return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
                      });
 }
 
+// Across a cycle without feedback nothing is known of the way.
+bool Supervisor::PlausibleCounts(const drive_feedback_t& feedback) const {
+  if (!counts_known_ || config_.velocity_limit.empty()) return true;
+  for (size_t j = 0; j < counts_.size(); ++j) {
+    const double change =
+        static_cast<double>(feedback.position_counts[j]) - static_cast<double>(counts_[j]);
+    const double most = config_.velocity_margin * config_.velocity_limit[j] * config_.period;
+    if (std::abs(change) / CountsPerRadian(config_.motors[j]) > most) return false;
+  }
+  return true;
+}
+
 bool Supervisor::Read(const drive_feedback_t& feedback) {
   if (!Usable(feedback)) {
+    // Of the reasons the nearest: readings that are finite but cannot be are as little to be used.
     Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_FEEDBACK_NOT_FINITE);
     return false;
   }
@@ -80,6 +95,13 @@ bool Supervisor::Read(const drive_feedback_t& feedback) {
   for (size_t j = 0; j < faulted_.size(); ++j) {
     const int32_t status = feedback.drive_status[j];
     if (status != drive_feedback_t::DRIVE_DISABLED && status != drive_feedback_t::DRIVE_ENABLED) {
+      faulted_[j] = 1;
+      Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_DRIVE_FAULT);
+    }
+    const bool refuses = enabled_[j] != 0 && status == drive_feedback_t::DRIVE_DISABLED;
+    disabled_cycles_[j] =
+        refuses ? std::min(disabled_cycles_[j] + 1, config_.enable_cycles + 1) : 0;
+    if (disabled_cycles_[j] > config_.enable_cycles) {
       faulted_[j] = 1;
       Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_DRIVE_FAULT);
     }
@@ -168,6 +190,7 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
         std::clamp(MotorCurrent(motor, torque), -motor.peak_current, motor.peak_current);
     drives->current[j] = current;
     drives->enabled[j] = follow ? 1 : 0;
+    enabled_[j] = follow ? 1 : 0;
     status->applied_torque[j] = torque;
     status->saturated[j] = saturated ? 1 : 0;
     saturations_ += saturated ? 1 : 0;

@@ -16,6 +16,13 @@ namespace poise {
 struct SupervisorConfig {
   std::vector<robot::MotorModel> motors;  ///< by joint
   std::vector<double> torque_limit;       ///< N·m, by joint, > 0; the peak current limits too
+  std::vector<double> velocity_limit;     ///< rad/s, by joint; empty: counts are not checked
+  /// From one cycle to the next no joint moves further than this many times velocity_limit ×
+  /// period: a fall or an impact may exceed the limit itself for a while; five times it is a broken
+  /// encoder.
+  double velocity_margin = 5;
+  /// Cycles in which a drive may still report itself disabled after it has been told to enable.
+  int enable_cycles = 2;
   int num_feet = 2;
   double period = 0.002;  ///< s, of a cycle
   int damping_after_cycles =
@@ -42,7 +49,8 @@ class Supervisor {
   void SetRun(int64_t run_id) { gate_.set_run(run_id); }
 
   /// Takes the feedback of this cycle. False, and the bridge stops (latched), when it is not
-  /// finite, beyond all reason or wrongly sized. A drive's fault stops the bridge too. A cycle
+  /// finite, beyond all reason (a joint's jump included) or wrongly sized. A drive's fault, or its
+  /// staying disabled although it is told to be enabled, stops the bridge too. A cycle
   /// without feedback simply has no Read: its damping torque is zero, as no velocity is known.
   bool Read(const drive_feedback_t& feedback);
 
@@ -63,6 +71,7 @@ class Supervisor {
  private:
   bool latched() const { return state_ >= bridge_status_t::STATE_STOPPING; }
   bool Usable(const drive_feedback_t& feedback) const;
+  bool PlausibleCounts(const drive_feedback_t& feedback) const;
   void UpdateVelocity(const drive_feedback_t& feedback);
   void Latch(int8_t state, int8_t reason);
   void UpdateState(int64_t cycle, const joint_command_t* command);
@@ -76,8 +85,10 @@ class Supervisor {
   std::vector<int64_t> counts_;
   std::vector<double> velocity_;
   std::vector<char> faulted_;
-  bool counts_known_ = false;   // counts_ are those of the cycle before
-  bool feedback_read_ = false;  // in this cycle
+  std::vector<char> enabled_;         // as last commanded
+  std::vector<int> disabled_cycles_;  // reported disabled while enabled, in a row
+  bool counts_known_ = false;         // counts_ are those of the cycle before
+  bool feedback_read_ = false;        // in this cycle
   int8_t state_ = bridge_status_t::STATE_INIT;
   int8_t reason_ = bridge_status_t::REASON_NO_COMMAND;
   int8_t last_refusal_ = bridge_status_t::REASON_NO_COMMAND;  // since the last accepted command

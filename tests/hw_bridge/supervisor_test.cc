@@ -333,6 +333,49 @@ TEST(Supervisor, FeedbackThatIsNotFiniteStops) {
   }
 }
 
+TEST(Supervisor, AnEncoderThatJumpsStops) {
+  SupervisorConfig config = ThreeJoints();
+  config.velocity_limit = {9, 9, 9};
+  const double most = 5 * 9 * config.period;  // rad in a cycle
+  for (const double share : {-1.01, -0.99, 0.99, 1.01}) {
+    Bench bench(config);
+    bench.Run(10, 10, 0);
+    bench.Step(10.0, share * most / config.period);
+    const bool stops = std::abs(share) > 1;
+    EXPECT_EQ(bench.status().state, stops ? Status::STATE_STOPPING : Status::STATE_RUNNING);
+    EXPECT_EQ(bench.status().reason,
+              stops ? Status::REASON_FEEDBACK_NOT_FINITE : Status::REASON_NONE);
+    if (stops) {
+      EXPECT_EQ(bench.drives().current[0], 0);
+    }
+  }
+}
+
+TEST(Supervisor, ADriveThatStaysDisabledIsAFault) {
+  Bench bench;
+  bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_DISABLED;
+  for (int i = 0; i < 10; ++i) bench.Step(nullptr);  // not told to enable yet
+  ASSERT_EQ(bench.status().state, Status::STATE_INIT);
+  for (int i = 0; i < 3; ++i) {  // told in the first of them, disabled in the next two
+    bench.Step(10.0);
+    ASSERT_EQ(bench.status().state, Status::STATE_RUNNING) << i;
+  }
+  bench.Step(10.0);
+  EXPECT_EQ(bench.status().state, Status::STATE_STOPPING);
+  EXPECT_EQ(bench.status().reason, Status::REASON_DRIVE_FAULT);
+  EXPECT_EQ(bench.drives().enabled[1], 0);
+  EXPECT_EQ(bench.drives().enabled[0], 1);
+}
+
+TEST(Supervisor, ADriveMayTakeTwoCyclesToEnable) {
+  Bench bench;
+  bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_DISABLED;
+  for (int i = 0; i < 3; ++i) bench.Step(10.0);
+  bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_ENABLED;
+  bench.Run(10, 10, 0);
+  EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);
+}
+
 TEST(Supervisor, WithoutFeedbackDampingHasNoTorqueAndTheVelocityIsNotJoinedAcrossTheGap) {
   Bench bench;
   bench.Run(100, 10, 1.0);
