@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/robot/robot_files.h"
+#include "components/messages/robot_resource.h"
 #include "hw_bridge/hw_bridge.pb.h"
 #include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/units.h"
@@ -28,14 +28,6 @@ void Validate(const HwBridgeConfig& config) {
           "must be between 0 and 10 s");
   Require(config.velocity_cutoff() > 0 && std::isfinite(config.velocity_cutoff()),
           "velocity_cutoff", "must be a finite number of Hz above 0");
-}
-
-robot::RobotModel LoadRobot(const ComponentContext& context) {
-  try {
-    return robot::LoadRobotTexts(context.resource("robot"), context.resource("urdf"));
-  } catch (const robot::RobotError& error) {
-    throw ConfigError(error.what());
-  }
 }
 
 SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot::RobotModel& model,
@@ -77,7 +69,8 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
 void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<HwBridgeConfig>();
   Validate(config);
-  const robot::RobotModel model = LoadRobot(context);
+  const std::shared_ptr<const robot::RobotModel> shared_model = LoadRobot(context);
+  const robot::RobotModel& model = *shared_model;
   const int n = model.num_joints();
   const int feet = static_cast<int>(model.feet().size());
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/robot/robot_files.h"
+#include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
@@ -46,22 +46,14 @@ BaseEstimatorConfig ReadConfig(const StateEstimatorConfig& config) {
   return result;
 }
 
-robot::RobotModel LoadRobot(const ComponentContext& context) {
-  try {
-    return robot::LoadRobotTexts(context.resource("robot"), context.resource("urdf"));
-  } catch (const robot::RobotError& error) {
-    throw ConfigError(error.what());
-  }
-}
-
 void Write(const Vector3d& v, double* out) { std::copy_n(v.data(), 3, out); }
 
 }  // namespace
 
 void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) {
   const BaseEstimatorConfig config = ReadConfig(context.config<StateEstimatorConfig>());
-  const auto model = std::make_shared<const robot::RobotModel>(LoadRobot(context));
-  const MessageCounts counts = {model->num_joints(), static_cast<int>(model->feet().size())};
+  const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
+  const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
   wiring->AddStage("estimate", {&robot_sensors_}, {&robot_state_},
