@@ -82,7 +82,7 @@ TEST(Equality, SummaryHoldsEveryRowOfTheTable) {
   EXPECT_TRUE(summary["passed"].get<bool>());
   EXPECT_TRUE(summary["run_id"].is_number_integer());
   EXPECT_TRUE(summary["versions"].contains("lcm"));
-  ASSERT_EQ(summary["checks"].size(), 5u);  // two of every run, three of the scenario
+  ASSERT_EQ(summary["checks"].size(), 8u);  // five of every run, three of the scenario
   for (const nlohmann::json& check : summary["checks"]) {
     for (const char* field : {"name", "measured", "unit", "limit", "paper", "passed"}) {
       EXPECT_TRUE(check.contains(field)) << check << field;
