@@ -2,31 +2,13 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <numeric>
 
 #include "components/framework/configuration.h"
+#include "components/framework/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {
-namespace {
-
 namespace fs = std::filesystem;
-
-size_t EditDistance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), size_t{0});
-  for (size_t i = 0; i < a.size(); ++i) {
-    size_t diagonal = row[0]++;
-    for (size_t j = 0; j < b.size(); ++j) {
-      const size_t change = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({change, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
 
 fs::path DeployDir() {
   const char* const dir = std::getenv("POISE_DEPLOY_DIR");
@@ -43,7 +25,7 @@ fs::path FindFile(const std::string& kind, const std::string& name, const fs::pa
   }
   const fs::path path = DeployDir() / kind / (name + ".pbtxt");
   if (fs::is_regular_file(path)) return path;
-  throw ConfigError(fmt::format("no {} named '{}'; there is {}, or give the path of a .pbtxt file",
+  throw ConfigError(fmt::format("no {} named '{}'; {}; or give the path of a .pbtxt file",
                                 what, name, Suggest(name, ListNames(kind))));
 }
 
@@ -58,23 +40,6 @@ std::vector<std::string> ListNames(const std::string& kind) {
   if (error) throw ConfigError(fmt::format("{}: {}", dir.string(), error.message()));
   std::sort(names.begin(), names.end());
   return names;
-}
-
-std::string Suggest(const std::string& name, const std::vector<std::string>& candidates) {
-  std::vector<std::string> near;
-  for (const std::string& candidate : candidates) {
-    if (candidate.find(name) != std::string::npos ||
-        EditDistance(name, candidate) <= 1 + name.size() / 4) {
-      near.push_back(candidate);
-    }
-  }
-  const std::vector<std::string>& shown = near.empty() ? candidates : near;
-  if (shown.empty()) return "none";
-  std::string text = shown[0];
-  for (size_t i = 1; i < shown.size(); ++i) {
-    text += (i + 1 == shown.size() ? " or " : ", ") + shown[i];
-  }
-  return text;
 }
 
 }  // namespace poise

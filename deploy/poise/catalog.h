@@ -19,7 +19,4 @@ std::filesystem::path FindFile(const std::string& kind, const std::string& name,
 /// Names that FindFile takes, sorted.
 std::vector<std::string> ListNames(const std::string& kind);
 
-/// The candidates nearest to `name` in spelling, or all when none is near: "x, y or z".
-std::string Suggest(const std::string& name, const std::vector<std::string>& candidates);
-
 }  // namespace poise

@@ -20,12 +20,11 @@ constexpr int64_t kRecordTimeout = 10 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
 constexpr int kSpin = 20;                       // ms
 constexpr size_t kDetailLines = 5;
-constexpr char kRecorder[] = "recorder";
 
 }  // namespace
 
 Launcher::Launcher(const RunSpec& spec, LaunchFiles files, Progress* progress)
-    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorder}) {}
+    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorderName}) {}
 
 Launcher::~Launcher() = default;
 
@@ -43,7 +42,7 @@ void Launcher::StartProcesses() {
     processes_.push_back(std::make_unique<ChildProcess>(
         name, command, fmt::format("{}/{}.log", files_.run_dir, name)));
   };
-  start(kRecorder,
+  start(kRecorderName,
         {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
          files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
   for (const ComponentInstance& instance : spec_.graph().component()) {
@@ -168,7 +167,7 @@ void Launcher::Watch() {
     }
     if (ended_at == 0 && (all_ended || !reason.empty())) ended_at = last_change = now;
     const bool recorded =
-        control_.statuses().at(kRecorder).health.state == health_t::STATE_FINISHED;
+        control_.statuses().at(kRecorderName).health.state == health_t::STATE_FINISHED;
     if (ended_at > 0 && recorded) {
       outcome_.completed = !failed;
       if (!reason.empty()) Fail(reason);

@@ -13,6 +13,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
+#include "components/framework/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
 #include "deploy/poise/catalog.h"
@@ -62,7 +63,7 @@ void CheckScenario(const LoadedScenario& loaded) {
   for (int i = 0; i < s.check_size(); ++i) {
     if (logging::FindMetric(s.check(i).metric()) == nullptr) {
       Fail(loaded, fmt::format("check[{}].metric", i),
-           fmt::format("no metric named '{}'; near it: {}; see `poise list metrics`",
+           fmt::format("no metric named '{}'; {}; see `poise list metrics`",
                        s.check(i).metric(), Suggest(s.check(i).metric(), names)));
     }
     if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
