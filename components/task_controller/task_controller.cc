@@ -182,6 +182,7 @@ void TaskController::Report(const References& references, const std::array<bool,
   const bool controlled = !schedule_->phase().gravity_compensation();
   std::copy_n(torque_.data(), torque_.size(), out.torque.begin());
   out.phase = schedule.phase;
+  out.waiting_for = schedule.waiting ? task_torque_t::WAITING_COM : task_torque_t::WAITING_NONE;
   out.transition = TransitionCode(schedule.transition);
   out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
   out.transition_progress = schedule.progress;
@@ -192,6 +193,7 @@ void TaskController::Report(const References& references, const std::array<bool,
              out.body_orientation_error);
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = in_contact[i] ? 1 : 0;
+    out.foot_state[i] = in_contact[i] ? task_torque_t::FOOT_SUPPORT : task_torque_t::FOOT_SWING;
     SetPose(data.foot_pose[i], &out.foot_pose[i]);
     out.foot_desired[i] = out.foot_pose[i];
     if (controlled && !in_contact[i]) {
