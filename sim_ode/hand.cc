@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "sim_ode/config_check.h"
+#include "sim_ode/minimum_jerk.h"
 #include "sim_ode/push.h"
 
 namespace poise {
@@ -63,11 +62,9 @@ void HandSpring::Grip(double time, const Vector3d& position) {
 
 Vector3d HandSpring::Force(double time, const Vector3d& position, const Vector3d& velocity) const {
   if (!gripped_ || time >= release_ - kEarly) return Vector3d::Zero();
-  const double s = std::clamp((time - start_) / move_duration_, 0.0, 1.0);
-  const double path = s * s * s * (10 + s * (6 * s - 15));  // minimum jerk
-  const double speed = 30 * s * s * (1 - s) * (1 - s) / move_duration_;
-  const Vector3d force =
-      stiffness_ * (origin_ + path * offset_ - position) + damping_ * (speed * offset_ - velocity);
+  const MinimumJerk move(time - start_, move_duration_);
+  const Vector3d force = stiffness_ * (origin_ + move.position * offset_ - position) +
+                         damping_ * (move.speed * offset_ - velocity);
   const double size = force.norm();
   return size > max_force_ ? Vector3d(max_force_ / size * force) : force;
 }

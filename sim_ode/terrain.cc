@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "sim_ode/config_check.h"
+#include "sim_ode/minimum_jerk.h"
 #include "sim_ode/random.h"
 
 namespace poise {
@@ -47,6 +48,7 @@ Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
   RequirePositive(block.irregularity_wavelength(), "block.irregularity_wavelength");
   RequireNotNegative(block.friction(), "block.friction");
   RequireNotNegative(block.start(), "block.start");
+  RequireNotNegative(block.rise(), "block.rise");
   if (!(std::abs(block.tilt_roll()) <= kMaxTilt)) {
     throw ConfigError("block.tilt_roll", "must be within 0.8 rad of level");
   }
@@ -58,6 +60,7 @@ Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
   half_size_ = {block.length() / 2, block.width() / 2};
   height_ = block.height();
   start_ = block.start();
+  rise_ = block.rise();
   // The normal is the z axis turned by roll about x, then by pitch about y.
   const Vector3d normal(std::sin(block.tilt_pitch()) * std::cos(block.tilt_roll()),
                         -std::sin(block.tilt_roll()),
@@ -81,7 +84,7 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
   if (!has_block_ || time < start_) return ground;
   const Vector2d place = Vector2d(x, y) - center_;
   if (std::abs(place.x()) > half_size_.x() || std::abs(place.y()) > half_size_.y()) return ground;
-  double height = height_ + slope_.dot(place);
+  double height = height_ * MinimumJerk(time - start_, rise_).position + slope_.dot(place);
   Vector2d slope = slope_;
   if (wave_amplitude_ > 0) {
     for (const Wave& wave : waves_) {

@@ -44,7 +44,7 @@ class Terrain {
   bool has_block_ = false;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d half_size_ = Eigen::Vector2d::Zero();
-  double height_ = 0, start_ = 0;
+  double height_ = 0, start_ = 0, rise_ = 0;
   Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();  // dz/dx, dz/dy of the tilted top
   double wave_amplitude_ = 0;
   std::array<Wave, kWaves> waves_{};

@@ -33,6 +33,15 @@ TEST(Terrain, BlockCoversItsRectangleFromItsStart) {
   EXPECT_EQ(terrain.At(1, 0.61, 2).height, 0);
 }
 
+TEST(Terrain, BlockRisesFromTheGround) {
+  const Terrain terrain = Make("block { height: 0.08 start: 2 rise: 1 }");
+  EXPECT_EQ(terrain.At(0, 0, 2).height, 0);
+  EXPECT_NEAR(terrain.At(0, 0, 2.5).height, 0.04, 1e-12);  // minimum jerk is symmetric
+  EXPECT_NEAR(terrain.At(0, 0, 2.2).height + terrain.At(0, 0, 2.8).height, 0.08, 1e-12);
+  EXPECT_EQ(terrain.At(0, 0, 3).height, 0.08);
+  EXPECT_EQ(terrain.At(0, 0, 9).height, 0.08);
+}
+
 TEST(Terrain, SpringAndDamperOfAWholeSoleAreSharedByFourCorners) {
   const double k = 18000 / 4.0, d = 300 / 4.0, h = 0.001;
   const Terrain::Material material =
