@@ -8,97 +8,12 @@
 #include <set>
 
 #include "logging/metrics.h"
-#include "poise/message_traits.hpp"
-#include "tests/logging/log_test_support.h"
+#include "tests/logging/record_fixture.h"
 
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 100;
-
-template <class T>
-T Sized(int64_t tick) {
-  T message{};
-  MessageTraits<T>::Resize(message,
-                           MessageTraits<T>::kCountNames.size() == 2   ? std::vector<int32_t>{12, 2}
-                           : MessageTraits<T>::kCountNames.size() == 1 ? std::vector<int32_t>{12}
-                                                                       : std::vector<int32_t>{});
-  SetHeader(tick, &message);
-  return message;
-}
-
-void SetIdentity(pose_t* pose) { pose->orientation[0] = 1; }
-
-/// A run of kTicks with every message at rest, which a test then changes.
-class AnalysisTest : public testing::Test {
- protected:
-  AnalysisTest() {
-    for (int64_t t = 0; t < kTicks; ++t) {
-      sensors_.push_back(Sized<robot_sensors_t>(t));
-      state_.push_back(Sized<robot_state_t>(t));
-      task_.push_back(Sized<task_torque_t>(t));
-      balance_.push_back(Sized<balance_torque_t>(t));
-      command_.push_back(Sized<joint_command_t>(t));
-      bridge_.push_back(Sized<bridge_status_t>(t));
-      push_.push_back(Sized<external_push_t>(t));
-      truth_.push_back(Sized<ground_truth_t>(t));
-      state_.back().base_orientation[0] = truth_.back().base_orientation[0] = 1;
-      SetIdentity(&balance_.back().frame_o);
-      balance_.back().cop_limit[0] = 0.13;
-      balance_.back().cop_limit[1] = 0.07;
-      for (size_t foot = 0; foot < 2; ++foot) {
-        SetIdentity(&task_.back().foot_pose[foot]);
-        task_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
-        task_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
-        command_.back().conditions_met[foot] = 1;
-        command_.back().margins[foot] = {1, 1, 1, 1, 1};
-      }
-    }
-  }
-
-  RunRecord Read() {
-    std::vector<RawEvent> events = {RunInfoEvent(spec_)};
-    for (size_t t = 0; t < kTicks; ++t) {
-      Add("ROBOT_SENSORS", sensors_[t], &events);
-      Add("ROBOT_STATE", state_[t], &events);
-      Add("TASK_TORQUE", task_[t], &events);
-      Add("BALANCE_TORQUE", balance_[t], &events);
-      Add("JOINT_COMMAND", command_[t], &events);
-      Add("BRIDGE_STATUS", bridge_[t], &events);
-      Add("EXTERNAL_PUSH", push_[t], &events);
-      Add("GROUND_TRUTH", truth_[t], &events);
-    }
-    WriteRawLog(path_, events);
-    return ReadRun(path_);
-  }
-
-  double Measure(const std::string& name, double from = 0) {
-    RunRecord run = Read();
-    run.first_tick = std::llround(from / 0.002);
-    const Metric* metric = FindMetric(name);
-    EXPECT_NE(metric, nullptr) << name;
-    const Answer value = metric->compute(run);
-    EXPECT_TRUE(value.has_value()) << name;
-    return value.value_or(-1e9);
-  }
-
-  template <class T>
-  static void Add(const char* channel, const T& message, std::vector<RawEvent>* events) {
-    events->push_back({channel, message.utime, Encode(message)});
-  }
-
-  TemporaryFolder folder_;
-  std::string path_ = folder_.path("run.lcm");
-  RunSpec spec_ = MakeTestSpec();
-  std::vector<robot_sensors_t> sensors_;
-  std::vector<robot_state_t> state_;
-  std::vector<task_torque_t> task_;
-  std::vector<balance_torque_t> balance_;
-  std::vector<joint_command_t> command_;
-  std::vector<bridge_status_t> bridge_;
-  std::vector<external_push_t> push_;
-  std::vector<ground_truth_t> truth_;
-};
+using AnalysisTest = RecordTest;
 
 TEST_F(AnalysisTest, MetricsHaveNamesOfTheirOwn) {
   std::set<std::string> names;

@@ -1,0 +1,131 @@
+#include "logging/contact_history.h"
+
+#include <cmath>
+
+#include "logging/schedule_plan.h"
+
+namespace poise::logging {
+namespace {
+
+// A reading beyond this many standard deviations of its noise is a load.
+constexpr double kNoiseDeviations = 5;
+
+std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
+  return {in_contact[0] != 0, in_contact[1] != 0};
+}
+
+double Height(const task_torque_t& task, size_t foot) { return task.foot_pose[foot].position[2]; }
+
+/// Follows where each foot's reference is to end, phase by phase.
+class ReferenceEnds {
+ public:
+  explicit ReferenceEnds(const RunRecord& run) : plan_(ReadSchedulePlan(run)) {}
+
+  void Update(const task_torque_t& task) {
+    if (task.phase == phase_) return;
+    phase_ = task.phase;
+    if (!plan_ || phase_ < 0 || static_cast<size_t>(phase_) >= plan_->phases.size()) return;
+    const auto& foot = plan_->phases[static_cast<size_t>(phase_)].foot;
+    if (!foot) return;
+    const auto f = static_cast<size_t>(foot->foot);
+    const double standing = task.foot_desired[f].position[2];
+    end_[f] = foot->above_support ? Height(task, 1 - f) + foot->z
+              : foot->at_once     ? standing
+                                  : standing + foot->z;
+  }
+  void Place(const task_torque_t& task, TouchDown* touch) const {
+    if (!end_[touch->foot]) return;
+    touch->above_end = Height(task, touch->foot) - *end_[touch->foot];
+    touch->timing = *touch->above_end > plan_->expected_within    ? Timing::kEarly
+                    : *touch->above_end < -plan_->expected_within ? Timing::kLate
+                                                                  : Timing::kExpected;
+  }
+
+ private:
+  std::optional<SchedulePlan> plan_;
+  int32_t phase_ = -1;
+  std::array<std::optional<double>, 2> end_;
+};
+
+}  // namespace
+
+std::string FootName(const RunRecord& run, size_t foot) {
+  return run.robot.feet()[foot].name + " foot";
+}
+
+std::vector<SupportChange> SupportChanges(const RunRecord& run) {
+  std::vector<SupportChange> changes;
+  for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
+    const joint_command_t* before = run.command.at(tick - 1);
+    const joint_command_t* now = run.command.at(tick);
+    if (before == nullptr || now == nullptr) continue;
+    SupportChange change{tick, Contacts(before->in_contact), Contacts(now->in_contact)};
+    if (change.before == change.after) continue;
+    for (size_t joint = 0; joint < now->torque.size(); ++joint) {
+      const double step = std::abs(now->torque[joint] - before->torque[joint]);
+      if (step > change.torque_step) {
+        change.torque_step = step;
+        change.joint = joint;
+      }
+    }
+    changes.push_back(change);
+  }
+  return changes;
+}
+
+std::vector<TouchDown> TouchDowns(const RunRecord& run) {
+  std::vector<TouchDown> touches;
+  ReferenceEnds ends(run);
+  const task_torque_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const task_torque_t* task = run.task.at(tick);
+    if (task == nullptr) continue;
+    ends.Update(*task);
+    for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
+      const int8_t was = before->foot_state[foot], is = task->foot_state[foot];
+      const bool off = was != task_torque_t::FOOT_SUPPORT && was != task_torque_t::FOOT_TOUCHING;
+      // From a swing straight to support the schedule alone decided.
+      const bool confirmed =
+          is == task_torque_t::FOOT_TOUCHING ||
+          (is == task_torque_t::FOOT_SUPPORT && was == task_torque_t::FOOT_SEARCHING);
+      if (!off || !confirmed) continue;
+      TouchDown touch{tick, foot, Height(*task, foot) - Height(*task, 1 - foot), {}};
+      ends.Place(*task, &touch);
+      touches.push_back(touch);
+    }
+    before = task;
+  }
+  return touches;
+}
+
+std::optional<bool> ContactLost(const RunRecord& run, size_t foot, int64_t tick) {
+  const joint_command_t* command = run.command.at(tick - 1);
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  if (command == nullptr || sensors == nullptr || command->in_contact[foot] == 0) return {};
+  const double weight = run.robot.total_mass() * robot::kGravity;
+  if (-command->foot_wrench[foot].force[2] < kLoadedShare * weight) return {};
+  return -sensors->foot_wrench[foot].force[2] <= kNoiseDeviations * run.robot.force_noise();
+}
+
+std::vector<Interval> Intervals(const RunRecord& run,
+                                const std::function<std::optional<bool>(int64_t)>& holds,
+                                int64_t gap) {
+  std::vector<Interval> intervals;
+  bool on = false;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bool now = holds(tick).value_or(on);
+    if (now && !on) {
+      const bool bridged = !intervals.empty() && tick - *intervals.back().end <= gap;
+      if (bridged) {
+        intervals.back().end.reset();
+      } else {
+        intervals.push_back({tick, {}});
+      }
+    }
+    if (!now && on) intervals.back().end = tick;
+    on = now;
+  }
+  return intervals;
+}
+
+}  // namespace poise::logging

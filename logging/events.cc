@@ -1,0 +1,340 @@
+#include "logging/events.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/contact_history.h"
+#include "logging/schedule_plan.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr double kMilli = 1e3;
+// A push that comes back sooner is the same push, s.
+constexpr double kPushGap = 0.05;
+
+class EventList {
+ public:
+  explicit EventList(const RunRecord& run) : run_(run) {}
+
+  void Add(int64_t tick, std::string name, std::string detail) {
+    events_.push_back({run_.time(tick), std::move(name), std::move(detail)});
+  }
+  /// `begin` and `end` name the events; `what` tells of the first tick, and the end adds how long
+  /// it was.
+  void AddIntervals(const std::vector<Interval>& intervals, const char* begin, const char* end,
+                    const std::function<std::string(int64_t tick)>& what) {
+    for (const Interval& interval : intervals) {
+      const std::string text = what(interval.begin);
+      Add(interval.begin, begin, text);
+      if (!interval.end) continue;
+      Add(*interval.end, end,
+          fmt::format("{}after {:.3f} s", text.empty() ? "" : text + ", ",
+                      run_.time(*interval.end - interval.begin)));
+    }
+  }
+  std::vector<Event> Sorted() && {
+    std::stable_sort(events_.begin(), events_.end(),
+                     [](const Event& a, const Event& b) { return a.time < b.time; });
+    return std::move(events_);
+  }
+
+ private:
+  const RunRecord& run_;
+  std::vector<Event> events_;
+};
+
+void AddPhases(const RunRecord& run, EventList* events) {
+  const std::optional<SchedulePlan> plan = ReadSchedulePlan(run);
+  std::optional<int32_t> phase;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const task_torque_t* task = run.task.at(tick);
+    if (task == nullptr || task->phase == phase) continue;
+    phase = task->phase;
+    const auto i = static_cast<size_t>(*phase);
+    const bool named = plan && i < plan->phases.size() && !plan->phases[i].name.empty();
+    events->Add(tick, "phase_began",
+                named ? fmt::format("phase {}, {}", *phase, plan->phases[i].name)
+                      : fmt::format("phase {}", *phase));
+  }
+}
+
+std::string SupportName(const RunRecord& run, const std::array<bool, 2>& contacts) {
+  if (contacts[0] && contacts[1]) return "both feet";
+  if (!contacts[0] && !contacts[1]) return "no foot";
+  return FootName(run, contacts[0] ? 0 : 1);
+}
+
+void AddSupport(const RunRecord& run, EventList* events) {
+  for (const SupportChange& change : SupportChanges(run)) {
+    events->Add(change.tick, "support_changed",
+                fmt::format("{} to {}; largest torque step {:.3g} N·m in {}",
+                            SupportName(run, change.before), SupportName(run, change.after),
+                            change.torque_step, run.robot.joints()[change.joint].name));
+  }
+}
+
+void AddTransitions(const RunRecord& run, EventList* events) {
+  for (const auto& [kind, begin, end] :
+       {std::tuple{task_torque_t::TRANSITION_UNLOADING, "unloading_begins", "unloading_ends"},
+        std::tuple{task_torque_t::TRANSITION_LOADING, "loading_begins", "loading_ends"}}) {
+    for (size_t foot = 0; foot < 2; ++foot) {
+      const auto holds = [&, wanted = kind](int64_t tick) -> std::optional<bool> {
+        const task_torque_t* task = run.task.at(tick);
+        if (task == nullptr) return {};
+        return task->transition == wanted && task->transition_foot == static_cast<int>(foot);
+      };
+      events->AddIntervals(Intervals(run, holds), begin, end,
+                           [&](int64_t) { return FootName(run, foot); });
+    }
+  }
+}
+
+void AddWaiting(const RunRecord& run, EventList* events) {
+  for (const auto& [reason, text] :
+       {std::pair{task_torque_t::WAITING_COM, "for the COM to come above the stance sole"},
+        std::pair{task_torque_t::WAITING_CONTACT, "for the measured load to confirm the contact"},
+        std::pair{task_torque_t::WAITING_NO_SURFACE, "for good: no surface was found"}}) {
+    const auto holds = [&, wanted = reason](int64_t tick) -> std::optional<bool> {
+      const task_torque_t* task = run.task.at(tick);
+      if (task == nullptr) return {};
+      return task->waiting_for == wanted;
+    };
+    events->AddIntervals(Intervals(run, holds), "waiting_begins", "waiting_ends",
+                         [&, why = text](int64_t) { return std::string(why); });
+  }
+}
+
+void AddFeet(const RunRecord& run, EventList* events) {
+  const task_torque_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const task_torque_t* task = run.task.at(tick);
+    if (task == nullptr) continue;
+    for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
+      const int8_t is = task->foot_state[foot];
+      if (is == before->foot_state[foot]) continue;
+      const double height =
+          kMilli * (task->foot_pose[foot].position[2] - task->foot_pose[1 - foot].position[2]);
+      if (is == task_torque_t::FOOT_SEARCHING) {
+        events->Add(tick, "searching",
+                    fmt::format("{} without contact {:.1f} mm above the other sole",
+                                FootName(run, foot), height));
+      } else if (is == task_torque_t::FOOT_RETRACTED) {
+        events->Add(tick, "no_surface",
+                    fmt::format("{} found no surface down to {:.1f} mm above the other sole; "
+                                "retracted",
+                                FootName(run, foot), height));
+      }
+    }
+    before = task;
+  }
+  for (const TouchDown& touch : TouchDowns(run)) {
+    const std::string foot = FootName(run, touch.foot);
+    events->Add(touch.tick, "contact_confirmed",
+                fmt::format("{}, {:.1f} mm above the other sole", foot, kMilli * touch.height));
+    if (touch.timing != Timing::kEarly && touch.timing != Timing::kLate) continue;
+    const bool early = touch.timing == Timing::kEarly;
+    events->Add(touch.tick, early ? "contact_early" : "contact_late",
+                fmt::format("{}, {:.1f} mm {} the end of its reference", foot,
+                            kMilli * std::abs(*touch.above_end), early ? "above" : "below"));
+  }
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto lost = [&](int64_t tick) -> std::optional<bool> {
+      if (run.command.at(tick - 1) == nullptr || run.sensors.at(tick) == nullptr) return {};
+      return ContactLost(run, foot, tick).value_or(false);
+    };
+    events->AddIntervals(
+        Intervals(run, lost), "contact_lost", "contact_regained", [&](int64_t tick) {
+          const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
+          return fmt::format("{}, which was to carry {:.0f} N", FootName(run, foot), load);
+        });
+  }
+}
+
+void AddBalancing(const RunRecord& run, EventList* events) {
+  for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
+    const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
+      const balance_torque_t* balance = run.balance.at(tick);
+      if (balance == nullptr) return {};
+      return (a == 0 ? balance->active_x : balance->active_y) != 0;
+    };
+    const std::vector<Interval> intervals = Intervals(run, on);
+    for (const Interval& interval : intervals) {
+      const balance_torque_t* balance = run.balance.at(interval.begin);
+      events->Add(interval.begin, "balancing_on",
+                  fmt::format("{}: CoP of the task torque {:.1f} mm, limit {:.1f} mm", name,
+                              kMilli * balance->cop_task[axis], kMilli * balance->cop_limit[axis]));
+      if (!interval.end) continue;
+      events->Add(
+          *interval.end, "balancing_off",
+          fmt::format("{}, after {:.3f} s", name, run.time(*interval.end - interval.begin)));
+    }
+  }
+  const auto not_achieved = [&](int64_t tick) -> std::optional<bool> {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    return balance->status == balance_torque_t::STATUS_NOT_ACHIEVED;
+  };
+  events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
+                       "cop_not_achieved_ends", [&](int64_t tick) {
+                         const balance_torque_t& balance = *run.balance.at(tick);
+                         return fmt::format("CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
+                                            kMilli * balance.cop[0], kMilli * balance.cop[1],
+                                            kMilli * balance.cop_limit[0],
+                                            kMilli * balance.cop_limit[1]);
+                       });
+  const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
+    const joint_command_t* command = run.command.at(tick);
+    if (command == nullptr) return {};
+    return command->eta_feasible == 0;
+  };
+  events->AddIntervals(Intervals(run, infeasible), "eta_infeasible_begins", "eta_infeasible_ends",
+                       [&](int64_t tick) {
+                         return fmt::format("no ratio meets all conditions; eta {:.3f}",
+                                            run.command.at(tick)->eta);
+                       });
+}
+
+std::string BridgeStateName(int8_t state) {
+  switch (state) {
+    case bridge_status_t::STATE_INIT:
+      return "init";
+    case bridge_status_t::STATE_RUNNING:
+      return "running";
+    case bridge_status_t::STATE_DAMPING:
+      return "damping";
+    case bridge_status_t::STATE_STOPPING:
+      return "stopping";
+    case bridge_status_t::STATE_ESTOP:
+      return "emergency stop";
+    default:
+      return fmt::format("state {}", state);
+  }
+}
+
+std::string BridgeReasonName(int8_t reason) {
+  switch (reason) {
+    case bridge_status_t::REASON_NONE:
+      return "";
+    case bridge_status_t::REASON_NO_COMMAND:
+      return "no command";
+    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
+      return "command not finite";
+    case bridge_status_t::REASON_COMMAND_STALE:
+      return "command stale";
+    case bridge_status_t::REASON_COMMAND_SEQUENCE:
+      return "command out of sequence";
+    case bridge_status_t::REASON_COMMAND_SIZE:
+      return "command of wrong size";
+    case bridge_status_t::REASON_COMMAND_RUN:
+      return "command of another run";
+    case bridge_status_t::REASON_OPERATOR:
+      return "operator";
+    case bridge_status_t::REASON_DRIVE_FAULT:
+      return "drive fault";
+    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
+      return "feedback not finite";
+    default:
+      return fmt::format("reason {}", reason);
+  }
+}
+
+void AddBridge(const RunRecord& run, EventList* events) {
+  const bridge_status_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bridge_status_t* bridge = run.bridge.at(tick);
+    if (bridge == nullptr) continue;
+    if (before != nullptr && bridge->state != before->state) {
+      const std::string reason = BridgeReasonName(bridge->reason);
+      events->Add(tick, "bridge_state",
+                  fmt::format("{} to {}{}", BridgeStateName(before->state),
+                              BridgeStateName(bridge->state), reason.empty() ? "" : ": " + reason));
+    }
+    before = bridge;
+  }
+}
+
+Answer PushForce(const RunRecord& run, int64_t tick) {
+  const external_push_t* push = run.push.at(tick);
+  if (push == nullptr) return {};
+  return GetVector3(push->force).norm();
+}
+
+/// N, below which a reading is noise: the sensor's deviation from the record itself, by the median
+/// difference between neighbouring samples, which a push does not touch.
+double PushThreshold(const RunRecord& run) {
+  constexpr double kDeviations = 6;  // of a norm of three: beyond it once in 10^7 samples
+  // Of the norm of three normal variables of deviation 1, and of a difference of two.
+  const double median_of_difference = 1.5382 * std::sqrt(2.0);
+  std::vector<double> differences;
+  for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
+    const external_push_t* before = run.push.at(tick - 1);
+    const external_push_t* now = run.push.at(tick);
+    if (before == nullptr || now == nullptr) continue;
+    differences.push_back((GetVector3(now->force) - GetVector3(before->force)).norm());
+  }
+  if (differences.empty()) return 0;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return kDeviations * *middle / median_of_difference;
+}
+
+void AddPush(const RunRecord& run, EventList* events) {
+  const double threshold = PushThreshold(run);
+  const auto pushed = [&](int64_t tick) -> std::optional<bool> {
+    const Answer force = PushForce(run, tick);
+    if (!force) return {};
+    return *force > threshold;
+  };
+  const auto gap = static_cast<int64_t>(std::ceil(kPushGap / run.spec.tick_period()));
+  for (const Interval& interval : Intervals(run, pushed, gap)) {
+    int64_t peak = interval.begin;
+    for (int64_t tick = peak; tick < interval.end.value_or(run.num_ticks); ++tick) {
+      if (PushForce(run, tick).value_or(0) > *PushForce(run, peak)) peak = tick;
+    }
+    const Eigen::Vector3d force = GetVector3(run.push.at(peak)->force);
+    events->Add(interval.begin, "push_begins", fmt::format("above {:.2g} N", threshold));
+    events->Add(peak, "push_peak",
+                fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), force.x(),
+                            force.y(), force.z()));
+    if (!interval.end) continue;
+    events->Add(*interval.end, "push_ends",
+                fmt::format("after {:.3f} s, peak {:.1f} N",
+                            run.time(*interval.end - interval.begin), force.norm()));
+  }
+}
+
+void AddEnd(const RunRecord& run, EventList* events) {
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (truth == nullptr || truth->fallen == 0) continue;
+    events->Add(tick, "fall", fmt::format("true COM {:.3f} m high", truth->com_position[2]));
+    break;
+  }
+  const int64_t planned = run.spec.num_ticks();
+  events->Add(run.num_ticks, "run_ended",
+              planned > run.num_ticks ? fmt::format("{:.3f} s before its planned end",
+                                                    run.time(planned - run.num_ticks))
+              : planned > 0           ? "planned end"
+                                      : "no end was planned");
+}
+
+}  // namespace
+
+std::vector<Event> Events(const RunRecord& run) {
+  EventList events(run);
+  AddPhases(run, &events);
+  AddSupport(run, &events);
+  AddTransitions(run, &events);
+  AddWaiting(run, &events);
+  AddFeet(run, &events);
+  AddBalancing(run, &events);
+  AddBridge(run, &events);
+  AddPush(run, &events);
+  AddEnd(run, &events);
+  return std::move(events).Sorted();
+}
+
+}  // namespace poise::logging

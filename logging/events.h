@@ -1,0 +1,26 @@
+// What happened in a run, in words.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "logging/run_record.h"
+
+namespace poise::logging {
+
+struct Event {
+  double time = 0;     ///< s
+  std::string name;    ///< stable identifier, "contact_early"
+  std::string detail;  ///< for people, with numbers and units
+};
+
+/// All of the run, first_tick or not, in order of time; found in its messages alone. Names:
+/// phase_began, support_changed, unloading_begins, unloading_ends, loading_begins, loading_ends,
+/// waiting_begins, waiting_ends, searching, contact_confirmed, contact_early, contact_late,
+/// no_surface, contact_lost, contact_regained, balancing_on, balancing_off, eta_infeasible_begins,
+/// eta_infeasible_ends, cop_not_achieved_begins, cop_not_achieved_ends, bridge_state, push_begins,
+/// push_peak, push_ends, fall, run_ended. What was so at the first tick is no event, and what lasts
+/// to the run's end has no end.
+std::vector<Event> Events(const RunRecord& run);
+
+}  // namespace poise::logging

@@ -1,0 +1,35 @@
+// What the scenario planned, read from the run's own configuration.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "logging/run_record.h"
+
+namespace poise::logging {
+
+/// Where a phase sends the foot that is off the ground.
+struct FootPlan {
+  int foot = 0;
+  double z = 0;  ///< m, shift of its reference, or height above the other sole
+  bool above_support = false;
+  bool at_once = false;  ///< a step: the reference stands at its end from the phase's first tick
+};
+
+struct PhasePlan {
+  std::string name;
+  std::optional<FootPlan> foot;
+};
+
+struct SchedulePlan {
+  std::vector<PhasePlan> phases;
+  double expected_within = 0;  ///< m, a contact further from its reference's end is early or late
+};
+
+/// Of the component that writes TASK_TORQUE. Empty when the run names no such configuration, when
+/// it does not fit this version's schema, or when the program does not link that schema: logging
+/// knows it by name only, since it includes no component's folder.
+std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run);
+
+}  // namespace poise::logging

@@ -1,0 +1,268 @@
+#include "logging/events.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "components/task_controller/task_controller.pb.h"
+#include "google/protobuf/text_format.h"
+#include "tests/logging/record_fixture.h"
+
+namespace poise::logging {
+
+void PrintTo(const Event& event, std::ostream* out) {
+  *out << event.time << " " << event.name << ": " << event.detail;
+}
+
+namespace {
+
+using testing::AllOf;
+using testing::DoubleNear;
+using testing::ElementsAre;
+using testing::Field;
+using testing::HasSubstr;
+
+auto Is(double time, const std::string& name, const std::string& detail = "") {
+  return AllOf(Field("time", &Event::time, DoubleNear(time, 1e-12)),
+               Field("name", &Event::name, name),
+               Field("detail", &Event::detail, HasSubstr(detail)));
+}
+
+class EventsTest : public RecordTest {
+ protected:
+  /// The plan in the run's own configuration.
+  void Plan(const TaskControllerConfig& config) {
+    ComponentConfig* part = spec_.add_config();
+    part->set_component("task_controller");
+    google::protobuf::TextFormat::PrintToString(config, part->mutable_text());
+  }
+  static TaskControllerConfig StepDown() {
+    TaskControllerConfig config;
+    config.add_phase()->set_name("stand");
+    Phase* down = config.add_phase();
+    down->set_name("set down");
+    down->mutable_foot()->set_foot(LEFT_FOOT);
+    down->mutable_foot()->set_height_above_support(0.09);
+    down->mutable_foot()->set_duration(0.1);
+    return config;
+  }
+  /// The left foot off the ground from tick 20 on, in phase 1.
+  void LiftLeft() {
+    for (size_t t = 20; t < kTicks; ++t) {
+      task_[t].phase = 1;
+      task_[t].in_contact[1] = command_[t].in_contact[1] = 0;
+      task_[t].foot_state[1] = task_torque_t::FOOT_SWING;
+      task_[t].foot_pose[1].position[2] = task_[t].foot_desired[1].position[2] = 0.12;
+    }
+  }
+  std::vector<Event> Named(const std::string& name) {
+    std::vector<Event> found;
+    for (const Event& event : Events(Read())) {
+      if (event.name == name) found.push_back(event);
+    }
+    return found;
+  }
+};
+
+TEST_F(EventsTest, ARunAtRestBeginsAndEnds) {
+  spec_.set_num_ticks(kTicks);
+  EXPECT_THAT(Events(Read()),
+              ElementsAre(Is(0, "phase_began", "phase 0"), Is(0.2, "run_ended", "planned end")));
+}
+
+TEST_F(EventsTest, ARunThatFallsEndsEarly) {
+  spec_.set_num_ticks(2 * kTicks);
+  for (size_t t = 70; t < kTicks; ++t) {
+    truth_[t].fallen = 1;
+    truth_[t].com_position[2] = 0.4;
+  }
+  EXPECT_THAT(Events(Read()), ElementsAre(Is(0, "phase_began"), Is(0.14, "fall", "0.400 m"),
+                                          Is(0.2, "run_ended", "0.200 s before")));
+}
+
+TEST_F(EventsTest, PhasesCarryTheirNames) {
+  LiftLeft();
+  EXPECT_THAT(Named("phase_began"),
+              ElementsAre(Is(0, "phase_began", "phase 0"), Is(0.04, "phase_began", "phase 1")));
+  Plan(StepDown());
+  EXPECT_THAT(Named("phase_began"), ElementsAre(Is(0, "phase_began", "phase 0, stand"),
+                                                Is(0.04, "phase_began", "phase 1, set down")));
+}
+
+TEST_F(EventsTest, APlanThatDoesNotFitLeavesThePhasesUnnamed) {
+  ComponentConfig* part = spec_.add_config();
+  part->set_component("task_controller");
+  part->set_text("phase { name: \"stand\" warp: 9 }");
+  EXPECT_THAT(Named("phase_began"), ElementsAre(Field(&Event::detail, "phase 0")));
+}
+
+TEST_F(EventsTest, SupportChangeNamesTheJointOfTheLargestStep) {
+  LiftLeft();
+  for (size_t t = 20; t < kTicks; ++t) {
+    command_[t].torque[3] = -0.21;
+    command_[t].torque[9] = 0.1;
+  }
+  const RunRecord run = Read();
+  EXPECT_THAT(Named("support_changed"),
+              ElementsAre(Is(0.04, "support_changed",
+                             "both feet to right foot; largest torque step 0.21 N·m in " +
+                                 run.robot.joints()[3].name)));
+}
+
+TEST_F(EventsTest, TransitionsAndWaiting) {
+  for (size_t t = 5; t < 10; ++t) {
+    task_[t].status = task_torque_t::STATUS_WAITING;
+    task_[t].waiting_for = task_torque_t::WAITING_COM;
+  }
+  for (size_t t = 10; t < 20; ++t) {
+    task_[t].transition = task_torque_t::TRANSITION_UNLOADING;
+    task_[t].transition_foot = 1;
+  }
+  for (size_t t = 40; t < 50; ++t) {
+    task_[t].transition = task_torque_t::TRANSITION_LOADING;
+    task_[t].transition_foot = 0;
+  }
+  for (size_t t = 60; t < kTicks; ++t) task_[t].waiting_for = task_torque_t::WAITING_NO_SURFACE;
+  EXPECT_THAT(
+      Events(Read()),
+      ElementsAre(Is(0, "phase_began"), Is(0.01, "waiting_begins", "above the stance sole"),
+                  Is(0.02, "unloading_begins", "left foot"),
+                  Is(0.02, "waiting_ends", "after 0.010 s"),
+                  Is(0.04, "unloading_ends", "left foot, after 0.020 s"),
+                  Is(0.08, "loading_begins", "right foot"), Is(0.1, "loading_ends", "right foot"),
+                  Is(0.12, "waiting_begins", "no surface"), Is(0.2, "run_ended")));
+}
+
+TEST_F(EventsTest, AContactAboveTheReferencesEndIsEarly) {
+  Plan(StepDown());
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
+    task_[t].foot_pose[1].position[2] = 0.115;
+  }
+  EXPECT_THAT(Named("contact_confirmed"),
+              ElementsAre(Is(0.1, "contact_confirmed", "left foot, 115.0 mm above")));
+  EXPECT_THAT(Named("contact_early"),
+              ElementsAre(Is(0.1, "contact_early", "left foot, 25.0 mm above")));
+  EXPECT_TRUE(Named("contact_late").empty());
+}
+
+TEST_F(EventsTest, AContactFoundBySearchingIsLate) {
+  Plan(StepDown());
+  LiftLeft();
+  for (size_t t = 30; t < 50; ++t) task_[t].foot_state[1] = task_torque_t::FOOT_SEARCHING;
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = task_torque_t::FOOT_SUPPORT;
+    task_[t].foot_pose[1].position[2] = 0.06;
+  }
+  EXPECT_THAT(Named("searching"), ElementsAre(Is(0.06, "searching", "left foot")));
+  EXPECT_THAT(Named("contact_confirmed"), ElementsAre(Is(0.1, "contact_confirmed", "60.0 mm")));
+  EXPECT_THAT(Named("contact_late"), ElementsAre(Is(0.1, "contact_late", "30.0 mm below")));
+}
+
+TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
+  TaskControllerConfig config = StepDown();
+  Plan(config);
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
+    task_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
+  }
+  EXPECT_EQ(Named("contact_confirmed").size(), 1u);
+  EXPECT_TRUE(Named("contact_early").empty());
+  // What counts as expected is the configuration's.
+  config.mutable_contact()->set_expected_within(0.004);
+  spec_.clear_config();
+  Plan(config);
+  EXPECT_EQ(Named("contact_early").size(), 1u);
+}
+
+TEST_F(EventsTest, AReferenceWithoutHeightEndsBelowWhereItBegan) {
+  TaskControllerConfig config = StepDown();
+  config.mutable_phase(1)->mutable_foot()->clear_height_above_support();
+  config.mutable_phase(1)->mutable_foot()->set_z(-0.1);  // from 0.12 to 0.02
+  Plan(config);
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
+  EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "100.0 mm above")));
+}
+
+TEST_F(EventsTest, NoSurface) {
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = task_torque_t::FOOT_RETRACTED;
+    task_[t].foot_pose[1].position[2] = -0.06;
+  }
+  EXPECT_THAT(Named("no_surface"), ElementsAre(Is(0.1, "no_surface", "-60.0 mm")));
+}
+
+TEST_F(EventsTest, ContactIsLostWhenALoadedFootReadsOnlyNoise) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    // The right foot is to carry 300 N and does, but for ticks 30..39; the left foot 5 N.
+    command_[t].foot_wrench[0].force[2] = -300;
+    sensors_[t].foot_wrench[0].force[2] = t >= 30 && t < 40 ? 2 : -290;
+    command_[t].foot_wrench[1].force[2] = -5;
+  }
+  EXPECT_THAT(Named("contact_lost"), ElementsAre(Is(0.06, "contact_lost", "right foot")));
+  EXPECT_THAT(Named("contact_regained"), ElementsAre(Is(0.08, "contact_regained", "300 N")));
+}
+
+TEST_F(EventsTest, BalancingOfEachAxis) {
+  for (size_t t = 20; t < 30; ++t) {
+    balance_[t].active_y = 1;
+    balance_[t].cop_task[1] = -0.085;
+  }
+  balance_[99].active_x = 1;
+  for (size_t t = 25; t < 28; ++t) balance_[t].status = balance_torque_t::STATUS_NOT_ACHIEVED;
+  command_[26].eta_feasible = 0;
+  EXPECT_THAT(Events(Read()),
+              ElementsAre(Is(0, "phase_began"),
+                          Is(0.04, "balancing_on", "y: CoP of the task torque -85.0 mm, limit 70"),
+                          Is(0.05, "cop_not_achieved_begins", "limits (130.0, 70.0) mm"),
+                          Is(0.052, "eta_infeasible_begins"), Is(0.054, "eta_infeasible_ends"),
+                          Is(0.056, "cop_not_achieved_ends", "after 0.006 s"),
+                          Is(0.06, "balancing_off", "y, after 0.020 s"),
+                          Is(0.198, "balancing_on", "x"), Is(0.2, "run_ended")));
+}
+
+TEST_F(EventsTest, BridgeStatesCarryTheirReason) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    bridge_[t].state = t < 2    ? bridge_status_t::STATE_INIT
+                       : t < 50 ? bridge_status_t::STATE_RUNNING
+                                : bridge_status_t::STATE_DAMPING;
+    bridge_[t].reason =
+        t < 50 ? bridge_status_t::REASON_NONE : bridge_status_t::REASON_COMMAND_STALE;
+  }
+  EXPECT_THAT(Named("bridge_state"),
+              ElementsAre(Is(0.004, "bridge_state", "init to running"),
+                          Is(0.1, "bridge_state", "running to damping: command stale")));
+}
+
+TEST_F(EventsTest, APushStandsOutOfItsSensorsNoise) {
+  // Noise of a sign that changes: differences of 0.4 N everywhere; a push of 20 ticks upon it.
+  for (size_t t = 0; t < kTicks; ++t) push_[t].force[0] = t % 2 == 0 ? 0.2 : -0.2;
+  EXPECT_TRUE(Named("push_begins").empty());
+  for (size_t t = 40; t <= 60; ++t) {
+    push_[t].force[1] = 100 * std::sin(std::numbers::pi * static_cast<double>(t - 40) / 20);
+  }
+  EXPECT_THAT(Named("push_begins"), ElementsAre(Is(0.082, "push_begins")));
+  EXPECT_THAT(Named("push_peak"), ElementsAre(Is(0.1, "push_peak", "100.0 N")));
+  EXPECT_THAT(Named("push_ends"), ElementsAre(Is(0.12, "push_ends", "after 0.038 s")));
+}
+
+TEST_F(EventsTest, APushWithAShortDipIsOne) {
+  for (size_t t = 40; t < 50; ++t) push_[t].force[1] = t == 45 ? 0 : 10;
+  EXPECT_EQ(Named("push_begins").size(), 1u);
+  for (size_t t = 90; t < 95; ++t) push_[t].force[1] = 10;
+  EXPECT_EQ(Named("push_begins").size(), 2u);
+}
+
+TEST_F(EventsTest, AMissingMessageEndsNothing) {
+  for (size_t t = 20; t < 30; ++t) balance_[t].active_y = 1;
+  balance_[25].run_id = 43;  // refused
+  EXPECT_EQ(Named("balancing_on").size(), 1u);
+}
+
+}  // namespace
+}  // namespace poise::logging

@@ -1,0 +1,85 @@
+#include "tests/logging/record_fixture.h"
+
+#include <cmath>
+
+#include "logging/metrics.h"
+
+namespace poise::logging {
+namespace {
+
+template <class T>
+T Sized(int64_t tick) {
+  T message{};
+  MessageTraits<T>::Resize(message,
+                           MessageTraits<T>::kCountNames.size() == 2   ? std::vector<int32_t>{12, 2}
+                           : MessageTraits<T>::kCountNames.size() == 1 ? std::vector<int32_t>{12}
+                                                                       : std::vector<int32_t>{});
+  SetHeader(tick, &message);
+  return message;
+}
+
+void SetIdentity(pose_t* pose) { pose->orientation[0] = 1; }
+
+}  // namespace
+
+RecordTest::RecordTest() {
+  for (int64_t t = 0; t < kTicks; ++t) {
+    sensors_.push_back(Sized<robot_sensors_t>(t));
+    state_.push_back(Sized<robot_state_t>(t));
+    task_.push_back(Sized<task_torque_t>(t));
+    balance_.push_back(Sized<balance_torque_t>(t));
+    command_.push_back(Sized<joint_command_t>(t));
+    bridge_.push_back(Sized<bridge_status_t>(t));
+    push_.push_back(Sized<external_push_t>(t));
+    truth_.push_back(Sized<ground_truth_t>(t));
+    state_.back().base_orientation[0] = truth_.back().base_orientation[0] = 1;
+    SetIdentity(&balance_.back().frame_o);
+    balance_.back().cop_limit[0] = 0.13;
+    balance_.back().cop_limit[1] = 0.07;
+    task_.back().transition_foot = -1;
+    command_.back().eta_feasible = 1;
+    for (size_t foot = 0; foot < 2; ++foot) {
+      SetIdentity(&task_.back().foot_pose[foot]);
+      SetIdentity(&task_.back().foot_desired[foot]);
+      task_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
+      task_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
+      command_.back().conditions_met[foot] = 1;
+      command_.back().margins[foot] = {1, 1, 1, 1, 1};
+    }
+  }
+}
+
+RunRecord RecordTest::Read() {
+  std::vector<RawEvent> events = {RunInfoEvent(spec_)};
+  for (size_t t = 0; t < kTicks; ++t) {
+    Add("ROBOT_SENSORS", sensors_[t], &events);
+    Add("ROBOT_STATE", state_[t], &events);
+    Add("TASK_TORQUE", task_[t], &events);
+    Add("BALANCE_TORQUE", balance_[t], &events);
+    Add("JOINT_COMMAND", command_[t], &events);
+    Add("BRIDGE_STATUS", bridge_[t], &events);
+    Add("EXTERNAL_PUSH", push_[t], &events);
+    Add("GROUND_TRUTH", truth_[t], &events);
+  }
+  WriteRawLog(path_, events);
+  return ReadRun(path_);
+}
+
+double RecordTest::Measure(const std::string& name, double from) {
+  RunRecord run = Read();
+  run.first_tick = std::llround(from / kPeriod);
+  const Metric* metric = FindMetric(name);
+  EXPECT_NE(metric, nullptr) << name;
+  if (metric == nullptr) return -1e9;
+  const Answer value = metric->compute(run);
+  EXPECT_TRUE(value.has_value()) << name;
+  return value.value_or(-1e9);
+}
+
+bool RecordTest::Unanswered(const std::string& name) {
+  const Metric* metric = FindMetric(name);
+  EXPECT_NE(metric, nullptr) << name;
+  return metric != nullptr && !metric->compute(Read()).has_value();
+}
+
+}  // namespace poise::logging
