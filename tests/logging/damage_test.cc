@@ -6,6 +6,7 @@
 
 #include "components/robot/robot_model.h"
 #include "logging/compare.h"
+#include "logging/events.h"
 #include "logging/metrics.h"
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
@@ -85,6 +86,7 @@ TEST_F(DamageTest, RunInfoWithRandomDamage) {
     try {
       RunRecord run = ReadRun(path);
       for (const Metric& metric : Metrics()) metric.compute(run);
+      Events(run);
       ++read;
     } catch (const LogError& error) {
       what = error.what();
