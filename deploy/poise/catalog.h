@@ -16,7 +16,8 @@ std::filesystem::path DeployDir();
 std::filesystem::path FindFile(const std::string& kind, const std::string& name,
                                const std::filesystem::path& base);
 
-/// Names that FindFile takes, sorted.
+/// Names that FindFile takes, sorted. What is in a folder named base is not: files that others are
+/// based on.
 std::vector<std::string> ListNames(const std::string& kind);
 
 }  // namespace poise

@@ -71,8 +71,8 @@ int CheckByName(const std::string& name) {
   const LoadedScenario loaded = LoadScenario(name, {});
   RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
   CheckRun(loaded, &spec);
-  fmt::print("{} with {}: {} components, {} channels, all good\n", loaded.file, loaded.graph_file,
-             spec.graph().component_size(), spec.graph().channel_size());
+  fmt::print("{} with {}: {} components, {} channels, all good\n", loaded.files.file(),
+             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size());
   ShowRun(spec);
   return kExitOk;
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <functional>
 #include <memory>
 
 #include "components/framework/configuration.h"
@@ -6,26 +7,30 @@
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/registry.h"
-#include "deploy/poise/scenario.pb.h"
+#include "deploy/poise/scenario_files.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
 
 namespace poise {
 namespace {
 
-/// One line a file: its name and what `describe` says of the message it holds; a file that does not
-/// parse shows its error.
-template <class Message, class Describe>
-void ListFiles(const std::string& kind, Describe describe) {
+template <class Message>
+Message ReadMessage(const std::string& file) {
+  Message message;
+  ReadTextProto(file, &message);
+  return message;
+}
+
+/// One line a file: its name and what `describe` says of it; a ConfigError is shown instead.
+void ListFiles(const std::string& kind,
+               const std::function<std::string(const std::string& file)>& describe) {
   const std::vector<std::string> names = ListNames(kind);
   size_t width = 0;
   for (const std::string& name : names) width = std::max(width, name.size());
   for (const std::string& name : names) {
     std::string text;
     try {
-      Message message;
-      ReadTextProto((DeployDir() / kind / (name + ".pbtxt")).string(), &message);
-      text = describe(message);
+      text = describe((DeployDir() / kind / (name + ".pbtxt")).string());
     } catch (const ConfigError& error) {
       text = error.what();
     }
@@ -40,16 +45,19 @@ int List(const std::string& what) {
     return all || what == kind;
   };
   if (wanted("scenarios")) {
-    ListFiles<Scenario>("scenarios", [](const Scenario& s) {
+    ListFiles("scenarios", [](const std::string& file) {
+      const Scenario s = ScenarioFiles(file).Merged();
       return fmt::format("{} ({} s{})", s.description(), s.duration(),
                          s.has_paper_section() ? ", paper section " + s.paper_section() : "");
     });
   }
   if (wanted("robots")) {
-    ListFiles<Robot>("robots", [](const Robot& r) { return "URDF " + r.urdf(); });
+    ListFiles("robots",
+              [](const std::string& file) { return "URDF " + ReadMessage<Robot>(file).urdf(); });
   }
   if (wanted("graphs")) {
-    ListFiles<Graph>("graphs", [](const Graph& g) {
+    ListFiles("graphs", [](const std::string& file) {
+      const Graph g = ReadMessage<Graph>(file);
       return fmt::format("{} ({} components, {} channels)", g.description(), g.component_size(),
                          g.channel_size());
     });

@@ -13,13 +13,10 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "components/framework/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
-#include "deploy/poise/catalog.h"
 #include "deploy/poise/registry.h"
 #include "fmt/format.h"
-#include "logging/metrics.h"
 
 namespace poise {
 namespace {
@@ -29,59 +26,6 @@ namespace fs = std::filesystem;
 // Below the ephemeral ports that the system gives to sockets of its own choice.
 constexpr int kFirstPort = 12000;
 constexpr int kLastPort = 32000;
-constexpr double kMinRate = 50;     // Hz
-constexpr double kMaxRate = 10000;  // Hz
-
-[[noreturn]] void Fail(const LoadedScenario& loaded, std::string_view field,
-                       std::string_view problem) {
-  const auto set_by = [&](const std::string& path) {
-    return field == path || field.starts_with(path + ".") || path.starts_with(std::string(field));
-  };
-  if (std::any_of(loaded.changed.begin(), loaded.changed.end(), set_by)) {
-    throw ConfigError(fmt::format("--set {}: {}", field, problem));
-  }
-  const int line = LocateField(loaded.source, field, loaded.scenario);
-  if (line > 0) throw ConfigError(fmt::format("{}:{}: {}: {}", loaded.file, line, field, problem));
-  throw ConfigError(fmt::format("{}: {}: {}", loaded.file, field, problem));
-}
-
-void CheckScenario(const LoadedScenario& loaded) {
-  const Scenario& s = loaded.scenario;
-  if (!s.has_robot()) Fail(loaded, "robot", "is missing; name one of deploy/robots");
-  if (!(s.duration() > 0) || s.duration() > 36000) {
-    Fail(loaded, "duration", fmt::format("is {} s; must be in (0, 36000]", s.duration()));
-  }
-  if (!(s.tick_rate() >= kMinRate && s.tick_rate() <= kMaxRate)) {
-    Fail(loaded, "tick_rate",
-         fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
-  }
-  if (!(s.check_from() >= 0 && s.check_from() < s.duration())) {
-    Fail(loaded, "check_from", "must be in [0, duration)");
-  }
-  std::vector<std::string> names;
-  for (const logging::Metric& metric : logging::Metrics()) names.push_back(metric.name);
-  for (int i = 0; i < s.check_size(); ++i) {
-    if (logging::FindMetric(s.check(i).metric()) == nullptr) {
-      Fail(loaded, fmt::format("check[{}].metric", i),
-           fmt::format("no metric named '{}'; {}; see `poise list metrics`",
-                       s.check(i).metric(), Suggest(s.check(i).metric(), names)));
-    }
-    if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
-        s.check(i).at_most() < s.check(i).at_least()) {
-      Fail(loaded, fmt::format("check[{}].at_most", i), "is smaller than at_least");
-    }
-  }
-  for (int i = 0; i < s.assumption_size(); ++i) {
-    const Assumption& assumption = s.assumption(i);
-    if (LocateField(loaded.source, assumption.field(), s) == 0) {
-      Fail(loaded, fmt::format("assumption[{}].field", i),
-           fmt::format("the scenario sets no field '{}'", assumption.field()));
-    }
-    if (assumption.kind() != "fitted" && assumption.kind() != "assumed") {
-      Fail(loaded, fmt::format("assumption[{}].kind", i), "must be \"fitted\" or \"assumed\"");
-    }
-  }
-}
 
 /// The scenario's field with the configuration of a component; nullptr when it has none of that
 /// name.
@@ -145,57 +89,14 @@ bool PortsFree(int first, int count) {
 
 }  // namespace
 
-LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
-  LoadedScenario loaded;
-  loaded.file = FindFile("scenarios", name, fs::current_path()).string();
-  loaded.source = ReadFile(loaded.file);
-  ParseTextProto(loaded.source, loaded.file, &loaded.scenario);
-  for (const std::string& change : changes.set) {
-    const size_t equals = change.find('=');
-    if (equals == std::string::npos || equals == 0) {
-      throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
-    }
-    const std::string path = change.substr(0, equals);
-    try {
-      SetField(&loaded.scenario, path, change.substr(equals + 1));
-    } catch (const ConfigError& error) {
-      throw ConfigError(fmt::format("--set {}", error.what()));
-    }
-    loaded.changed.push_back(path);
-  }
-  if (changes.duration) {
-    loaded.scenario.set_duration(*changes.duration);
-    loaded.changed.push_back("duration");
-  }
-  if (changes.seed) loaded.scenario.set_seed(*changes.seed);
-  CheckScenario(loaded);
-  const fs::path folder = fs::path(loaded.file).parent_path();
-  try {
-    loaded.graph_file = FindFile("graphs", loaded.scenario.graph(), folder).string();
-  } catch (const ConfigError& error) {
-    Fail(loaded, "graph", error.what());
-  }
-  try {
-    loaded.robot_file = FindFile("robots", loaded.scenario.robot(), folder).string();
-  } catch (const ConfigError& error) {
-    Fail(loaded, "robot", error.what());
-  }
-  return loaded;
-}
-
-std::string ScenarioText(const Scenario& scenario) {
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(scenario, &text);
-  return text;
-}
-
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings) {
   const Scenario& scenario = loaded.scenario;
   RunSpec spec;
   std::random_device random;
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
-  spec.set_scenario(scenario.has_name() ? scenario.name() : fs::path(loaded.file).stem().string());
+  spec.set_scenario(scenario.has_name() ? scenario.name()
+                                        : fs::path(loaded.files.file()).stem().string());
   ReadTextProto(loaded.graph_file, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
@@ -245,7 +146,7 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
         break;
       }
     }
-    Fail(loaded, field, error.problem());
+    FailField(loaded, field, error.problem());
   }
 }
 

@@ -1,42 +1,14 @@
-// From a scenario's name and the command line to a checked run.
+// From a scenario to a checked run.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "components/framework/graph.h"
 #include "components/framework/graph.pb.h"
-#include "deploy/poise/scenario.pb.h"
+#include "deploy/poise/scenario_loading.h"
 
 namespace poise {
-
-/// What the command line changes.
-struct RunChanges {
-  std::vector<std::string> set;    ///< "field.path=value", as SetField takes them, in order
-  std::optional<double> duration;  ///< s
-  std::optional<uint64_t> seed;
-  double drop_rate = 0;
-  bool realtime = false;
-};
-
-/// A scenario read and resolved to files.
-struct LoadedScenario {
-  std::string file;
-  std::string source;                ///< text of the file, for the lines of errors
-  Scenario scenario;                 ///< with the changes
-  std::vector<std::string> changed;  ///< paths of the fields that --set changed
-  std::string graph_file;
-  std::string robot_file;
-};
-
-/// Reads and checks the scenario itself: duration, rate, metrics and limits of its checks,
-/// assumptions that name fields. Throws ConfigError, "file:line: field: problem; what to do".
-LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes);
-
-/// The scenario with its changes as protobuf text.
-std::string ScenarioText(const Scenario& scenario);
 
 /// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
 /// No ports yet. Throws ConfigError, or RobotError when the robot's files cannot work; what is odd

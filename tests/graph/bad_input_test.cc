@@ -23,18 +23,12 @@ class BadInputTest : public testing::Test {
     return file_;
   }
 
-  /// One line beginning with "poise: ", holding every one of `parts`; exit code 2; no run folder.
+  /// A usage error, and no run folder.
   void ExpectRefused(const std::vector<std::string>& arguments,
                      const std::vector<std::string>& parts) {
     std::vector<std::string> all = arguments;
     if (arguments[0] == "run") all.insert(all.end(), {"--inline", "--out", folder_ / "run"});
-    const ProgramResult result = RunPoise(all);
-    EXPECT_EQ(result.exit_code, 2) << result.output;
-    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
-    EXPECT_EQ(result.output.find("poise: "), 0u) << result.output;
-    for (const std::string& part : parts) {
-      EXPECT_NE(result.output.find(part), std::string::npos) << part << " in " << result.output;
-    }
+    ExpectUsageError(all, parts);
     EXPECT_FALSE(std::filesystem::exists(folder_ / "run"));
   }
 
@@ -114,6 +108,7 @@ TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
   const std::filesystem::path folder = POISE_SOURCE_DIR "/deploy/scenarios";
   int checked = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;  // base/: not to be run by themselves
     const ProgramResult result = RunPoise({"graph", "check", entry.path().string()});
     EXPECT_EQ(result.exit_code, 0) << result.output;
     ++checked;

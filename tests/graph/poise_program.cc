@@ -1,10 +1,12 @@
 #include "tests/graph/poise_program.h"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -62,6 +64,17 @@ ProgramResult PoiseProgram::Wait() {
 
 ProgramResult RunPoise(const std::vector<std::string>& arguments) {
   return PoiseProgram(arguments).Wait();
+}
+
+void ExpectUsageError(const std::vector<std::string>& arguments,
+                      const std::vector<std::string>& parts) {
+  const ProgramResult result = RunPoise(arguments);
+  EXPECT_EQ(result.exit_code, 2) << result.output;
+  EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+  EXPECT_EQ(result.output.find("poise: "), 0u) << result.output;
+  for (const std::string& part : parts) {
+    EXPECT_NE(result.output.find(part), std::string::npos) << part << " in " << result.output;
+  }
 }
 
 RunFolder::RunFolder() {

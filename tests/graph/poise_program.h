@@ -40,6 +40,11 @@ class PoiseProgram {
 /// Runs `poise ARGUMENTS` to its end.
 ProgramResult RunPoise(const std::vector<std::string>& arguments);
 
+/// Expects that `poise ARGUMENTS` ends with exit code 2 and one line that begins with "poise: " and
+/// holds every one of `parts`.
+void ExpectUsageError(const std::vector<std::string>& arguments,
+                      const std::vector<std::string>& parts);
+
 /// A folder that goes with the test, for runs.
 class RunFolder {
  public:

@@ -1,0 +1,51 @@
+// A scenario's file and the files it is based on.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "deploy/poise/scenario.pb.h"
+
+namespace poise {
+
+/// Where a field of the merged scenario was written.
+struct FieldPlace {
+  std::string file;
+  int line = 0;       ///< from 1
+  std::string field;  ///< its path in that file: list indexes count that file's own elements
+};
+
+/// Scenario.base followed to its end. Immutable.
+class ScenarioFiles {
+ public:
+  /// Reads `file`, its base, and so on. Throws ConfigError "file:line: base: problem": no such
+  /// file, bases that form a loop; and ParseTextProto's.
+  explicit ScenarioFiles(const std::filesystem::path& file);
+
+  /// All fields: the furthest base's first, single values replaced, lists appended. `base` is gone.
+  Scenario Merged() const;
+  /// File of the scenario itself.
+  const std::string& file() const { return files_.back().name; }
+  /// The place of `field`, a path in the merged scenario, or of the nearest enclosing field that
+  /// any file sets; of several files, of the one that counts. `line` 0 and the scenario's own file
+  /// when there is none.
+  FieldPlace Locate(std::string_view field) const;
+  /// Folder to which a file name in `field`, a path in the merged scenario, is relative.
+  std::filesystem::path FolderOf(std::string_view field) const;
+
+ private:
+  struct File {
+    std::string name;
+    std::string text;
+    Scenario fields;  ///< its own alone
+  };
+  std::vector<File> files_;  // the furthest base first
+};
+
+/// True when `message` sets the field with dotted path `field` ("push[0].peak"; a list without
+/// index has elements).
+bool HasField(const google::protobuf::Message& message, std::string_view field);
+
+}  // namespace poise

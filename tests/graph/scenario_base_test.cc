@@ -1,0 +1,193 @@
+// Scenarios that are based on other files.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "components/framework/configuration.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+/// base/robot.pbtxt is the scenario "stand" with one check; derived.pbtxt is based on it.
+class ScenarioBaseTest : public testing::Test {
+ protected:
+  ScenarioBaseTest() {
+    std::filesystem::create_directory(folder_ / "base");
+    std::string text;
+    std::istringstream lines(ReadFile(StandScenario()));
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.starts_with("check")) text += line + "\n";
+    }
+    Write("base/robot", text + "check { metric: \"fallen\" at_most: 0 }\n");
+  }
+
+  std::string File(const std::string& name) const { return folder_ / (name + ".pbtxt"); }
+
+  std::string Write(const std::string& name, const std::string& text) {
+    std::ofstream(File(name)) << text;
+    return File(name);
+  }
+
+  /// A scenario based on base/robot with `text` from line 2 on.
+  std::string Derived(const std::string& text) {
+    return Write("derived", "base: \"base/robot\"\n" + text);
+  }
+
+  /// The line of base/robot that begins with `start`, spaces aside, as "FILE:LINE: ".
+  std::string BaseLine(const std::string& start) const {
+    std::istringstream lines(ReadFile(File("base/robot")));
+    int number = 0;
+    for (std::string line; std::getline(lines, line);) {
+      ++number;
+      if (line.find_first_not_of(' ') == line.find(start)) {
+        return File("base/robot") + ":" + std::to_string(number) + ": ";
+      }
+    }
+    ADD_FAILURE() << start;
+    return "";
+  }
+
+  /// `poise graph check` refuses the scenario with a message that holds `parts`.
+  void ExpectRefused(const std::string& file, const std::vector<std::string>& parts) {
+    ExpectUsageError({"graph", "check", file}, parts);
+  }
+
+  RunFolder folder_;
+};
+
+TEST_F(ScenarioBaseTest, SingleValuesAreReplacedAndListsAppended) {
+  const std::string file = Derived(
+      "duration: 0.1\n"
+      "redistributor { double_support { half_width: 0.06 } }\n"
+      "check { metric: \"push_peak\" }\n");
+  const ProgramResult result = RunPoise({"run", file, "--inline", "--out", folder_ / "run"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  const nlohmann::json summary = ReadSummary(folder_ / "run");
+  EXPECT_EQ(summary["planned_ticks"], 50);
+  const nlohmann::json& checks = summary["checks"];
+  ASSERT_EQ(checks.size(), 7u);  // five of every run
+  EXPECT_EQ(checks[5]["name"], "fallen");
+  EXPECT_EQ(checks[6]["name"], "push_peak");
+
+  // The run's folder has the whole scenario, which runs by itself.
+  const std::string merged = ReadFile(folder_ / "run/scenario.pbtxt");
+  EXPECT_EQ(merged.find("base:"), std::string::npos) << merged;
+  EXPECT_NE(merged.find("half_length: 0.12\n    half_width: 0.06\n"), std::string::npos) << merged;
+  const ProgramResult again = RunPoise(
+      {"run", folder_ / "run/scenario.pbtxt", "--inline", "--out", folder_ / "again", "--quiet"});
+  EXPECT_EQ(again.exit_code, 0) << again.output;
+  const ProgramResult same = RunPoise({"compare", folder_ / "run", folder_ / "again"});
+  EXPECT_EQ(same.exit_code, 0) << same.output;
+}
+
+TEST_F(ScenarioBaseTest, AnErrorNamesTheFileThatSetTheField) {
+  Derived("description: \"x\"\ncheck { metric: \"push_peek\" }\n");
+  ExpectRefused(File("derived"), {File("derived") + ":3: check[0].metric", "push_peak"});
+  Derived("duration: -2\n");
+  ExpectRefused(File("derived"), {File("derived") + ":2: duration"});
+  Derived("redistributor {\n  double_support {\n    half_width: -1 } }\n");
+  ExpectRefused(File("derived"), {File("derived") + ":4: redistributor.double_support.half_width"});
+  Derived("no_such: 1\n");
+  ExpectRefused(File("derived"), {File("derived") + ":2:", "no_such"});
+
+  std::string base = ReadFile(File("base/robot"));
+  base.replace(base.find("half_length: 0.13"), 17, "half_length: -13.");
+  Write("base/robot", base + "check { metric: \"push_impulze\" }\n");
+  Derived("");
+  ExpectRefused(File("derived"),
+                {BaseLine("check { metric: \"push_impulze"), "check[1].metric", "push_impulse"});
+  Write("base/robot", base);
+  ExpectRefused(File("derived"), {BaseLine("double_support { half_length: -13"),
+                                  "contact_wrench_monitor.double_support.half_length"});
+  Write("base/robot", base + "no_such: 1\n");
+  ExpectRefused(File("derived"),
+                {BaseLine("no_such").substr(0, BaseLine("no_such").size() - 1), "no_such"});
+}
+
+TEST_F(ScenarioBaseTest, IndexesOfListsMapToTheFileOfTheElement) {
+  // Phase 0 is the base's; of the lists inside sim_ode, the base has six joints and a push.
+  Derived(
+      "task_controller {\n"
+      "  phase { name: \"later\" start: -1 }\n"
+      "}\n");
+  ExpectRefused(File("derived"), {File("derived") + ":3: task_controller.phase[0]"});
+  Derived(
+      "sim_ode {\n"
+      "  start {\n"
+      "    nominal { joint: \"left_hip_roll\" position: 0 }\n"
+      "    nominal { joint: \"tail\" position: 0 }\n"
+      "  }\n"
+      "}\n");
+  ExpectRefused(File("derived"), {File("derived") + ":5: sim_ode.start.nominal[1]", "tail"});
+  Derived(
+      "sim_ode {\n"
+      "  push { start: 0.2 duration: 0.1 peak: 10 direction_x: 1 link: \"tail\" }\n"
+      "}\n");
+  ExpectRefused(File("derived"), {File("derived") + ":3: sim_ode.push[0].link", "tail"});
+  Derived("");
+  std::string base = ReadFile(File("base/robot"));
+  base.replace(base.find("left_knee_pitch"), 15, "left_knee_patch");
+  Write("base/robot", base);
+  ExpectRefused(File("derived"),
+                {BaseLine("nominal { joint: \"left_knee_patch"), "sim_ode.start.nominal[4]"});
+}
+
+TEST_F(ScenarioBaseTest, BasesNestAndRelativeNamesAreThoseOfTheirFile) {
+  std::filesystem::create_directory(folder_ / "base/parts");
+  std::string base = ReadFile(File("base/robot"));
+  base.replace(base.find("dyros/dyros_legs"), 16, "../legs.pbtxt");
+  Write("base/parts/robot", base);
+  Write("base/robot", "base: \"parts/robot\"\ncheck { metric: \"push_peek\" }\n");
+  Derived("check { metric: \"push_impulse\" }\n");
+  ExpectRefused(File("derived"), {File("base/robot") + ":2: check[0].metric"});
+  Write("base/robot", "base: \"parts/robot\"\n");
+  ExpectRefused(File("derived"),
+                {File("base/parts/robot") + ":", "robot: ", folder_ / "base/parts/../legs.pbtxt"});
+}
+
+TEST_F(ScenarioBaseTest, ALoopOrAMissingBaseIsAnError) {
+  Write("base/robot", "name: \"robot\"\nbase: \"../derived\"\n");
+  Derived("");
+  ExpectRefused(File("derived"), {File("base/robot") + ":2: base", "loop"});
+  Write("self", "base: \"self\"\n");
+  ExpectRefused(File("self"), {File("self") + ":1: base", "loop"});
+  Write("derived", "base: \"base/robbot\"\n");
+  ExpectRefused(File("derived"), {File("derived") + ":1: base", "did you mean base/robot?"});
+  Write("derived", "base: \"no/folder\"\n");
+  ExpectRefused(File("derived"), {File("derived") + ":1: base"});
+  Write("derived", "base: \"\"\n");
+  ExpectRefused(File("derived"), {File("derived") + ":1: base"});
+}
+
+TEST_F(ScenarioBaseTest, AnAssumptionMayNameAFieldOfEitherFile) {
+  const std::string assumption = "assumption { kind: \"assumed\" field: ";
+  Derived(assumption + "\"sim_ode.push[0].peak\" }\n" + assumption + "\"duration\" }\n");
+  EXPECT_EQ(RunPoise({"graph", "check", File("derived")}).exit_code, 0);
+  Derived(assumption + "\"sim_ode.push[1].peak\" }\n");
+  ExpectRefused(File("derived"), {File("derived") + ":2: assumption[0].field", "push[1]"});
+  Derived(assumption + "\"sim_ode.drive_train.backlash\" }\n");
+  ExpectRefused(File("derived"), {File("derived") + ":2: assumption[0].field", "backlash"});
+}
+
+TEST_F(ScenarioBaseTest, FilesInBaseAreNotOfferedToRun) {
+  std::filesystem::create_directories(folder_ / "deploy/scenarios");
+  for (const char* kind : {"robots", "graphs"}) {
+    std::filesystem::create_directory_symlink(POISE_SOURCE_DIR "/deploy/" + std::string(kind),
+                                              folder_ / "deploy" + "/" + kind);
+  }
+  std::filesystem::rename(folder_ / "base", folder_ / "deploy/scenarios/base");
+  Write("deploy/scenarios/mine", "base: \"base/robot\"\ndescription: \"derived from it\"\n");
+  setenv("POISE_DEPLOY_DIR", (folder_ / "deploy").c_str(), 1);
+  const ProgramResult list = RunPoise({"list", "scenarios"});
+  EXPECT_NE(list.output.find("mine"), std::string::npos) << list.output;
+  EXPECT_NE(list.output.find("derived from it (0.4 s)"), std::string::npos) << list.output;
+  EXPECT_EQ(list.output.find("base/"), std::string::npos) << list.output;
+  ExpectUsageError({"run", "base/robot"}, {"no scenario named 'base/robot'", "mine"});
+  EXPECT_EQ(RunPoise({"graph", "check", "mine"}).exit_code, 0);
+  unsetenv("POISE_DEPLOY_DIR");
+}
+
+}  // namespace
+}  // namespace poise
