@@ -79,6 +79,9 @@ struct RunRecord {
   int64_t refused_health = 0;  ///< unreadable, of another run, or under another component's name
   /// Simulated time over wall time; not in the log, set by who ran it.
   std::optional<double> real_time_factor;
+  /// The run of the scenario's reference variant, for metrics that compare with it; nullptr when
+  /// there is none. Not in the log, set by who reads both.
+  std::shared_ptr<RunRecord> reference;
 
   double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
 };
