@@ -37,6 +37,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   CheckRatio(eta_min_, "eta_min");
   CheckRatio(eta_max_, "eta_max");
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
+  ratio_moves_ = RatioMoves(config);
 
   model_ = LoadRobot(context);
   whole_body_ = context.shared->Get<balance::WholeBody>(
@@ -52,7 +53,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddOutput(&joint_command_, "joint_command", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("redistribute", {&robot_state_, &task_torque_, &balance_torque_},
-                   {&joint_command_}, [this](const Tick&) { Redistribute(); });
+                   {&joint_command_}, [this](const Tick& tick) { Redistribute(tick.time); });
 }
 
 void Redistributor::Prepare() {
@@ -62,7 +63,7 @@ void Redistributor::Prepare() {
   whole_body_->ContactJacobian(kBoth, &contact_jacobian_);
 }
 
-void Redistributor::Redistribute() {
+void Redistributor::Redistribute(double time) {
   const balance_torque_t& balance = *balance_torque_;
   joint_command_t& out = *joint_command_;
   const int8_t task = task_torque_->status;
@@ -81,7 +82,7 @@ void Redistributor::Redistribute() {
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }
-  out.status = in_contact[0] && in_contact[1] ? ComputeDouble() : ComputeSingle(in_contact);
+  out.status = in_contact[0] && in_contact[1] ? ComputeDouble(time) : ComputeSingle(in_contact);
 }
 
 int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
@@ -95,7 +96,7 @@ int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
   return joint_command_t::STATUS_OK;
 }
 
-int8_t Redistributor::ComputeDouble() {
+int8_t Redistributor::ComputeDouble(double time) {
   joint_command_t& out = *joint_command_;
   const Vector6d resultant = GetWrench(balance_torque_->resultant);
   const Eigen::Isometry3d frame_o = GetPose(balance_torque_->frame_o);
@@ -115,7 +116,7 @@ int8_t Redistributor::ComputeDouble() {
   if (redistribution_ && pressed) {
     const double free_ratio =
         balance::SelectRatio(interval, resultant, sole_in_o, double_support_, eta_min_, eta_max_);
-    out.eta = RampedRatio(free_ratio, resultant, sole_in_o);
+    out.eta = RampedRatio(ratio_moves_.Ratio(time, interval, free_ratio), resultant, sole_in_o);
     const Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
     Eigen::Matrix<double, 12, 1> change;
     change << desired[0] - wrench[0], desired[1] - wrench[1];

@@ -10,6 +10,7 @@
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/redistributor/ratio_moves.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/joint_command_t.hpp"
@@ -31,8 +32,8 @@ class Redistributor : public Component {
   using Wrenches = std::array<balance::Vector6d, 2>;
 
   void Prepare();
-  void Redistribute();
-  int8_t ComputeDouble();
+  void Redistribute(double time);
+  int8_t ComputeDouble(double time);
   int8_t ComputeSingle(const std::array<bool, 2>& in_contact);
   /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
   double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
@@ -50,6 +51,7 @@ class Redistributor : public Component {
   std::shared_ptr<balance::WholeBody> whole_body_;
   bool redistribution_ = true, transition_ = true;
   double eta_min_ = 0, eta_max_ = 1;
+  RatioMoves ratio_moves_;
   balance::ContactLimits double_support_, single_support_;
   robot::RobotState state_;
   bool state_valid_ = false;
