@@ -4,7 +4,8 @@
 
 namespace poise {
 
-/// A minimum-jerk move from 0 to 1 in `duration` s, `elapsed` s after its start; duration 0: a step.
+/// A minimum-jerk move from 0 to 1 in `duration` s, `elapsed` s after its start; duration 0: a
+/// step.
 struct MinimumJerk {
   MinimumJerk(double elapsed, double duration) {
     if (duration <= 0) {

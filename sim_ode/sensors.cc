@@ -21,18 +21,13 @@ SensorReadings::SensorReadings(int num_joints)
   foot_wrench.fill(robot::Vector6d::Zero());
 }
 
-Sensors::Sensors(const robot::RobotModel& model, bool noise, double push_noise, uint64_t seed)
-    : gyro_noise_(noise ? model.imu().gyro_noise : 0),
-      accelerometer_noise_(noise ? model.imu().accelerometer_noise : 0),
-      force_noise_(noise ? model.force_noise() : 0),
-      moment_noise_(noise ? model.moment_noise() : 0),
-      push_noise_(noise ? push_noise : 0),
-      random_(seed, kSensorStream) {
+Sensors::Sensors(const robot::RobotModel& model, const SensorNoise& noise, uint64_t seed)
+    : noise_(noise), random_(seed, kSensorStream) {
   for (const robot::MotorModel& motor : model.motors()) {
     counts_per_radian_.push_back(motor.gear_ratio * motor.encoder_counts / (2 * std::numbers::pi));
   }
-  gyro_bias_ = Noise(noise ? model.imu().gyro_bias : 0);
-  accelerometer_bias_ = Noise(noise ? model.imu().accelerometer_bias : 0);
+  gyro_bias_ = Noise(noise_.gyro_bias);
+  accelerometer_bias_ = Noise(noise_.accelerometer_bias);
 }
 
 Vector3d Sensors::Noise(double deviation) {
@@ -46,15 +41,15 @@ void Sensors::Measure(const SimulationTruth& truth, SensorReadings* readings) {
     const double position = truth.encoder_position[static_cast<Eigen::Index>(j)];
     readings->position_counts[j] = std::llround(position * counts_per_radian_[j]);
   }
-  readings->imu_angular_velocity = truth.imu_angular_velocity + gyro_bias_ + Noise(gyro_noise_);
+  readings->imu_angular_velocity = truth.imu_angular_velocity + gyro_bias_ + Noise(noise_.gyro);
   readings->imu_acceleration =
-      truth.imu_specific_force + accelerometer_bias_ + Noise(accelerometer_noise_);
+      truth.imu_specific_force + accelerometer_bias_ + Noise(noise_.accelerometer);
   for (size_t f = 0; f < 2; ++f) {
     readings->foot_wrench[f] = truth.foot_wrench[f];
-    readings->foot_wrench[f].head<3>() += Noise(force_noise_);
-    readings->foot_wrench[f].tail<3>() += Noise(moment_noise_);
+    readings->foot_wrench[f].head<3>() += Noise(noise_.force);
+    readings->foot_wrench[f].tail<3>() += Noise(noise_.moment);
   }
-  readings->push_force = truth.push_force + Noise(push_noise_);
+  readings->push_force = truth.push_force + Noise(noise_.push);
 }
 
 }  // namespace poise

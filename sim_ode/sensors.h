@@ -8,6 +8,7 @@
 
 #include "components/robot/robot_model.h"
 #include "sim_ode/random.h"
+#include "sim_ode/simulated_robot.h"
 #include "sim_ode/simulation.h"
 
 namespace poise {
@@ -22,13 +23,13 @@ struct SensorReadings {
   Eigen::Vector3d push_force;                  ///< N, world
 };
 
-/// Gaussian noise of each sample and IMU biases drawn once, as the robot file states them. Every
+/// Gaussian noise of each sample and IMU biases drawn once. Every
 /// number is drawn in the same order whatever is switched off, so switching the noise of one sensor
 /// off leaves the others' as they were.
 class Sensors {
  public:
-  /// `noise` false: only the encoders' quantisation remains. `push_noise`: standard deviation, N.
-  Sensors(const robot::RobotModel& model, bool noise, double push_noise, uint64_t seed);
+  /// Without noise only the encoders' quantisation remains.
+  Sensors(const robot::RobotModel& model, const SensorNoise& noise, uint64_t seed);
 
   /// One sample of every sensor. Does not allocate.
   void Measure(const SimulationTruth& truth, SensorReadings* readings);
@@ -40,7 +41,7 @@ class Sensors {
   Eigen::Vector3d Noise(double deviation);
 
   std::vector<double> counts_per_radian_;
-  double gyro_noise_, accelerometer_noise_, force_noise_, moment_noise_, push_noise_;
+  SensorNoise noise_;
   RandomStream random_;
   Eigen::Vector3d gyro_bias_, accelerometer_bias_;
 };

@@ -4,17 +4,14 @@
 
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
-#include "sim_ode/config_check.h"
 
 namespace poise {
 
 void SimOde::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<SimOdeConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
-  RequireNotNegative(config.push_sensor_noise(), "push_sensor_noise");
   simulation_ = std::make_unique<Simulation>(*model, config, context.tick_period, context.seed);
-  sensors_ = std::make_unique<Sensors>(*model, config.sensor_noise(), config.push_sensor_noise(),
-                                       context.seed);
+  sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, config), context.seed);
   readings_ = std::make_unique<SensorReadings>(model->num_joints());
 
   const MessageCounts counts = JointAndFootCounts(*model);

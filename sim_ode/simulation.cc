@@ -7,6 +7,7 @@
 #include <string>
 
 #include "sim_ode/config_check.h"
+#include "sim_ode/simulated_robot.h"
 #include "sim_ode/start_posture.h"
 
 namespace poise {
@@ -38,23 +39,9 @@ int StepsPerTick(const SimOdeConfig& config, double tick_period) {
   return static_cast<int>(whole);
 }
 
-RobotModel WithErrors(const RobotModel& model, const SimOdeConfig& config) {
-  RobotModel result = model;
-  for (int i = 0; i < config.model_error_size(); ++i) {
-    const ModelError& error = config.model_error(i);
-    const std::string field = "model_error[" + std::to_string(i) + "]";
-    FindBody(model, error.link(), field + ".link");
-    try {
-      result = result.WithModelError(error.link(), error.mass_scale(),
-                                     {error.com_x(), error.com_y(), error.com_z()});
-    } catch (const robot::RobotError& refused) {
-      throw ConfigError(field, refused.what());
-    }
-  }
-  return result;
-}
-
-Drivetrain::Options DrivetrainOptions(const RobotModel& model, const SimOdeConfig& config) {
+Drivetrain::Options DrivetrainOptions(const RobotModel& model,
+                                      const std::vector<robot::MotorModel>& motors,
+                                      const SimOdeConfig& config) {
   RequirePositive(config.friction_stiffness(), "friction_stiffness");
   const DriveTrain& drive = config.drive_train();
   RequireNotNegative(drive.torque_lag(), "drive_train.torque_lag");
@@ -72,7 +59,7 @@ Drivetrain::Options DrivetrainOptions(const RobotModel& model, const SimOdeConfi
     throw ConfigError(field, "needs the rotor as a body; set rotor_inertia: true or this to 0");
   }
   for (size_t j = 0; j < model.joints().size(); ++j) {
-    if (model.motors()[j].reflected_inertia > 0) continue;
+    if (motors[j].reflected_inertia > 0) continue;
     throw ConfigError(field, "needs the rotor as a body, but joint '" + model.joints()[j].name +
                                  "' has none; give its motor a rotor_inertia in the robot file");
   }
@@ -112,7 +99,8 @@ SimulationTruth::SimulationTruth(int num_joints)
 
 Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, double tick_period,
                        uint64_t seed)
-    : model_(WithErrors(model, config)),
+    : model_(WithModelErrors(model, config)),
+      motors_(SimulatedMotors(model, config)),
       steps_per_tick_(StepsPerTick(config, tick_period)),
       step_(tick_period / steps_per_tick_),
       torque_limits_(config.torque_limits()),
@@ -121,7 +109,7 @@ Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, doub
       terrain_(config, step_, seed),
       world_(model_, kCorners * static_cast<int>(model_.feet().size())),
       drive_train_(config.drive_train()),
-      drivetrain_options_(DrivetrainOptions(model_, config)),
+      drivetrain_options_(DrivetrainOptions(model_, motors_, config)),
       current_loop_(drive_train_, step_),
       command_(Eigen::VectorXd::Zero(model_.num_joints())),
       current_(Eigen::VectorXd::Zero(model_.num_joints())),
@@ -169,7 +157,7 @@ void Simulation::SetState(const RobotState& state) {
   world_.SetState(state);
   drivetrains_.clear();
   for (size_t j = 0; j < model_.joints().size(); ++j) {
-    drivetrains_.emplace_back(model_.joints()[j], model_.motors()[j], drivetrain_options_);
+    drivetrains_.emplace_back(model_.joints()[j], motors_[j], drivetrain_options_);
   }
   std::array<bool, 2> in_contact{};
   for (size_t f = 0; f < 2; ++f) {
@@ -185,7 +173,7 @@ void Simulation::SetState(const RobotState& state) {
       const auto i = static_cast<size_t>(j);
       drivetrains_[i].Place(state.joint_position[j], state.joint_velocity[j], torque[j]);
       if (!current_loop_.lags()) continue;
-      current_[j] = mean_current_[j] = torque[j] / model_.motors()[i].torque_per_ampere();
+      current_[j] = mean_current_[j] = torque[j] / motors_[i].torque_per_ampere();
       torque_[j] = torque[j];
     }
   }
@@ -195,8 +183,8 @@ void Simulation::SetState(const RobotState& state) {
 }
 
 void Simulation::SetCurrents(std::span<const double> current, std::span<const int8_t> enabled) {
-  for (size_t j = 0; j < model_.motors().size(); ++j) {
-    const robot::MotorModel& motor = model_.motors()[j];
+  for (size_t j = 0; j < motors_.size(); ++j) {
+    const robot::MotorModel& motor = motors_[j];
     const auto i = static_cast<Eigen::Index>(j);
     double amperes = j < current.size() && j < enabled.size() && enabled[j] != 0 ? current[j] : 0;
     if (!std::isfinite(amperes)) {
@@ -242,7 +230,7 @@ void Simulation::StepOnce() {
   const double to = static_cast<double>(steps_ + 1) * step_;
   for (int j = 0; j < model_.num_joints(); ++j) {
     Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
-    const double gain = model_.motors()[static_cast<size_t>(j)].torque_per_ampere();
+    const double gain = motors_[static_cast<size_t>(j)].torque_per_ampere();
     mean_current_[j] = current_loop_.Advance(command_[j], &current_[j]);
     torque_[j] = mean_current_[j] * gain;
     world_.SetDrivetrain(

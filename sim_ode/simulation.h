@@ -96,6 +96,7 @@ class Simulation {
   void CheckStart() const;
 
   robot::RobotModel model_;
+  std::vector<robot::MotorModel> motors_;  // of the simulated joints
   int steps_per_tick_ = 1;
   double step_ = 0;
   bool torque_limits_;

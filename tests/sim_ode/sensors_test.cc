@@ -40,6 +40,13 @@ TEST(RandomStream, SeedsAndStreamsDiffer) {
   EXPECT_NE(first, stream.Uniform());
 }
 
+SensorNoise Noise(const robot::RobotModel& model, bool on, double push) {
+  SimOdeConfig config;
+  config.set_sensor_noise(on);
+  config.set_push_sensor_noise(push);
+  return SimulatedNoise(model, config);
+}
+
 class SensorsTest : public ::testing::Test {
  protected:
   SensorsTest()
@@ -53,7 +60,7 @@ class SensorsTest : public ::testing::Test {
 };
 
 TEST_F(SensorsTest, EncodersCountTurnsOfTheMotor) {
-  Sensors sensors(model_, true, 0, 1);
+  Sensors sensors(model_, Noise(model_, true, 0), 1);
   const double count = 2 * std::numbers::pi / (50.0 * 8192);  // gear and encoder of the robot file
   truth_.encoder_position[0] = 1000.4 * count;
   truth_.encoder_position[1] = -1000.6 * count;
@@ -65,7 +72,7 @@ TEST_F(SensorsTest, EncodersCountTurnsOfTheMotor) {
 }
 
 TEST_F(SensorsTest, WithoutNoiseTheTruth) {
-  Sensors sensors(model_, false, 0.2, 1);
+  Sensors sensors(model_, Noise(model_, false, 0.2), 1);
   sensors.Measure(truth_, &readings_);
   EXPECT_EQ(readings_.imu_acceleration, truth_.imu_specific_force);
   EXPECT_EQ(readings_.imu_angular_velocity, truth_.imu_angular_velocity);
@@ -74,7 +81,7 @@ TEST_F(SensorsTest, WithoutNoiseTheTruth) {
 }
 
 TEST_F(SensorsTest, NoiseHasTheDeviationsOfTheRobotFile) {
-  Sensors sensors(model_, true, 0.2, 11);
+  Sensors sensors(model_, Noise(model_, true, 0.2), 11);
   constexpr int kSamples = 50000;
   struct Statistics {
     double sum = 0, squares = 0;
@@ -110,13 +117,14 @@ TEST_F(SensorsTest, BiasIsDrawnOncePerSeed) {
   double squares = 0;
   constexpr int kSeeds = 3000;
   for (uint64_t seed = 0; seed < kSeeds; ++seed) {
-    squares += Sensors(model_, true, 0, seed).accelerometer_bias().squaredNorm() / 3;
+    squares += Sensors(model_, Noise(model_, true, 0), seed).accelerometer_bias().squaredNorm() / 3;
   }
   EXPECT_NEAR(std::sqrt(squares / kSeeds) / 0.1, 1, 5 / std::sqrt(6.0 * kSeeds));
 }
 
 TEST_F(SensorsTest, SameSeedSameSamples) {
-  Sensors a(model_, true, 0.2, 4), same(model_, true, 0.2, 4), other(model_, true, 0.2, 5);
+  Sensors a(model_, Noise(model_, true, 0.2), 4), same(model_, Noise(model_, true, 0.2), 4),
+      other(model_, Noise(model_, true, 0.2), 5);
   SensorReadings from_same(model_.num_joints()), from_other(model_.num_joints());
   for (int i = 0; i < 100; ++i) {
     a.Measure(truth_, &readings_);
@@ -134,7 +142,7 @@ TEST_F(SensorsTest, OneSensorsNoiseDoesNotMoveAnothers) {
     description->set_force_noise(0);
     description->mutable_imu()->set_gyro_noise(0);
   });
-  Sensors a(model_, true, 0.2, 4), b(quiet_feet, true, 0, 4);
+  Sensors a(model_, Noise(model_, true, 0.2), 4), b(quiet_feet, Noise(quiet_feet, true, 0), 4);
   SensorReadings from_b(model_.num_joints());
   for (int i = 0; i < 10; ++i) {
     a.Measure(truth_, &readings_);
