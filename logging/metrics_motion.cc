@@ -112,7 +112,9 @@ void AddMotion(MetricList* list) {
   list->push_back({"com_motion_max", "mm",
                    "largest distance of the true COM from where it was when the window began",
                    ComMotion});
-  list->push_back({"com_motion_reference_max", "mm", "the same in the reference run",
+  list->push_back({"com_motion_reference_max", "mm",
+                   "largest distance of the true COM from where it was when the window began, "
+                   "reference run",
                    [](const RunRecord& run) { return OfReference(run, ComMotion); }});
   list->push_back({"com_difference_max", "mm",
                    "largest distance of the true COM from the reference run's at the same tick",

@@ -60,7 +60,9 @@ void AddTorques(MetricList* list) {
   list->push_back({"torque_step_at_switch", "N·m",
                    "largest change of a joint's command in a tick in which the support changes",
                    TorqueStepAtSwitch});
-  list->push_back({"torque_step_at_switch_reference", "N·m", "the same in the reference run",
+  list->push_back({"torque_step_at_switch_reference", "N·m",
+                   "largest change of a joint's command in a tick in which the support changes, "
+                   "reference run",
                    [](const RunRecord& run) { return OfReference(run, TorqueStepAtSwitch); }});
   list->push_back({"torque_step_ratio", "%",
                    "largest change of a joint's command in a tick in which the support changes, of "

@@ -128,6 +128,22 @@ void AddViolations(MetricList* list) {
                            run.spec.tick_period());
            }});
       list->push_back(
+          {fmt::format("{}_foot_{}_violation_after_contact", kFoot[foot], edge.name), "s",
+           fmt::format("time in which the measured wrench of the loaded {} foot breaks ({}) after "
+                       "it was set down",
+                       kFoot[foot], 29 + edge.margin),
+           [foot, edge](const RunRecord& run) -> Answer {
+             const std::optional<int64_t> stand = FirstStand(run, foot);
+             if (!stand) return {};
+             const auto violated = MeasuredViolation(run, foot, edge);
+             return Scaled(CountTicks(run,
+                                      [&](int64_t t) -> std::optional<bool> {
+                                        if (t < *stand) return {};
+                                        return violated(t);
+                                      }),
+                           run.spec.tick_period());
+           }});
+      list->push_back(
           {fmt::format("{}_foot_{}_violation_first", kFoot[foot], edge.name), "s",
            fmt::format("first time at which the measured wrench of the loaded {} foot breaks ({})",
                        kFoot[foot], 29 + edge.margin),
@@ -197,13 +213,12 @@ void AddTouchDowns(MetricList* list) {
 }  // namespace
 
 void AddTransitions(MetricList* list) {
-  list->push_back(
-      {"foot_lift_motion_z", "mm",
-       fmt::format("largest vertical motion, peak to peak, of the foot that stops being "
-                   "a support, from {} s before to {} s after (ground truth)",
-                   kBeforeSwitch, kAfterSwitch),
-       LiftMotion});
-  list->push_back({"foot_lift_motion_z_reference", "mm", "the same in the reference run",
+  const std::string lift = fmt::format(
+      "largest vertical motion, peak to peak, of the foot that stops being a support, from {} s "
+      "before to {} s after (ground truth)",
+      kBeforeSwitch, kAfterSwitch);
+  list->push_back({"foot_lift_motion_z", "mm", lift, LiftMotion});
+  list->push_back({"foot_lift_motion_z_reference", "mm", lift + ", reference run",
                    [](const RunRecord& run) { return OfReference(run, LiftMotion); }});
   for (size_t foot = 0; foot < 2; ++foot) {
     list->push_back(

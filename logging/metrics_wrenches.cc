@@ -37,14 +37,15 @@ void AddFootErrors(MetricList* list) {
   add("moment_z", "N·m", "M_z", [](const W& e) { return e[5] * e[5]; });
 }
 
-/// N, -F_z of a foot in contact: computed at `tick`, or read there for the command before.
+/// N, 0 - F_z (never minus zero) of a foot in contact: computed at `tick`, or read there for the
+/// command before.
 Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) {
   const joint_command_t* command = run.command.at(measured ? tick - 1 : tick);
   if (command == nullptr || command->in_contact[foot] == 0) return {};
-  if (!measured) return -command->foot_wrench[foot].force[2];
+  if (!measured) return 0.0 - command->foot_wrench[foot].force[2];
   const robot_sensors_t* sensors = run.sensors.at(tick);
   if (sensors == nullptr) return {};
-  return -sensors->foot_wrench[foot].force[2];
+  return 0.0 - sensors->foot_wrench[foot].force[2];
 }
 
 void AddFootLoads(MetricList* list) {

@@ -232,6 +232,18 @@ TEST_F(MetricsTest, MeasuredViolationsUseTheCommandsOwnSole) {
   EXPECT_EQ(Measure("left_foot_roll_violation_measured"), 0);
 }
 
+TEST_F(MetricsTest, ViolationsAfterAFootWasSetDown) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    command_[t].foot_wrench[1].force[2] = sensors_[t].foot_wrench[1].force[2] = -200;
+    command_[t].margins[1].pitch = 0.12 * 200;
+    sensors_[t].foot_wrench[1].moment[1] = t < 20 || (t >= 60 && t < 65) ? 25 : 23;  // limit 24
+  }
+  EXPECT_TRUE(Unanswered("left_foot_pitch_violation_after_contact"));
+  LiftLeft(30, 50);
+  EXPECT_NEAR(Measure("left_foot_pitch_violation_measured"), 24 * kPeriod, 1e-12);
+  EXPECT_NEAR(Measure("left_foot_pitch_violation_after_contact"), 5 * kPeriod, 1e-12);
+}
+
 TEST_F(MetricsTest, SingleSupportHasASoleOfItsOwn) {
   LiftLeft(50, kTicks);
   for (size_t t = 0; t < kTicks; ++t) {
