@@ -20,7 +20,14 @@ class EventList {
   explicit EventList(const RunRecord& run) : run_(run) {}
 
   void Add(int64_t tick, std::string name, std::string detail) {
-    events_.push_back({run_.time(tick), std::move(name), std::move(detail)});
+    events_.push_back({{run_.time(tick), std::move(name), std::move(detail)}, false});
+  }
+  /// The end of something; of one tick's events it comes first.
+  void AddEndOf(const Interval& interval, std::string name, const std::string& what) {
+    if (!interval.end) return;
+    std::string detail =
+        fmt::format("{}, after {:.3f} s", what, run_.time(*interval.end - interval.begin));
+    events_.push_back({{run_.time(*interval.end), std::move(name), std::move(detail)}, true});
   }
   /// `begin` and `end` name the events; `what` tells of the first tick, and the end adds how long
   /// it was.
@@ -29,21 +36,25 @@ class EventList {
     for (const Interval& interval : intervals) {
       const std::string text = what(interval.begin);
       Add(interval.begin, begin, text);
-      if (!interval.end) continue;
-      Add(*interval.end, end,
-          fmt::format("{}after {:.3f} s", text.empty() ? "" : text + ", ",
-                      run_.time(*interval.end - interval.begin)));
+      AddEndOf(interval, end, text);
     }
   }
   std::vector<Event> Sorted() && {
-    std::stable_sort(events_.begin(), events_.end(),
-                     [](const Event& a, const Event& b) { return a.time < b.time; });
-    return std::move(events_);
+    std::stable_sort(events_.begin(), events_.end(), [](const Entry& a, const Entry& b) {
+      return a.event.time < b.event.time || (a.event.time == b.event.time && a.ends && !b.ends);
+    });
+    std::vector<Event> sorted;
+    for (Entry& entry : events_) sorted.push_back(std::move(entry.event));
+    return sorted;
   }
 
  private:
+  struct Entry {
+    Event event;
+    bool ends;
+  };
   const RunRecord& run_;
-  std::vector<Event> events_;
+  std::vector<Entry> events_;
 };
 
 void AddPhases(const RunRecord& run, EventList* events) {
@@ -166,10 +177,7 @@ void AddBalancing(const RunRecord& run, EventList* events) {
       events->Add(interval.begin, "balancing_on",
                   fmt::format("{}: CoP of the task torque {:.1f} mm, limit {:.1f} mm", name,
                               kMilli * balance->cop_task[axis], kMilli * balance->cop_limit[axis]));
-      if (!interval.end) continue;
-      events->Add(
-          *interval.end, "balancing_off",
-          fmt::format("{}, after {:.3f} s", name, run.time(*interval.end - interval.begin)));
+      events->AddEndOf(interval, "balancing_off", name);
     }
   }
   const auto not_achieved = [&](int64_t tick) -> std::optional<bool> {
@@ -299,10 +307,7 @@ void AddPush(const RunRecord& run, EventList* events) {
     events->Add(peak, "push_peak",
                 fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), force.x(),
                             force.y(), force.z()));
-    if (!interval.end) continue;
-    events->Add(*interval.end, "push_ends",
-                fmt::format("after {:.3f} s, peak {:.1f} N",
-                            run.time(*interval.end - interval.begin), force.norm()));
+    events->AddEndOf(interval, "push_ends", fmt::format("peak {:.1f} N", force.norm()));
   }
 }
 

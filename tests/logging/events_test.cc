@@ -127,8 +127,8 @@ TEST_F(EventsTest, TransitionsAndWaiting) {
   EXPECT_THAT(
       Events(Read()),
       ElementsAre(Is(0, "phase_began"), Is(0.01, "waiting_begins", "above the stance sole"),
-                  Is(0.02, "unloading_begins", "left foot"),
                   Is(0.02, "waiting_ends", "after 0.010 s"),
+                  Is(0.02, "unloading_begins", "left foot"),
                   Is(0.04, "unloading_ends", "left foot, after 0.020 s"),
                   Is(0.08, "loading_begins", "right foot"), Is(0.1, "loading_ends", "right foot"),
                   Is(0.12, "waiting_begins", "no surface"), Is(0.2, "run_ended")));
