@@ -157,9 +157,8 @@ std::string FormatAssumptions(const Scenario& scenario) {
   return text;
 }
 
-std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
-                        const RunOutcome& outcome, const std::string& mode,
-                        const std::vector<CheckResult>& checks, bool passed) {
+Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
+             const std::vector<CheckResult>& checks) {
   Json json;
   json["scenario"] = run.spec.scenario();
   json["paper_section"] = scenario.paper_section();
@@ -171,7 +170,6 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
     json["versions"][library.substr(0, space)] =
         library.substr(std::min(space, library.size() - 1) + 1);
   }
-  json["mode"] = mode;
   json["realtime"] = run.spec.realtime();
   json["seed"] = run.spec.seed();
   json["drop_rate"] = run.spec.drop_rate();
@@ -179,12 +177,7 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
   json["planned_ticks"] = run.spec.num_ticks();
   json["ticks"] = run.num_ticks;
   json["simulated_time"] = run.time(run.num_ticks);
-  json["wall_time"] = outcome.wall_time;
   json["real_time_factor"] = Optional(run.real_time_factor);
-  json["passed"] = passed;
-  json["end"] = outcome.message.empty() ? "planned end" : outcome.message;
-  json["interrupted"] = outcome.interrupted;
-  json["launcher"]["refused"] = outcome.refused;
   json["refused_health"] = run.refused_health;
   json["log"] = "run.lcm";
   json["components"] = Json::array();
@@ -234,6 +227,19 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
                                    {"kind", assumption.kind()},
                                    {"reason", assumption.reason()}});
   }
+  return json;
+}
+
+std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
+                        const RunOutcome& outcome, const std::string& mode,
+                        const std::vector<CheckResult>& checks, bool passed) {
+  Json json = RunJson(scenario, run, checks);
+  json["mode"] = mode;
+  json["wall_time"] = outcome.wall_time;
+  json["passed"] = passed;
+  json["end"] = outcome.message.empty() ? "planned end" : outcome.message;
+  json["interrupted"] = outcome.interrupted;
+  json["launcher"]["refused"] = outcome.refused;
   // Names and texts of a log may hold any bytes.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -1,6 +1,7 @@
 // The table and the summary at the end of a run.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,10 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
 std::string FormatTable(const std::vector<CheckResult>& checks);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);
+
+/// What summary.json says of the run itself, without how it was run and how it ended.
+nlohmann::ordered_json RunJson(const Scenario& scenario, const logging::RunRecord& run,
+                               const std::vector<CheckResult>& checks);
 
 /// All that summary.json says. `outcome` of the run just ended.
 std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,

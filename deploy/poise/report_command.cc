@@ -2,6 +2,7 @@
 
 #include "components/framework/configuration.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/html_report.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
 #include "fmt/format.h"
@@ -9,16 +10,45 @@
 namespace poise {
 namespace {
 
-int Report(const std::string& run) {
-  const std::string log = FindLog(run).string();
-  logging::RunRecord record = logging::ReadRun(log);
-  Scenario scenario;
-  ParseTextProto(record.info.scenario, log + ": RUN_INFO.scenario", &scenario);
-  record.first_tick = FirstCheckedTick(scenario, record);
-  const std::vector<CheckResult> checks = EvaluateChecks(scenario, record);
-  fmt::print("{} of {}, poise {}\n\n{}\n{}", record.spec.scenario(), record.info.started_at,
-             record.spec.poise_version(), FormatTable(checks), FormatAssumptions(scenario));
-  for (const CheckResult& check : checks) {
+struct ReportOptions {
+  std::string run;
+  std::string overlay;
+  std::string html;
+  bool no_html = false;
+};
+
+ReportedRun ReadReportedRun(const std::string& run) {
+  ReportedRun result;
+  result.log = FindLog(run).string();
+  result.record = logging::ReadRun(result.log);
+  ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  result.record.first_tick = FirstCheckedTick(result.scenario, result.record);
+  result.checks = EvaluateChecks(result.scenario, result.record);
+  return result;
+}
+
+/// report.html in a run's folder; beside any other log, under the log's name.
+std::filesystem::path DefaultHtml(const std::string& log) {
+  const std::filesystem::path path = log;
+  if (path.filename() == "run.lcm") return path.parent_path() / "report.html";
+  return std::filesystem::path(path).replace_extension(".html");
+}
+
+int Report(const ReportOptions& options) {
+  std::vector<ReportedRun> runs;
+  runs.push_back(ReadReportedRun(options.run));
+  if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
+  const ReportedRun& run = runs.front();
+  fmt::print("{} of {}, poise {}\n\n{}\n{}", run.record.spec.scenario(), run.record.info.started_at,
+             run.record.spec.poise_version(), FormatTable(run.checks),
+             FormatAssumptions(run.scenario));
+  if (!options.no_html) {
+    const std::filesystem::path html =
+        options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
+    WriteHtmlReport(html, runs);
+    fmt::print("\n{}\n", html.string());
+  }
+  for (const CheckResult& check : run.checks) {
     if (!check.passed) return kExitFailed;
   }
   return kExitOk;
@@ -27,10 +57,15 @@ int Report(const std::string& run) {
 }  // namespace
 
 void AddReportCommand(CLI::App* app, Command* command) {
-  auto run = std::make_shared<std::string>();
-  CLI::App* report = app->add_subcommand("report", "the table of a run from its log");
-  report->add_option("run", *run, "folder of a run or a log; default: the latest run");
-  report->callback([run, command] { *command = [run] { return Report(*run); }; });
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* report = app->add_subcommand(
+      "report", "the table of a run from its log, and the run as a page to look at");
+  report->add_option("run", options->run, "folder of a run or a log; default: the latest run");
+  report->add_option("overlay", options->overlay, "a second run, drawn over the first in the page");
+  CLI::Option* html = report->add_option(
+      "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
+  report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report->callback([options, command] { *command = [options] { return Report(*options); }; });
 }
 
 }  // namespace poise

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kFiles[] = {"run.lcm", "summary.json", "recorder.json", "run_spec.pbtxt",
-                                  "scenario.pbtxt"};
+                                  "scenario.pbtxt", "report.html"};
 
 /// Keeps other runs out of `dir` until this program ends; its children do not inherit the lock.
 void Lock(const fs::path& dir) {

@@ -1,0 +1,153 @@
+#include "deploy/poise/html_report.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "components/framework/configuration.h"
+#include "deploy/poise/robot_json.h"
+#include "fmt/format.h"
+#include "logging/column_codec.h"
+#include "logging/signal_table.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kDataMark = "<!--POISE-RUN-DATA-->";
+
+/// build/web/report.html, beside build/PRESET/bin/poise.
+fs::path TemplatePath() {
+  return fs::read_symlink("/proc/self/exe").parent_path() / ".." / ".." / "web" / "report.html";
+}
+
+std::string ReadTemplate() {
+  const fs::path path = TemplatePath();
+  std::ifstream in(path, std::ios::binary);
+  std::stringstream text;
+  if (!in || !(text << in.rdbuf())) {
+    throw ConfigError(
+        fmt::format("{}: the page of reports is not built; run deploy/setup, or give --no-html",
+                    path.lexically_normal().string()));
+  }
+  if (text.view().find(kDataMark) == std::string_view::npos) {
+    throw ConfigError(fmt::format("{}: is no template of a report; run deploy/setup",
+                                  path.lexically_normal().string()));
+  }
+  return text.str();
+}
+
+/// JSON that can stand in a <script>: any bytes that logs hold, and no tag.
+std::string ScriptText(const Json& json) {
+  std::string text;
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
+Json ScenarioJson(const Scenario& scenario) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;  // with the defaults of what is not set
+  options.preserve_proto_field_names = true;
+  std::string text;
+  const auto status = google::protobuf::util::MessageToJsonString(scenario, &text, options);
+  if (!status.ok()) {
+    throw ConfigError(fmt::format("scenario: cannot be written as JSON: {}", status.ToString()));
+  }
+  return Json::parse(text);
+}
+
+/// Packs columns and writes each distinct one once, as an element of the page.
+class BlobWriter {
+ public:
+  BlobWriter(std::ostream* out, size_t run) : out_(out), run_(run) {}
+
+  /// {"value"} of a column of one value, else {"blob", "step", "order"}.
+  Json Add(std::span<const double> values, bool integer) {
+    const double first = values.front();
+    if (std::ranges::all_of(values, [first](double x) { return x == first; })) {
+      return {{"value", first}};
+    }
+    if (std::ranges::none_of(values, [](double x) { return std::isfinite(x); })) {
+      return {{"value", nullptr}};
+    }
+    logging::PackedColumn column = logging::PackColumn(values, integer);
+    const auto [blob, added] =
+        blobs_.try_emplace(std::move(column.data), fmt::format("run{}-{}", run_, blobs_.size()));
+    if (added) {
+      *out_ << "<script type=\"application/octet-stream\" id=\"" << blob->second << "\">"
+            << blob->first << "</script>\n";
+    }
+    return {{"blob", blob->second}, {"step", column.step}, {"order", column.order}};
+  }
+
+ private:
+  std::ostream* out_;
+  size_t run_;
+  std::map<std::string, std::string> blobs_;  // id by content
+};
+
+Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t num_ticks,
+                  BlobWriter* blobs) {
+  Json json = Json::array();
+  for (const logging::ChannelColumns& channel : channels) {
+    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.ticks.size()}};
+    if (static_cast<int64_t>(channel.ticks.size()) != num_ticks) {
+      const std::vector<double> ticks(channel.ticks.begin(), channel.ticks.end());
+      item["ticks"] = blobs->Add(ticks, true);
+    }
+    item["signals"] = Json::array();
+    for (const logging::SignalColumn& column : channel.columns) {
+      Json signal = {{"field", column.field}, {"integer", column.integer}};
+      signal.update(blobs->Add(column.values, column.integer));
+      item["signals"].push_back(std::move(signal));
+    }
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
+void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
+  Json json;
+  json["format"] = 1;
+  json["run"] = RunJson(run.scenario, run.record, run.checks);
+  json["run"]["run_id"] = std::to_string(run.record.spec.run_id());  // beyond a double's integers
+  json["run"]["log"] = run.log;
+  json["run"]["damages"] = run.record.damages;
+  json["scenario"] = ScenarioJson(run.scenario);
+  json["scenario_text"] = run.record.info.scenario;
+  json["robot"] = RobotJson(run.record);
+  BlobWriter blobs(out, index);
+  json["channels"] =
+      ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
+  *out << "<script type=\"application/json\" class=\"poise-run\">" << ScriptText(json)
+       << "</script>\n";
+}
+
+}  // namespace
+
+void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
+  const std::string page = ReadTemplate();
+  const size_t mark = page.find(kDataMark);
+  std::ofstream out(file, std::ios::binary);
+  out << std::string_view(page).substr(0, mark);
+  for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
+  out << std::string_view(page).substr(mark + kDataMark.size());
+  if (!out.flush()) {
+    throw ConfigError(
+        fmt::format("{}: cannot be written; name another file with --html", file.string()));
+  }
+}
+
+}  // namespace poise

@@ -1,0 +1,26 @@
+// A run as one page that opens from disk: docs/report-format.md.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "deploy/poise/report.h"
+#include "deploy/poise/scenario.pb.h"
+#include "logging/run_record.h"
+
+namespace poise {
+
+/// One run of a page: its log, what was read from it, and its scenario as it was run.
+struct ReportedRun {
+  std::string log;
+  logging::RunRecord record;
+  Scenario scenario;
+  std::vector<CheckResult> checks;
+};
+
+/// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
+/// template is not built, `file` cannot be written; LogError for a log that is gone.
+void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
+
+}  // namespace poise

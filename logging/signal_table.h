@@ -1,0 +1,34 @@
+// Every scalar of every channel of a run's log as columns, whatever the graph and the messages.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "logging/run_record.h"
+
+namespace poise::logging {
+
+/// One scalar field over the messages of its channel.
+struct SignalColumn {
+  std::string field;  ///< path in the message, e.g. "foot_wrench[1].force[2]"
+  bool integer = false;
+  std::vector<double>
+      values;  ///< in the unit of the field's .lcm comment; NaN where the log says so
+};
+
+/// One channel: `ticks` ascending, each column of the same length.
+struct ChannelColumns {
+  std::string name;
+  std::string type;  ///< LCM type, e.g. "robot_state_t"
+  std::vector<int64_t> ticks;
+  std::vector<SignalColumn> columns;
+};
+
+/// Columns of the log's channels, those of the graph first, then HEALTH_*; a channel without
+/// messages is left out. Counts, run_id, tick and texts are no columns. Of two messages of a tick
+/// the first is taken; an external channel's messages stand at the tick in which they were
+/// recorded. `run` is the record of the same log. Throws LogError.
+std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run);
+
+}  // namespace poise::logging

@@ -1,0 +1,31 @@
+// Units, texts and names of constants of the messages' fields, read from the comments of the .lcm files.
+
+const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A'];
+
+/** The unit that a field's comment begins with; '' when it begins with none. */
+export function unitOf(comment) {
+  const unit = UNITS.find((u) => comment === u || /^[,;:( ]/.test(comment.slice(u.length)) && comment.startsWith(u));
+  return unit === 'm/s^2' ? 'm/s²' : unit === 'us' ? 'µs' : unit ?? '';
+}
+
+/** {name, text, fields: {field: {type, unit, text, values}}} of one .lcm file; values: names by number. */
+export function parseMessage(source) {
+  const name = /^struct\s+(\w+)/m.exec(source)[1];
+  const head = source.slice(0, source.indexOf('struct'));
+  const text = [...head.matchAll(/^\/\/\s?(.*)$/gm)].map((m) => m[1]).join(' ');
+  const fields = {};
+  for (const m of source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[\w+\])?;[ \t]*(?:\/\/[ \t]*(.*))?$/gm)) {
+    const comment = m[3] ?? '';
+    fields[m[2]] = {type: m[1], unit: unitOf(comment), text: comment};
+  }
+  const code = source.replace(/\/\/.*$/gm, '');
+  const constants = [...code.matchAll(/\bconst\s+\w+\s+([^;]+);/g)]
+    .flatMap((m) => m[1].split(',')).map((c) => c.split('=').map((s) => s.trim()));
+  for (const field of Object.values(fields)) {
+    const prefix = /\b([A-Z]+(?:_[A-Z]+)*_)\*/.exec(field.text)?.[1];
+    if (!prefix) continue;
+    field.values = Object.fromEntries(constants.filter(([n]) => n.startsWith(prefix))
+      .map(([n, value]) => [value, n.slice(prefix.length).toLowerCase().replaceAll('_', ' ')]));
+  }
+  return {name, text, fields};
+}

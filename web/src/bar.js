@@ -1,0 +1,80 @@
+// The bar at the bottom: play, speed, scrub, zoom, and the keys.
+import {element} from './dom.js';
+import {SPEEDS} from './player.js';
+
+const LONG_STEP = 0.1;  // s
+const ZOOM_STEP = 1.5;
+
+export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shift ← →', '0.1 s'], ['home end', 'start, end'],
+  ['[ ]', 'slower, faster'], ['+ −', 'zoom the plots at the cursor'], ['0', 'whole run'], ['/', 'search signals']];
+
+function track(shared) {
+  const {run, phases, events} = shared;
+  const end = Math.max(run.duration, run.period);
+  const share = (t) => `${100 * Math.min(1, t / end)}%`;
+  const span = (name, {from, to}) => {
+    const mark = element('span', {class: name});
+    mark.style.left = share(from);
+    mark.style.width = `max(2px, ${100 * (Math.min(to, end) - from) / end}%)`;
+    return mark;
+  };
+  return element('div', {class: 'track', 'aria-hidden': 'true'},
+    ...phases.support.filter((p) => p.value !== 'both feet').map((p) => span('single', p)),
+    ...phases.balancing.map((p) => span('balancing', p)),
+    ...events.map((e) => {
+      const mark = element('span', {class: 'event'});
+      mark.style.left = share(e.time);
+      return mark;
+    }));
+}
+
+/** Fills `host`; `shared` as for panels. */
+export function playerBar(host, shared) {
+  const {player, view, run} = shared;
+  const button = (text, label, action) =>
+    element('button', {type: 'button', title: label, 'aria-label': label, click: action}, text);
+  const play = button('▶', 'Play or pause (space)', () => player.toggle());
+  play.id = 'play';
+  const speed = element('select', {id: 'speed', 'aria-label': 'Speed',
+    change: () => player.setSpeed(Number(speed.value))},
+  ...SPEEDS.map((s) => element('option', {value: s, selected: s === 1}, `${s}×`)));
+  const scrub = element('input', {type: 'range', id: 'scrub', min: 0, max: Math.max(0, run.numTicks - 1), step: 1,
+    'aria-label': 'Time', input: () => player.seek(Number(scrub.value) * run.period),
+    keydown: (e) => e.preventDefault()});  // the page's own keys step
+  const time = element('output', {id: 'time'});
+  host.append(button('|◂', 'Start (home)', () => player.seek(0)), button('◂', 'One tick back (←)', () => player.step(-1)), play,
+    button('▸', 'One tick on (→)', () => player.step(1)), speed,
+    element('div', {class: 'scrub'}, track(shared), scrub), time,
+    button('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
+    button('+', 'Zoom the plots in at the cursor (+)', () => view.zoom(1 / ZOOM_STEP, player.time)),
+    button('whole run', 'Show the whole run in the plots (0)', () => view.reset()));
+  const showTime = () => {
+    scrub.value = player.tick;
+    time.textContent = `${player.time.toFixed(3)} s  tick ${player.tick}`;
+  };
+  player.addEventListener('time', showTime);
+  player.addEventListener('state', () => {
+    play.textContent = player.playing ? '⏸' : '▶';
+    speed.value = player.speed;
+  });
+  showTime();
+  listenToKeys(shared);
+}
+
+function listenToKeys({player, view, run}) {
+  const long = Math.max(1, Math.round(LONG_STEP / run.period));
+  const actions = {
+    ' ': () => player.toggle(), ArrowLeft: (e) => player.step(e.shiftKey ? -long : -1),
+    ArrowRight: (e) => player.step(e.shiftKey ? long : 1), Home: () => player.seek(0), End: () => player.seek(run.duration),
+    '[': () => player.changeSpeed(-1), ']': () => player.changeSpeed(1), '0': () => view.reset(),
+    '+': () => view.zoom(1 / ZOOM_STEP, player.time), '=': () => view.zoom(1 / ZOOM_STEP, player.time),
+    '-': () => view.zoom(ZOOM_STEP, player.time), '/': () => document.getElementById('signal-search').focus(),
+  };
+  document.addEventListener('keydown', (e) => {
+    const writing = e.target.matches('input:not([type=range]), select, textarea');
+    const pressing = e.key === ' ' && e.target.matches('button, summary, a');
+    if (writing || pressing || e.ctrlKey || e.metaKey || e.altKey || !Object.hasOwn(actions, e.key)) return;
+    e.preventDefault();
+    actions[e.key](e);
+  });
+}

@@ -1,0 +1,130 @@
+// A run's signals by tick, whether they come with the page or arrive while the run goes on.
+import {unpack} from './codec.js';
+
+/** Unit, text and names of values of a field path such as "foot_wrench[1].force[2]". */
+export function describeField(messages, type, path) {
+  let message = messages[type];
+  let result = {unit: '', text: ''};
+  for (const name of path.replace(/\[\d+\]/g, '').split('.')) {
+    const field = message?.fields[name];
+    if (!field) break;
+    const text = [result.text, field.text].filter(Boolean).join('; ');
+    result = {unit: field.unit || result.unit, text, valueNames: field.values};
+    message = messages[field.type];
+  }
+  return result;
+}
+
+/** One scalar by tick; NaN where its channel has no message. `values` is there after load(). */
+export class Signal {
+  #array = null;
+  #length = 0;
+  #loading = null;
+
+  constructor(channel, spec, description) {
+    this.channel = channel;
+    this.field = spec.field;
+    this.integer = spec.integer ?? false;
+    this.name = `${channel.name}.${spec.field}`;
+    this.spec = spec;
+    Object.assign(this, description);
+  }
+
+  get values() { return this.#array?.subarray(0, this.#length); }
+
+  load() {
+    return this.#loading ??= this.channel.read(this.spec, this.integer).then((array) => {
+      this.#array = array;
+      this.#length = array.length;
+    });
+  }
+
+  /** Adds `values` at the end; the array grows by doubling. */
+  append(values) {
+    const length = this.#length + values.length;
+    this.#loading ??= Promise.resolve();
+    if (!this.#array || length > this.#array.length) {
+      const grown = new (this.integer ? Float64Array : Float32Array)(Math.max(1024, 2 * length));
+      grown.set(this.values ?? []);
+      this.#array = grown;
+    }
+    this.#array.set(values, this.#length);
+    this.#length = length;
+  }
+}
+
+class Channel {
+  #ticks = null;
+
+  constructor(run, spec, blob) {
+    this.run = run;
+    this.spec = spec;
+    this.name = spec.name;
+    this.type = spec.type;
+    this.blob = blob;
+    /** False: it has messages in some ticks only. */
+    this.dense = spec.ticks === undefined;
+  }
+
+  /** A packed column by tick. */
+  async read(packed, integer) {
+    const column = await unpack(packed, this.spec.count, this.blob, integer);
+    if (this.dense) return column;
+    const ticks = await (this.#ticks ??= unpack(this.spec.ticks, this.spec.count, this.blob, true));
+    const values = new column.constructor(this.run.numTicks).fill(NaN);
+    ticks.forEach((tick, i) => { values[tick] = column[i]; });
+    return values;
+  }
+}
+
+/**
+ * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.mjs; `blob`: gives the text of a packed
+ * column by its id. A live run starts with a meta without ticks and grows by appendTicks, which fires 'append'.
+ */
+export class Run extends EventTarget {
+  constructor(meta, messages, blob) {
+    super();
+    Object.assign(this, {meta, scenario: meta.scenario, robot: meta.robot});
+    this.period = meta.run.tick_period;
+    this.numTicks = meta.run.ticks;
+    this.signals = new Map();
+    this.channels = meta.channels.map((spec) => {
+      const channel = new Channel(this, spec, blob);
+      for (const signal of spec.signals) {
+        this.add(new Signal(channel, signal, describeField(messages, spec.type, signal.field)));
+      }
+      return channel;
+    });
+  }
+
+  get duration() { return Math.max(0, this.numTicks - 1) * this.period; }
+  add(signal) { this.signals.set(signal.name, signal); }
+
+  /** The signal of the first channel of `type`, as the run's checks take it; undefined when there is none. */
+  find(type, field) {
+    const channel = this.channels.find((c) => c.type === type);
+    return channel && this.signals.get(`${channel.name}.${field}`);
+  }
+
+  tickAt(time) {
+    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period)));
+  }
+
+  /** `values`: by signal name, `count` numbers each; a signal that is not named gets NaN. */
+  appendTicks(count, values) {
+    const none = new Float32Array(count).fill(NaN);
+    for (const [name, signal] of this.signals) {
+      if (signal.append) signal.append(values[name] ?? none);
+    }
+    this.numTicks += count;
+    this.dispatchEvent(new Event('append'));
+  }
+}
+
+/** The runs that `poise report` wrote into the page. */
+export function embeddedRuns(document) {
+  const messages = JSON.parse(document.getElementById('poise-messages').textContent);
+  const blob = (id) => document.getElementById(id).textContent;
+  return [...document.querySelectorAll('script.poise-run')]
+    .map((element) => new Run(JSON.parse(element.textContent), messages, blob));
+}

@@ -1,0 +1,213 @@
+// Signals that follow from those of the log: centre of pressure, contact conditions, errors. They join a run's signals.
+import {centerOfPressure, conjugate, rotate, transformWrench} from './spatial.js';
+
+const LIGHT_LOAD = 5;  // N: below it, ratios of a sensor's readings are noise
+const IN_THE_AIR = 1;  // N: below it there is no centre of pressure (logging/analysis.cc)
+
+const AXES = ['x', 'y', 'z'];
+const vector = (type, field, n = 3) => Array.from({length: n}, (_, i) => [type, `${field}[${i}]`]);
+const wrench = (type, foot) =>
+  [...vector(type, `foot_wrench[${foot}].force`), ...vector(type, `foot_wrench[${foot}].moment`)];
+const pose = (type, field) => [...vector(type, `${field}.position`), ...vector(type, `${field}.orientation`, 4)];
+const poseOf = (v) => ({position: v.slice(0, 3), orientation: v.slice(3, 7)});
+const wrenchOf = (v) => ({force: v.slice(0, 3), moment: v.slice(3, 6)});
+
+/** Ratios of a sole's wrench to |F_z| that (30)-(33) limit. */
+export const CONDITIONS = [
+  {key: 'friction', number: '30', unit: '', ratio: (f) => Math.hypot(f[0], f[1]), text: '|(F_x, F_y)| / |F_z|'},
+  {key: 'yaw', number: '31', unit: 'm', ratio: (f) => Math.abs(f[5]), text: '|M_z| / |F_z|'},
+  {key: 'roll', number: '32', unit: 'm', ratio: (f) => Math.abs(f[3]), text: '|M_x| / |F_z|'},
+  {key: 'pitch', number: '33', unit: 'm', ratio: (f) => Math.abs(f[4]), text: '|M_y| / |F_z|'},
+];
+const LIMIT_FIELDS = {friction: 'friction', yaw: 'yaw_friction', roll: 'half_width', pitch: 'half_length'};
+
+/** By tick from values of the same tick. */
+const pointwise = (f) => (arrays, n) => {
+  const result = new Float32Array(n);
+  const values = new Array(arrays.length);
+  for (let i = 0; i < n; ++i) {
+    for (let k = 0; k < arrays.length; ++k) values[k] = arrays[k][i];
+    result[i] = f(values);
+  }
+  return result;
+};
+
+/** A sensor's reading shows the command of the tick before, so frame and soles are those of the tick before. */
+function measuredCop(axis) {
+  return (arrays, n) => {
+    const result = new Float32Array(n).fill(NaN);
+    const at = (from, count, i) => arrays.slice(from, from + count).map((a) => a[i]);
+    for (let i = 1; i < n; ++i) {
+      const frame = poseOf(at(28, 7, i - 1));
+      const sum = {force: [0, 0, 0], moment: [0, 0, 0]};
+      for (const foot of [0, 1]) {
+        if (!(arrays[26 + foot][i - 1] > 0)) continue;
+        const part = transformWrench(frame, poseOf(at(12 + 7 * foot, 7, i - 1)), wrenchOf(at(6 * foot, 6, i)));
+        for (const k of [0, 1, 2]) {
+          sum.force[k] += part.force[k];
+          sum.moment[k] += part.moment[k];
+        }
+      }
+      if (Math.abs(sum.force[2]) > IN_THE_AIR) result[i] = centerOfPressure(sum)[axis];
+    }
+    return result;
+  };
+}
+
+const relative = ([values], n) => {
+  const first = values.find((x) => !Number.isNaN(x)) ?? NaN;
+  return Float32Array.from({length: n}, (_, i) => values[i] - first);
+};
+
+function comSignals() {
+  return AXES.flatMap((axis, i) => [
+    {name: `com_motion_${axis}`, unit: 'm', text: 'estimated COM from where it was first',
+      deps: [['task_torque_t', `com_position[${i}]`]], compute: relative},
+    {name: `com_motion_true_${axis}`, unit: 'm', text: 'true COM from where it was first',
+      deps: [['ground_truth_t', `com_position[${i}]`]], compute: relative},
+    {name: `com_motion_desired_${axis}`, unit: 'm', text: 'desired COM from where the estimated one was first',
+      deps: [['task_torque_t', `com_desired[${i}]`], ['task_torque_t', `com_position[${i}]`]],
+      compute: ([desired, estimated], n) => {
+        const first = estimated.find((x) => !Number.isNaN(x)) ?? NaN;
+        return Float32Array.from({length: n}, (_, k) => desired[k] - first);
+      }},
+    {name: `com_error_${axis}`, unit: 'm', text: 'estimated COM less desired',
+      deps: [['task_torque_t', `com_position[${i}]`], ['task_torque_t', `com_desired[${i}]`]],
+      compute: pointwise(([a, b]) => a - b)},
+  ]);
+}
+
+function copSignals() {
+  const both = [...wrench('robot_sensors_t', 0), ...wrench('robot_sensors_t', 1),
+    ...pose('task_torque_t', 'foot_pose[0]'), ...pose('task_torque_t', 'foot_pose[1]'),
+    ['task_torque_t', 'in_contact[0]'], ['task_torque_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
+  return [0, 1].flatMap((i) => [
+    {name: `cop_measured_${AXES[i]}`, unit: 'm', text: 'measured centre of pressure, frame O',
+      deps: both, compute: measuredCop(i)},
+    {name: `cop_desired_${AXES[i]}`, unit: 'm', text: 'O_d: the bound while balancing controls this axis, frame O',
+      deps: [['balance_torque_t', `cop_task[${i}]`], ['balance_torque_t', `cop_limit[${i}]`],
+        ['balance_torque_t', `active_${AXES[i]}`]],
+      compute: pointwise(([task, limit, active]) => active > 0 ? Math.sign(task) * limit : task)},
+    ...['measured', 'computed'].map((kind) => ({
+      name: `cop_${kind}_abs_${AXES[i]}`, unit: 'm', text: `${kind} centre of pressure, frame O, absolute`,
+      deps: kind === 'measured' ? both : [['balance_torque_t', `cop[${i}]`]],
+      compute: (arrays, n) => (kind === 'measured' ? measuredCop(i)(arrays, n) : arrays[0].slice(0, n)).map(Math.abs),
+    })),
+  ]);
+}
+
+function footSignals(run) {
+  const config = run.scenario.redistributor ?? {};
+  return run.robot.feet.flatMap((foot, f) => {
+    const contact = [0, 1].map((k) => ['joint_command_t', `in_contact[${k}]`]);
+    return [
+      ...CONDITIONS.flatMap(({key, number, unit, ratio, text}) => [
+        {name: `${foot.name}_${key}_ratio_computed`, unit, text: `(${number}): ${text}, ${foot.name} foot, computed`,
+          deps: [contact[f], ...wrench('joint_command_t', f)],
+          compute: pointwise(([on, ...w]) => on > 0 ? ratio(w) / Math.abs(w[2]) : NaN)},
+        {name: `${foot.name}_${key}_ratio_measured`, unit, text: `(${number}): ${text}, ${foot.name} foot, measured`,
+          deps: wrench('robot_sensors_t', f),
+          compute: pointwise((w) => Math.abs(w[2]) > LIGHT_LOAD ? ratio(w) / Math.abs(w[2]) : NaN)},
+        {name: `${foot.name}_${key}_limit`, unit, text: `(${number}): limit of ${text}, ${foot.name} foot`,
+          deps: [contact[f], contact[1 - f]],
+          compute: pointwise(([on, other]) => on > 0
+            ? config[other > 0 ? 'double_support' : 'single_support']?.[LIMIT_FIELDS[key]] ?? NaN : NaN)},
+      ]),
+      ...[['computed', 'joint_command_t'], ['measured', 'robot_sensors_t'], ['true', 'ground_truth_t']]
+        .map(([kind, type]) => ({
+          name: `${foot.name}_load_${kind}`, unit: 'N', text: `-F_z: ground on ${foot.name} foot, ${kind}`,
+          deps: [[type, `foot_wrench[${f}].force[2]`]], compute: pointwise(([x]) => -x)})),
+    ];
+  });
+}
+
+function estimatorSignals() {
+  const both = (field, n) => [...vector('robot_state_t', field, n), ...vector('ground_truth_t', field, n)];
+  const up = [0, 0, 1];
+  return [
+    ...AXES.map((axis, i) => ({
+      name: `base_position_error_${axis}`, unit: 'm', text: 'base, estimated less true',
+      deps: [['robot_state_t', `base_position[${i}]`], ['ground_truth_t', `base_position[${i}]`]],
+      compute: pointwise(([a, b]) => a - b)})),
+    {name: 'base_velocity_error', unit: 'm/s', text: 'base, norm of estimated less true velocity',
+      deps: both('base_linear_velocity', 3),
+      compute: pointwise((v) => Math.hypot(v[0] - v[3], v[1] - v[4], v[2] - v[5]))},
+    {name: 'base_tilt_error', unit: 'rad', text: 'angle between the estimated and the true vertical',
+      deps: both('base_orientation', 4),
+      compute: pointwise((q) => {
+        const a = rotate(conjugate(q.slice(0, 4)), up), b = rotate(conjugate(q.slice(4)), up);
+        return 2 * Math.asin(Math.min(1, Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / 2));
+      })},
+  ];
+}
+
+function otherSignals(run) {
+  return [
+    {name: 'push_magnitude', unit: 'N', text: 'external push, measured', deps: vector('external_push_t', 'force'),
+      compute: pointwise((f) => Math.hypot(...f))},
+    ...run.robot.joints.map((joint, i) => ({
+      name: `torque_share_${joint.name}`, unit: '%', text: 'commanded torque, of the joint\'s limit',
+      deps: [['joint_command_t', `torque[${i}]`]], compute: pointwise(([x]) => 100 * x / joint.torque_limit)})),
+  ];
+}
+
+/** A signal computed from others when it is loaded, and anew when the run has grown. */
+class DerivedSignal {
+  #values = null;
+
+  constructor(run, definition) {
+    Object.assign(this, definition);
+    this.run = run;
+    this.field = definition.name;
+    this.channel = {name: 'derived', dense: true};
+    this.name = `derived.${definition.name}`;
+    this.integer = false;
+  }
+
+  get values() { return this.#values; }
+
+  async load() {
+    if (this.#values?.length === this.run.numTicks) return;
+    const signals = this.deps.map(([type, field]) => this.run.find(type, field));
+    await Promise.all(signals.map((s) => s.load()));
+    const n = this.run.numTicks;
+    this.#values = this.compute(signals.map((s) => s.values), n);
+  }
+}
+
+/** Adds to `run` the derived signals for which it has what they need. */
+export function addDerivedSignals(run) {
+  const definitions = [...comSignals(), ...copSignals(), ...footSignals(run), ...estimatorSignals(),
+    ...otherSignals(run)];
+  for (const definition of definitions) {
+    if (definition.deps.every(([type, field]) => run.find(type, field))) run.add(new DerivedSignal(run, definition));
+  }
+}
+
+/** [{from, to, value}] in ticks, of stretches in which key(tick) stays the same. */
+export function intervals(n, key) {
+  const result = [];
+  for (let i = 0; i < n; ++i) {
+    const value = key(i);
+    if (result.at(-1)?.value === value) result.at(-1).to = i;
+    else result.push({from: i, to: i, value});
+  }
+  return result;
+}
+
+/** {balancing, support} in seconds: where balancing runs; which feet the controller's model stands on. */
+export async function findPhases(run) {
+  const get = (type, field) => run.find(type, field);
+  const active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
+  const contact = run.robot.feet.map((_, f) => get('task_torque_t', `in_contact[${f}]`)).filter(Boolean);
+  await Promise.all([...active, ...contact].map((s) => s.load()));
+  const seconds = ({from, to, value}) => ({from: from * run.period, to: (to + 1) * run.period, value});
+  const name = (i) => {
+    const on = run.robot.feet.filter((_, f) => contact[f].values[i] > 0).map((foot) => foot.name);
+    return on.length === contact.length ? 'both feet' : on.length ? `${on.join(', ')} foot` : 'no foot';
+  };
+  return {
+    balancing: intervals(run.numTicks, (i) => active.some((s) => s.values[i] > 0)).filter((p) => p.value).map(seconds),
+    support: contact.length ? intervals(run.numTicks, name).map(seconds) : [],
+  };
+}

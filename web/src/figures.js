@@ -1,0 +1,163 @@
+// Which plots a run gets: the paper's figures of its section, then what every run is looked at for.
+import {CONDITIONS} from './derived.js';
+
+const series = (label, role, type, field) => ({label, role, type, field});
+const derived = (label, role, name) => ({label, role, type: 'derived', field: name});
+
+const SUPPORT_NOTE = 'The yellow areas show when balancing runs.';
+
+function comMotion(figure, title, axes, note) {
+  return {figure, title, unit: 'm', note, series: axes.flatMap((axis) => [
+    derived(axes.length > 1 ? axis : 'estimated', axes.length > 1 ? `axis-${axis}` : 'computed', `com_motion_${axis}`),
+    derived(axes.length > 1 ? `${axis}, true` : 'true', axes.length > 1 ? `axis-${axis}-thin` : 'truth',
+      `com_motion_true_${axis}`),
+    ...(axes.length > 1 ? [] : [derived('desired', 'desired', `com_motion_desired_${axis}`)]),
+  ])};
+}
+
+const push = (figure) => ({figure, title: 'External push, magnitude', unit: 'N',
+  series: [derived('measured', 'measured', 'push_magnitude')]});
+
+function resultantConditions(figure) {
+  return [['a', 'y', 1, 'l_y/2 > |M_x| / |F_z|, resultant in frame O (37)'],
+    ['b', 'x', 0, 'l_x/2 > |M_y| / |F_z|, resultant in frame O (38)']].map(([letter, axis, i, title]) => ({
+    figure: figure && `${figure}${letter}`, title, unit: 'm', series: [
+      derived('measured', 'measured', `cop_measured_abs_${axis}`),
+      derived('computed', 'computed', `cop_computed_abs_${axis}`),
+      series('limit', 'limit', 'balance_torque_t', `cop_limit[${i}]`)]}));
+}
+
+function footConditions(run, figure, foot) {
+  const {name} = run.robot.feet[foot];
+  const limits = {friction: 'μ_s', yaw: 'μ_z', roll: 'l_y/2', pitch: 'l_x/2'};
+  return CONDITIONS.map(({key, number, unit, text}, i) => ({
+    figure: figure && `${figure}${'abcd'[i]}`, unit,
+    title: `${limits[key]} > ${text}, ${name} foot (${number})`, series: [
+      derived('measured', 'measured', `${name}_${key}_ratio_measured`),
+      derived('computed', 'computed', `${name}_${key}_ratio_computed`),
+      derived('limit', 'limit', `${name}_${key}_limit`)]}));
+}
+
+function footWrenches(run, figure) {
+  const part = {force: ['F', 'N'], moment: ['M', 'N·m']};
+  return Object.entries(part).flatMap(([kind, [letter, unit]]) => ['x', 'y', 'z'].map((axis, i) => ({
+    figure, title: `${letter}_${axis} of each foot, robot on ground, sole frame`, unit,
+    series: run.robot.feet.flatMap((foot, f) => [
+      series(`${foot.name}, measured`, `foot-${f}`, 'robot_sensors_t', `foot_wrench[${f}].${kind}[${i}]`),
+      series(`${foot.name}, computed`, `foot-${f}-dashed`, 'joint_command_t', `foot_wrench[${f}].${kind}[${i}]`)]),
+  })));
+}
+
+function footMotion(figure, run, foot, axis, note) {
+  return {figure, title: `${run.robot.feet[foot].name} foot, ${'xyz'[axis]}`, unit: 'm', note, series: [
+    series('estimated', 'computed', 'task_torque_t', `foot_pose[${foot}].position[${axis}]`),
+    series('true', 'truth', 'ground_truth_t', `foot_pose[${foot}].position[${axis}]`),
+    series('desired', 'desired', 'task_torque_t', `foot_desired[${foot}].position[${axis}]`)]};
+}
+
+/** Indices of the joints between base and foot that turn about the world's y axis in the zero posture, nearly. */
+export function pitchJoints(robot, foot) {
+  const chain = [];
+  for (let b = robot.feet[foot].body; robot.bodies[b].joint >= 0; b = robot.bodies[b].parent) chain.unshift(b);
+  let [w, x, y, z] = [1, 0, 0, 0];
+  const result = [];
+  for (const b of chain) {
+    const {origin: {orientation: q}, axis, joint} = robot.bodies[b];
+    [w, x, y, z] = [w * q[0] - x * q[1] - y * q[2] - z * q[3], w * q[1] + x * q[0] + y * q[3] - z * q[2],
+      w * q[2] - x * q[3] + y * q[0] + z * q[1], w * q[3] + x * q[2] - y * q[1] + z * q[0]];
+    const across = axis[0] * 2 * (x * y + w * z) + axis[1] * (1 - 2 * (x * x + z * z)) + axis[2] * 2 * (y * z - w * x);
+    if (Math.abs(across) > 0.8) result.push(joint);
+  }
+  return result;
+}
+
+function jointTorque(figure, run, joint) {
+  return {figure, title: `Torque of ${run.robot.joints[joint].name}`, unit: 'N·m', series: [
+    series('commanded', 'computed', 'joint_command_t', `torque[${joint}]`),
+    series('delivered', 'truth', 'ground_truth_t', `joint_torque[${joint}]`)]};
+}
+
+const bodyRoll = (figure, note) => ({figure, title: 'Orientation error of the body about x', unit: 'rad', note,
+  series: [series('desired less actual', 'computed', 'task_torque_t', 'body_orientation_error[0]')]});
+
+/** The paper's figures by section. */
+const SECTIONS = {
+  '7.1': (run) => [...footWrenches(run, '6'),
+    comMotion('7', 'COM motion', ['x', 'y', 'z'], 'The paper sees 1 to 3 mm.')],
+  '7.2': (run) => [
+    comMotion('9a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 0.035 m.`), push('9b'),
+    ...resultantConditions('10'), ...footConditions(run, '11', 0), ...footConditions(run, '12', 1)],
+  '7.3': (run) => [
+    comMotion('14a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 0.0106 m.`),
+    footMotion('14b', run, 1, 1, 'The paper\'s largest error: 0.015 m.'), push('14c'),
+    ...footConditions(run, '15', 0)],
+  '7.4': (run) => [
+    ...pitchJoints(run.robot, 0).map((joint, i) => jointTorque(`16${'abcdef'[i]}`, run, joint)),
+    footMotion('17', run, 1, 2)],
+  '7.5': (run) => [
+    comMotion('19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
+    footMotion('20a', run, 1, 2, 'As 19b; zoom in on the contact.'),
+    {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
+      derived('measured', 'measured', `${run.robot.feet[1].name}_load_measured`),
+      derived('computed', 'computed', `${run.robot.feet[1].name}_load_computed`)]},
+    bodyRoll('21', 'a: first double support; b: second, with balancing.'),
+    ...resultantConditions('22'), ...footConditions(run, '23', 0), ...footConditions(run, '24', 1)],
+};
+
+function defaults(run) {
+  return [comMotion('', 'COM motion, lateral (y)', ['y']), comMotion('', 'COM motion', ['x', 'y', 'z']), push(''),
+    ...resultantConditions(''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
+}
+
+/** What every run is looked at for. */
+function common(run, covered) {
+  const legs = run.robot.feet.map((foot, f) => {
+    const joints = [];
+    for (let b = foot.body; run.robot.bodies[b].joint >= 0; b = run.robot.bodies[b].parent) {
+      joints.unshift(run.robot.bodies[b].joint);
+    }
+    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100],
+      series: joints.map((j, i) => derived(run.robot.joints[j].name, `hue-${i}`,
+        `torque_share_${run.robot.joints[j].name}`)), key: `leg-${f}`};
+  });
+  const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
+  return [
+    {title: 'Vertical force of the ground on each foot', unit: 'N', series: run.robot.feet.flatMap((foot, f) => [
+      derived(`${foot.name}, measured`, `foot-${f}`, `${foot.name}_load_measured`),
+      derived(`${foot.name}, computed`, `foot-${f}-dashed`, `${foot.name}_load_computed`)])},
+    {title: 'η: the right foot\'s share of F_z (61)', unit: '', series: [
+      eta('commanded', 'computed', 'eta'), eta('optimal (71)', 'desired', 'eta_optimal'),
+      eta('lower bound', 'limit', 'eta_min'), eta('upper bound', 'limit', 'eta_max')]},
+    ...legs,
+    {title: 'COM error', unit: 'm',
+      series: ['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `com_error_${axis}`))},
+    {title: 'Orientation error of the body', unit: 'rad', series: ['x', 'y', 'z'].map((axis, i) =>
+      series(axis, `axis-${axis}`, 'task_torque_t', `body_orientation_error[${i}]`))},
+    {title: 'Estimator: base position, estimated less true', unit: 'm',
+      series: ['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `base_position_error_${axis}`))},
+    {title: 'Estimator: tilt error', unit: 'rad', series: [derived('tilt', 'computed', 'base_tilt_error')]},
+    {title: 'Estimator: velocity error', unit: 'm/s', series: [derived('norm', 'computed', 'base_velocity_error')]},
+    ...(covered === '7.1' ? [] : footWrenches(run, '')),
+  ];
+}
+
+/** Panels {figure, title, unit, note, limits, series: [{label, role, signal}]}; those of a run without their signals are left out. */
+export function figuresFor(run) {
+  const section = run.scenario.paper_section;
+  const wanted = [...(SECTIONS[section] ?? defaults)(run), ...common(run, section)];
+  return wanted.map((panel) => ({...panel, series: panel.series
+    .map((s) => ({...s, signal: findSignal(run, s)})).filter((s) => s.signal)}))
+    .filter((panel) => panel.series.some((s) => s.role !== 'limit'));
+}
+
+/** The signal that a series shows of `run`; undefined when it has none. */
+export function findSignal(run, {type, field, name}) {
+  if (name) return run.signals.get(name);
+  return type === 'derived' ? run.signals.get(`derived.${field}`) : run.find(type, field);
+}
+
+/** A panel of one signal, from the search. */
+export function panelOf(signal) {
+  return {title: signal.name, unit: signal.unit, note: signal.text, added: true,
+    series: [{label: signal.field, role: 'computed', name: signal.name, signal}]};
+}

@@ -1,0 +1,119 @@
+// Builds the page from the run that it holds.
+import {KEYS, playerBar} from './bar.js';
+import {embeddedRuns} from './data.js';
+import {addDerivedSignals, findPhases} from './derived.js';
+import {element} from './dom.js';
+import {figuresFor} from './figures.js';
+import {Player} from './player.js';
+import {PanelGrid, TimeView} from './plots.js';
+import {COLORS, SceneView} from './scene.js';
+import {signalSearch} from './search.js';
+import {eventList, Readout} from './side.js';
+import {tables, verdictBadge} from './table.js';
+
+const READOUT_PERIOD = 80;  // ms
+
+function header(run, overlay) {
+  const {run: r} = run.meta;
+  document.title = `${r.scenario} – Poise`;
+  document.getElementById('header').append(
+    element('h1', {}, r.scenario), element('p', {}, run.scenario.description ?? ''),
+    r.paper_section ? element('span', {class: 'badge'}, `paper, section ${r.paper_section}`) : '', verdictBadge(run),
+    element('span', {class: 'soft'}, `${r.started_at}, poise ${r.versions.poise}`),
+    overlay ? element('span', {class: 'badge second'}, `over it, dashed: ${overlay.meta.run.scenario}, ${overlay.meta.run.started_at}`)
+      : '');
+}
+
+function sceneToolbar(scene) {
+  const button = (name) => element('button', {type: 'button', click: () => scene.look(name)}, name);
+  const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: scene.show[name],
+    change: (e) => scene.setShow(name, e.target.checked)}), label);
+  return element('div', {class: 'toolbar'}, ...['free', 'front', 'side', 'top'].map(button),
+    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'));
+}
+
+function sceneKey(overlay) {
+  const entry = (name, symbol, text) => {
+    const mark = element('span', {class: 'symbol'}, symbol);
+    mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
+    return element('li', {}, mark, text);
+  };
+  return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
+    entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
+    entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
+    entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
+    overlay ? entry('desired', '▒', 'second run') : '');
+}
+
+/** Keeps the picture in sight, small, while the plots are read; the box that switches this off. */
+function floatingScene(scene) {
+  let away = false;
+  const box = element('input', {type: 'checkbox', checked: true});
+  const update = () => {
+    scene.host.classList.toggle('floating', away && box.checked);
+    scene.visible = !away || box.checked;
+    scene.draw();
+  };
+  box.addEventListener('change', update);
+  new IntersectionObserver(([entry]) => {
+    away = !entry.isIntersecting;
+    update();
+  }, {threshold: 0.12}).observe(document.getElementById('scene-place'));
+  return element('label', {class: 'soft'}, box, ' robot beside the plots');
+}
+
+async function start() {
+  const [run, overlay] = embeddedRuns(document);
+  if (!run) throw new Error('this page holds no run: write one with poise report');
+  for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
+  header(run, overlay);
+  const events = run.meta.events ?? [];
+  const player = new Player(run);
+  performance.mark('poise-data');
+  const scene = new SceneView(document.getElementById('scene'), run, overlay);
+  scene.host.append(sceneToolbar(scene), sceneKey(overlay),
+    element('span', {class: 'inset'}, 'soles from above, forward is up'));
+  const [phases] = await Promise.all([findPhases(run), scene.load()]);
+  performance.mark('poise-picture');
+  document.documentElement.dataset.picture = String(Math.round(performance.now()));
+
+  const view = new TimeView(run);
+  const shared = {run, overlay, player, view, phases, events};
+  playerBar(document.getElementById('player'), shared);
+  const grid = new PanelGrid(document.getElementById('figures'), shared);
+  const readout = new Readout(run, phases);
+  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
+    eventList(events, player), element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
+      ...KEYS.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
+  document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
+    element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
+    element('li', {}, element('span', {class: 'area single'}), 'single support'),
+    element('li', {}, element('span', {class: 'area event'}), 'event'),
+    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: whole run')),
+  floatingScene(scene));
+  for (const definition of figuresFor(run)) grid.add(definition);
+  document.getElementById('tables').append(...tables(run, overlay));
+  await readout.load();
+
+  let shown = 0;
+  const update = (now) => {
+    if (player.playing && now - shown < READOUT_PERIOD) return;
+    shown = now;
+    readout.update(player.tick);
+    grid.updateValues();
+  };
+  player.addEventListener('time', () => {
+    scene.setTick(player.tick);
+    update(performance.now());
+  });
+  player.addEventListener('state', () => update(performance.now()));
+  update(performance.now());
+  document.documentElement.dataset.ready = 'true';
+  // For whoever looks closer from the browser's console.
+  window.poise = {run, overlay, player, view, grid, scene};
+}
+
+start().catch((error) => {
+  console.error(error);
+  document.getElementById('header').append(element('p', {class: 'failed', role: 'alert'}, `This page cannot be shown: ${error.message}`));
+});

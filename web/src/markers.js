@@ -1,0 +1,103 @@
+// What is drawn beside the robot: arrows, points on the ground, outlines, the soft block.
+import {
+  BufferAttribute, BufferGeometry, CircleGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group,
+  Line, LineDashedMaterial, LineLoop, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, RingGeometry,
+  Vector3,
+} from 'three';
+
+const UP = new Vector3(0, 1, 0);
+const OVERLAY_ORDER = 10;
+
+/** Drawn over what lies before it: points under a sole stay in sight. */
+const overlay = (color, more = {}) =>
+  new MeshBasicMaterial({color, depthTest: false, transparent: true, side: DoubleSide, ...more});
+
+/** An arrow from a point along a vector. */
+export class Arrow {
+  constructor(color, radius) {
+    this.object = new Group();
+    this.material = overlay(color);
+    this.radius = radius;
+    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), this.material);
+    this.head = new Mesh(new ConeGeometry(1, 1, 16).translate(0, -0.5, 0), this.material);
+    this.object.add(this.shaft, this.head);
+    this.object.children.forEach((mesh) => { mesh.renderOrder = OVERLAY_ORDER; });
+  }
+
+  /** Hidden when shorter than `least` m. */
+  set(from, vector, least = 0.005) {
+    direction.set(...vector);
+    const length = direction.length();
+    this.object.visible = length > least && Number.isFinite(length);
+    if (!this.object.visible) return;
+    this.object.position.set(...from);
+    this.object.quaternion.setFromUnitVectors(UP, direction.divideScalar(length));
+    const head = Math.min(0.4 * length, 5 * this.radius);
+    this.shaft.scale.set(this.radius, length - head, this.radius);
+    this.head.scale.set(2.2 * this.radius, head, 2.2 * this.radius);
+    this.head.position.y = length;
+  }
+}
+const direction = new Vector3();
+
+/** A flat mark: 'disc', 'ring', 'cross' or 'diamond'; lies in the x-y plane of its frame. */
+export function mark(kind, color, size) {
+  const geometry = kind === 'disc' ? new CircleGeometry(size, 24)
+    : kind === 'ring' ? new RingGeometry(0.62 * size, size, 28)
+      : kind === 'diamond' ? new RingGeometry(0.72 * size, size, 4) : crossGeometry(size);
+  const mesh = new Mesh(geometry, overlay(color));
+  mesh.renderOrder = OVERLAY_ORDER + 1;
+  return mesh;
+}
+
+function crossGeometry(size) {
+  const t = 0.22 * size;
+  const quad = (a, b) => [-a, -b, 0, a, -b, 0, a, b, 0, -a, -b, 0, a, b, 0, -a, b, 0];
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new Float32BufferAttribute([...quad(size, t), ...quad(t, size)], 3));
+  return geometry;
+}
+
+/** A closed outline of up to `capacity` points. */
+export class Outline {
+  constructor(color, capacity, dashed = false) {
+    this.positions = new BufferAttribute(new Float32Array(3 * (capacity + 1)), 3);
+    const geometry = new BufferGeometry().setAttribute('position', this.positions);
+    const look = {color, depthTest: false, transparent: true};
+    this.material = dashed ? new LineDashedMaterial({...look, dashSize: 0.02, gapSize: 0.012})
+      : new LineBasicMaterial(look);
+    this.object = dashed ? new Line(geometry, this.material) : new LineLoop(geometry, this.material);
+    this.dashed = dashed;
+    this.object.renderOrder = OVERLAY_ORDER;
+    this.object.frustumCulled = false;
+  }
+
+  set(points) {
+    const list = this.dashed && points.length ? [...points, points[0]] : points;
+    list.forEach((p, i) => this.positions.setXYZ(i, p[0], p[1], p[2]));
+    this.positions.needsUpdate = true;
+    this.object.geometry.setDrawRange(0, list.length);
+    this.object.visible = list.length > 1;
+    if (this.dashed) this.object.computeLineDistances();
+  }
+}
+
+/** The scenario's soft block, undeformed, without its irregularity. Its top is tilted as in sim_ode/terrain.cc. */
+export function blockMesh(block) {
+  const normal = [Math.sin(block.tilt_pitch) * Math.cos(block.tilt_roll), -Math.sin(block.tilt_roll),
+    Math.cos(block.tilt_pitch) * Math.cos(block.tilt_roll)];
+  const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([i, j]) => [i * block.length / 2, j * block.width / 2]);
+  const top = corners.map(([x, y]) => [x, y, block.height - (normal[0] * x + normal[1] * y) / normal[2]]);
+  const bottom = corners.map(([x, y]) => [x, y, 0]);
+  const quad = (a, b, c, d) => [a, b, c, a, c, d].flat();
+  const faces = [quad(...top), ...[0, 1, 2, 3].map((k) => {
+    const next = (k + 1) % 4;
+    return quad(bottom[k], bottom[next], top[next], top[k]);
+  })].flat();
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new Float32BufferAttribute(faces, 3));
+  geometry.computeVertexNormals();
+  const mesh = new Mesh(geometry, new MeshStandardMaterial({color: 0x9c8458, roughness: 1, side: DoubleSide}));
+  mesh.position.set(block.x, block.y, 0.001);
+  return mesh;
+}

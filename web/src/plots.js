@@ -1,0 +1,332 @@
+// Plots over time: one zoom and one time cursor for all of them.
+import uPlot from 'uplot';
+import {element, formatNumber} from './dom.js';
+import {csvOf, pngOf, savePanel} from './export.js';
+import {findSignal} from './figures.js';
+import {cssColor, onThemeChange, styleOf} from './palette.js';
+
+const HEIGHT = 200;       // px
+const CLICK_SLACK = 4;    // px that a click may move
+const ZOOM_STEP = 1.25;
+
+/** The stretch of time that all plots show. Fires 'change'. */
+export class TimeView extends EventTarget {
+  constructor(run) {
+    super();
+    this.run = run;
+    this.reset();
+  }
+  get whole() { return this.min === 0 && this.max === this.end; }
+  get end() { return Math.max(this.run.duration, this.run.period); }
+  reset() { this.set(0, this.end); }
+  set(min, max) {
+    const least = 4 * this.run.period;
+    this.min = Math.max(0, Math.min(min, this.end - least));
+    this.max = Math.min(this.end, Math.max(max, this.min + least));
+    this.dispatchEvent(new Event('change'));
+  }
+  /** Keeps `time` where it is. */
+  zoom(factor, time) { this.set(time - (time - this.min) * factor, time + (this.max - time) * factor); }
+}
+
+/** Numbers as uPlot wants them: null where there is none. */
+function nullable(values, n) {
+  const result = new Array(n);
+  for (let i = 0; i < n; ++i) {
+    const v = i < values.length ? values[i] : NaN;
+    result[i] = v === v ? v : null;
+  }
+  return result;
+}
+
+/** The other run's values at the first run's ticks. */
+function resampled(values, run, other) {
+  if (run.period === other.period) return nullable(values, run.numTicks);
+  return Array.from({length: run.numTicks}, (_, i) => {
+    const v = values[Math.round(i * run.period / other.period)];
+    return v === undefined || Number.isNaN(v) ? null : v;
+  });
+}
+
+/** y range around the data, never empty. */
+function paddedRange(_, low, high) {
+  if (low === null || high === null) return [0, 1];
+  const pad = high > low ? 0.07 * (high - low) : Math.max(Math.abs(high) * 0.1, 1e-9);
+  return [low - pad, high + pad];
+}
+
+/** One plot. `definition` as figures.js gives it; `shared`: {run, overlay, player, view, phases, events}. */
+export class Panel {
+  constructor(definition, shared, onRemove) {
+    Object.assign(this, {definition, shared});
+    this.hidden = new Set();
+    this.host = element('div', {class: 'plot-host'});
+    this.legend = element('div', {class: 'legend'});
+    this.cursor = element('div', {class: 'time-cursor'});
+    const button = (text, label, action) => element('button', {type: 'button', title: label, 'aria-label': label,
+      click: action}, text);
+    this.element = element('article', {class: 'panel'},
+      element('header', {},
+        definition.figure ? element('span', {class: 'figure-number'}, `Fig. ${definition.figure}`) : '',
+        element('h3', {}, definition.title),
+        element('span', {class: 'panel-buttons'},
+          button('CSV', 'Save the stretch shown as CSV', () => this.saveCsv()),
+          button('PNG', 'Save as PNG', () => this.savePng()),
+          onRemove ? button('×', 'Remove this plot', () => onRemove(this)) : '')),
+      this.host, this.legend, definition.note ? element('p', {class: 'note'}, definition.note) : '');
+  }
+
+  /** Loads the signals and draws; once. */
+  show() {
+    return this.building ??= this.#build();
+  }
+
+  async #build() {
+    await this.#load();
+    this.#create();
+    new ResizeObserver(() => this.resize()).observe(this.host);
+    this.updateCursor();
+  }
+
+  async #load() {
+    const {run, overlay} = this.shared;
+    const {definition} = this;
+    const lines = definition.series.map((s) => ({...s, run, signal: s.signal ?? findSignal(run, s)}));
+    for (const limit of definition.limits ?? []) lines.push({label: 'limit', role: 'limit', constant: limit});
+    if (overlay) {
+      for (const s of definition.series.filter((x) => x.role !== 'limit')) {
+        const signal = findSignal(overlay, {...s, name: s.name ?? undefined});
+        if (signal) lines.push({...s, signal, run: overlay, label: `${s.label} (second run)`, overlay: true});
+      }
+    }
+    await Promise.all(lines.map((line) => line.signal?.load()));
+    this.lines = lines;
+  }
+
+  #data() {
+    const {run} = this.shared;
+    const times = Float64Array.from({length: run.numTicks}, (_, i) => i * run.period);
+    return [times, ...this.lines.map((line) => line.constant !== undefined
+      ? new Array(run.numTicks).fill(line.constant)
+      : line.overlay ? resampled(line.signal.values, run, line.run) : nullable(line.signal.values, run.numTicks))];
+  }
+
+  #create() {
+    const {view} = this.shared;
+    const axis = (more) => ({
+      stroke: () => cssColor('--ink-soft'), grid: {stroke: () => cssColor('--grid'), width: 1},
+      ticks: {stroke: () => cssColor('--grid'), size: 4}, font: '11px system-ui, sans-serif',
+      labelFont: '11px system-ui, sans-serif', ...more});
+    const {unit} = this.definition;
+    this.data = this.#data();
+    this.plot = new uPlot({
+      width: Math.max(120, this.host.clientWidth), height: HEIGHT, legend: {show: false},
+      scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: paddedRange}},
+      axes: [axis({label: 'time (s)', labelSize: 16, size: 26}),
+        axis({label: unit || '1', labelSize: 16, size: 62,
+          values: (_, splits) => splits.map((v) => formatNumber(Number(v.toPrecision(8)), 6))})],
+      cursor: {drag: {x: true, y: false, setScale: false}, points: {size: 5}, sync: {key: 'poise', setSeries: false}},
+      series: [{}, ...this.lines.map((line) => {
+        const style = styleOf(line.role, line.overlay);
+        return {label: line.label, stroke: style.color, dash: style.dash, width: style.width, points: {show: false},
+          spanGaps: line.signal?.channel.dense === false, show: !this.hidden.has(line.label)};
+      })],
+      hooks: {
+        drawClear: [(u) => this.#shade(u)],
+        setSelect: [(u) => {
+          if (u.select.width > CLICK_SLACK) {
+            view.set(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'));
+          }
+          u.setSelect({left: 0, top: 0, width: 0, height: 0}, false);
+        }],
+        setCursor: [(u) => this.#updateValues(u.cursor.idx ?? null)],
+      },
+    }, this.data, this.host);
+    const over = this.plot.over;
+    over.append(this.cursor);
+    let pressed = 0;
+    over.addEventListener('pointerdown', (e) => { pressed = e.offsetX; });
+    over.addEventListener('click', (e) => {
+      if (Math.abs(e.offsetX - pressed) <= CLICK_SLACK) this.shared.player.seek(this.plot.posToVal(e.offsetX, 'x'));
+    });
+    over.addEventListener('dblclick', () => view.reset());
+    over.addEventListener('wheel', (e) => {
+      if (!e.ctrlKey && !e.shiftKey) return;  // the page scrolls
+      e.preventDefault();
+      view.zoom((e.deltaY || e.deltaX) > 0 ? ZOOM_STEP : 1 / ZOOM_STEP, this.plot.posToVal(e.offsetX, 'x'));
+    }, {passive: false});
+    this.#fillLegend();
+  }
+
+  #fillLegend() {
+    this.values = this.lines.map(() => element('span', {class: 'value'}));
+    const seen = new Set();
+    this.legend.replaceChildren(...this.lines.map((line, i) => {
+      if (line.constant !== undefined && seen.has('limit')) return '';
+      if (line.constant !== undefined) seen.add('limit');
+      const style = styleOf(line.role, line.overlay);
+      const swatch = element('span', {class: 'swatch'});
+      swatch.style.borderTop = `2px ${style.dash ? 'dashed' : 'solid'} ${style.color()}`;
+      return element('button', {type: 'button', class: 'entry', title: line.signal?.name ?? 'limit',
+        'aria-pressed': String(!this.hidden.has(line.label)), click: (e) => {
+          const on = this.hidden.delete(line.label);
+          if (!on) this.hidden.add(line.label);
+          e.currentTarget.setAttribute('aria-pressed', String(on));
+          this.lines.forEach((other, k) => {
+            if (other.label === line.label) this.plot.setSeries(k + 1, {show: on});
+          });
+        }}, swatch, line.label, this.values[i]);
+    }).filter(Boolean));
+    this.#updateValues(null);
+  }
+
+  /** Values at the tick under the pointer, else at the time cursor. */
+  #updateValues(index) {
+    if (!this.values) return;
+    const tick = index ?? this.shared.player.tick;
+    this.lines.forEach((line, i) => {
+      const value = this.data[i + 1][tick];
+      const name = line.signal?.values && line.signal.integer ? this.#nameOf(line.signal, value) : null;
+      this.values[i].textContent = line.constant !== undefined ? '' : name ?? formatNumber(value);
+    });
+  }
+
+  #nameOf(signal, value) {
+    const name = signal.valueNames?.[value];
+    return name === undefined ? null : `${value} ${name}`;
+  }
+
+  #shade(u) {
+    const {ctx, bbox} = u;
+    const {phases, events, view} = this.shared;
+    ctx.save();
+    const x = (time) => Math.min(bbox.left + bbox.width, Math.max(bbox.left, u.valToPos(time, 'x', true)));
+    const fill = (list, color) => {
+      ctx.fillStyle = color;
+      for (const {from, to} of list) {
+        if (to > view.min && from < view.max) {
+          ctx.fillRect(x(from), bbox.top, Math.max(1, x(to) - x(from)), bbox.height);
+        }
+      }
+    };
+    fill(phases.support.filter((p) => p.value !== 'both feet'), cssColor('--single-support'));
+    fill(phases.balancing, cssColor('--balancing'));
+    ctx.strokeStyle = cssColor('--event');
+    ctx.lineWidth = 1;
+    ctx.setLineDash([2, 3]);
+    for (const event of events) {
+      if (event.time < view.min || event.time > view.max) continue;
+      ctx.beginPath();
+      ctx.moveTo(x(event.time), bbox.top);
+      ctx.lineTo(x(event.time), bbox.top + bbox.height);
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  updateCursor() {
+    if (!this.plot) return;
+    const {time} = this.shared.player;
+    const {min, max} = this.shared.view;
+    this.cursor.style.display = time < min || time > max ? 'none' : '';
+    this.cursor.style.transform = `translateX(${this.plot.valToPos(time, 'x')}px)`;
+  }
+
+  updateValues() {
+    if (this.plot) this.#updateValues(this.plot.cursor.idx ?? null);
+  }
+
+  /** After a zoom. */
+  redraw() {
+    if (!this.plot) return;
+    this.plot.setScale('x', {min: this.shared.view.min, max: this.shared.view.max});
+    this.updateCursor();
+  }
+
+  /** After a change of theme. */
+  restyle() {
+    if (!this.plot) return;
+    this.plot.redraw(false, true);
+    this.#fillLegend();
+  }
+
+  resize() {
+    if (!this.plot || this.host.clientWidth === 0) return;
+    this.plot.setSize({width: this.host.clientWidth, height: HEIGHT});
+    this.updateCursor();
+  }
+
+  /** After the signals have grown, or a series was added. */
+  async reload() {
+    if (!this.plot) return;
+    await this.#load();
+    this.plot.destroy();
+    this.#create();
+    this.updateCursor();
+  }
+
+  async saveCsv() {
+    await this.show();
+    savePanel(this, 'csv', new Blob([csvOf(this)], {type: 'text/csv'}));
+  }
+
+  async savePng() {
+    await this.show();
+    savePanel(this, 'png', await pngOf(this));
+  }
+}
+
+/** All plots; builds those that come into sight and moves only those. */
+export class PanelGrid {
+  constructor(host, shared) {
+    Object.assign(this, {host, shared});
+    this.panels = [];
+    this.inSight = new Set();
+    this.observer = new IntersectionObserver((entries) => {
+      for (const {target, isIntersecting} of entries) {
+        const panel = this.panels.find((p) => p.element === target);
+        if (!panel) continue;
+        if (!isIntersecting) this.inSight.delete(panel);
+        else this.#enter(panel);
+      }
+    }, {rootMargin: '150px'});
+    shared.view.addEventListener('change', () => {
+      this.inSight.forEach((p) => p.redraw());
+      this.panels.forEach((p) => { p.stale = !this.inSight.has(p); });
+    });
+    shared.player.addEventListener('time', () => this.inSight.forEach((p) => p.updateCursor()));
+    onThemeChange(() => this.panels.forEach((p) => p.restyle()));
+  }
+
+  #enter(panel) {
+    this.inSight.add(panel);
+    if (panel.stale) panel.redraw();
+    panel.stale = false;
+    panel.show().then(() => panel.updateCursor());
+    panel.updateValues();
+  }
+
+  updateValues() { this.inSight.forEach((p) => p.updateValues()); }
+
+  /** At the end, or first when it was asked for. */
+  add(definition, first = false) {
+    const panel = new Panel(definition, this.shared, definition.added ? (p) => this.remove(p) : null);
+    this.panels.push(panel);
+    if (first) this.host.prepend(panel.element);
+    else this.host.append(panel.element);
+    this.observer.observe(panel.element);
+    return panel;
+  }
+
+  remove(panel) {
+    this.observer.unobserve(panel.element);
+    this.inSight.delete(panel);
+    this.panels.splice(this.panels.indexOf(panel), 1);
+    panel.plot?.destroy();
+    panel.element.remove();
+  }
+
+  async reload() {
+    await Promise.all(this.panels.map((p) => p.reload()));
+  }
+}

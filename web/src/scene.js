@@ -1,0 +1,349 @@
+// The robot in 3D with contact wrenches, centre of pressure and push; from above in the corner.
+import {
+  AmbientLight, Box3, CanvasTexture, Color, DirectionalLight, Group, HemisphereLight, Mesh, MeshBasicMaterial, OrthographicCamera,
+  PerspectiveCamera, PlaneGeometry, RepeatWrapping, Scene, SphereGeometry, SRGBColorSpace, Vector3, WebGLRenderer,
+} from 'three';
+import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
+import {Arrow, blockMesh, mark, Outline} from './markers.js';
+import {place, RobotView} from './robot_view.js';
+import {add, convexHull, rotate} from './spatial.js';
+
+const METRES_PER_NEWTON = 1 / 900;
+const METRES_PER_NEWTON_METRE = 1 / 100;
+const LEAST_PUSH = 3;  // N: below it the sensor's noise
+const LEAST_LOAD = 5;  // N
+const INSET = 0.34;    // of the picture's smaller side
+const FILL = 1.15;  // of the picture's height that the robot may take, as its inverse
+const ABOVE = 0.26;    // m, half of what the view from above shows
+const GROUND = 12;     // m
+const GRID = 0.1;      // m
+const GROUND_LAYER = 1;  // what the view from above shows
+
+export const COLORS = {
+  computed: {light: '#1f5fd0', dark: '#6ea8ff'}, measured: {light: '#1d1d1f', dark: '#f2f2f2'},
+  limit: {light: '#d11f1f', dark: '#ff6b6b'}, com: {light: '#0f8a4b', dark: '#3ecf8e'},
+  desired: {light: '#a11fb0', dark: '#e58cff'}, push: {light: '#c2410c', dark: '#ff9a4d'},
+  support: {light: '#5b6675', dark: '#9fb0c5'},
+};
+
+const VIEWS = {front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1], free: [0.75, -0.62, 0.28]};
+
+/** Numbers by tick that the picture needs, all loaded; a name that the run lacks is NaN. */
+class Samples {
+  #signals = new Map();
+
+  async load(run, wanted) {
+    const found = Object.entries(wanted).map(([name, [type, field]]) =>
+      [name, type === 'derived' ? run.signals.get(`derived.${field}`) : run.find(type, field)]);
+    await Promise.all(found.filter(([, s]) => s).map(([name, s]) => {
+      this.#signals.set(name, s);
+      return s.load();
+    }));
+  }
+
+  at(name, tick) { return this.#signals.get(name)?.values?.[tick] ?? NaN; }
+  vector(name, tick, n = 3) { return Array.from({length: n}, (_, i) => this.at(`${name}[${i}]`, tick)); }
+  pose(name, tick) {
+    return {position: this.vector(`${name}.position`, tick), orientation: this.vector(`${name}.orientation`, tick, 4)};
+  }
+}
+
+const vector = (key, type, field, n = 3) =>
+  Object.fromEntries(Array.from({length: n}, (_, i) => [`${key}[${i}]`, [type, `${field}[${i}]`]]));
+const pose = (key, type, field) => ({...vector(`${key}.position`, type, `${field}.position`),
+  ...vector(`${key}.orientation`, type, `${field}.orientation`, 4)});
+
+/** Squares of GRID on the ground. */
+function gridTexture(fill, line) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 128;
+  const context = canvas.getContext('2d');
+  context.fillStyle = fill;
+  context.fillRect(0, 0, 128, 128);
+  context.strokeStyle = line;
+  context.lineWidth = 4;
+  context.strokeRect(0, 0, 128, 128);
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace;
+  texture.wrapS = texture.wrapT = RepeatWrapping;
+  texture.repeat.set(GROUND / GRID, GROUND / GRID);
+  return texture;
+}
+
+/** True motion when the run has it, else the estimated one. */
+function motionSignals(run) {
+  const type = run.find('ground_truth_t', 'base_position[0]') ? 'ground_truth_t' : 'robot_state_t';
+  return {...vector('base.position', type, 'base_position'),
+    ...vector('base.orientation', type, 'base_orientation', 4),
+    ...vector('joint', type, 'joint_position', run.robot.joints.length),
+    ...(type === 'ground_truth_t' ? vector('com', type, 'com_position')
+      : vector('com', 'task_torque_t', 'com_position'))};
+}
+
+function contactSignals(run) {
+  const truth = run.find('ground_truth_t', 'foot_pose[0].position[0]');
+  return Object.assign({}, ...run.robot.feet.map((_, f) => ({
+    ...pose(`sole${f}`, truth ? 'ground_truth_t' : 'task_torque_t', `foot_pose[${f}]`),
+    ...vector(`measured${f}.force`, 'robot_sensors_t', `foot_wrench[${f}].force`),
+    ...vector(`measured${f}.moment`, 'robot_sensors_t', `foot_wrench[${f}].moment`),
+    ...vector(`computed${f}.force`, 'joint_command_t', `foot_wrench[${f}].force`),
+    ...vector(`computed${f}.moment`, 'joint_command_t', `foot_wrench[${f}].moment`),
+    [`contact${f}`]: ['task_torque_t', `in_contact[${f}]`],
+  })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
+  vector('limit', 'balance_torque_t', 'cop_limit', 2), vector('push', 'external_push_t', 'force'),
+  vector('point', 'external_push_t', 'point'), {
+    'measured_cop[0]': ['derived', 'cop_measured_x'], 'measured_cop[1]': ['derived', 'cop_measured_y'],
+    'desired_cop[0]': ['derived', 'cop_desired_x'], 'desired_cop[1]': ['derived', 'cop_desired_y'],
+    active_x: ['balance_torque_t', 'active_x'], active_y: ['balance_torque_t', 'active_y']});
+}
+
+export class SceneView {
+  /** `host` is the element to fill; `overlay` a second run, drawn as a ghost, or undefined. */
+  constructor(host, run, overlay) {
+    Object.assign(this, {host, run, overlay});
+    this.samples = new Samples();
+    this.overlaySamples = new Samples();
+    this.tick = 0;
+    this.visible = true;
+    this.show = {forces: true, moments: false, pressure: true, com: true};
+    this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    host.append(this.renderer.domElement);
+    this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(32, 1, 0.05, 60);
+    this.camera.up.set(0, 0, 1);
+    this.above = new OrthographicCamera(-ABOVE, ABOVE, ABOVE, -ABOVE, 0.01, 20);
+    this.above.up.set(1, 0, 0);  // forward is up
+    this.above.layers.set(GROUND_LAYER);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.addEventListener('change', () => this.draw());
+    this.#build();
+    this.setTheme();
+    this.look('free');
+    new ResizeObserver(() => this.#resize()).observe(host);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.setTheme());
+  }
+
+  async load() {
+    await Promise.all([
+      this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
+      this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
+    ]);
+    this.setTick(0);
+    this.look('free');
+  }
+
+  #build() {
+    const {scene} = this;
+    scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), new AmbientLight(0xffffff, 0.35));
+    const sun = new DirectionalLight(0xffffff, 1.6);
+    sun.position.set(2, -3, 5);
+    scene.add(sun);
+    // Drawn first and without depth, so that nothing that lies on it flickers.
+    this.ground = new Mesh(new PlaneGeometry(GROUND, GROUND), new MeshBasicMaterial({depthWrite: false}));
+    this.ground.renderOrder = -2;
+    this.robotView = new RobotView(this.run.robot);
+    scene.add(this.ground, this.robotView.object);
+    if (this.overlay) {
+      this.ghost = new RobotView(this.overlay.robot, {ghost: true});
+      scene.add(this.ghost.object);
+    }
+    const block = this.run.scenario.sim_ode?.block;
+    if (block) {
+      this.block = blockMesh(block);
+      scene.add(this.block);
+    }
+    this.colored = [];  // [material, name of COLORS]
+    const colored = (material, name) => { this.colored.push([material, name]); };
+    const flat = (kind, name, size) => {
+      const mesh = mark(kind, 0, size);
+      colored(mesh.material, name);
+      return mesh;
+    };
+    const arrow = (name, radius) => {
+      const result = new Arrow(0, radius);
+      colored(result.material, name);
+      return result;
+    };
+    const outline = (name, count, dashed) => {
+      const result = new Outline(0, count, dashed);
+      colored(result.material, name);
+      return result;
+    };
+    this.arrows = this.run.robot.feet.map(() => ({
+      measured: arrow('measured', 0.0055), computed: arrow('computed', 0.009),
+      measuredMoment: arrow('measured', 0.004), computedMoment: arrow('desired', 0.006)}));
+    this.pushArrow = arrow('push', 0.012);
+    this.soles = this.run.robot.feet.map(() => outline('support', 4));
+    this.polygon = outline('support', 8);
+    this.region = outline('limit', 4, true);
+    this.frame = new Group();
+    this.marks = {desired: flat('diamond', 'desired', 0.024), computed: flat('ring', 'computed', 0.013),
+      measured: flat('disc', 'measured', 0.0075)};
+    this.frame.add(...Object.values(this.marks));
+    this.comMark = flat('cross', 'com', 0.014);
+    this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
+    this.com.renderOrder = 9;
+    colored(this.com.material, 'com');
+    scene.add(this.frame, this.comMark, this.com, this.polygon.object, this.region.object, this.pushArrow.object,
+      ...this.soles.map((s) => s.object),
+      ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
+    for (const object of [this.frame, this.comMark, this.polygon.object, this.region.object,
+      ...this.soles.map((s) => s.object)]) {
+      object.traverse((o) => o.layers.enable(GROUND_LAYER));
+    }
+  }
+
+  setTheme() {
+    const dark = matchMedia('(prefers-color-scheme: dark)').matches;
+    for (const [material, name] of this.colored) material.color.set(COLORS[name][dark ? 'dark' : 'light']);
+    this.background = new Color(dark ? 0x14171c : 0xeef1f5);
+    this.insetBackground = new Color(dark ? 0x20252c : 0xffffff);
+    this.scene.background = this.background;
+    this.ground.material.map?.dispose();
+    this.ground.material.map = gridTexture(...(dark ? ['#1b1f26', '#323945'] : ['#e4e8ee', '#c3cbd6']));
+    this.ground.material.map.anisotropy = this.renderer.capabilities.getMaxAnisotropy();
+    this.ground.material.needsUpdate = true;
+    this.draw();
+  }
+
+  /** 'front', 'side', 'top' or 'free', with the robot in the middle. */
+  look(name) {
+    const box = new Box3().setFromObject(this.robotView.object);
+    const size = box.getSize(new Vector3());
+    box.getCenter(this.controls.target);
+    const distance = FILL * Math.max(size.z, size.x, size.y) / 2 / Math.tan(this.camera.fov * Math.PI / 360);
+    this.camera.position.set(...VIEWS[name]).normalize().multiplyScalar(distance + size.x / 2).add(this.controls.target);
+    this.controls.update();
+    this.draw();
+  }
+
+  setShow(name, on) {
+    this.show[name] = on;
+    this.setTick(this.tick);
+  }
+
+  setTick(tick) {
+    this.tick = tick;
+    const {samples, show} = this;
+    this.robotView.setPose(samples.pose('base', tick), samples.vector('joint', tick, this.run.robot.joints.length));
+    if (this.ghost) {
+      const other = this.overlay.tickAt(tick * this.run.period);
+      this.ghost.setPose(this.overlaySamples.pose('base', other),
+        this.overlaySamples.vector('joint', other, this.overlay.robot.joints.length));
+    }
+    if (this.block) this.block.visible = tick * this.run.period >= (this.run.scenario.sim_ode.block.start ?? 0);
+
+    const com = samples.vector('com', tick);
+    this.com.visible = this.comMark.visible = show.com && com.every(Number.isFinite);
+    if (this.com.visible) {
+      this.com.position.set(...com);
+      this.comMark.position.set(com[0], com[1], this.#groundHeight(tick) + 0.001);
+    }
+    const force = samples.vector('push', tick);
+    const point = samples.vector('point', tick);
+    const pushed = Math.hypot(...force) > LEAST_PUSH;
+    const push = force.map((f) => f * METRES_PER_NEWTON * 1.5);
+    this.pushArrow.set(point.map((p, i) => p - push[i]), pushed ? push : [0, 0, 0]);
+    this.#setFeet(tick);
+    this.#setPressure(tick);
+    this.draw();
+  }
+
+  #groundHeight(tick) {
+    const z = this.samples.at('frame.position[2]', tick);
+    return Number.isFinite(z) ? z : 0;
+  }
+
+  #setFeet(tick) {
+    const {samples, show} = this;
+    const polygon = [];
+    this.run.robot.feet.forEach((foot, f) => {
+      const sole = samples.pose(`sole${f}`, tick);
+      const [x, y] = [foot.length / 2, foot.width / 2];
+      const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
+        .map(([a, b]) => add(sole.position, rotate(sole.orientation, [a, b, 0])));
+      this.soles[f].set(show.pressure && corners.flat().every(Number.isFinite) ? corners : []);
+      if (samples.at(`contact${f}`, tick) > 0) polygon.push(...corners);
+      for (const kind of ['measured', 'computed']) {
+        const arrows = this.arrows[f];
+        const [fx, fy, fz] = samples.vector(`${kind}${f}.force`, tick);
+        const moment = samples.vector(`${kind}${f}.moment`, tick);
+        // What the ground does to the robot, where it acts on the sole.
+        const loaded = Math.abs(fz) > LEAST_LOAD;
+        const at = loaded ? add(sole.position, rotate(sole.orientation, [-moment[1] / fz, moment[0] / fz, 0]))
+          : sole.position;
+        const force = rotate(sole.orientation, [-fx, -fy, -fz].map((v) => v * METRES_PER_NEWTON));
+        arrows[kind].set(at, show.forces && loaded ? force : [0, 0, 0]);
+        const turn = rotate(sole.orientation, moment.map((v) => -v * METRES_PER_NEWTON_METRE));
+        arrows[`${kind}Moment`].set(sole.position, show.moments ? turn : [0, 0, 0]);
+      }
+    });
+    const hull = polygon.flat().every(Number.isFinite) ? convexHull(polygon) : [];
+    this.polygon.set(show.pressure ? hull : []);
+  }
+
+  #setPressure(tick) {
+    const {samples, show} = this;
+    const frame = samples.pose('frame', tick);
+    const known = show.pressure && [...frame.position, ...frame.orientation].every(Number.isFinite);
+    this.frame.visible = known;
+    const [x, y] = samples.vector('limit', tick, 2);
+    const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
+      .map(([a, b]) => add(frame.position, rotate(frame.orientation, [a, b, 0.001])));
+    this.region.set(known && corners.flat().every(Number.isFinite) ? corners : []);
+    if (!known) return;
+    place(this.frame, frame);
+    const balancing = samples.at('active_x', tick) > 0 || samples.at('active_y', tick) > 0;
+    const put = (object, name, on = true) => {
+      const cop = samples.vector(name, tick, 2);
+      object.visible = on && cop.every(Number.isFinite);
+      if (object.visible) object.position.set(cop[0], cop[1], 0.001);
+    };
+    put(this.marks.computed, 'cop');
+    put(this.marks.measured, 'measured_cop');
+    put(this.marks.desired, 'desired_cop', balancing);
+  }
+
+  #resize() {
+    const {clientWidth: width, clientHeight: height} = this.host;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.#render();
+  }
+
+  /** In the next frame, once. */
+  draw() {
+    if (this.#waiting || !this.visible) return;
+    this.#waiting = true;
+    requestAnimationFrame(() => {
+      this.#waiting = false;
+      this.#render();
+    });
+  }
+  #waiting = false;
+
+  #render() {
+    const {renderer} = this;
+    const {clientWidth: width, clientHeight: height} = this.host;
+    if (width === 0 || height === 0) return;
+    renderer.setViewport(0, 0, width, height);
+    renderer.setScissorTest(false);
+    this.scene.background = this.background;
+    renderer.render(this.scene, this.camera);
+    const side = Math.round(INSET * Math.min(width, height));
+    const frame = this.samples.pose('frame', this.tick).position;
+    if (side < 60 || !this.show.pressure || !frame.every(Number.isFinite)) return;
+    this.above.position.set(frame[0], frame[1], frame[2] + 5);
+    this.above.lookAt(frame[0], frame[1], frame[2]);
+    renderer.setViewport(width - side - 8, 8, side, side);
+    renderer.setScissor(width - side - 8, 8, side, side);
+    renderer.setScissorTest(true);
+    this.scene.background = this.insetBackground;
+    renderer.render(this.scene, this.above);
+    renderer.setScissorTest(false);
+  }
+}

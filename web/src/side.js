@@ -1,0 +1,61 @@
+// What holds at the time cursor, and the events.
+import {element, formatNumber} from './dom.js';
+
+const MILLI = 1000;
+
+/** {element, load(), update(tick)}. */
+export class Readout {
+  constructor(run, phases) {
+    this.run = run;
+    this.phases = phases;
+    this.cells = new Map();
+    const row = (name) => {
+      const cell = element('td', {class: 'number'});
+      this.cells.set(name, cell);
+      return element('tr', {}, element('th', {scope: 'row'}, name), cell);
+    };
+    this.rows = this.#rows();
+    this.element = element('table', {class: 'readout'}, element('tbody', {}, ...this.rows.map(([name]) => row(name))));
+  }
+
+  /** [name, signals, text of their values] */
+  #rows() {
+    const {run} = this;
+    const find = (type, field) => run.find(type, field);
+    const derived = (name) => run.signals.get(`derived.${name}`);
+    const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
+    const mm = (values) => `${values.map((v) => formatNumber(v * MILLI, 3)).join(', ')} mm`;
+    const newton = ([a, b]) => `${formatNumber(a, 4)}, ${formatNumber(b, 4)} N`;
+    const status = find('task_torque_t', 'status');
+    const bridge = find('bridge_status_t', 'state');
+    const phase = find('task_torque_t', 'phase');
+    return [
+      ['phase', [phase], ([i]) => run.scenario.task_controller?.phase?.[i]?.name ?? formatNumber(i)],
+      ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
+      ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, 3)],
+      ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), mm],
+      ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], mm],
+      ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), mm],
+      ['push', [derived('push_magnitude')], ([v]) => `${formatNumber(v, 3)} N`],
+      ...run.robot.feet.map((foot) => [`${foot.name} load: measured, computed`,
+        [derived(`${foot.name}_load_measured`), derived(`${foot.name}_load_computed`)], newton]),
+    ].filter(([, signals]) => signals.every(Boolean));
+  }
+
+  async load() { await Promise.all(this.rows.flatMap(([, signals]) => signals).map((s) => s.load())); }
+
+  update(tick) {
+    for (const [name, signals, text] of this.rows) {
+      this.cells.get(name).textContent = text(signals.map((s) => s.values?.[tick] ?? NaN));
+    }
+  }
+}
+
+/** Events as a list; a click goes there. */
+export function eventList(events, player) {
+  if (events.length === 0) return '';
+  return element('section', {class: 'events'}, element('h2', {}, 'Events'), element('ol', {}, ...events.map((event) =>
+    element('li', {}, element('button', {type: 'button', title: event.detail, click: () => player.seek(event.time)},
+      element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ` ${event.name}`,
+      event.detail ? element('span', {class: 'text'}, ` ${event.detail}`) : '')))));
+}
