@@ -12,6 +12,7 @@
 #include "deploy/poise/robot_json.h"
 #include "fmt/format.h"
 #include "logging/column_codec.h"
+#include "logging/events.h"
 #include "logging/signal_table.h"
 
 namespace poise {
@@ -128,6 +129,11 @@ void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
   json["scenario"] = ScenarioJson(run.scenario);
   json["scenario_text"] = run.record.info.scenario;
   json["robot"] = RobotJson(run.record);
+  json["events"] = Json::array();
+  for (const logging::Event& event : logging::Events(run.record)) {
+    json["events"].push_back(
+        {{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
+  }
   BlobWriter blobs(out, index);
   json["channels"] =
       ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);

@@ -25,7 +25,7 @@ export class Readout {
     const derived = (name) => run.signals.get(`derived.${name}`);
     const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
     const mm = (values) => `${values.map((v) => formatNumber(v * MILLI, 3)).join(', ')} mm`;
-    const newton = ([a, b]) => `${formatNumber(a, 4)}, ${formatNumber(b, 4)} N`;
+    const newton = ([v]) => `${formatNumber(v, 3)} N`;
     const status = find('task_torque_t', 'status');
     const bridge = find('bridge_status_t', 'state');
     const phase = find('task_torque_t', 'phase');
@@ -36,9 +36,9 @@ export class Readout {
       ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), mm],
       ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], mm],
       ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), mm],
-      ['push', [derived('push_magnitude')], ([v]) => `${formatNumber(v, 3)} N`],
-      ...run.robot.feet.map((foot) => [`${foot.name} load: measured, computed`,
-        [derived(`${foot.name}_load_measured`), derived(`${foot.name}_load_computed`)], newton]),
+      ['push', [derived('push_magnitude')], newton],
+      ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
+        [`${foot.name} foot, load ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
     ].filter(([, signals]) => signals.every(Boolean));
   }
 

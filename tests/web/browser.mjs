@@ -1,0 +1,33 @@
+// Chromium without a window, and a page of a run in it.
+import {existsSync} from 'node:fs';
+import {createRequire} from 'node:module';
+import {resolve} from 'node:path';
+import {pathToFileURL} from 'node:url';
+
+const CHROMIUM = '/usr/bin/chromium';
+const QUIET = ['--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+  '--disable-quic', '--enable-unsafe-swiftshader'];  // no look-ups at start; 3D without a graphics card
+
+/** `web`: build/web, where deploy/setup installs playwright-core. */
+export async function launchBrowser(web) {
+  if (!existsSync(CHROMIUM)) throw new Error(`${CHROMIUM} is missing: run deploy/setup, which installs it`);
+  const {chromium} = createRequire(resolve(web, 'package.json'))('playwright-core');
+  return chromium.launch({executablePath: CHROMIUM, args: QUIET});
+}
+
+/** Opens a file from disk; `problems` gathers errors of its console and every request beyond the file itself. */
+export async function openPage(browser, file, options = {}) {
+  const context = await browser.newContext({viewport: {width: 1440, height: 1000}, acceptDownloads: true, ...options});
+  const page = await context.newPage();
+  const problems = [];
+  page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
+  page.on('pageerror', (error) => problems.push(String(error)));
+  const url = pathToFileURL(resolve(file)).href;
+  page.on('request', (request) => {
+    if (request.url() !== url && !/^(blob|data):/.test(request.url())) problems.push(`request of ${request.url()}`);
+  });
+  await page.goto(url);
+  await page.waitForFunction(() => document.documentElement.dataset.ready
+    || document.querySelector('[role=alert]'), null, {timeout: 60000});
+  return {page, problems};
+}

@@ -1,0 +1,59 @@
+// Runs for tests, with every signal given in the page's own format.
+import {readFileSync, readdirSync} from 'node:fs';
+import {parseMessage} from '../../web/messages.mjs';
+import {Run} from '../../web/src/data.js';
+import {addDerivedSignals} from '../../web/src/derived.js';
+
+const lcm = new URL('../../lcmtypes/', import.meta.url);
+export const messages = Object.fromEntries(readdirSync(lcm).filter((f) => f.endsWith('.lcm'))
+  .map((f) => parseMessage(readFileSync(new URL(f, lcm), 'utf8'))).map((m) => [m.name, m]));
+
+const identity = {position: [0, 0, 0], orientation: [1, 0, 0, 0]};
+const COUNTS = {num_joints: 2, num_motors: 2, num_feet: 2};
+
+/** Field paths of a message whose counts are COUNTS. */
+function paths(type, source) {
+  return [...source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[(\w+)\])?;/gm)].flatMap(([, fieldType, name, size]) => {
+    if (name.startsWith('num_') || name === 'run_id' || name === 'tick' || fieldType === 'string') return [];
+    const names = size ? Array.from({length: COUNTS[size] ?? Number(size)}, (_, i) => `${name}[${i}]`) : [name];
+    return messages[fieldType] ? names.flatMap((n) => paths(fieldType, sourceOf(fieldType)).map((p) => `${n}.${p}`)) : names;
+  });
+}
+const sourceOf = (type) => readFileSync(new URL(`${type}.lcm`, lcm), 'utf8');
+
+const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'task_torque_t', 'balance_torque_t', 'joint_command_t',
+  'bridge_status_t', 'external_push_t', 'ground_truth_t'];
+
+/** A robot with a pitch and a roll joint in the right leg, none in the left. */
+export const robot = {
+  name: 'hopper', mass: 10,
+  bodies: [{name: 'trunk', parent: -1, joint: -1},
+    {name: 'thigh', parent: 0, joint: 0, origin: identity, axis: [0, 1, 0]},
+    {name: 'foot', parent: 1, joint: 1, origin: identity, axis: [1, 0, 0]}],
+  joints: [{name: 'hip_pitch', torque_limit: 50}, {name: 'ankle_roll', torque_limit: 20}],
+  feet: [{name: 'right', body: 2, sole: identity, length: 0.3, width: 0.15},
+    {name: 'left', body: 0, sole: identity, length: 0.3, width: 0.15}],
+  visuals: [],
+};
+
+/** `constants`: value by "type.field"; all others are 0. */
+export function makeRun(section, constants = {}, ticks = 4) {
+  const channels = TYPES.map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
+    signals: paths(type, sourceOf(type)).map((field) => ({field, integer: false, value: constants[`${type}.${field}`] ?? 0}))}));
+  const limits = {half_length: 0.12, half_width: 0.05, friction: 0.9, yaw_friction: 0.8};
+  const run = new Run({
+    format: 1, channels, robot, events: [],
+    run: {tick_period: 0.002, ticks, checks: [], assumptions: [], components: [], channels: []},
+    scenario: {name: 'test', paper_section: section,
+      redistributor: {double_support: limits, single_support: {...limits, half_width: 0.06}}},
+  }, messages, () => { throw new Error('no packed column here'); });
+  addDerivedSignals(run);
+  return run;
+}
+
+export async function valuesOf(run, name) {
+  const signal = run.signals.get(name);
+  if (!signal) throw new Error(`the run has no signal ${name}`);
+  await signal.load();
+  return [...signal.values];
+}

@@ -1,0 +1,233 @@
+// `poise report` from a short run to the page in a browser.
+// Usage: node report_test.mjs --poise PROGRAM --web DIR, where DIR is build/web
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {launchBrowser, openPage} from './browser.mjs';
+import {readLog, writeLog} from './lcm_log.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
+const folder = mkdtempSync(join(tmpdir(), 'poise-web-'));
+const path = (name) => join(folder, name);
+let browser;
+
+function poise(...parameters) {
+  const {status, stdout, stderr} = spawnSync(options.poise, parameters, {encoding: 'utf8'});
+  return {status, stdout, stderr};
+}
+
+/** 3 s of the push of 7.2; then `poise report` of it over the arguments' run. */
+before(async () => {
+  const push = ['run', 'push_double_support', '--inline', '--duration', '2'];
+  for (const [out, more] of [['a', []], ['b', ['--set', 'sim_ode.push[0].duration=0.09']]]) {
+    const run = poise(...push, ...more, '--out', path(out));
+    assert.ok(run.status === 0 || run.status === 1, run.stderr);  // a check of the shorter run may fail
+  }
+  browser = await launchBrowser(options.web);
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, {recursive: true, force: true});
+});
+
+/** The page's own run, with a signal's values loaded. */
+const signal = (page, name, which = 'run') => page.evaluate(async ([n, w]) => {
+  const s = window.poise[w].signals.get(n);
+  await s.load();
+  return [...s.values];
+}, [name, which]);
+
+const pause = (page) => page.waitForTimeout(50);
+const state = (page) => page.evaluate(() => {
+  const {player, view, run} = window.poise;
+  return {time: player.time, tick: player.tick, playing: player.playing, min: view.min, max: view.max, period: run.period};
+});
+
+test('the command prints the table, writes the page where it is told to, and says what is wrong', () => {
+  const report = poise('report', path('a'));
+  assert.match(report.stdout, /verdict/);
+  assert.match(report.stdout, /report\.html/);
+  assert.ok(statSync(path('a/report.html')).size > 1e5);
+  const table = poise('report', path('b'), '--no-html');
+  assert.match(table.stdout, /verdict/);
+  assert.throws(() => statSync(path('b/report.html')));
+  assert.equal(poise('report', path('a'), '--html', path('none/there.html')).status, 2);
+  assert.equal(poise('report', path('a'), '--html', path('x.html'), '--no-html').status, 2);
+  assert.equal(poise('report', path('a'), path('missing')).status, 2);
+  assert.match(poise('report', '--help').stdout, /--html/);
+});
+
+test('the page shows the run, plays it, and needs no network', async () => {
+  poise('report', path('a'));
+  const summary = JSON.parse(readFileSync(path('a/summary.json'), 'utf8'));
+  const {page, problems} = await openPage(browser, path('a/report.html'));
+  assert.equal(await page.locator('[role=alert]').count(), 0);
+  assert.equal(await page.locator('h1').innerText(), 'push_double_support');
+
+  // The page's numbers against those that C++ worked out for the table.
+  const check = (name) => summary.checks.find((c) => c.name === name).measured;
+  const largest = (values) => Math.max(...values.filter((x) => !Number.isNaN(x)).map(Math.abs));
+  const near = (actual, expected, tolerance) =>
+    assert.ok(Math.abs(actual - expected) < tolerance, `${actual} is not ${expected}`);
+  near(largest(await signal(page, 'derived.push_magnitude')), check('push_peak'), 1e-3);
+  near(1e3 * largest(await signal(page, 'derived.com_error_y')), check('com_error_max_y'), 1e-3);
+  near(1e3 * largest(await signal(page, 'derived.cop_measured_y')), check('cop_measured_max_y'), 1e-3);
+  near(1e3 * largest(await signal(page, 'derived.cop_measured_x')), check('cop_measured_max_x'), 1e-3);
+  const phases = await page.evaluate(() => window.poise.grid.shared.phases.balancing);
+  near(phases[0].from, check('balancing_first'), 1e-9);
+  const table = await page.locator('#tables table').first().innerText();
+  for (const c of summary.checks) assert.ok(table.includes(c.label), c.label);
+
+  // The robot: its soles stand where the simulator says they are.
+  const soles = await page.evaluate(() => {
+    const {scene, run, player} = window.poise;
+    player.seek(0.5);
+    scene.scene.updateMatrixWorld(true);
+    return run.robot.feet.map((foot, f) => {
+      const sole = scene.robotView.groups[foot.body].children.find((c) => c.isGroup && c.children[0]?.isMesh
+        && c.children[0].geometry.parameters.width === foot.length);
+      return [sole.matrixWorld.elements.slice(12, 15), scene.samples.pose(`sole${f}`, player.tick).position];
+    });
+  });
+  for (const [drawn, truth] of soles) drawn.forEach((x, i) => near(x, truth[i], 1e-4));
+
+  // Play, pause, scrub, step.
+  await page.click('#play');
+  await page.waitForFunction(() => window.poise.player.time > 0.6);
+  await page.keyboard.press('Space');
+  assert.equal((await state(page)).playing, false);
+  await page.selectOption('#speed', '0.1');
+  assert.equal(await page.evaluate(() => window.poise.player.speed), 0.1);
+  await page.locator('#scrub').fill('300');
+  assert.equal((await state(page)).tick, 300);
+  await page.locator('#header').click();
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await state(page)).tick, 301);
+  await page.keyboard.press('Shift+ArrowLeft');
+  assert.equal((await state(page)).tick, 251);
+  assert.match(await page.locator('#time').innerText(), /0\.502 s\s+tick 251/);
+
+  // Zoom: all plots together, by key and by dragging; a click moves the cursor.
+  await page.keyboard.press('+');
+  const zoomed = await state(page);
+  assert.ok(zoomed.max - zoomed.min < 1.9 && zoomed.min <= zoomed.time && zoomed.time <= zoomed.max);
+  await page.keyboard.press('0');
+  const plots = page.locator('.panel .u-over');
+  await plots.first().scrollIntoViewIfNeeded();
+  await page.waitForFunction(() => document.querySelectorAll('.panel .u-over').length >= 2);
+  const box = await plots.first().boundingBox();
+  await page.mouse.move(box.x + 0.25 * box.width, box.y + 20);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 30, {steps: 4});
+  await page.mouse.up();
+  const dragged = await state(page);
+  near(dragged.min, 0.5, 0.02);
+  near(dragged.max, 1, 0.02);
+  const scales = await page.evaluate(() => window.poise.grid.panels.filter((p) => p.plot && window.poise.grid.inSight.has(p))
+    .map((p) => [p.plot.scales.x.min, p.plot.scales.x.max]));
+  assert.ok(scales.length >= 2);
+  for (const [min, max] of scales) assert.deepEqual([min, max], [dragged.min, dragged.max]);
+  await page.mouse.click(box.x + 0.5 * box.width, box.y + 20);
+  near((await state(page)).time, 0.75, 0.01);
+
+  // Search and add.
+  const before = await page.locator('.panel').count();
+  await page.keyboard.press('/');
+  await page.keyboard.type('joint_command eta_max');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.locator('.panel').count(), before + 1);
+  assert.equal(await page.locator('.panel h3').first().innerText(), 'JOINT_COMMAND.eta_max');
+  await page.fill('#signal-search', 'joint_command eta_min');
+  await page.click('text=into last');
+  await page.waitForFunction(() => document.querySelector('.panel .legend').children.length === 2);
+  await page.fill('#signal-search', 'no such signal');
+  assert.match(await page.locator('.results').innerText(), /0 signals/);
+  await page.keyboard.press('Escape');
+
+  // Save.
+  const save = async (panel, name) => {
+    const download = page.waitForEvent('download');
+    await page.locator('.panel', {hasText: panel}).first().getByRole('button', {name}).click();
+    const file = await download;
+    await file.saveAs(path(file.suggestedFilename()));
+    return {name: file.suggestedFilename(), bytes: readFileSync(path(file.suggestedFilename()))};
+  };
+  const csv = await save('External push', 'Save the stretch shown as CSV');
+  assert.match(csv.name, /^fig-9b-.*\.csv$/);
+  const rows = csv.bytes.toString().trim().split('\r\n');
+  assert.equal(rows[0], 'time (s),measured (N)');
+  const shown = await state(page);
+  near(Number(rows[1].split(',')[0]), shown.min, shown.period);
+  near(Number(rows.at(-1).split(',')[0]), shown.max, shown.period);
+  const png = await save('External push', 'Save as PNG');
+  assert.deepEqual([...png.bytes.subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
+  assert.ok(png.bytes.length > 3000);
+
+  // Every plot can be built.
+  const lines = await page.evaluate(async () => {
+    const {grid, view} = window.poise;
+    view.reset();
+    await Promise.all(grid.panels.map((p) => p.show()));
+    return grid.panels.map((p) => [p.definition.title, p.data.slice(1).map((v) => v.some((x) => x !== null))]);
+  });
+  for (const [title, filled] of lines) assert.ok(filled.every(Boolean), title);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a second run is drawn over the first', async () => {
+  assert.ok(poise('report', path('a'), path('b'), '-o', path('both.html')).status <= 1);
+  const {page, problems} = await openPage(browser, path('both.html'), {colorScheme: 'dark'});
+  const first = await signal(page, 'EXTERNAL_PUSH.force[1]');
+  const second = await signal(page, 'EXTERNAL_PUSH.force[1]', 'overlay');
+  const end = (values) => values.findLastIndex((x) => x > 20);
+  assert.ok(end(second) < end(first));  // the shorter push
+  const panel = page.locator('.panel', {hasText: 'External push'}).first();
+  await panel.scrollIntoViewIfNeeded();
+  await panel.locator('.legend .entry').nth(1).waitFor();
+  assert.match(await panel.locator('.legend').innerText(), /second run/);
+  await page.evaluate(() => window.poise.player.seek(0.8));
+  const apart = await page.evaluate(() => {
+    const {scene} = window.poise;
+    return scene.ghost.object.position.distanceTo(scene.robotView.object.position);
+  });
+  assert.ok(apart > 0.002, `the ghost stands ${apart} m away`);
+  assert.match(await page.locator('#tables').innerText(), /second run/i);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a log with gaps, with numbers that are none, and with hostile names is shown all the same', async () => {
+  const name = 'push_double_support';
+  const hostile = "</script><b>&'</b>x";
+  assert.equal(hostile.length, name.length);
+  const events = readLog(path('a/run.lcm'));
+  let info = events[0].data.toString('latin1').replaceAll(`"${name}"`, `"${hostile}"`);
+  events[0].data = Buffer.from(info, 'latin1');
+  const counts = {};
+  const kept = events.filter((event) => {
+    const tick = counts[event.channel] = (counts[event.channel] ?? -1) + 1;
+    if (event.channel === 'JOINT_COMMAND' && tick === 40) event.data.writeDoubleBE(NaN, event.data.length - 200);
+    return !(event.channel === 'ROBOT_SENSORS' && tick >= 100 && tick < 150)
+      && !(event.channel === 'GROUND_TRUTH' && tick % 3 === 0) && event.channel !== 'BRIDGE_STATUS';
+  });
+  writeLog(path('damaged.lcm'), kept);
+  assert.equal(poise('report', path('damaged.lcm')).status, 1);
+  const {page, problems} = await openPage(browser, path('damaged.html'));
+  assert.equal(await page.locator('h1').innerText(), hostile);
+  const measured = await signal(page, 'ROBOT_SENSORS.foot_wrench[0].force[2]');
+  assert.deepEqual([99, 100, 149, 150].map((i) => Number.isNaN(measured[i])), [false, true, true, false]);
+  await page.evaluate(async () => {
+    const {grid, player, run} = window.poise;
+    await Promise.all(grid.panels.map((p) => p.show()));
+    for (let tick = 90; tick < 160; ++tick) player.seek(tick * run.period);
+  });
+  await pause(page);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});

@@ -1,0 +1,148 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {findPhases, intervals} from '../../web/src/derived.js';
+import {figuresFor, pitchJoints} from '../../web/src/figures.js';
+import {searchSignals} from '../../web/src/search.js';
+import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
+
+const near = (actual, expected, message) => assert.ok(Math.abs(actual - expected) < 1e-6, message ?? `${actual} is not ${expected}`);
+
+test('units, texts and names of values come from the .lcm files', () => {
+  const run = makeRun('7.2');
+  const signal = (name) => run.signals.get(name);
+  assert.equal(signal('ROBOT_STATE.base_position[1]').unit, 'm');
+  assert.equal(signal('JOINT_COMMAND.foot_wrench[0].moment[2]').unit, 'N·m');
+  assert.equal(signal('GROUND_TRUTH.foot_pose[1].position[2]').unit, 'm');
+  assert.equal(signal('ROBOT_SENSORS.imu_acceleration[0]').unit, 'm/s²');
+  assert.equal(signal('TASK_TORQUE.status').valueNames[3], 'waiting');
+  assert.match(signal('JOINT_COMMAND.eta').text, /share of the right foot/);
+  assert.equal(messages.health_t.fields.latency_p99.unit, 'µs');
+  assert.equal(messages.drive_feedback_t.fields.current.unit, 'A');
+  assert.equal(messages.joint_command_t.fields.margins.unit, '');  // "of foot_wrench"
+});
+
+test('every section of the paper gets its figures', () => {
+  const wanted = {
+    '7.1': ['6', '7'], '7.2': ['9a', '9b', '10a', '10b', '11a', '11b', '11c', '11d', '12a', '12b', '12c', '12d'],
+    '7.3': ['14a', '14b', '14c', '15a', '15b', '15c', '15d'], '7.4': ['16a', '17'],
+    '7.5': ['19a', '19b', '20a', '20b', '21', '22a', '22b', '23a', '23b', '23c', '23d', '24a', '24b', '24c', '24d'],
+  };
+  for (const [section, numbers] of Object.entries(wanted)) {
+    const figures = figuresFor(makeRun(section));
+    assert.deepEqual([...new Set(figures.map((f) => f.figure).filter(Boolean))], numbers, `section ${section}`);
+    for (const f of figures) assert.ok(f.series.length > 0 && f.unit !== undefined, f.title);
+  }
+});
+
+test('conditions have a red limit, another scenario gets the general figures', () => {
+  const figures = figuresFor(makeRun('7.2'));
+  for (const f of figures.filter((x) => /^1[0-2]/.test(x.figure ?? ''))) {
+    assert.ok(f.series.some((s) => s.role === 'limit'), f.title);
+  }
+  const others = figuresFor(makeRun(''));
+  assert.ok(others.length > 15);
+  assert.ok(others.every((f) => !f.figure));
+});
+
+test('a run without ground truth and push keeps the figures that it can show', () => {
+  const run = makeRun('7.2');
+  for (const name of [...run.signals.keys()]) {
+    if (/^(GROUND_TRUTH|EXTERNAL_PUSH)/.test(name) || /true|push|_error/.test(name)) run.signals.delete(name);
+  }
+  run.channels = run.channels.filter((c) => !['ground_truth_t', 'external_push_t'].includes(c.type));
+  const figures = figuresFor(run);
+  assert.ok(figures.some((f) => f.figure === '9a'));
+  assert.ok(!figures.some((f) => f.figure === '9b'));
+});
+
+test('pitch joints are found by their axis', () => {
+  assert.deepEqual(pitchJoints(robot, 0), [0]);
+  assert.deepEqual(pitchJoints(robot, 1), []);
+  // A roll axis turned by a quarter about z is a pitch axis.
+  const q = Math.SQRT1_2;
+  const turned = {...robot, bodies: robot.bodies.map((b, i) => i === 2 ? {...b, origin: {position: [0, 0, 0],
+    orientation: [q, 0, 0, q]}} : b)};
+  assert.deepEqual(pitchJoints(turned, 0), [0, 1]);
+});
+
+test('measured centre of pressure of two soles, closed form', async () => {
+  const load = {'robot_sensors_t.foot_wrench[0].force[2]': -300, 'robot_sensors_t.foot_wrench[1].force[2]': -100,
+    'task_torque_t.foot_pose[0].position[1]': -0.1, 'task_torque_t.foot_pose[1].position[1]': 0.1,
+    'task_torque_t.foot_pose[0].orientation[0]': 1, 'task_torque_t.foot_pose[1].orientation[0]': 1,
+    'balance_torque_t.frame_o.orientation[0]': 1, 'task_torque_t.in_contact[0]': 1, 'task_torque_t.in_contact[1]': 1};
+  const y = await valuesOf(makeRun('', load), 'derived.cop_measured_y');
+  assert.ok(Number.isNaN(y[0]));  // no tick before
+  near(y[1], (300 * -0.1 + 100 * 0.1) / 400);
+  // A pitch moment M_y moves it by -M_y / F_z along x.
+  const pushed = {...load, 'robot_sensors_t.foot_wrench[0].moment[1]': 8};
+  near((await valuesOf(makeRun('', pushed), 'derived.cop_measured_x'))[2], 8 / 400);
+  // Frame O turned by a quarter about z: its x is the world's y.
+  const q = Math.SQRT1_2;
+  const turned = {...load, 'balance_torque_t.frame_o.orientation[0]': q, 'balance_torque_t.frame_o.orientation[3]': q};
+  near((await valuesOf(makeRun('', turned), 'derived.cop_measured_x'))[1], -0.05);
+});
+
+test('contact conditions take the limits of the support', async () => {
+  const both = {'joint_command_t.in_contact[0]': 1, 'joint_command_t.in_contact[1]': 1};
+  const foot = {'joint_command_t.foot_wrench[0].force[2]': -200, 'joint_command_t.foot_wrench[0].force[0]': 30,
+    'joint_command_t.foot_wrench[0].force[1]': -40, 'joint_command_t.foot_wrench[0].moment[0]': -6};
+  const double = makeRun('7.2', {...both, ...foot});
+  near((await valuesOf(double, 'derived.right_friction_ratio_computed'))[0], 50 / 200);
+  near((await valuesOf(double, 'derived.right_roll_ratio_computed'))[0], 6 / 200);
+  near((await valuesOf(double, 'derived.right_roll_limit'))[0], 0.05);
+  near((await valuesOf(double, 'derived.right_yaw_limit'))[0], 0.8);
+  const single = makeRun('7.2', {...foot, 'joint_command_t.in_contact[0]': 1});
+  near((await valuesOf(single, 'derived.right_roll_limit'))[0], 0.06);
+  assert.ok(Number.isNaN((await valuesOf(single, 'derived.left_roll_limit'))[0]));
+  assert.ok(Number.isNaN((await valuesOf(single, 'derived.left_roll_ratio_computed'))[0]));
+});
+
+test('the tilt error sees tilts and no heading', async () => {
+  const half = 0.01;
+  const tilt = async (axis) => (await valuesOf(makeRun('', {'ground_truth_t.base_orientation[0]': 1,
+    'robot_state_t.base_orientation[0]': Math.cos(half), [`robot_state_t.base_orientation[${axis}]`]: Math.sin(half)}),
+  'derived.base_tilt_error'))[0];
+  near(await tilt(1), 0.02);
+  near(await tilt(2), 0.02);
+  near(await tilt(3), 0);
+});
+
+test('a run grows by ticks, and what follows from its signals with it', async () => {
+  const run = makeRun('', {}, 0);
+  run.meta.run.ticks = run.numTicks = 0;
+  let appended = 0;
+  run.addEventListener('append', () => { ++appended; });
+  for (let k = 0; k < 5; ++k) {
+    run.appendTicks(700, {'EXTERNAL_PUSH.force[0]': new Float32Array(700).fill(3), 'EXTERNAL_PUSH.force[1]': new Float32Array(700).fill(4 * k)});
+  }
+  assert.equal(appended, 5);
+  assert.equal(run.numTicks, 3500);
+  const push = await valuesOf(run, 'EXTERNAL_PUSH.force[1]');
+  assert.equal(push.length, 3500);
+  assert.deepEqual([push[699], push[700], push[3499]], [0, 4, 16]);
+  assert.ok(Number.isNaN((await valuesOf(run, 'TASK_TORQUE.phase'))[10]));
+  const size = await valuesOf(run, 'derived.push_magnitude').then((v) => v.map((x) => Number.isNaN(x) ? x : Math.round(x)));
+  assert.equal(size.length, 3500);
+  run.appendTicks(1, {});
+  assert.equal((await valuesOf(run, 'derived.push_magnitude')).length, 3501);
+});
+
+test('stretches of the same value, in ticks and as phases', async () => {
+  assert.deepEqual(intervals(6, (i) => i < 2 || i > 4), [{from: 0, to: 1, value: true}, {from: 2, to: 4, value: false},
+    {from: 5, to: 5, value: true}]);
+  const run = makeRun('', {'task_torque_t.in_contact[0]': 1, 'balance_torque_t.active_y': 1});
+  const phases = await findPhases(run);
+  assert.deepEqual(phases.support, [{from: 0, to: 4 * 0.002, value: 'right foot'}]);
+  assert.deepEqual(phases.balancing, [{from: 0, to: 4 * 0.002, value: true}]);
+});
+
+test('the search finds signals by all words of name and text', () => {
+  const signals = [...makeRun('').signals.values()];
+  const names = (query) => searchSignals(signals, query).map((s) => s.name);
+  assert.deepEqual(names('joint command eta max'), ['JOINT_COMMAND.eta_max']);
+  assert.deepEqual(names('ROBOT_STATE.base_position[2]'), ['ROBOT_STATE.base_position[2]']);
+  assert.ok(names('gyro bias').length === 0 && names('imu bias').length === 3);
+  assert.ok(names('peak current').length === 0);
+  assert.deepEqual(names('   '), []);
+  assert.equal(names('force').length, names('FORCE').length);
+});

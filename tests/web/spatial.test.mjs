@@ -1,0 +1,42 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {add, centerOfPressure, convexHull, cross, dot, rotate, transformWrench} from '../../web/src/spatial.js';
+
+const close = (a, b) => a.forEach((x, i) => assert.ok(Math.abs(x - b[i]) < 1e-12, `${a} is not ${b}`));
+
+/** Unit quaternion about an axis. */
+function about(axis, angle) {
+  const n = Math.hypot(...axis);
+  return [Math.cos(angle / 2), ...axis.map((x) => x / n * Math.sin(angle / 2))];
+}
+
+test('quarter turns', () => {
+  close(rotate(about([0, 0, 1], Math.PI / 2), [1, 0, 0]), [0, 1, 0]);
+  close(rotate(about([1, 0, 0], Math.PI / 2), [0, 1, 0]), [0, 0, 1]);
+  close(rotate(about([0, 1, 0], Math.PI / 2), [0, 0, 1]), [1, 0, 0]);
+});
+
+test('a wrench does the same work in every frame', () => {
+  const from = {position: [0.3, -0.2, 0.7], orientation: about([1, 2, -1], 0.9)};
+  const to = {position: [-0.4, 0.6, 0.1], orientation: about([-2, 1, 3], 2.2)};
+  const wrench = {force: [10, -20, 30], moment: [1, 2, -3]};
+  const spin = [0.4, -1.1, 0.8], velocity = [0.2, 0.5, -0.3];  // of a rigid body, at the world's origin, world axes
+  const power = (frame, w) => {
+    const v = add(velocity, cross(spin, frame.position));
+    return dot(rotate(frame.orientation, w.force), v) + dot(rotate(frame.orientation, w.moment), spin);
+  };
+  const moved = transformWrench(to, from, wrench);
+  assert.ok(Math.abs(power(from, wrench) - power(to, moved)) < 1e-10);
+  assert.ok(Math.abs(Math.hypot(...moved.force) - Math.hypot(...wrench.force)) < 1e-10);
+});
+
+test('a load off the origin has its centre of pressure there', () => {
+  const sole = {position: [0.04, -0.03, 0], orientation: [1, 0, 0, 0]};
+  const origin = {position: [0, 0, 0], orientation: [1, 0, 0, 0]};
+  close(centerOfPressure(transformWrench(origin, sole, {force: [5, 7, -400], moment: [0, 0, 0]})), [0.04, -0.03]);
+});
+
+test('the hull of a square with points inside and on its edges is the square, anticlockwise', () => {
+  const hull = convexHull([[1, 1], [0, 0], [0.5, 0.5], [1, 0], [0.5, 0], [0, 1], [0.2, 0.9]]);
+  assert.deepEqual(hull, [[0, 0], [1, 0], [1, 1], [0, 1]]);
+});
