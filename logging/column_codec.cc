@@ -39,8 +39,9 @@ double Step(std::span<const double> values, bool integer) {
       std::ranges::nth_element(finite, finite.begin() + i);
       return finite[static_cast<size_t>(i)];
     };
-    const double span = at(1 - kOutliers) - at(kOutliers);
-    step = PowerOfTwoBelow((span > 0 ? span : std::max(high - low, largest)) / kStepsPerSpan);
+    // Divided first: a difference of the largest numbers would be infinite.
+    const double span = at(1 - kOutliers) / kStepsPerSpan - at(kOutliers) / kStepsPerSpan;
+    step = PowerOfTwoBelow(span > 0 ? span : largest / kStepsPerSpan);
   }
   return std::max(step, 2 * PowerOfTwoBelow(largest / kLargest));
 }

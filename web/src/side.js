@@ -38,7 +38,7 @@ export class Readout {
       ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), mm],
       ['push', [derived('push_magnitude')], newton],
       ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
-        [`${foot.name} foot, load ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
+        [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
     ].filter(([, signals]) => signals.every(Boolean));
   }
 
@@ -56,6 +56,6 @@ export function eventList(events, player) {
   if (events.length === 0) return '';
   return element('section', {class: 'events'}, element('h2', {}, 'Events'), element('ol', {}, ...events.map((event) =>
     element('li', {}, element('button', {type: 'button', title: event.detail, click: () => player.seek(event.time)},
-      element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ` ${event.name}`,
+      element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ` ${event.name.replaceAll('_', ' ')}`,
       event.detail ? element('span', {class: 'text'}, ` ${event.detail}`) : '')))));
 }
