@@ -58,6 +58,12 @@ void StartOde() {
 
 Vector3d ToEigen(const dReal* v) { return {v[0], v[1], v[2]}; }
 
+void Turn(dBodyID body, const Matrix3d& r) {
+  const dMatrix3 rotation = {r(0, 0), r(0, 1), r(0, 2), 0,       r(1, 0), r(1, 1),
+                             r(1, 2), 0,       r(2, 0), r(2, 1), r(2, 2), 0};
+  dBodySetRotation(body, rotation);
+}
+
 }  // namespace
 
 OdeWorld::OdeWorld(const robot::RobotModel& model, int max_contacts) : model_(model) {
@@ -80,7 +86,9 @@ OdeWorld::OdeWorld(const robot::RobotModel& model, int max_contacts) : model_(mo
     dMassSetParameters(&mass, body.mass, 0, 0, 0, inertia(0, 0), inertia(1, 1), inertia(2, 2),
                        inertia(0, 1), inertia(0, 2), inertia(1, 2));
     dBodySetMass(id, &mass);
-    const Vector3d com = data.body_position[bodies_.size()] + body.com;
+    const Matrix3d& r = data.body_rotation[bodies_.size()];
+    const Vector3d com = data.body_position[bodies_.size()] + r * body.com;
+    Turn(id, r);
     dBodySetPosition(id, com.x(), com.y(), com.z());
     bodies_.push_back(id);
   }
@@ -113,9 +121,7 @@ void OdeWorld::SetState(const robot::RobotState& state) {
     const Vector3d com = data.base_position + data.body_position[b] + arm;
     const Vector3d& w = data.body_angular_velocity[b];
     const Vector3d v = data.body_linear_velocity[b] + w.cross(arm);
-    const dMatrix3 rotation = {r(0, 0), r(0, 1), r(0, 2), 0,       r(1, 0), r(1, 1),
-                               r(1, 2), 0,       r(2, 0), r(2, 1), r(2, 2), 0};
-    dBodySetRotation(bodies_[b], rotation);
+    Turn(bodies_[b], r);
     dBodySetPosition(bodies_[b], com.x(), com.y(), com.z());
     dBodySetLinearVel(bodies_[b], v.x(), v.y(), v.z());
     dBodySetAngularVel(bodies_[b], w.x(), w.y(), w.z());

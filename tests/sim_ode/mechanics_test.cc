@@ -6,6 +6,8 @@
 #include <numbers>
 #include <random>
 
+#include "components/robot/robot_files.h"
+#include "sim_ode/ode_world.h"
 #include "tests/sim_ode/simulation_fixture.h"
 
 namespace poise {
@@ -276,6 +278,28 @@ TEST(Motors, CurrentIsLimitedByPeakAndEffort) {
     const double expected = j == 1 ? -limit : j == 2 ? 35 : j == 3 ? 0 : limit;
     EXPECT_NEAR(torque[j], expected, 1e-12) << joints[static_cast<size_t>(j)].name;
     EXPECT_NEAR(simulation.truth().motor_current[j], expected / 5, 1e-12);
+  }
+}
+
+TEST(Posture, JointsReadWhatTheyWereSetToWhateverTheFramesOfTheLinks) {
+  // Its link frames are turned against each other in the zero posture.
+  const robot::RobotModel model =
+      robot::LoadRobotFiles(POISE_SOURCE_DIR "/tests/robot/data/mantis.pbtxt");
+  OdeWorld world(model, 8);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> angle(-1, 1);
+  robot::RobotState state(model.num_joints());
+  robot::RobotState read(model.num_joints());
+  for (int i = 0; i < 20; ++i) {
+    state.base_position = {angle(random), angle(random), 2};
+    state.base_orientation = Eigen::Quaterniond(angle(random), angle(random), angle(random), 1);
+    state.base_orientation.normalize();
+    for (int j = 0; j < model.num_joints(); ++j) state.joint_position[j] = angle(random);
+    world.SetState(state);
+    world.GetState(&read);
+    EXPECT_LT((read.joint_position - state.joint_position).cwiseAbs().maxCoeff(), 1e-9);
+    EXPECT_LT((read.base_position - state.base_position).norm(), 1e-12);
+    EXPECT_LT(read.base_orientation.angularDistance(state.base_orientation), 1e-7);
   }
 }
 
