@@ -12,13 +12,13 @@ export function element(tag, attributes = {}, ...children) {
   return result;
 }
 
-/** Four digits, as short as they can be written. */
+/** So many digits, as short as they can be written. */
 export function formatNumber(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';
   if (Number.isInteger(value) && Math.abs(value) < 1e15) return String(value);
   const magnitude = Math.abs(value);
-  if (magnitude !== 0 && (magnitude < 1e-4 || magnitude >= 1e6)) return value.toExponential(digits - 1);
-  return String(Number(value.toPrecision(digits)));
+  const rounded = Number(value.toPrecision(digits));
+  return magnitude < 1e-4 || magnitude >= 1e6 ? rounded.toExponential() : String(rounded);
 }
 
 export const withUnit = (value, unit) => unit ? `${formatNumber(value)} ${unit}` : formatNumber(value);

@@ -38,18 +38,22 @@ function footConditions(run, figure, foot) {
       derived('limit', 'limit', `${name}_${key}_limit`)]}));
 }
 
+/** Measured of both feet, then computed, which is drawn over it. */
+const ofFeet = (run, make) =>
+  ['measured', 'computed'].flatMap((what) => run.robot.feet.map((foot, f) => make(foot, f, what)));
+
 function footWrenches(run, figure) {
   const part = {force: ['F', 'N'], moment: ['M', 'N·m']};
   return Object.entries(part).flatMap(([kind, [letter, unit]]) => ['x', 'y', 'z'].map((axis, i) => ({
     figure, title: `${letter}_${axis} of each foot, robot on ground, sole frame`, unit,
-    series: run.robot.feet.flatMap((foot, f) => [
-      series(`${foot.name}, measured`, `foot-${f}`, 'robot_sensors_t', `foot_wrench[${f}].${kind}[${i}]`),
-      series(`${foot.name}, computed`, `foot-${f}-dashed`, 'joint_command_t', `foot_wrench[${f}].${kind}[${i}]`)]),
+    series: ofFeet(run, (foot, f, what) =>
+      series(`${foot.name}, ${what}`, `foot-${f}-${what}`, what === 'measured' ? 'robot_sensors_t' : 'joint_command_t',
+        `foot_wrench[${f}].${kind}[${i}]`)),
   })));
 }
 
 function footMotion(figure, run, foot, axis, note) {
-  return {figure, title: `${run.robot.feet[foot].name} foot, ${'xyz'[axis]}`, unit: 'm', note, series: [
+  return {figure, title: `Position of the ${run.robot.feet[foot].name} sole, ${'xyz'[axis]}`, unit: 'm', note, series: [
     series('estimated', 'computed', 'task_torque_t', `foot_pose[${foot}].position[${axis}]`),
     series('true', 'truth', 'ground_truth_t', `foot_pose[${foot}].position[${axis}]`),
     series('desired', 'desired', 'task_torque_t', `foot_desired[${foot}].position[${axis}]`)]};
@@ -96,7 +100,7 @@ const SECTIONS = {
     footMotion('17', run, 1, 2)],
   '7.5': (run) => [
     comMotion('19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
-    footMotion('20a', run, 1, 2, 'As 19b; zoom in on the contact.'),
+    footMotion('20a', run, 1, 2, 'As 19b: zoom in on the contact.'),
     {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
       derived('measured', 'measured', `${run.robot.feet[1].name}_load_measured`),
       derived('computed', 'computed', `${run.robot.feet[1].name}_load_computed`)]},
@@ -122,9 +126,8 @@ function common(run, covered) {
   });
   const eta = (label, role, field) => series(label, role, 'joint_command_t', field);
   return [
-    {title: 'Vertical force of the ground on each foot', unit: 'N', series: run.robot.feet.flatMap((foot, f) => [
-      derived(`${foot.name}, measured`, `foot-${f}`, `${foot.name}_load_measured`),
-      derived(`${foot.name}, computed`, `foot-${f}-dashed`, `${foot.name}_load_computed`)])},
+    {title: 'Vertical force of the ground on each foot', unit: 'N', series: ofFeet(run, (foot, f, what) =>
+      derived(`${foot.name}, ${what}`, `foot-${f}-${what}`, `${foot.name}_load_${what}`))},
     {title: 'η: the right foot\'s share of F_z (61)', unit: '', series: [
       eta('commanded', 'computed', 'eta'), eta('optimal (71)', 'desired', 'eta_optimal'),
       eta('lower bound', 'limit', 'eta_min'), eta('upper bound', 'limit', 'eta_max')]},

@@ -4,7 +4,8 @@ const COLORS = {
   computed: ['#1f5fd0', '#6ea8ff'], measured: ['#26272b', '#e6e6e6'], limit: ['#d11f1f', '#ff6b6b'],
   desired: ['#a11fb0', '#e58cff'], truth: ['#0f8a4b', '#3ecf8e'],
   'axis-x': ['#c2410c', '#ff9a4d'], 'axis-y': ['#0f8a4b', '#3ecf8e'], 'axis-z': ['#1f5fd0', '#6ea8ff'],
-  'foot-0': ['#1f5fd0', '#6ea8ff'], 'foot-1': ['#c2410c', '#ff9a4d'],
+  'foot-0-measured': ['#86aeea', '#41639c'], 'foot-0-computed': ['#123f94', '#a9ccff'],
+  'foot-1-measured': ['#eda27f', '#9c5a33'], 'foot-1-computed': ['#8f2f06', '#ffc499'],
   'hue-0': ['#1f5fd0', '#6ea8ff'], 'hue-1': ['#c2410c', '#ff9a4d'], 'hue-2': ['#0f8a4b', '#3ecf8e'],
   'hue-3': ['#a11fb0', '#e58cff'], 'hue-4': ['#8a6d00', '#e6c84d'], 'hue-5': ['#0e7490', '#5fd3ea'],
   'hue-6': ['#7c2d12', '#d9a083'], 'hue-7': ['#4b5563', '#b3bdcc'],
@@ -15,12 +16,12 @@ const query = matchMedia('(prefers-color-scheme: dark)');
 export const isDark = () => query.matches;
 export const onThemeChange = (listener) => query.addEventListener('change', listener);
 
-/** {color(), dash, width} of a role: "computed", "foot-0-dashed", "axis-x-thin", ... */
+/** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ... */
 export function styleOf(role, overlay = false) {
-  const [, name, variant] = /^(.*?)(?:-(dashed|thin))?$/.exec(role);
+  const [, name, variant] = /^(.*?)(?:-(thin))?$/.exec(role);
   const hue = /^hue-(\d+)$/.exec(name);
   const pair = COLORS[hue ? `hue-${hue[1] % HUES}` : name] ?? COLORS.computed;
-  const dash = overlay ? [3, 3] : name === 'limit' ? [7, 4] : name === 'desired' || variant === 'dashed' ? [5, 3]
+  const dash = overlay ? [3, 3] : name === 'limit' ? [7, 4] : name === 'desired' || /^foot-.*-computed$/.test(name) ? [5, 3]
     : undefined;
   return {color: () => pair[isDark() ? 1 : 0], dash, width: variant === 'thin' || overlay ? 1 : 1.5};
 }

@@ -335,10 +335,11 @@ export class SceneView {
     this.scene.background = this.background;
     renderer.render(this.scene, this.camera);
     const side = Math.round(INSET * Math.min(width, height));
-    const frame = this.samples.pose('frame', this.tick).position;
-    if (side < 60 || !this.show.pressure || !frame.every(Number.isFinite)) return;
-    this.above.position.set(frame[0], frame[1], frame[2] + 5);
-    this.above.lookAt(frame[0], frame[1], frame[2]);
+    const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.tick).position);
+    const middle = [0, 1, 2].map((i) => soles.reduce((sum, sole) => sum + sole[i], 0) / soles.length);
+    if (side < 60 || !this.show.pressure || !middle.every(Number.isFinite)) return;
+    this.above.position.set(middle[0], middle[1], middle[2] + 5);
+    this.above.lookAt(...middle);
     renderer.setViewport(width - side - 8, 8, side, side);
     renderer.setScissor(width - side - 8, 8, side, side);
     renderer.setScissorTest(true);
