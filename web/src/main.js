@@ -104,11 +104,15 @@ async function start() {
   };
   player.addEventListener('time', () => {
     scene.setTick(player.tick);
+    if (player.playing) scene.pace(true);
     update(performance.now());
   });
-  player.addEventListener('state', () => update(performance.now()));
+  player.addEventListener('state', () => {
+    scene.pace(player.playing);
+    update(performance.now());
+  });
   update(performance.now());
-  document.documentElement.dataset.ready = 'true';
+  document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
   window.poise = {run, overlay, player, view, grid, scene};
 }

@@ -1,7 +1,8 @@
 // The robot in 3D with contact wrenches, centre of pressure and push; from above in the corner.
 import {
-  AmbientLight, Box3, CanvasTexture, Color, DirectionalLight, Group, HemisphereLight, Mesh, MeshBasicMaterial, OrthographicCamera,
-  PerspectiveCamera, PlaneGeometry, RepeatWrapping, Scene, SphereGeometry, SRGBColorSpace, Vector3, WebGLRenderer,
+  AmbientLight, Box3, BufferGeometry, CircleGeometry, Color, DirectionalLight, Float32BufferAttribute, Fog, Group, HemisphereLight,
+  LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, OrthographicCamera, PerspectiveCamera, Scene, SphereGeometry,
+  Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {Arrow, blockMesh, mark, Outline} from './markers.js';
@@ -14,9 +15,17 @@ const LEAST_PUSH = 3;  // N: below it the sensor's noise
 const LEAST_LOAD = 5;  // N
 const INSET = 0.34;    // of the picture's smaller side
 const FILL = 1.15;  // of the picture's height that the robot may take, as its inverse
-const ABOVE = 0.26;    // m, half of what the view from above shows
-const GROUND = 12;     // m
+const ABOVE = 0.26;    // m, half of what the view from above shows, at least
+const ABOVE_STEP = 0.1;  // m
+const FINEST = Math.min(2, globalThis.devicePixelRatio);  // pixels of the picture per CSS pixel
+const COARSEST = 0.5;
+const SLOW_FRAME = 22;      // ms
+const FRAME_SHARE = 0.1;    // of a new frame in the mean
+const LONGEST_PAUSE = 500;  // ms; what took longer was no frame
+const GROUND = 6;      // m, across
 const GRID = 0.1;      // m
+const PIECE = 5;       // squares
+const FOG = [3.2, 6];  // m, where the ground begins to fade and where it ends
 const GROUND_LAYER = 1;  // what the view from above shows
 
 export const COLORS = {
@@ -53,21 +62,16 @@ const vector = (key, type, field, n = 3) =>
 const pose = (key, type, field) => ({...vector(`${key}.position`, type, `${field}.position`),
   ...vector(`${key}.orientation`, type, `${field}.orientation`, 4)});
 
-/** Squares of GRID on the ground. */
-function gridTexture(fill, line) {
-  const canvas = document.createElement('canvas');
-  canvas.width = canvas.height = 128;
-  const context = canvas.getContext('2d');
-  context.fillStyle = fill;
-  context.fillRect(0, 0, 128, 128);
-  context.strokeStyle = line;
-  context.lineWidth = 4;
-  context.strokeRect(0, 0, 128, 128);
-  const texture = new CanvasTexture(canvas);
-  texture.colorSpace = SRGBColorSpace;
-  texture.wrapS = texture.wrapT = RepeatWrapping;
-  texture.repeat.set(GROUND / GRID, GROUND / GRID);
-  return texture;
+/** Squares of GRID on the ground, of short pieces: software renderers drop lines that reach behind the camera. */
+function gridGeometry() {
+  const n = Math.round(GROUND / GRID / 2);
+  const points = [];
+  for (let i = -n; i <= n; ++i) {
+    for (let k = -n; k < n; k += PIECE) {
+      points.push(i * GRID, k * GRID, 0, i * GRID, (k + PIECE) * GRID, 0, k * GRID, i * GRID, 0, (k + PIECE) * GRID, i * GRID, 0);
+    }
+  }
+  return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(points, 3));
 }
 
 /** True motion when the run has it, else the estimated one. */
@@ -107,7 +111,7 @@ export class SceneView {
     this.visible = true;
     this.show = {forces: true, moments: false, pressure: true, com: true};
     this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
-    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.#setRatio(FINEST);
     host.append(this.renderer.domElement);
     this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
     this.scene = new Scene();
@@ -141,10 +145,13 @@ export class SceneView {
     sun.position.set(2, -3, 5);
     scene.add(sun);
     // Drawn first and without depth, so that nothing that lies on it flickers.
-    this.ground = new Mesh(new PlaneGeometry(GROUND, GROUND), new MeshBasicMaterial({depthWrite: false}));
+    this.ground = new Mesh(new CircleGeometry(2 * GROUND, 48), new MeshBasicMaterial({depthWrite: false}));
     this.ground.renderOrder = -2;
+    this.grid = new LineSegments(gridGeometry(), new LineBasicMaterial({depthWrite: false, depthTest: false}));
+    this.grid.renderOrder = -1;
+    this.scene.fog = new Fog(0, ...FOG);
     this.robotView = new RobotView(this.run.robot);
-    scene.add(this.ground, this.robotView.object);
+    scene.add(this.ground, this.grid, this.robotView.object);
     if (this.overlay) {
       this.ghost = new RobotView(this.overlay.robot, {ghost: true});
       scene.add(this.ghost.object);
@@ -201,10 +208,9 @@ export class SceneView {
     this.background = new Color(dark ? 0x14171c : 0xeef1f5);
     this.insetBackground = new Color(dark ? 0x20252c : 0xffffff);
     this.scene.background = this.background;
-    this.ground.material.map?.dispose();
-    this.ground.material.map = gridTexture(...(dark ? ['#1b1f26', '#323945'] : ['#e4e8ee', '#c3cbd6']));
-    this.ground.material.map.anisotropy = this.renderer.capabilities.getMaxAnisotropy();
-    this.ground.material.needsUpdate = true;
+    this.scene.fog.color = this.background;
+    this.ground.material.color.set(dark ? 0x1b1f26 : 0xe4e8ee);
+    this.grid.material.color.set(dark ? 0x333b47 : 0xc3cbd6);
     this.draw();
   }
 
@@ -312,7 +318,17 @@ export class SceneView {
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.#render();
+    this.renderNow();
+  }
+
+  /** Both soles in the view from above; in steps, so that it holds still. */
+  #fitAbove(soles, middle) {
+    const reach = soles.map((sole, f) => Math.hypot(sole[0] - middle[0], sole[1] - middle[1])
+      + this.run.robot.feet[f].length / 2);
+    const half = Math.max(ABOVE, Math.ceil(Math.max(...reach) / ABOVE_STEP) * ABOVE_STEP);
+    if (half === this.above.top) return;
+    Object.assign(this.above, {left: -half, right: half, top: half, bottom: -half});
+    this.above.updateProjectionMatrix();
   }
 
   /** In the next frame, once. */
@@ -321,12 +337,36 @@ export class SceneView {
     this.#waiting = true;
     requestAnimationFrame(() => {
       this.#waiting = false;
-      this.#render();
+      this.renderNow();
     });
   }
   #waiting = false;
 
-  #render() {
+  /** Once a frame while the run plays: coarser while frames are slow to come, as without a graphics card. */
+  pace(playing) {
+    const now = performance.now();
+    const took = now - this.#lastPace;
+    this.#lastPace = now;
+    if (!playing) this.#setRatio(FINEST);
+    else if (took < LONGEST_PAUSE) this.#frameTime += FRAME_SHARE * (took - this.#frameTime);
+    if (playing && this.#frameTime > SLOW_FRAME && this.#ratio > COARSEST) {
+      this.#setRatio(Math.max(COARSEST, 0.75 * this.#ratio));
+      this.#frameTime = 0;  // measured anew
+    }
+  }
+  #lastPace = 0;
+  #frameTime = 0;
+  #ratio = 0;
+
+  #setRatio(ratio) {
+    if (ratio === this.#ratio) return;
+    this.#ratio = ratio;
+    this.renderer.setPixelRatio(ratio);
+    this.draw();
+  }
+
+  /** At once. */
+  renderNow() {
     const {renderer} = this;
     const {clientWidth: width, clientHeight: height} = this.host;
     if (width === 0 || height === 0) return;
@@ -338,7 +378,8 @@ export class SceneView {
     const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.tick).position);
     const middle = [0, 1, 2].map((i) => soles.reduce((sum, sole) => sum + sole[i], 0) / soles.length);
     if (side < 60 || !this.show.pressure || !middle.every(Number.isFinite)) return;
-    this.above.position.set(middle[0], middle[1], middle[2] + 5);
+    this.#fitAbove(soles, middle);
+    this.above.position.set(middle[0], middle[1], middle[2] + 1);  // nearer than the fog
     this.above.lookAt(...middle);
     renderer.setViewport(width - side - 8, 8, side, side);
     renderer.setScissor(width - side - 8, 8, side, side);
