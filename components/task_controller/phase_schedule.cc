@@ -95,6 +95,35 @@ void CheckTransition(const TaskControllerConfig& config, int index, const std::s
   }
 }
 
+void CheckContact(const ContactConfirmation& contact) {
+  const auto positive = [](double value, const char* name, const char* unit) {
+    if (!(value > 0) || !std::isfinite(value)) {
+      throw ConfigError(fmt::format("contact.{}", name),
+                        fmt::format("is {}; must be a positive number of {}", value, unit));
+    }
+  };
+  positive(contact.touch_load(), "touch_load", "N");
+  positive(contact.release_load(), "release_load", "N");
+  positive(contact.press_load(), "press_load", "N");
+  positive(contact.search_speed(), "search_speed", "m/s");
+  positive(contact.search_depth(), "search_depth", "m");
+  positive(contact.retract_height(), "retract_height", "m");
+  positive(contact.expected_within(), "expected_within", "m");
+  CheckNotNegative(contact.touch_duration(), "contact.touch_duration");
+  CheckNotNegative(contact.settle_duration(), "contact.settle_duration");
+  if (contact.release_load() >= contact.touch_load()) {
+    throw ConfigError("contact.release_load",
+                      fmt::format("is {} N; must be below touch_load, {} N, or contact flickers",
+                                  contact.release_load(), contact.touch_load()));
+  }
+  if (contact.press_load() <= contact.touch_load()) {
+    throw ConfigError("contact.press_load",
+                      fmt::format("is {} N; must be above touch_load, {} N, or the search comes to "
+                                  "a stand before contact counts",
+                                  contact.press_load(), contact.touch_load()));
+  }
+}
+
 }  // namespace
 
 void CheckTaskControllerConfig(const TaskControllerConfig& config) {
@@ -102,6 +131,7 @@ void CheckTaskControllerConfig(const TaskControllerConfig& config) {
   CheckGains(config.has_orientation(), config.orientation(), "orientation",
              "give kp and kd of the body's orientation");
   if (config.has_posture()) CheckGains(true, config.posture(), "posture", "");
+  CheckContact(config.contact());
   if (config.phase_size() == 0) throw ConfigError("phase", "is missing; give at least one phase");
   for (int i = 0; i < config.phase_size(); ++i) {
     const Phase& phase = config.phase(i);
@@ -135,18 +165,19 @@ void CheckTaskControllerConfig(const TaskControllerConfig& config) {
 
 std::array<bool, 2> ContactsOf(Support support) { return {support != LEFT, support != RIGHT}; }
 
-const ScheduleState& PhaseSchedule::Advance(double time, const std::array<bool, 2>& com_over_foot) {
+const ScheduleState& PhaseSchedule::Advance(double time, const std::array<bool, 2>& com_over_foot,
+                                            const std::array<bool, 2>& foot_confirmed) {
   state_.phase_began = false;
   const int next = state_.phase + 1;
-  bool held = false;
+  WaitingFor hindrance = WaitingFor::kNothing;
   if (!began_) {
     began_ = true;
     state_.phase_began = true;
     state_.phase_start = time;
   } else if (next < config_.phase_size() && !(Unloads() && !transition_began_) &&
              time - shift_ >= config_.phase(next).start() - kTimeTolerance) {
-    held = LiftOffHeld(com_over_foot);
-    if (held) {
+    hindrance = Hindrance(com_over_foot, foot_confirmed);
+    if (hindrance != WaitingFor::kNothing) {
       shift_ = std::max(shift_, time - config_.phase(next).start());
     } else {
       state_.phase = next;
@@ -156,21 +187,35 @@ const ScheduleState& PhaseSchedule::Advance(double time, const std::array<bool, 
     }
   }
   AdvanceTransition(time, com_over_foot);
-  state_.waiting = state_.waiting || held;
+  if (hindrance != WaitingFor::kNothing) state_.waiting_for = hindrance;
   return state_;
+}
+
+bool PhaseSchedule::BeforeTouchDown() const {
+  const int next = state_.phase + 1;
+  return phase().support() != DOUBLE && next < config_.phase_size() &&
+         config_.phase(next).support() == DOUBLE;
 }
 
 bool PhaseSchedule::Unloads() const {
   return phase().has_transition() && phase().transition().kind() == ContactTransition::UNLOAD;
 }
 
-// The ramp has ended by then: CheckTaskControllerConfig sees to that.
-bool PhaseSchedule::LiftOffHeld(const std::array<bool, 2>& com_over_foot) const {
-  return Unloads() && !com_over_foot[static_cast<size_t>(Other(phase().transition().foot()))];
+WaitingFor PhaseSchedule::Hindrance(const std::array<bool, 2>& com_over_foot,
+                                    const std::array<bool, 2>& foot_confirmed) const {
+  // The ramp has ended by then: CheckTaskControllerConfig sees to that.
+  if (Unloads() && !com_over_foot[static_cast<size_t>(Other(phase().transition().foot()))]) {
+    return WaitingFor::kCom;
+  }
+  if (config_.contact().required() && BeforeTouchDown()) {
+    const int foot = phase().support() == RIGHT ? LEFT_FOOT : RIGHT_FOOT;
+    if (!foot_confirmed[static_cast<size_t>(foot)]) return WaitingFor::kContact;
+  }
+  return WaitingFor::kNothing;
 }
 
 void PhaseSchedule::AdvanceTransition(double time, const std::array<bool, 2>& com_over_foot) {
-  state_.waiting = false;
+  state_.waiting_for = WaitingFor::kNothing;
   state_.transition = TransitionKind::kNone;
   state_.transition_foot = -1;
   state_.progress = 0;
@@ -182,7 +227,7 @@ void PhaseSchedule::AdvanceTransition(double time, const std::array<bool, 2>& co
   if (!transition_began_) {
     const bool is_due = time >= due - kTimeTolerance;
     if (is_due && unloading && !com_over_foot[static_cast<size_t>(Other(transition.foot()))]) {
-      state_.waiting = true;
+      state_.waiting_for = WaitingFor::kCom;
       shift_ += time - due;
       return;
     }

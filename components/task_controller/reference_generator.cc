@@ -52,6 +52,8 @@ PointMotion QuinticMove::At(double time) const {
 void ReferencePoint::Hold(const Eigen::Vector3d& position) {
   move_.Hold(position);
   pending_ = false;
+  target_ = position;
+  start_ = duration_ = 0;
 }
 
 void ReferencePoint::Schedule(const Eigen::Vector3d& target, double start, double duration) {
@@ -136,6 +138,12 @@ const References& ReferenceGenerator::Update(double time) {
     if (foot_free_[i]) references_.foot[i] = foot_[i].At(time);
   }
   return references_;
+}
+
+void ReferenceGenerator::HoldFoot(size_t foot, const Eigen::Vector3d& position,
+                                  const Eigen::Matrix3d& rotation) {
+  foot_[foot].Hold(position);
+  references_.foot_rotation[foot] = rotation;
 }
 
 }  // namespace poise

@@ -40,6 +40,9 @@ class ReferencePoint {
   void Schedule(const Eigen::Vector3d& target, double start, double duration);
   /// `time` must not decrease from call to call.
   PointMotion At(double time);
+  /// Where and when, s, the last move ends.
+  const Eigen::Vector3d& target() const { return target_; }
+  double end() const { return start_ + duration_; }
 
  private:
   QuinticMove move_;
@@ -72,6 +75,9 @@ class ReferenceGenerator {
   /// First tick: everything holds where it is. COM targets of the phase are set relative to that.
   void BeginPhase(const Phase& phase, const EstimatedPose& estimate, double time);
   const References& Update(double time);
+  /// From here on the free foot rests there; its moves under way and to come are dropped.
+  void HoldFoot(size_t foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
+  const ReferencePoint& foot(size_t index) const { return foot_[index]; }
 
  private:
   Eigen::Vector3d ComTarget(const ComReference& com, const EstimatedPose& estimate,

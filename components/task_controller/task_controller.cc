@@ -25,6 +25,20 @@ int8_t TransitionCode(TransitionKind kind) {
   return task_torque_t::TRANSITION_NONE;
 }
 
+int8_t FootCode(Landing::State state) {
+  switch (state) {
+    case Landing::State::kSearching:
+      return task_torque_t::FOOT_SEARCHING;
+    case Landing::State::kTouching:
+      return task_torque_t::FOOT_TOUCHING;
+    case Landing::State::kRetracted:
+      return task_torque_t::FOOT_RETRACTED;
+    case Landing::State::kSwing:
+      break;
+  }
+  return task_torque_t::FOOT_SWING;
+}
+
 // The paper's distance of the limits from the edges of its sole, m.
 constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 
@@ -69,6 +83,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   schedule_.emplace(config);
+  landing_.assign(2, Landing(config.contact()));
   tasks_.emplace(*model_, ReadGains(config.com()), ReadGains(config.orientation()),
                  ReadGains(config.foot()));
   task_dynamics_.emplace(num_joints, TaskStack::kMaxRows);
@@ -101,7 +116,11 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 void TaskController::Step(const Tick& tick) { task_torque_->status = Control(tick.time); }
 
 int8_t TaskController::Control(double time) {
-  if (!ReadState(*robot_state_, &state_)) return task_torque_t::STATUS_INVALID_STATE;
+  const std::array<double, 2> load{-robot_state_->foot_wrench[0].force[2],
+                                   -robot_state_->foot_wrench[1].force[2]};
+  if (!ReadState(*robot_state_, &state_) || !std::isfinite(load[0] + load[1])) {
+    return task_torque_t::STATUS_INVALID_STATE;
+  }
   // The schedule needs the COM, which comes with the dynamics of the contacts so far; they seldom
   // change.
   if (!whole_body_->Update(state_, in_contact_)) return task_torque_t::STATUS_SINGULAR;
@@ -109,23 +128,77 @@ int8_t TaskController::Control(double time) {
     started_ = true;
     posture_reference_ = state_.joint_position;
   }
-  const ScheduleState& schedule = schedule_->Advance(time, ComOverFoot());
-  const Phase& phase = schedule_->phase();
-  if (schedule.phase_began) {
-    references_.BeginPhase(phase, Estimate(), time);
-    in_contact_ = ContactsOf(phase.support());
-    if (!whole_body_->Update(state_, in_contact_)) return task_torque_t::STATUS_SINGULAR;
-  }
-  const References& references = references_.Update(time);
-  if (phase.gravity_compensation()) {
+  for (size_t i = 0; i < 2; ++i) landing_[i].Measure(time, load[i]);
+  const ScheduleState& schedule =
+      schedule_->Advance(time, ComOverFoot(), {landing_[0].confirmed(), landing_[1].confirmed()});
+  if (schedule.phase_began && !BeginPhase(time)) return task_torque_t::STATUS_SINGULAR;
+  UpdateReferences(time);
+  if (schedule_->phase().gravity_compensation()) {
     balance::GravityCompensation(whole_body_->contact(), torque_);
     posture_reference_ = state_.joint_position;
-  } else if (!ComputeTorque(references, in_contact_)) {
+  } else if (!ComputeTorque(references_, in_contact_)) {
     return task_torque_t::STATUS_SINGULAR;
   }
   if (!torque_.allFinite()) return task_torque_t::STATUS_SINGULAR;
-  Report(references, in_contact_);
-  return schedule.waiting ? task_torque_t::STATUS_WAITING : task_torque_t::STATUS_OK;
+  Report(references_, in_contact_);
+  return schedule.waiting() ? task_torque_t::STATUS_WAITING : task_torque_t::STATUS_OK;
+}
+
+bool TaskController::BeginPhase(double time) {
+  const Phase& phase = schedule_->phase();
+  const EstimatedPose estimate = Estimate();
+  generator_.BeginPhase(phase, estimate, time);
+  const std::array<bool, 2> last_contact = in_contact_;
+  in_contact_ = ContactsOf(phase.support());
+  for (size_t i = 0; i < 2; ++i) {
+    if (in_contact_[i]) continue;
+    if (last_contact[i] || !last_controlled_) {
+      references_.foot[i].position = estimate.sole[i].translation();
+      references_.foot_rotation[i] = estimate.sole[i].linear();
+      landing_[i].LiftOff(references_.foot[i].position.z());
+    }
+    const bool moves = phase.has_foot() && static_cast<size_t>(phase.foot().foot()) == i;
+    const PointMotion& standing = references_.foot[i];
+    if (moves && !landing_[i].BeginMove(standing.position.z(), generator_.foot(i).target().z(),
+                                        generator_.foot(i).end())) {
+      generator_.HoldFoot(i, standing.position, references_.foot_rotation[i]);
+    }
+  }
+  last_controlled_ = !phase.gravity_compensation();
+  return whole_body_->Update(state_, in_contact_);
+}
+
+void TaskController::UpdateReferences(double time) {
+  references_ = generator_.Update(time);
+  if (schedule_->phase().gravity_compensation()) return;
+  const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
+  for (size_t i = 0; i < 2; ++i) {
+    if (in_contact_[i]) continue;
+    PointMotion* foot = &references_.foot[i];
+    Eigen::Matrix3d* rotation = &references_.foot_rotation[i];
+    if (landing_[i].Update(schedule_->BeforeTouchDown(), due, whole_body_->data().foot_pose[i],
+                           foot, rotation)) {
+      // Where the landing ends, the scenario goes on from here.
+      generator_.HoldFoot(i, foot->position, *rotation);
+    }
+  }
+}
+
+int8_t TaskController::WaitingCode() const {
+  switch (schedule_->state().waiting_for) {
+    case WaitingFor::kCom:
+      return task_torque_t::WAITING_COM;
+    case WaitingFor::kContact:
+      for (size_t i = 0; i < 2; ++i) {
+        if (!in_contact_[i] && landing_[i].state() == Landing::State::kRetracted) {
+          return task_torque_t::WAITING_NO_SURFACE;
+        }
+      }
+      return task_torque_t::WAITING_CONTACT;
+    case WaitingFor::kNothing:
+      break;
+  }
+  return task_torque_t::WAITING_NONE;
 }
 
 EstimatedPose TaskController::Estimate() const {
@@ -182,7 +255,7 @@ void TaskController::Report(const References& references, const std::array<bool,
   const bool controlled = !schedule_->phase().gravity_compensation();
   std::copy_n(torque_.data(), torque_.size(), out.torque.begin());
   out.phase = schedule.phase;
-  out.waiting_for = schedule.waiting ? task_torque_t::WAITING_COM : task_torque_t::WAITING_NONE;
+  out.waiting_for = WaitingCode();
   out.transition = TransitionCode(schedule.transition);
   out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
   out.transition_progress = schedule.progress;
@@ -193,7 +266,7 @@ void TaskController::Report(const References& references, const std::array<bool,
              out.body_orientation_error);
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = in_contact[i] ? 1 : 0;
-    out.foot_state[i] = in_contact[i] ? task_torque_t::FOOT_SUPPORT : task_torque_t::FOOT_SWING;
+    out.foot_state[i] = in_contact[i] ? task_torque_t::FOOT_SUPPORT : FootCode(landing_[i].state());
     SetPose(data.foot_pose[i], &out.foot_pose[i]);
     out.foot_desired[i] = out.foot_pose[i];
     if (controlled && !in_contact[i]) {

@@ -4,11 +4,13 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
+#include "components/task_controller/landing.h"
 #include "components/task_controller/phase_schedule.h"
 #include "components/task_controller/reference_generator.h"
 #include "components/task_controller/task_stack.h"
@@ -28,12 +30,17 @@ class TaskController : public Component {
   void Step(const Tick& tick);
   /// Fills contacts, phase, references and torque; STATUS_* of the message.
   int8_t Control(double time);
+  /// Contacts, references and landings of a phase's first tick; false: dynamics are singular.
+  bool BeginPhase(double time);
+  /// The scenario's references where the free foot follows them, else its landing's.
+  void UpdateReferences(double time);
   EstimatedPose Estimate() const;
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced rectangle. At rest that is the COM's projection, and the CoP.
   std::array<bool, 2> ComOverFoot() const;
   bool ComputeTorque(const References& references, const std::array<bool, 2>& in_contact);
   void Report(const References& references, const std::array<bool, 2>& in_contact);
+  int8_t WaitingCode() const;
 
   Input<robot_state_t> robot_state_;
   Output<task_torque_t> task_torque_;
@@ -43,10 +50,13 @@ class TaskController : public Component {
   std::optional<PhaseSchedule> schedule_;
   std::optional<TaskStack> tasks_;
   std::optional<balance::TaskDynamics> task_dynamics_;
-  ReferenceGenerator references_;
+  ReferenceGenerator generator_;
+  std::vector<Landing> landing_;  // by foot
+  References references_;
   robot::RobotState state_;
   std::array<bool, 2> in_contact_{true, true};
   bool started_ = false;
+  bool last_controlled_ = false;  // the phase before had tasks
   PdGains posture_;
   std::array<Eigen::Vector2d, 2> stance_half_;  // m, of each sole's reduced rectangle
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;

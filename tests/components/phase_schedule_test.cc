@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::array<bool, 2> kOverBoth{true, true};
 constexpr std::array<bool, 2> kOverNeither{false, false};
+constexpr std::array<bool, 2> kConfirmed{true, true};
+constexpr std::array<bool, 2> kUnconfirmed{false, false};
 constexpr double kTick = 0.002;
 
 const std::string kGains =
@@ -42,12 +44,12 @@ TEST(PhaseSchedule, FollowsTheScenarioToTheTick) {
   PhaseSchedule schedule = Schedule(kThere);
   for (int tick = 0; tick <= 1500; ++tick) {
     const double time = kTick * tick;
-    const ScheduleState& state = schedule.Advance(time, kOverBoth);
+    const ScheduleState& state = schedule.Advance(time, kOverBoth, kConfirmed);
     SCOPED_TRACE(time);
     const int phase = tick < 500 ? 0 : tick < 1000 ? 1 : 2;
     ASSERT_EQ(state.phase, phase);
     ASSERT_EQ(state.phase_began, tick == 0 || tick == 500 || tick == 1000);
-    ASSERT_FALSE(state.waiting);
+    ASSERT_FALSE(state.waiting());
     TransitionKind kind = TransitionKind::kNone;
     double progress = 0;
     if (tick >= 250 && tick < 500) {
@@ -68,8 +70,8 @@ TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
   // The COM stands above the left foot only: the foot that is to be lifted does not count.
   const std::array<bool, 2> over_left{false, true};
   for (int tick = 0; tick < 400; ++tick) {
-    const ScheduleState& state = schedule.Advance(kTick * tick, over_left);
-    ASSERT_EQ(state.waiting, tick >= 250) << tick;
+    const ScheduleState& state = schedule.Advance(kTick * tick, over_left, kConfirmed);
+    ASSERT_EQ(state.waiting_for, tick >= 250 ? WaitingFor::kCom : WaitingFor::kNothing) << tick;
     ASSERT_EQ(state.transition, TransitionKind::kNone);
     ASSERT_EQ(state.phase, 0);
   }
@@ -77,8 +79,8 @@ TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
   // distances.
   int unloading = -1, single = -1, second_double = -1;
   for (int tick = 400; tick < 1800; ++tick) {
-    const ScheduleState& state = schedule.Advance(kTick * tick, kOverBoth);
-    ASSERT_FALSE(state.waiting);
+    const ScheduleState& state = schedule.Advance(kTick * tick, kOverBoth, kConfirmed);
+    ASSERT_FALSE(state.waiting());
     if (unloading < 0 && state.transition == TransitionKind::kUnloading) unloading = tick;
     if (single < 0 && state.phase == 1) single = tick;
     if (second_double < 0 && state.phase == 2) second_double = tick;
@@ -90,21 +92,21 @@ TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
 
 TEST(PhaseSchedule, TheLiftOffWaitsWhenTheComLeavesDuringTheRamp) {
   PhaseSchedule schedule = Schedule(kThere);
-  for (int tick = 0; tick < 400; ++tick) schedule.Advance(kTick * tick, kOverBoth);
+  for (int tick = 0; tick < 400; ++tick) schedule.Advance(kTick * tick, kOverBoth, kConfirmed);
   for (int tick = 400; tick < 600; ++tick) {
-    const ScheduleState& state = schedule.Advance(kTick * tick, kOverNeither);
+    const ScheduleState& state = schedule.Advance(kTick * tick, kOverNeither, kConfirmed);
     ASSERT_EQ(state.phase, 0) << tick;
-    ASSERT_EQ(state.waiting, tick >= 500) << tick;
+    ASSERT_EQ(state.waiting(), tick >= 500) << tick;
     ASSERT_EQ(state.transition, TransitionKind::kUnloading);
     if (tick >= 500) {
       ASSERT_EQ(state.progress, 1) << tick;
     }
   }
-  EXPECT_EQ(schedule.Advance(kTick * 600, kOverBoth).phase, 1);
-  EXPECT_FALSE(schedule.state().waiting);
+  EXPECT_EQ(schedule.Advance(kTick * 600, kOverBoth, kConfirmed).phase, 1);
+  EXPECT_FALSE(schedule.state().waiting());
   int second_double = -1;
   for (int tick = 601; tick < 1400 && second_double < 0; ++tick) {
-    if (schedule.Advance(kTick * tick, kOverNeither).phase == 2) second_double = tick;
+    if (schedule.Advance(kTick * tick, kOverNeither, kConfirmed).phase == 2) second_double = tick;
   }
   EXPECT_NEAR(second_double - 600, 500, 1);  // later phases keep their distances
 }
@@ -112,9 +114,9 @@ TEST(PhaseSchedule, TheLiftOffWaitsWhenTheComLeavesDuringTheRamp) {
 TEST(PhaseSchedule, NeverLiftsAFootUnderTheCom) {
   PhaseSchedule schedule = Schedule(kThere);
   for (int tick = 0; tick < 10000; ++tick) {
-    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither).phase, 0);
+    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither, kConfirmed).phase, 0);
   }
-  EXPECT_TRUE(schedule.state().waiting);
+  EXPECT_TRUE(schedule.state().waiting());
 }
 
 TEST(PhaseSchedule, AnInstantUnloadingIsCheckedToo) {
@@ -122,10 +124,50 @@ TEST(PhaseSchedule, AnInstantUnloadingIsCheckedToo) {
       "phase { start: 0 transition { kind: UNLOAD foot: RIGHT_FOOT delay: 1 duration: 0 } } "
       "phase { start: 1 support: LEFT } ");
   for (int tick = 0; tick < 1000; ++tick) {
-    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither).phase, 0);
+    ASSERT_EQ(schedule.Advance(kTick * tick, kOverNeither, kConfirmed).phase, 0);
   }
-  EXPECT_EQ(schedule.Advance(kTick * 1000, kOverBoth).progress, 1);
-  EXPECT_EQ(schedule.Advance(kTick * 1001, kOverBoth).phase, 1);
+  EXPECT_EQ(schedule.Advance(kTick * 1000, kOverBoth, kConfirmed).progress, 1);
+  EXPECT_EQ(schedule.Advance(kTick * 1001, kOverBoth, kConfirmed).phase, 1);
+}
+
+TEST(PhaseSchedule, DoubleSupportWaitsForTheFootThatComesDown) {
+  PhaseSchedule schedule = Schedule(kThere);
+  const std::array<bool, 2> only_right{true, false}, only_left{false, true};
+  for (int tick = 0; tick < 1400; ++tick) {
+    const ScheduleState& state = schedule.Advance(kTick * tick, kOverBoth, only_right);
+    ASSERT_EQ(state.phase, tick < 500 ? 0 : 1) << tick;
+    ASSERT_EQ(state.waiting_for, tick < 1000 ? WaitingFor::kNothing : WaitingFor::kContact) << tick;
+    ASSERT_EQ(schedule.BeforeTouchDown(), tick >= 500);
+  }
+  const ScheduleState& state = schedule.Advance(kTick * 1400, kOverBoth, only_left);
+  EXPECT_EQ(state.phase, 2);
+  EXPECT_TRUE(state.phase_began);
+  EXPECT_FALSE(state.waiting());
+  // The loading keeps its distance from the phase's start: 0.2 s.
+  int loading = -1;
+  for (int tick = 1401; tick < 1700 && loading < 0; ++tick) {
+    // A contact lost again does not end double support.
+    if (schedule.Advance(kTick * tick, kOverBoth, kUnconfirmed).progress > 0) loading = tick;
+  }
+  EXPECT_NEAR(loading - 1400, 100, 2);
+  EXPECT_EQ(schedule.state().phase, 2);
+}
+
+TEST(PhaseSchedule, TheScheduleAloneDecidesWhenNoConfirmationIsRequired) {
+  PhaseSchedule schedule = Schedule("contact { required: false } " + kThere);
+  for (int tick = 0; tick <= 1000; ++tick) schedule.Advance(kTick * tick, kOverBoth, kUnconfirmed);
+  EXPECT_EQ(schedule.state().phase, 2);
+}
+
+TEST(PhaseSchedule, OnlyDoubleSupportAfterSingleSupportNeedsConfirmation) {
+  PhaseSchedule schedule = Schedule(
+      "phase { start: 0 } phase { start: 0.1 } phase { start: 0.2 support: LEFT } "
+      "phase { start: 0.3 support: LEFT } ");
+  for (int tick = 0; tick <= 150; ++tick) {
+    ASSERT_FALSE(schedule.Advance(kTick * tick, kOverBoth, kUnconfirmed).waiting());
+    ASSERT_FALSE(schedule.BeforeTouchDown());
+  }
+  EXPECT_EQ(schedule.state().phase, 3);
 }
 
 TEST(PhaseSchedule, ContactsOfASupport) {
@@ -162,6 +204,19 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"com { kp: -1 kd: 1 }", "com.kp"}, Refused{"com { kp: 1 }", "com.kd"},
         Refused{"com { kp: 1 kd: nan }", "com.kd"},
         Refused{"com { kp: 1 kd: 1 } orientation { kp: 1 kd: 0 }", "orientation.kd"},
+        Refused{GAINS "contact { touch_load: 0 }", "contact.touch_load"},
+        Refused{GAINS "contact { touch_load: nan }", "contact.touch_load"},
+        Refused{GAINS "contact { touch_load: 3 }", "contact.release_load"},
+        Refused{GAINS "contact { release_load: 10 }", "contact.release_load"},
+        Refused{GAINS "contact { release_load: -1 }", "contact.release_load"},
+        Refused{GAINS "contact { press_load: 10 }", "contact.press_load"},
+        Refused{GAINS "contact { press_load: inf }", "contact.press_load"},
+        Refused{GAINS "contact { touch_duration: -0.1 }", "contact.touch_duration"},
+        Refused{GAINS "contact { settle_duration: nan }", "contact.settle_duration"},
+        Refused{GAINS "contact { search_speed: 0 }", "contact.search_speed"},
+        Refused{GAINS "contact { search_depth: -0.01 }", "contact.search_depth"},
+        Refused{GAINS "contact { retract_height: 0 }", "contact.retract_height"},
+        Refused{GAINS "contact { expected_within: 0 }", "contact.expected_within"},
         Refused{GAINS, "phase"}, Refused{GAINS "phase { }", "phase[0].start"},
         Refused{GAINS "phase { start: 0.1 }", "phase[0].start"},
         Refused{GAINS "phase { start: 0 } phase { start: 0 }", "phase[1].start"},
@@ -312,6 +367,30 @@ TEST(ReferenceGenerator, TheFreeFootStartsWhereItIsWhenItLeavesTheGround) {
       4);
   EXPECT_LT((references.Update(5).foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.071)).norm(),
             1e-14);
+}
+
+TEST(ReferenceGenerator, AHeldFootRestsAndLaterMovesStartThere) {
+  ReferenceGenerator references;
+  references.BeginPhase(ParsePhase("start: 0 support: RIGHT foot { foot: LEFT_FOOT z: 0.1 "
+                                   "duration: 1 }"),
+                        Pose(), 0);
+  EXPECT_NEAR(references.foot(1).target().z(), 0.102, 1e-15);
+  EXPECT_NEAR(references.foot(1).end(), 1, 1e-15);
+  references.Update(0.5);
+  const Eigen::Vector3d place(0.01, 0.12, 0.07);
+  const Eigen::Matrix3d rotation =
+      Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  references.HoldFoot(1, place, rotation);
+  for (const double time : {0.5, 0.7, 2.0}) {
+    const References& held = references.Update(time);
+    EXPECT_EQ(held.foot[1].position, place);
+    EXPECT_EQ(held.foot[1].velocity.norm(), 0);
+    EXPECT_EQ(held.foot_rotation[1], rotation);
+  }
+  references.BeginPhase(ParsePhase("start: 2 support: RIGHT foot { foot: LEFT_FOOT z: 0.03 }"),
+                        Pose(), 2);
+  EXPECT_LT((references.Update(2.1).foot[1].position - place - Eigen::Vector3d(0, 0, 0.03)).norm(),
+            1e-15);
 }
 
 TEST(ReferenceGenerator, AfterGravityCompensationTheRobotHoldsWhereItWasLeft) {

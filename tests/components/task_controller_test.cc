@@ -272,5 +272,93 @@ TEST(TaskController, ReportsAWaitingUnloading) {
   EXPECT_EQ(harness.output<task_torque_t>().transition_foot, 1);
 }
 
+// A robot on its right foot whose left one, lowered at 0.1 s, is to carry from 0.4 s on.
+class TouchDown : public testing::Test {
+ protected:
+  explicit TouchDown(const std::string& contact = "")
+      : harness_(&context_,
+                 TaskConfig(contact +
+                            "phase { start: 0 support: RIGHT } "
+                            "phase { start: 0.1 support: RIGHT foot { foot: LEFT_FOOT z: -0.02 "
+                            "duration: 0.1 } } "
+                            "phase { start: 0.4 transition { kind: LOAD foot: LEFT_FOOT duration: "
+                            "0.1 } }")) {
+    message_ = StateMessage(robot::LoadTestRobot(TestRobot::kDyros),
+                            StandingState(robot::LoadTestRobot(TestRobot::kDyros)));
+    message_.foot_wrench[0].force[2] = -500;
+    harness_.Bind("robot_state", &message_);
+  }
+  /// `load` on the left sole, N, until `time`, s.
+  const task_torque_t& Run(double time, double load) {
+    message_.foot_wrench[1].force[2] = -load;
+    while (TickAt(tick_).time < time - 1e-9) harness_.Run(TickAt(tick_++));
+    return harness_.output<task_torque_t>();
+  }
+
+  ControlContext context_{TestRobot::kDyros};
+  Harness<TaskController> harness_;
+  robot_state_t message_;
+  int64_t tick_ = 0;
+};
+
+TEST_F(TouchDown, InTimeDoesNotShiftTheSchedule) {
+  EXPECT_EQ(Run(0.07, 0).foot_state[1], task_torque_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.4, 12).foot_state[1], task_torque_t::FOOT_TOUCHING);
+  EXPECT_EQ(harness_.output<task_torque_t>().in_contact[1], 0);
+  const task_torque_t& out = Run(0.402, 12);
+  EXPECT_EQ(out.status, task_torque_t::STATUS_OK);
+  EXPECT_EQ(out.phase, 2);
+  EXPECT_EQ(out.in_contact[1], 1);
+  EXPECT_EQ(out.foot_state[1], task_torque_t::FOOT_SUPPORT);
+  EXPECT_EQ(out.transition, task_torque_t::TRANSITION_LOADING);
+  EXPECT_NEAR(out.transition_progress, 0, 1e-8);
+}
+
+TEST_F(TouchDown, LateHoldsTheScheduleUntilTheLoadHasLasted) {
+  EXPECT_EQ(Run(0.2, 0).foot_state[1], task_torque_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.21, 0).foot_state[1], task_torque_t::FOOT_SEARCHING);
+  EXPECT_EQ(Run(0.4, 0).status, task_torque_t::STATUS_OK);
+  const task_torque_t& out = Run(0.5, 0);
+  EXPECT_EQ(out.status, task_torque_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, task_torque_t::WAITING_CONTACT);
+  EXPECT_EQ(out.phase, 1);
+  EXPECT_LT(out.foot_desired[1].position[2], out.foot_pose[1].position[2] - 0.02);
+  // 0.02 s of load, then 0.3 s in which it settles.
+  EXPECT_EQ(Run(0.52, 12).foot_state[1], task_torque_t::FOOT_SEARCHING);
+  EXPECT_EQ(Run(0.522, 12).foot_state[1], task_torque_t::FOOT_TOUCHING);
+  EXPECT_EQ(Run(0.82, 12).waiting_for, task_torque_t::WAITING_CONTACT);
+  EXPECT_EQ(Run(0.824, 12).phase, 2);
+  EXPECT_EQ(out.status, task_torque_t::STATUS_OK);
+  EXPECT_EQ(out.waiting_for, task_torque_t::WAITING_NONE);
+}
+
+// This foot does not move: its reference gives up at twice the depth.
+TEST_F(TouchDown, WithoutASurfaceItEndsInSingleSupport) {
+  const task_torque_t& out = Run(8, 0);
+  EXPECT_EQ(out.status, task_torque_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, task_torque_t::WAITING_NO_SURFACE);
+  EXPECT_EQ(out.foot_state[1], task_torque_t::FOOT_RETRACTED);
+  EXPECT_EQ(out.phase, 1);
+  EXPECT_NEAR(out.foot_desired[1].position[2], -0.02 - 0.12 + 0.05, 1e-3);
+  EXPECT_EQ(Run(9, 100).phase, 1);  // for good
+}
+
+TEST_F(TouchDown, ALoadThatIsNoNumberIsAnInvalidState) {
+  Run(0.1, 0);
+  EXPECT_EQ(Run(0.11, std::numeric_limits<double>::quiet_NaN()).status,
+            task_torque_t::STATUS_INVALID_STATE);
+  EXPECT_EQ(Run(0.12, 0).status, task_torque_t::STATUS_OK);
+}
+
+class UnconfirmedTouchDown : public TouchDown {
+ protected:
+  UnconfirmedTouchDown() : TouchDown("contact { required: false } ") {}
+};
+
+TEST_F(UnconfirmedTouchDown, FollowsTheScheduleAlone) {
+  EXPECT_EQ(Run(0.4, 0).foot_state[1], task_torque_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.402, 0).phase, 2);
+}
+
 }  // namespace
 }  // namespace poise

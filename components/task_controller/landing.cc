@@ -1,0 +1,165 @@
+#include "components/task_controller/landing.h"
+
+#include <algorithm>
+
+namespace poise {
+namespace {
+
+constexpr double kTimeTolerance = 1e-9;  // s, far below a tick, far above rounding
+constexpr double kMaxPeriod = 0.02;      // s, counted after a gap of the ticks
+// Time constant, s, of the reference's velocity: a search begins and a lowering ends without a
+// step.
+constexpr double kVelocityTime = 0.05;
+// Time constant, s, with which a touching sole's reference comes to where the sole stands: a
+// fraction of settle_duration's default.
+constexpr double kRelaxTime = 0.1;
+
+}  // namespace
+
+void TouchDetector::Reset(bool touching) {
+  touching_ = touching;
+  changing_ = false;
+}
+
+bool TouchDetector::Update(double time, double load) {
+  const bool contradicts = touching_ ? load < config_.release_load() : load > config_.touch_load();
+  if (!contradicts) {
+    changing_ = false;
+    return touching_;
+  }
+  if (!changing_) {
+    changing_ = true;
+    since_ = time;
+  }
+  if (time - since_ >= config_.touch_duration() - kTimeTolerance) Reset(!touching_);
+  return touching_;
+}
+
+void Landing::LiftOff(double z) {
+  touch_.Reset(true);
+  left_ = false;
+  state_ = State::kSwing;
+  lowered_ = false;
+  end_height_ = z;
+}
+
+bool Landing::BeginMove(double from, double to, double end) {
+  if (state_ == State::kRetracted) return false;
+  if (state_ == State::kTouching) {
+    if (to < from) return false;
+    left_ = false;
+  }
+  state_ = State::kSwing;
+  lowered_ = to < from;
+  move_end_ = end;
+  end_height_ = to;
+  return true;
+}
+
+void Landing::Measure(double time, double load) {
+  period_ = std::clamp(time - time_, 0.0, kMaxPeriod);
+  time_ = time;
+  load_ = load;
+  const bool before = touch_.touching();
+  if (touch_.Update(time, load) && !before) touched_ = time;
+}
+
+bool Landing::confirmed() const {
+  if (!touch_.touching()) return false;
+  if (state_ == State::kSwing) return !left_;
+  return state_ == State::kTouching &&
+         time_ - touched_ >= config_.settle_duration() - kTimeTolerance;
+}
+
+bool Landing::SearchBegins(bool before_touch_down, bool due) const {
+  if (!config_.required() || !before_touch_down) return false;
+  return due || (lowered_ && time_ >= move_end_ - kTimeTolerance);
+}
+
+void Landing::Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation) {
+  state_ = state;
+  reference_ = reference;
+  reference_.acceleration.setZero();
+  rotation_ = rotation;
+}
+
+void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
+                           const PointMotion& reference, const Eigen::Matrix3d& rotation) {
+  const bool touching = touch_.touching();
+  const bool searches = SearchBegins(before_touch_down, due);
+  switch (state_) {
+    case State::kSwing:
+      left_ = left_ || !touching;
+      if (left_ && touching) {
+        Enter(State::kTouching, reference, rotation);
+      } else if (left_ && searches) {
+        Enter(State::kSearching, reference, rotation);
+      }
+      break;
+    case State::kSearching: {
+      // The reference leads the sole by what friction and load ask for; were the sole held up by
+      // something else, it must not run away.
+      const double depth = config_.search_depth();
+      if (touching) {
+        state_ = State::kTouching;
+      } else if (sole.translation().z() <= end_height_ - depth ||
+                 reference_.position.z() <= end_height_ - 2 * depth) {
+        state_ = State::kRetracted;
+        const double height = config_.retract_height();
+        retreat_.Begin(reference_, reference_.position + height * Eigen::Vector3d::UnitZ(), time_,
+                       height / config_.search_speed());
+      }
+      break;
+    }
+    case State::kTouching:
+      if (!touching) state_ = searches ? State::kSearching : State::kSwing;
+      break;
+    case State::kRetracted:
+      break;
+  }
+}
+
+void Landing::Search() {
+  const double missing = std::max(1 - load_ / config_.press_load(), 0.0);
+  const Eigen::Vector3d velocity(0, 0, -config_.search_speed() * missing);
+  reference_.velocity += Share(kVelocityTime) * (velocity - reference_.velocity);
+  reference_.position += period_ * reference_.velocity;
+}
+
+void Landing::Touch(const Eigen::Isometry3d& sole) {
+  const double loaded = std::clamp(
+      (load_ - config_.release_load()) / (config_.touch_load() - config_.release_load()), 0.0, 1.0);
+  Eigen::Vector3d share = Eigen::Vector3d::Constant(Share(kRelaxTime));
+  share.z() *= loaded;
+  reference_.position += share.cwiseProduct(sole.translation() - reference_.position);
+  reference_.position.z() -= period_ * config_.search_speed() * (1 - loaded);
+  // Not that of the reference's coming back, which would lift the foot.
+  reference_.velocity -= Share(kVelocityTime) * reference_.velocity;
+  rotation_ = Eigen::Quaterniond(rotation_)
+                  .slerp(Share(kRelaxTime), Eigen::Quaterniond(sole.linear()))
+                  .toRotationMatrix();
+}
+
+bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
+                     PointMotion* reference, Eigen::Matrix3d* rotation) {
+  if (!config_.required()) return false;
+  AdvanceState(before_touch_down, due, sole, *reference, *rotation);
+  switch (state_) {
+    case State::kSwing:
+      return false;
+    case State::kSearching:
+      Search();
+      break;
+    case State::kTouching:
+      Touch(sole);
+      break;
+    case State::kRetracted:
+      reference_ = retreat_.At(time_);
+      break;
+  }
+  *reference = reference_;
+  *rotation = rotation_;
+  return true;
+}
+
+}  // namespace poise

@@ -1,0 +1,90 @@
+// Touch-down of a free foot: contact by measured load, compliance while it touches, the search for
+// a surface that is not where it was expected, and the safe end when there is none.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "components/task_controller/reference_generator.h"
+#include "components/task_controller/task_controller.pb.h"
+
+namespace poise {
+
+/// Contact from a measured load, with hysteresis: it is made when the load has stayed above
+/// touch_load for touch_duration, and lost when it has stayed below release_load as long.
+class TouchDetector {
+ public:
+  explicit TouchDetector(const ContactConfirmation& config) : config_(config) {}
+
+  /// `touching`: what holds until the load says otherwise.
+  void Reset(bool touching);
+  /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
+  bool Update(double time, double load);
+  bool touching() const { return touching_; }
+
+ private:
+  ContactConfirmation config_;
+  bool touching_ = false;
+  bool changing_ = false;
+  double since_ = 0;  // s, when the load began to contradict `touching_`
+};
+
+/// One foot from lift-off to double support. Pure function of its calls.
+///
+/// Searching: the reference goes on downward at search_speed · (1 − load / press_load), which
+/// presses until contact counts in spite of joint friction, and never much harder.
+/// Touching: the foot is let go. Its reference comes to where the sole stands, so that the task
+/// asks for no acceleration and is a damper only: the sole settles flat, yields to a surface that
+/// rises, and the change of the model's contact makes no step of the torque. In z this is mixed
+/// with the search, by the load from touch_load (let go) down to release_load (search), so that
+/// contact stays measured when no joint friction holds the foot down.
+class Landing {
+ public:
+  enum class State { kSwing, kSearching, kTouching, kRetracted };
+
+  explicit Landing(const ContactConfirmation& config) : config_(config), touch_(config) {}
+
+  /// The foot is free from here on, its reference at rest at height `z`, m. It counts as touching
+  /// the ground that it leaves until its load says that it has left.
+  void LiftOff(double z);
+  /// Its reference is to move from height `from` to `to`, m, until `end`, s. A foot that touches is
+  /// not lowered any further, and a retracted one stays: false, the move is not to be made.
+  bool BeginMove(double from, double to, double end);
+  /// Once a tick, before the schedule: `load` in N, measured along the sole's normal.
+  void Measure(double time, double load);
+  /// Measured contact that has settled: double support may begin.
+  bool confirmed() const;
+
+  /// Once a tick, after the schedule. `before_touch_down`: the next phase is double support; `due`:
+  /// it should have begun. `reference`, `rotation`: of the scenario; replaced where the foot does
+  /// not follow it, which is told by true.
+  bool Update(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
+              PointMotion* reference, Eigen::Matrix3d* rotation);
+  State state() const { return state_; }
+
+ private:
+  void Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation);
+  void AdvanceState(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
+                    const PointMotion& reference, const Eigen::Matrix3d& rotation);
+  bool SearchBegins(bool before_touch_down, bool due) const;
+  /// Share of a first-order approach with `time_constant`, s, in this tick.
+  double Share(double time_constant) const { return period_ / (time_constant + period_); }
+  void Search();
+  void Touch(const Eigen::Isometry3d& sole);
+
+  ContactConfirmation config_;
+  TouchDetector touch_;
+  State state_ = State::kSwing;
+  double time_ = 0, period_ = 0;  // s, of this tick, since the last
+  double load_ = 0;               // N
+  double touched_ = 0;            // s, when the touch began
+  bool left_ = false;             // the ground or surface from which the last move started
+  bool lowered_ = false;          // the last move went down
+  double move_end_ = 0;           // s
+  double end_height_ = 0;         // m, where the scenario's reference ends
+  PointMotion reference_;
+  Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();
+  QuinticMove retreat_;
+};
+
+}  // namespace poise
