@@ -2,10 +2,11 @@
 // Usage: node report_test.mjs --poise PROGRAM --web DIR, where DIR is build/web
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
-import {mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
+import {fileURLToPath} from 'node:url';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage} from './browser.mjs';
 import {readLog, writeLog} from './lcm_log.mjs';
@@ -42,6 +43,33 @@ const signal = (page, name, which = 'run') => page.evaluate(async ([n, w]) => {
   return [...s.values];
 }, [name, which]);
 
+const near = (actual, expected, tolerance) =>
+  assert.ok(Math.abs(actual - expected) < tolerance, `${actual} is not ${expected}`);
+
+/** Where the soles are drawn at a time, and where the simulator says they are. */
+const soles = (page, time) => page.evaluate((t) => {
+  const {scene, run, player} = window.poise;
+  player.seek(t);
+  scene.scene.updateMatrixWorld(true);
+  return run.robot.feet.map((foot, f) => {
+    const sole = scene.robotView.groups[foot.body].children.find((c) => c.children[0]?.geometry?.parameters.width === foot.length);
+    return [sole.matrixWorld.elements.slice(12, 15), scene.samples.pose(`sole${f}`, player.tick).position];
+  });
+}, time);
+
+/** Standing, for a robot whose posture is not known. */
+const robotScenario = (robot) => `name: "robot_test" description: "" robot: "${robot}" duration: 0.1
+  task_controller { com { kp: 225 kd: 10 } orientation { kp: 225 kd: 10 } foot { kp: 225 kd: 10 } posture { kp: 100 kd: 20 }
+    phase { name: "stand" start: 0 support: DOUBLE } }
+  contact_wrench_monitor {
+    double_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 }
+    single_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 } }
+  redistributor {
+    double_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 }
+    single_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 } }
+  sim_ode { start { } ground { friction: 0.9 } }
+`;
+
 const pause = (page) => page.waitForTimeout(50);
 const state = (page) => page.evaluate(() => {
   const {player, view, run} = window.poise;
@@ -72,8 +100,6 @@ test('the page shows the run, plays it, and needs no network', async () => {
   // The page's numbers against those that C++ worked out for the table.
   const check = (name) => summary.checks.find((c) => c.name === name).measured;
   const largest = (values) => Math.max(...values.filter((x) => !Number.isNaN(x)).map(Math.abs));
-  const near = (actual, expected, tolerance) =>
-    assert.ok(Math.abs(actual - expected) < tolerance, `${actual} is not ${expected}`);
   near(largest(await signal(page, 'derived.push_magnitude')), check('push_peak'), 1e-3);
   near(1e3 * largest(await signal(page, 'derived.com_error_y')), check('com_error_max_y'), 1e-3);
   near(1e3 * largest(await signal(page, 'derived.cop_measured_y')), check('cop_measured_max_y'), 1e-3);
@@ -84,17 +110,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
   for (const c of summary.checks) assert.ok(table.includes(c.label), c.label);
 
   // The robot: its soles stand where the simulator says they are.
-  const soles = await page.evaluate(() => {
-    const {scene, run, player} = window.poise;
-    player.seek(0.5);
-    scene.scene.updateMatrixWorld(true);
-    return run.robot.feet.map((foot, f) => {
-      const sole = scene.robotView.groups[foot.body].children.find((c) => c.isGroup && c.children[0]?.isMesh
-        && c.children[0].geometry.parameters.width === foot.length);
-      return [sole.matrixWorld.elements.slice(12, 15), scene.samples.pose(`sole${f}`, player.tick).position];
-    });
-  });
-  for (const [drawn, truth] of soles) drawn.forEach((x, i) => near(x, truth[i], 1e-4));
+  for (const [drawn, truth] of await soles(page, 0.5)) drawn.forEach((x, i) => near(x, truth[i], 1e-4));
 
   // Play, pause, scrub, step.
   await page.click('#play');
@@ -230,4 +246,43 @@ test('a log with gaps, with numbers that are none, and with hostile names is sho
   await pause(page);
   assert.deepEqual(problems, []);
   await page.context().close();
+});
+
+test('robots of other shapes, and with meshes only, are drawn where they stand', async () => {
+  const sources = fileURLToPath(new URL('../../', import.meta.url));
+  mkdirSync(path('robot'));
+  const urdf = readFileSync(join(sources, 'deploy/robots/dyros/dyros_legs.urdf'), 'utf8');
+  const shapes = ['<cylinder radius="0.06" length="0.36"/>', '<sphere radius="0.1"/>', '<mesh filename="none.stl"/>',
+    '<box size="1 2"/>', '<box size="0.1 nan 0.1"/>', '<box/>', '<cylinder radius="-1" length="1"/>', ''];
+  let k = 0;
+  const box = /(<visual>\s*<origin[^>]*>\s*<geometry>)(<box [^>]*>)/g;
+  const boxes = urdf.match(box).length;
+  writeFileSync(path('robot/dyros_legs.urdf'), urdf.replace(box, (_, before, old) => before + (shapes[k++] ?? old)));
+  writeFileSync(path('robot/robot.pbtxt'), readFileSync(join(sources, 'deploy/robots/dyros/dyros_legs.pbtxt')));
+  writeFileSync(path('meshes.pbtxt'), robotScenario(join(sources, 'tests/robot/data/mantis.pbtxt')));
+  for (const [name, scenario] of [['shapes', ['push_double_support', '--duration', '0.1', '--set', `robot=${path('robot/robot.pbtxt')}`]],
+    ['meshes', [path('meshes.pbtxt')]]]) {
+    const run = poise('run', ...scenario, '--inline', '--out', path(name));
+    assert.ok(run.status === 0 || run.status === 1, run.stderr);
+    poise('report', path(name));
+    const {page, problems} = await openPage(browser, path(`${name}/report.html`));
+    const visuals = await page.evaluate(() => window.poise.run.robot.visuals.map((v) => v.shape));
+    if (name === 'meshes') {
+      assert.equal(visuals.length, 0);
+    } else {
+      assert.equal(visuals.length, boxes - shapes.length + 2);
+      for (const shape of ['cylinder', 'sphere', 'box']) assert.ok(visuals.includes(shape), shape);
+    }
+    const drawn = await page.evaluate(() => {
+      let meshes = 0;
+      window.poise.scene.robotView.object.traverse((o) => { meshes += o.isMesh ? 1 : 0; });
+      return meshes;
+    });
+    assert.ok(drawn > 12, `${drawn} shapes`);
+    for (const time of [0, 0.1]) {
+      for (const [sole, truth] of await soles(page, time)) sole.forEach((x, i) => near(x, truth[i], 1e-4));
+    }
+    assert.deepEqual(problems, []);
+    await page.context().close();
+  }
 });

@@ -109,7 +109,6 @@ test('the tilt error sees tilts and no heading', async () => {
 
 test('a run grows by ticks, and what follows from its signals with it', async () => {
   const run = makeRun('', {}, 0);
-  run.meta.run.ticks = run.numTicks = 0;
   let appended = 0;
   run.addEventListener('append', () => { ++appended; });
   for (let k = 0; k < 5; ++k) {

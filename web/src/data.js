@@ -39,8 +39,9 @@ export class Signal {
     });
   }
 
-  /** Adds `values` at the end; the array grows by doubling. */
+  /** Adds `values` at the end; the array grows by doubling. Throws when packed values have not been loaded. */
   append(values) {
+    if (!this.#array && this.spec.blob !== undefined) throw new Error(`${this.name}: load it before it grows`);
     const length = this.#length + values.length;
     this.#loading ??= Promise.resolve();
     if (!this.#array || length > this.#array.length) {
