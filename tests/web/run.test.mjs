@@ -39,6 +39,7 @@ test('conditions have a red limit, another scenario gets the general figures', (
   for (const f of figures.filter((x) => /^1[0-2]/.test(x.figure ?? ''))) {
     assert.ok(f.series.some((s) => s.role === 'limit'), f.title);
   }
+  assert.equal(figuresFor(makeRun('section 7.3, without balancing'))[0].figure, '14a');
   const others = figuresFor(makeRun(''));
   assert.ok(others.length > 15);
   assert.ok(others.every((f) => !f.figure));

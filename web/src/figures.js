@@ -146,7 +146,7 @@ function common(run, covered) {
 
 /** Panels {figure, title, unit, note, limits, series: [{label, role, signal}]}; those of a run without their signals are left out. */
 export function figuresFor(run) {
-  const section = run.scenario.paper_section;
+  const section = /7\.[1-5]/.exec(run.scenario.paper_section ?? '')?.[0];
   const wanted = [...(SECTIONS[section] ?? defaults)(run), ...common(run, section)];
   return wanted.map((panel) => ({...panel, series: panel.series
     .map((s) => ({...s, signal: findSignal(run, s)})).filter((s) => s.signal)}))

@@ -4,7 +4,8 @@ import {element, formatNumber, withUnit} from './dom.js';
 function table(caption, columns, rows, {numbers = []} = {}) {
   return element('section', {class: 'table'}, element('h2', {}, caption),
     element('div', {class: 'scroll'}, element('table', {},
-      element('thead', {}, element('tr', {}, ...columns.map((c) => element('th', {scope: 'col'}, c)))),
+      element('thead', {}, element('tr', {}, ...columns.map((c, i) =>
+        element('th', {scope: 'col', class: numbers.includes(i) ? 'number' : null}, c)))),
       element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
         element('td', {class: numbers.includes(i) ? 'number' : null}, cell))))))));
 }
