@@ -63,7 +63,7 @@ try {
   const pictures = [], ready = [], rates = {'at the robot': [], 'at the plots': []};
   let ticks = 0;
   for (let i = 0; i < repeat; ++i) {
-    const {page, problems} = await openPage(browser, html);
+    const {page, problems} = await openPage(browser, html, {viewport: {width: 1440, height: 1000}, deviceScaleFactor: 1});
     if (problems.length) throw new Error(problems.join('\n'));
     const marks = await page.evaluate(() => ({picture: Number(document.documentElement.dataset.picture),
       ready: Number(document.documentElement.dataset.ready), ticks: window.poise.run.numTicks}));

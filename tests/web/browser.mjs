@@ -17,7 +17,8 @@ export async function launchBrowser(web) {
 
 /** Opens a file from disk; `problems` gathers errors of its console and every request beyond the file itself. */
 export async function openPage(browser, file, options = {}) {
-  const context = await browser.newContext({viewport: {width: 1100, height: 800}, acceptDownloads: true, ...options});
+  const context = await browser.newContext({viewport: {width: 1100, height: 800}, deviceScaleFactor: 0.5,
+    acceptDownloads: true, ...options});
   const page = await context.newPage();
   const problems = [];
   page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });

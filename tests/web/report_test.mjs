@@ -196,6 +196,36 @@ test('the page shows the run, plays it, and needs no network', async () => {
   await page.context().close();
 });
 
+test('a run that grows grows in the plots, the bar and the picture', async () => {
+  const {page, problems} = await openPage(browser, path('a/report.html'));
+  const ticks = await page.evaluate(async () => {
+    const {run, grid} = window.poise;
+    await Promise.all([...run.signals.values()].map((s) => s.load()));
+    await Promise.all(grid.panels.map((p) => p.show()));
+    // 0.1 s more, in which every signal stays as it is, but the push, which is there again along x.
+    const n = 50, last = run.numTicks - 1;
+    const values = {};
+    for (const s of run.signals.values()) values[s.name] = new Float64Array(n).fill(s.values[last]);
+    values['EXTERNAL_PUSH.force[0]'] = new Float64Array(n).fill(250);
+    run.appendTicks(n, values);
+    return run.numTicks;
+  });
+  await page.waitForFunction((n) => document.getElementById('scrub').max === String(n - 1)
+    && window.poise.grid.panels.every((p) => p.data[0].length === n), ticks);
+  near((await state(page)).max, (ticks - 1) * 0.002, 1e-9);
+  const push = await page.evaluate(() => {
+    const panel = window.poise.grid.panels.find((p) => p.definition.title.startsWith('External push'));
+    return [panel.data[1].at(-1), panel.data[1].length];
+  });
+  near(push[0], 250, 1);
+  assert.equal(push[1], ticks);
+  await page.keyboard.press('End');
+  assert.equal((await state(page)).tick, ticks - 1);
+  assert.ok(await page.evaluate(() => window.poise.scene.pushArrow.object.visible));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
 test('a second run is drawn over the first', async () => {
   assert.ok(poise('report', path('a'), path('b'), '-o', path('both.html')).status <= 1);
   const {page, problems} = await openPage(browser, path('both.html'), {colorScheme: 'dark'});

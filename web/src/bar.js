@@ -28,7 +28,7 @@ function track(shared) {
     }));
 }
 
-/** Fills `host`; `shared` as for panels. */
+/** Fills `host`; `shared` as for panels. Returns {refresh}, for a run that has grown. */
 export function playerBar(host, shared) {
   const {player, view, run} = shared;
   const button = (text, label, action) =>
@@ -42,9 +42,10 @@ export function playerBar(host, shared) {
     'aria-label': 'Time', input: () => player.seek(Number(scrub.value) * run.period),
     keydown: (e) => e.preventDefault()});  // the page's own keys step
   const time = element('output', {id: 'time'});
+  const marks = element('div', {class: 'marks'}, track(shared));
   host.append(button('|◂', 'Start (home)', () => player.seek(0)), button('◂', 'One tick back (←)', () => player.step(-1)), play,
     button('▸', 'One tick on (→)', () => player.step(1)), speed,
-    element('div', {class: 'scrub'}, track(shared), scrub), time,
+    element('div', {class: 'scrub'}, marks, scrub), time,
     button('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
     button('+', 'Zoom the plots in at the cursor (+)', () => view.zoom(1 / ZOOM_STEP, player.time)),
     button('whole run', 'Show the whole run in the plots (0)', () => view.reset()));
@@ -59,6 +60,11 @@ export function playerBar(host, shared) {
   });
   showTime();
   listenToKeys(shared);
+  return {refresh: () => {
+    scrub.max = Math.max(0, run.numTicks - 1);
+    marks.replaceChildren(track(shared));
+    showTime();
+  }};
 }
 
 function listenToKeys({player, view, run}) {

@@ -12,6 +12,7 @@ import {eventList, Readout} from './side.js';
 import {tables, verdictBadge} from './table.js';
 
 const READOUT_PERIOD = 80;  // ms
+const GROWTH_PERIOD = 200;  // ms
 
 function header(run, overlay) {
   const {run: r} = run.meta;
@@ -62,6 +63,19 @@ function floatingScene(scene) {
   return element('label', {class: 'soft'}, box, ' robot beside the plots');
 }
 
+/** Calls `refresh` after the run has grown, at most once in GROWTH_PERIOD. */
+function followGrowth(run, refresh) {
+  let waiting = false;
+  run.addEventListener('append', () => {
+    if (waiting) return;
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      refresh();
+    }, GROWTH_PERIOD);
+  });
+}
+
 async function start() {
   const [run, overlay] = embeddedRuns(document);
   if (!run) throw new Error('this page holds no run: write one with poise report');
@@ -79,7 +93,7 @@ async function start() {
 
   const view = new TimeView(run);
   const shared = {run, overlay, player, view, phases, events};
-  playerBar(document.getElementById('player'), shared);
+  const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
   const readout = new Readout(run, phases);
   document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
@@ -112,6 +126,15 @@ async function start() {
     update(performance.now());
   });
   update(performance.now());
+  followGrowth(run, async () => {
+    shared.phases = await findPhases(run);
+    await Promise.all([scene.samples.refresh(), readout.load()]);
+    bar.refresh();
+    view.grow();
+    await grid.refresh();
+    scene.setTick(player.tick);
+    update(performance.now());
+  });
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
   window.poise = {run, overlay, player, view, grid, scene};

@@ -16,15 +16,17 @@ export class TimeView extends EventTarget {
     this.run = run;
     this.reset();
   }
-  get whole() { return this.min === 0 && this.max === this.end; }
   get end() { return Math.max(this.run.duration, this.run.period); }
   reset() { this.set(0, this.end); }
   set(min, max) {
     const least = 4 * this.run.period;
     this.min = Math.max(0, Math.min(min, this.end - least));
     this.max = Math.min(this.end, Math.max(max, this.min + least));
+    this.whole = this.min === 0 && this.max === this.end;
     this.dispatchEvent(new Event('change'));
   }
+  /** After the run has grown: what showed all of it does so again. */
+  grow() { if (this.whole) this.reset(); }
   /** Keeps `time` where it is. */
   zoom(factor, time) { this.set(time - (time - this.min) * factor, time + (this.max - time) * factor); }
 }
@@ -256,7 +258,16 @@ export class Panel {
     this.updateCursor();
   }
 
-  /** After the signals have grown, or a series was added. */
+  /** After the run has grown. */
+  async refresh() {
+    if (!this.plot) return;
+    await Promise.all(this.lines.map((line) => line.signal?.load()));
+    this.data = this.#data();
+    this.plot.setData(this.data, false);
+    this.redraw();
+  }
+
+  /** After a series was added. */
   async reload() {
     if (!this.plot) return;
     await this.#load();
@@ -326,7 +337,8 @@ export class PanelGrid {
     panel.element.remove();
   }
 
-  async reload() {
-    await Promise.all(this.panels.map((p) => p.reload()));
+  /** After the run has grown. */
+  async refresh() {
+    await Promise.all(this.panels.map((p) => p.refresh()));
   }
 }

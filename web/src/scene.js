@@ -50,6 +50,9 @@ class Samples {
     }));
   }
 
+  /** After the run has grown: what is derived follows. */
+  async refresh() { await Promise.all([...this.#signals.values()].map((s) => s.load())); }
+
   at(name, tick) { return this.#signals.get(name)?.values?.[tick] ?? NaN; }
   vector(name, tick, n = 3) { return Array.from({length: n}, (_, i) => this.at(`${name}[${i}]`, tick)); }
   pose(name, tick) {
