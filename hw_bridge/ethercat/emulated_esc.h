@@ -1,0 +1,113 @@
+// EmulatedEsc: an EtherCAT slave controller as its registers, memory, clock and EEPROM show it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/registers.h"
+
+namespace poise::ethercat {
+
+/// A subset: FMMUs map whole bytes; three-buffer sync managers show the last write at once.
+class EmulatedEsc {
+ public:
+  struct Options {
+    std::vector<uint16_t> eeprom;  ///< words of the SII
+    int64_t eeprom_time = 0;       ///< ns that reading a word takes
+    double clock_error = 0;        ///< of its oscillator, ppm
+    int64_t clock_start = 0;       ///< ns, its local time at time 0
+    bool last = false;             ///< no slave behind: port 1 is closed
+  };
+  explicit EmulatedEsc(const Options& options);
+
+  // The master's side. `now`: ns, when the frame passes this slave; never decreases.
+
+  /// Physical read and write. False, and nothing happens, when the memory is not accessible: beyond
+  /// its end, a sync manager's buffer in the wrong direction, full or empty, or only read-only.
+  bool Read(uint16_t address, std::span<uint8_t> data, int64_t now);
+  bool Write(uint16_t address, std::span<const uint8_t> data, int64_t now);
+  struct Access {
+    bool read = false, written = false;
+  };
+  /// A logical command's data through the FMMUs, in place.
+  Access Logical(uint32_t address, std::span<uint8_t> data, bool read, bool write, int64_t now);
+  /// The times that a broadcast write to 0x0900 latches: passing ports 0 and 1 (ns, true time).
+  void LatchReceiveTimes(int64_t port0, int64_t port1);
+
+  // The slave application's side (PDI).
+
+  /// Lets time pass: EEPROM, watchdog, SYNC0.
+  void AdvanceTo(int64_t now);
+  /// What the master has written to AL control since the last call.
+  std::optional<uint16_t> TakeAlControl();
+  void SetAlStatus(uint8_t status, AlStatusCode code);
+
+  struct SyncManagerSettings {
+    uint16_t start = 0, length = 0;
+    uint8_t control = 0;
+    bool active = false;
+  };
+  SyncManagerSettings sync_manager(int index) const;
+  /// The application's own disabling of a sync manager: its memory refuses the master.
+  void SetSyncManagerDisabled(int index, bool disabled);
+
+  /// A message the master has put into the mailbox, which is free again; empty: none.
+  std::span<const uint8_t> TakeMailbox();
+  /// Where the application puts a message for the master; empty when the mailbox is full or off.
+  std::span<uint8_t> BeginMailboxReply();
+  void EndMailboxReply();
+  /// The master has asked for the last message once more; true once per request.
+  bool TakeRepeatRequest();
+  void AcknowledgeRepeat();
+
+  /// Buffers of the process data; empty when the sync manager is not active.
+  std::span<const uint8_t> process_outputs() const { return Buffer(kProcessOut); }
+  std::span<uint8_t> process_inputs();
+  /// Whether the master has written all process outputs since the last call.
+  bool TakeOutputsWritten();
+  bool watchdog_expired() const { return watchdog_expired_; }
+  void RestartWatchdog() { watchdog_running_ = watchdog_expired_ = false; }
+
+  bool sync0_enabled() const;
+  uint32_t sync0_cycle() const { return Get<uint32_t>(memory_, reg::kDcSync0Cycle); }
+  /// Whether SYNC0 has pulsed since the last call.
+  bool TakeSync0();
+  /// ns, this slave's copy of the common time.
+  int64_t SystemTime() const;
+
+ private:
+  static constexpr size_t kMemory = 0x3000;  // registers, then 8 KiB of process data RAM
+
+  enum class Rule { kFree, kRefused, kBuffer };
+  /// How the sync managers treat an access by the master; `manager`: whose buffer it is.
+  Rule SyncManagerRule(size_t address, size_t size, bool write, int* manager) const;
+  std::span<const uint8_t> Buffer(int index) const;
+  uint8_t& SyncByte(int index, size_t offset);
+  bool WriteRegisters(size_t address, std::span<const uint8_t> data);
+  void AfterWrite(size_t address, size_t size, std::span<const uint8_t> data);
+  void UpdateEeprom();
+  void UpdateWatchdog();
+  void CompareSystemTime(std::span<const uint8_t> data);
+  void StartSync0();
+
+  Options options_;
+  std::array<uint8_t, kMemory> memory_{};
+  int64_t now_ = 0;  // ns, true time
+  std::optional<uint16_t> al_control_;
+  bool mailbox_written_ = false, repeat_requested_ = false, outputs_written_ = false;
+  std::optional<int64_t> eeprom_ready_;  // ns
+  int64_t watchdog_triggered_ = 0;       // ns
+  bool watchdog_running_ = false, watchdog_expired_ = false;
+
+  // The clock: true time × (1 + error), plus what drift compensation has added.
+  double local_ = 0, adjustment_ = 0, rate_ = 0;
+  int64_t compared_ = 0;               // ns, true time of the last comparison
+  std::optional<int64_t> next_sync0_;  // ns, system time
+  bool sync0_pulsed_ = false;
+};
+
+}  // namespace poise::ethercat

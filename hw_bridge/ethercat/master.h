@@ -1,0 +1,96 @@
+// Master: starts a chain of CiA 402 drives and exchanges their process data each cycle.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "hw_bridge/ethercat/distributed_clocks.h"
+#include "hw_bridge/ethercat/ethercat.pb.h"
+#include "hw_bridge/ethercat/process_image.h"
+#include "hw_bridge/ethercat/slave_access.h"
+#include "hw_bridge/ethercat/transactions.h"
+
+namespace poise::ethercat {
+
+/// The cyclic datagram: all at once, or inputs and outputs apart.
+enum class Exchange : uint8_t { kReadWrite, kRead, kWrite };
+
+/// What became of the frame of a cycle.
+struct CycleResult {
+  bool returned = false;  ///< false: lost, late or unusable
+  /// Every slave answered: for a read, inputs() are of this cycle; else they stay those before.
+  bool complete = false;
+  uint16_t working_counter = 0, expected_working_counter = 0;
+  uint16_t slaves_answering = 0;       ///< to the broadcast read of the AL status
+  uint8_t al_status = 0;               ///< of all slaves, or-ed: 0x08 when all are in OP
+  std::optional<int64_t> system_time;  ///< ns, of the reference clock, with distributed clocks
+};
+
+class Master {
+ public:
+  /// `link` must outlive this. Throws EthercatError: a configuration that cannot work.
+  Master(Link* link, const MasterConfig& config);
+
+  size_t num_drives() const { return outputs_.size(); }
+  const ProcessImage& image() const { return image_; }
+
+  /// Number of slaves that answer a broadcast read of the AL status; nullopt: no frame came back.
+  std::optional<int> CountSlaves();
+  /// Leads all slaves from whatever state to OP, with outputs of zero (no torque, 6072 = 0), and
+  /// returns only when number, identity, ratings and mapping of the drives are as configured.
+  /// Process data must flow from then on, or the drives' watchdogs expire. Throws EthercatError;
+  /// the slaves then stay where they are: call Stop().
+  void Start();
+  /// Leads all slaves to INIT. False when not all have got there.
+  bool Stop();
+
+  // Cyclic operation: nothing allocates, throws or, with a deadline in the past, waits.
+
+  void set_outputs(size_t drive, const DriveOutputs& outputs) { outputs_[drive] = outputs; }
+  const DriveOutputs& outputs(size_t drive) const { return outputs_[drive]; }
+  /// Of the last complete read.
+  const DriveInputs& inputs(size_t drive) const { return inputs_[drive]; }
+  /// Sends the frame of a cycle. False when the link refused it.
+  bool Send(Exchange exchange = Exchange::kReadWrite);
+  /// Takes the answer to the last Send, waiting until `deadline` (the link's clock) at most. Frames
+  /// of earlier cycles are counted and dropped.
+  CycleResult Receive(int64_t deadline);
+
+  /// Of the drive's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis.
+  SlaveAccess& slave(size_t drive) { return slaves_[drive]; }
+  /// As read at start.
+  const Identity& identity(size_t drive) const { return identities_[drive]; }
+  const FrameCounts& counts() const { return transactions_.counts(); }
+  int64_t short_working_counters() const { return short_working_counters_; }
+
+ private:
+  void ResetAndAddress();
+  void CheckDrive(size_t drive);
+  void SetUpProcessData(size_t drive);
+  void SetUpDistributedClocks();
+  void GoOperational();
+  bool Take(const FrameReader& reader, CycleResult* result);
+
+  MasterConfig config_;
+  ProcessImage image_;
+  Transactions transactions_;
+  Timeouts timeouts_;
+  std::vector<SlaveAccess> slaves_;
+  std::vector<Identity> identities_;
+  std::vector<DriveOutputs> outputs_;
+  std::vector<DriveInputs> inputs_;
+
+  // Of the cyclic frame.
+  std::vector<uint8_t> image_bytes_;
+  FrameBuilder builder_;
+  std::array<uint8_t, kMaxFrame> received_{};
+  Exchange exchange_ = Exchange::kReadWrite;
+  uint8_t cyclic_index_ = 0;
+  bool awaited_ = false;  // sent and not yet returned
+  bool clocks_running_ = false;
+  int64_t short_working_counters_ = 0;
+};
+
+}  // namespace poise::ethercat

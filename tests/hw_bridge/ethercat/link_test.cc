@@ -1,0 +1,181 @@
+// Real sockets: EtherCAT over UDP on the loopback, raw Ethernet over a veth pair where permitted.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <thread>
+
+#include "hw_bridge/ethercat/socket_link.h"
+#include "tests/hw_bridge/ethercat/chain_fixture.h"
+
+namespace poise::ethercat {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Serves a chain on a link from a thread of its own.
+class Server {
+ public:
+  Server(Link* link, EmulatedChain* chain) : thread_([this, link, chain] { Run(link, chain); }) {}
+  ~Server() {
+    stop_ = true;
+    thread_.join();
+  }
+
+ private:
+  void Run(Link* link, EmulatedChain* chain) {
+    std::array<uint8_t, kMaxFrame> frame;
+    while (!stop_) {
+      const size_t size = link->Receive(frame, link->Now() + kMillisecond);
+      if (size == 0) {
+        chain->AdvanceTo(link->Now());
+      } else if (chain->HandleFrame(std::span(frame).first(size), link->Now())) {
+        static_cast<void>(link->Send(std::span(frame).first(size)));
+      }
+    }
+  }
+
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// Starts twelve drives over real sockets, enables them, gives them torque, and stops them.
+void RunDrives(Link* master_link, Link* slaves_link) {
+  EmulatedChainConfig chain_config = MakeChainConfig(12);
+  std::vector<TestLoad> loads(12);
+  std::vector<MotorLoad*> pointers;
+  for (TestLoad& load : loads) pointers.push_back(&load);
+  EmulatedChain chain(chain_config, pointers);
+  MasterConfig config = MakeMasterConfig(12);
+  // A machine whose processors are taken may stop either side for a while: not what is tested.
+  config.set_watchdog(6000);
+  config.set_frame_timeout(2000);
+  Master master(master_link, config);
+  {
+    Server server(slaves_link, &chain);
+    master.Start();
+    std::vector<DriveControl> controls(12);
+    int complete = 0;
+    bool enabled = false;
+    for (int cycle = 0; cycle < 500 && !(enabled && complete > 100); ++cycle) {
+      for (size_t i = 0; i < 12; ++i) {
+        const DriveState state = DecodeState(master.inputs(i).statusword);
+        master.set_outputs(i, {.controlword = controls[i].Controlword(state, DriveGoal::kEnabled),
+                               .target_torque = 250,
+                               .max_torque = 1000});
+      }
+      ASSERT_TRUE(master.Send());
+      const CycleResult result = master.Receive(master_link->Now() + 2 * kSecond);
+      complete += result.complete ? 1 : 0;
+      enabled = true;
+      for (size_t i = 0; i < 12; ++i) {
+        enabled = enabled &&
+                  DecodeState(master.inputs(i).statusword) == DriveState::kOperationEnabled &&
+                  master.inputs(i).torque == 250;
+      }
+      // About a cycle of time, that transitions take.
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_TRUE(enabled);
+    EXPECT_GT(complete, 100);
+    EXPECT_TRUE(master.Stop());
+  }
+  for (size_t i = 0; i < 12; ++i) EXPECT_EQ(chain.slave(i).al_state(), AlState::kInit);
+}
+
+TEST(UdpLink, CarriesTwelveDrives) {
+  const auto slaves = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
+  const auto master = UdpLink::Connect({.address = "127.0.0.1", .port = slaves->local_port()});
+  RunDrives(master.get(), slaves.get());
+}
+
+TEST(UdpLink, TakesFramesOfItsPeerAlone) {
+  const auto slaves = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
+  const auto master = UdpLink::Connect({.address = "127.0.0.1", .port = slaves->local_port()});
+  const auto stranger = UdpLink::Connect({.address = "127.0.0.1", .port = master->local_port()});
+  const uint8_t hello[] = {1, 2, 3};
+  ASSERT_TRUE(stranger->Send(hello));
+  std::array<uint8_t, 16> frame{};
+  EXPECT_EQ(master->Receive(frame, master->Now() + 20 * kMillisecond), 0U);
+  EXPECT_FALSE(slaves->Send(hello));  // nobody has asked yet
+  ASSERT_TRUE(master->Send(hello));
+  EXPECT_EQ(slaves->Receive(frame, slaves->Now() + kSecond), 3U);
+  ASSERT_TRUE(slaves->Send(hello));
+  EXPECT_EQ(master->Receive(frame, master->Now() + kSecond), 3U);
+}
+
+TEST(UdpLink, SurvivesThatNobodyListens) {
+  uint16_t port = 0;
+  {
+    const auto gone = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
+    port = gone->local_port();
+  }
+  MasterConfig config = MakeMasterConfig(1);
+  const auto link = UdpLink::Connect({.address = "127.0.0.1", .port = port});
+  Master master(link.get(), config);
+  EXPECT_THAT(ErrorOf([&] { master.Start(); }), HasSubstr("no frame comes back"));
+}
+
+TEST(UdpLink, NamesAddressesThatCannotBe) {
+  EXPECT_THAT(ErrorOf([] { UdpLink::Connect({.address = "robot", .port = 1}); }),
+              HasSubstr("\"robot\" is no IPv4 address"));
+  const auto taken = UdpLink::Listen({.address = "127.0.0.1", .port = 0});
+  EXPECT_THAT(
+      ErrorOf([&] { UdpLink::Listen({.address = "127.0.0.1", .port = taken->local_port()}); }),
+      HasSubstr("give another port"));
+}
+
+TEST(RawLink, NamesInterfacesThatCannotBe) {
+  const std::string error = ErrorOf([] { RawLink("no_such_if", RawLink::Side::kMaster); });
+  EXPECT_THAT(error, ::testing::AnyOf(HasSubstr("no such interface"), HasSubstr("CAP_NET_RAW")));
+  EXPECT_NE(ErrorOf([] { RawLink("a_name_longer_than_any", RawLink::Side::kMaster); }), "");
+}
+
+/// Two ends of a virtual cable, gone at the end.
+class VethPair {
+ public:
+  VethPair() {
+    const std::string id = std::to_string(getpid() % 100000);
+    a_ = "ecm" + id;
+    b_ = "ecs" + id;
+    created_ = Ip("link add " + a_ + " type veth peer name " + b_) &&
+               Ip("link set " + a_ + " up") && Ip("link set " + b_ + " up");
+  }
+  ~VethPair() {
+    if (created_) Ip("link del " + a_);
+  }
+  bool created() const { return created_; }
+  const std::string& a() const { return a_; }
+  const std::string& b() const { return b_; }
+
+ private:
+  static bool Ip(const std::string& arguments) {
+    return std::system(("ip " + arguments + " >/dev/null 2>&1").c_str()) == 0;
+  }
+  std::string a_, b_;
+  bool created_ = false;
+};
+
+TEST(RawLink, CarriesTwelveDrivesOverAVethPair) {
+  VethPair pair;
+  if (!pair.created()) {
+    GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
+  }
+  RawLink master(pair.a(), RawLink::Side::kMaster);
+  RawLink slaves(pair.b(), RawLink::Side::kSlaves);
+  RunDrives(&master, &slaves);
+}
+
+TEST(RawLink, SaysThatAnInterfaceIsDown) {
+  VethPair pair;
+  if (!pair.created()) {
+    GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
+  }
+  ASSERT_EQ(std::system(("ip link set " + pair.a() + " down").c_str()), 0);
+  EXPECT_THAT(ErrorOf([&] { RawLink(pair.a(), RawLink::Side::kMaster); }), HasSubstr("is down"));
+}
+
+}  // namespace
+}  // namespace poise::ethercat
