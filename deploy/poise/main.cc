@@ -23,6 +23,8 @@ int main(int argc, char** argv) {
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
+  poise::AddEchoCommand(&app, &command);
+  poise::AddTopCommand(&app, &command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,11 +1,10 @@
 #include <google/protobuf/text_format.h>
 
 #include <cstdio>
-#include <cstdlib>
-#include <functional>
 #include <memory>
 
 #include "components/framework/run.h"
+#include "deploy/poise/cli_checks.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/inline_run.h"
 #include "deploy/poise/launcher.h"
@@ -92,20 +91,6 @@ int Run(const RunOptions& options) {
   }
   fmt::print("{}\n", passed ? "passed" : "FAILED");
   return passed ? kExitOk : kExitFailed;
-}
-
-}  // namespace
-
-namespace {
-
-/// "--flag: VALUE: must be RANGE" for what is no number or not `good`; NaN never is.
-std::function<std::string(const std::string&)> Within(const char* range, bool (*good)(double)) {
-  return [=](const std::string& text) -> std::string {
-    char* end = nullptr;
-    const double value = std::strtod(text.c_str(), &end);
-    const bool number = !text.empty() && *end == '\0';
-    return number && good(value) ? "" : fmt::format("{}: must be {}", text, range);
-  };
 }
 
 }  // namespace

@@ -1,0 +1,129 @@
+#include "deploy/poise/message_text.h"
+
+#include <algorithm>
+
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+constexpr char kTick[] = "tick";
+
+bool Selected(const std::vector<Scalar>& fields, std::string_view path) {
+  return std::any_of(fields.begin(), fields.end(),
+                     [&](const Scalar& field) { return field.path == path; });
+}
+
+/// Quotes become `quote`, bytes outside printable ASCII escape sequences.
+std::string Escape(std::string_view text, const char* quote) {
+  std::string escaped;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"') {
+      escaped += quote;
+    } else if (c == '\\') {
+      escaped += "\\\\";
+    } else if (c == '\n') {
+      escaped += "\\n";
+    } else if (byte < 0x20 || byte >= 0x7f) {
+      escaped += fmt::format("\\x{:02x}", byte);
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string ShortValue(const Scalar& scalar) {
+  struct Format {
+    std::string operator()(int64_t value) const { return fmt::format("{}", value); }
+    std::string operator()(double value) const { return fmt::format("{:.6g}", value); }
+    std::string operator()(const std::string& value) const { return '"' + Printable(value) + '"'; }
+  };
+  return std::visit(Format{}, scalar.value);
+}
+
+std::string CsvValue(const Scalar& scalar) {
+  struct Format {
+    std::string operator()(int64_t value) const { return fmt::format("{}", value); }
+    std::string operator()(double value) const { return fmt::format("{}", value); }
+    std::string operator()(const std::string& value) const {
+      return '"' + Escape(value, "\"\"") + '"';
+    }
+  };
+  return std::visit(Format{}, scalar.value);
+}
+
+/// One cell a field, the tick in front unless it is among them.
+template <class Cell>
+std::string Row(const std::optional<std::string>& tick, const std::vector<Scalar>& fields,
+                char separator, Cell cell) {
+  std::string row;
+  if (tick && !Selected(fields, kTick)) row = *tick;
+  for (const Scalar& field : fields) {
+    if (!row.empty()) row += separator;
+    row += cell(field);
+  }
+  return row + '\n';
+}
+
+/// "torque" of "torque[3]": elements of one array share a line.
+std::string_view ArrayOf(std::string_view path) {
+  return path.ends_with(']') ? path.substr(0, path.rfind('[')) : path;
+}
+
+}  // namespace
+
+std::string Printable(std::string_view text) { return Escape(text, "\\\""); }
+
+std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
+  std::optional<std::string> first;
+  if (tick) first = fmt::format("{}={}", kTick, *tick);
+  return Row(first, fields, ' ', [](const Scalar& field) {
+    return field.path + '=' + ShortValue(field);
+  });
+}
+
+std::string MessageBlock(std::string_view title, const std::vector<Scalar>& fields) {
+  size_t width = 0;
+  for (const Scalar& field : fields) width = std::max(width, ArrayOf(field.path).size());
+  std::string block = fmt::format("{}\n", title);
+  std::string_view open;  // the array whose line is being written
+  for (const Scalar& field : fields) {
+    const std::string_view name = ArrayOf(field.path);
+    if (name == open) {
+      block += ' ' + ShortValue(field);
+      continue;
+    }
+    if (!open.empty()) block += "]\n";
+    open = name.size() < field.path.size() ? name : std::string_view();
+    block += fmt::format("  {:<{}}  {}{}", name, width, open.empty() ? "" : "[", ShortValue(field));
+    if (open.empty()) block += '\n';
+  }
+  if (!open.empty()) block += "]\n";
+  return block + '\n';
+}
+
+std::string CsvHeader(bool has_tick, const std::vector<Scalar>& fields) {
+  std::optional<std::string> first;
+  if (has_tick) first = kTick;
+  return Row(first, fields, ',', [](const Scalar& field) { return field.path; });
+}
+
+std::string CsvRow(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
+  std::optional<std::string> first;
+  if (tick) first = fmt::format("{}", *tick);
+  return Row(first, fields, ',', CsvValue);
+}
+
+bool Thinner::Pass(double time) {
+  if (period_ == 0) return true;
+  // A time far before the next is another run in the same log.
+  if (begun_ && time < next_ && time > next_ - 2 * period_) return false;
+  // On the grid of the first one while that holds, so that the rate is met on average.
+  next_ = begun_ && time >= next_ && time < next_ + period_ ? next_ + period_ : time + period_;
+  begun_ = true;
+  return true;
+}
+
+}  // namespace poise
