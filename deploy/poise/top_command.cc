@@ -19,6 +19,7 @@
 namespace poise {
 namespace {
 
+constexpr size_t kHintLine = 2;                    // of the view
 constexpr int64_t kMillisecond = 1'000'000;        // ns
 constexpr int64_t kLongestWait = 50;               // ms, until keys are looked at
 constexpr int64_t kSilence = 1000 * kMillisecond;  // then it is asked whether the run goes on
@@ -104,8 +105,7 @@ int Top(const TopOptions& options) {
         next = NowNanoseconds() + interval;
         view = watch.View();
         std::vector<ViewLine> lines = view;
-        lines.push_back({});
-        lines.push_back({"q: quit"});
+        lines[kHintLine].text += "  q: quit";
         const FullScreen::Size size = screen.size();
         quit = !screen.Show(Frame(lines, size.columns, size.rows));
       }

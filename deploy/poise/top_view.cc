@@ -157,13 +157,17 @@ std::string PlainText(const std::vector<ViewLine>& lines) {
 }
 
 std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows) {
-  const size_t width = static_cast<size_t>(std::max(columns, 1));
-  const size_t height = std::min(lines.size(), static_cast<size_t>(std::max(rows, 1)));
+  const auto width = static_cast<size_t>(std::max(columns, 1));
+  const auto height = static_cast<size_t>(std::max(rows, 1));
   std::string frame = "\x1b[H";
-  for (size_t i = 0; i < height; ++i) {
+  size_t shown = 0;
+  for (const ViewLine& line : lines) {
+    if (shown == height) break;
+    if (line.text.empty() && lines.size() > height) continue;
     // A line feed after the last would scroll.
-    frame += fmt::format("{}{}{}\x1b[0m\x1b[K", i == 0 ? "" : "\r\n", Color(lines[i].style),
-                         lines[i].text.substr(0, width));
+    frame += fmt::format("{}{}{}\x1b[0m\x1b[K", shown == 0 ? "" : "\r\n", Color(line.style),
+                         line.text.substr(0, width));
+    ++shown;
   }
   return frame + "\x1b[J";
 }

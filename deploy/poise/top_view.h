@@ -24,7 +24,8 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const std::string& dir,
 /// Plain text, a line feed after each line.
 std::string PlainText(const std::vector<ViewLine>& lines);
 
-/// One frame for a terminal of this size, over the frame before; what does not fit is cut off.
+/// One frame for a terminal of this size, over the frame before; blank lines go first when there
+/// are too many, then what does not fit.
 std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows);
 
 }  // namespace poise
