@@ -106,7 +106,7 @@ std::vector<uint8_t> ZeroMessage(const MessageType& type, std::span<const int32_
 void FieldSelection::Check(const MessageType& type, const std::vector<Scalar>& scalars) const {
   for (const std::string& field : fields_) {
     if (field.empty() || !AnyInside(scalars, field)) {
-      throw ConfigError(Problem(type, scalars, field));
+      throw ConfigError(field, Problem(type, scalars, field));
     }
   }
 }

@@ -13,7 +13,7 @@ double Seconds(int64_t nanoseconds) { return static_cast<double>(nanoseconds) * 
 
 double LiveStatistics::Progress::RateSince(const Progress& from) const {
   if (from.tick < 0 || time <= from.time) return -1;
-  return static_cast<double>(tick - from.tick) / Seconds(time - from.time);
+  return (static_cast<double>(tick) - static_cast<double>(from.tick)) / Seconds(time - from.time);
 }
 
 LiveStatistics::LiveStatistics(const RunSpec& spec, int64_t now)

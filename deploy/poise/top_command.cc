@@ -88,11 +88,11 @@ int Once(const TopOptions& options) {
 int Top(const TopOptions& options) {
   CatchStopSignals();
   if (options.once) return Once(options);
+  signal(SIGPIPE, SIG_IGN);  // a terminal that goes away shows as an error of the write
+  Watch watch(options.run);
   if (isatty(STDOUT_FILENO) == 0) {
     throw ConfigError("top: stdout is no terminal; take one snapshot with --once");
   }
-  signal(SIGPIPE, SIG_IGN);  // a terminal that goes away shows as an error of the write
-  Watch watch(options.run);
   const auto interval = static_cast<int64_t>(options.interval * 1e3) * kMillisecond;
   std::vector<ViewLine> view = watch.View();
   bool ended = false;
