@@ -151,6 +151,8 @@ void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs)
   for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
   out << std::string_view(page).substr(mark + kDataMark.size());
   if (!out.flush()) {
+    std::error_code ignored;
+    if (fs::is_regular_file(file, ignored)) fs::remove(file, ignored);  // half a page
     throw ConfigError(
         fmt::format("{}: cannot be written; name another file with --html", file.string()));
   }

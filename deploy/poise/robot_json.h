@@ -1,7 +1,7 @@
 // A run's robot as JSON, for drawing it.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "logging/run_record.h"
 

@@ -70,7 +70,6 @@ const robotScenario = (robot) => `name: "robot_test" description: "" robot: "${r
   sim_ode { start { } ground { friction: 0.9 } }
 `;
 
-const pause = (page) => page.waitForTimeout(50);
 const state = (page) => page.evaluate(() => {
   const {player, view, run} = window.poise;
   return {time: player.time, tick: player.tick, playing: player.playing, min: view.min, max: view.max, period: run.period};
@@ -273,9 +272,24 @@ test('a log with gaps, with numbers that are none, and with hostile names is sho
     await Promise.all(grid.panels.map((p) => p.show()));
     for (let tick = 90; tick < 160; ++tick) player.seek(tick * run.period);
   });
-  await pause(page);
   assert.deepEqual(problems, []);
   await page.context().close();
+});
+
+test('a log that ends before its first tick, or after it, is a page too', async () => {
+  const events = readLog(path('a/run.lcm'));
+  const second = events.findIndex((e, i) => i > 1 && e.channel === events[1].channel);
+  for (const [name, count] of [['none', 1], ['one', second]]) {
+    writeLog(path(`${name}.lcm`), events.slice(0, count));
+    assert.equal(poise('report', path(`${name}.lcm`)).status, 1);
+    const {page, problems} = await openPage(browser, path(`${name}.html`));
+    assert.equal(await page.evaluate(() => window.poise.run.numTicks), count === 1 ? 0 : 1);
+    assert.equal(await page.locator('[role=alert]').count(), 0);
+    await page.click('#play');
+    await page.keyboard.press('ArrowRight');
+    assert.deepEqual(problems, []);
+    await page.context().close();
+  }
 });
 
 test('robots of other shapes, and with meshes only, are drawn where they stand', async () => {

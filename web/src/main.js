@@ -83,12 +83,11 @@ async function start() {
   header(run, overlay);
   const events = run.meta.events ?? [];
   const player = new Player(run);
-  performance.mark('poise-data');
+  const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
   const scene = new SceneView(document.getElementById('scene'), run, overlay);
   scene.host.append(sceneToolbar(scene), sceneKey(overlay),
     element('span', {class: 'inset'}, 'soles from above, forward is up'));
-  const [phases] = await Promise.all([findPhases(run), scene.load()]);
-  performance.mark('poise-picture');
+  const [phases] = await Promise.all([phasesFound, scene.load()]);
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
 
   const view = new TimeView(run);

@@ -90,6 +90,12 @@ export class Panel {
     this.updateCursor();
   }
 
+  /** Says in the plot's place why there is none. */
+  fail(error) {
+    console.error(error);
+    this.host.replaceChildren(element('p', {class: 'failed', role: 'alert'}, `cannot be drawn: ${error.message}`));
+  }
+
   async #load() {
     const {run, overlay} = this.shared;
     const {definition} = this;
@@ -313,7 +319,7 @@ export class PanelGrid {
     this.inSight.add(panel);
     if (panel.stale) panel.redraw();
     panel.stale = false;
-    panel.show().then(() => panel.updateCursor());
+    panel.show().then(() => panel.updateCursor(), (error) => panel.fail(error));
     panel.updateValues();
   }
 
