@@ -209,8 +209,10 @@ test('a run that grows grows in the plots, the bar and the picture', async () =>
     run.appendTicks(n, values);
     return run.numTicks;
   });
+  await page.locator('.panel', {hasText: 'External push'}).first().scrollIntoViewIfNeeded();
   await page.waitForFunction((n) => document.getElementById('scrub').max === String(n - 1)
-    && window.poise.grid.panels.every((p) => p.data[0].length === n), ticks);
+    && window.poise.grid.inSight.size > 0
+    && [...window.poise.grid.inSight].every((p) => p.data[0].length === n), ticks);
   near((await state(page)).max, (ticks - 1) * 0.002, 1e-9);
   const push = await page.evaluate(() => {
     const panel = window.poise.grid.panels.find((p) => p.definition.title.startsWith('External push'));

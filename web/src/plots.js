@@ -41,6 +41,15 @@ function nullable(values, n) {
   return result;
 }
 
+/** Seconds of every tick, one array for all plots. */
+function timesOf(run) {
+  if (times.get(run)?.length !== run.numTicks) {
+    times.set(run, Float64Array.from({length: run.numTicks}, (_, i) => i * run.period));
+  }
+  return times.get(run);
+}
+const times = new WeakMap();
+
 /** The other run's values at the first run's ticks. */
 function resampled(values, run, other) {
   if (run.period === other.period) return nullable(values, run.numTicks);
@@ -113,8 +122,7 @@ export class Panel {
 
   #data() {
     const {run} = this.shared;
-    const times = Float64Array.from({length: run.numTicks}, (_, i) => i * run.period);
-    return [times, ...this.lines.map((line) => line.constant !== undefined
+    return [timesOf(run), ...this.lines.map((line) => line.constant !== undefined
       ? new Array(run.numTicks).fill(line.constant)
       : line.overlay ? resampled(line.signal.values, run, line.run) : nullable(line.signal.values, run.numTicks))];
   }
@@ -136,8 +144,9 @@ export class Panel {
       cursor: {drag: {x: true, y: false, setScale: false}, points: {size: 5}, sync: {key: 'poise', setSeries: false}},
       series: [{}, ...this.lines.map((line) => {
         const style = styleOf(line.role, line.overlay);
-        return {label: line.label, stroke: style.color, dash: style.dash, width: style.width, points: {show: false},
-          spanGaps: line.signal?.channel.dense === false, show: !this.hidden.has(line.label)};
+        const sparse = line.signal?.channel.dense === false;  // a few messages a second: each one is shown
+        return {label: line.label, stroke: style.color, dash: style.dash, width: style.width,
+          points: {show: sparse, size: 5}, spanGaps: sparse, show: !this.hidden.has(line.label)};
       })],
       hooks: {
         drawClear: [(u) => this.#shade(u)],
@@ -317,10 +326,10 @@ export class PanelGrid {
 
   #enter(panel) {
     this.inSight.add(panel);
-    if (panel.stale) panel.redraw();
-    panel.stale = false;
-    panel.show().then(() => panel.updateCursor(), (error) => panel.fail(error));
-    panel.updateValues();
+    panel.show().then(() => this.#catchUp(panel)).then(() => {
+      panel.updateCursor();
+      panel.updateValues();
+    }).catch((error) => panel.fail(error));
   }
 
   updateValues() { this.inSight.forEach((p) => p.updateValues()); }
@@ -343,8 +352,16 @@ export class PanelGrid {
     panel.element.remove();
   }
 
-  /** After the run has grown. */
+  /** After the run has grown: what is in sight; the others when they come into sight. */
   async refresh() {
-    await Promise.all(this.panels.map((p) => p.refresh()));
+    this.panels.forEach((p) => { p.outdated = true; });
+    await Promise.all([...this.inSight].map((p) => this.#catchUp(p)));
+  }
+
+  async #catchUp(panel) {
+    const {outdated, stale} = panel;
+    panel.outdated = panel.stale = false;  // first: it may grow again meanwhile
+    if (outdated) await panel.refresh();
+    else if (stale) panel.redraw();
   }
 }

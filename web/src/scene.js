@@ -116,6 +116,7 @@ export class SceneView {
     this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
     this.#setRatio(FINEST);
     host.append(this.renderer.domElement);
+    this.renderer.domElement.setAttribute('role', 'img');
     this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(32, 1, 0.05, 60);
