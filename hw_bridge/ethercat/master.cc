@@ -73,7 +73,7 @@ std::optional<int> Master::CountSlaves() {
 }
 
 void Master::Start() {
-  clocks_running_ = false;
+  operational_ = clocks_running_ = false;
   const std::optional<int> found = CountSlaves();
   if (!found) {
     throw EthercatError(
@@ -211,13 +211,16 @@ void Master::SetUpDistributedClocks() {
   clocks_running_ = true;
 }
 
+void Master::ExchangeOnce() {
+  static_cast<void>(Send());
+  static_cast<void>(Receive(transactions_.link()->Now() + Milliseconds(config_.frame_timeout())));
+  slaves_[0].Pause();
+}
+
 void Master::GoOperational() {
   std::fill(outputs_.begin(), outputs_.end(), DriveOutputs{});
-  const auto exchange = [this] {
-    static_cast<void>(Send());
-    static_cast<void>(Receive(transactions_.link()->Now() + timeouts_.eeprom));
-    slaves_[0].Pause();
-  };
+  operational_ = true;  // from here on there is something to stop
+  const auto exchange = [this] { ExchangeOnce(); };
   // Slaves enter OP only once they have outputs.
   exchange();
   for (SlaveAccess& slave : slaves_) {
@@ -240,19 +243,28 @@ void Master::GoOperational() {
 }
 
 bool Master::Stop() {
-  clocks_running_ = false;
+  if (operational_) {
+    // Zero torque and the drives' way down first: in INIT they would trip on lost process data.
+    std::fill(outputs_.begin(), outputs_.end(), DriveOutputs{});
+    const int64_t down = transactions_.link()->Now() + 3 * int64_t{config_.cycle()};
+    while (transactions_.link()->Now() < down) ExchangeOnce();
+  }
+  operational_ = clocks_running_ = false;
   const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
   std::array<uint8_t, 2> bytes{};
-  do {
+  // A bus from which nothing comes back is not waited for: its watchdogs have acted.
+  for (int silent = 0; silent < 2;) {
     Put<uint16_t>(bytes, 0, static_cast<uint16_t>(AlState::kInit) | kAlError);
     static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kAlControl, bytes));
     Put<uint16_t>(bytes, 0, 0);
     const auto counter = transactions_.Execute(Command::kBrd, 0, reg::kAlStatus, bytes);
+    silent = counter ? 0 : silent + 1;
     if (counter && *counter == num_drives() && bytes[0] == static_cast<uint8_t>(AlState::kInit)) {
       return true;
     }
+    if (transactions_.link()->Now() > deadline) return false;
     slaves_[0].Pause();
-  } while (transactions_.link()->Now() < deadline);
+  }
   return false;
 }
 

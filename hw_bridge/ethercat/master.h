@@ -43,7 +43,8 @@ class Master {
   /// Process data must flow from then on, or the drives' watchdogs expire. Throws EthercatError;
   /// the slaves then stay where they are: call Stop().
   void Start();
-  /// Leads all slaves to INIT. False when not all have got there.
+  /// Takes all torque, disables the drives and leads all slaves to INIT. False when not all have
+  /// got there.
   bool Stop();
 
   // Cyclic operation: nothing allocates, throws or, with a deadline in the past, waits.
@@ -71,6 +72,7 @@ class Master {
   void SetUpProcessData(size_t drive);
   void SetUpDistributedClocks();
   void GoOperational();
+  void ExchangeOnce();
   bool Take(const FrameReader& reader, CycleResult* result);
 
   MasterConfig config_;
@@ -89,7 +91,7 @@ class Master {
   Exchange exchange_ = Exchange::kReadWrite;
   uint8_t cyclic_index_ = 0;
   bool awaited_ = false;  // sent and not yet returned
-  bool clocks_running_ = false;
+  bool operational_ = false, clocks_running_ = false;
   int64_t short_working_counters_ = 0;
 };
 

@@ -175,4 +175,18 @@ size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
   return 0;
 }
 
+std::unique_ptr<Link> OpenLink(const LinkConfig& config) {
+  if (config.has_udp() == config.has_interface()) {
+    throw EthercatError("EtherCAT configuration: link: give either udp or interface");
+  }
+  if (config.has_interface()) {
+    return std::make_unique<RawLink>(config.interface(), RawLink::Side::kMaster);
+  }
+  if (config.udp().port() == 0 || config.udp().port() > 0xFFFF) {
+    throw EthercatError("EtherCAT configuration: link.udp.port must be between 1 and 65535");
+  }
+  return UdpLink::Connect(
+      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
+}
+
 }  // namespace poise::ethercat

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "hw_bridge/ethercat/ethercat.pb.h"
 #include "hw_bridge/ethercat/frame.h"
 #include "hw_bridge/ethercat/link.h"
 
@@ -72,5 +73,9 @@ class RawLink final : public SocketLink {
   std::array<uint8_t, kEthernetHeader + kMaxFrame> out_{};
   std::array<uint8_t, kEthernetHeader + kMaxFrame + 1> in_{};
 };
+
+/// The master's side of the configured link. Throws EthercatError: not exactly one kind is set, or
+/// it cannot be opened.
+std::unique_ptr<Link> OpenLink(const LinkConfig& config);
 
 }  // namespace poise::ethercat

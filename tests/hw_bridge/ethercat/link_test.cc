@@ -127,6 +127,19 @@ TEST(UdpLink, NamesAddressesThatCannotBe) {
       HasSubstr("give another port"));
 }
 
+TEST(OpenLink, TakesExactlyOneKind) {
+  LinkConfig config;
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("either udp or interface"));
+  config.mutable_udp();
+  EXPECT_NE(OpenLink(config), nullptr);
+  config.mutable_udp()->set_port(70000);
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("link.udp.port"));
+  config.set_interface("no_such_if");
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("either udp or interface"));
+  config.clear_udp();
+  EXPECT_THAT(ErrorOf([&] { OpenLink(config); }), HasSubstr("no_such_if"));
+}
+
 TEST(RawLink, NamesInterfacesThatCannotBe) {
   const std::string error = ErrorOf([] { RawLink("no_such_if", RawLink::Side::kMaster); });
   EXPECT_THAT(error, ::testing::AnyOf(HasSubstr("no such interface"), HasSubstr("CAP_NET_RAW")));

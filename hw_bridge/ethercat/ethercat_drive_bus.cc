@@ -1,0 +1,200 @@
+#include "hw_bridge/ethercat/ethercat_drive_bus.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "poise/message_traits.hpp"
+
+namespace poise::ethercat {
+namespace {
+
+const EthercatBusConfig& Checked(const EthercatBusConfig& config) {
+  if (config.most_bad_in_a_row() < 1 || config.most_bad_in_100() < 1) {
+    throw EthercatError(
+        "EtherCAT configuration: most_bad_in_a_row and most_bad_in_100 must be at least 1");
+  }
+  if (int64_t{config.input_wait()} * 1000 >= config.master().cycle()) {
+    throw EthercatError("EtherCAT configuration: input_wait must be less than a cycle");
+  }
+  return config;
+}
+
+}  // namespace
+
+MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& model) {
+  std::vector<bool> has_drive(static_cast<size_t>(model.num_joints()), false);
+  for (DriveConfig& drive : *config.mutable_drive()) {
+    const int joint = model.FindJoint(drive.joint());
+    if (joint < 0) {
+      throw EthercatError(
+          fmt::format("EtherCAT configuration: drive \"{}\": robot \"{}\" has no "
+                      "joint of that name",
+                      drive.joint(), model.name()));
+    }
+    if (has_drive[static_cast<size_t>(joint)]) {
+      throw EthercatError(
+          fmt::format("EtherCAT configuration: joint \"{}\" has two drives", drive.joint()));
+    }
+    has_drive[static_cast<size_t>(joint)] = true;
+
+    const robot::MotorModel& motor = model.motors()[static_cast<size_t>(joint)];
+    const double current = motor.rated_current * 1e3;                         // mA
+    const double torque = motor.torque_constant * motor.rated_current * 1e3;  // mN·m
+    if (!(current >= 1) || !(torque >= 1) || motor.encoder_counts <= 0) {
+      throw EthercatError(
+          fmt::format("joint \"{}\": its motor needs a rated_current, a torque_constant and "
+                      "encoder_counts above 0 in the robot's description",
+                      drive.joint()));
+    }
+    if (!drive.has_rated_current()) {
+      drive.set_rated_current(static_cast<uint32_t>(std::lround(current)));
+    }
+    if (!drive.has_rated_torque()) {
+      drive.set_rated_torque(static_cast<uint32_t>(std::lround(torque)));
+    }
+    if (std::abs(drive.rated_current() - current) > 0.01 * current ||
+        std::abs(drive.rated_torque() - torque) > 0.01 * torque) {
+      throw EthercatError(fmt::format(
+          "EtherCAT configuration: drive \"{}\": rated for {} mN·m at {} mA, the robot's motor for "
+          "{:.0f} mN·m at {:.0f} mA",
+          drive.joint(), drive.rated_torque(), drive.rated_current(), torque, current));
+    }
+  }
+  for (int j = 0; j < model.num_joints(); ++j) {
+    if (!has_drive[static_cast<size_t>(j)]) {
+      throw EthercatError(fmt::format("EtherCAT configuration: joint \"{}\" has no drive",
+                                      model.joints()[static_cast<size_t>(j)].name));
+    }
+  }
+  return config;
+}
+
+EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
+                                   const robot::RobotModel& model, SensorSource* sensors)
+    : config_(Checked(config)),
+      master_(link, CompleteMasterConfig(config.master(), model)),
+      link_(link),
+      sensors_(sensors),
+      steering_(config.master().cycle()) {
+  const MasterConfig complete = CompleteMasterConfig(config.master(), model);
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
+    const std::string& name = model.joints()[static_cast<size_t>(j)].name;
+    const auto place = std::find_if(complete.drive().begin(), complete.drive().end(),
+                                    [&](const DriveConfig& d) { return d.joint() == name; });
+    const DriveScale scale(motor, *place);
+    drives_.push_back({.slave = static_cast<size_t>(place - complete.drive().begin()),
+                       .scale = scale,
+                       .max_torque = scale.LimitPerMille(motor.peak_current),
+                       .control = {},
+                       .counter = {}});
+  }
+  const int32_t counts[] = {model.num_joints(), static_cast<int32_t>(model.feet().size())};
+  MessageTraits<drive_feedback_t>::Resize(feedback_, counts);
+}
+
+CycleResult EthercatDriveBus::ReceiveFrames() {
+  CycleResult result;
+  if (sent_) result = master_.Receive(link_->Now());
+  sent_ = false;
+  if (!config_.fresh_inputs()) return result;
+  if (master_.Send(Exchange::kRead)) {
+    result = master_.Receive(link_->Now() + int64_t{config_.input_wait()} * 1000);
+  } else {
+    result = {};
+  }
+  return result;
+}
+
+void EthercatDriveBus::Judge(const CycleResult& result) {
+  const bool bad = !result.complete;
+  const auto place = static_cast<size_t>(health_.cycles % 100);
+  ++health_.cycles;
+  health_.bad_cycles += bad ? 1 : 0;
+  health_.bad_in_a_row = bad ? health_.bad_in_a_row + 1 : 0;
+  bad_[place] = bad;
+  health_.bad_in_100 = static_cast<int>(bad_.count());
+  if (result.returned) health_.al_status = result.al_status;
+  if (health_.bad_in_a_row >= static_cast<int>(config_.most_bad_in_a_row()) ||
+      health_.bad_in_100 >= static_cast<int>(config_.most_bad_in_100())) {
+    health_.usable = false;
+  }
+}
+
+int32_t EthercatDriveBus::Status(const Drive& drive, const DriveInputs& inputs) const {
+  const bool enabled = drive.state == DriveState::kOperationEnabled;
+  const bool stopped = (inputs.statusword & kStatusVoltageEnabled) == 0;  // STO
+  const bool fault = drive.state == DriveState::kFault ||
+                     drive.state == DriveState::kFaultReactionActive ||
+                     drive.state == DriveState::kUnknown ||
+                     health_.al_status != static_cast<uint8_t>(AlState::kOp) ||
+                     (stopped && drive.commanded) || (enabled && inputs.mode != kModeCyclicTorque);
+  if (fault) return drive_feedback_t::DRIVE_FAULT;
+  if (enabled) return drive_feedback_t::DRIVE_ENABLED;
+  return drive_feedback_t::DRIVE_DISABLED;
+}
+
+const drive_feedback_t* EthercatDriveBus::Receive() {
+  const CycleResult result = ReceiveFrames();
+  Judge(result);
+  cycle_correction_ = result.system_time ? steering_.Update(*result.system_time) : 0;
+  const bool sensed = sensors_ == nullptr || sensors_->Read(&feedback_);
+  if (!result.complete) return nullptr;
+  for (size_t j = 0; j < drives_.size(); ++j) {
+    Drive& drive = drives_[j];
+    const DriveInputs& inputs = master_.inputs(drive.slave);
+    drive.state = DecodeState(inputs.statusword);
+    feedback_.position_counts[j] = drive.scale.JointCounts(drive.counter.Update(inputs.position));
+    feedback_.current[j] = drive.scale.Current(inputs.torque);
+    feedback_.drive_status[j] = Status(drive, inputs);
+  }
+  return sensed ? &feedback_ : nullptr;
+}
+
+void EthercatDriveBus::Send(const drive_command_t& command) {
+  const bool sized =
+      command.current.size() == drives_.size() && command.enabled.size() == drives_.size();
+  bool any = false, all_enabled = true;
+  for (size_t j = 0; j < drives_.size(); ++j) {
+    Drive& drive = drives_[j];
+    drive.commanded = sized && command.enabled[j] != 0;
+    any = any || drive.commanded;
+    all_enabled = all_enabled && (!drive.commanded ||
+                                  feedback_.drive_status[j] == drive_feedback_t::DRIVE_ENABLED);
+  }
+  // Once all have been enabled together, one that fails does not take the others' torque: what
+  // becomes of them is the supervisor's decision.
+  released_ = any && (released_ || all_enabled);
+  for (size_t j = 0; j < drives_.size(); ++j) {
+    Drive& drive = drives_[j];
+    DriveOutputs outputs;
+    outputs.controlword = drive.control.Controlword(
+        drive.state, drive.commanded ? DriveGoal::kEnabled : DriveGoal::kDisabled);
+    if (released_ && drive.commanded) {
+      const double current = command.current[j];
+      const bool finite = std::isfinite(current);
+      health_.refused_currents += finite ? 0 : 1;
+      const auto limit = static_cast<int>(drive.max_torque);
+      const int torque = finite ? drive.scale.TorquePerMille(current) : 0;
+      outputs.target_torque = static_cast<int16_t>(std::clamp(torque, -limit, limit));
+      outputs.max_torque = drive.max_torque;
+    }
+    master_.set_outputs(drive.slave, outputs);
+  }
+  sent_ = master_.Send(config_.fresh_inputs() ? Exchange::kWrite : Exchange::kReadWrite);
+}
+
+void EthercatDriveBus::RequestFaultReset() {
+  for (Drive& drive : drives_) {
+    if (!drive.commanded) drive.control.RequestFaultReset();
+  }
+}
+
+bool EthercatDriveBus::Stop() {
+  released_ = sent_ = false;
+  return master_.Stop();
+}
+
+}  // namespace poise::ethercat
