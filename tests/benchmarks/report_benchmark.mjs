@@ -39,8 +39,14 @@ function write() {
   return (performance.now() - start) / 1000;
 }
 
+/** s of processor time that the page's main thread took so far: what a busy machine does not change. */
+async function processorTime(session) {
+  const {metrics} = await session.send('Performance.getMetrics');
+  return metrics.find((m) => m.name === 'TaskDuration').value;
+}
+
 /** Frames drawn while the run plays from its start, per second of wall time. */
-const play = (page, seconds) => page.evaluate((duration) => new Promise((done) => {
+const playFor = (page, seconds) => page.evaluate((duration) => new Promise((done) => {
   const {player} = window.poise;
   player.seek(0);
   player.setSpeed(player.run.duration > duration ? 1 : 0.5);
@@ -51,29 +57,40 @@ const play = (page, seconds) => page.evaluate((duration) => new Promise((done) =
     ++frames;
     if (now - start < 1000 * duration && player.playing) return requestAnimationFrame(count);
     player.pause();
-    done(frames / (now - start) * 1000);
+    done({frames, time: (now - start) / 1000});
   };
   requestAnimationFrame(count);
 }), seconds);
+
+async function play(page, session) {
+  const before = await processorTime(session);
+  const {frames, time} = await playFor(page, PLAY);
+  return {rate: frames / time, cost: (await processorTime(session) - before) / frames};
+}
 
 let browser;
 try {
   const written = Array.from({length: repeat}, write);
   browser = await launchBrowser(options.web);
-  const pictures = [], ready = [], rates = {'at the robot': [], 'at the plots': []};
+  const pictures = [], ready = [], opening = [], rates = {'at the robot': [], 'at the plots': []};
   let ticks = 0;
   for (let i = 0; i < repeat; ++i) {
     const {page, problems} = await openPage(browser, html, {viewport: {width: 1440, height: 1000}, deviceScaleFactor: 1});
     if (problems.length) throw new Error(problems.join('\n'));
+    const session = await page.context().newCDPSession(page);
+    await session.send('Performance.enable', {timeDomain: 'threadTicks'});
+    await page.reload();
+    await page.waitForFunction(() => document.documentElement.dataset.ready);
+    opening.push(await processorTime(session));
     const marks = await page.evaluate(() => ({picture: Number(document.documentElement.dataset.picture),
       ready: Number(document.documentElement.dataset.ready), ticks: window.poise.run.numTicks}));
     pictures.push(marks.picture / 1000);
     ready.push(marks.ready / 1000);
     ticks = marks.ticks;
-    rates['at the robot'].push(await play(page, PLAY));
+    rates['at the robot'].push(await play(page, session));
     await page.locator('#figures').evaluate((e) => e.scrollIntoView());
     await page.waitForTimeout(500);
-    rates['at the plots'].push(await play(page, PLAY));
+    rates['at the plots'].push(await play(page, session));
     await page.context().close();
   }
   console.log(`ticks                           ${ticks}`);
@@ -81,8 +98,10 @@ try {
   console.log(`written, table included         ${median(written).toFixed(2)} s`);
   console.log(`first picture of the robot      ${median(pictures).toFixed(2)} s from opening`);
   console.log(`page complete                   ${median(ready).toFixed(2)} s from opening`);
+  console.log(`main thread until then          ${median(opening).toFixed(2)} s of processor time`);
   for (const [where, values] of Object.entries(rates)) {
-    console.log(`playing, ${where.padEnd(22)} ${median(values).toFixed(0)} frames per second`);
+    console.log(`playing, ${where.padEnd(22)} ${median(values.map((v) => v.rate)).toFixed(0)} frames per second, ` +
+      `${(1000 * median(values.map((v) => v.cost))).toFixed(1)} ms of the main thread's processor time each`);
   }
 } finally {
   await browser?.close();
