@@ -205,50 +205,6 @@ void AddBalancing(const RunRecord& run, EventList* events) {
                        });
 }
 
-std::string BridgeStateName(int8_t state) {
-  switch (state) {
-    case bridge_status_t::STATE_INIT:
-      return "init";
-    case bridge_status_t::STATE_RUNNING:
-      return "running";
-    case bridge_status_t::STATE_DAMPING:
-      return "damping";
-    case bridge_status_t::STATE_STOPPING:
-      return "stopping";
-    case bridge_status_t::STATE_ESTOP:
-      return "emergency stop";
-    default:
-      return fmt::format("state {}", state);
-  }
-}
-
-std::string BridgeReasonName(int8_t reason) {
-  switch (reason) {
-    case bridge_status_t::REASON_NONE:
-      return "";
-    case bridge_status_t::REASON_NO_COMMAND:
-      return "no command";
-    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
-      return "command not finite";
-    case bridge_status_t::REASON_COMMAND_STALE:
-      return "command stale";
-    case bridge_status_t::REASON_COMMAND_SEQUENCE:
-      return "command out of sequence";
-    case bridge_status_t::REASON_COMMAND_SIZE:
-      return "command of wrong size";
-    case bridge_status_t::REASON_COMMAND_RUN:
-      return "command of another run";
-    case bridge_status_t::REASON_OPERATOR:
-      return "operator";
-    case bridge_status_t::REASON_DRIVE_FAULT:
-      return "drive fault";
-    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
-      return "feedback not finite";
-    default:
-      return fmt::format("reason {}", reason);
-  }
-}
-
 void AddBridge(const RunRecord& run, EventList* events) {
   const bridge_status_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
@@ -327,6 +283,50 @@ void AddEnd(const RunRecord& run, EventList* events) {
 }
 
 }  // namespace
+
+std::string BridgeStateName(int8_t state) {
+  switch (state) {
+    case bridge_status_t::STATE_INIT:
+      return "init";
+    case bridge_status_t::STATE_RUNNING:
+      return "running";
+    case bridge_status_t::STATE_DAMPING:
+      return "damping";
+    case bridge_status_t::STATE_STOPPING:
+      return "stopping";
+    case bridge_status_t::STATE_ESTOP:
+      return "emergency stop";
+    default:
+      return fmt::format("state {}", state);
+  }
+}
+
+std::string BridgeReasonName(int8_t reason) {
+  switch (reason) {
+    case bridge_status_t::REASON_NONE:
+      return "";
+    case bridge_status_t::REASON_NO_COMMAND:
+      return "no command";
+    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
+      return "command not finite";
+    case bridge_status_t::REASON_COMMAND_STALE:
+      return "command stale";
+    case bridge_status_t::REASON_COMMAND_SEQUENCE:
+      return "command out of sequence";
+    case bridge_status_t::REASON_COMMAND_SIZE:
+      return "command of wrong size";
+    case bridge_status_t::REASON_COMMAND_RUN:
+      return "command of another run";
+    case bridge_status_t::REASON_OPERATOR:
+      return "operator";
+    case bridge_status_t::REASON_DRIVE_FAULT:
+      return "drive fault";
+    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
+      return "feedback not finite";
+    default:
+      return fmt::format("reason {}", reason);
+  }
+}
 
 std::vector<Event> Events(const RunRecord& run) {
   EventList events(run);

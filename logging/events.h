@@ -23,4 +23,9 @@ struct Event {
 /// cop_not_achieved_ends, bridge_state, push_begins, push_peak, push_ends, fall, run_ended.
 std::vector<Event> Events(const RunRecord& run);
 
+/// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty
+/// reason for none.
+std::string BridgeStateName(int8_t state);
+std::string BridgeReasonName(int8_t reason);
+
 }  // namespace poise::logging

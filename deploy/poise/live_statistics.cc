@@ -39,6 +39,8 @@ void LiveStatistics::AddMessage(int channel, int64_t tick, size_t bytes, int64_t
   count.last_arrival = now;
 }
 
+void LiveStatistics::SetBridge(const bridge_status_t& status) { bridge_ = status; }
+
 void LiveStatistics::SetProcess(const std::string& name, const ControlClient::Status& status) {
   if (!status.seen) return;
   ProcessCount& process = processes_[name];
@@ -51,6 +53,7 @@ LiveSnapshot LiveStatistics::Take(int64_t now) {
   const double interval = Seconds(std::max<int64_t>(1, now - interval_begin_));
   snapshot.tick = newest_.tick;
   snapshot.tick_rate = newest_.RateSince(first_);
+  snapshot.bridge = bridge_;
   first_ = newest_;
   std::vector<std::string> names;
   for (const ComponentInstance& instance : spec_.graph().component()) {

@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "components/framework/control_client.h"
 #include "components/framework/graph.pb.h"
+#include "poise/bridge_status_t.hpp"
 
 namespace poise {
 
@@ -31,10 +33,11 @@ struct LiveSnapshot {
     double age = -1;                ///< s
     int64_t missed = 0;             ///< ticks that this listener did not get, since the start
   };
-  std::vector<Process> processes;    ///< in the graph's order, then the recorder
-  std::vector<ChannelRow> channels;  ///< in the graph's order
-  int64_t tick = -1;                 ///< newest of any channel
-  double tick_rate = -1;             ///< ticks/s
+  std::vector<Process> processes;         ///< in the graph's order, then the recorder
+  std::vector<ChannelRow> channels;       ///< in the graph's order
+  std::optional<bridge_status_t> bridge;  ///< newest
+  int64_t tick = -1;                      ///< newest of any channel
+  double tick_rate = -1;                  ///< ticks/s
 };
 
 /// Times are ns of one steady clock. Not thread-safe.
@@ -45,6 +48,7 @@ class LiveStatistics {
 
   /// `channel`: index in the graph.
   void AddMessage(int channel, int64_t tick, size_t bytes, int64_t now);
+  void SetBridge(const bridge_status_t& status);
   void SetProcess(const std::string& name, const ControlClient::Status& status);
   /// The moment `now`; the next interval begins.
   LiveSnapshot Take(int64_t now);
@@ -74,6 +78,7 @@ class LiveStatistics {
   const RunSpec& spec_;
   std::vector<ChannelCount> channels_;
   std::map<std::string, ProcessCount> processes_;
+  std::optional<bridge_status_t> bridge_;
   Progress first_;
   Progress newest_;
   int64_t interval_begin_;

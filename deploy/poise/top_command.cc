@@ -47,6 +47,11 @@ class Watch {
     live_.Spin(static_cast<int>(std::min(wait, kLongestWait)), [&](const LiveMessage& message) {
       last_arrival_ = NowNanoseconds();
       if (message.index < 0) return;  // health comes from the processes themselves
+      bridge_status_t bridge;
+      if (message.type->fingerprint == bridge_status_t::getHash() &&
+          DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bridge)) {
+        statistics_.SetBridge(bridge);
+      }
       statistics_.AddMessage(message.index, message.tick, message.data.size(), last_arrival_);
     });
     control_.Spin(0);

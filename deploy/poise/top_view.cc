@@ -5,6 +5,7 @@
 #include "components/framework/run.h"
 #include "deploy/poise/message_text.h"
 #include "fmt/format.h"
+#include "logging/events.h"
 
 namespace poise {
 namespace {
@@ -57,7 +58,16 @@ void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& 
                             snapshot.tick_rate * period);
   }
   progress += spec.realtime() ? "  paced by the wall clock" : "  as fast as it goes";
-  lines->push_back({progress});
+  const bool stopped = snapshot.bridge && snapshot.bridge->state >= bridge_status_t::STATE_STOPPING;
+  const bool damping = snapshot.bridge && snapshot.bridge->state == bridge_status_t::STATE_DAMPING;
+  if (snapshot.bridge) {
+    progress += "  bridge: " + logging::BridgeStateName(snapshot.bridge->state);
+    const std::string reason = logging::BridgeReasonName(snapshot.bridge->reason);
+    if (!reason.empty()) progress += ", " + reason;
+  }
+  lines->push_back({progress, stopped   ? Style::kFailure
+                              : damping ? Style::kWarning
+                                        : Style::kPlain});
   lines->push_back({fmt::format("{}  refused here: {} packets", MirrorUrl(spec), refused),
                     refused > 0 ? Style::kWarning : Style::kPlain});
 }

@@ -37,7 +37,7 @@ port=$(sed 's/.*:\([0-9]*\)?.*/\1/' <<<"$url")
 
 lcm-logger --lcm-url="$url" "$work/logger.lcm" >"$work/logger.txt" 2>&1 &
 logger=$!
-started+=($logger)
+started+=("$logger")
 
 spec=$run/run_spec.pbtxt
 types=$(basename -s .lcm "$source_dir"/lcmtypes/*.lcm | paste -sd,)
@@ -45,24 +45,26 @@ types=$(basename -s .lcm "$source_dir"/lcmtypes/*.lcm | paste -sd,)
 channels=$(sed -n '/^  channel {/,/^  }/p' "$spec" | tr -d '\n' | sed 's/  channel {/\n/g' | grep -v external: |
   sed -n 's/.*name: "\([^"]*\)".*type: "\([^"]*\)".*/\1=\2/p')
 health=$(sed -n '/^  component {/,/^  }/s/^    name: "\(.*\)"/HEALTH_\U\1\E=health_t/p' "$spec")
-[ "$(wc -l <<<"$channels")" -ge 10 ] && [ "$(wc -l <<<"$health")" -ge 6 ] || fail "the run's channels were not read"
+if [ "$(wc -l <<<"$channels")" -lt 10 ] || [ "$(wc -l <<<"$health")" -lt 6 ]; then
+  fail "the run's channels were not read"
+fi
 
 export JAVA_TOOL_OPTIONS="-javaagent:$probe -Dprobe.types=$types -Dprobe.open=BALANCE_TORQUE \
 -Dprobe.channels=$(paste -sd, <<<"$channels"$'\n'"$health"),HEALTH_RECORDER=health_t \
 -Dprobe.last=EMERGENCY_STOP=emergency_stop_t -Dprobe.picture=$work/spy.png"
 xvfb-run -a -s '-screen 0 1280x720x24' "$source_dir/deploy/spy" "$run" >"$work/spy.txt" 2>&1 &
 spy=$!
-started+=($spy)
+started+=("$spy")
 # An operator's channel speaks when the rest has been seen, which ends the run.
-opened() { grep -q 'probe: opened\|probe: FAILED' "$work/spy.txt" || ! kill -0 $spy; }
+opened() { grep -q 'probe: opened\|probe: FAILED' "$work/spy.txt" || ! kill -0 "$spy"; }
 wait_for opened
 "$poise" estop "$run" || true
-wait $spy || { cat "$work/spy.txt"; fail "lcm-spy did not show everything"; }
+wait "$spy" || { cat "$work/spy.txt"; fail "lcm-spy did not show everything"; }
 grep '^probe: ' "$work/spy.txt"
 [ "$(wc -c <"$work/spy.png")" -gt 10000 ] || fail "the picture is empty"
 
-kill $logger
-wait $logger || true
+kill "$logger"
+wait "$logger" || true
 kill -INT "${started[0]}" 2>/dev/null || true
 wait "${started[0]}" || true
 
@@ -76,12 +78,12 @@ echo "lcm-logger: $(wc -l <"$work/logger_ticks") ticks"
 # lcm-logplayer sends a log on the URL for whoever listens.
 lcm-logger --lcm-url="$url" "$work/played.lcm" >"$work/played.txt" 2>&1 &
 listener=$!
-started+=($listener)
+started+=("$listener")
 wait_for listening "$port"
 lcm-logplayer --speed=4 --lcm-url="$url" "$work/logger.lcm" >"$work/player.txt" 2>&1
 sleep 0.5 # for the last messages to be written
-kill $listener
-wait $listener || true
+kill "$listener"
+wait "$listener" || true
 ticks "$work/played.lcm" ROBOT_STATE >"$work/played_ticks"
 [ "$(wc -l <"$work/played_ticks")" -gt 100 ] || fail "lcm-logplayer sent too little"
 if grep -Fvxf "$work/logger_ticks" "$work/played_ticks"; then fail "lcm-logplayer sent what was not in the log"; fi

@@ -66,6 +66,18 @@ TEST_F(TopViewTest, ShowsTheRunsProgress) {
   EXPECT_THAT(Text(), HasSubstr("refused here: 3 packets"));
 }
 
+TEST_F(TopViewTest, ShowsTheBridgesState) {
+  EXPECT_THAT(Text(), Not(HasSubstr("bridge:")));
+  snapshot.bridge.emplace();
+  snapshot.bridge->state = bridge_status_t::STATE_RUNNING;
+  snapshot.bridge->reason = bridge_status_t::REASON_NONE;
+  EXPECT_THAT(Text(), HasSubstr("bridge: running\n"));
+  snapshot.bridge->state = bridge_status_t::STATE_ESTOP;
+  snapshot.bridge->reason = bridge_status_t::REASON_OPERATOR;
+  EXPECT_THAT(Text(), HasSubstr("bridge: emergency stop, operator\n"));
+  EXPECT_EQ(TopView(spec, "", snapshot, 0)[1].style, ViewLine::Style::kFailure);
+}
+
 TEST_F(TopViewTest, ShowsAProcess) {
   EXPECT_THAT(Row("sim_ode"),
               ::testing::ElementsAre("sim_ode", "running", "1520", "499.8", "256.5", "565.0",
