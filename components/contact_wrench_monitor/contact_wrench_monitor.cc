@@ -23,7 +23,16 @@ bool Inside(const Eigen::Vector2d& cop, const balance::ContactLimits& limits) {
 void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<ContactWrenchMonitorConfig>();
   balancing_ = config.balancing();
-  double_support_ = ReadLimits(config.double_support(), "double_support");
+  ContactLimitsConfig double_support = config.double_support();
+  if (config.has_half_width_beyond_soles()) {
+    beyond_soles_ = config.half_width_beyond_soles();
+    if (!(*beyond_soles_ >= 0) || !std::isfinite(*beyond_soles_)) {
+      throw ConfigError("half_width_beyond_soles", "must be a number of m, 0 or more");
+    }
+    // Replaced in every tick.
+    if (!double_support.has_half_width()) double_support.set_half_width(1);
+  }
+  double_support_ = ReadLimits(double_support, "double_support");
   single_support_ = ReadLimits(config.single_support(), "single_support");
   model_ = LoadRobot(context);
   whole_body_ = context.shared->Get<balance::WholeBody>(
@@ -90,8 +99,7 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   if (const int8_t status = ComputeDynamics(in_contact); status != balance_torque_t::STATUS_OK) {
     return status;
   }
-  const balance::ContactLimits& limits =
-      in_contact[0] && in_contact[1] ? double_support_ : single_support_;
+  const balance::ContactLimits limits = Limits(in_contact);
   balance::BalanceResult result;
   const balance::BalanceStatus status =
       balance_control_->Compute(whole_body_->contact(), *com_height_, whole_body_->geometry(),
@@ -103,6 +111,17 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, limits);
   return achieved || !balancing_ ? balance_torque_t::STATUS_OK
                                  : balance_torque_t::STATUS_NOT_ACHIEVED;
+}
+
+balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {
+  if (!(in_contact[0] && in_contact[1])) return single_support_;
+  balance::ContactLimits limits = double_support_;
+  if (beyond_soles_) {
+    const auto& sole = whole_body_->geometry().sole;
+    limits.half_width =
+        0.5 * (sole[0].translation() - sole[1].translation()).norm() + *beyond_soles_;
+  }
+  return limits;
 }
 
 void ContactWrenchMonitor::Report(const balance::BalanceResult& result,

@@ -31,6 +31,7 @@ class ContactWrenchMonitor : public Component {
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
   int8_t ComputeBalance(const std::array<bool, 2>& in_contact);
+  balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
   void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
               const std::array<bool, 2>& in_contact);
 
@@ -44,6 +45,7 @@ class ContactWrenchMonitor : public Component {
   std::optional<balance::BalanceControl> balance_control_;
   bool balancing_ = true;
   balance::ContactLimits double_support_, single_support_;
+  std::optional<double> beyond_soles_;  // m
   robot::RobotState state_;
   bool state_valid_ = false;
   std::array<bool, 2> in_contact_{true, true};  // of the last tick

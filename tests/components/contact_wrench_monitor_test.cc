@@ -212,6 +212,35 @@ INSTANTIATE_TEST_SUITE_P(All, MonitorCase,
 
 // The stage that prepares works with the contacts of the tick before; a change must not leave a
 // trace of them.
+// Whatever the distance between the feet, each sole's centre is as far inside.
+TEST(ContactWrenchMonitor, HalfWidthBeyondTheSolesFollowsTheirDistance) {
+  const auto model = robot::LoadTestRobot(TestRobot::kDyros);
+  ControlContext context(TestRobot::kDyros);
+  Harness<ContactWrenchMonitor> harness(
+      &context,
+      "double_support { half_length: 0.12 } half_width_beyond_soles: 0.02 "
+      "single_support { half_length: 0.12 half_width: 0.06 }");
+  task_torque_t task{};
+  MessageTraits<task_torque_t>::Resize(task, std::array{model.num_joints(), 2});
+  std::fill(task.in_contact.begin(), task.in_contact.end(), int8_t{1});
+  robot::RobotState state = StandingState(model);
+  for (const double spread : {0.0, 0.1, 0.2}) {
+    for (const char* joint : {"right_hip_roll", "left_hip_roll"}) {
+      state.joint_position[model.FindJoint(joint)] += joint[0] == 'r' ? -spread : spread;
+    }
+    robot_state_t message = StateMessage(model, state);
+    harness.Bind("robot_state", &message);
+    harness.Bind("task_torque", &task);
+    harness.Run(TickAt(0));
+    robot::RobotData data(model);
+    robot::ComputeKinematics(model, state, &data);
+    robot::ComputeFeet(model, &data);
+    const double distance =
+        (data.foot_pose[0].translation() - data.foot_pose[1].translation()).norm();
+    EXPECT_NEAR(harness.output<balance_torque_t>().cop_limit[1], 0.5 * distance + 0.02, 1e-9);
+  }
+}
+
 TEST(ContactWrenchMonitor, AChangeOfSupportGivesWhatAFreshMonitorGives) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   std::mt19937 random(22);
@@ -251,6 +280,8 @@ TEST(ContactWrenchMonitor, RefusesLimitsThatCannotBe) {
     return "accepted";
   };
   const std::string single = "single_support { half_length: 0.1 half_width: 0.1 } ";
+  EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 } half_width_beyond_soles: -1"),
+            "half_width_beyond_soles");
   EXPECT_EQ(field_of(single), "double_support.half_length");
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "double_support.half_width");
   EXPECT_EQ(field_of(single + "double_support { half_length: -0.1 half_width: 0.1 }"),
