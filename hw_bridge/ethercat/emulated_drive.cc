@@ -93,9 +93,15 @@ void EmulatedDrive::UpdateState(int64_t now, bool outputs_valid) {
   }
   if (next_ && now >= next_time_) Enter(*next_);
   if (outputs_valid) Follow(controlword, reset_edge, now);
-  const auto mode = static_cast<int8_t>(mode_->value);
   // Another mode is not supported: the drive stays in the one it has.
-  if (outputs_valid && mode == kModeCyclicTorque) mode_display_->value = mode_->value;
+  const bool change = outputs_valid && static_cast<int8_t>(mode_->value) == kModeCyclicTorque &&
+                      mode_display_->value != mode_->value;
+  if (!change) {
+    mode_wanted_at_ = now;
+  } else if (now - mode_wanted_at_ >=
+             static_cast<int64_t>(config_.mode_time() * kNanosecondsPerMs)) {
+    mode_display_->value = mode_->value;
+  }
 }
 
 void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {

@@ -68,6 +68,7 @@ class EmulatedDrive {
   DriveState state_ = DriveState::kNotReadyToSwitchOn;
   std::optional<DriveState> next_;  // entered at next_time_
   int64_t next_time_ = 0;           // ns
+  int64_t mode_wanted_at_ = 0;      // ns
   int64_t now_ = 0;                 // ns
   uint16_t last_controlword_ = 0;
   bool sto_ = false, frozen_ = false;

@@ -29,8 +29,7 @@ class EmulatedSlave {
   ObjectDictionary& objects() { return objects_; }
   AlState al_state() const { return state_; }
   bool al_error() const { return error_; }
-  /// A fault: frames pass without being touched, as with a slave that has lost its power supply's
-  /// process data side.
+  /// A fault: frames pass without being touched, so the working counter lacks this slave.
   void SetSilent(bool silent) { silent_ = silent; }
   bool silent() const { return silent_; }
 

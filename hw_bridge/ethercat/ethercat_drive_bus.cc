@@ -123,14 +123,14 @@ void EthercatDriveBus::Judge(const CycleResult& result) {
   }
 }
 
-int32_t EthercatDriveBus::Status(const Drive& drive, const DriveInputs& inputs) const {
+int32_t EthercatDriveBus::Status(const Drive& drive, uint16_t statusword) const {
   const bool enabled = drive.state == DriveState::kOperationEnabled;
-  const bool stopped = (inputs.statusword & kStatusVoltageEnabled) == 0;  // STO
+  const bool stopped = (statusword & kStatusVoltageEnabled) == 0;  // STO
   const bool fault = drive.state == DriveState::kFault ||
                      drive.state == DriveState::kFaultReactionActive ||
                      drive.state == DriveState::kUnknown ||
                      health_.al_status != static_cast<uint8_t>(AlState::kOp) ||
-                     (stopped && drive.commanded) || (enabled && inputs.mode != kModeCyclicTorque);
+                     (stopped && drive.commanded) || (enabled && !drive.in_mode);
   if (fault) return drive_feedback_t::DRIVE_FAULT;
   if (enabled) return drive_feedback_t::DRIVE_ENABLED;
   return drive_feedback_t::DRIVE_DISABLED;
@@ -146,9 +146,10 @@ const drive_feedback_t* EthercatDriveBus::Receive() {
     Drive& drive = drives_[j];
     const DriveInputs& inputs = master_.inputs(drive.slave);
     drive.state = DecodeState(inputs.statusword);
+    drive.in_mode = inputs.mode == kModeCyclicTorque;
     feedback_.position_counts[j] = drive.scale.JointCounts(drive.counter.Update(inputs.position));
     feedback_.current[j] = drive.scale.Current(inputs.torque);
-    feedback_.drive_status[j] = Status(drive, inputs);
+    feedback_.drive_status[j] = Status(drive, inputs.statusword);
   }
   return sensed ? &feedback_ : nullptr;
 }
@@ -169,9 +170,10 @@ void EthercatDriveBus::Send(const drive_command_t& command) {
   released_ = any && (released_ || all_enabled);
   for (size_t j = 0; j < drives_.size(); ++j) {
     Drive& drive = drives_[j];
-    DriveOutputs outputs;
-    outputs.controlword = drive.control.Controlword(
-        drive.state, drive.commanded ? DriveGoal::kEnabled : DriveGoal::kDisabled);
+    DriveOutputs outputs;  // of this mode: the way up begins once the drive shows it
+    const bool enable = drive.commanded && drive.in_mode;
+    outputs.controlword =
+        drive.control.Controlword(drive.state, enable ? DriveGoal::kEnabled : DriveGoal::kDisabled);
     if (released_ && drive.commanded) {
       const double current = command.current[j];
       const bool finite = std::isfinite(current);

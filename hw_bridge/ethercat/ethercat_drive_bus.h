@@ -74,13 +74,14 @@ class EthercatDriveBus final : public DriveBus {
     DriveControl control;
     CounterUnwrap counter;
     DriveState state = DriveState::kUnknown;
+    bool in_mode = false;    // cyclic synchronous torque is the mode it shows
     bool commanded = false;  // to be enabled
   };
 
   /// Takes what has come of the last frame; the result of the exchange that has inputs.
   CycleResult ReceiveFrames();
   void Judge(const CycleResult& result);
-  int32_t Status(const Drive& drive, const DriveInputs& inputs) const;
+  int32_t Status(const Drive& drive, uint16_t statusword) const;
 
   EthercatBusConfig config_;
   Master master_;

@@ -112,7 +112,9 @@ void Master::ResetAndAddress() {
     }
   };
   broadcast(reg::kAlControl, 2, static_cast<uint16_t>(AlState::kInit) | kAlError);
-  broadcast(reg::kDcActivation, 1, 0);
+  // Slaves without distributed clocks do not count here.
+  std::array<uint8_t, 1> off{};
+  static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kDcActivation, off));
   broadcast(reg::kFmmu, kNumFmmus * kFmmuSize, 0);
   broadcast(reg::kSyncManager, kNumSyncManagers * kSyncManagerSize, 0);
   for (size_t i = 0; i < num_drives(); ++i) {

@@ -139,6 +139,22 @@ TEST_F(EthercatBus, GivesNoTorqueUntilAllDrivesAreEnabled) {
   }
 }
 
+TEST_F(EthercatBus, EnablesADriveOnlyInItsMode) {
+  bench_.chain_config.mutable_drive(static_cast<int>(Slave(6)))->set_mode_time(100);
+  Start();
+  // Enabling is asked for well before that drive shows the mode; it is no fault.
+  command_.enabled.assign(kDrives, 1);
+  for (int i = 0; i < 15; ++i) {
+    const drive_feedback_t* feedback = Cycle();
+    ASSERT_NE(feedback, nullptr);
+    EXPECT_EQ(feedback->drive_status[6], drive_feedback_t::DRIVE_DISABLED);
+    EXPECT_EQ(spy_->controlword(Slave(6)), 0);
+  }
+  EXPECT_EQ(bus_->drive_state(5), DriveState::kOperationEnabled);
+  Enable(60);
+  EXPECT_EQ(Status(6), drive_feedback_t::DRIVE_ENABLED);
+}
+
 TEST_F(EthercatBus, MapsJointsSignsAndZeros) {
   DriveConfig& reversed = *bench_.master_config.mutable_drive(static_cast<int>(Slave(3)));
   reversed.set_reversed(true);

@@ -44,6 +44,7 @@ class Server {
 /// Starts twelve drives over real sockets, enables them, gives them torque, and stops them.
 void RunDrives(Link* master_link, Link* slaves_link) {
   EmulatedChainConfig chain_config = MakeChainConfig(12);
+  for (EmulatedDriveConfig& drive : *chain_config.mutable_drive()) drive.set_output_timeout(30'000);
   std::vector<TestLoad> loads(12);
   std::vector<MotorLoad*> pointers;
   for (TestLoad& load : loads) pointers.push_back(&load);
@@ -52,6 +53,9 @@ void RunDrives(Link* master_link, Link* slaves_link) {
   // A machine whose processors are taken may stop either side for a while: not what is tested.
   config.set_watchdog(6000);
   config.set_frame_timeout(2000);
+  config.set_eeprom_timeout(30'000);
+  config.set_mailbox_timeout(30'000);
+  config.set_state_timeout(30'000);
   Master master(master_link, config);
   {
     Server server(slaves_link, &chain);
