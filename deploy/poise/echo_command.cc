@@ -198,6 +198,7 @@ int EchoLog(const EchoOptions& options) {
     if (output.pending() > kLogBuffer) output.Write();
   }
   output.Write();
+  if (names.empty()) throw ConfigError(fmt::format("{}: holds no message at all", path));
   if (names.find(options.channel) == names.end()) {
     throw ConfigError(fmt::format("{}: holds no message of channel '{}'; {}", path, options.channel,
                                   Suggest(options.channel, {names.begin(), names.end()})));

@@ -164,6 +164,8 @@ TEST(WatchEndedRunTest, AnEndedRunIsReadFromItsLog) {
   ExpectUsageError({"echo", "ROBOT_STATE", "--run", run}, {"has ended", "--log"});
   ExpectUsageError({"echo", "ROBOT_STATE", "--run", run, "--log", run}, {"--log"});
   ExpectUsageError({"echo", "ROBOT_STAET", "--log", run}, {"did you mean ROBOT_STATE"});
+  std::ofstream(folder / "empty.lcm").flush();
+  ExpectUsageError({"echo", "ROBOT_STATE", "--log", folder / "empty.lcm"}, {"no message at all"});
   ExpectUsageError({"echo", "ROBOT_STATE", "tik", "--log", run}, {"did you mean tick"});
   ExpectUsageError({"echo", "ROBOT_STATE", "--log", run, "--rate", "0"}, {"--rate"});
   ExpectUsageError({"echo", "ROBOT_STATE", "--log", run, "--count", "0"}, {"--count"});
