@@ -79,9 +79,8 @@ std::string Printable(std::string_view text) { return Escape(text, "\\\""); }
 std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
   std::optional<std::string> first;
   if (tick) first = fmt::format("{}={}", kTick, *tick);
-  return Row(first, fields, ' ', [](const Scalar& field) {
-    return field.path + '=' + ShortValue(field);
-  });
+  return Row(first, fields, ' ',
+             [](const Scalar& field) { return field.path + '=' + ShortValue(field); });
 }
 
 std::string MessageBlock(std::string_view title, const std::vector<Scalar>& fields) {
