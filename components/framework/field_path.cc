@@ -235,6 +235,11 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
     }
     walked += (walked.empty() ? "" : ".") + step.name;
     const Reflection* reflection = level->GetReflection();
+    const bool is_message = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+    if (last && value.empty() && step.index < 0 && (field->is_repeated() || is_message)) {
+      reflection->ClearField(level, field);
+      return;
+    }
     int index = -1;
     if (field->is_repeated()) {
       const int size = reflection->FieldSize(*level, field);
@@ -250,7 +255,6 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
     } else if (step.index >= 0) {
       fail(fmt::format("{} is not a list; leave out the index", walked));
     }
-    const bool is_message = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
     if (last == is_message) {
       fail(last ? fmt::format("{} is a group of fields; name one of them: {}", walked,
                               fmt::join(FieldNames(*field->message_type()), ", "))

@@ -71,8 +71,18 @@ int CheckByName(const std::string& name) {
   const LoadedScenario loaded = LoadScenario(name, {});
   RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
   CheckRun(loaded, &spec);
-  fmt::print("{} with {}: {} components, {} channels, all good\n", loaded.files.file(),
-             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size());
+  std::string variants;
+  for (const Variant& variant : loaded.scenario.variant()) {
+    RunChanges changes;
+    changes.variant = variant.name();
+    const LoadedScenario changed = LoadScenario(name, changes);
+    RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
+    CheckRun(changed, &changed_spec);
+    variants += ", " + variant.name();
+  }
+  fmt::print("{} with {}: {} components, {} channels, all good{}\n", loaded.files.file(),
+             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(),
+             variants.empty() ? "" : "; variants too: " + variants.substr(2));
   ShowRun(spec);
   return kExitOk;
 }

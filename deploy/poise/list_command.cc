@@ -47,8 +47,14 @@ int List(const std::string& what) {
   if (wanted("scenarios")) {
     ListFiles("scenarios", [](const std::string& file) {
       const Scenario s = ScenarioFiles(file).Merged();
-      return fmt::format("{} ({} s{})", s.description(), s.duration(),
-                         s.has_paper_section() ? ", paper section " + s.paper_section() : "");
+      std::string text =
+          fmt::format("{} ({} s{})", s.description(), s.duration(),
+                      s.has_paper_section() ? ", paper section " + s.paper_section() : "");
+      for (const Variant& variant : s.variant()) {
+        text += fmt::format("\n      --variant {}: {}{}", variant.name(), variant.description(),
+                            variant.name() == s.reference() ? " (the reference)" : "");
+      }
+      return text;
     });
   }
   if (wanted("robots")) {

@@ -1,12 +1,12 @@
 #include "deploy/poise/report.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "components/framework/configuration.h"
-#include "deploy/poise/run_setup.h"
+#include "deploy/poise/scenario_loading.h"
+#include "deploy/poise/text_table.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
 
@@ -15,30 +15,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Number(double value) {
-  if (value == std::floor(value) && std::abs(value) < 1e15) return fmt::format("{:.0f}", value);
-  return std::abs(value) >= 1e4 ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
-}
-
-std::string WithUnit(double value, const std::string& unit) {
-  return unit.empty() ? Number(value) : Number(value) + " " + unit;
-}
-
-/// Columns that a UTF-8 text takes: its code points.
-size_t Width(const std::string& text) {
-  return static_cast<size_t>(std::count_if(text.begin(), text.end(), [](char c) {
-    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-  }));
-}
-
 std::string Limit(const CheckResult& check) {
   if (check.at_most && check.at_least) {
-    if (*check.at_most == *check.at_least) return "= " + WithUnit(*check.at_most, check.unit);
-    return fmt::format("{} … {}", Number(*check.at_least), WithUnit(*check.at_most, check.unit));
+    if (*check.at_most == *check.at_least) return "= " + FormatNumber(*check.at_most, check.unit);
+    return fmt::format("{} … {}", FormatNumber(*check.at_least),
+                       FormatNumber(*check.at_most, check.unit));
   }
-  if (check.at_most) return "≤ " + WithUnit(*check.at_most, check.unit);
-  if (check.at_least) return "≥ " + WithUnit(*check.at_least, check.unit);
+  if (check.at_most) return "≤ " + FormatNumber(*check.at_most, check.unit);
+  if (check.at_least) return "≥ " + FormatNumber(*check.at_least, check.unit);
   return "";
+}
+
+std::string EndOf(const RunOutcome& outcome) {
+  return outcome.message.empty() ? "planned end" : outcome.message;
 }
 
 Json Optional(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
@@ -114,33 +103,35 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
 }
 
 std::string FormatTable(const std::vector<CheckResult>& checks) {
-  using Row = std::array<std::string, 5>;
-  std::vector<Row> rows = {{"what", "measured", "limit", "paper", "verdict"}};
+  std::vector<std::vector<std::string>> rows = {{"what", "measured", "limit", "paper", "verdict"}};
   for (const CheckResult& check : checks) {
-    rows.push_back({check.label, check.measured ? WithUnit(*check.measured, check.unit) : "none",
-                    Limit(check), check.paper,
+    rows.push_back({check.label, FormatMeasured(check), Limit(check), check.paper,
                     !check.limited() ? ""
                     : check.passed   ? "ok"
                                      : "FAILED"});
   }
-  std::array<size_t, 5> widths{};
-  for (const Row& row : rows) {
-    for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], Width(row[i]));
-  }
-  std::string text;
-  for (size_t r = 0; r < rows.size(); ++r) {
-    std::string line;
-    for (size_t i = 0; i < widths.size(); ++i) {
-      if (i > 0) line += "  ";
-      line += rows[r][i] + std::string(widths[i] - Width(rows[r][i]), ' ');
+  return FormatColumns(rows);
+}
+
+std::string FormatMeasured(const CheckResult& check) {
+  return check.measured ? FormatNumber(*check.measured, check.unit) : "none";
+}
+
+std::string FormatEvents(const std::vector<logging::Event>& events) {
+  constexpr size_t kFirst = 30;
+  constexpr size_t kLast = 10;
+  std::string text = events.empty() ? "" : "Events:\n";
+  size_t width = 0;
+  for (const logging::Event& event : events) width = std::max(width, event.name.size());
+  for (size_t i = 0; i < events.size(); ++i) {
+    if (events.size() > kFirst + kLast + 1 && i == kFirst) {
+      const size_t hidden = events.size() - kFirst - kLast;
+      text += fmt::format("  ... {} more, all of them in summary.json ...\n", hidden);
+      i += hidden;
     }
-    line.erase(line.find_last_not_of(' ') + 1);
-    text += line + "\n";
-    if (r > 0) continue;
-    for (size_t i = 0; i < widths.size(); ++i) {
-      for (size_t k = 0; k < widths[i]; ++k) text += "─";
-      text += i + 1 < widths.size() ? "  " : "\n";
-    }
+    std::string name = events[i].name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    text += fmt::format("  {:7.3f} s  {:<{}}  {}\n", events[i].time, name, width, events[i].detail);
   }
   return text;
 }
@@ -169,6 +160,14 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
     const size_t space = library.find(' ');
     json["versions"][library.substr(0, space)] =
         library.substr(std::min(space, library.size() - 1) + 1);
+  }
+  json["variant"] =
+      scenario.applied().has_variant() ? Json(scenario.applied().variant()) : Json(nullptr);
+  json["ablations"] = Json::array();
+  for (const std::string& flag : scenario.applied().ablation()) json["ablations"].push_back(flag);
+  json["changes"] = Json::array();
+  for (const Applied::Change& change : scenario.applied().change()) {
+    json["changes"].push_back({{"by", change.by()}, {"set", change.set()}});
   }
   json["realtime"] = run.spec.realtime();
   json["seed"] = run.spec.seed();
@@ -231,15 +230,28 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
 }
 
 std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
-                        const RunOutcome& outcome, const std::string& mode,
-                        const std::vector<CheckResult>& checks, bool passed) {
-  Json json = RunJson(scenario, run, checks);
-  json["mode"] = mode;
+                        const RunSummary& summary) {
+  const RunOutcome& outcome = summary.outcome;
+  Json json = RunJson(scenario, run, summary.checks);
+  json["mode"] = summary.mode;
   json["wall_time"] = outcome.wall_time;
-  json["passed"] = passed;
-  json["end"] = outcome.message.empty() ? "planned end" : outcome.message;
+  json["passed"] = summary.passed;
+  json["end"] = EndOf(outcome);
+  json["completed"] = outcome.completed;
   json["interrupted"] = outcome.interrupted;
+  json["reference"] = nullptr;
+  if (summary.reference) {
+    json["reference"] = {{"variant", scenario.reference()},
+                         {"end", EndOf(*summary.reference)},
+                         {"completed", summary.reference->completed},
+                         {"log", "reference/run.lcm"}};
+  }
   json["launcher"]["refused"] = outcome.refused;
+  json["events"] = Json::array();
+  for (const logging::Event& event : summary.events) {
+    json["events"].push_back(
+        {{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
+  }
   // Names and texts of a log may hold any bytes.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

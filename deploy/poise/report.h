@@ -8,6 +8,7 @@
 
 #include "deploy/poise/run_outcome.h"
 #include "deploy/poise/scenario.pb.h"
+#include "logging/events.h"
 #include "logging/run_record.h"
 
 namespace poise {
@@ -35,6 +36,10 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
 
 /// Columns what, measured, limit, paper, verdict.
 std::string FormatTable(const std::vector<CheckResult>& checks);
+/// "12.3 mm", or "none".
+std::string FormatMeasured(const CheckResult& check);
+/// A line each; of a long list the first and the last ones.
+std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);
 
@@ -42,9 +47,18 @@ std::string FormatAssumptions(const Scenario& scenario);
 nlohmann::ordered_json RunJson(const Scenario& scenario, const logging::RunRecord& run,
                                const std::vector<CheckResult>& checks);
 
-/// All that summary.json says. `outcome` of the run just ended.
+/// What a run came to.
+struct RunSummary {
+  std::string mode;  ///< "processes" or "inline"
+  RunOutcome outcome;
+  std::optional<RunOutcome> reference;  ///< of the reference variant's run
+  std::vector<CheckResult> checks;
+  std::vector<logging::Event> events;
+  bool passed = false;
+};
+
+/// All that summary.json says.
 std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
-                        const RunOutcome& outcome, const std::string& mode,
-                        const std::vector<CheckResult>& checks, bool passed);
+                        const RunSummary& summary);
 
 }  // namespace poise

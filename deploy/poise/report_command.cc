@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <memory>
 
 #include "components/framework/configuration.h"
@@ -5,6 +6,7 @@
 #include "deploy/poise/html_report.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
+#include "deploy/poise/scenario_run.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -22,7 +24,11 @@ ReportedRun ReadReportedRun(const std::string& run) {
   result.log = FindLog(run).string();
   result.record = logging::ReadRun(result.log);
   ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
-  result.record.first_tick = FirstCheckedTick(result.scenario, result.record);
+  ReadReference(result.log, result.scenario, &result.record);
+  if (result.scenario.has_reference() && result.record.reference == nullptr) {
+    fmt::print(stderr, "warning: {}: is missing; what compares with it has no value\n",
+               (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
+  }
   result.checks = EvaluateChecks(result.scenario, result.record);
   return result;
 }
@@ -39,9 +45,10 @@ int Report(const ReportOptions& options) {
   runs.push_back(ReadReportedRun(options.run));
   if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
   const ReportedRun& run = runs.front();
-  fmt::print("{} of {}, poise {}\n\n{}\n{}", run.record.spec.scenario(), run.record.info.started_at,
-             run.record.spec.poise_version(), FormatTable(run.checks),
-             FormatAssumptions(run.scenario));
+  fmt::print("{} of {}, poise {}\n{}\n{}\n{}{}", run.record.spec.scenario(),
+             run.record.info.started_at, run.record.spec.poise_version(),
+             FormatChanges(run.scenario), FormatTable(run.checks),
+             FormatEvents(logging::Events(run.record)), FormatAssumptions(run.scenario));
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);

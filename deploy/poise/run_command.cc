@@ -1,111 +1,62 @@
-#include <google/protobuf/text_format.h>
-
 #include <cstdio>
 #include <memory>
 
-#include "components/framework/run.h"
+#include "deploy/poise/ablations.h"
 #include "deploy/poise/cli_checks.h"
 #include "deploy/poise/commands.h"
-#include "deploy/poise/inline_run.h"
-#include "deploy/poise/launcher.h"
-#include "deploy/poise/report.h"
-#include "deploy/poise/run_dir.h"
-#include "deploy/poise/run_setup.h"
-#include "deploy/poise/signals.h"
+#include "deploy/poise/scenario_run.h"
+#include "deploy/poise/several_runs.h"
 #include "fmt/format.h"
 
 namespace poise {
 namespace {
 
-namespace fs = std::filesystem;
-
-struct RunOptions {
-  std::string scenario = "push_double_support";
+struct RunArguments {
+  std::vector<std::string> scenarios = {"push_double_support"};
   std::string out;
-  RunChanges changes;
-  bool in_process = false;
-  bool quiet = false;
+  RunOptions options;
+  bool no_reference = false;
 };
 
-RunOutcome RunGraph(const RunOptions& options, const LoadedScenario& loaded, const fs::path& dir,
-                    const RunSpec& spec) {
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(spec, &text);
-  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
-                          (dir / "run_spec.pbtxt").string(), (dir / "scenario.pbtxt").string()};
-  WriteFile(files.spec_file, text);
-  WriteFile(files.scenario_file, ScenarioText(loaded.scenario));
-  CatchStopSignals();
-  Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), options.quiet);
-  if (options.in_process) {
-    return RunInline(spec, ScenarioText(loaded.scenario), dir / "run.lcm", &progress);
+int Run(RunArguments arguments) {
+  arguments.options.changes.reference = !arguments.no_reference;
+  const std::vector<std::string>& names = arguments.scenarios;
+  if (names.size() == 1 && names.front() != kAllScenarios) {
+    const RunResult result = ScenarioRun(names.front(), arguments.options).Run(arguments.out);
+    return result.summary.passed ? kExitOk : kExitFailed;
   }
-  return Launcher(spec, files, &progress).Run();
-}
-
-int Run(const RunOptions& options) {
-  const LoadedScenario loaded = LoadScenario(options.scenario, options.changes);
-  std::vector<std::string> warnings;
-  RunSpec spec = MakeRunSpec(loaded, options.changes, &warnings);
-  spec.set_recorded(!options.in_process);
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
-  CheckRun(loaded, &spec);
-  if (!options.in_process) ChoosePorts(&spec);
-  const fs::path dir = MakeRunDir(options.out, spec.scenario());
-  if (!options.quiet) {
-    fmt::print("{}: {}\n", spec.scenario(), loaded.scenario.description());
-    fmt::print("{} s at {} Hz, {}; seed {}; run {}{}\n", loaded.scenario.duration(),
-               loaded.scenario.tick_rate(),
-               options.in_process
-                   ? "in one process"
-                   : fmt::format("{} processes and the recorder", spec.graph().component_size()),
-               spec.seed(), spec.run_id(),
-               options.in_process ? "" : fmt::format("; listen at {}", MirrorUrl(spec)));
-    std::fflush(stdout);
-  }
-
-  const RunOutcome outcome = RunGraph(options, loaded, dir, spec);
-  if (!outcome.message.empty()) {
-    fmt::print(stderr, "poise: {}: {}\n", outcome.completed ? "run ended" : "run failed",
-               outcome.message);
-    for (const std::string& line : outcome.details) fmt::print(stderr, "  {}\n", line);
-  }
-  const fs::path log = dir / "run.lcm";
-  if (!fs::exists(log)) return kExitFailed;  // the recorder never came to start
-  logging::RunRecord record = logging::ReadRun(log);
-  if (outcome.wall_time > 0) {
-    record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
-  }
-  record.first_tick = FirstCheckedTick(loaded.scenario, record);
-  const std::vector<CheckResult> checks = EvaluateChecks(loaded.scenario, record);
-  bool passed = outcome.completed;
-  for (const CheckResult& check : checks) passed = passed && check.passed;
-  WriteFile(dir / "summary.json",
-            SummaryJson(loaded.scenario, record, outcome,
-                        options.in_process ? "inline" : "processes", checks, passed));
-  if (!options.quiet) {
-    fmt::print("\n{}\n{}", FormatTable(checks), FormatAssumptions(loaded.scenario));
-    fmt::print("\n{:.3f} s simulated in {:.2f} s, {:.1f} x real time; {}\n",
-               record.time(record.num_ticks), outcome.wall_time,
-               record.real_time_factor.value_or(0), dir.string());
-  }
-  fmt::print("{}\n", passed ? "passed" : "FAILED");
-  return passed ? kExitOk : kExitFailed;
+  return RunSeveral(names, arguments.options, arguments.out) ? kExitOk : kExitFailed;
 }
 
 }  // namespace
 
 void AddRunCommand(CLI::App* app, Command* command) {
-  auto options = std::make_shared<RunOptions>();
-  CLI::App* run = app->add_subcommand("run", "run a scenario and check it");
-  run->add_option("scenario", options->scenario, "name (poise list scenarios) or .pbtxt file")
+  auto arguments = std::make_shared<RunArguments>();
+  RunOptions* const options = &arguments->options;
+  CLI::App* run = app->add_subcommand("run", "run scenarios and check them");
+  run->add_option("scenario", arguments->scenarios,
+                  "names (poise list scenarios) or .pbtxt files; all: every experiment of the "
+                  "paper, by section, with an overview")
       ->capture_default_str();
-  run->add_option("--out", options->out, "folder of the run; default: a dated one under runs/");
+  run->add_option("--out", arguments->out,
+                  "folder of the run (of several: holds a folder each); default: a dated one under "
+                  "runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
   run->add_flag("--realtime", options->changes.realtime, "pace the ticks with the wall clock");
+  run->add_option("--variant", options->changes.variant,
+                  "run this variant of the scenario (poise list scenarios)");
+  run->add_option("--without", options->changes.without, "leave out a part of the controller")
+      ->check(CLI::IsMember(RemovableParts()))
+      ->allow_extra_args(false)
+      ->take_all();
+  run->add_flag("--ideal", options->changes.ideal,
+                "a robot without joint friction, sensor noise, drive train and model error");
+  run->add_flag("--no-reference", arguments->no_reference,
+                "do not run the scenario's reference variant beside it");
   run->add_option("--set", options->changes.set,
-                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120")
+                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120; "
+                  "no value: empties a list or group")
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)
       ->take_all();
@@ -121,7 +72,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
       ->excludes(in_process);
   run->add_flag("--quiet", options->quiet, "only errors and the verdict");
-  run->callback([options, command] { *command = [options] { return Run(*options); }; });
+  run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });
 }
 
 }  // namespace poise

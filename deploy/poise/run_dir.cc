@@ -38,7 +38,7 @@ void Lock(const fs::path& dir) {
 
 fs::path RunsDir() { return DeployDir().parent_path() / "runs"; }
 
-fs::path MakeRunDir(const std::string& out, const std::string& scenario) {
+fs::path MakeRunDir(const std::string& out, const std::string& name) {
   std::error_code error;
   if (!out.empty()) {
     const fs::path dir = fs::absolute(out);
@@ -48,22 +48,35 @@ fs::path MakeRunDir(const std::string& out, const std::string& scenario) {
                                     error ? error.message() : "there is a file of that name"));
     }
     Lock(dir);
-    for (const char* file : kFiles) fs::remove(dir / file, error);
+    for (const char* file : kFiles) {
+      fs::remove(dir / file, error);
+      fs::remove(ReferenceDir(dir) / file, error);
+    }
+    fs::remove(ReferenceDir(dir), error);  // if it is empty
     return dir;
   }
-  const std::string name =
-      fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), scenario);
+  const std::string dated =
+      fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), name);
   fs::create_directories(RunsDir(), error);
   for (int i = 1; i < 1000 && !error; ++i) {
-    const fs::path dir = RunsDir() / (i == 1 ? name : fmt::format("{}-{}", name, i));
+    const fs::path dir = RunsDir() / (i == 1 ? dated : fmt::format("{}-{}", dated, i));
     if (!fs::create_directory(dir, error)) continue;
     Lock(dir);
-    fs::remove(RunsDir() / "latest", error);
-    fs::create_directory_symlink(dir.filename(), RunsDir() / "latest", error);
+    PointLatestTo(dir);
     return dir;
   }
   throw ConfigError(fmt::format("{}: cannot be made: {}; choose another folder with --out",
-                                (RunsDir() / name).string(), error.message()));
+                                (RunsDir() / dated).string(), error.message()));
+}
+
+fs::path ReferenceDir(const fs::path& dir) { return dir / "reference"; }
+
+void PointLatestTo(const fs::path& dir) {
+  const fs::path target = dir.lexically_relative(RunsDir());
+  if (target.empty() || *target.begin() == "..") return;
+  std::error_code error;  // a convenience: a run is good without it
+  fs::remove(RunsDir() / "latest", error);
+  fs::create_directory_symlink(target, RunsDir() / "latest", error);
 }
 
 fs::path FindLog(const std::string& run) {

@@ -12,9 +12,15 @@ namespace poise {
 std::filesystem::path RunsDir();
 
 /// Makes the run's folder: `out`, from which an earlier run's files are removed, or, when empty, a
-/// new one under runs/ named after date and scenario, to which runs/latest then points. Throws
+/// new one under runs/ named after date and `name`, to which runs/latest then points. Throws
 /// ConfigError.
-std::filesystem::path MakeRunDir(const std::string& out, const std::string& scenario);
+std::filesystem::path MakeRunDir(const std::string& out, const std::string& name);
+
+/// In a run's folder, the folder of the run that it is compared with.
+std::filesystem::path ReferenceDir(const std::filesystem::path& dir);
+
+/// Lets runs/latest point to `dir`, a folder below runs/; does nothing for one elsewhere.
+void PointLatestTo(const std::filesystem::path& dir);
 
 /// The log that `run` means: a folder of a run, a log, or, when empty, the latest run under runs/.
 /// Throws ConfigError.

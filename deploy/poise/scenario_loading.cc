@@ -3,6 +3,7 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 
 #include "components/framework/configuration.h"
@@ -18,6 +19,14 @@ namespace fs = std::filesystem;
 
 constexpr double kMinRate = 50;     // Hz
 constexpr double kMaxRate = 10000;  // Hz
+constexpr char kSetFlag[] = "--set";
+
+std::string VariantLabel(const Variant& variant) { return "variant " + variant.name(); }
+
+std::string NoVariant(const std::string& name, const std::vector<std::string>& names) {
+  return names.empty() ? "the scenario has no variants"
+                       : fmt::format("no variant named '{}'; {}", name, Suggest(name, names));
+}
 
 void CheckScenario(const LoadedScenario& loaded) {
   const Scenario& s = loaded.scenario;
@@ -50,7 +59,8 @@ void CheckScenario(const LoadedScenario& loaded) {
   }
   for (int i = 0; i < s.assumption_size(); ++i) {
     const Assumption& assumption = s.assumption(i);
-    if (!HasField(s, assumption.field())) {
+    // As the files have it: an ablation may have cleared what the assumption is about.
+    if (!HasField(s, assumption.field()) && !HasField(loaded.files.Merged(), assumption.field())) {
       fail(fmt::format("assumption[{}].field", i),
            fmt::format("the scenario sets no field '{}'", assumption.field()));
     }
@@ -58,6 +68,83 @@ void CheckScenario(const LoadedScenario& loaded) {
       fail(fmt::format("assumption[{}].kind", i), "must be \"fitted\" or \"assumed\"");
     }
   }
+}
+
+std::string PathOf(const FieldChange& change) { return change.set.substr(0, change.set.find('=')); }
+
+bool HasOwnChecks(const LoadedScenario& loaded) {
+  return loaded.variant && loaded.variant->check_size() > 0;
+}
+
+/// The line of an error in `field`, to which `change` gave its value.
+std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
+                     std::string_view field, std::string_view problem) {
+  if (change.by == kSetFlag) return fmt::format("{} {}: {}", change.by, field, problem);
+  if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) {
+    return fmt::format("{}: {}: {}", change.by, field, problem);
+  }
+  int i = loaded.variant->set_size() - 1;
+  while (i > 0 && loaded.variant->set(i) != change.set) --i;
+  const FieldPlace place =
+      loaded.files.Locate(fmt::format("variant[{}].set[{}]", loaded.variant_index, i));
+  return fmt::format("{}:{}: {}: {}: {}", place.file, place.line, place.field, field, problem);
+}
+
+void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
+  const size_t equals = change.set.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw ConfigError(Describe(*loaded, change, change.set, "must be field.path=value"));
+  }
+  const std::string path = change.set.substr(0, equals);
+  try {
+    SetField(&loaded->scenario, path, change.set.substr(equals + 1));
+  } catch (const ConfigError& error) {
+    throw ConfigError(Describe(*loaded, change, error.field(), error.problem()));
+  }
+  loaded->changes.push_back(change);
+}
+
+std::vector<std::string> VariantNames(const Scenario& scenario) {
+  std::vector<std::string> names;
+  for (const Variant& variant : scenario.variant()) names.push_back(variant.name());
+  return names;
+}
+
+/// Their names, and that of the reference.
+void CheckVariants(const LoadedScenario& loaded) {
+  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  for (size_t i = 0; i < names.size(); ++i) {
+    const auto fail = [&](const std::string& problem) {
+      FailField(loaded, fmt::format("variant[{}].name", i), problem);
+    };
+    const auto good = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
+    if (names[i].empty() || !std::all_of(names[i].begin(), names[i].end(), good)) {
+      fail(fmt::format("is '{}'; use letters, digits, _ and -", names[i]));
+    }
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
+        names.begin() + static_cast<std::ptrdiff_t>(i)) {
+      fail(fmt::format("there are two variants named '{}'", names[i]));
+    }
+  }
+  const std::string& reference = loaded.scenario.reference();
+  if (loaded.scenario.has_reference() &&
+      std::find(names.begin(), names.end(), reference) == names.end()) {
+    FailField(loaded, "reference", NoVariant(reference, names));
+  }
+}
+
+void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
+  const std::vector<std::string> names = VariantNames(loaded->scenario);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw ConfigError(
+        fmt::format("--variant {}: {}: {}", name, loaded->files.file(), NoVariant(name, names)));
+  }
+  loaded->variant_index = static_cast<int>(found - names.begin());
+  loaded->variant = loaded->scenario.variant(loaded->variant_index);
+  const Variant& variant = *loaded->variant;
+  for (const std::string& set : variant.set()) ApplyChange({set, VariantLabel(variant)}, loaded);
+  if (variant.check_size() > 0) *loaded->scenario.mutable_check() = variant.check();
 }
 
 /// File of deploy/`kind` that the scenario's `field` names.
@@ -73,41 +160,73 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
 }  // namespace
 
 void FailField(const LoadedScenario& loaded, std::string_view field, std::string_view problem) {
-  const auto set_by = [&](const std::string& path) {
-    return field == path || field.starts_with(path + ".") || path.starts_with(std::string(field));
+  const auto concerns = [&](const std::string& path) {
+    return field == path || field.starts_with(path + ".") || field.starts_with(path + "[") ||
+           path.starts_with(std::string(field));
   };
-  if (std::any_of(loaded.changed.begin(), loaded.changed.end(), set_by)) {
-    throw ConfigError(fmt::format("--set {}: {}", field, problem));
+  // The last one counts.
+  for (auto change = loaded.changes.rbegin(); change != loaded.changes.rend(); ++change) {
+    if (concerns(PathOf(*change))) throw ConfigError(Describe(loaded, *change, field, problem));
   }
-  const FieldPlace place = loaded.files.Locate(field);
+  std::string written(field);
+  if (HasOwnChecks(loaded) && field.starts_with("check[")) {
+    written = fmt::format("variant[{}].{}", loaded.variant_index, field);
+  }
+  const FieldPlace place = loaded.files.Locate(written);
   if (place.line == 0) throw ConfigError(fmt::format("{}: {}: {}", place.file, field, problem));
   throw ConfigError(fmt::format("{}:{}: {}: {}", place.file, place.line, place.field, problem));
 }
 
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
   LoadedScenario loaded(FindFile("scenarios", name, fs::current_path()));
-  for (const std::string& change : changes.set) {
-    const size_t equals = change.find('=');
-    if (equals == std::string::npos || equals == 0) {
-      throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
-    }
-    const std::string path = change.substr(0, equals);
-    try {
-      SetField(&loaded.scenario, path, change.substr(equals + 1));
-    } catch (const ConfigError& error) {
-      throw ConfigError(fmt::format("--set {}", error.what()));
-    }
-    loaded.changed.push_back(path);
+  Scenario* const scenario = &loaded.scenario;
+  CheckVariants(loaded);
+  for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
+    ApplyChange(change, &loaded);
   }
+  if (!changes.variant.empty()) ApplyVariant(changes.variant, &loaded);
+  for (const std::string& set : changes.set) ApplyChange({set, kSetFlag}, &loaded);
   if (changes.duration) {
-    loaded.scenario.set_duration(*changes.duration);
-    loaded.changed.push_back("duration");
+    ApplyChange({fmt::format("duration={}", *changes.duration), "--duration"}, &loaded);
   }
-  if (changes.seed) loaded.scenario.set_seed(*changes.seed);
+  if (changes.seed) ApplyChange({fmt::format("seed={}", *changes.seed), "--seed"}, &loaded);
+  if (!changes.reference || HasOwnChecks(loaded) || changes.variant == scenario->reference()) {
+    scenario->clear_reference();
+  }
   CheckScenario(loaded);
-  loaded.graph_file = Resolve(loaded, "graphs", "graph", loaded.scenario.graph());
-  loaded.robot_file = Resolve(loaded, "robots", "robot", loaded.scenario.robot());
+  loaded.graph_file = Resolve(loaded, "graphs", "graph", scenario->graph());
+  loaded.robot_file = Resolve(loaded, "robots", "robot", scenario->robot());
+  Applied* const applied = scenario->mutable_applied();
+  applied->Clear();
+  if (!changes.variant.empty()) applied->set_variant(changes.variant);
+  for (const std::string& part : changes.without) applied->add_ablation("--without " + part);
+  if (changes.ideal) applied->add_ablation("--ideal");
+  for (const FieldChange& change : loaded.changes) {
+    Applied::Change* const entry = applied->add_change();
+    entry->set_by(change.by);
+    entry->set_set(change.set);
+  }
   return loaded;
+}
+
+RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes) {
+  RunChanges reference = changes;
+  reference.variant = loaded.scenario.reference();
+  reference.realtime = false;
+  reference.drop_rate = 0;
+  return reference;
+}
+
+std::string FormatChanges(const Scenario& scenario) {
+  std::string text;
+  std::string by;
+  for (const Applied::Change& change : scenario.applied().change()) {
+    const bool same = !text.empty() && change.by() == by;
+    text += same ? ", " : fmt::format("{}{}: ", text.empty() ? "" : "\n", change.by());
+    text += change.set();
+    by = change.by();
+  }
+  return text.empty() ? "" : text + "\n";
 }
 
 std::string ScenarioText(const Scenario& scenario) {

@@ -8,13 +8,18 @@
 #include <string_view>
 #include <vector>
 
+#include "deploy/poise/ablations.h"
 #include "deploy/poise/scenario.pb.h"
 #include "deploy/poise/scenario_files.h"
 
 namespace poise {
 
-/// What the command line changes.
+/// What the command line changes, in this order: ablations, the variant, single fields.
 struct RunChanges {
+  std::vector<std::string> without;  ///< of RemovableParts()
+  bool ideal = false;
+  std::string variant;             ///< of the scenario; empty: none
+  bool reference = true;           ///< false: the scenario's reference variant is not run
   std::vector<std::string> set;    ///< "field.path=value", as SetField takes them, in order
   std::optional<double> duration;  ///< s
   std::optional<uint64_t> seed;
@@ -28,15 +33,25 @@ struct LoadedScenario {
       : files(file), scenario(files.Merged()) {}
 
   ScenarioFiles files;
-  Scenario scenario;                 ///< merged, with the changes
-  std::vector<std::string> changed;  ///< paths of the fields that --set changed
+  /// Merged, with the changes. `reference` is empty when none is to be run.
+  Scenario scenario;
+  std::vector<FieldChange> changes;  ///< in order
+  std::optional<Variant> variant;    ///< the one that was chosen, as the file has it
+  int variant_index = -1;            ///< its place in the file's list
   std::string graph_file;
   std::string robot_file;
 };
 
-/// Reads and checks the scenario itself: bases, duration, rate, metrics and limits of its checks,
-/// assumptions that name fields. Throws ConfigError, "file:line: field: problem; what to do".
+/// Reads and checks the scenario itself: bases, variants' names, duration, rate, metrics and limits
+/// of its checks, assumptions that name fields. Throws ConfigError, "file:line: field: problem;
+/// what to do".
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes);
+
+/// The same changes for the scenario's reference variant. Precondition: the scenario has one.
+RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes);
+
+/// A line for each flag and the variant: what they changed.
+std::string FormatChanges(const Scenario& scenario);
 
 /// Throws the ConfigError of a value of the scenario: with file and line of `field`, a path in the
 /// merged scenario, or with the flag that changed it.

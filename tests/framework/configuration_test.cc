@@ -132,6 +132,21 @@ TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
   }
 }
 
+TEST(SetField, AnEmptyTextClearsAListOrAGroup) {
+  ToyConfig config;
+  ParseTextProto("gains { kp: 3 } phase { kp: 8 } phase { kp: 9 } weight: 3 label: 'x'", "config",
+                 &config);
+  SetField(&config, "gains", "");
+  SetField(&config, "phase", "");
+  SetField(&config, "weight", "");
+  SetField(&config, "label", "");
+  ToyConfig expected;
+  ParseTextProto("label: ''", "expected", &expected);
+  EXPECT_EQ(config.DebugString(), expected.DebugString());
+  // A single element is no list.
+  EXPECT_NE(SetError("phase[0]", "").find("group of fields"), std::string::npos);
+}
+
 TEST(SetField, AFailedAppendLeavesTheListAsItWas) {
   ToyConfig config;
   EXPECT_NE(ErrorOf([&] { SetField(&config, "weight[0]", "heavy"); }), "no error");

@@ -44,9 +44,8 @@ TEST(Fall, ThePapersPushFellsTheRobotOnlyWithoutBalancing) {
   const ProgramResult with =
       RunPoise({"run", "push_double_support", "--inline", "--out", folder / "with"});
   EXPECT_EQ(with.exit_code, 0) << with.output;
-  const ProgramResult without =
-      RunPoise({"run", "push_double_support", "--inline", "--out", folder / "without", "--set",
-                "contact_wrench_monitor.balancing=false"});
+  const ProgramResult without = RunPoise({"run", "push_double_support", "--inline", "--out",
+                                          folder / "without", "--without", "balancing"});
   EXPECT_EQ(without.exit_code, 1) << without.output;
   EXPECT_NE(without.output.find("the robot fell"), std::string::npos) << without.output;
 }

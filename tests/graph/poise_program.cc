@@ -88,6 +88,24 @@ RunFolder::~RunFolder() {
   fs::remove_all(path_, ignored);
 }
 
+TestDeploy::TestDeploy() {
+  fs::create_directories(folder_ / "deploy/scenarios/base");
+  for (const char* kind : {"robots", "graphs"}) {
+    fs::create_directory_symlink(fs::path(POISE_SOURCE_DIR) / "deploy" / kind,
+                                 fs::path(folder_ / "deploy") / kind);
+  }
+  fs::copy_file(StandScenario(), folder_ / "deploy/scenarios/base/stand.pbtxt");
+  setenv("POISE_DEPLOY_DIR", (folder_ / "deploy").c_str(), 1);
+}
+
+TestDeploy::~TestDeploy() { unsetenv("POISE_DEPLOY_DIR"); }
+
+std::string TestDeploy::Scenario(const std::string& name, const std::string& text) const {
+  const std::string file = folder_ / ("deploy/scenarios/" + name + ".pbtxt");
+  std::ofstream(file) << text;
+  return file;
+}
+
 std::string StandScenario() { return POISE_SOURCE_DIR "/tests/graph/data/stand.pbtxt"; }
 
 nlohmann::json ReadSummary(const std::string& run) {

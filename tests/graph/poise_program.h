@@ -56,6 +56,22 @@ class RunFolder {
   std::filesystem::path path_;
 };
 
+/// A deploy folder of its own for the programs that this process starts while it lives: the robots
+/// and graphs of the house, its own scenarios, of which base/stand is StandScenario(), and its own
+/// runs.
+class TestDeploy {
+ public:
+  TestDeploy();
+  ~TestDeploy();
+  /// Writes scenarios/`name`.pbtxt and returns the file.
+  std::string Scenario(const std::string& name, const std::string& text) const;
+  std::string runs() const { return folder_ / "runs"; }
+  std::string operator/(const std::string& name) const { return folder_ / name; }
+
+ private:
+  RunFolder folder_;
+};
+
 /// The scenario "stand" of these tests.
 std::string StandScenario();
 

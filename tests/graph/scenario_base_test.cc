@@ -171,22 +171,15 @@ TEST_F(ScenarioBaseTest, AnAssumptionMayNameAFieldOfEitherFile) {
   ExpectRefused(File("derived"), {File("derived") + ":2: assumption[0].field", "backlash"});
 }
 
-TEST_F(ScenarioBaseTest, FilesInBaseAreNotOfferedToRun) {
-  std::filesystem::create_directories(folder_ / "deploy/scenarios");
-  for (const char* kind : {"robots", "graphs"}) {
-    std::filesystem::create_directory_symlink(POISE_SOURCE_DIR "/deploy/" + std::string(kind),
-                                              folder_ / "deploy" + "/" + kind);
-  }
-  std::filesystem::rename(folder_ / "base", folder_ / "deploy/scenarios/base");
-  Write("deploy/scenarios/mine", "base: \"base/robot\"\ndescription: \"derived from it\"\n");
-  setenv("POISE_DEPLOY_DIR", (folder_ / "deploy").c_str(), 1);
+TEST(ScenarioBase, FilesInBaseAreNotOfferedToRun) {
+  const TestDeploy deploy;
+  deploy.Scenario("mine", "base: \"base/stand\"\ndescription: \"derived from it\"\n");
   const ProgramResult list = RunPoise({"list", "scenarios"});
   EXPECT_NE(list.output.find("mine"), std::string::npos) << list.output;
   EXPECT_NE(list.output.find("derived from it (0.4 s)"), std::string::npos) << list.output;
   EXPECT_EQ(list.output.find("base/"), std::string::npos) << list.output;
-  ExpectUsageError({"run", "base/robot"}, {"no scenario named 'base/robot'", "mine"});
+  ExpectUsageError({"run", "base/stand"}, {"no scenario named 'base/stand'", "mine"});
   EXPECT_EQ(RunPoise({"graph", "check", "mine"}).exit_code, 0);
-  unsetenv("POISE_DEPLOY_DIR");
 }
 
 }  // namespace

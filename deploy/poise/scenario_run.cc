@@ -1,0 +1,141 @@
+#include "deploy/poise/scenario_run.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "components/framework/run.h"
+#include "deploy/poise/inline_run.h"
+#include "deploy/poise/launcher.h"
+#include "deploy/poise/run_dir.h"
+#include "deploy/poise/run_setup.h"
+#include "deploy/poise/signals.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+void PrintEnd(const std::string& what, const RunOutcome& outcome) {
+  if (outcome.message.empty()) return;
+  fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
+             outcome.message);
+  for (const std::string& line : outcome.details) fmt::print(stderr, "  {}\n", line);
+}
+
+}  // namespace
+
+ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
+    : options_(options), main_(Prepare(scenario, options.changes, options.in_process, true)) {
+  if (!main_.loaded.scenario.has_reference()) return;
+  reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
+                       /*in_process=*/true, false);
+}
+
+ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunChanges& changes,
+                                       bool in_process, bool warn) const {
+  Part part{LoadScenario(scenario, changes), {}};
+  std::vector<std::string> warnings;
+  part.spec = MakeRunSpec(part.loaded, changes, &warnings);
+  part.spec.set_recorded(!in_process);
+  if (warn) {
+    for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  }
+  CheckRun(part.loaded, &part.spec);
+  return part;
+}
+
+RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process,
+                                bool quiet) const {
+  const RunSpec& spec = part.spec;
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(spec, &text);
+  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
+                          (dir / "run_spec.pbtxt").string(), (dir / "scenario.pbtxt").string()};
+  const std::string scenario_text = ScenarioText(part.loaded.scenario);
+  WriteFile(files.spec_file, text);
+  WriteFile(files.scenario_file, scenario_text);
+  Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), quiet);
+  if (in_process) return RunInline(spec, scenario_text, dir / "run.lcm", &progress);
+  return Launcher(spec, files, &progress).Run();
+}
+
+void ScenarioRun::PrintHeading() const {
+  const Scenario& scenario = main_.loaded.scenario;
+  const RunSpec& spec = main_.spec;
+  fmt::print("{}: {}\n", spec.scenario(), scenario.description());
+  if (main_.loaded.variant && main_.loaded.variant->has_description()) {
+    fmt::print("variant {}: {}\n", main_.loaded.variant->name(),
+               main_.loaded.variant->description());
+  }
+  fmt::print("{}", FormatChanges(scenario));
+  if (reference_) {
+    fmt::print("compared with variant {}, which runs first, in one process\n",
+               scenario.reference());
+  }
+  fmt::print("{} s at {} Hz, {}; seed {}; run {}{}\n", scenario.duration(), scenario.tick_rate(),
+             options_.in_process
+                 ? "in one process"
+                 : fmt::format("{} processes and the recorder", spec.graph().component_size()),
+             spec.seed(), spec.run_id(),
+             options_.in_process ? "" : fmt::format("; listen at {}", MirrorUrl(spec)));
+  std::fflush(stdout);
+}
+
+RunResult ScenarioRun::Run(const std::string& out) {
+  const Scenario& scenario = main_.loaded.scenario;
+  if (!options_.in_process) ChoosePorts(&main_.spec);
+  RunResult result;
+  result.dir = MakeRunDir(out, name());
+  if (!options_.quiet) PrintHeading();
+  CatchStopSignals();
+  RunSummary& summary = result.summary;
+  summary.mode = options_.in_process ? "inline" : "processes";
+  if (reference_) {
+    const fs::path dir = MakeRunDir(ReferenceDir(result.dir).string(), name());
+    summary.reference = RunPart(*reference_, dir, /*in_process=*/true, /*quiet=*/true);
+    PrintEnd(fmt::format("reference run (variant {})", scenario.reference()), *summary.reference);
+  }
+  if (StopSignal() == 0) {
+    summary.outcome = RunPart(main_, result.dir, options_.in_process, options_.quiet);
+    PrintEnd("run", summary.outcome);
+  } else {
+    summary.outcome = *summary.reference;  // interrupted
+  }
+  const RunOutcome& outcome = summary.outcome;
+  const fs::path log = result.dir / "run.lcm";
+  if (!fs::exists(log)) return result;  // the recorder never came to start
+  logging::RunRecord record = logging::ReadRun(log);
+  ReadReference(log, scenario, &record);
+  if (outcome.wall_time > 0) {
+    record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
+  }
+  summary.checks = EvaluateChecks(scenario, record);
+  summary.events = logging::Events(record);
+  summary.passed = outcome.completed;
+  for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
+  WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
+  if (!options_.quiet) {
+    fmt::print("\n{}\n{}{}", FormatTable(summary.checks), FormatEvents(summary.events),
+               FormatAssumptions(scenario));
+    fmt::print("\n{:.3f} s simulated in {:.2f} s, {:.1f} x real time; {}\n",
+               record.time(record.num_ticks), outcome.wall_time,
+               record.real_time_factor.value_or(0), result.dir.string());
+  }
+  fmt::print("{}\n", summary.passed ? "passed" : "FAILED");
+  std::fflush(stdout);
+  return result;
+}
+
+void ReadReference(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {
+  record->first_tick = FirstCheckedTick(scenario, *record);
+  const fs::path reference = ReferenceDir(log.parent_path()) / "run.lcm";
+  if (scenario.has_reference() && fs::exists(reference)) {
+    record->reference = std::make_shared<logging::RunRecord>(logging::ReadRun(reference));
+    record->reference->first_tick = FirstCheckedTick(scenario, *record->reference);
+  }
+}
+
+}  // namespace poise

@@ -1,0 +1,62 @@
+// One scenario run from its name to its summary.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+#include "deploy/poise/report.h"
+#include "deploy/poise/scenario_loading.h"
+
+namespace poise {
+
+struct RunOptions {
+  RunChanges changes;
+  bool in_process = false;
+  bool quiet = false;
+};
+
+/// What `poise report` and the overview of several runs say of a run's scenario.
+struct RunResult {
+  RunSummary summary;
+  std::filesystem::path dir;
+};
+
+/// A checked scenario, ready to run, with its reference variant.
+class ScenarioRun {
+ public:
+  /// Throws ConfigError or RobotError; what is odd about the robot goes to stderr.
+  ScenarioRun(const std::string& scenario, const RunOptions& options);
+
+  /// Runs, writes the run's files into a folder (MakeRunDir's rules for `out`) and prints what
+  /// happens, the table and the verdict. Throws ConfigError for the folder, LogError for the log.
+  RunResult Run(const std::string& out);
+
+  const std::string& name() const { return main_.spec.scenario(); }
+  const Scenario& scenario() const { return main_.loaded.scenario; }
+
+ private:
+  /// One run of a graph.
+  struct Part {
+    LoadedScenario loaded;
+    RunSpec spec;
+  };
+  Part Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
+               bool warn) const;
+  RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
+                     bool quiet) const;
+  void PrintHeading() const;
+
+  RunOptions options_;
+  Part main_;
+  std::optional<Part> reference_;
+};
+
+/// Makes a record, read from `log`, ready for the scenario's checks: its first_tick, and its
+/// reference if the scenario has one and its log is there. Throws LogError or RobotError.
+void ReadReference(const std::filesystem::path& log, const Scenario& scenario,
+                   logging::RunRecord* record);
+
+}  // namespace poise

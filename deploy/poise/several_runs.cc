@@ -1,0 +1,119 @@
+#include "deploy/poise/several_runs.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "components/framework/configuration.h"
+#include "deploy/poise/catalog.h"
+#include "deploy/poise/run_dir.h"
+#include "deploy/poise/signals.h"
+#include "deploy/poise/text_table.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The numbers of "7.1.2": sections in the order of a book.
+std::vector<int64_t> SectionNumbers(std::string_view section) {
+  std::vector<int64_t> numbers;
+  bool in_number = false;
+  for (const char c : section) {
+    const bool digit = c >= '0' && c <= '9';
+    if (digit && !in_number) numbers.push_back(0);
+    if (digit) numbers.back() = std::min<int64_t>(numbers.back() * 10 + (c - '0'), 1'000'000);
+    in_number = digit;
+  }
+  return numbers;
+}
+
+/// Every scenario with a paper_section, by section, then by name.
+std::vector<std::string> Experiments() {
+  std::vector<std::pair<std::vector<int64_t>, std::string>> found;
+  for (const std::string& name : ListNames("scenarios")) {
+    const Scenario scenario =
+        ScenarioFiles(FindFile("scenarios", name, fs::current_path())).Merged();
+    if (!scenario.paper_section().empty()) {
+      found.emplace_back(SectionNumbers(scenario.paper_section()), name);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::string> names;
+  for (auto& [section, name] : found) names.push_back(std::move(name));
+  if (names.empty()) throw ConfigError("no scenario has a paper_section; name the ones to run");
+  return names;
+}
+
+std::string FormatOverview(const std::vector<ScenarioRun>& runs,
+                           const std::vector<RunResult>& results) {
+  std::vector<std::vector<std::string>> rows = {
+      {"section", "scenario", "verdict", "what", "measured", "paper"}};
+  for (size_t i = 0; i < runs.size(); ++i) {
+    const bool ran = i < results.size();
+    const std::string verdict = !ran ? "not run" : results[i].summary.passed ? "passed" : "FAILED";
+    rows.push_back({runs[i].scenario().paper_section(), runs[i].name(), verdict, "", "", ""});
+    if (!ran) continue;
+    bool first = true;
+    for (const CheckResult& check : results[i].summary.checks) {
+      if (check.paper.empty()) continue;
+      if (!first) rows.push_back({"", "", "", "", "", ""});
+      first = false;
+      rows.back()[3] = check.label;
+      rows.back()[4] = FormatMeasured(check);
+      rows.back()[5] = check.paper;
+    }
+  }
+  return FormatColumns(rows);
+}
+
+}  // namespace
+
+std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names) {
+  std::vector<std::string> expanded;
+  for (const std::string& name : names) {
+    if (name == kAllScenarios) {
+      const std::vector<std::string> all = Experiments();
+      expanded.insert(expanded.end(), all.begin(), all.end());
+    } else {
+      expanded.push_back(name);
+    }
+  }
+  return expanded;
+}
+
+bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
+                const std::string& out) {
+  std::vector<ScenarioRun> runs;
+  for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
+  const bool all = names.size() == 1;
+  const fs::path folder = MakeRunDir(out, all ? kAllScenarios : "several");
+  CatchStopSignals();
+  std::vector<RunResult> results;
+  std::set<std::string> taken;
+  for (ScenarioRun& run : runs) {
+    if (StopSignal() != 0) break;
+    std::string name = run.name();
+    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}-{}", run.name(), i);
+    if (options.quiet) {
+      fmt::print("{}: ", name);
+      std::fflush(stdout);
+    }
+    results.push_back(run.Run((folder / name).string()));
+    PointLatestTo(results.back().dir);
+    if (!options.quiet) fmt::print("\n");
+  }
+  bool passed = results.size() == runs.size();
+  for (const RunResult& result : results) passed = passed && result.summary.passed;
+  if (!options.quiet) {
+    fmt::print("{}\n{}\n", FormatOverview(runs, results), folder.string());
+  }
+  fmt::print("{}\n", passed ? "all passed" : "FAILED");
+  return passed;
+}
+
+}  // namespace poise

@@ -1,0 +1,24 @@
+// `poise run` with more than one scenario.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "deploy/poise/scenario_run.h"
+
+namespace poise {
+
+/// Name that means every scenario with a paper_section.
+inline constexpr char kAllScenarios[] = "all";
+
+/// `names` with "all" replaced by the experiments of the paper, in the order of their sections.
+/// Throws ConfigError.
+std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names);
+
+/// Runs one after the other, each in a folder of its own below `out` (MakeRunDir's rules), and
+/// prints an overview: verdicts, and the measured figures beside the paper's. A stop signal ends
+/// the run and the rest. True when all passed. Throws as ScenarioRun does; nothing has run then.
+bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
+                const std::string& out);
+
+}  // namespace poise

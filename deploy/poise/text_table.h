@@ -1,0 +1,17 @@
+// Tables in plain text.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace poise {
+
+/// "12.35", "3": at most four digits, or all before the point.
+std::string FormatNumber(double value);
+std::string FormatNumber(double value, const std::string& unit);
+
+/// The rows in aligned columns, a line below the first one, the heading. All rows have as many
+/// cells as it; UTF-8.
+std::string FormatColumns(const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace poise

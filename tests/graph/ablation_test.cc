@@ -1,0 +1,231 @@
+// Variants, ablations, the reference run, and several scenarios in one go.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include "logging/compare.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+constexpr char kBase[] = "base: \"base/stand\" duration: 0.3\n";
+
+class AblationTest : public testing::Test {
+ protected:
+  /// Runs to the folder `name` with `flags`; expects success. Returns the folder.
+  std::string Run(const std::string& name, const std::string& scenario,
+                  const std::vector<std::string>& flags = {}) {
+    std::vector<std::string> arguments = {"run", scenario, "--inline", "--out", deploy_ / name};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    const ProgramResult result = RunPoise(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    output_ = result.output;
+    return deploy_ / name;
+  }
+
+  static bool Equal(const std::string& first, const std::string& second) {
+    const logging::LogComparison result =
+        logging::CompareLogs(first + "/run.lcm", second + "/run.lcm");
+    EXPECT_GT(result.messages, 0);
+    return result.equal();
+  }
+
+  void ExpectOutput(const std::string& part) const {
+    EXPECT_NE(output_.find(part), std::string::npos) << part << " in " << output_;
+  }
+
+  TestDeploy deploy_;
+  std::string output_;
+};
+
+TEST_F(AblationTest, AVariantIsTheScenarioWithItsFieldsSet) {
+  const std::string file = deploy_.Scenario(
+      "mine", std::string(kBase) +
+                  "variant { name: \"hard\" description: \"A harder push\"\n"
+                  "  set: \"sim_ode.push[0].peak=90\" set: \"seed=5\" }\n"
+                  "variant { name: \"own\" check { metric: \"push_peak\" at_least: 50 } }\n");
+  const std::string hard = Run("hard", "mine", {"--variant", "hard"});
+  ExpectOutput("A harder push");
+  ExpectOutput("variant hard: sim_ode.push[0].peak=90, seed=5");
+  EXPECT_TRUE(Equal(hard, Run("set", "mine", {"--set", "sim_ode.push[0].peak=90", "--seed", "5"})));
+  EXPECT_FALSE(Equal(hard, Run("plain", "mine")));
+  // The command line has the last word.
+  EXPECT_TRUE(
+      Equal(Run("back", "mine",
+                {"--variant", "hard", "--set", "seed=1", "--set", "sim_ode.push[0].peak=60"}),
+            Run("plain", "mine")));
+  const nlohmann::json summary = ReadSummary(hard);
+  EXPECT_EQ(summary["variant"], "hard");
+  ASSERT_EQ(summary["changes"].size(), 2u);
+  EXPECT_EQ(summary["changes"][0]["by"], "variant hard");
+  EXPECT_EQ(summary["changes"][0]["set"], "sim_ode.push[0].peak=90");
+  EXPECT_EQ(summary["checks"].size(), 8u);  // five of every run, three of base/stand
+  const nlohmann::json own = ReadSummary(Run("own", "mine", {"--variant", "own"}));
+  ASSERT_EQ(own["checks"].size(), 6u);
+  EXPECT_EQ(own["checks"][5]["name"], "push_peak");
+
+  const ProgramResult list = RunPoise({"list", "scenarios"});
+  EXPECT_NE(list.output.find("--variant hard: A harder push"), std::string::npos) << list.output;
+  ExpectUsageError({"run", "mine", "--variant", "hrd"}, {"--variant hrd", file, "hard"});
+  ExpectUsageError({"run", StandScenario(), "--variant", "x"}, {"has no variants"});
+}
+
+TEST_F(AblationTest, AWrongVariantHasFileAndLine) {
+  const auto expect_refused = [&](const std::string& text, const std::vector<std::string>& parts) {
+    const std::string file = deploy_.Scenario("mine", kBase + text);
+    std::vector<std::string> all = parts;
+    all.push_back(file + ":3: ");
+    ExpectUsageError({"graph", "check", "mine"}, all);
+  };
+  expect_refused("variant { name: \"a\"\n set: \"sim_ode.push[0].peek=1\" }",
+                 {"variant[0].set[0]", "peek", "peak"});
+  expect_refused("variant { name: \"a\"\n set: \"sim_ode.push[0].peak=much\" }",
+                 {"variant[0].set[0]", "much"});
+  expect_refused("variant { name: \"a\"\n set: \"duration\" }", {"variant[0].set[0]", "value"});
+  expect_refused("variant { name: \"a\"\n set: \"duration=-1\" }",
+                 {"variant[0].set[0]", "duration"});
+  expect_refused("variant { name: \"a\"\n set: \"redistributor.double_support.half_width=0\" }",
+                 {"variant[0].set[0]", "redistributor.double_support.half_width"});
+  expect_refused("variant { name: \"a\" }\nvariant { check { metric: \"nothing\" } name: \"b\" }",
+                 {"variant[1].check[0].metric", "nothing"});
+  expect_refused("variant { name: \"a\" }\nvariant { name: \"a/b\" }", {"variant[1].name"});
+  expect_refused("variant { name: \"a\" }\nvariant { name: \"a\" }", {"two variants"});
+  expect_refused("variant { name: \"abc\" }\nreference: \"abd\"", {"reference", "abc"});
+}
+
+TEST_F(AblationTest, EachPartIsSwitchedOffByItsField) {
+  deploy_.Scenario("mine",
+                   std::string(kBase) + "variant { name: \"any\" check { metric: \"fallen\" } }");
+  const std::vector<std::string> any = {"--variant", "any"};  // checks no condition
+  const std::string plain = Run("plain", "mine", any);
+  const std::pair<const char*, const char*> parts[] = {
+      {"balancing", "contact_wrench_monitor.balancing=false"},
+      {"redistribution", "redistributor.redistribution=false"},
+      {"transition", "redistributor.transition=false"}};
+  for (const auto& [part, set] : parts) {
+    const std::string without = Run(part, "mine", {any[0], any[1], "--without", part});
+    ExpectOutput(std::string("--without ") + part + ": " + set);
+    EXPECT_TRUE(Equal(without, Run("set", "mine", {any[0], any[1], "--set", set}))) << part;
+    // Without contact changes there is nothing that a transition does.
+    EXPECT_EQ(Equal(without, plain), part == std::string("transition")) << part;
+  }
+  const nlohmann::json summary = ReadSummary(Run(
+      "two", "mine", {any[0], any[1], "--without", "redistribution", "--without", "balancing"}));
+  EXPECT_EQ(summary["ablations"],
+            nlohmann::json::array({"--without redistribution", "--without balancing"}));
+  ExpectUsageError({"run", "mine", "--without", "legs"}, {"--without", "legs", "balancing"});
+}
+
+TEST_F(AblationTest, AnIdealRobotIsTheModelWithoutNoise) {
+  deploy_.Scenario("mine", kBase);
+  deploy_.Scenario(
+      "imperfect",
+      std::string(kBase) +
+          "sim_ode { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
+          "  model_error { link: \"upper_body\" mass_scale: 1.02 }\n"
+          "  model_error { link: \"left_shank\" com_x: 0.005 } }\n"
+          "assumption { field: \"sim_ode.drive_train.torque_lag\" kind: \"assumed\" }\n");
+  const std::string ideal = Run("ideal", "mine", {"--ideal"});
+  ExpectOutput("--ideal: ");
+  // Nothing is left that depends on the seed, or on what the scenario says of imperfections.
+  EXPECT_TRUE(Equal(ideal, Run("seed", "mine", {"--ideal", "--seed", "2"})));
+  EXPECT_TRUE(Equal(ideal, Run("imperfect", "imperfect", {"--ideal"})));
+  EXPECT_FALSE(Equal(ideal, Run("plain", "mine")));
+  const nlohmann::json summary = ReadSummary(ideal);
+  EXPECT_EQ(summary["ablations"], nlohmann::json::array({"--ideal"}));
+  // The changes of --ideal, done by hand.
+  std::vector<std::string> set;
+  for (const nlohmann::json& change : summary["changes"]) {
+    set.insert(set.end(), {"--set", change["set"].get<std::string>()});
+  }
+  EXPECT_TRUE(Equal(ideal, Run("by_hand", "mine", set)));
+}
+
+TEST_F(AblationTest, TheReferenceVariantRunsBeside) {
+  deploy_.Scenario("mine", std::string(kBase) +
+                               "variant { name: \"free\" set: \"sim_ode.push=\" }\n"
+                               "variant { name: \"own\" check { metric: \"fallen\" } }\n"
+                               "variant { name: \"other\" set: \"seed=3\" }\n"
+                               "reference: \"free\"\n");
+  const std::string plain = Run("plain", "mine", {"--without", "transition", "--set", "seed=4"});
+  EXPECT_EQ(ReadSummary(plain)["reference"]["variant"], "free");
+  EXPECT_EQ(ReadSummary(plain)["reference"]["completed"], true);
+  // The flags of the command line are the reference's too.
+  const std::string reference = plain + "/reference";
+  EXPECT_TRUE(Equal(
+      reference,
+      Run("free", "mine", {"--variant", "free", "--without", "transition", "--set", "seed=4"})));
+  EXPECT_FALSE(Equal(reference, plain));
+  const auto has_reference = [&](const std::string& run) {
+    return std::filesystem::exists(run + "/reference");
+  };
+  EXPECT_FALSE(has_reference(deploy_ / "free"));
+  EXPECT_TRUE(has_reference(Run("other", "mine", {"--variant", "other"})));
+  EXPECT_FALSE(has_reference(Run("own", "mine", {"--variant", "own"})));
+
+  EXPECT_EQ(RunPoise({"report", plain}).output.find("warning"), std::string::npos);
+  std::filesystem::remove_all(reference);
+  const ProgramResult report = RunPoise({"report", plain});
+  EXPECT_EQ(report.exit_code, 0);
+  EXPECT_NE(report.output.find("warning: " + reference), std::string::npos) << report.output;
+  // A folder that is used again keeps none of an earlier run.
+  Run("plain", "mine");
+  EXPECT_TRUE(has_reference(plain));
+  Run("plain", "mine", {"--no-reference"});
+  EXPECT_FALSE(has_reference(plain));
+  EXPECT_TRUE(ReadSummary(plain)["reference"].is_null());
+}
+
+TEST_F(AblationTest, AllRunsTheExperimentsInTheOrderOfTheirSections) {
+  deploy_.Scenario("a_late", std::string(kBase) +
+                                 "name: \"a_late\" paper_section: \"7.10\"\n"
+                                 "check { metric: \"push_peak\" paper: \"60.5 N\" }\n");
+  deploy_.Scenario("early", std::string(kBase) + "name: \"early\" paper_section: \"7.2\"\n");
+  deploy_.Scenario("other", std::string(kBase) + "name: \"other\"\n");
+  const ProgramResult result = RunPoise({"run", "all", "--inline"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  const std::string overview = result.output.substr(result.output.find("section  scenario"));
+  EXPECT_NE(overview.find("\n7.2      early     passed\n7.10     a_late    passed   largest push"),
+            std::string::npos)
+      << overview;
+  EXPECT_NE(overview.find("60.5 N\n"), std::string::npos) << overview;
+  EXPECT_EQ(overview.find("other"), std::string::npos) << overview;
+  EXPECT_NE(overview.find("all passed"), std::string::npos) << overview;
+  const std::string latest = std::filesystem::read_symlink(deploy_.runs() + "/latest").string();
+  EXPECT_TRUE(latest.ends_with("-all/a_late")) << latest;
+  EXPECT_EQ(RunPoise({"report"}).exit_code, 0);
+}
+
+TEST_F(AblationTest, SeveralScenariosFailWithOneOfThem) {
+  deploy_.Scenario("good", std::string(kBase) + "name: \"good\"");
+  deploy_.Scenario(
+      "bad", std::string(kBase) + "name: \"bad\" check { metric: \"push_peak\" at_most: 1 }\n");
+  const std::string out = deploy_ / "several";
+  const ProgramResult result =
+      RunPoise({"run", "bad", "good", "good", "--inline", "--quiet", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_FALSE(ReadSummary(out + "/bad")["passed"].get<bool>());
+  EXPECT_TRUE(ReadSummary(out + "/good")["passed"].get<bool>());
+  EXPECT_TRUE(ReadSummary(out + "/good-2")["passed"].get<bool>());
+  // A wrong one is found before any has run.
+  ExpectUsageError({"run", "good", "--variant", "x", "bad", "--out", deploy_ / "none"}, {"x"});
+  EXPECT_FALSE(std::filesystem::exists(deploy_ / "none"));
+}
+
+TEST_F(AblationTest, AnInterruptEndsAllRuns) {
+  deploy_.Scenario("long",
+                   "base: \"base/stand\" duration: 1000 name: \"long\" paper_section: \"7\"");
+  deploy_.Scenario("more", std::string(kBase) + "name: \"more\" paper_section: \"8\"");
+  const std::string out = deploy_ / "all";
+  PoiseProgram program({"run", "all", "--out", out});
+  ASSERT_TRUE(WaitForLog(out + "/long", 100'000));
+  kill(program.pid(), SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_NE(result.output.find("not run"), std::string::npos) << result.output;
+  EXPECT_FALSE(std::filesystem::exists(out + "/more"));
+  EXPECT_TRUE(ProcessesWith(out).empty());
+}
+
+}  // namespace
+}  // namespace poise
