@@ -17,6 +17,7 @@ const std::vector<std::pair<std::string, std::string>>& PartFields() {
 constexpr const char* kIdeal[] = {
     "sim_ode.joint_friction=false", "sim_ode.sensor_noise=false", "sim_ode.rotor_inertia=true",
     "sim_ode.push_sensor_noise=0",  "sim_ode.drive_train=",       "sim_ode.model_error=",
+    "sim_ode.motor_change=",
 };
 
 }  // namespace
@@ -40,12 +41,17 @@ std::vector<FieldChange> AblationChanges(const std::vector<std::string>& parts, 
   return changes;
 }
 
+std::vector<std::string> Ablation::flags() const {
+  std::vector<std::string> flags;
+  for (const std::string& part : without) flags.insert(flags.end(), {"--without", part});
+  if (ideal) flags.push_back("--ideal");
+  return flags;
+}
+
 std::vector<Ablation> Ablations() {
   std::vector<Ablation> ablations = {{"full", {}}};
-  for (const std::string& part : RemovableParts()) {
-    ablations.push_back({"without_" + part, {"--without", part}});
-  }
-  ablations.push_back({"ideal", {"--ideal"}});
+  for (const std::string& part : RemovableParts()) ablations.push_back({"without_" + part, {part}});
+  ablations.push_back({"ideal", {}, true});
   return ablations;
 }
 

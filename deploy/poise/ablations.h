@@ -14,8 +14,10 @@ struct FieldChange {
 
 /// One way to run a scenario with something left out.
 struct Ablation {
-  std::string name;                ///< "full", "without_balancing", "ideal"
-  std::vector<std::string> flags;  ///< of `poise run`
+  std::string name;                  ///< "full", "without_balancing", "ideal"
+  std::vector<std::string> without;  ///< of RemovableParts()
+  bool ideal = false;
+  std::vector<std::string> flags() const;  ///< of `poise run`
 };
 
 /// What --without takes.

@@ -16,6 +16,7 @@ using Command = std::function<int()>;
 /// Each adds its subcommand; parsing it sets `command`, which may throw ConfigError (usage),
 /// anything else (failure).
 void AddRunCommand(CLI::App* app, Command* command);
+void AddMatrixCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);

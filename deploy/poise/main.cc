@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
       "wrong usage or configuration.");
   poise::Command command;
   poise::AddRunCommand(&app, &command);
+  poise::AddMatrixCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);

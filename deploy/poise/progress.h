@@ -1,26 +1,40 @@
-// A run's progress on the terminal.
+// Progress on the terminal.
 #pragma once
 
-#include <cstdint>
+#include <string>
 
 namespace poise {
 
 /// One line that rewrites itself on a terminal; elsewhere a line every few seconds.
-class Progress {
+class StatusLine {
  public:
-  /// `duration`: s of the whole run. Quiet: shows nothing.
-  Progress(double duration, bool quiet);
-  /// Simulated time and wall time since the start, s. Cheap: shows only when it is time to.
-  void Show(double time, double wall);
+  /// Quiet: shows nothing.
+  explicit StatusLine(bool quiet);
+  /// True when it is time to show again. `wall`: s since the start.
+  bool Due(double wall) const { return !quiet_ && wall >= next_; }
+  void Show(const std::string& text, double wall);
   /// Removes the line from a terminal.
   void Clear();
 
  private:
-  double duration_;
   bool quiet_;
   bool terminal_;
   bool shown_ = false;
   double next_;  // wall time from which to show again
+};
+
+/// A run's progress.
+class Progress {
+ public:
+  /// `duration`: s of the whole run. Quiet: shows nothing.
+  Progress(double duration, bool quiet) : duration_(duration), line_(quiet) {}
+  /// Simulated time and wall time since the start, s. Cheap: shows only when it is time to.
+  void Show(double time, double wall);
+  void Clear() { line_.Clear(); }
+
+ private:
+  double duration_;
+  StatusLine line_;
 };
 
 }  // namespace poise

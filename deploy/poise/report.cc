@@ -148,6 +148,27 @@ std::string FormatAssumptions(const Scenario& scenario) {
   return text;
 }
 
+std::vector<CheckResult> ChecksOf(const nlohmann::json& summary) {
+  const auto number = [](const nlohmann::json& value) {
+    return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+  };
+  std::vector<CheckResult> checks;
+  for (const nlohmann::json& json : summary.at("checks")) {
+    CheckResult check;
+    check.name = json.at("name").get<std::string>();
+    check.label = json.at("label").get<std::string>();
+    check.unit = json.at("unit").get<std::string>();
+    check.measured = number(json.at("measured"));
+    check.at_most = number(json.at("at_most"));
+    check.at_least = number(json.at("at_least"));
+    if (!json.at("paper").is_null()) check.paper = json.at("paper").get<std::string>();
+    check.paper_value = number(json.at("paper_value"));
+    check.passed = json.at("passed").get<bool>();
+    checks.push_back(std::move(check));
+  }
+  return checks;
+}
+
 Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
              const std::vector<CheckResult>& checks) {
   Json json;

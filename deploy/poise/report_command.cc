@@ -26,8 +26,9 @@ ReportedRun ReadReportedRun(const std::string& run) {
   ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
   ReadReference(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {
-    fmt::print(stderr, "warning: {}: is missing; what compares with it has no value\n",
-               (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
+    fmt::print(
+        stderr, "warning: {}: is missing; what compares with it has no value\n",
+        (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
   }
   result.checks = EvaluateChecks(result.scenario, result.record);
   return result;

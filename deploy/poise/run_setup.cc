@@ -95,8 +95,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   RunSpec spec;
   std::random_device random;
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
-  spec.set_scenario(scenario.has_name() ? scenario.name()
-                                        : fs::path(loaded.files.file()).stem().string());
+  spec.set_scenario(NameOf(loaded));
   ReadTextProto(loaded.graph_file, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());

@@ -209,6 +209,11 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   return loaded;
 }
 
+std::string NameOf(const LoadedScenario& loaded) {
+  return loaded.scenario.has_name() ? loaded.scenario.name()
+                                    : fs::path(loaded.files.file()).stem().string();
+}
+
 RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes) {
   RunChanges reference = changes;
   reference.variant = loaded.scenario.reference();

@@ -47,6 +47,9 @@ struct LoadedScenario {
 /// what to do".
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes);
 
+/// The scenario's name, or its file's without ending.
+std::string NameOf(const LoadedScenario& loaded);
+
 /// The same changes for the scenario's reference variant. Precondition: the scenario has one.
 RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes);
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <set>
 #include <string_view>
 #include <utility>
 
@@ -86,6 +85,12 @@ std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names) 
   return expanded;
 }
 
+std::string UniqueName(const std::string& name, std::set<std::string>* taken) {
+  std::string unique = name;
+  for (int i = 2; !taken->insert(unique).second; ++i) unique = fmt::format("{}-{}", name, i);
+  return unique;
+}
+
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out) {
   std::vector<ScenarioRun> runs;
@@ -97,8 +102,7 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
   std::set<std::string> taken;
   for (ScenarioRun& run : runs) {
     if (StopSignal() != 0) break;
-    std::string name = run.name();
-    for (int i = 2; !taken.insert(name).second; ++i) name = fmt::format("{}-{}", run.name(), i);
+    const std::string name = UniqueName(run.name(), &taken);
     if (options.quiet) {
       fmt::print("{}: ", name);
       std::fflush(stdout);

@@ -1,6 +1,7 @@
 // `poise run` with more than one scenario.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ inline constexpr char kAllScenarios[] = "all";
 /// `names` with "all" replaced by the experiments of the paper, in the order of their sections.
 /// Throws ConfigError.
 std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names);
+
+/// `name`, or with -2, -3, ... at its end when it is taken; then in `taken`.
+std::string UniqueName(const std::string& name, std::set<std::string>* taken);
 
 /// Runs one after the other, each in a folder of its own below `out` (MakeRunDir's rules), and
 /// prints an overview: verdicts, and the measured figures beside the paper's. A stop signal ends

@@ -163,9 +163,9 @@ TEST_F(AblationTest, TheReferenceVariantRunsBeside) {
   EXPECT_TRUE(has_reference(Run("other", "mine", {"--variant", "other"})));
   EXPECT_FALSE(has_reference(Run("own", "mine", {"--variant", "own"})));
 
-  EXPECT_EQ(RunPoise({"report", plain}).output.find("warning"), std::string::npos);
+  EXPECT_EQ(RunPoise({"report", plain, "--no-html"}).output.find("warning"), std::string::npos);
   std::filesystem::remove_all(reference);
-  const ProgramResult report = RunPoise({"report", plain});
+  const ProgramResult report = RunPoise({"report", plain, "--no-html"});
   EXPECT_EQ(report.exit_code, 0);
   EXPECT_NE(report.output.find("warning: " + reference), std::string::npos) << report.output;
   // A folder that is used again keeps none of an earlier run.
@@ -193,7 +193,7 @@ TEST_F(AblationTest, AllRunsTheExperimentsInTheOrderOfTheirSections) {
   EXPECT_NE(overview.find("all passed"), std::string::npos) << overview;
   const std::string latest = std::filesystem::read_symlink(deploy_.runs() + "/latest").string();
   EXPECT_TRUE(latest.ends_with("-all/a_late")) << latest;
-  EXPECT_EQ(RunPoise({"report"}).exit_code, 0);
+  EXPECT_EQ(RunPoise({"report", "--no-html"}).exit_code, 0);
 }
 
 TEST_F(AblationTest, SeveralScenariosFailWithOneOfThem) {

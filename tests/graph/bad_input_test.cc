@@ -119,6 +119,7 @@ TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
 TEST_F(BadInputTest, HelpIsThereForEveryCommand) {
   for (const std::vector<std::string>& command : {std::vector<std::string>{},
                                                   {"run"},
+                                                  {"matrix"},
                                                   {"report"},
                                                   {"compare"},
                                                   {"graph"},

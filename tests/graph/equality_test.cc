@@ -1,6 +1,8 @@
 // The same scenario gives the same messages, bit for bit, however it runs.
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "logging/compare.h"
 #include "logging/metrics.h"
 #include "tests/graph/poise_program.h"
@@ -41,6 +43,34 @@ TEST(Equality, ProcessesGiveWhatOneProcessGives) {
     EXPECT_EQ(channel.messages, kTicks) << channel.name;
     EXPECT_EQ(channel.missing + channel.duplicate + channel.out_of_order + channel.refused, 0)
         << channel.name;
+  }
+}
+
+TEST(Equality, EveryExperimentOfThePaperIsTheSameAsProcessesAndInOneProcess) {
+  std::vector<std::string> experiments;
+  std::istringstream list(RunPoise({"list", "scenarios"}).output);
+  for (std::string line; std::getline(list, line);) {
+    if (line.find(", paper section ") == std::string::npos) continue;
+    experiments.emplace_back();
+    std::istringstream(line) >> experiments.back();
+  }
+  ASSERT_GE(experiments.size(), 2u);
+  for (const std::string& experiment : experiments) {
+    SCOPED_TRACE(experiment);
+    const RunFolder folder;
+    // Side by side; whether the checks hold is the scenario's concern.
+    PoiseProgram inside(
+        {"run", experiment, "--inline", "--quiet", "--no-reference", "--out", folder / "inline"});
+    PoiseProgram processes(
+        {"run", experiment, "--quiet", "--no-reference", "--out", folder / "processes"});
+    EXPECT_GE(inside.Wait().exit_code, 0);
+    EXPECT_GE(processes.Wait().exit_code, 0);
+    const logging::LogComparison result =
+        logging::CompareLogs(folder / "inline/run.lcm", folder / "processes/run.lcm");
+    EXPECT_TRUE(result.equal()) << (result.earliest ? result.earliest->channel : "");
+    const nlohmann::json summary = ReadSummary(folder / "processes");
+    EXPECT_EQ(result.ticks, summary["ticks"].get<int64_t>());
+    EXPECT_EQ(result.messages, result.ticks * kChannels);
   }
 }
 

@@ -1,0 +1,130 @@
+#include "deploy/poise/matrix_table.h"
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "deploy/poise/text_table.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+std::string ColumnTitle(const MatrixCell& cell) {
+  if (!cell.variant.empty()) return "variant " + cell.variant;
+  std::string title = cell.ablation;
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
+const CheckResult* FindCheck(const MatrixCell& cell, const std::string& name) {
+  for (const CheckResult& check : cell.checks) {
+    if (check.name == name) return &check;
+  }
+  return nullptr;
+}
+
+/// The cells of one scenario.
+std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
+  std::vector<std::vector<std::string>> rows = {{"what", "paper"}, {"outcome", ""}};
+  std::vector<const CheckResult*> figures;  // in the order in which the cells have them
+  for (const MatrixCell* cell : cells) {
+    rows[0].push_back(ColumnTitle(*cell));
+    rows[1].push_back(cell->problem ? "could not be run" : cell->outcome);
+    for (const CheckResult& check : cell->checks) {
+      const auto same = [&](const CheckResult* other) { return other->name == check.name; };
+      const bool paper = !check.paper.empty() || check.paper_value;
+      if (paper && std::none_of(figures.begin(), figures.end(), same)) figures.push_back(&check);
+    }
+  }
+  for (const CheckResult* figure : figures) {
+    std::string paper = figure->paper;
+    if (paper.empty()) paper = FormatNumber(*figure->paper_value, figure->unit);
+    rows.push_back({figure->label, paper});
+    for (const MatrixCell* cell : cells) {
+      const CheckResult* const check = FindCheck(*cell, figure->name);
+      const bool failed = check != nullptr && !check->passed;
+      rows.back().push_back(check == nullptr ? "" : FormatMeasured(*check) + (failed ? " !" : ""));
+    }
+  }
+  return FormatColumns(rows);
+}
+
+std::string Quoted(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
+}
+
+std::string Number(const std::optional<double>& value) {
+  return value ? fmt::format("{}", *value) : "";
+}
+
+std::string Truth(bool value) { return value ? "true" : "false"; }
+
+}  // namespace
+
+void ReadCellSummary(const std::filesystem::path& file, MatrixCell* cell) {
+  std::ifstream in(file);
+  const nlohmann::json summary = nlohmann::json::parse(in);
+  cell->passed = summary.at("passed").get<bool>();
+  cell->simulated_time = summary.at("simulated_time").get<double>();
+  for (const nlohmann::json& event : summary.at("events")) {
+    if (event.at("name") == "fall") cell->fell_at = event.at("time").get<double>();
+  }
+  cell->checks = ChecksOf(summary);
+  if (cell->fell_at) {
+    cell->outcome = fmt::format("fell at {:.3f} s", *cell->fell_at);
+  } else if (summary.at("completed").get<bool>()) {
+    cell->outcome = "stands";
+  } else {
+    cell->outcome = fmt::format("stopped at {:.3f} s: {}", cell->simulated_time,
+                                summary.at("end").get<std::string>());
+  }
+}
+
+std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
+  std::string text;
+  bool failed = false;
+  for (size_t begin = 0; begin < cells.size();) {
+    std::vector<const MatrixCell*> group;
+    size_t end = begin;
+    for (; end < cells.size() && cells[end].scenario == cells[begin].scenario; ++end) {
+      group.push_back(&cells[end]);
+      for (const CheckResult& check : cells[end].checks) failed = failed || !check.passed;
+    }
+    const MatrixCell& first = cells[begin];
+    text += fmt::format("{}{}: {}\n", first.paper_section.empty() ? "" : first.paper_section + "  ",
+                        first.scenario, first.description);
+    text += FormatScenario(group) + "\n";
+    begin = end;
+  }
+  if (failed) text += "!: outside the limit that the scenario's check sets\n";
+  return text;
+}
+
+std::string MatrixCsv(const std::vector<MatrixCell>& cells) {
+  std::string csv =
+      "scenario,paper_section,variant,ablation,outcome,fell_at,simulated_time,passed,metric,label,"
+      "unit,measured,at_least,at_most,check_passed,paper,paper_value\n";
+  for (const MatrixCell& cell : cells) {
+    const std::string run =
+        fmt::format("{},{},{},{}", Quoted(cell.scenario), Quoted(cell.paper_section),
+                    Quoted(cell.variant), Quoted(cell.ablation));
+    if (cell.problem) {
+      csv += fmt::format("{},{},,,,,,,,,,,,\n", run, Quoted("could not be run: " + *cell.problem));
+    }
+    for (const CheckResult& check : cell.checks) {
+      csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", run, Quoted(cell.outcome),
+                         Number(cell.fell_at), Number(cell.simulated_time), Truth(cell.passed),
+                         Quoted(check.name), Quoted(check.label), Quoted(check.unit),
+                         Number(check.measured), Number(check.at_least), Number(check.at_most),
+                         check.limited() ? Truth(check.passed) : "", Quoted(check.paper),
+                         Number(check.paper_value));
+    }
+  }
+  return csv;
+}
+
+}  // namespace poise
