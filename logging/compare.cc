@@ -1,7 +1,6 @@
 #include "logging/compare.h"
 
 #include <algorithm>
-#include <cstring>
 #include <map>
 #include <span>
 #include <utility>
@@ -9,6 +8,7 @@
 
 #include "components/framework/packet_filter.h"
 #include "fmt/format.h"
+#include "logging/message_difference.h"
 #include "logging/run_record.h"
 #include "poise/message_traits.hpp"
 
@@ -23,14 +23,10 @@ struct Messages {
 
   explicit Messages(const std::string& path) : reader(path) {
     ReadRunInfo(&reader, path, &spec);
+    CheckLogSpec(spec, path);
     std::map<std::string, int, std::less<>> index;
     for (int i = 0; i < spec.graph().channel_size(); ++i) {
       const Channel& channel = spec.graph().channel(i);
-      const MessageType* type = FindMessageType(channel.type());
-      if (type == nullptr || type->run_id_offset < 0) {
-        throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' with a header",
-                                   path, channel.name(), channel.type()));
-      }
       if (!channel.external()) index[channel.name()] = i;
     }
     LogEvent event;
@@ -46,43 +42,16 @@ struct Messages {
   }
 };
 
-class Values final : public ScalarVisitor {
- public:
-  void Integer(std::string_view path, int64_t value) override {
-    values.emplace_back(path, fmt::format("{}", value));
-  }
-  void Real(std::string_view path, double value) override {
-    values.emplace_back(path, fmt::format("{:.17g}", value));
-  }
-  void Text(std::string_view path, std::string_view value) override {
-    values.emplace_back(path, value);
-  }
-  std::vector<std::pair<std::string, std::string>> values;
-};
-
-bool SameBits(std::span<const uint8_t> a, std::span<const uint8_t> b, int run_id_offset) {
-  const auto run_id = static_cast<size_t>(run_id_offset);
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), run_id) == 0 &&
-         std::memcmp(a.data() + run_id + 8, b.data() + run_id + 8, a.size() - run_id - 8) == 0;
-}
-
 void DescribeField(const MessageType& type, std::span<const uint8_t> a, std::span<const uint8_t> b,
                    LogDifference* difference) {
-  Values first;
-  Values second;
-  if (!type.visit(a.data(), static_cast<int64_t>(a.size()), &first) ||
-      !type.visit(b.data(), static_cast<int64_t>(b.size()), &second)) {
-    difference->field = "(not decodable)";
-    return;
+  const auto scalars = DifferingScalars(type, a, b);
+  if (!scalars) {
+    difference->field = "(not decodable, or other numbers of elements)";
+  } else if (!scalars->empty()) {
+    difference->field = scalars->front().path;
+    difference->first = scalars->front().first;
+    difference->second = scalars->front().second;
   }
-  for (size_t i = 0; i < std::min(first.values.size(), second.values.size()); ++i) {
-    if (first.values[i] == second.values[i] || first.values[i].first == "run_id") continue;
-    difference->field = first.values[i].first;
-    difference->first = first.values[i].second;
-    difference->second = second.values[i].second;
-    return;
-  }
-  difference->field = "(number of elements)";
 }
 
 }  // namespace
@@ -117,7 +86,7 @@ LogComparison CompareLogs(const std::string& first, const std::string& second) {
       result.ticks += tick != last_tick ? 1 : 0;
       last_tick = tick;
       const MessageType& type = *FindMessageType(channel.type());
-      if (!SameBits(i->second, j->second, type.run_id_offset)) {
+      if (!SameBits(type, i->second, j->second)) {
         ++result.differing;
         if (!result.earliest) {
           LogDifference difference{tick, channel.name(), {}, {}, {}};

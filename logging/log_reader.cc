@@ -20,20 +20,47 @@ constexpr uint32_t kMagic = 0xEDA1DA01u;
 constexpr int32_t kMaxChannel = 63;  // LCM_MAX_CHANNEL_NAME_LENGTH
 constexpr int32_t kMaxData = 1 << 28;
 
+constexpr uint8_t kMagicBytes[] = {0xED, 0xA1, 0xDA, 0x01};
+
 bool MagicAt(const uint8_t* data) { return static_cast<uint32_t>(ReadInt32(data)) == kMagic; }
 
-/// True when a record that comes after record `number` begins in [data, data + size), before
-/// `end` of the file. The magic alone may stand in a message by chance.
-bool HoldsRecordAfter(int64_t number, const uint8_t* data, size_t size, const uint8_t* end) {
-  constexpr uint8_t kMagicBytes[] = {0xED, 0xA1, 0xDA, 0x01};
-  const uint8_t* const last = std::min(data + size, end - std::min<ptrdiff_t>(12, end - data));
+/// Size of the record whose header begins at `header`, with `left` bytes of the file from there; 0
+/// when none can begin there.
+size_t RecordSize(const uint8_t* header, size_t left) {
+  if (left < kHeaderSize || !MagicAt(header)) return 0;
+  const int32_t channel_length = ReadInt32(header + 20);
+  const int32_t data_length = ReadInt32(header + 24);
+  if (channel_length < 1 || channel_length > kMaxChannel || data_length < 0 ||
+      data_length > kMaxData) {
+    return 0;
+  }
+  const size_t size =
+      kHeaderSize + static_cast<size_t>(channel_length) + static_cast<size_t>(data_length);
+  return size <= left ? size : 0;
+}
+
+/// True where a record may end: the file's end or the next record.
+bool EndsWell(const uint8_t* at, const uint8_t* end) {
+  return at == end || (end - at >= 4 && MagicAt(at));
+}
+
+/// True when the record [record, record + size) swallows another one, since its lengths were
+/// damaged: one that begins inside it and comes after it by number or, when this one does not end
+/// where a record may, ends well itself. The magic alone may stand in a message by chance.
+bool SwallowsRecord(const uint8_t* record, size_t size, const uint8_t* end) {
+  const auto number = static_cast<uint64_t>(ReadInt64(record + 4));
+  const bool ends_well = EndsWell(record + size, end);
+  const uint8_t* data = record + kHeaderSize;
+  const uint8_t* const last =
+      std::min(record + size, end - std::min<ptrdiff_t>(12, end - (record + kHeaderSize)));
   while (data < last) {
     const size_t reach = static_cast<size_t>(last - data) + sizeof(kMagicBytes) - 1;
     const void* const found = memmem(data, reach, kMagicBytes, sizeof(kMagicBytes));
     if (found == nullptr) return false;
     const auto* const at = static_cast<const uint8_t*>(found);
-    const auto ahead = static_cast<uint64_t>(ReadInt64(at + 4)) - static_cast<uint64_t>(number);
-    if (ahead - 1 < (1u << 20)) return true;
+    if (static_cast<uint64_t>(ReadInt64(at + 4)) - number - 1 < (1u << 20)) return true;
+    const size_t inner = ends_well ? 0 : RecordSize(at, static_cast<size_t>(end - at));
+    if (inner > 0 && EndsWell(at + inner, end)) return true;
     data = at + 1;
   }
   return false;
@@ -69,43 +96,53 @@ LogReader::~LogReader() {
 }
 
 bool LogReader::ParseAt(size_t position, LogEvent* event, size_t* end) const {
-  if (size_ - position < kHeaderSize) return false;
-  const uint8_t* header = data_ + position;
-  if (!MagicAt(header)) return false;
-  const int32_t channel_length = ReadInt32(header + 20);
-  const int32_t data_length = ReadInt32(header + 24);
-  if (channel_length < 1 || channel_length > kMaxChannel || data_length < 0 ||
-      data_length > kMaxData) {
-    return false;
-  }
-  const size_t body = static_cast<size_t>(channel_length) + static_cast<size_t>(data_length);
-  if (size_ - position - kHeaderSize < body) return false;
-  *end = position + kHeaderSize + body;
-  // Lengths that were damaged may swallow later records.
-  if (HoldsRecordAfter(ReadInt64(header + 4), header + kHeaderSize, body, data_ + size_))
-    return false;
+  const uint8_t* const header = data_ + position;
+  const size_t size = RecordSize(header, size_ - position);
+  if (size == 0 || SwallowsRecord(header, size, data_ + size_)) return false;
+  *end = position + size;
+  const auto channel_length = static_cast<size_t>(ReadInt32(header + 20));
   event->number = ReadInt64(header + 4);
   event->utime = ReadInt64(header + 12);
-  event->channel = {reinterpret_cast<const char*>(header + kHeaderSize),
-                    static_cast<size_t>(channel_length)};
-  event->data = {header + kHeaderSize + channel_length, static_cast<size_t>(data_length)};
+  event->channel = {reinterpret_cast<const char*>(header + kHeaderSize), channel_length};
+  event->data = {header + kHeaderSize + channel_length, size - kHeaderSize - channel_length};
+  event->offset = position;
   return true;
 }
 
 bool LogReader::Next(LogEvent* event) {
   size_t end = 0;
-  bool skipping = false;
-  while (position_ < size_) {
-    if (ParseAt(position_, event, &end)) {
-      position_ = end;
-      return true;
-    }
-    damages_ += skipping ? 0 : 1;
-    skipping = true;
-    ++skipped_;
-    ++position_;
+  const size_t begin = position_;
+  while (position_ < size_ && !ParseAt(position_, event, &end)) {
+    // On to the next magic; memmem is much faster than a look at every byte.
+    const void* const next =
+        memmem(data_ + position_ + 1, size_ - position_ - 1, kMagicBytes, sizeof(kMagicBytes));
+    position_ =
+        next == nullptr ? size_ : static_cast<size_t>(static_cast<const uint8_t*>(next) - data_);
   }
-  return false;
+  const bool found = position_ < size_;
+  if (position_ > begin) {
+    damage_.push_back({begin, position_ - begin, number_, {}});
+    if (found) damage_.back().number_after = event->number;
+  }
+  if (!found) return false;
+  position_ = end;
+  number_ = event->number;
+  return true;
+}
+
+int64_t LogReader::skipped_bytes() const {
+  uint64_t sum = 0;
+  for (const LogDamage& damage : damage_) sum += damage.size;
+  return static_cast<int64_t>(sum);
+}
+
+std::optional<int64_t> LogDamage::lost_events() const {
+  // A number may be damaged itself: each record has 29 bytes or more.
+  if (!number_after || *number_after <= number_before || number_before < -1) return {};
+  const uint64_t lost =
+      static_cast<uint64_t>(*number_after) - static_cast<uint64_t>(number_before) - 1;
+  if (lost > size / (kHeaderSize + 1)) return {};
+  return static_cast<int64_t>(lost);
 }
 
 }  // namespace poise::logging

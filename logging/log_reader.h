@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "logging/run_log_writer.h"
 
@@ -15,6 +17,17 @@ struct LogEvent {
   int64_t utime = 0;  ///< us
   std::string_view channel;
   std::span<const uint8_t> data;
+  uint64_t offset = 0;  ///< of the record in the file, bytes
+};
+
+/// A place where the file held no record.
+struct LogDamage {
+  uint64_t offset = 0;                  ///< bytes
+  uint64_t size = 0;                    ///< bytes skipped
+  int64_t number_before = -1;           ///< of the event before it; -1: none
+  std::optional<int64_t> number_after;  ///< of the event after it; empty: the file ends there
+  /// Events that the numbers around it show to be lost; empty when they do not tell.
+  std::optional<int64_t> lost_events() const;
 };
 
 /// Events in the order of the file. Lengths are checked against the file before they are used; what
@@ -31,8 +44,10 @@ class LogReader {
   bool Next(LogEvent* event);
   /// Places where the file held no record, and the bytes skipped there. A log cut short counts as
   /// damaged at its end.
-  int64_t damages() const { return damages_; }
-  int64_t skipped_bytes() const { return skipped_; }
+  int64_t damages() const { return static_cast<int64_t>(damage_.size()); }
+  int64_t skipped_bytes() const;
+  const std::vector<LogDamage>& damage() const { return damage_; }
+  uint64_t file_size() const { return size_; }
 
  private:
   bool ParseAt(size_t position, LogEvent* event, size_t* end) const;
@@ -40,8 +55,8 @@ class LogReader {
   const uint8_t* data_ = nullptr;
   size_t size_ = 0;
   size_t position_ = 0;
-  int64_t damages_ = 0;
-  int64_t skipped_ = 0;
+  int64_t number_ = -1;  // of the last event
+  std::vector<LogDamage> damage_;
 };
 
 }  // namespace poise::logging

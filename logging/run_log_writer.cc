@@ -3,7 +3,6 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstring>
 
@@ -16,8 +15,7 @@
 namespace poise::logging {
 
 RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info)
-    : path_(path), log_(lcm_eventlog_create(path.c_str(), "w")) {
-  if (!log_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+    : log_(path) {
   health_utime_offset_ = FindMessageType("health_t")->run_id_offset + 16;
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
@@ -38,11 +36,9 @@ RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const r
   }
   std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
   info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  Write(kRunInfoChannel, 0, bytes);
+  log_.Write(kRunInfoChannel, 0, bytes);
   Flush();
 }
-
-RunLogWriter::~RunLogWriter() = default;
 
 void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t> data) {
   Lane& lane = lanes_[static_cast<size_t>(channel)];
@@ -51,7 +47,7 @@ void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t
         fmt::format("{}: {} bytes instead of {}", lane.name, data.size(), lane.size));
   }
   if (lane.external) {
-    Write(lane.name, ReadInt64(data.data() + lane.utime_offset), data);
+    log_.Write(lane.name, ReadInt64(data.data() + lane.utime_offset), data);
     return;
   }
   if (tick != lane.next_tick) {
@@ -67,7 +63,7 @@ void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t
 }
 
 void RunLogWriter::AddHealth(std::string_view channel, std::span<const uint8_t> data) {
-  Write(channel, ReadInt64(data.data() + health_utime_offset_), data);
+  log_.Write(channel, ReadInt64(data.data() + health_utime_offset_), data);
 }
 
 void RunLogWriter::Grow() {
@@ -87,40 +83,19 @@ void RunLogWriter::WriteTick(int64_t tick) {
   for (const Lane& lane : lanes_) {
     if (lane.external || lane.next_tick <= tick) continue;
     const uint8_t* data = lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size;
-    Write(lane.name, ReadInt64(data + lane.utime_offset), {data, lane.size});
-  }
-}
-
-void RunLogWriter::Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
-  std::string name(channel);
-  lcm_eventlog_event_t event{};
-  event.timestamp = utime;
-  event.channellen = static_cast<int32_t>(name.size());
-  event.datalen = static_cast<int32_t>(data.size());
-  event.channel = name.data();
-  event.data = const_cast<uint8_t*>(data.data());  // liblcm only reads it
-  if (lcm_eventlog_write_event(log_.get(), &event) != 0) {
-    throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
-  }
-  ++events_;
-}
-
-void RunLogWriter::Flush() {
-  if (log_ && std::fflush(log_->f) != 0) {
-    throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+    log_.Write(lane.name, ReadInt64(data + lane.utime_offset), {data, lane.size});
   }
 }
 
 void RunLogWriter::Close() {
-  if (!log_) return;
+  if (!log_.open()) return;
   int64_t last = next_tick_;
   for (const Lane& lane : lanes_) last = std::max(last, lane.next_tick);
   for (int64_t tick = next_tick_; tick < last; ++tick) {
     WriteTick(tick);
     for (const Lane& lane : lanes_) missing_ += !lane.external && lane.next_tick <= tick ? 1 : 0;
   }
-  Flush();
-  log_.reset();
+  log_.Close();
 }
 
 run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {

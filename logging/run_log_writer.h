@@ -1,26 +1,17 @@
 // Writes a run as a standard LCM event log, in an order that does not depend on how it ran.
 #pragma once
 
-#include <lcm/eventlog.h>
-
 #include <cstdint>
-#include <memory>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "components/framework/graph.pb.h"
+#include "logging/event_log_writer.h"
 #include "poise/run_info_t.hpp"
 
 namespace poise::logging {
-
-/// A log that cannot be written or read. what() is one line naming the file and the reason.
-class LogError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 inline constexpr char kRunInfoChannel[] = "RUN_INFO";
 
@@ -32,7 +23,6 @@ class RunLogWriter {
  public:
   /// `spec` must hold the channels' counts. Throws LogError.
   RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info);
-  ~RunLogWriter();
 
   /// The encoded message of `tick` on channel `channel` of the graph. Every channel's ticks must
   /// come in order and without a gap (std::logic_error otherwise); channels may run ahead of each
@@ -41,11 +31,11 @@ class RunLogWriter {
   /// A HEALTH_* message. Throws LogError.
   void AddHealth(std::string_view channel, std::span<const uint8_t> data);
   /// Hands what is written to the system. Throws LogError.
-  void Flush();
+  void Flush() { log_.Flush(); }
   /// Writes also the ticks that some channel lacks, and closes. Throws LogError.
   void Close();
 
-  int64_t events() const { return events_; }
+  int64_t events() const { return log_.events(); }
   /// Ticks written with the messages of all channels.
   int64_t complete_ticks() const { return next_tick_; }
   /// After Close: messages that were missing from the last, incomplete ticks.
@@ -60,20 +50,13 @@ class RunLogWriter {
     int64_t next_tick = 0;       // first tick that has not come
     std::vector<uint8_t> bytes;  // ticks [next_tick_, next_tick), by tick modulo capacity_
   };
-  struct CloseLog {
-    void operator()(lcm_eventlog_t* log) const { lcm_eventlog_destroy(log); }
-  };
-
   void Grow();
   void WriteTick(int64_t tick);
-  void Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data);
 
-  std::string path_;
-  std::unique_ptr<lcm_eventlog_t, CloseLog> log_;
+  EventLogWriter log_;
   std::vector<Lane> lanes_;
   int64_t capacity_ = 16;  // ticks a lane can hold
   int64_t next_tick_ = 0;  // first tick not written
-  int64_t events_ = 0;
   int64_t missing_ = 0;
   int health_utime_offset_ = 0;
 };

@@ -14,14 +14,9 @@
 namespace poise::logging {
 namespace {
 
-// A tick beyond this is damage, not a run: 5 hours at 500 Hz.
-constexpr int64_t kMaxTicks = 10'000'000;
-
 struct Lane {
-  PacketFilter filter;
+  ChannelTicks ticks;
   std::function<bool(int64_t tick, std::span<const uint8_t> data)> add;
-  std::vector<bool> seen;
-  int64_t newest = -1;
 };
 
 template <class T>
@@ -48,37 +43,12 @@ Adders MakeAdders(RunRecord* run) {
           {"ground_truth_t", AddTo(&run->truth)}};
 }
 
-void AddHealth(const LogEvent& event, RunRecord* run) {
-  health_t health;
-  if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &health) ||
-      health.run_id != run->spec.run_id() || HealthChannel(health.component) != event.channel ||
-      !MessageTraits<health_t>::AllFinite(health)) {
-    ++run->refused_health;
-    return;
-  }
-  run->health[health.component] = std::move(health);
-}
-
 /// Metrics index messages by the robot's joints and feet.
-void CheckSpec(const RunRecord& run, const std::string& path) {
-  const double period = run.spec.tick_period();
-  if (!std::isfinite(period) || period <= 0) {
-    throw LogError(
-        fmt::format("{}: RUN_INFO: tick_period is {} s; must be positive", path, period));
-  }
-  if (run.spec.num_ticks() < 0) {
-    throw LogError(fmt::format("{}: RUN_INFO: num_ticks is {}; must not be negative", path,
-                               run.spec.num_ticks()));
-  }
+void CheckRobot(const RunRecord& run, const std::string& path) {
   for (const Channel& channel : run.spec.graph().channel()) {
-    const MessageType* type = FindMessageType(channel.type());
-    if (type == nullptr || type->has_strings ||
-        static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
-      throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts", path,
-                                 channel.name(), channel.type()));
-    }
-    for (size_t i = 0; i < type->count_names.size(); ++i) {
-      const std::string_view name = type->count_names[i];
+    const std::span<const char* const> names = ChannelType(channel).count_names;
+    for (size_t i = 0; i < names.size(); ++i) {
+      const std::string_view name = names[i];
       const int32_t count = channel.count(static_cast<int>(i));
       const bool joints = name == "num_joints" || name == "num_motors";
       const auto robots = joints ? run.robot.joints().size() : size_t{2};
@@ -88,30 +58,6 @@ void CheckSpec(const RunRecord& run, const std::string& path) {
       }
     }
   }
-}
-
-void AddMessage(const LogEvent& event, int64_t max_ticks, Lane* lane,
-                ChannelCompleteness* channel) {
-  if (lane->filter.Check(event.data.data(), event.data.size(), 0, max_ticks - 1) !=
-      PacketVerdict::kAccepted) {
-    ++channel->refused;
-    return;
-  }
-  const int64_t tick = lane->filter.tick(event.data.data());
-  const auto i = static_cast<size_t>(tick);
-  if (i >= lane->seen.size()) lane->seen.resize(i + 1, false);
-  if (lane->seen[i]) {
-    ++channel->duplicate;
-    return;
-  }
-  if (lane->add && !lane->add(tick, event.data)) {
-    ++channel->refused;
-    return;
-  }
-  lane->seen[i] = true;
-  ++channel->messages;
-  channel->out_of_order += tick < lane->newest ? 1 : 0;
-  lane->newest = std::max(lane->newest, tick);
 }
 
 }  // namespace
@@ -136,42 +82,57 @@ RunRecord ReadRun(const std::string& path) {
   LogReader reader(path);
   RunRecord run;
   run.info = ReadRunInfo(&reader, path, &run.spec);
+  CheckLogSpec(run.spec, path);
   run.robot = robot::LoadRobotTexts(run.info.robot, run.info.urdf);
-  CheckSpec(run, path);
+  CheckRobot(run, path);
 
   Adders adders = MakeAdders(&run);
   std::vector<Lane> lanes;
   std::map<std::string, size_t, std::less<>> lane_of;
   for (const Channel& channel : run.spec.graph().channel()) {
-    const MessageType* type = FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    if (channel.external()) continue;
+    if (channel.external() || !IsKept(run.spec, channel.name())) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
-    lanes.push_back({PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)),
-                                  counts, run.spec.run_id()),
-                     adder ? adder.mapped() : nullptr,
-                     {}});
-    run.channels.push_back({channel.name()});
+    lanes.push_back({ChannelTicks(run.spec, channel), adder ? adder.mapped() : nullptr});
   }
-  const int64_t max_ticks = run.spec.num_ticks() > 0 && run.spec.num_ticks() < kMaxTicks
-                                ? run.spec.num_ticks()
-                                : kMaxTicks;
   LogEvent event;
   while (reader.Next(&event)) {
     const auto lane = lane_of.find(event.channel);
     if (lane != lane_of.end()) {
-      AddMessage(event, max_ticks, &lanes[lane->second], &run.channels[lane->second]);
+      Lane& to = lanes[lane->second];
+      const std::optional<int64_t> tick = to.ticks.Check(event.data);
+      if (!tick) continue;
+      if (!to.add || to.add(*tick, event.data)) {
+        to.ticks.Take(*tick);
+      } else {
+        to.ticks.Refuse();
+      }
     } else if (event.channel.starts_with("HEALTH_")) {
-      AddHealth(event, &run);
+      std::optional<health_t> health = ReadHealth(event, run.spec.run_id());
+      if (health) {
+        run.health[health->component] = std::move(*health);
+      } else {
+        ++run.refused_health;
+      }
     }
   }
   run.damages = reader.damages();
-  for (const Lane& lane : lanes) run.num_ticks = std::max(run.num_ticks, lane.newest + 1);
-  for (ChannelCompleteness& channel : run.channels) {
-    channel.missing = run.num_ticks - channel.messages;
+  for (const Lane& lane : lanes) run.num_ticks = std::max(run.num_ticks, lane.ticks.newest() + 1);
+  const int64_t first = run.spec.cut().first_tick();
+  for (const Lane& lane : lanes) {
+    run.channels.push_back(lane.ticks.Completeness(first, run.num_ticks));
   }
   return run;
+}
+
+std::optional<health_t> ReadHealth(const LogEvent& event, int64_t run_id) {
+  health_t health;
+  if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &health) ||
+      health.run_id != run_id || HealthChannel(health.component) != event.channel ||
+      !MessageTraits<health_t>::AllFinite(health)) {
+    return {};
+  }
+  return health;
 }
 
 }  // namespace poise::logging

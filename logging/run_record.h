@@ -10,6 +10,7 @@
 
 #include "components/framework/graph.pb.h"
 #include "components/robot/robot_model.h"
+#include "logging/channel_ticks.h"
 #include "logging/log_reader.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
@@ -43,16 +44,6 @@ class Series {
 
  private:
   std::vector<std::optional<T>> messages_;
-};
-
-/// What a log shows of one channel of the graph.
-struct ChannelCompleteness {
-  std::string name;
-  int64_t messages = 0;
-  int64_t missing = 0;       ///< ticks without a message, up to the run's last tick
-  int64_t duplicate = 0;     ///< messages of a tick that was there already
-  int64_t out_of_order = 0;  ///< messages of an earlier tick than the one before
-  int64_t refused = 0;       ///< wrong size, fingerprint, counts, run or tick, or not finite
 };
 
 /// All of one run. Of several channels with one type the graph's first is taken.
@@ -92,5 +83,8 @@ RunRecord ReadRun(const std::string& path);
 
 /// RUN_INFO and the spec it holds, the log's first event. Throws LogError.
 run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec);
+
+/// A HEALTH_* message; empty: unreadable, of another run, or under another component's name.
+std::optional<health_t> ReadHealth(const LogEvent& event, int64_t run_id);
 
 }  // namespace poise::logging

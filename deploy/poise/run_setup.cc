@@ -13,6 +13,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
+#include "components/framework/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
 #include "deploy/poise/registry.h"
@@ -156,6 +157,43 @@ void CheckGraphFile(const std::string& path) {
     CheckGraph(graph, Components());
   } catch (const GraphError& error) {
     FailGraph(path, error);
+  }
+}
+
+void ChangeConfiguration(const std::string& change, RunSpec* spec) {
+  const std::string type = change.substr(0, change.find_first_of(".[="));
+  std::vector<std::string> types;
+  bool changed = false;
+  const size_t equals = change.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
+  }
+  for (const ComponentInstance& instance : spec->graph().component()) {
+    types.push_back(TypeOf(instance));
+    Scenario scenario;
+    const auto* field = ConfigField(scenario, type);
+    if (types.back() != type || field == nullptr) continue;
+    auto& configs = *spec->mutable_config();
+    auto config = std::find_if(configs.begin(), configs.end(), [&](const ComponentConfig& c) {
+      return c.component() == instance.name();
+    });
+    if (config == configs.end()) {
+      throw ConfigError(
+          fmt::format("--set {}: the run has no configuration of {}", change, instance.name()));
+    }
+    ParseTextProto(config->text(), "configuration of " + instance.name(),
+                   scenario.GetReflection()->MutableMessage(&scenario, field));
+    try {
+      SetField(&scenario, change.substr(0, equals), change.substr(equals + 1));
+    } catch (const ConfigError& error) {
+      throw ConfigError(fmt::format("--set {}", error.what()));
+    }
+    config->set_text(ConfigText(scenario, type));
+    changed = true;
+  }
+  if (!changed) {
+    throw ConfigError(fmt::format("--set {}: the run has no component '{}'; {}", change, type,
+                                  Suggest(type, types)));
   }
 }
 

@@ -23,6 +23,10 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec);
 /// The lines that CheckRun would throw for a graph on its own, without a scenario.
 void CheckGraphFile(const std::string& path);
 
+/// Changes one field of the components' configurations in a run, "task_controller.com.kp=200".
+/// Throws ConfigError.
+void ChangeConfiguration(const std::string& change, RunSpec* spec);
+
 /// A block of free UDP ports for the run's channels. Throws ConfigError when none is found.
 void ChoosePorts(RunSpec* spec);
 

@@ -4,48 +4,13 @@
 #include <lcm/eventlog.h>
 
 #include "logging/log_reader.h"
-#include "poise/drive_command_t.hpp"
 #include "poise/emergency_stop_t.hpp"
-#include "poise/external_push_t.hpp"
 #include "poise/health_t.hpp"
 #include "tests/logging/log_test_support.h"
+#include "tests/logging/small_log.h"
 
 namespace poise::logging {
 namespace {
-
-/// Two data channels, PUSH before COMMAND, and an external one.
-RunSpec SmallSpec() {
-  RunSpec spec;
-  spec.set_run_id(42);
-  spec.set_tick_period(0.002);
-  const auto add = [&](const char* name, const char* type, bool external) {
-    Channel* channel = spec.mutable_graph()->add_channel();
-    channel->set_name(name);
-    channel->set_type(type);
-    channel->set_external(external);
-    return channel;
-  };
-  add("PUSH", "external_push_t", false);
-  add("COMMAND", "drive_command_t", false)->add_count(12);
-  add("STOP", "emergency_stop_t", true);
-  return spec;
-}
-
-std::vector<uint8_t> Push(int64_t tick) {
-  external_push_t push{};
-  SetHeader(tick, &push);
-  push.force[0] = static_cast<double>(tick) + 0.25;
-  return Encode(push);
-}
-
-std::vector<uint8_t> Command(int64_t tick) {
-  drive_command_t command{};
-  SetHeader(tick, &command);
-  command.num_motors = 12;
-  command.current.assign(12, static_cast<double>(tick));
-  command.enabled.assign(12, 1);
-  return Encode(command);
-}
 
 struct Seen {
   std::string channel;

@@ -1,0 +1,244 @@
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "components/framework/packet_filter.h"
+#include "fmt/format.h"
+#include "logging/log_export.h"
+#include "logging/log_messages.h"
+
+namespace poise::logging {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A field of a row; in quotes when a separator stands in it.
+void AppendText(std::string_view text, std::string* row) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
+    row->append(text);
+    return;
+  }
+  row->push_back('"');
+  for (const char c : text) row->append(c == '"' ? 2 : 1, c);
+  row->push_back('"');
+}
+
+/// Values and names of a message's fields; counts and header are left out.
+class Row final : public ScalarVisitor {
+ public:
+  /// `names`: write names instead of values, each after `prefix`.
+  Row(const MessageType& type, bool names, std::string prefix, std::string* to)
+      : skip_(type.count_names.size() + 3), names_(names), prefix_(std::move(prefix)), to_(to) {}
+
+  void Integer(std::string_view path, int64_t value) override {
+    if (Begin(path)) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  }
+  void Real(std::string_view path, double value) override {
+    if (Begin(path)) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  }
+  void Text(std::string_view path, std::string_view value) override {
+    if (Begin(path)) AppendText(value, to_);
+  }
+  size_t columns() const { return columns_; }
+
+ private:
+  /// Writes the separator; true when the value is to follow.
+  bool Begin(std::string_view path) {
+    if (seen_++ < skip_) return false;
+    to_->push_back(',');
+    ++columns_;
+    if (names_) to_->append(prefix_).append(path);
+    return !names_;
+  }
+
+  size_t skip_;
+  bool names_;
+  std::string prefix_;
+  std::string* to_;
+  size_t seen_ = 0;
+  size_t columns_ = 0;
+};
+
+/// One file; what is written is checked at Close.
+class File {
+ public:
+  explicit File(const std::string& path) : path_(path), out_(path, std::ios::binary) {
+    if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
+  void Write(const std::string& text) {
+    out_.write(text.data(), static_cast<std::streamsize>(text.size()));
+  }
+  void Close() {
+    out_.close();
+    if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+  }
+
+ private:
+  std::string path_;
+  std::ofstream out_;
+};
+
+/// What a channel's columns depend on.
+struct Shape {
+  const MessageType* type = nullptr;
+  std::vector<uint8_t> counts;  // as encoded
+
+  Shape(const MessageType* t, std::span<const uint8_t> data)
+      : type(t), counts(data.begin() + 8, data.begin() + t->run_id_offset) {}
+  bool operator==(const Shape&) const = default;
+};
+
+size_t Append(const MessageType& type, std::span<const uint8_t> data, bool names,
+              const std::string& prefix, std::string* to) {
+  Row row(type, names, prefix, to);
+  type.visit(data.data(), static_cast<int64_t>(data.size()), &row);
+  return row.columns();
+}
+
+std::string TimeAndTick(int64_t utime, int64_t tick) {
+  return fmt::format("{:.6f},{}", static_cast<double>(utime) * 1e-6, tick);
+}
+
+/// Damage may put anything into a channel's name, a path too.
+bool IsFileName(std::string_view name) {
+  return name.find_first_not_of(
+             "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-") ==
+         std::string_view::npos;
+}
+
+/// The results by channel, in the order in which the channels first come.
+class Results {
+ public:
+  ExportedChannel& of(std::string_view channel) {
+    const auto found = std::find_if(channels_.begin(), channels_.end(),
+                                    [&](const auto& c) { return c.channel == channel; });
+    if (found != channels_.end()) return *found;
+    channels_.push_back({std::string(channel), "", 0, 0});
+    return channels_.back();
+  }
+  std::vector<ExportedChannel> take() { return std::move(channels_); }
+
+ private:
+  std::vector<ExportedChannel> channels_;
+};
+
+}  // namespace
+
+std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder) {
+  LogMessages messages(log);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw LogError(fmt::format("{}: cannot be made: {}", folder, error.message()));
+  struct Table {
+    File file;
+    Shape shape;
+  };
+  std::map<std::string, Table, std::less<>> tables;
+  Results results;
+  LogEvent event;
+  std::string row;
+  while (messages.reader().Next(&event)) {
+    if (event.channel == kRunInfoChannel) continue;
+    ExportedChannel& result = results.of(event.channel);
+    const MessageType* const type = messages.TypeOf(event);
+    if (type == nullptr || !IsFileName(event.channel)) {
+      ++result.refused;
+      continue;
+    }
+    auto table = tables.find(event.channel);
+    if (table == tables.end()) {
+      const std::string name(event.channel);
+      table = tables
+                  .emplace(name, Table{File((fs::path(folder) / (name + ".csv")).string()),
+                                       Shape(type, event.data)})
+                  .first;
+      result.type = type->name;
+      row = "time,tick";
+      Append(*type, event.data, true, "", &row);
+      table->second.file.Write(row + "\n");
+    }
+    if (table->second.shape != Shape(type, event.data)) {
+      ++result.refused;
+      continue;
+    }
+    row = TimeAndTick(ReadInt64(event.data.data() + type->run_id_offset + 16),
+                      LogMessages::Tick(*type, event));
+    Append(*type, event.data, false, "", &row);
+    row.push_back('\n');
+    table->second.file.Write(row);
+    ++result.messages;
+  }
+  for (auto& [name, table] : tables) table.file.Close();
+  return results.take();
+}
+
+std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file) {
+  LogMessages messages(log);
+  struct Column {
+    std::optional<Shape> shape;
+    std::string names;
+    size_t width = 0;
+  };
+  std::vector<ExportedChannel> results;
+  std::map<std::string, size_t, std::less<>> index;
+  for (const Channel& channel : messages.spec().graph().channel()) {
+    if (channel.external()) continue;
+    index[channel.name()] = results.size();
+    results.push_back({channel.name(), channel.type(), 0, 0});
+  }
+  std::vector<Column> columns(results.size());
+  std::map<int64_t, std::vector<std::span<const uint8_t>>> ticks;  // spans into the reader's file
+  LogEvent event;
+  while (messages.reader().Next(&event)) {
+    const auto found = index.find(event.channel);
+    if (found == index.end()) continue;
+    ExportedChannel& result = results[found->second];
+    Column& column = columns[found->second];
+    const MessageType* const type = messages.TypeOf(event);
+    if (type == nullptr || (column.shape && *column.shape != Shape(type, event.data))) {
+      ++result.refused;
+      continue;
+    }
+    if (!column.shape) {
+      column.shape.emplace(type, event.data);
+      column.width =
+          Append(*type, event.data, true, std::string(event.channel) + ".", &column.names);
+    }
+    auto& cells = ticks[LogMessages::Tick(*type, event)];
+    cells.resize(columns.size());
+    std::span<const uint8_t>& cell = cells[found->second];
+    ++(cell.empty() ? result.messages : result.refused);
+    if (cell.empty()) cell = event.data;
+  }
+  File out(file);
+  std::string row = "time,tick";
+  for (const Column& column : columns) row += column.names;
+  out.Write(row + "\n");
+  for (const auto& [tick, cells] : ticks) {
+    row.clear();
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].empty()) continue;
+      const int offset = columns[i].shape->type->run_id_offset;
+      row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16), tick);
+      break;
+    }
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].empty()) {
+        row.append(columns[i].width, ',');
+      } else {
+        Append(*columns[i].shape->type, cells[i], false, "", &row);
+      }
+    }
+    out.Write(row + "\n");
+  }
+  out.Close();
+  return results;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,45 @@
+// Writes standard LCM event logs.
+#pragma once
+
+#include <lcm/eventlog.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace poise::logging {
+
+/// A log that cannot be written or read. what() is one line naming the file and the reason.
+class LogError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One log, written through liblcm; events are numbered from 0.
+class EventLogWriter {
+ public:
+  /// Replaces a file of that name. Throws LogError.
+  explicit EventLogWriter(const std::string& path);
+  /// `utime` in us. Throws LogError.
+  void Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data);
+  /// Hands what is written to the system. Throws LogError.
+  void Flush();
+  /// Throws LogError.
+  void Close();
+  int64_t events() const { return events_; }
+  bool open() const { return log_ != nullptr; }
+
+ private:
+  struct CloseLog {
+    void operator()(lcm_eventlog_t* log) const { lcm_eventlog_destroy(log); }
+  };
+  std::string path_;
+  std::string channel_;
+  std::unique_ptr<lcm_eventlog_t, CloseLog> log_;
+  int64_t events_ = 0;
+};
+
+}  // namespace poise::logging

@@ -1,0 +1,107 @@
+#include "logging/log_cut.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "components/framework/run.h"
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "logging/event_log_writer.h"
+#include "logging/log_survey.h"
+#include "logging/run_record.h"
+
+namespace poise::logging {
+namespace {
+
+/// The cut that `range` asks for, inside what the log holds.
+LogCut MakeCut(const LogSurvey& survey, const CutRange& range, const std::string& path) {
+  std::set<std::string> names;
+  for (const ChannelSurvey& channel : survey.channels) names.insert(channel.ticks.name);
+  for (const ChannelSurvey& channel : survey.others) names.insert(channel.ticks.name);
+  LogCut cut;
+  for (const std::string& name : range.channels) {
+    if (!names.contains(name)) {
+      throw LogError(fmt::format("{}: no channel named '{}'; {}", path, name,
+                                 Suggest(name, {names.begin(), names.end()})));
+    }
+  }
+  for (const std::string& name : names) {
+    const auto& wanted = range.channels;
+    const bool all = wanted.empty();
+    if (all && survey.spec.cut().channel().empty()) break;
+    if (all || std::find(wanted.begin(), wanted.end(), name) != wanted.end()) cut.add_channel(name);
+  }
+  cut.set_first_tick(std::max(range.first_tick, survey.first_tick));
+  cut.set_last_tick(std::min(range.last_tick, survey.end_tick - 1));
+  if (cut.last_tick() < cut.first_tick()) {
+    throw LogError(fmt::format("{}: holds ticks {} to {}, none of those asked for", path,
+                               survey.first_tick, survey.end_tick - 1));
+  }
+  return cut;
+}
+
+}  // namespace
+
+CutRange TicksOfTimes(double from, double to, double period) {
+  // Times of ticks are rounded to a whole microsecond in the log.
+  constexpr double kHalf = 0.5e-6;
+  const auto tick = [](double value) {
+    return static_cast<int64_t>(std::clamp(value, -1.0, 9e15));
+  };
+  return {std::max<int64_t>(0, tick(std::ceil((from - kHalf) / period))),
+          tick(std::floor((to + kHalf) / period)),
+          {}};
+}
+
+CutResult CutLog(const std::string& from, const CutRange& range, const std::string& to) {
+  const LogSurvey survey = SurveyLog(from);
+  if (!survey.info_problem.empty()) throw LogError(survey.info_problem);
+  RunSpec spec = survey.spec;
+  *spec.mutable_cut() = MakeCut(survey, range, from);
+  // Never truncates a log that someone reads, this one least of all.
+  if (std::filesystem::exists(to)) {
+    throw LogError(fmt::format("{}: exists; choose another name or remove it", to));
+  }
+  run_info_t info = survey.info;
+  google::protobuf::TextFormat::PrintToString(spec, &info.run_spec);
+
+  LogReader reader(from);
+  EventLogWriter writer(to);
+  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
+  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  writer.Write(kRunInfoChannel, 0, bytes);
+  CutResult result{0, spec.cut().first_tick(), spec.cut().last_tick(), 0};
+  const int64_t first_utime = MakeTick(result.first_tick, spec.tick_period()).utime;
+  const int64_t last_utime = MakeTick(result.last_tick, spec.tick_period()).utime;
+  std::map<std::string, bool, std::less<>> external;
+  for (const Channel& channel : spec.graph().channel()) {
+    external[channel.name()] = channel.external();
+  }
+  LogEvent event;
+  while (reader.Next(&event)) {
+    if (event.channel == kRunInfoChannel || !IsKept(spec, std::string(event.channel))) continue;
+    const MessageType* type =
+        event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
+    if (type == nullptr || !type->has_header ||
+        type->well_formed_size(event.data.data(), static_cast<int64_t>(event.data.size())) !=
+            static_cast<int64_t>(event.data.size())) {
+      ++result.refused;
+      continue;
+    }
+    const auto channel = external.find(event.channel);
+    const bool by_tick = channel == external.end() || !channel->second;
+    const int64_t tick = ReadInt64(event.data.data() + type->run_id_offset + 8);
+    const bool inside = by_tick ? tick >= result.first_tick && tick <= result.last_tick
+                                : event.utime >= first_utime && event.utime <= last_utime;
+    if (inside) writer.Write(event.channel, event.utime, event.data);
+  }
+  writer.Close();
+  result.events = writer.events();
+  return result;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,30 @@
+// A run's log in formats that other tools read: CSV and MCAP.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace poise::logging {
+
+struct ExportedChannel {
+  std::string channel;
+  std::string type;
+  int64_t messages = 0;  ///< written
+  int64_t refused = 0;   ///< not of the channel's type, or of other counts than the first: left out
+};
+
+/// FOLDER/CHANNEL.csv for every channel that has messages, RUN_INFO aside: a row a message, in the
+/// log's order; columns time (s), tick and the message's fields, "foot_wrench[1].force[2]", numbers
+/// with all their digits. Makes the folder. Throws LogError.
+std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder);
+
+/// One wide file: a row a tick, columns time (s), tick and "CHANNEL.field" of the graph's channels,
+/// external ones aside; empty where a channel lacks the tick. Throws LogError.
+std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file);
+
+/// An MCAP file with every message as Protobuf (ProtobufMessages), a topic a channel, in the log's
+/// order; times in ns of the run. Throws LogError.
+std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file);
+
+}  // namespace poise::logging

@@ -1,0 +1,33 @@
+#include "logging/log_messages.h"
+
+#include "components/framework/packet_filter.h"
+#include "logging/channel_ticks.h"
+#include "logging/run_record.h"
+
+namespace poise::logging {
+
+LogMessages::LogMessages(const std::string& path)
+    : reader_(path), info_(ReadRunInfo(&reader_, path, &spec_)) {
+  CheckLogSpec(spec_, path);
+  for (const Channel& channel : spec_.graph().channel()) {
+    graph_[channel.name()] = &ChannelType(channel);
+  }
+}
+
+const MessageType* LogMessages::TypeOf(const LogEvent& event) const {
+  if (event.data.size() < 8) return nullptr;
+  const int64_t fingerprint = ReadInt64(event.data.data());
+  const auto known = graph_.find(event.channel);
+  const MessageType* const type =
+      known == graph_.end() ? FindMessageType(fingerprint) : known->second;
+  const auto size = static_cast<int64_t>(event.data.size());
+  const bool good = type != nullptr && type->has_header && type->fingerprint == fingerprint &&
+                    type->well_formed_size(event.data.data(), size) == size;
+  return good ? type : nullptr;
+}
+
+int64_t LogMessages::Tick(const MessageType& type, const LogEvent& event) {
+  return ReadInt64(event.data.data() + type.run_id_offset + 8);
+}
+
+}  // namespace poise::logging

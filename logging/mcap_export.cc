@@ -1,0 +1,79 @@
+#include <map>
+
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "logging/log_export.h"
+#include "logging/log_messages.h"
+#include "logging/mcap_writer.h"
+#include "logging/protobuf_messages.h"
+
+namespace poise::logging {
+namespace {
+
+McapWriter::Texts RunTexts(const LogMessages& messages) {
+  const RunSpec& spec = messages.spec();
+  McapWriter::Texts texts = {{"scenario", spec.scenario()},
+                             {"run_id", fmt::format("{}", spec.run_id())},
+                             {"seed", fmt::format("{}", spec.seed())},
+                             {"started_at", messages.info().started_at},
+                             {"poise", spec.poise_version()}};
+  for (const std::string& version : spec.library_version()) {
+    const size_t space = version.find(' ');
+    if (space != std::string::npos) texts[version.substr(0, space)] = version.substr(space + 1);
+  }
+  return texts;
+}
+
+}  // namespace
+
+std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file) {
+  LogMessages messages(log);
+  ProtobufMessages protobuf;
+  McapWriter writer(file, fmt::format("poise {}", PoiseVersion()));
+  writer.AddMetadata("run", RunTexts(messages));
+  std::map<std::string, uint16_t> schemas;  // by type
+  struct Topic {
+    uint16_t id;
+    const MessageType* type;
+    size_t result;
+  };
+  std::map<std::string, Topic, std::less<>> topics;
+  std::vector<ExportedChannel> results;
+  LogReader all(log);  // with RUN_INFO
+  LogEvent event;
+  while (all.Next(&event)) {
+    const MessageType* const type = messages.TypeOf(event);
+    auto topic = topics.find(event.channel);
+    if (topic == topics.end()) {
+      topic = topics.emplace(event.channel, Topic{0, nullptr, results.size()}).first;
+      results.push_back({std::string(event.channel), "", 0, 0});
+    }
+    ExportedChannel& result = results[topic->second.result];
+    std::optional<std::string> bytes;
+    if (type != nullptr && event.utime >= 0 && event.utime < INT64_MAX / 1000 &&
+        (topic->second.type == nullptr || topic->second.type == type)) {
+      bytes = protobuf.Convert(type->name, event.data);
+    }
+    if (!bytes) {
+      ++result.refused;
+      continue;
+    }
+    if (topic->second.type == nullptr) {
+      if (!schemas.contains(type->name)) {
+        schemas[type->name] = writer.AddSchema(ProtobufMessages::FullName(type->name), "protobuf",
+                                               protobuf.file_descriptor_set());
+      }
+      topic->second.type = type;
+      topic->second.id = writer.AddChannel(schemas[type->name], result.channel, "protobuf",
+                                           {{"lcm_type", type->name}});
+      result.type = type->name;
+    }
+    writer.AddMessage(topic->second.id, static_cast<uint32_t>(result.messages),
+                      static_cast<uint64_t>(event.utime) * 1000, *bytes);
+    ++result.messages;
+  }
+  writer.Close();
+  return results;
+}
+
+}  // namespace poise::logging
