@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   poise::AddMatrixCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
+  poise::AddReplayCommand(&app, &command);
   poise::AddLogCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);
   poise::AddListCommand(&app, &command);

@@ -1,0 +1,185 @@
+// A component fed from a log gives what it gave in the run.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "components/framework/run.h"
+#include "components/framework/udp_bus.h"
+#include "fmt/format.h"
+#include "logging/log_reader.h"
+#include "logging/run_log_writer.h"
+#include "logging/run_record.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+class ReplayTest : public testing::Test {
+ protected:
+  void Run(const std::vector<std::string>& flags = {}) {
+    std::vector<std::string> arguments = {"run", StandScenario(), "--out", run_};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    RunPoise(arguments);
+  }
+  /// `poise replay` of the run.
+  ProgramResult Replay(const std::vector<std::string>& flags = {}, const std::string& run = "") {
+    std::vector<std::string> arguments = {"replay", run.empty() ? run_ : run};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    return RunPoise(arguments);
+  }
+  /// The run's log with the events that `keep` keeps, each as it changes them.
+  template <class Change>
+  std::string Changed(Change change) {
+    const std::string path = folder_ / "changed.lcm";
+    logging::LogReader reader(run_ + "/run.lcm");
+    logging::EventLogWriter writer(path);
+    logging::LogEvent event;
+    while (reader.Next(&event)) {
+      std::vector<uint8_t> data(event.data.begin(), event.data.end());
+      if (change(event, &data)) writer.Write(event.channel, event.utime, data);
+    }
+    writer.Close();
+    return path;
+  }
+
+  RunFolder folder_;
+  std::string run_ = folder_ / "run";
+};
+
+#define EXPECT_HAS(result, text) \
+  EXPECT_NE((result).output.find(text), std::string::npos) << (result).output
+
+TEST_F(ReplayTest, EveryComponentGivesTheLoggedBits) {
+  Run();  // as processes
+  const ProgramResult result = Replay();
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  for (const char* component : {"sim_ode", "hw_bridge", "state_estimator", "task_controller",
+                                "contact_wrench_monitor", "redistributor"}) {
+    EXPECT_HAS(result, std::string(component) + ": 200 ticks");
+  }
+  EXPECT_HAS(result, "JOINT_COMMAND: 200 messages, the same bits");
+}
+
+TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
+  Run({"--inline", "--set", "task_controller.com.kp=190", "--seed", "5"});
+  EXPECT_EQ(Replay({"--component", "task_controller", "--component", "sim_ode"}).exit_code, 0);
+  const ProgramResult result =
+      Replay({"--component", "task_controller", "--set", "task_controller.com.kp=225"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_HAS(result, "task_controller: 200 ticks");
+  EXPECT_HAS(result, "DIFFERENT");
+  EXPECT_HAS(result, "first torque[");
+}
+
+TEST_F(ReplayTest, OneChangedBitShowsWithItsFieldAndTick) {
+  Run({"--inline"});
+  double change = 0;
+  const std::string log = Changed([&](const logging::LogEvent& event, std::vector<uint8_t>* data) {
+    joint_command_t command;
+    if (event.channel != "JOINT_COMMAND" ||
+        !DecodeChecked(data->data(), static_cast<int64_t>(data->size()), &command) ||
+        command.tick != 123) {
+      return true;
+    }
+    change = command.torque[7];
+    command.torque[7] = std::nextafter(command.torque[7], 1e9);
+    change = command.torque[7] - change;
+    command.encode(data->data(), 0, static_cast<int>(data->size()));
+    return true;
+  });
+  ASSERT_GT(change, 0);
+  const ProgramResult result = Replay({"--component", "redistributor"}, log);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_HAS(result, "JOINT_COMMAND: 1 of 200 messages differ, first torque[7] at tick 123");
+  EXPECT_HAS(result, fmt::format("torque: 1 ticks, from 123 on; largest {:.3g}: torque[7] at tick",
+                                 change));
+  // The bridge reads it, and its own output changes by it.
+  EXPECT_EQ(Replay({"--component", "hw_bridge"}, log).exit_code, 1);
+  EXPECT_EQ(Replay({"--component", "state_estimator"}, log).exit_code, 0);
+}
+
+TEST_F(ReplayTest, NamesWhatTheLogLacks) {
+  Run({"--inline"});
+  const std::string log = Changed([](const logging::LogEvent& event, std::vector<uint8_t>*) {
+    return event.channel != "ROBOT_STATE" || event.utime < 20'000 || event.utime > 24'000;
+  });
+  const ProgramResult result = Replay({"--component", "redistributor"}, log);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_HAS(result, "redistributor cannot be replayed");
+  EXPECT_HAS(result, "ROBOT_STATE of tick 10 to 12");
+  EXPECT_EQ(Replay({"--component", "hw_bridge"}, log).exit_code, 0);
+
+  const std::string cut = folder_ / "cut.lcm";
+  ASSERT_EQ(RunPoise({"log", "cut", run_, "--first-tick", "50", "--out", cut}).exit_code, 0);
+  const ProgramResult of_cut = Replay({"--component", "state_estimator"}, cut);
+  EXPECT_EQ(of_cut.exit_code, 1);
+  EXPECT_HAS(of_cut, "cut from a longer log");
+}
+
+TEST_F(ReplayTest, InterruptedRunReplaysUpToItsEnd) {
+  PoiseProgram program({"run", StandScenario(), "--out", run_, "--duration", "600"});
+  ASSERT_TRUE(WaitForLog(run_, 200'000));
+  kill(program.pid(), SIGINT);
+  program.Wait();
+  const ProgramResult result = Replay();
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+}
+
+TEST_F(ReplayTest, WrongUseIsAnErrorOfUse) {
+  Run({"--inline"});
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--component", "redistributer"},
+        {"--set", "task_controller.com.kq=1"},
+        {"--set", "task_controller.com.kp=many"},
+        {"--set", "duration=3"},
+        {"--set", "nonsense"},
+        {"--speed", "2"},
+        {"--to-bus", "--speed", "0"},
+        {"--to-bus", "--component", "redistributor"}}) {
+    const ProgramResult result = Replay(flags);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(flags) << result.output;
+    EXPECT_EQ(std::count(result.output.begin(), result.output.end(), '\n'), 1) << result.output;
+  }
+}
+
+TEST_F(ReplayTest, PlaysTheLogOnItsPublicUrlInOrder) {
+  Run();  // as processes: the run has ports
+  logging::LogReader reader(run_ + "/run.lcm");
+  RunSpec spec;
+  logging::ReadRunInfo(&reader, "log", &spec);
+  BusReceiver receiver(MirrorUrl(spec));
+  {
+    PoiseProgram program({"replay", run_, "--to-bus"});
+    std::map<std::string, int64_t> last;  // tick by channel
+    BusReceiver::Packet packet;
+    const auto take = [&] {
+      while (receiver.Receive(&packet)) {
+        const MessageType* type = FindMessageType(ReadInt64(packet.data));
+        if (type == nullptr) continue;  // liblcm's self test
+        const int64_t tick = ReadInt64(packet.data + type->run_id_offset + 8);
+        const std::string channel(packet.channel);
+        EXPECT_TRUE(!last.contains(channel) || last[channel] <= tick) << channel;
+        last[channel] = tick;
+      }
+      return last["GROUND_TRUTH"] == 199 && last["JOINT_COMMAND"] == 199;
+    };
+    EXPECT_TRUE(WaitUntil(take));
+    const ProgramResult result = program.Wait();
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    EXPECT_HAS(result, "0.398 s of the run");
+  }
+  // Slowly: Ctrl-C ends it.
+  PoiseProgram slow({"replay", run_, "--to-bus", "--speed", "0.001"});
+  BusReceiver::Packet packet;
+  EXPECT_TRUE(WaitUntil([&] { return receiver.Receive(&packet); }));
+  kill(slow.pid(), SIGINT);
+  const ProgramResult result = slow.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_HAS(result, "interrupted");
+}
+
+}  // namespace
+}  // namespace poise
