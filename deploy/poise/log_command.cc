@@ -45,10 +45,14 @@ void PrintRun(const logging::LogSurvey& survey) {
   fmt::print("duration  {:.3f} s in the log, {} ticks of {:g} s from tick {}; {} planned\n",
              static_cast<double>(ticks) * spec.tick_period(), ticks, spec.tick_period(),
              survey.first_tick, spec.num_ticks());
-  Scenario scenario;
-  ParseTextProto(survey.info.scenario, "RUN_INFO.scenario", &scenario);
-  const std::string changes = FormatChanges(scenario);
-  if (!changes.empty()) fmt::print("changed   {}\n", changes);
+  try {
+    Scenario scenario;
+    ParseTextProto(survey.info.scenario, "RUN_INFO.scenario", &scenario);
+    const std::string changes = FormatChanges(scenario);
+    if (!changes.empty()) fmt::print("changed   {}\n", changes);
+  } catch (const ConfigError& error) {
+    fmt::print("changed   not known: {}\n", error.what());
+  }
   if (spec.drop_rate() > 0)
     fmt::print("dropped   {} of the messages, on purpose\n", spec.drop_rate());
   if (spec.realtime()) fmt::print("paced     with the wall clock\n");
