@@ -16,7 +16,7 @@ std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
 
 double Height(const task_torque_t& task, size_t foot) { return task.foot_pose[foot].position[2]; }
 
-/// Follows where each foot's reference is to end, phase by phase.
+/// Follows where each foot's reference is to end before both feet are to stand, phase by phase.
 class ReferenceEnds {
  public:
   explicit ReferenceEnds(const RunRecord& run) : plan_(ReadSchedulePlan(run)) {}
@@ -25,13 +25,20 @@ class ReferenceEnds {
     if (task.phase == phase_) return;
     phase_ = task.phase;
     if (!plan_ || phase_ < 0 || static_cast<size_t>(phase_) >= plan_->phases.size()) return;
-    const auto& foot = plan_->phases[static_cast<size_t>(phase_)].foot;
-    if (!foot) return;
-    const auto f = static_cast<size_t>(foot->foot);
-    const double standing = task.foot_desired[f].position[2];
-    end_[f] = foot->above_support ? Height(task, 1 - f) + foot->z
-              : foot->at_once     ? standing
-                                  : standing + foot->z;
+    const auto now = static_cast<size_t>(phase_);
+    std::array<double, 2> level{task.foot_desired[0].position[2], task.foot_desired[1].position[2]};
+    for (size_t p = now; p < plan_->phases.size(); ++p) {
+      const PhasePlan& phase = plan_->phases[p];
+      if (p > now && phase.double_support) break;
+      if (!phase.foot) continue;
+      const auto f = static_cast<size_t>(phase.foot->foot);
+      if (phase.foot->above_support) {
+        level[f] = Height(task, 1 - f) + phase.foot->z;
+      } else if (!(p == now && phase.foot->at_once)) {  // else it stands there already
+        level[f] += phase.foot->z;
+      }
+      end_[f] = level[f];
+    }
   }
   void Place(const task_torque_t& task, TouchDown* touch) const {
     if (!end_[touch->foot]) return;

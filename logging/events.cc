@@ -11,6 +11,8 @@
 namespace poise::logging {
 namespace {
 
+constexpr double kShortestLoss = 0.01;  // s; shorter is the foot's rattle, and the sensor's noise
+
 constexpr double kMilli = 1e3;
 // A push that comes back sooner is the same push, s.
 constexpr double kPushGap = 0.05;
@@ -156,11 +158,14 @@ void AddFeet(const RunRecord& run, EventList* events) {
       if (run.command.at(tick - 1) == nullptr || run.sensors.at(tick) == nullptr) return {};
       return ContactLost(run, foot, tick).value_or(false);
     };
-    events->AddIntervals(
-        Intervals(run, lost), "contact_lost", "contact_regained", [&](int64_t tick) {
-          const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
-          return fmt::format("{}, which was to carry {:.0f} N", FootName(run, foot), load);
-        });
+    std::vector<Interval> intervals = Intervals(run, lost);
+    std::erase_if(intervals, [&](const Interval& i) {
+      return i.end && run.time(*i.end - i.begin) < kShortestLoss;
+    });
+    events->AddIntervals(intervals, "contact_lost", "contact_regained", [&](int64_t tick) {
+      const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
+      return fmt::format("{}, which was to carry {:.0f} N", FootName(run, foot), load);
+    });
   }
 }
 

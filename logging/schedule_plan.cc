@@ -70,6 +70,7 @@ std::string WriterOf(const Graph& graph, const std::string& type) {
 PhasePlan ReadPhase(const Reader& phase) {
   PhasePlan plan;
   plan.name = phase.Text("name");
+  plan.double_support = phase.Enum("support") == 0;  // the schema's first: DOUBLE
   if (!phase.Has("foot")) return plan;
   const Reader foot = phase.Part("foot");
   FootPlan& to = plan.foot.emplace();

@@ -19,6 +19,7 @@ struct FootPlan {
 
 struct PhasePlan {
   std::string name;
+  bool double_support = false;
   std::optional<FootPlan> foot;
 };
 

@@ -42,6 +42,7 @@ class EventsTest : public RecordTest {
     config.add_phase()->set_name("stand");
     Phase* down = config.add_phase();
     down->set_name("set down");
+    down->set_support(RIGHT);
     down->mutable_foot()->set_foot(LEFT_FOOT);
     down->mutable_foot()->set_height_above_support(0.09);
     down->mutable_foot()->set_duration(0.1);
@@ -146,6 +147,20 @@ TEST_F(EventsTest, AContactAboveTheReferencesEndIsEarly) {
   EXPECT_THAT(Named("contact_early"),
               ElementsAre(Is(0.1, "contact_early", "left foot, 25.0 mm above")));
   EXPECT_TRUE(Named("contact_late").empty());
+}
+
+// What comes in a phase before the one that lowers the foot is early too.
+TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
+  TaskControllerConfig config = StepDown();
+  *config.add_phase() = config.phase(1);
+  config.mutable_phase(1)->mutable_foot()->set_height_above_support(0.12);
+  Plan(config);
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
+    task_[t].foot_pose[1].position[2] = 0.125;  // 5 mm above where it hovers
+  }
+  EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "35.0 mm above")));
 }
 
 TEST_F(EventsTest, AContactFoundBySearchingIsLate) {

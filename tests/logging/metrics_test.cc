@@ -223,7 +223,7 @@ TEST_F(MetricsTest, MeasuredViolationsUseTheCommandsOwnSole) {
   for (size_t t = 40; t < 50; ++t) sensors_[t].foot_wrench[1].moment[1] = -18.1;  // limit 18
   sensors_[60].foot_wrench[1].moment[1] = 17.9;
   sensors_[70].foot_wrench[1].moment[1] = 5;  // unloaded: anything
-  sensors_[70].foot_wrench[1].force[2] = -10;
+  sensors_[70].foot_wrench[1].force[2] = -5;
   sensors_[80].foot_wrench[0].moment[0] = 7.6;  // limit 7.5
   EXPECT_NEAR(Measure("left_foot_pitch_violation_measured"), 0.02, 1e-12);
   EXPECT_NEAR(Measure("left_foot_pitch_violation_first"), 0.08, 1e-12);
