@@ -20,7 +20,7 @@ class ColumnAppender : public ScalarVisitor {
   explicit ColumnAppender(const MessageType* type) : type_(type) {}
 
   void Integer(std::string_view path, int64_t value) override {
-    if (!IsHeader(path)) Add(path, true, static_cast<double>(value));
+    if (IsSignal(*type_, path)) Add(path, true, static_cast<double>(value));
   }
   void Real(std::string_view path, double value) override { Add(path, false, value); }
   void Text(std::string_view, std::string_view) override {}
@@ -29,10 +29,6 @@ class ColumnAppender : public ScalarVisitor {
   std::vector<SignalColumn>& columns() { return columns_; }
 
  private:
-  bool IsHeader(std::string_view path) const {
-    if (path == "run_id" || path == "tick") return true;
-    return std::ranges::find(type_->count_names, path) != type_->count_names.end();
-  }
   void Add(std::string_view path, bool integer, double value) {
     // The counts of a channel are the same in all its messages, and so are its fields.
     if (next_ == columns_.size()) columns_.push_back({std::string(path), integer, {}});
@@ -81,6 +77,11 @@ void Sort(ChannelColumns* channel) {
 }
 
 }  // namespace
+
+bool IsSignal(const MessageType& type, std::string_view path) {
+  if (path == "run_id" || path == "tick") return false;
+  return std::ranges::find(type.count_names, path) == type.count_names.end();
+}
 
 std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run) {
   LogReader reader(path);

@@ -3,11 +3,17 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "logging/run_record.h"
+#include "poise/message_traits.hpp"
 
 namespace poise::logging {
+
+/// True when the scalar at `path` of such a message is a signal: no count, not run_id or tick.
+/// Texts are none either.
+bool IsSignal(const MessageType& type, std::string_view path);
 
 /// One scalar field over the messages of its channel.
 struct SignalColumn {

@@ -27,5 +27,6 @@ void AddDoctorCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
+void AddViewCommand(CLI::App* app, Command* command);
 
 }  // namespace poise

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -121,17 +122,29 @@ Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t 
   return json;
 }
 
-void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
+/// What a page knows of a run beside its ticks.
+Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
+              const std::vector<CheckResult>& checks) {
   Json json;
   json["format"] = 1;
-  json["run"] = RunJson(run.scenario, run.record, run.checks);
-  json["run"]["run_id"] = std::to_string(run.record.spec.run_id());  // beyond a double's integers
-  json["run"]["log"] = run.log;
-  json["run"]["damages"] = run.record.damages;
-  json["scenario"] = ScenarioJson(run.scenario);
-  json["scenario_text"] = run.record.info.scenario;
-  json["robot"] = RobotJson(run.record);
+  json["run"] = RunJson(scenario, record, checks);
+  json["run"]["run_id"] = std::to_string(record.spec.run_id());  // beyond a double's integers
+  json["run"]["damages"] = record.damages;
+  json["scenario"] = ScenarioJson(scenario);
+  json["scenario_text"] = record.info.scenario;
+  json["robot"] = RobotJson(record);
   json["events"] = Json::array();
+  return json;
+}
+
+void WriteMetadata(const Json& json, std::ostream* out) {
+  *out << "<script type=\"application/json\" class=\"poise-run\">" << ScriptText(json)
+       << "</script>\n";
+}
+
+void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
+  Json json = Metadata(run.record, run.scenario, run.checks);
+  json["run"]["log"] = run.log;
   for (const logging::Event& event : logging::Events(run.record)) {
     json["events"].push_back(
         {{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
@@ -139,25 +152,41 @@ void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
   BlobWriter blobs(out, index);
   json["channels"] =
       ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
-  *out << "<script type=\"application/json\" class=\"poise-run\">" << ScriptText(json)
-       << "</script>\n";
+  WriteMetadata(json, out);
+}
+
+/// The template with what `write` says of its runs.
+void WritePage(std::ostream* out, const std::function<void()>& write) {
+  const std::string page = ReadTemplate();
+  const size_t mark = page.find(kDataMark);
+  *out << std::string_view(page).substr(0, mark);
+  write();
+  *out << std::string_view(page).substr(mark + kDataMark.size());
 }
 
 }  // namespace
 
 void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
-  const std::string page = ReadTemplate();
-  const size_t mark = page.find(kDataMark);
   std::ofstream out(file, std::ios::binary);
-  out << std::string_view(page).substr(0, mark);
-  for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
-  out << std::string_view(page).substr(mark + kDataMark.size());
+  WritePage(&out, [&] {
+    for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
+  });
   if (!out.flush()) {
     std::error_code ignored;
     if (fs::is_regular_file(file, ignored)) fs::remove(file, ignored);  // half a page
     throw ConfigError(
         fmt::format("{}: cannot be written; name another file with --html", file.string()));
   }
+}
+
+std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario, Json channels,
+                     int64_t keep) {
+  Json json = Metadata(record, scenario, {});
+  json["channels"] = std::move(channels);
+  json["live"] = {{"keep", keep}};
+  std::ostringstream out;
+  WritePage(&out, [&] { WriteMetadata(json, &out); });
+  return std::move(out).str();
 }
 
 }  // namespace poise

@@ -1,7 +1,9 @@
 // A run as one page that opens from disk: docs/report-format.md.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -22,5 +24,11 @@ struct ReportedRun {
 /// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
 /// template is not built, `file` cannot be written; LogError for a log that is gone.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
+
+/// The page of a run in progress: no ticks, which come from its stream. `channels` as in
+/// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not
+/// built.
+std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario,
+                     nlohmann::ordered_json channels, int64_t keep);
 
 }  // namespace poise

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   poise::AddEstopCommand(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);
+  poise::AddViewCommand(&app, &command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

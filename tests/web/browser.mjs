@@ -15,7 +15,7 @@ export async function launchBrowser(web) {
   return chromium.launch({executablePath: CHROMIUM, args: QUIET});
 }
 
-/** Opens a file from disk; `problems` gathers errors of its console and every request beyond the file itself. */
+/** Opens a file from disk or an http address; `problems` gathers errors of its console and every request beyond the page itself. */
 export async function openPage(browser, file, options = {}) {
   const context = await browser.newContext({viewport: {width: 1100, height: 800}, deviceScaleFactor: 0.5,
     acceptDownloads: true, ...options});
@@ -23,7 +23,7 @@ export async function openPage(browser, file, options = {}) {
   const problems = [];
   page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
   page.on('pageerror', (error) => problems.push(String(error)));
-  const url = pathToFileURL(resolve(file)).href;
+  const url = file.startsWith('http:') ? file : pathToFileURL(resolve(file)).href;
   page.on('request', (request) => {
     if (request.url() !== url && !/^(blob|data):/.test(request.url())) problems.push(`request of ${request.url()}`);
   });

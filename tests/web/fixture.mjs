@@ -36,13 +36,13 @@ export const robot = {
   visuals: [],
 };
 
-/** `constants`: value by "type.field"; all others are 0. */
-export function makeRun(section, constants = {}, ticks = 4) {
+/** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. */
+export function makeRun(section, constants = {}, ticks = 4, live = undefined) {
   const channels = TYPES.map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
     signals: paths(type, sourceOf(type)).map((field) => ({field, integer: false, value: constants[`${type}.${field}`] ?? 0}))}));
   const limits = {half_length: 0.12, half_width: 0.05, friction: 0.9, yaw_friction: 0.8};
   const run = new Run({
-    format: 1, channels, robot, events: [],
+    format: 1, channels, robot, events: [], live,
     run: {tick_period: 0.002, ticks, checks: [], assumptions: [], components: [], channels: []},
     scenario: {name: 'test', paper_section: section,
       redistributor: {double_support: limits, single_support: {...limits, half_width: 0.06}}},

@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {findPhases, intervals} from '../../web/src/derived.js';
 import {figuresFor, pitchJoints} from '../../web/src/figures.js';
+import {addBatch, decodeBatch} from '../../web/src/live.js';
 import {searchSignals} from '../../web/src/search.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
 
@@ -145,4 +146,59 @@ test('the search finds signals by all words of name and text', () => {
   assert.ok(names('peak current').length === 0);
   assert.deepEqual(names('   '), []);
   assert.equal(names('force').length, names('FORCE').length);
+});
+
+test('a live run keeps its last ticks, and what is derived goes on', async () => {
+  const run = makeRun('', {}, 0, {keep: 1500});
+  const push = run.signals.get('derived.push_magnitude');
+  const motion = run.signals.get('derived.com_motion_y');
+  await Promise.all([push.load(), motion.load()]);
+  const ramp = (first, n) => Float32Array.from({length: n}, (_, i) => first + i);
+  for (const [first, n] of [[0, 700], [700, 700], [1400, 7], [1407, 2000], [3407, 33]]) {
+    run.appendTicks(n, {...Object.fromEntries(['x', 'y', 'z'].map((_, i) => [`EXTERNAL_PUSH.force[${i}]`, new Float32Array(n)])),
+      'EXTERNAL_PUSH.force[0]': ramp(first, n), 'TASK_TORQUE.com_position[1]': ramp(first + 5, n)});
+  }
+  assert.deepEqual([run.firstTick, run.numTicks], [1940, 1500]);
+  near(run.start, 3.88);
+  near(run.end, 6.878);
+  assert.deepEqual([run.rowAt(0), run.rowAt(4), run.rowAt(100)], [0, 60, 1499]);
+  const ticks = Array.from({length: 1500}, (_, i) => 1940 + i);
+  for (const name of ['EXTERNAL_PUSH.force[0]', 'derived.push_magnitude', 'derived.com_motion_y']) {
+    assert.deepEqual(await valuesOf(run, name), ticks, name);  // from the first tick ever, which had 5
+  }
+});
+
+/** A batch as docs/report-format.md says, every number telling its column and tick. */
+function batchOf(run, first, count) {
+  const signals = [...run.signals.values()].filter((s) => s.append);
+  const integers = signals.filter((s) => s.integer), reals = signals.filter((s) => !s.integer);
+  const buffer = new ArrayBuffer(16 + count * (8 * integers.length + 4 * reals.length));
+  const data = new DataView(buffer);
+  data.setUint32(0, 1, true);
+  data.setUint32(4, count, true);
+  data.setFloat64(8, first, true);
+  let at = 16;
+  integers.forEach((_, k) => { for (let i = 0; i < count; ++i, at += 8) data.setFloat64(at, 1e6 * k + first + i, true); });
+  reals.forEach((_, k) => { for (let i = 0; i < count; ++i, at += 4) data.setFloat32(at, 1000 * k + first + i, true); });
+  return {buffer, name: reals[3].name};
+}
+
+test('batches of the stream: in order, with a gap, sent twice, damaged', async () => {
+  const run = makeRun('', {}, 0, {keep: 100});
+  const add = (first, count) => {
+    const {buffer, name} = batchOf(run, first, count);
+    addBatch(run, decodeBatch(buffer, run));
+    return valuesOf(run, name);
+  };
+  assert.deepEqual(await add(40, 3), [3040, 3041, 3042]);
+  assert.equal(run.firstTick, 40);
+  assert.deepEqual(await add(42, 3), [3040, 3041, 3042, 3043, 3044]);
+  assert.deepEqual(await add(41, 2), [3040, 3041, 3042, 3043, 3044]);
+  assert.deepEqual(await add(47, 1), [3040, 3041, 3042, 3043, 3044, NaN, NaN, 3047]);
+  const values = await add(5000, 2);
+  assert.deepEqual([values.length, run.firstTick, values.at(-3), values.at(-2), values.at(-1)], [100, 4902, NaN, 8000, 8001]);
+  const {buffer} = batchOf(run, 5002, 2);
+  for (const damaged of [buffer.slice(0, 8), buffer.slice(0, 16), buffer.slice(0, -4), new ArrayBuffer(buffer.byteLength)]) {
+    assert.throws(() => decodeBatch(damaged, run));
+  }
 });

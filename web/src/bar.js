@@ -10,12 +10,12 @@ export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shif
 
 function track(shared) {
   const {run, phases, events} = shared;
-  const end = Math.max(run.duration, run.period);
-  const share = (t) => `${100 * Math.min(1, t / end)}%`;
+  const length = Math.max(run.end - run.start, run.period);
+  const share = (t) => 100 * Math.min(1, Math.max(0, (t - run.start) / length));
   const span = (name, {from, to}) => {
     const mark = element('span', {class: name});
-    mark.style.left = share(from);
-    mark.style.width = `max(2px, ${100 * (Math.min(to, end) - from) / end}%)`;
+    mark.style.left = `${share(from)}%`;
+    mark.style.width = `max(2px, ${share(to) - share(from)}%)`;
     return mark;
   };
   return element('div', {class: 'track', 'aria-hidden': 'true'},
@@ -23,12 +23,29 @@ function track(shared) {
     ...phases.balancing.map((p) => span('balancing', p)),
     ...events.map((e) => {
       const mark = element('span', {class: 'event'});
-      mark.style.left = share(e.time);
+      mark.style.left = `${share(e.time)}%`;
       return mark;
     }));
 }
 
-/** Fills `host`; `shared` as for panels. Returns {refresh}, for a run that has grown. */
+const LIVE_TEXTS = {live: '● live', ended: '■ run ended', waiting: '○ no connection: trying again'};
+
+/** Whether the run goes on; pressed: the page follows it. */
+function liveButton({player, feed}) {
+  const button = element('button', {type: 'button', id: 'live', title: 'Follow the end of the run',
+    click: () => player.setFollowing(true)});
+  const update = () => {
+    const missed = feed.lost > 0 ? `, ${feed.lost} messages missed` : '';
+    button.textContent = LIVE_TEXTS[feed.state] + missed;
+    button.setAttribute('aria-pressed', String(player.following));
+  };
+  feed.addEventListener('state', update);
+  player.addEventListener('state', update);
+  update();
+  return button;
+}
+
+/** Fills `host`; `shared` as for panels, `feed` when the run is live. Returns {refresh}, for a run that has grown. */
 export function playerBar(host, shared) {
   const {player, view, run} = shared;
   const button = (text, label, action) =>
@@ -38,12 +55,18 @@ export function playerBar(host, shared) {
   const speed = element('select', {id: 'speed', 'aria-label': 'Speed',
     change: () => player.setSpeed(Number(speed.value))},
   ...SPEEDS.map((s) => element('option', {value: s, selected: s === 1}, `${s}×`)));
-  const scrub = element('input', {type: 'range', id: 'scrub', min: 0, max: Math.max(0, run.numTicks - 1), step: 1,
+  const scrub = element('input', {type: 'range', id: 'scrub', step: 1,
     'aria-label': 'Time', input: () => player.seek(Number(scrub.value) * run.period),
     keydown: (e) => e.preventDefault()});  // the page's own keys step
   const time = element('output', {id: 'time'});
+  const scale = () => {
+    scrub.min = run.firstTick;
+    scrub.max = run.firstTick + Math.max(0, run.numTicks - 1);
+  };
+  scale();
   const marks = element('div', {class: 'marks'}, track(shared));
-  host.append(button('|◂', 'Start (home)', () => player.seek(0)), button('◂', 'One tick back (←)', () => player.step(-1)), play,
+  host.append(shared.feed ? liveButton(shared) : '', button('|◂', 'Start (home)', () => player.seek(run.start)),
+    button('◂', 'One tick back (←)', () => player.step(-1)), play,
     button('▸', 'One tick on (→)', () => player.step(1)), speed,
     element('div', {class: 'scrub'}, marks, scrub), time,
     button('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
@@ -61,17 +84,18 @@ export function playerBar(host, shared) {
   showTime();
   listenToKeys(shared);
   return {refresh: () => {
-    scrub.max = Math.max(0, run.numTicks - 1);
+    scale();
     marks.replaceChildren(track(shared));
     showTime();
   }};
 }
 
-function listenToKeys({player, view, run}) {
+function listenToKeys({player, view, run, feed}) {
   const long = Math.max(1, Math.round(LONG_STEP / run.period));
   const actions = {
     ' ': () => player.toggle(), ArrowLeft: (e) => player.step(e.shiftKey ? -long : -1),
-    ArrowRight: (e) => player.step(e.shiftKey ? long : 1), Home: () => player.seek(0), End: () => player.seek(run.duration),
+    ArrowRight: (e) => player.step(e.shiftKey ? long : 1), Home: () => player.seek(run.start),
+    End: () => feed ? player.setFollowing(true) : player.seek(run.end),
     '[': () => player.changeSpeed(-1), ']': () => player.changeSpeed(1), '0': () => view.reset(),
     '+': () => view.zoom(1 / ZOOM_STEP, player.time), '=': () => view.zoom(1 / ZOOM_STEP, player.time),
     '-': () => view.zoom(ZOOM_STEP, player.time), '/': () => document.getElementById('signal-search').focus(),

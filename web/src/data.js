@@ -1,5 +1,6 @@
 // A run's signals by tick, whether they come with the page or arrive while the run goes on.
 import {unpack} from './codec.js';
+import {Column} from './column.js';
 
 /** Unit, text and names of values of a field path such as "foot_wrench[1].force[2]". */
 export function describeField(messages, type, path) {
@@ -15,10 +16,9 @@ export function describeField(messages, type, path) {
   return result;
 }
 
-/** One scalar by tick; NaN where its channel has no message. `values` is there after load(). */
+/** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
 export class Signal {
-  #array = null;
-  #length = 0;
+  #column = null;
   #loading = null;
 
   constructor(channel, spec, description) {
@@ -28,29 +28,28 @@ export class Signal {
     this.name = `${channel.name}.${spec.field}`;
     this.spec = spec;
     Object.assign(this, description);
+    if (channel.run.meta.live) this.#start();
   }
 
-  get values() { return this.#array?.subarray(0, this.#length); }
+  get values() { return this.#column?.values; }
 
   load() {
     return this.#loading ??= this.channel.read(this.spec, this.integer).then((array) => {
-      this.#array = array;
-      this.#length = array.length;
+      this.#column = new Column(array);
     });
   }
 
-  /** Adds `values` at the end; the array grows by doubling. Throws when packed values have not been loaded. */
-  append(values) {
-    if (!this.#array && this.spec.blob !== undefined) throw new Error(`${this.name}: load it before it grows`);
-    const length = this.#length + values.length;
-    this.#loading ??= Promise.resolve();
-    if (!this.#array || length > this.#array.length) {
-      const grown = new (this.integer ? Float64Array : Float32Array)(Math.max(1024, 2 * length));
-      grown.set(this.values ?? []);
-      this.#array = grown;
-    }
-    this.#array.set(values, this.#length);
-    this.#length = length;
+  /** Adds `values` at the end and lets go of the first `dropped`. Throws when packed values have not been loaded. */
+  append(values, dropped = 0) {
+    if (!this.#column && this.spec.blob !== undefined) throw new Error(`${this.name}: load it before it grows`);
+    if (!this.#column) this.#start();
+    this.#column.append(values, dropped, this.channel.run.keep);
+  }
+
+  /** There is nothing to load. */
+  #start() {
+    this.#column = new Column(this.integer ? new Float64Array(0) : new Float32Array(0));
+    this.#loading = Promise.resolve();
   }
 }
 
@@ -80,14 +79,17 @@ class Channel {
 
 /**
  * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.mjs; `blob`: gives the text of a packed
- * column by its id. A live run starts with a meta without ticks and grows by appendTicks, which fires 'append'.
+ * column by its id. It holds the ticks from `firstTick` on, a row each. A live run (meta.live) starts without ticks, grows
+ * by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
  */
 export class Run extends EventTarget {
   constructor(meta, messages, blob) {
     super();
     Object.assign(this, {meta, scenario: meta.scenario, robot: meta.robot});
     this.period = meta.run.tick_period;
+    this.firstTick = 0;
     this.numTicks = meta.run.ticks;
+    this.keep = meta.live?.keep ?? Infinity;
     this.signals = new Map();
     this.channels = meta.channels.map((spec) => {
       const channel = new Channel(this, spec, blob);
@@ -98,7 +100,9 @@ export class Run extends EventTarget {
     });
   }
 
-  get duration() { return Math.max(0, this.numTicks - 1) * this.period; }
+  /** Time of the first row and of the last, s. */
+  get start() { return this.firstTick * this.period; }
+  get end() { return this.timeAt(Math.max(0, this.numTicks - 1)); }
   add(signal) { this.signals.set(signal.name, signal); }
 
   /** The signal of the first channel of `type`, as the run's checks take it; undefined when there is none. */
@@ -107,17 +111,23 @@ export class Run extends EventTarget {
     return channel && this.signals.get(`${channel.name}.${field}`);
   }
 
-  tickAt(time) {
-    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period)));
+  rowAt(time) {
+    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period) - this.firstTick));
   }
+  timeAt(row) { return (this.firstTick + row) * this.period; }
 
   /** `values`: by signal name, `count` numbers each; a signal that is not named gets NaN. */
   appendTicks(count, values) {
     const none = new Float32Array(count).fill(NaN);
+    const dropped = Math.max(0, this.numTicks + count - this.keep);
+    const derived = [];
     for (const [name, signal] of this.signals) {
-      if (signal.append) signal.append(values[name] ?? none);
+      if (signal.append) signal.append(values[name] ?? none, dropped);
+      else derived.push(signal);
     }
-    this.numTicks += count;
+    this.firstTick += dropped;
+    this.numTicks += count - dropped;
+    for (const signal of derived) signal.grow(dropped);
     this.dispatchEvent(new Event('append'));
   }
 }

@@ -1,4 +1,5 @@
 // Signals that follow from those of the log: centre of pressure, contact conditions, errors. They join a run's signals.
+import {Column} from './column.js';
 import {centerOfPressure, conjugate, rotate, transformWrench} from './spatial.js';
 
 const LIGHT_LOAD = 5;  // N: below it, ratios of a sensor's readings are noise
@@ -21,43 +22,37 @@ export const CONDITIONS = [
 ];
 const LIMIT_FIELDS = {friction: 'friction', yaw: 'yaw_friction', roll: 'half_width', pitch: 'half_length'};
 
-/** By tick from values of the same tick. */
-const pointwise = (f) => (arrays, n) => {
-  const result = new Float32Array(n);
-  const values = new Array(arrays.length);
-  for (let i = 0; i < n; ++i) {
-    for (let k = 0; k < arrays.length; ++k) values[k] = arrays[k][i];
-    result[i] = f(values);
-  }
-  return result;
+// compute(arrays, i, memory) of a definition: its value in row i from its dependencies' values; `memory` is its own, rows
+// come in order.
+
+/** From values of the same row. */
+const pointwise = (f) => (arrays, i) => f(arrays.map((values) => values[i]));
+
+const firstNumber = (memory, value) => {
+  if (memory.first === undefined && !Number.isNaN(value)) memory.first = value;
+  return memory.first ?? NaN;
 };
 
 /** A sensor's reading shows the command of the tick before, so frame and soles are those of the tick before. */
 function measuredCop(axis) {
-  return (arrays, n) => {
-    const result = new Float32Array(n).fill(NaN);
-    const at = (from, count, i) => arrays.slice(from, from + count).map((a) => a[i]);
-    for (let i = 1; i < n; ++i) {
-      const frame = poseOf(at(28, 7, i - 1));
-      const sum = {force: [0, 0, 0], moment: [0, 0, 0]};
-      for (const foot of [0, 1]) {
-        if (!(arrays[26 + foot][i - 1] > 0)) continue;
-        const part = transformWrench(frame, poseOf(at(12 + 7 * foot, 7, i - 1)), wrenchOf(at(6 * foot, 6, i)));
-        for (const k of [0, 1, 2]) {
-          sum.force[k] += part.force[k];
-          sum.moment[k] += part.moment[k];
-        }
+  return (arrays, i) => {
+    if (i === 0) return NaN;
+    const at = (from, count, row) => arrays.slice(from, from + count).map((a) => a[row]);
+    const frame = poseOf(at(28, 7, i - 1));
+    const sum = {force: [0, 0, 0], moment: [0, 0, 0]};
+    for (const foot of [0, 1]) {
+      if (!(arrays[26 + foot][i - 1] > 0)) continue;
+      const part = transformWrench(frame, poseOf(at(12 + 7 * foot, 7, i - 1)), wrenchOf(at(6 * foot, 6, i)));
+      for (const k of [0, 1, 2]) {
+        sum.force[k] += part.force[k];
+        sum.moment[k] += part.moment[k];
       }
-      if (Math.abs(sum.force[2]) > IN_THE_AIR) result[i] = centerOfPressure(sum)[axis];
     }
-    return result;
+    return Math.abs(sum.force[2]) > IN_THE_AIR ? centerOfPressure(sum)[axis] : NaN;
   };
 }
 
-const relative = ([values], n) => {
-  const first = values.find((x) => !Number.isNaN(x)) ?? NaN;
-  return Float32Array.from({length: n}, (_, i) => values[i] - first);
-};
+const relative = ([values], i, memory) => values[i] - firstNumber(memory, values[i]);
 
 function comSignals() {
   return AXES.flatMap((axis, i) => [
@@ -67,10 +62,7 @@ function comSignals() {
       deps: [['ground_truth_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_desired_${axis}`, unit: 'm', text: 'desired COM from where the estimated one was first',
       deps: [['task_torque_t', `com_desired[${i}]`], ['task_torque_t', `com_position[${i}]`]],
-      compute: ([desired, estimated], n) => {
-        const first = estimated.find((x) => !Number.isNaN(x)) ?? NaN;
-        return Float32Array.from({length: n}, (_, k) => desired[k] - first);
-      }},
+      compute: ([desired, estimated], k, memory) => desired[k] - firstNumber(memory, estimated[k])},
     {name: `com_error_${axis}`, unit: 'm', text: 'estimated COM less desired',
       deps: [['task_torque_t', `com_position[${i}]`], ['task_torque_t', `com_desired[${i}]`]],
       compute: pointwise(([a, b]) => a - b)},
@@ -91,7 +83,7 @@ function copSignals() {
     ...['measured', 'computed'].map((kind) => ({
       name: `cop_${kind}_abs_${AXES[i]}`, unit: 'm', text: `${kind} centre of pressure, frame O, absolute`,
       deps: kind === 'measured' ? both : [['balance_torque_t', `cop[${i}]`]],
-      compute: (arrays, n) => (kind === 'measured' ? measuredCop(i)(arrays, n) : arrays[0].slice(0, n)).map(Math.abs),
+      compute: (arrays, k) => Math.abs(kind === 'measured' ? measuredCop(i)(arrays, k) : arrays[0][k]),
     })),
   ]);
 }
@@ -151,9 +143,12 @@ function otherSignals(run) {
   ];
 }
 
-/** A signal computed from others when it is loaded, and anew when the run has grown. */
+/** A signal computed from others when it is loaded; from then on it grows with its run. */
 class DerivedSignal {
-  #values = null;
+  #signals = null;
+  #column = null;
+  #memory = {};
+  #loading = null;
 
   constructor(run, definition) {
     Object.assign(this, definition);
@@ -164,14 +159,31 @@ class DerivedSignal {
     this.integer = false;
   }
 
-  get values() { return this.#values; }
+  get values() { return this.#column?.values; }
 
-  async load() {
-    if (this.#values?.length === this.run.numTicks) return;
+  load() { return this.#loading ??= this.#load(); }
+
+  async #load() {
     const signals = this.deps.map(([type, field]) => this.run.find(type, field));
     await Promise.all(signals.map((s) => s.load()));
-    const n = this.run.numTicks;
-    this.#values = this.compute(signals.map((s) => s.values), n);
+    this.#signals = signals;
+    this.#column = new Column(this.#rows(0));
+  }
+
+  /** After its run has grown and let go of the first `dropped` rows. */
+  grow(dropped) {
+    if (!this.#column) return;
+    const held = this.values.length;
+    // Rows that came and went in one piece were never here.
+    const rows = this.#rows(Math.max(0, held - dropped));
+    this.#column.append(rows, held + rows.length - this.run.numTicks, this.run.keep);
+  }
+
+  #rows(from) {
+    const arrays = this.#signals.map((s) => s.values);
+    const rows = new Float32Array(this.run.numTicks - from);
+    for (let i = 0; i < rows.length; ++i) rows[i] = this.compute(arrays, from + i, this.#memory);
+    return rows;
   }
 }
 
@@ -184,7 +196,7 @@ export function addDerivedSignals(run) {
   }
 }
 
-/** [{from, to, value}] in ticks, of stretches in which key(tick) stays the same. */
+/** [{from, to, value}] in rows, of stretches in which key(tick) stays the same. */
 export function intervals(n, key) {
   const result = [];
   for (let i = 0; i < n; ++i) {
@@ -201,7 +213,7 @@ export async function findPhases(run) {
   const active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
   const contact = run.robot.feet.map((_, f) => get('task_torque_t', `in_contact[${f}]`)).filter(Boolean);
   await Promise.all([...active, ...contact].map((s) => s.load()));
-  const seconds = ({from, to, value}) => ({from: from * run.period, to: (to + 1) * run.period, value});
+  const seconds = ({from, to, value}) => ({from: run.timeAt(from), to: run.timeAt(to + 1), value});
   const name = (i) => {
     const on = run.robot.feet.filter((_, f) => contact[f].values[i] > 0).map((foot) => foot.name);
     return on.length === contact.length ? 'both feet' : on.length ? `${on.join(', ')} foot` : 'no foot';

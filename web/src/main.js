@@ -4,6 +4,7 @@ import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
 import {figuresFor} from './figures.js';
+import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {COLORS, SceneView} from './scene.js';
@@ -12,14 +13,14 @@ import {eventList, Readout} from './side.js';
 import {tables, verdictBadge} from './table.js';
 
 const READOUT_PERIOD = 80;  // ms
-const GROWTH_PERIOD = 200;  // ms
 
 function header(run, overlay) {
   const {run: r} = run.meta;
   document.title = `${r.scenario} – Poise`;
   document.getElementById('header').append(
     element('h1', {}, r.scenario), element('p', {}, run.scenario.description ?? ''),
-    r.paper_section ? element('span', {class: 'badge'}, `paper, section ${r.paper_section}`) : '', verdictBadge(run),
+    r.paper_section ? element('span', {class: 'badge'}, `paper, section ${r.paper_section}`) : '',
+    run.meta.live ? element('span', {class: 'badge'}, 'in progress') : verdictBadge(run),
     element('span', {class: 'soft'}, `${r.started_at}, poise ${r.versions.poise}`),
     overlay ? element('span', {class: 'badge second'}, `over it, dashed: ${overlay.meta.run.scenario}, ${overlay.meta.run.started_at}`)
       : '');
@@ -63,24 +64,13 @@ function floatingScene(scene) {
   return element('label', {class: 'soft'}, box, ' robot beside the plots');
 }
 
-/** Calls `refresh` after the run has grown, at most once in GROWTH_PERIOD. */
-function followGrowth(run, refresh) {
-  let waiting = false;
-  run.addEventListener('append', () => {
-    if (waiting) return;
-    waiting = true;
-    setTimeout(() => {
-      waiting = false;
-      refresh();
-    }, GROWTH_PERIOD);
-  });
-}
-
 async function start() {
   const [run, overlay] = embeddedRuns(document);
   if (!run) throw new Error('this page holds no run: write one with poise report');
   for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
   header(run, overlay);
+  const feed = run.meta.live ? new LiveFeed(run) : undefined;
+  if (feed) await firstTicks(feed);
   const events = run.meta.events ?? [];
   const player = new Player(run);
   const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
@@ -91,7 +81,7 @@ async function start() {
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
 
   const view = new TimeView(run);
-  const shared = {run, overlay, player, view, phases, events};
+  const shared = {run, overlay, player, view, phases, events, feed};
   const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
   const readout = new Readout(run, phases);
@@ -110,33 +100,31 @@ async function start() {
 
   let shown = 0;
   const update = (now) => {
-    if (player.playing && now - shown < READOUT_PERIOD) return;
+    if ((player.playing || player.following) && now - shown < READOUT_PERIOD) return;
     shown = now;
-    readout.update(player.tick);
+    readout.update(player.row);
     grid.updateValues();
   };
   player.addEventListener('time', () => {
-    scene.setTick(player.tick);
-    if (player.playing) scene.pace(true);
+    scene.setRow(player.row);
+    if (player.playing || player.following) scene.pace(true);
     update(performance.now());
   });
   player.addEventListener('state', () => {
-    scene.pace(player.playing);
+    scene.pace(player.playing || player.following);
     update(performance.now());
   });
   update(performance.now());
-  followGrowth(run, async () => {
-    shared.phases = await findPhases(run);
-    await Promise.all([scene.samples.refresh(), readout.load()]);
+  followGrowth(shared, () => {
     bar.refresh();
-    view.grow();
-    await grid.refresh();
-    scene.setTick(player.tick);
+    view.grow(player.following);
+    scene.setRow(player.row);
     update(performance.now());
   });
+  if (feed) showEnd(shared);
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
-  window.poise = {run, overlay, player, view, grid, scene};
+  window.poise = {run, overlay, player, view, grid, scene, feed};
 }
 
 start().catch((error) => {

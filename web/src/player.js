@@ -2,34 +2,60 @@
 
 export const SPEEDS = [0.1, 0.2, 0.5, 1, 2];
 
-/** Fires 'time' when the cursor moves, 'state' when it starts, stops or changes speed. */
+/** Fires 'time' when the cursor moves, 'state' when it starts, stops, follows a live run or changes speed. */
 export class Player extends EventTarget {
   time = 0;
   playing = false;
+  following = false;  // the end of a live run
   speed = 1;
   #last = 0;
 
   constructor(run) {
     super();
     this.run = run;
+    run.addEventListener('append', () => this.#grow());
   }
 
-  get tick() { return this.run.tickAt(this.time); }
+  /** Of the run's values at the cursor. */
+  get row() { return this.run.rowAt(this.time); }
+  get tick() { return this.run.firstTick + this.row; }
 
+  /** Stays there while a live run goes on. */
   seek(time) {
-    this.time = Math.min(this.run.duration, Math.max(0, time));
+    this.setFollowing(false);
+    this.#move(time);
+  }
+
+  setFollowing(on) {
+    if (on) {
+      this.pause();
+      this.#move(this.run.end);
+    }
+    if (on === this.following) return;
+    this.following = on;
+    this.dispatchEvent(new Event('state'));
+  }
+
+  #grow() {
+    if (this.following) this.#move(this.run.end);
+    else if (this.time < this.run.start) this.#move(this.run.start);  // what was there is gone
+  }
+
+  #move(time) {
+    this.time = Math.min(this.run.end, Math.max(this.run.start, time));
     this.dispatchEvent(new Event('time'));
   }
 
   /** By ticks; stops the playing. */
   step(ticks) {
     this.pause();
-    this.seek((this.tick + ticks) * this.run.period);
+    this.seek(this.run.timeAt(this.row + ticks));
   }
 
   play() {
-    if (this.playing || this.run.duration === 0) return;
-    if (this.time >= this.run.duration) this.seek(0);
+    if (this.playing || this.run.end === this.run.start) return;
+    if (this.time >= this.run.end) this.seek(this.run.start);
+    this.setFollowing(false);
     this.playing = true;
     this.#last = performance.now();
     requestAnimationFrame((now) => this.#frame(now));
@@ -59,7 +85,7 @@ export class Player extends EventTarget {
     if (!this.playing) return;
     this.seek(this.time + Math.max(0, now - this.#last) / 1000 * this.speed);
     this.#last = now;
-    if (this.time >= this.run.duration) this.pause();
+    if (this.time >= this.run.end) this.pause();
     else requestAnimationFrame((t) => this.#frame(t));
   }
 }

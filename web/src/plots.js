@@ -9,42 +9,61 @@ const HEIGHT = 200;       // px
 const CLICK_SLACK = 4;    // px that a click may move
 const ZOOM_STEP = 1.25;
 
-/** The stretch of time that all plots show. Fires 'change'. */
+/** The stretch of time that all plots show. Fires 'change', and 'away' when the run's end was put out of sight. */
 export class TimeView extends EventTarget {
+  #span = Infinity;  // s, that is asked for
+
   constructor(run) {
     super();
     this.run = run;
     this.reset();
   }
-  get end() { return Math.max(this.run.duration, this.run.period); }
-  reset() { this.set(0, this.end); }
+  get end() { return Math.max(this.run.end, this.run.start + this.run.period); }
+  reset() {
+    this.#span = Infinity;
+    this.#show(this.run.start, this.end);
+  }
   set(min, max) {
+    this.#span = max - min;
+    this.#show(min, max);
+    if (this.max < this.end) this.dispatchEvent(new Event('away'));
+  }
+  /** The last `span` seconds. */
+  setLast(span) {
+    this.#span = span;
+    this.#show(this.end - span, this.end);
+  }
+  /** After the run has grown: all of it again, its last stretch of the same length, or what was shown. */
+  grow(following) {
+    if (this.#span === Infinity) this.reset();
+    else if (following) this.setLast(this.#span);
+    else this.#show(this.min, this.max);
+  }
+  #show(min, max) {
     const least = 4 * this.run.period;
-    this.min = Math.max(0, Math.min(min, this.end - least));
+    this.min = Math.max(this.run.start, Math.min(min, this.end - least));
     this.max = Math.min(this.end, Math.max(max, this.min + least));
-    this.whole = this.min === 0 && this.max === this.end;
     this.dispatchEvent(new Event('change'));
   }
-  /** After the run has grown: what showed all of it does so again. */
-  grow() { if (this.whole) this.reset(); }
   /** Keeps `time` where it is. */
   zoom(factor, time) { this.set(time - (time - this.min) * factor, time + (this.max - time) * factor); }
 }
 
-/** Numbers as uPlot wants them: null where there is none. */
-function nullable(values, n) {
-  const result = new Array(n);
-  for (let i = 0; i < n; ++i) {
+/** Numbers of the rows [from, n) as uPlot wants them: null where there is none. */
+function nullable(values, n, from = 0) {
+  const result = new Array(n - from);
+  for (let i = from; i < n; ++i) {
     const v = i < values.length ? values[i] : NaN;
-    result[i] = v === v ? v : null;
+    result[i - from] = v === v ? v : null;
   }
   return result;
 }
 
-/** Seconds of every tick, one array for all plots. */
+/** Seconds of every row, one array for all plots. */
 function timesOf(run) {
-  if (times.get(run)?.length !== run.numTicks) {
-    times.set(run, Float64Array.from({length: run.numTicks}, (_, i) => i * run.period));
+  const held = times.get(run);
+  if (held?.length !== run.numTicks || held[0] !== run.start) {
+    times.set(run, Float64Array.from({length: run.numTicks}, (_, i) => run.timeAt(i)));
   }
   return times.get(run);
 }
@@ -120,11 +139,37 @@ export class Panel {
     this.lines = lines;
   }
 
-  #data() {
+  /** The lines' values of the rows from `from` on. */
+  #columns(from = 0) {
     const {run} = this.shared;
-    return [timesOf(run), ...this.lines.map((line) => line.constant !== undefined
-      ? new Array(run.numTicks).fill(line.constant)
-      : line.overlay ? resampled(line.signal.values, run, line.run) : nullable(line.signal.values, run.numTicks))];
+    return this.lines.map((line) => line.constant !== undefined ? new Array(run.numTicks - from).fill(line.constant)
+      : line.overlay ? resampled(line.signal.values, run, line.run)
+        : nullable(line.signal.values, run.numTicks, from));
+  }
+
+  #readAll() {
+    this.firstTick = this.shared.run.firstTick;
+    this.data = [timesOf(this.shared.run), ...this.#columns()];
+  }
+
+  /** Brings the plot to what the run holds. */
+  #grow() {
+    const {run, overlay} = this.shared;
+    const dropped = run.firstTick - this.firstTick;
+    const held = this.data[0].length - dropped;
+    if (dropped === 0 && held === run.numTicks) return;
+    if (held <= 0 || overlay) {
+      this.#readAll();
+    } else {
+      const columns = this.data.slice(1);
+      this.#columns(held).forEach((more, i) => {
+        columns[i].splice(0, dropped);
+        for (const value of more) columns[i].push(value);
+      });
+      this.data = [timesOf(run), ...columns];
+      this.firstTick = run.firstTick;
+    }
+    this.plot.setData(this.data);
   }
 
   #create() {
@@ -134,7 +179,7 @@ export class Panel {
       ticks: {stroke: () => cssColor('--grid'), size: 4}, font: '11px system-ui, sans-serif',
       labelFont: '11px system-ui, sans-serif', ...more});
     const {unit} = this.definition;
-    this.data = this.#data();
+    this.#readAll();
     this.plot = new uPlot({
       width: Math.max(120, this.host.clientWidth), height: HEIGHT, legend: {show: false},
       scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: paddedRange}},
@@ -197,12 +242,12 @@ export class Panel {
     this.#updateValues(null);
   }
 
-  /** Values at the tick under the pointer, else at the time cursor. */
+  /** Values in the row under the pointer, else at the time cursor. */
   #updateValues(index) {
     if (!this.values) return;
-    const tick = index ?? this.shared.player.tick;
+    const row = index ?? this.shared.player.tick - this.firstTick;
     this.lines.forEach((line, i) => {
-      const value = this.data[i + 1][tick];
+      const value = this.data[i + 1][row];
       const name = line.signal?.values && line.signal.integer ? this.#nameOf(line.signal, value) : null;
       this.values[i].textContent = line.constant !== undefined ? '' : name ?? formatNumber(value);
     });
@@ -253,9 +298,10 @@ export class Panel {
     if (this.plot) this.#updateValues(this.plot.cursor.idx ?? null);
   }
 
-  /** After a zoom. */
+  /** After a zoom, or when the run has grown. */
   redraw() {
     if (!this.plot) return;
+    this.#grow();
     this.plot.setScale('x', {min: this.shared.view.min, max: this.shared.view.max});
     this.updateCursor();
   }
@@ -273,15 +319,6 @@ export class Panel {
     this.updateCursor();
   }
 
-  /** After the run has grown. */
-  async refresh() {
-    if (!this.plot) return;
-    await Promise.all(this.lines.map((line) => line.signal?.load()));
-    this.data = this.#data();
-    this.plot.setData(this.data, false);
-    this.redraw();
-  }
-
   /** After a series was added. */
   async reload() {
     if (!this.plot) return;
@@ -293,11 +330,13 @@ export class Panel {
 
   async saveCsv() {
     await this.show();
+    this.redraw();
     savePanel(this, 'csv', new Blob([csvOf(this)], {type: 'text/csv'}));
   }
 
   async savePng() {
     await this.show();
+    this.redraw();
     savePanel(this, 'png', await pngOf(this));
   }
 }
@@ -326,7 +365,9 @@ export class PanelGrid {
 
   #enter(panel) {
     this.inSight.add(panel);
-    panel.show().then(() => this.#catchUp(panel)).then(() => {
+    panel.show().then(() => {
+      if (panel.stale) panel.redraw();
+      panel.stale = false;
       panel.updateCursor();
       panel.updateValues();
     }).catch((error) => panel.fail(error));
@@ -350,18 +391,5 @@ export class PanelGrid {
     this.panels.splice(this.panels.indexOf(panel), 1);
     panel.plot?.destroy();
     panel.element.remove();
-  }
-
-  /** After the run has grown: what is in sight; the others when they come into sight. */
-  async refresh() {
-    this.panels.forEach((p) => { p.outdated = true; });
-    await Promise.all([...this.inSight].map((p) => this.#catchUp(p)));
-  }
-
-  async #catchUp(panel) {
-    const {outdated, stale} = panel;
-    panel.outdated = panel.stale = false;  // first: it may grow again meanwhile
-    if (outdated) await panel.refresh();
-    else if (stale) panel.redraw();
   }
 }

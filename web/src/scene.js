@@ -37,7 +37,7 @@ export const COLORS = {
 
 const VIEWS = {front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1], free: [0.75, -0.62, 0.28]};
 
-/** Numbers by tick that the picture needs, all loaded; a name that the run lacks is NaN. */
+/** Numbers by row that the picture needs, all loaded; a name that the run lacks is NaN. */
 class Samples {
   #signals = new Map();
 
@@ -50,13 +50,10 @@ class Samples {
     }));
   }
 
-  /** After the run has grown: what is derived follows. */
-  async refresh() { await Promise.all([...this.#signals.values()].map((s) => s.load())); }
-
-  at(name, tick) { return this.#signals.get(name)?.values?.[tick] ?? NaN; }
-  vector(name, tick, n = 3) { return Array.from({length: n}, (_, i) => this.at(`${name}[${i}]`, tick)); }
-  pose(name, tick) {
-    return {position: this.vector(`${name}.position`, tick), orientation: this.vector(`${name}.orientation`, tick, 4)};
+  at(name, row) { return this.#signals.get(name)?.values?.[row] ?? NaN; }
+  vector(name, row, n = 3) { return Array.from({length: n}, (_, i) => this.at(`${name}[${i}]`, row)); }
+  pose(name, row) {
+    return {position: this.vector(`${name}.position`, row), orientation: this.vector(`${name}.orientation`, row, 4)};
   }
 }
 
@@ -110,7 +107,7 @@ export class SceneView {
     Object.assign(this, {host, run, overlay});
     this.samples = new Samples();
     this.overlaySamples = new Samples();
-    this.tick = 0;
+    this.row = 0;
     this.visible = true;
     this.show = {forces: true, moments: false, pressure: true, com: true};
     this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
@@ -138,7 +135,7 @@ export class SceneView {
       this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
       this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
     ]);
-    this.setTick(0);
+    this.setRow(this.run.meta.live ? this.run.numTicks - 1 : 0);
     this.look('free');
   }
 
@@ -231,55 +228,56 @@ export class SceneView {
 
   setShow(name, on) {
     this.show[name] = on;
-    this.setTick(this.tick);
+    this.setRow(this.row);
   }
 
-  setTick(tick) {
-    this.tick = tick;
+  /** Shows the run as its values of this row are. */
+  setRow(row) {
+    this.row = row;
     const {samples, show} = this;
-    this.robotView.setPose(samples.pose('base', tick), samples.vector('joint', tick, this.run.robot.joints.length));
+    this.robotView.setPose(samples.pose('base', row), samples.vector('joint', row, this.run.robot.joints.length));
     if (this.ghost) {
-      const other = this.overlay.tickAt(tick * this.run.period);
+      const other = this.overlay.rowAt(this.run.timeAt(row));
       this.ghost.setPose(this.overlaySamples.pose('base', other),
         this.overlaySamples.vector('joint', other, this.overlay.robot.joints.length));
     }
-    if (this.block) this.block.visible = tick * this.run.period >= (this.run.scenario.sim_ode.block.start ?? 0);
+    if (this.block) this.block.visible = this.run.timeAt(row) >= (this.run.scenario.sim_ode.block.start ?? 0);
 
-    const com = samples.vector('com', tick);
+    const com = samples.vector('com', row);
     this.com.visible = this.comMark.visible = show.com && com.every(Number.isFinite);
     if (this.com.visible) {
       this.com.position.set(...com);
-      this.comMark.position.set(com[0], com[1], this.#groundHeight(tick) + 0.001);
+      this.comMark.position.set(com[0], com[1], this.#groundHeight(row) + 0.001);
     }
-    const force = samples.vector('push', tick);
-    const point = samples.vector('point', tick);
+    const force = samples.vector('push', row);
+    const point = samples.vector('point', row);
     const pushed = Math.hypot(...force) > LEAST_PUSH;
     const push = force.map((f) => f * METRES_PER_NEWTON * 1.5);
     this.pushArrow.set(point.map((p, i) => p - push[i]), pushed ? push : [0, 0, 0]);
-    this.#setFeet(tick);
-    this.#setPressure(tick);
+    this.#setFeet(row);
+    this.#setPressure(row);
     this.draw();
   }
 
-  #groundHeight(tick) {
-    const z = this.samples.at('frame.position[2]', tick);
+  #groundHeight(row) {
+    const z = this.samples.at('frame.position[2]', row);
     return Number.isFinite(z) ? z : 0;
   }
 
-  #setFeet(tick) {
+  #setFeet(row) {
     const {samples, show} = this;
     const polygon = [];
     this.run.robot.feet.forEach((foot, f) => {
-      const sole = samples.pose(`sole${f}`, tick);
+      const sole = samples.pose(`sole${f}`, row);
       const [x, y] = [foot.length / 2, foot.width / 2];
       const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
         .map(([a, b]) => add(sole.position, rotate(sole.orientation, [a, b, 0])));
       this.soles[f].set(show.pressure && corners.flat().every(Number.isFinite) ? corners : []);
-      if (samples.at(`contact${f}`, tick) > 0) polygon.push(...corners);
+      if (samples.at(`contact${f}`, row) > 0) polygon.push(...corners);
       for (const kind of ['measured', 'computed']) {
         const arrows = this.arrows[f];
-        const [fx, fy, fz] = samples.vector(`${kind}${f}.force`, tick);
-        const moment = samples.vector(`${kind}${f}.moment`, tick);
+        const [fx, fy, fz] = samples.vector(`${kind}${f}.force`, row);
+        const moment = samples.vector(`${kind}${f}.moment`, row);
         // What the ground does to the robot, where it acts on the sole.
         const loaded = Math.abs(fz) > LEAST_LOAD;
         const at = loaded ? add(sole.position, rotate(sole.orientation, [-moment[1] / fz, moment[0] / fz, 0]))
@@ -294,20 +292,20 @@ export class SceneView {
     this.polygon.set(show.pressure ? hull : []);
   }
 
-  #setPressure(tick) {
+  #setPressure(row) {
     const {samples, show} = this;
-    const frame = samples.pose('frame', tick);
+    const frame = samples.pose('frame', row);
     const known = show.pressure && [...frame.position, ...frame.orientation].every(Number.isFinite);
     this.frame.visible = known;
-    const [x, y] = samples.vector('limit', tick, 2);
+    const [x, y] = samples.vector('limit', row, 2);
     const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
       .map(([a, b]) => add(frame.position, rotate(frame.orientation, [a, b, 0.001])));
     this.region.set(known && corners.flat().every(Number.isFinite) ? corners : []);
     if (!known) return;
     place(this.frame, frame);
-    const balancing = samples.at('active_x', tick) > 0 || samples.at('active_y', tick) > 0;
+    const balancing = samples.at('active_x', row) > 0 || samples.at('active_y', row) > 0;
     const put = (object, name, on = true) => {
-      const cop = samples.vector(name, tick, 2);
+      const cop = samples.vector(name, row, 2);
       object.visible = on && cop.every(Number.isFinite);
       if (object.visible) object.position.set(cop[0], cop[1], 0.001);
     };
@@ -379,7 +377,7 @@ export class SceneView {
     this.scene.background = this.background;
     renderer.render(this.scene, this.camera);
     const side = Math.round(INSET * Math.min(width, height));
-    const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.tick).position);
+    const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.row).position);
     const middle = [0, 1, 2].map((i) => soles.reduce((sum, sole) => sum + sole[i], 0) / soles.length);
     if (side < 60 || !this.show.pressure || !middle.every(Number.isFinite)) return;
     this.#fitAbove(soles, middle);

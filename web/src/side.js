@@ -3,7 +3,7 @@ import {element, formatNumber} from './dom.js';
 
 const MILLI = 1000;
 
-/** {element, load(), update(tick)}. */
+/** {element, load(), update(row)}. */
 export class Readout {
   constructor(run, phases) {
     this.run = run;
@@ -44,9 +44,9 @@ export class Readout {
 
   async load() { await Promise.all(this.rows.flatMap(([, signals]) => signals).map((s) => s.load())); }
 
-  update(tick) {
+  update(row) {
     for (const [name, signals, text] of this.rows) {
-      this.cells.get(name).textContent = text(signals.map((s) => s.values?.[tick] ?? NaN));
+      this.cells.get(name).textContent = text(signals.map((s) => s.values?.[row] ?? NaN));
     }
   }
 }

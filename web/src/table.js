@@ -64,10 +64,10 @@ function information(run, title) {
   const rows = [['scenario', r.scenario], ['description', run.scenario.description ?? ''],
     ['paper section', r.paper_section], ['run id', r.run_id], ['started', r.started_at], ['seed', String(r.seed)],
     ['robot', `${run.robot.name}, ${formatNumber(run.robot.mass)} kg, ${run.robot.joints.length} joints`],
-    ['ticks', `${r.ticks} of ${formatNumber(1 / r.tick_period)} per second${r.planned_ticks > 0
+    ['ticks', `${run.meta.live ? '' : `${r.ticks} of `}${formatNumber(1 / r.tick_period)} per second${r.planned_ticks > 0
       ? `, ${r.planned_ticks} planned` : ''}`],
     ['paced by', r.realtime ? 'the wall clock' : 'lockstep'], ['messages dropped on purpose', `${100 * r.drop_rate} %`],
-    ['log', r.log], ['places of the log without a record', String(r.damages)],
+    ['log', r.log], ['places of the log without a record', run.meta.live ? '' : String(r.damages)],
     ...Object.entries(r.versions).map(([name, version]) => [name, version])];
   return element('section', {class: 'table'}, element('h2', {}, title),
     element('div', {class: 'scroll'}, element('table', {}, element('tbody', {}, ...rows.filter(([, v]) => v)
@@ -76,8 +76,9 @@ function information(run, title) {
       element('pre', {}, run.meta.scenario_text)));
 }
 
-/** All tables below the plots. */
+/** All tables below the plots; a live run's checks and counters are those of its report. */
 export function tables(run, overlay) {
+  if (run.meta.live) return [assumptionTable(run), information(run, 'This run')].filter(Boolean);
   return [checkTable(run, overlay), assumptionTable(run), latencyTable(run), channelTable(run),
     information(run, 'This run'), overlay ? information(overlay, 'The second run') : ''].filter(Boolean);
 }

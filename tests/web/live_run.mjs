@@ -1,0 +1,47 @@
+// A run in progress and `poise view` of it.
+import {spawn} from 'node:child_process';
+import {once} from 'node:events';
+
+const ENDS = 20000;  // ms that a program may take to end
+
+class Program {
+  constructor(poise, parameters) {
+    this.output = '';
+    this.child = spawn(poise, parameters, {stdio: ['ignore', 'pipe', 'pipe']});
+    this.ended = once(this.child, 'exit').then(([code]) => code);
+    for (const stream of [this.child.stdout, this.child.stderr]) {
+      stream.on('data', (data) => {
+        this.output += data;
+        this.child.emit('output');
+      });
+    }
+  }
+
+  /** The match of `pattern` in what it prints, as soon as it does. */
+  async prints(pattern) {
+    while (!pattern.test(this.output)) {
+      const ended = await Promise.race([once(this.child, 'output').then(() => false), this.ended.then(() => true)]);
+      if (ended && !pattern.test(this.output)) throw new Error(`it ended without ${pattern}: ${this.output}`);
+    }
+    return pattern.exec(this.output);
+  }
+
+  /** Ctrl-C; gives the exit code. */
+  async stop() {
+    this.child.kill('SIGINT');
+    const late = setTimeout(() => this.child.kill('SIGKILL'), ENDS);
+    const code = await this.ended;
+    clearTimeout(late);
+    return code;
+  }
+}
+
+export const startRun = (poise, folder, ...more) => new Program(poise, ['run', 'push_double_support', '--out', folder, ...more]);
+
+/** `poise view` of a run in `folder` that is starting; has `port` and `url`. */
+export async function startView(poise, run, folder, ...more) {
+  await run.prints(/run \d+/);
+  const view = new Program(poise, ['view', folder, ...more]);
+  const [, url, port] = await view.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/)/);
+  return Object.assign(view, {url, port: Number(port)});
+}

@@ -1,0 +1,229 @@
+// `poise view` of runs in progress, in a browser and before hostile connections.
+// Usage: node view_test.mjs --poise PROGRAM --web DIR, where DIR is build/web
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {launchBrowser, openPage} from './browser.mjs';
+import {startRun, startView} from './live_run.mjs';
+import {ask, open, openStream, upgrade} from './raw_socket.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
+const folder = mkdtempSync(join(tmpdir(), 'poise-view-'));
+const path = (name) => join(folder, name);
+const programs = [];
+let browser;
+
+before(async () => { browser = await launchBrowser(options.web); });
+after(async () => {
+  await browser?.close();
+  for (const program of programs) await program.stop();
+  rmSync(folder, {recursive: true, force: true});
+});
+
+async function start(name, parameters, viewParameters = []) {
+  const run = startRun(options.poise, path(name), ...parameters);
+  programs.push(run);
+  const view = await startView(options.poise, run, path(name), ...viewParameters);
+  programs.push(view);
+  return {run, view};
+}
+
+const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: 60000});
+const end = (page) => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numTicks);
+const more = async (page, ticks = 20) => until(page, (n) => window.poise.run.firstTick + window.poise.run.numTicks > n,
+  await end(page) + ticks);
+
+test('a page follows a run in progress, looks back while it goes on, and has all of it in the end', async () => {
+  const {run, view} = await start('live', ['--realtime', '--duration', '60']);
+  const {page, problems} = await openPage(browser, view.url);
+  assert.match(await page.locator('#live').innerText(), /live/);
+  await more(page);
+
+  // Plots and picture stand at the end.
+  await page.locator('.panel').first().scrollIntoViewIfNeeded();
+  await until(page, () => [...window.poise.grid.inSight].some((p) => p.plot));
+  const length = await page.evaluate(() => [...window.poise.grid.inSight].find((p) => p.plot).data[0].length);
+  await until(page, (n) => {
+    const {grid, view: shown, player, scene} = window.poise;
+    const plots = [...grid.inSight].filter((p) => p.plot);
+    return player.following && scene.row === player.row && shown.max > shown.min
+      && plots.every((p) => p.data.every((values) => values.length > n) && p.plot.scales.x.max === shown.max);
+  }, length);
+
+  // Looking back holds still while the run goes on.
+  await page.evaluate(() => window.poise.player.seek(window.poise.run.start + 0.1));
+  const {time} = await page.evaluate(() => ({time: window.poise.player.time}));
+  await more(page);
+  assert.equal(await page.evaluate(() => window.poise.player.time), time);
+  assert.equal(await page.locator('#live').getAttribute('aria-pressed'), 'false');
+  await page.click('#live');
+  assert.equal(await page.evaluate(() => window.poise.player.time === window.poise.run.end), true);
+
+  // A second browser, and the first one closed and opened again.
+  const other = await openPage(browser, view.url);
+  await more(other.page);
+  await page.reload();
+  await until(page, () => document.documentElement.dataset.ready);
+  await more(page);
+
+  await run.stop();
+  await until(page, () => window.poise.feed.state === 'ended');
+  await until(other.page, () => window.poise.feed.state === 'ended');
+  await view.prints(/the run has ended/);
+  const late = await openPage(browser, view.url);  // what it has is still served
+  await until(late.page, () => window.poise.feed.state === 'ended');
+
+  // The same numbers as in the log.
+  const report = spawnSync(options.poise, ['report', path('live'), '-o', path('live.html')], {encoding: 'utf8'});
+  assert.ok(report.status <= 1, report.stderr);
+  const logged = await openPage(browser, path('live.html'));
+  const compare = ['ROBOT_STATE.base_position[1]', 'GROUND_TRUTH.joint_position[3]', 'ROBOT_SENSORS.foot_wrench[0].force[2]'];
+  const read = (from) => from.evaluate(async (names) => {
+    const {run: r} = window.poise;
+    return {first: r.firstTick, columns: await Promise.all(names.map(async (name) => {
+      const s = r.signals.get(name);
+      await s.load();
+      return [...s.values];
+    }))};
+  }, compare);
+  const truth = await read(logged.page);
+  for (const {page: live} of [{page}, other, late]) {
+    const {first, columns} = await read(live);
+    columns.forEach((column, k) => {
+      const numbers = truth.columns[k].filter((x) => !Number.isNaN(x));
+      const range = Math.max(...numbers) - Math.min(...numbers);
+      let compared = 0;
+      column.forEach((value, i) => {
+        const expected = truth.columns[k][first + i];
+        if (Number.isNaN(value) || expected === undefined) return;
+        ++compared;
+        assert.ok(Math.abs(value - expected) <= 1e-6 * range + 1e-6 * Math.abs(expected), `${compare[k]} of tick ${first + i}: ${value}, not ${expected}`);
+      });
+      assert.ok(compared > 20, `${compare[k]}: ${compared} values to compare`);
+    });
+  }
+  for (const {problems: found} of [{problems}, other, late]) assert.deepEqual(found, []);
+  for (const p of [page, other.page, late.page, logged.page]) await p.context().close();
+  assert.equal(await view.stop(), 0);
+});
+
+test('a page keeps the last ticks only', async () => {
+  const {run, view} = await start('short', ['--realtime', '--duration', '60'], ['--keep', '1']);
+  const {page, problems} = await openPage(browser, view.url);
+  await until(page, () => window.poise.run.firstTick > 300);
+  const held = await page.evaluate(() => {
+    const {run: r} = window.poise;
+    return [r.numTicks, ...[...r.signals.values()].filter((s) => s.values).map((s) => s.values.length)];
+  });
+  for (const n of held) assert.equal(n, 500);
+  await page.evaluate(() => window.poise.player.seek(window.poise.run.start));
+  await more(page, 100);
+  assert.ok(await page.evaluate(() => window.poise.player.time >= window.poise.run.start));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+  await run.stop();
+  await view.stop();
+});
+
+test('a page that loses its server goes on with the next one where it was', async () => {
+  const {run, view} = await start('again', ['--realtime', '--duration', '60']);
+  const {page} = await openPage(browser, view.url);
+  await more(page);
+  assert.equal(await view.stop(), 0);
+  await until(page, () => window.poise.feed.state === 'waiting');
+  const [first, ticks] = await page.evaluate(() => [window.poise.run.firstTick, window.poise.run.numTicks]);
+  const next = await startView(options.poise, run, path('again'), '--port', String(view.port));
+  programs.push(next);
+  await until(page, () => window.poise.feed.state === 'live');
+  await more(page);
+  // What came between the two is a gap, and what was there has stayed.
+  const values = await page.evaluate(() => [...window.poise.run.signals.get('ROBOT_STATE.utime').values]);
+  values.forEach((utime, row) => assert.ok(Number.isNaN(utime) || utime === 2000 * (first + row), `${utime} in row ${row}`));
+  assert.ok(values.slice(0, ticks).some((x) => !Number.isNaN(x)));
+  assert.ok(!Number.isNaN(values.at(-1)));
+  await page.context().close();
+  await run.stop();
+  await next.stop();
+});
+
+test('hostile connections end, the server and the run go on', async () => {
+  const {run, view} = await start('hostile', ['--duration', '3']);
+  const {port} = view;
+  const get = (target, host = `127.0.0.1:${port}`, lines = '') => `GET ${target} HTTP/1.1\r\nHost: ${host}\r\n${lines}\r\n`;
+  const idle = open(port);  // says nothing
+  const half = open(port);
+  half.socket.write('GET / HT');
+  const attacks = [
+    ['\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03 hello\r\n\r\n', /400/],
+    [get('/', 'evil.example'), /403/], [get('/', `evil.example:${port}`), /403/], ['GET / HTTP/1.0\r\n\r\n', /403/],
+    [get('/', undefined, 'Origin: http://evil.example\r\n'), /403/],
+    [upgrade(port, {origin: 'http://evil.example'}), /403/], [upgrade(port, {host: `evil.example:${port}`}), /403/],
+    [upgrade(port, {origin: 'null'}), /403/], [upgrade(port, {target: '/stream?from=-1'}), /404/],
+    [upgrade(port, {target: '/stream?from=99999999999999999999'}), /404/], [upgrade(port, {target: '/other'}), /404/],
+    [get('/../../etc/passwd'), /404/], [`POST / HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nContent-Length: 0\r\n\r\n`, /405/],
+    [get('/', undefined, `X: ${'x'.repeat(1 << 17)}\r\n`), /^(HTTP\/1\.1 4\d\d.*)?$/],
+    [`POST / HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nContent-Length: 99999999999\r\n\r\n`, /^HTTP\/1\.1 4/],
+    [Buffer.alloc(1 << 16, 0), /^(HTTP\/1\.1 400.*)?$/],
+  ];
+  for (const [bytes, answer] of attacks) assert.match(await ask(port, bytes), answer, String(bytes).slice(0, 120));
+
+  // Frames: a message, one of 2^63 bytes, one without a mask, reserved bits, a long ping, a cut frame.
+  const masked = (head, ...rest) => Buffer.from([...head, 1, 2, 3, 4, ...rest]);
+  const frames = [masked([0x81, 0x83], 5, 6, 7), masked([0x82, 0xff, 0x7f, 255, 255, 255, 255, 255, 255, 255]),
+    masked([0x82, 0xfe, 0xff, 0xff], ...new Array(0xffff).fill(0)), Buffer.from([0x81, 3, 65, 66, 67]),
+    masked([0xf1, 0x80]), masked([0x89, 0xfe, 0x10, 0x00]), masked([0x80, 0x81], 1)];
+  for (const frame of frames) {
+    const stream = await openStream(port);
+    assert.match(stream.answer, /101/);
+    stream.socket.write(frame);
+    await stream.closed;
+  }
+  const cut = await openStream(port, {target: '/stream?from=9007199254740993'});
+  cut.socket.write(Buffer.from([0x82, 0xff]));
+  cut.socket.end();
+  await cut.closed;
+  await Promise.all([idle.closed, half.closed]);
+
+  // More connections than it takes at a time.
+  const many = Array.from({length: 64}, () => open(port));
+  await Promise.all(many.map((connection) => connection.closed));
+
+  const page = await ask(port, get('/'));
+  assert.match(page, /200/);
+  await run.ended;
+  const summary = JSON.parse(readFileSync(path('hostile/summary.json'), 'utf8'));
+  assert.equal(summary.ticks, summary.planned_ticks);
+  assert.equal(summary.checks.find((c) => c.name === 'log_defects').measured, 0);
+  assert.equal(JSON.parse(readFileSync(path('hostile/recorder.json'), 'utf8')).complete, true);
+  assert.match(await ask(port, get('/')), /200/);
+  assert.equal(await view.stop(), 0);
+});
+
+test('a client that does not read is dropped, one that reads is not', async () => {
+  const {run, view} = await start('slow', ['--duration', '3']);
+  const slow = await openStream(view.port);
+  slow.socket.pause();
+  const quick = await openStream(view.port);
+  await view.prints(/was dropped/);
+  slow.socket.resume();
+  await slow.closed;
+  await run.ended;
+  assert.equal(quick.socket.closed, false);
+  quick.socket.destroy();
+  assert.equal(await view.stop(), 0);
+});
+
+test('wrong usage is told', async () => {
+  const poise = (...parameters) => spawnSync(options.poise, ['view', ...parameters], {encoding: 'utf8'});
+  for (const [parameters, text] of [[[path('none')], /no such run folder/], [[path('slow')], /has ended.*poise report/],
+    [[path('slow/run.lcm')], /file/], [['--port', '70000'], /port/], [['--keep', '0'], /keep/]]) {
+    const {status, stderr} = poise(...parameters);
+    assert.equal(status, 2);
+    assert.match(stderr, text);
+  }
+  assert.match(poise('--help').stdout, /--port/);
+});

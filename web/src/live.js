@@ -1,0 +1,133 @@
+// A run in progress: its ticks from the stream of `poise view`, and the page that grows with them.
+import {element} from './dom.js';
+import {findPhases} from './derived.js';
+
+const RETRY = 1000;          // ms
+const SPAN = 10;             // s that the plots show at first
+const GROWTH_PERIOD = 33;    // ms, at least
+const GROWTH_SHARE = 2;      // times what drawing took: the picture goes first
+const PHASES_PERIOD = 1000;  // ms
+const FORMAT = 1;
+const HEADER = 16;           // bytes
+
+/** {first, count, values by name} of a batch of docs/report-format.md. Throws when it is none of `run`. */
+export function decodeBatch(buffer, run) {
+  const head = new DataView(buffer);
+  if (buffer.byteLength < HEADER || head.getUint32(0, true) !== FORMAT) throw new Error('the stream is of another version');
+  const count = head.getUint32(4, true);
+  const first = head.getFloat64(8, true);
+  const values = {};
+  let at = HEADER;
+  const take = (type, wanted) => {
+    for (const [name, signal] of run.signals) {
+      if (!signal.append || signal.integer !== wanted) continue;
+      if (at + count * type.BYTES_PER_ELEMENT > buffer.byteLength) throw new Error('a batch of the stream is too short');
+      values[name] = new type(buffer, at, count);
+      at += count * type.BYTES_PER_ELEMENT;
+    }
+  };
+  take(Float64Array, true);
+  take(Float32Array, false);
+  if (at !== buffer.byteLength) throw new Error('a batch of the stream is too long');
+  return {first, count, values};
+}
+
+/** Adds a batch to the run: ticks that it has are passed over, those that it never got are rows of NaN. */
+export function addBatch(run, {first, count, values}) {
+  if (run.numTicks === 0) run.firstTick = first;
+  const missed = first - run.firstTick - run.numTicks;
+  if (missed > 0) {
+    const rows = Math.min(missed, run.keep);
+    run.firstTick += missed - rows;
+    run.appendTicks(rows, {});
+  }
+  const known = Math.max(0, -missed);
+  if (known >= count) return;
+  run.appendTicks(count - known, known === 0 ? values
+    : Object.fromEntries(Object.entries(values).map(([name, column]) => [name, column.subarray(known)])));
+}
+
+/** Fires 'state': it or the messages lost by the server have changed. A lost connection is made again. */
+export class LiveFeed extends EventTarget {
+  state = 'waiting';
+  lost = 0;
+  #ticks = Infinity;  // of the run, once it has ended
+
+  constructor(run) {
+    super();
+    this.run = run;
+    this.#connect();
+  }
+
+  #connect() {
+    const {run} = this;
+    const url = new URL(`stream?from=${run.firstTick + run.numTicks}`, location.href);
+    url.protocol = 'ws:';
+    const socket = new WebSocket(url);
+    socket.binaryType = 'arraybuffer';
+    socket.addEventListener('message', ({data}) => {
+      if (typeof data === 'string') this.#tell(JSON.parse(data));
+      else addBatch(run, decodeBatch(data, run));
+    });
+    socket.addEventListener('close', () => {
+      if (run.firstTick + run.numTicks >= this.#ticks) return;
+      this.#setState('waiting');
+      setTimeout(() => this.#connect(), RETRY);
+    });
+  }
+
+  #tell({run_id: id, state, lost, end_tick: ticks}) {
+    if (id !== this.run.meta.run.run_id) return location.reload();  // another run is served here
+    this.lost = lost;
+    if (state === 'ended') this.#ticks = ticks;
+    this.#setState(state);
+  }
+
+  #setState(state) {
+    this.state = state;
+    this.dispatchEvent(new Event('state'));
+  }
+}
+
+/** Waits until there is something to show. */
+export async function firstTicks(feed) {
+  if (feed.run.numTicks > 0) return;
+  const text = element('p', {class: 'soft'});
+  const tell = () => {
+    text.textContent = feed.state === 'ended' ? 'The run has ended without a tick.' : 'Waiting for the first tick';
+  };
+  feed.addEventListener('state', tell);
+  tell();
+  document.getElementById('header').append(text);
+  await new Promise((done) => { feed.run.addEventListener('append', done, {once: true}); });
+  feed.removeEventListener('state', tell);
+  text.remove();
+}
+
+/** Calls `refresh` after the run has grown, as often as drawing it allows, its phases found anew now and then. */
+export function followGrowth(shared, refresh) {
+  let waiting = false, delay = GROWTH_PERIOD, phasesAt = -Infinity;
+  const grow = async () => {
+    const start = performance.now();
+    if (start - phasesAt > PHASES_PERIOD) {
+      phasesAt = start;
+      shared.phases = await findPhases(shared.run);
+    }
+    waiting = false;
+    refresh();
+    await null;  // uPlot draws
+    delay = Math.max(GROWTH_PERIOD, GROWTH_SHARE * (performance.now() - start));
+  };
+  shared.run.addEventListener('append', () => {
+    if (waiting) return;
+    waiting = true;
+    setTimeout(grow, delay);
+  });
+}
+
+/** Cursor and plots stay at the end until the reader goes elsewhere. */
+export function showEnd({player, view}) {
+  view.addEventListener('away', () => player.setFollowing(false));
+  view.setLast(SPAN);
+  player.setFollowing(true);
+}
