@@ -84,6 +84,7 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
   std::vector<TouchDown> touches;
   ReferenceEnds ends(run);
   const task_torque_t* before = nullptr;
+  std::array<bool, 2> down{};  // a sole that bounces touches down once
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const task_torque_t* task = run.task.at(tick);
     if (task == nullptr) continue;
@@ -95,7 +96,9 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
       const bool confirmed =
           is == task_torque_t::FOOT_TOUCHING ||
           (is == task_torque_t::FOOT_SUPPORT && was == task_torque_t::FOOT_SEARCHING);
-      if (!off || !confirmed) continue;
+      if (was == task_torque_t::FOOT_SUPPORT) down[foot] = false;
+      if (!off || !confirmed || down[foot]) continue;
+      down[foot] = true;
       TouchDown touch{tick, foot, Height(*task, foot) - Height(*task, 1 - foot), {}};
       ends.Place(*task, &touch);
       touches.push_back(touch);

@@ -31,7 +31,7 @@ std::vector<SupportChange> SupportChanges(const RunRecord& run);
 
 enum class Timing { kUnknown, kExpected, kEarly, kLate };
 
-/// The measured load confirmed the contact of a foot that came down.
+/// The measured load of a foot that came down lasted: contact, once per lift-off.
 struct TouchDown {
   int64_t tick = 0;
   size_t foot = 0;

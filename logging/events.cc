@@ -145,7 +145,7 @@ void AddFeet(const RunRecord& run, EventList* events) {
   }
   for (const TouchDown& touch : TouchDowns(run)) {
     const std::string foot = FootName(run, touch.foot);
-    events->Add(touch.tick, "contact_confirmed",
+    events->Add(touch.tick, "touch_down",
                 fmt::format("{}, {:.1f} mm above the other sole", foot, kMilli * touch.height));
     if (touch.timing != Timing::kEarly && touch.timing != Timing::kLate) continue;
     const bool early = touch.timing == Timing::kEarly;

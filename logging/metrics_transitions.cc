@@ -9,10 +9,9 @@
 namespace poise::logging {
 namespace {
 
-// Figure 17 shows half a second after the switch; what moves before it is not its doing.
-// Of the robot's weight: a load whose centre of pressure stands out of the sensor's noise (5 N at 1
-// N).
+// Of the robot's weight: a load whose centre of pressure stands out of a sensor noise of 1 N.
 constexpr double kReadableShare = 0.01;
+// Figure 17 shows half a second after the switch; what moves before it is not its doing.
 constexpr double kBeforeSwitch = 0.05, kAfterSwitch = 0.5;  // s
 
 /// m, of a sole; empty without ground truth.
@@ -162,8 +161,8 @@ void AddViolations(MetricList* list) {
 }
 
 void AddTouchDowns(MetricList* list) {
-  list->push_back({"contact_confirmed", "s",
-                   "first time that the measured load confirmed the contact of a foot set down",
+  list->push_back({"touch_down", "s",
+                   "first time that the measured load of a foot that came down lasted",
                    [](const RunRecord& run) -> Answer {
                      for (const TouchDown& touch : TouchDowns(run)) {
                        if (touch.tick >= run.first_tick) return run.time(touch.tick);
@@ -182,9 +181,10 @@ void AddTouchDowns(MetricList* list) {
                        return found;
                      }});
   };
-  count("early_contacts", "contacts confirmed above the end of the foot's reference",
+  count("early_contacts", "feet that touched down above the end of the foot's reference",
         Timing::kEarly);
-  count("late_contacts", "contacts confirmed below the end of the foot's reference", Timing::kLate);
+  count("late_contacts", "feet that touched down below the end of the foot's reference",
+        Timing::kLate);
   list->push_back({"no_surface_stops", "", "times that a foot found no surface and was retracted",
                    [](const RunRecord& run) -> Answer {
                      if (run.task.empty()) return {};

@@ -212,10 +212,11 @@ void OdeWorld::AddForce(int body, const Vector3d& force, const Vector3d& point) 
 }
 
 void OdeWorld::AddContact(int body, const Vector3d& position, const Vector3d& normal, double depth,
-                          const Terrain::Material& material) {
+                          double velocity, const Terrain::Material& material) {
   if (num_contacts_ == feedback_.size()) return;
   dContact contact{};
-  contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM;
+  contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM | dContactMotionN;
+  contact.surface.motionN = velocity;
   contact.surface.mu = material.friction;
   contact.surface.soft_erp = material.erp;
   contact.surface.soft_cfm = material.cfm;

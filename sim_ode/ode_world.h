@@ -44,9 +44,10 @@ class OdeWorld {
   // Before each step:
   void SetDrivetrain(int joint, const Drivetrain::Row& row);
   void AddForce(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point);  ///< world
-  /// A contact at `position` (world) that pushes `body` along `normal`; `depth` in m.
+  /// A contact at `position` (world) that pushes `body` along `normal`; `depth` in m,
+  /// `velocity` in m/s of the surface along the normal.
   void AddContact(int body, const Eigen::Vector3d& position, const Eigen::Vector3d& normal,
-                  double depth, const Terrain::Material& material);
+                  double depth, double velocity, const Terrain::Material& material);
 
   /// Steps by `h` s; contacts, torques and forces are then used up. False when ODE had something to
   /// say: see message().

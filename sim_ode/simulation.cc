@@ -283,7 +283,7 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     ++count;
     if (add) {
       world_.AddContact(body, p, surface.normal, std::max(depth, 0.0),
-                        terrain_.material(surface.block));
+                        surface.velocity * surface.normal.z(), terrain_.material(surface.block));
     }
   }
   return count;

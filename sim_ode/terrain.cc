@@ -80,11 +80,11 @@ Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
 }
 
 Terrain::Surface Terrain::At(double x, double y, double time) const {
-  const Surface ground{0, Vector3d::UnitZ(), false};
+  const Surface ground{0, 0, Vector3d::UnitZ(), false};
   if (!has_block_ || time < start_) return ground;
   const Vector2d place = Vector2d(x, y) - center_;
   if (std::abs(place.x()) > half_size_.x() || std::abs(place.y()) > half_size_.y()) return ground;
-  double height = height_ * MinimumJerk(time - start_, rise_).position + slope_.dot(place);
+  double height = height_ + slope_.dot(place);
   Vector2d slope = slope_;
   if (wave_amplitude_ > 0) {
     for (const Wave& wave : waves_) {
@@ -93,8 +93,13 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
       slope += wave_amplitude_ * std::cos(angle) * wave.number;
     }
   }
+  // A rising block grows from the ground, its relief with it.
+  const MinimumJerk rise(time - start_, rise_);
+  const double velocity = rise.speed * height;
+  height *= rise.position;
+  slope *= rise.position;
   if (height <= 0) return ground;
-  return {height, Vector3d(-slope.x(), -slope.y(), 1).normalized(), true};
+  return {height, velocity, Vector3d(-slope.x(), -slope.y(), 1).normalized(), true};
 }
 
 }  // namespace poise

@@ -14,6 +14,7 @@ class Terrain {
  public:
   struct Surface {
     double height;           ///< m, world
+    double velocity;         ///< m/s, upward, of a block that rises
     Eigen::Vector3d normal;  ///< unit, upward
     bool block;              ///< of the block rather than of the ground
   };

@@ -90,7 +90,8 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
   switch (state_) {
     case State::kSwing:
       left_ = left_ || !touching;
-      if (left_ && touching) {
+      // A tap on the way up is left behind by going on.
+      if (left_ && touching && !Rises()) {
         Enter(State::kTouching, reference, rotation);
       } else if (left_ && searches) {
         Enter(State::kSearching, reference, rotation);

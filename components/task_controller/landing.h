@@ -66,6 +66,7 @@ class Landing {
   void Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation);
   void AdvanceState(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
                     const PointMotion& reference, const Eigen::Matrix3d& rotation);
+  bool Rises() const { return !lowered_ && time_ < move_end_; }
   bool SearchBegins(bool before_touch_down, bool due) const;
   /// Share of a first-order approach with `time_constant`, s, in this tick.
   double Share(double time_constant) const { return period_ / (time_constant + period_); }

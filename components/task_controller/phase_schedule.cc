@@ -157,6 +157,12 @@ void CheckTaskControllerConfig(const TaskControllerConfig& config) {
       CheckGains(config.has_foot(), config.foot(), "foot",
                  "give kp and kd of the pose of the foot out of contact");
     }
+    if (phase.support() == DOUBLE && i > 0 && config.phase(i - 1).support() != DOUBLE &&
+        config.phase(i - 1).gravity_compensation() && config.contact().required()) {
+      throw ConfigError(fmt::format("phase[{}].gravity_compensation", i - 1),
+                        "lowers no foot, but the next phase waits for one to touch down; set "
+                        "contact.required: false, or a phase with tasks between");
+    }
     if (phase.has_com()) CheckCom(phase.com(), field + ".com");
     if (phase.has_foot()) CheckFoot(phase, field + ".foot");
     if (phase.has_transition()) CheckTransition(config, i, field + ".transition");

@@ -290,6 +290,16 @@ TEST(Landing, AMoveUpwardTakesATouchingFootOff) {
   EXPECT_NEAR(foot.z(), 0.15, 0.012);
 }
 
+TEST(Landing, ATapOnTheWayUpDoesNotEndTheMove) {
+  Foot foot({}, 0, 8);
+  foot.Move(0.12, 2);
+  foot.Run(0.5, 0, false);
+  foot.Run(0.1, foot.z() + 0.005, false);  // something in the way, then gone
+  foot.Run(3, 0, false);
+  EXPECT_EQ(foot.landing.state(), State::kSwing);
+  EXPECT_NEAR(foot.z(), 0.12, 0.012);
+}
+
 // The sole takes the surface's slope and place: what it touches with is let go in all axes.
 TEST(Landing, ATouchingFootsReferenceComesToItsSole) {
   const ContactConfirmation config;

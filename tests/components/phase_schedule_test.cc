@@ -227,6 +227,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{GAINS "phase { start: 0 com { duration: -1 } }", "phase[0].com.duration"},
         Refused{GAINS "phase { start: 0 com { delay: nan } }", "phase[0].com.delay"},
         Refused{GAINS "phase { start: 0 com { y: inf } }", "phase[0].com.y"},
+        Refused{GAINS "phase { start: 0 support: RIGHT gravity_compensation: true } "
+                      "phase { start: 1 support: DOUBLE }",
+                "phase[0].gravity_compensation"},
         Refused{GAINS "phase { start: 0 gravity_compensation: true com { x: 0.1 } }",
                 "phase[0].gravity_compensation"},
         Refused{GAINS "phase { start: 0 support: RIGHT foot { z: 0.1 } }", "phase[0].foot.foot"},

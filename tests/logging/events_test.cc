@@ -142,14 +142,23 @@ TEST_F(EventsTest, AContactAboveTheReferencesEndIsEarly) {
     task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
     task_[t].foot_pose[1].position[2] = 0.115;
   }
-  EXPECT_THAT(Named("contact_confirmed"),
-              ElementsAre(Is(0.1, "contact_confirmed", "left foot, 115.0 mm above")));
+  EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "left foot, 115.0 mm above")));
   EXPECT_THAT(Named("contact_early"),
               ElementsAre(Is(0.1, "contact_early", "left foot, 25.0 mm above")));
   EXPECT_TRUE(Named("contact_late").empty());
 }
 
 // What comes in a phase before the one that lowers the foot is early too.
+TEST_F(EventsTest, ASoleThatBouncesTouchesDownOnce) {
+  Plan(StepDown());
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    task_[t].foot_state[1] = t % 20 < 10 ? task_torque_t::FOOT_TOUCHING : task_torque_t::FOOT_SWING;
+  }
+  EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.12, "touch_down", "left foot")));
+  EXPECT_EQ(Named("contact_early").size(), 1u);
+}
+
 TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
   TaskControllerConfig config = StepDown();
   *config.add_phase() = config.phase(1);
@@ -172,7 +181,7 @@ TEST_F(EventsTest, AContactFoundBySearchingIsLate) {
     task_[t].foot_pose[1].position[2] = 0.06;
   }
   EXPECT_THAT(Named("searching"), ElementsAre(Is(0.06, "searching", "left foot")));
-  EXPECT_THAT(Named("contact_confirmed"), ElementsAre(Is(0.1, "contact_confirmed", "60.0 mm")));
+  EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "60.0 mm")));
   EXPECT_THAT(Named("contact_late"), ElementsAre(Is(0.1, "contact_late", "30.0 mm below")));
 }
 
@@ -184,7 +193,7 @@ TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
     task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
     task_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
   }
-  EXPECT_EQ(Named("contact_confirmed").size(), 1u);
+  EXPECT_EQ(Named("touch_down").size(), 1u);
   EXPECT_TRUE(Named("contact_early").empty());
   // What counts as expected is the configuration's.
   config.mutable_contact()->set_expected_within(0.004);
@@ -216,7 +225,8 @@ TEST_F(EventsTest, ContactIsLostWhenALoadedFootReadsOnlyNoise) {
   for (size_t t = 0; t < kTicks; ++t) {
     // The right foot is to carry 300 N and does, but for ticks 30..39; the left foot 5 N.
     command_[t].foot_wrench[0].force[2] = -300;
-    sensors_[t].foot_wrench[0].force[2] = t >= 30 && t < 40 ? 2 : -290;
+    // And for ticks 60..63, which is too short to be a loss.
+    sensors_[t].foot_wrench[0].force[2] = (t >= 30 && t < 40) || (t >= 60 && t < 64) ? 2 : -290;
     command_[t].foot_wrench[1].force[2] = -5;
   }
   EXPECT_THAT(Named("contact_lost"), ElementsAre(Is(0.06, "contact_lost", "right foot")));

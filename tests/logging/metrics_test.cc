@@ -164,11 +164,11 @@ TEST_F(MetricsTest, SinkIsFromTheConfirmedContactToTheNextLift) {
   }
   EXPECT_NEAR(Measure("left_foot_sink"), 12, 1e-9);
   EXPECT_TRUE(Unanswered("right_foot_sink"));
-  EXPECT_NEAR(Measure("contact_confirmed"), 0.06, 1e-12);
+  EXPECT_NEAR(Measure("touch_down"), 0.06, 1e-12);
   // Nothing confirms: from the first tick of support on.
   for (size_t t = 30; t < 40; ++t) task_[t].foot_state[1] = task_torque_t::FOOT_SWING;
   EXPECT_NEAR(Measure("left_foot_sink"), 2, 1e-9);
-  EXPECT_TRUE(Unanswered("contact_confirmed"));
+  EXPECT_TRUE(Unanswered("touch_down"));
 }
 
 TEST_F(MetricsTest, EarlyAndLateContacts) {

@@ -109,6 +109,7 @@ TEST(Standing, JointFrictionAloneHoldsThePosture) {
   const robot::RobotModel model = EditedRobot([](Robot* description) {
     for (auto& motor : *description->mutable_motor()) {
       motor.set_coulomb_friction(100);
+      motor.clear_static_friction();
       motor.set_viscous_friction(0.5);
     }
   });
@@ -198,6 +199,26 @@ TEST(Block, TheHigherSurfaceWins) {
   // Every corner of the left foot is 4 mm deep in the block; the right one is on the ground.
   EXPECT_NEAR(simulation.truth().foot_wrench[1][2], 0.004 * 40000, 0.5 * 0.004 * 40000);
   EXPECT_EQ(simulation.truth().contact_points[1], 4);
+}
+
+// A lift: at its greatest speed it accelerates nothing, so its spring carries the weight alone. A
+// surface taken to stand still would brake with its damper, here by 94 mm/s · 4000 N·s/m a sole.
+TEST(Block, ThatRisesCarriesTheRobotAtItsOwnSpeed) {
+  SimOdeConfig config = StandingConfig();
+  SoftBlock* block = config.mutable_block();
+  block->set_width(1);
+  block->set_length(1);
+  block->set_height(0.2);
+  block->set_rise(4);
+  block->set_stiffness(40000);
+  block->set_damping(4000);
+  Simulation simulation(RigidRobot(), config, kTick, 1);
+  while (simulation.time() < 2) simulation.Step();
+  const double depth = Weight(simulation) / (2 * 40000);
+  for (const auto& sole : simulation.truth().foot_pose) {
+    EXPECT_NEAR(0.1 - sole.translation().z(), depth, 0.05 * depth);
+  }
+  EXPECT_NEAR(simulation.truth().com_velocity.z(), 1.875 * 0.2 / 4, 0.002);
 }
 
 struct PushCase {

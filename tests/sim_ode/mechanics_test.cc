@@ -241,6 +241,7 @@ TEST(Joints, TurnsAreCounted) {
   for (auto& motor : *description.mutable_motor()) {
     motor.set_viscous_friction(5);
     motor.set_coulomb_friction(0);
+    motor.set_static_friction(0);
   }
   const robot::RobotModel model = robot::RobotModel::Load(description, urdf);
   Simulation simulation(model, StandingConfig("step: 0.0005"), kTick, 1);

@@ -37,6 +37,7 @@ inline robot::RobotModel RigidRobot() {
     for (auto& motor : *description->mutable_motor()) {
       motor.set_viscous_friction(1e9);
       motor.set_coulomb_friction(0);
+      motor.set_static_friction(0);
     }
   });
 }

@@ -40,6 +40,19 @@ TEST(Terrain, BlockRisesFromTheGround) {
   EXPECT_NEAR(terrain.At(0, 0, 2.2).height + terrain.At(0, 0, 2.8).height, 0.08, 1e-12);
   EXPECT_EQ(terrain.At(0, 0, 3).height, 0.08);
   EXPECT_EQ(terrain.At(0, 0, 9).height, 0.08);
+  const double h = 1e-6;
+  EXPECT_NEAR(terrain.At(0, 0, 2.3).velocity,
+              (terrain.At(0, 0, 2.3 + h).height - terrain.At(0, 0, 2.3 - h).height) / (2 * h),
+              1e-6);
+  EXPECT_EQ(terrain.At(0, 0, 9).velocity, 0);
+}
+
+TEST(Terrain, ReliefRisesWithTheBlock) {
+  const std::string text = "length: 1 height: 0.08 tilt_pitch: 0.1 irregularity: 0.01 start: 2";
+  const Terrain done = Make("block { " + text + " }");
+  const Terrain rising = Make("block { " + text + " rise: 1 }");
+  EXPECT_EQ(rising.At(-0.3, 0.05, 2).height, 0);
+  EXPECT_NEAR(rising.At(-0.3, 0.05, 2.5).height, 0.5 * done.At(-0.3, 0.05, 2.5).height, 1e-12);
 }
 
 TEST(Terrain, SpringAndDamperOfAWholeSoleAreSharedByFourCorners) {
