@@ -3,8 +3,10 @@
 namespace poise::logging {
 
 void AddOutcome(MetricList* list) {
-  list->push_back({"duration_reached", "s", "simulated time of the run",
-                   [](const RunRecord& run) { return Answer(run.time(run.num_ticks)); }});
+  const auto duration = [](const RunRecord& run) { return Answer(run.time(run.num_ticks)); };
+  list->push_back({"duration_reached", "s", "simulated time of the run", duration});
+  list->push_back({"duration_reached_reference", "s", "simulated time of the reference run",
+                   [=](const RunRecord& run) { return OfReference(run, duration); }});
   list->push_back({"fallen", "", "ticks in which the robot lay fallen (ground truth)",
                    [](const RunRecord& run) {
                      return CountTicks(run, [&](int64_t t) -> std::optional<bool> {

@@ -66,7 +66,7 @@ int Estop(const std::string& run) {
   }
   fmt::print(stderr,
              "poise: run {}: the stop was sent, but no bridge has confirmed it for {} s; "
-             "has the run ended?\n",
+             "has the run ended, or does its reference still run?\n",
              spec.run_id(), kPatience / kSecond);
   return kExitFailed;
 }

@@ -185,7 +185,8 @@ bool RunJobs(const fs::path& folder, int at_once, std::vector<Job>* jobs) {
 
 int Matrix(const MatrixOptions& options) {
   std::vector<Job> jobs = MakeJobs(options);
-  const fs::path folder = MakeRunDir(options.out, "matrix");
+  const RunDir matrix = MakeRunDir(options.out, "matrix");
+  const fs::path& folder = matrix.path();
   CatchStopSignals();
   fmt::print("{} runs, {} at a time\n", jobs.size(), options.jobs);
   std::fflush(stdout);
@@ -213,7 +214,11 @@ int Matrix(const MatrixOptions& options) {
     good = good && !cell.problem && (cell.passed || !cell.must_pass);
   }
   WriteFile(folder / "matrix.csv", MatrixCsv(cells));
-  PointLatestTo(folder / jobs.front().name);
+  const auto ran = std::find_if(cells.begin(), cells.end(),
+                                [](const MatrixCell& cell) { return !cell.problem; });
+  if (ran != cells.end()) {
+    PointLatestTo(folder / jobs[static_cast<size_t>(ran - cells.begin())].name);
+  }
   fmt::print("{} runs in {:.1f} s; {}\n", jobs.size(), wall, (folder / "matrix.csv").string());
   return good ? kExitOk : kExitFailed;
 }

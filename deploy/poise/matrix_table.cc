@@ -17,11 +17,29 @@ std::string ColumnTitle(const MatrixCell& cell) {
   return title;
 }
 
-const CheckResult* FindCheck(const MatrixCell& cell, const std::string& name) {
+/// A metric may stand in several checks, with a label each.
+bool Same(const CheckResult& a, const CheckResult& b) {
+  return a.name == b.name && a.label == b.label;
+}
+
+const CheckResult* FindCheck(const MatrixCell& cell, const CheckResult& wanted) {
   for (const CheckResult& check : cell.checks) {
-    if (check.name == name) return &check;
+    if (Same(check, wanted)) return &check;
   }
   return nullptr;
+}
+
+/// True when the run failed and none of the figures says so.
+bool FailedUnseen(const MatrixCell& cell, const std::vector<const CheckResult*>& figures) {
+  if (cell.problem || cell.passed) return false;
+  bool seen = false;
+  for (const CheckResult& check : cell.checks) {
+    if (check.passed) continue;
+    seen = std::any_of(figures.begin(), figures.end(),
+                       [&](const CheckResult* figure) { return Same(*figure, check); });
+    if (!seen) return true;
+  }
+  return !seen;
 }
 
 /// The cells of one scenario.
@@ -32,17 +50,20 @@ std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
     rows[0].push_back(ColumnTitle(*cell));
     rows[1].push_back(cell->problem ? "could not be run" : cell->outcome);
     for (const CheckResult& check : cell->checks) {
-      const auto same = [&](const CheckResult* other) { return other->name == check.name; };
+      const auto same = [&](const CheckResult* other) { return Same(*other, check); };
       const bool paper = !check.paper.empty() || check.paper_value;
       if (paper && std::none_of(figures.begin(), figures.end(), same)) figures.push_back(&check);
     }
+  }
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (FailedUnseen(*cells[i], figures)) rows[1][i + 2] += " !";
   }
   for (const CheckResult* figure : figures) {
     std::string paper = figure->paper;
     if (paper.empty()) paper = FormatNumber(*figure->paper_value, figure->unit);
     rows.push_back({figure->label, paper});
     for (const MatrixCell* cell : cells) {
-      const CheckResult* const check = FindCheck(*cell, figure->name);
+      const CheckResult* const check = FindCheck(*cell, *figure);
       const bool failed = check != nullptr && !check->passed;
       rows.back().push_back(check == nullptr ? "" : FormatMeasured(*check) + (failed ? " !" : ""));
     }
@@ -92,7 +113,7 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
     size_t end = begin;
     for (; end < cells.size() && cells[end].scenario == cells[begin].scenario; ++end) {
       group.push_back(&cells[end]);
-      for (const CheckResult& check : cells[end].checks) failed = failed || !check.passed;
+      failed = failed || (!cells[end].problem && !cells[end].passed);
     }
     const MatrixCell& first = cells[begin];
     text += fmt::format("{}{}: {}\n", first.paper_section.empty() ? "" : first.paper_section + "  ",
@@ -100,7 +121,11 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
     text += FormatScenario(group) + "\n";
     begin = end;
   }
-  if (failed) text += "!: outside the limit that the scenario's check sets\n";
+  if (failed) {
+    text +=
+        "!: outside the limit that the scenario's check sets; at the outcome: a check that is not "
+        "shown failed, see poise report\n";
+  }
   return text;
 }
 

@@ -31,7 +31,8 @@ struct MatrixCell {
 void ReadCellSummary(const std::filesystem::path& file, MatrixCell* cell);
 
 /// A table for each scenario: a column for each of its cells, rows for the outcome and for each
-/// check that has a figure of the paper. Cells of a scenario stand together.
+/// check that has a figure of the paper. The outcome of a run that failed by a check without a row
+/// is marked. Cells of a scenario stand together.
 std::string FormatMatrix(const std::vector<MatrixCell>& cells);
 
 /// A line for each check of each cell, below a line with the columns' names (RFC 4180). A cell that

@@ -65,11 +65,16 @@ int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run
 
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
   std::vector<CheckResult> results;
-  CheckResult duration;
-  const double planned = static_cast<double>(run.spec.num_ticks()) * run.spec.tick_period();
-  if (run.spec.num_ticks() > 0) duration.at_least = planned;
-  results.push_back(duration);
-  Evaluate(*logging::FindMetric("duration_reached"), run, &results.back());
+  const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
+    CheckResult duration;
+    if (spec.num_ticks() > 0) {
+      duration.at_least = static_cast<double>(spec.num_ticks()) * spec.tick_period();
+    }
+    Evaluate(*logging::FindMetric(metric), run, &duration);
+    results.push_back(std::move(duration));
+  };
+  reaches_end("duration_reached", run.spec);
+  if (run.reference) reaches_end("duration_reached_reference", run.reference->spec);
   CheckResult defects;
   defects.at_most = 0;
   results.push_back(defects);

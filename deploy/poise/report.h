@@ -30,8 +30,8 @@ struct CheckResult {
 /// First tick at or after check_from.
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run);
 
-/// The scenario's checks on a run, after two of every run: it reached its planned end, and its log
-/// is whole.
+/// The scenario's checks on a run, after those of every run: it reached its planned end, so did
+/// its reference, its log is whole, and each component did its work.
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run);
 
 /// Columns what, measured, limit, paper, verdict.

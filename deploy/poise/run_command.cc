@@ -22,7 +22,8 @@ int Run(RunArguments arguments) {
   arguments.options.changes.reference = !arguments.no_reference;
   const std::vector<std::string>& names = arguments.scenarios;
   if (names.size() == 1 && names.front() != kAllScenarios) {
-    const RunResult result = ScenarioRun(names.front(), arguments.options).Run(arguments.out);
+    const RunResult result = ScenarioRun(names.front(), arguments.options)
+                                 .Run(arguments.out, /*latest=*/arguments.out.empty());
     return result.summary.passed ? kExitOk : kExitFailed;
   }
   return RunSeveral(names, arguments.options, arguments.out) ? kExitOk : kExitFailed;

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
@@ -19,51 +20,62 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFiles[] = {"run.lcm", "summary.json", "recorder.json", "run_spec.pbtxt",
-                                  "scenario.pbtxt", "report.html"};
+constexpr const char* kFiles[] = {"run.lcm",        "summary.json",   "recorder.json",
+                                  "run_spec.pbtxt", "scenario.pbtxt", "report.html"};
 
-/// Keeps other runs out of `dir` until this program ends; its children do not inherit the lock.
-void Lock(const fs::path& dir) {
-  const int fd = open(dir.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0 || flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    throw ConfigError(fmt::format(
-        "{}: {}", dir.string(),
-        errno == EWOULDBLOCK
-            ? "a run is going on in this folder; choose another with --out, or wait for its end"
-            : fmt::format("cannot be locked: {}", std::strerror(errno))));
+/// The folder or log that `run` means. Throws ConfigError.
+fs::path FindRun(const std::string& run) {
+  const fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
+  if (!fs::exists(path)) {
+    throw ConfigError(run.empty() ? "there is no run yet; start one with poise run"
+                                  : fmt::format("{}: no such log or run folder", run));
   }
+  return path;
 }
 
 }  // namespace
 
 fs::path RunsDir() { return DeployDir().parent_path() / "runs"; }
 
-fs::path MakeRunDir(const std::string& out, const std::string& name) {
+RunDir::RunDir(fs::path path)
+    : path_(std::move(path)), fd_(open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (fd_ >= 0 && flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+  const int problem = errno;
+  if (fd_ >= 0) close(fd_);
+  throw ConfigError(fmt::format(
+      "{}: {}", path_.string(),
+      problem == EWOULDBLOCK
+          ? "a run is going on in this folder; choose another with --out, or wait for its end"
+          : fmt::format("cannot be locked: {}", std::strerror(problem))));
+}
+
+RunDir::~RunDir() {
+  if (fd_ >= 0) close(fd_);
+}
+
+RunDir MakeRunDir(const std::string& out, const std::string& name) {
   std::error_code error;
   if (!out.empty()) {
-    const fs::path dir = fs::absolute(out);
-    fs::create_directories(dir, error);
-    if (error || !fs::is_directory(dir)) {
+    const fs::path path = fs::absolute(out);
+    fs::create_directories(path, error);
+    if (error || !fs::is_directory(path)) {
       throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
                                     error ? error.message() : "there is a file of that name"));
     }
-    Lock(dir);
+    RunDir dir(path);
     for (const char* file : kFiles) {
-      fs::remove(dir / file, error);
-      fs::remove(ReferenceDir(dir) / file, error);
+      fs::remove(path / file, error);
+      fs::remove(ReferenceDir(path) / file, error);
     }
-    fs::remove(ReferenceDir(dir), error);  // if it is empty
+    fs::remove(ReferenceDir(path), error);  // if it is empty
     return dir;
   }
   const std::string dated =
       fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), name);
   fs::create_directories(RunsDir(), error);
   for (int i = 1; i < 1000 && !error; ++i) {
-    const fs::path dir = RunsDir() / (i == 1 ? dated : fmt::format("{}-{}", dated, i));
-    if (!fs::create_directory(dir, error)) continue;
-    Lock(dir);
-    PointLatestTo(dir);
-    return dir;
+    const fs::path path = RunsDir() / (i == 1 ? dated : fmt::format("{}-{}", dated, i));
+    if (fs::create_directory(path, error)) return RunDir(path);
   }
   throw ConfigError(fmt::format("{}: cannot be made: {}; choose another folder with --out",
                                 (RunsDir() / dated).string(), error.message()));
@@ -75,22 +87,28 @@ void PointLatestTo(const fs::path& dir) {
   const fs::path target = dir.lexically_relative(RunsDir());
   if (target.empty() || *target.begin() == "..") return;
   std::error_code error;  // a convenience: a run is good without it
-  fs::remove(RunsDir() / "latest", error);
-  fs::create_directory_symlink(target, RunsDir() / "latest", error);
+  // Replaced in one step: another program always finds one.
+  const fs::path next = RunsDir() / fmt::format(".latest-{}", getpid());
+  fs::create_directory_symlink(target, next, error);
+  fs::rename(next, RunsDir() / "latest", error);
+  if (error) fs::remove(next, error);
 }
 
 fs::path FindLog(const std::string& run) {
-  fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
-  if (fs::is_directory(path)) path /= "run.lcm";
+  fs::path path = FindRun(run);
+  if (!fs::is_directory(path)) return path;
+  path /= "run.lcm";
   if (!fs::exists(path)) {
-    throw ConfigError(run.empty() ? "there is no run yet; start one with poise run"
-                                  : fmt::format("{}: no such log or run folder", run));
+    throw ConfigError(fmt::format("{}: is missing: that run has not begun, or never came to start",
+                                  path.string()));
   }
   return path;
 }
 
 RunSpec ReadRunSpec(const std::string& run) {
-  const fs::path path = FindLog(run).parent_path() / "run_spec.pbtxt";
+  fs::path path = FindRun(run);
+  if (!fs::is_directory(path)) path = path.parent_path();
+  path /= "run_spec.pbtxt";
   RunSpec spec;
   ReadTextProto(path.string(), &spec);
   return spec;

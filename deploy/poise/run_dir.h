@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "components/framework/graph.pb.h"
 
@@ -11,10 +12,27 @@ namespace poise {
 /// runs/ beside deploy/.
 std::filesystem::path RunsDir();
 
+/// A run's folder, locked against other runs for as long as this lives. Programs that the run
+/// starts do not inherit the lock.
+class RunDir {
+ public:
+  /// Throws ConfigError when another run goes on in `path`, a folder.
+  explicit RunDir(std::filesystem::path path);
+  ~RunDir();
+  RunDir(RunDir&& other) noexcept
+      : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)) {}
+  RunDir& operator=(RunDir&&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+};
+
 /// Makes the run's folder: `out`, from which an earlier run's files are removed, or, when empty, a
-/// new one under runs/ named after date and `name`, to which runs/latest then points. Throws
-/// ConfigError.
-std::filesystem::path MakeRunDir(const std::string& out, const std::string& name);
+/// new one under runs/ named after date and `name`. Throws ConfigError.
+RunDir MakeRunDir(const std::string& out, const std::string& name);
 
 /// In a run's folder, the folder of the run that it is compared with.
 std::filesystem::path ReferenceDir(const std::filesystem::path& dir);
@@ -26,7 +44,8 @@ void PointLatestTo(const std::filesystem::path& dir);
 /// Throws ConfigError.
 std::filesystem::path FindLog(const std::string& run);
 
-/// The run spec in a run's folder (FindLog's rules). Throws ConfigError.
+/// The run spec in a run's folder, or beside a log; empty `run`: of the latest run. It is there
+/// before the log is. Throws ConfigError.
 RunSpec ReadRunSpec(const std::string& run);
 
 /// Writes a whole file. Throws ConfigError.

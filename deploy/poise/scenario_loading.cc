@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 
 #include "components/framework/configuration.h"
@@ -21,7 +22,18 @@ constexpr double kMinRate = 50;     // Hz
 constexpr double kMaxRate = 10000;  // Hz
 constexpr char kSetFlag[] = "--set";
 
+bool InName(unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; }
+
+/// What is wrong with the name of a scenario or variant, which becomes a part of a path; empty when
+/// nothing is.
+std::string NameProblem(const std::string& name) {
+  if (!name.empty() && std::all_of(name.begin(), name.end(), InName)) return "";
+  return fmt::format("is '{}'; use letters, digits, _ and -", name);
+}
+
 std::string VariantLabel(const Variant& variant) { return "variant " + variant.name(); }
+
+std::string PathOf(const FieldChange& change) { return change.set.substr(0, change.set.find('=')); }
 
 std::string NoVariant(const std::string& name, const std::vector<std::string>& names) {
   return names.empty() ? "the scenario has no variants"
@@ -33,6 +45,9 @@ void CheckScenario(const LoadedScenario& loaded) {
   const auto fail = [&](const std::string& field, const std::string& problem) {
     FailField(loaded, field, problem);
   };
+  if (const std::string problem = NameProblem(s.name()); s.has_name() && !problem.empty()) {
+    fail("name", problem);
+  }
   if (!s.has_robot()) fail("robot", "is missing; name one of deploy/robots");
   if (!(s.duration() > 0) || s.duration() > 36000) {
     fail("duration", fmt::format("is {} s; must be in (0, 36000]", s.duration()));
@@ -41,7 +56,17 @@ void CheckScenario(const LoadedScenario& loaded) {
     fail("tick_rate",
          fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
   }
-  if (!(s.check_from() >= 0 && s.check_from() < s.duration())) {
+  if (!(s.check_from() >= 0)) fail("check_from", "must be in [0, duration)");
+  if (!(s.check_from() < s.duration())) {
+    const auto changed = [&](const char* field) {
+      return std::any_of(loaded.changes.begin(), loaded.changes.end(),
+                         [&](const FieldChange& change) { return PathOf(change) == field; });
+    };
+    if (changed("duration") && !changed("check_from")) {
+      fail("duration", fmt::format("is {} s; must be more than check_from, {} s, from which on the "
+                                   "scenario is checked",
+                                   s.duration(), s.check_from()));
+    }
     fail("check_from", "must be in [0, duration)");
   }
   std::vector<std::string> names;
@@ -52,6 +77,13 @@ void CheckScenario(const LoadedScenario& loaded) {
            fmt::format("no metric named '{}'; {}; see `poise list metrics`", s.check(i).metric(),
                        Suggest(s.check(i).metric(), names)));
     }
+    const auto check_finite = [&](const char* field, double value) {
+      if (std::isfinite(value)) return;
+      fail(fmt::format("check[{}].{}", i, field), fmt::format("is {}; must be finite", value));
+    };
+    check_finite("at_most", s.check(i).at_most());
+    check_finite("at_least", s.check(i).at_least());
+    check_finite("paper_value", s.check(i).paper_value());
     if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
         s.check(i).at_most() < s.check(i).at_least()) {
       fail(fmt::format("check[{}].at_most", i), "is smaller than at_least");
@@ -69,8 +101,6 @@ void CheckScenario(const LoadedScenario& loaded) {
     }
   }
 }
-
-std::string PathOf(const FieldChange& change) { return change.set.substr(0, change.set.find('=')); }
 
 bool HasOwnChecks(const LoadedScenario& loaded) {
   return loaded.variant && loaded.variant->check_size() > 0;
@@ -96,6 +126,14 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
     throw ConfigError(Describe(*loaded, change, change.set, "must be field.path=value"));
   }
   const std::string path = change.set.substr(0, equals);
+  const std::string first = path.substr(0, path.find_first_of(".["));
+  // A change of what is read before any change, or is written alone, would do nothing.
+  if (first == "base" || first == "variant" || first == "applied") {
+    throw ConfigError(Describe(*loaded, change, path,
+                               first == "applied" ? "cannot be set; poise run writes it"
+                                                  : "cannot be set here; write it in the "
+                                                    "scenario's file"));
+  }
   try {
     SetField(&loaded->scenario, path, change.set.substr(equals + 1));
   } catch (const ConfigError& error) {
@@ -110,6 +148,15 @@ std::vector<std::string> VariantNames(const Scenario& scenario) {
   return names;
 }
 
+void CheckReference(const LoadedScenario& loaded) {
+  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  const std::string& reference = loaded.scenario.reference();
+  if (loaded.scenario.has_reference() &&
+      std::find(names.begin(), names.end(), reference) == names.end()) {
+    FailField(loaded, "reference", NoVariant(reference, names));
+  }
+}
+
 /// Their names, and that of the reference.
 void CheckVariants(const LoadedScenario& loaded) {
   const std::vector<std::string> names = VariantNames(loaded.scenario);
@@ -117,20 +164,13 @@ void CheckVariants(const LoadedScenario& loaded) {
     const auto fail = [&](const std::string& problem) {
       FailField(loaded, fmt::format("variant[{}].name", i), problem);
     };
-    const auto good = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
-    if (names[i].empty() || !std::all_of(names[i].begin(), names[i].end(), good)) {
-      fail(fmt::format("is '{}'; use letters, digits, _ and -", names[i]));
-    }
+    if (const std::string problem = NameProblem(names[i]); !problem.empty()) fail(problem);
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
         names.begin() + static_cast<std::ptrdiff_t>(i)) {
       fail(fmt::format("there are two variants named '{}'", names[i]));
     }
   }
-  const std::string& reference = loaded.scenario.reference();
-  if (loaded.scenario.has_reference() &&
-      std::find(names.begin(), names.end(), reference) == names.end()) {
-    FailField(loaded, "reference", NoVariant(reference, names));
-  }
+  CheckReference(loaded);
 }
 
 void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
@@ -190,6 +230,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
     ApplyChange({fmt::format("duration={}", *changes.duration), "--duration"}, &loaded);
   }
   if (changes.seed) ApplyChange({fmt::format("seed={}", *changes.seed), "--seed"}, &loaded);
+  CheckReference(loaded);  // which a change may have named
   if (!changes.reference || HasOwnChecks(loaded) || changes.variant == scenario->reference()) {
     scenario->clear_reference();
   }
@@ -210,8 +251,11 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
 }
 
 std::string NameOf(const LoadedScenario& loaded) {
-  return loaded.scenario.has_name() ? loaded.scenario.name()
-                                    : fs::path(loaded.files.file()).stem().string();
+  if (loaded.scenario.has_name()) return loaded.scenario.name();
+  std::string name = fs::path(loaded.files.file()).stem().string();
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return !InName(c); }, '_');
+  return name;
 }
 
 RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes) {

@@ -47,7 +47,8 @@ struct LoadedScenario {
 /// what to do".
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes);
 
-/// The scenario's name, or its file's without ending.
+/// The scenario's name, or its file's without ending and with _ for what a name cannot have: a part
+/// of a path.
 std::string NameOf(const LoadedScenario& loaded);
 
 /// The same changes for the scenario's reference variant. Precondition: the scenario has one.

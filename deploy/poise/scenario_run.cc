@@ -18,6 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char kSpecFile[] = "run_spec.pbtxt";
+constexpr char kScenarioFile[] = "scenario.pbtxt";
+
 void PrintEnd(const std::string& what, const RunOutcome& outcome) {
   if (outcome.message.empty()) return;
   fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
@@ -47,18 +50,22 @@ ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunCha
   return part;
 }
 
-RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process,
-                                bool quiet) const {
-  const RunSpec& spec = part.spec;
+void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
   std::string text;
-  google::protobuf::TextFormat::PrintToString(spec, &text);
-  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
-                          (dir / "run_spec.pbtxt").string(), (dir / "scenario.pbtxt").string()};
-  const std::string scenario_text = ScenarioText(part.loaded.scenario);
-  WriteFile(files.spec_file, text);
-  WriteFile(files.scenario_file, scenario_text);
+  google::protobuf::TextFormat::PrintToString(part.spec, &text);
+  WriteFile(dir / kSpecFile, text);
+  WriteFile(dir / kScenarioFile, ScenarioText(part.loaded.scenario));
+}
+
+RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process,
+                                bool quiet) {
+  const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), quiet);
-  if (in_process) return RunInline(spec, scenario_text, dir / "run.lcm", &progress);
+  if (in_process) {
+    return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
+  }
+  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
+                          (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
   return Launcher(spec, files, &progress).Run();
 }
 
@@ -84,18 +91,23 @@ void ScenarioRun::PrintHeading() const {
   std::fflush(stdout);
 }
 
-RunResult ScenarioRun::Run(const std::string& out) {
+RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const Scenario& scenario = main_.loaded.scenario;
   if (!options_.in_process) ChoosePorts(&main_.spec);
   RunResult result;
-  result.dir = MakeRunDir(out, name());
+  const RunDir dir = MakeRunDir(out, name());
+  result.dir = dir.path();
+  // Also what runs after its reference can be found and watched from here on.
+  WriteFiles(main_, result.dir);
+  if (latest) PointLatestTo(result.dir);
   if (!options_.quiet) PrintHeading();
   CatchStopSignals();
   RunSummary& summary = result.summary;
   summary.mode = options_.in_process ? "inline" : "processes";
   if (reference_) {
-    const fs::path dir = MakeRunDir(ReferenceDir(result.dir).string(), name());
-    summary.reference = RunPart(*reference_, dir, /*in_process=*/true, /*quiet=*/true);
+    const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name());
+    WriteFiles(*reference_, reference.path());
+    summary.reference = RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true);
     PrintEnd(fmt::format("reference run (variant {})", scenario.reference()), *summary.reference);
   }
   if (StopSignal() == 0) {
@@ -106,18 +118,24 @@ RunResult ScenarioRun::Run(const std::string& out) {
   }
   const RunOutcome& outcome = summary.outcome;
   const fs::path log = result.dir / "run.lcm";
-  if (!fs::exists(log)) return result;  // the recorder never came to start
-  logging::RunRecord record = logging::ReadRun(log);
-  ReadReference(log, scenario, &record);
-  if (outcome.wall_time > 0) {
-    record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
+  const bool recorded = fs::exists(log);  // else the recorder never came to start
+  logging::RunRecord record;
+  if (recorded) {
+    record = logging::ReadRun(log);
+    ReadReference(log, scenario, &record);
+    if (outcome.wall_time > 0) {
+      record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
+    }
+    summary.checks = EvaluateChecks(scenario, record);
+    summary.events = logging::Events(record);
+  } else {
+    record.spec = main_.spec;
   }
-  summary.checks = EvaluateChecks(scenario, record);
-  summary.events = logging::Events(record);
-  summary.passed = outcome.completed;
+  summary.passed =
+      recorded && outcome.completed && (!summary.reference || summary.reference->completed);
   for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
   WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
-  if (!options_.quiet) {
+  if (!options_.quiet && recorded) {
     fmt::print("\n{}\n{}{}", FormatTable(summary.checks), FormatEvents(summary.events),
                FormatAssumptions(scenario));
     fmt::print("\n{:.3f} s simulated in {:.2f} s, {:.1f} x real time; {}\n",

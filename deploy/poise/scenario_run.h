@@ -22,6 +22,7 @@ struct RunOptions {
 struct RunResult {
   RunSummary summary;
   std::filesystem::path dir;
+  std::string problem;  ///< why nothing could be run or read; empty: it could
 };
 
 /// A checked scenario, ready to run, with its reference variant.
@@ -31,8 +32,9 @@ class ScenarioRun {
   ScenarioRun(const std::string& scenario, const RunOptions& options);
 
   /// Runs, writes the run's files into a folder (MakeRunDir's rules for `out`) and prints what
-  /// happens, the table and the verdict. Throws ConfigError for the folder, LogError for the log.
-  RunResult Run(const std::string& out);
+  /// happens, the table and the verdict. With `latest`, runs/latest points there before the run
+  /// starts. Throws ConfigError for the folder, LogError for the log.
+  RunResult Run(const std::string& out, bool latest);
 
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }
@@ -45,8 +47,9 @@ class ScenarioRun {
   };
   Part Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
                bool warn) const;
-  RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
-                     bool quiet) const;
+  static void WriteFiles(const Part& part, const std::filesystem::path& dir);
+  static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
+                            bool quiet);
   void PrintHeading() const;
 
   RunOptions options_;

@@ -57,6 +57,7 @@ std::string FormatOverview(const std::vector<ScenarioRun>& runs,
     const std::string verdict = !ran ? "not run" : results[i].summary.passed ? "passed" : "FAILED";
     rows.push_back({runs[i].scenario().paper_section(), runs[i].name(), verdict, "", "", ""});
     if (!ran) continue;
+    rows.back()[3] = results[i].problem;
     bool first = true;
     for (const CheckResult& check : results[i].summary.checks) {
       if (check.paper.empty()) continue;
@@ -96,7 +97,7 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
   std::vector<ScenarioRun> runs;
   for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
   const bool all = names.size() == 1;
-  const fs::path folder = MakeRunDir(out, all ? kAllScenarios : "several");
+  const RunDir folder = MakeRunDir(out, all ? kAllScenarios : "several");
   CatchStopSignals();
   std::vector<RunResult> results;
   std::set<std::string> taken;
@@ -107,14 +108,21 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
       fmt::print("{}: ", name);
       std::fflush(stdout);
     }
-    results.push_back(run.Run((folder / name).string()));
-    PointLatestTo(results.back().dir);
+    const fs::path dir = folder.path() / name;
+    try {
+      results.push_back(run.Run(dir.string(), /*latest=*/true));
+    } catch (const std::exception& error) {
+      std::fflush(stdout);
+      fmt::print(stderr, "poise: {}: {}\n", name, error.what());
+      fmt::print("FAILED\n");
+      results.push_back({{}, dir, error.what()});
+    }
     if (!options.quiet) fmt::print("\n");
   }
   bool passed = results.size() == runs.size();
   for (const RunResult& result : results) passed = passed && result.summary.passed;
   if (!options.quiet) {
-    fmt::print("{}\n{}\n", FormatOverview(runs, results), folder.string());
+    fmt::print("{}\n{}\n", FormatOverview(runs, results), folder.path().string());
   }
   fmt::print("{}\n", passed ? "all passed" : "FAILED");
   return passed;

@@ -20,8 +20,9 @@ std::vector<std::string> ExpandScenarios(const std::vector<std::string>& names);
 std::string UniqueName(const std::string& name, std::set<std::string>* taken);
 
 /// Runs one after the other, each in a folder of its own below `out` (MakeRunDir's rules), and
-/// prints an overview: verdicts, and the measured figures beside the paper's. A stop signal ends
-/// the run and the rest. True when all passed. Throws as ScenarioRun does; nothing has run then.
+/// prints an overview: verdicts, and the measured figures beside the paper's. runs/latest points
+/// to each in turn. One that cannot be run has failed, and the others go on; a stop signal ends the
+/// run and the rest. True when all passed. Throws as ScenarioRun does; nothing has run then.
 bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options,
                 const std::string& out);
 

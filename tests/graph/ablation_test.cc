@@ -1,14 +1,31 @@
 // Variants, ablations, the reference run, and several scenarios in one go.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <fstream>
+
+#include "components/framework/configuration.h"
 #include "logging/compare.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr char kBase[] = "base: \"base/stand\" duration: 0.3\n";
+
+/// True when a program holds the lock that a run in progress has on its folder.
+bool IsLocked(const fs::path& dir) {
+  const int fd = open(dir.c_str(), O_RDONLY | O_DIRECTORY);
+  EXPECT_GE(fd, 0) << dir;
+  const bool locked = flock(fd, LOCK_SH | LOCK_NB) != 0;
+  close(fd);
+  return locked;
+}
 
 class AblationTest : public testing::Test {
  protected:
@@ -91,6 +108,49 @@ TEST_F(AblationTest, AWrongVariantHasFileAndLine) {
   expect_refused("variant { name: \"a\" }\nvariant { name: \"a/b\" }", {"variant[1].name"});
   expect_refused("variant { name: \"a\" }\nvariant { name: \"a\" }", {"two variants"});
   expect_refused("variant { name: \"abc\" }\nreference: \"abd\"", {"reference", "abc"});
+  expect_refused("variant { name: \"a\"\n set: \"base=other\" }", {"variant[0].set[0]", "base"});
+}
+
+TEST_F(AblationTest, AWrongNameOrLimitHasFileAndLine) {
+  const auto expect_refused = [&](const std::string& text, const std::vector<std::string>& parts) {
+    std::vector<std::string> all = parts;
+    all.push_back(deploy_.Scenario("mine", kBase + text) + ":2: ");
+    ExpectUsageError({"graph", "check", "mine"}, all);
+  };
+  // A name becomes a folder's.
+  for (const char* name : {"../escaped", "a/b", "..", "a b", "", "\\303\\244"}) {
+    expect_refused(std::string("name: \"") + name + "\"", {"name: is '", "letters, digits"});
+  }
+  expect_refused("check { metric: \"fallen\" at_most: nan }", {"check[0].at_most", "finite"});
+  expect_refused("check { metric: \"fallen\" at_least: -inf }", {"check[0].at_least", "finite"});
+  expect_refused("check { metric: \"fallen\" paper_value: nan }", {"paper_value", "finite"});
+}
+
+TEST_F(AblationTest, AFileNameThatIsNoNameBecomesOne) {
+  // base/stand's name would count: a scenario of its own.
+  std::string text = ReadFile(StandScenario());
+  const size_t name = text.find("name: \"stand\"");
+  ASSERT_NE(name, std::string::npos);
+  text.erase(name, text.find('\n', name) - name);
+  EXPECT_EQ(ReadSummary(Run("run", deploy_.Scenario("un named..two", text)))["scenario"],
+            "un_named__two");
+}
+
+TEST_F(AblationTest, AWrongFlagIsNamed) {
+  deploy_.Scenario("mine", std::string(kBase) +
+                               "check_from: 0.25 variant { name: \"abc\" }\nreference: \"abc\"\n");
+  const auto expect_refused = [&](const std::string& flag, const std::string& value,
+                                  const std::string& message) {
+    ExpectUsageError({"run", "mine", flag, value, "--out", deploy_ / "none"}, {message});
+  };
+  expect_refused("--set", "check[0].at_most=nan", "--set check[0].at_most: is nan");
+  expect_refused("--set", "base=nothing", "--set base: cannot be set");
+  expect_refused("--set", "variant[0].set=seed=3", "--set variant[0].set: cannot be set");
+  expect_refused("--set", "applied.variant=a", "--set applied.variant: cannot be set");
+  expect_refused("--set", "reference=abd", "--set reference: no variant named 'abd'");
+  expect_refused("--set", "name=../escaped", "--set name: is '../escaped'");
+  expect_refused("--duration", "0.2", "--duration: duration: is 0.2 s; must be more than");
+  EXPECT_FALSE(fs::exists(deploy_ / "none"));
 }
 
 TEST_F(AblationTest, EachPartIsSwitchedOffByItsField) {
@@ -122,6 +182,7 @@ TEST_F(AblationTest, AnIdealRobotIsTheModelWithoutNoise) {
       "imperfect",
       std::string(kBase) +
           "sim_ode { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
+          "  motor_change { joint: \"left_knee_pitch\" torque_constant: 0.9 }\n"
           "  model_error { link: \"upper_body\" mass_scale: 1.02 }\n"
           "  model_error { link: \"left_shank\" com_x: 0.005 } }\n"
           "assumption { field: \"sim_ode.drive_train.torque_lag\" kind: \"assumed\" }\n");
@@ -174,6 +235,82 @@ TEST_F(AblationTest, TheReferenceVariantRunsBeside) {
   Run("plain", "mine", {"--no-reference"});
   EXPECT_FALSE(has_reference(plain));
   EXPECT_TRUE(ReadSummary(plain)["reference"].is_null());
+}
+
+TEST_F(AblationTest, AReferenceThatFallsFailsTheRun) {
+  // 382 N s on a robot of this size, ten times what it can stand (fall_test.cc).
+  deploy_.Scenario("mine", std::string("base: \"base/stand\" duration: 1.5\n") +
+                               "variant { name: \"felled\" set: \"sim_ode.push[0].peak=2000\"\n"
+                               "  set: \"sim_ode.push[0].duration=0.3\" }\n"
+                               "reference: \"felled\"\n");
+  const std::string out = deploy_ / "run";
+  const ProgramResult result = RunPoise({"run", "mine", "--inline", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const nlohmann::json summary = ReadSummary(out);
+  EXPECT_FALSE(summary["passed"].get<bool>());
+  int failed = 0;
+  for (const nlohmann::json& check : summary["checks"]) {
+    const bool passed = check["passed"].get<bool>();
+    EXPECT_EQ(passed, check["name"] != "duration_reached_reference") << check;
+    if (!passed) ++failed;
+  }
+  EXPECT_EQ(failed, 1);
+  EXPECT_EQ(RunPoise({"report", out, "--no-html"}).exit_code, 1);
+  EXPECT_EQ(RunPoise({"run", "mine", "--inline", "--no-reference", "--out", out}).exit_code, 0);
+}
+
+TEST_F(AblationTest, ARunIsTheLatestBeforeItsReferenceRuns) {
+  deploy_.Scenario("mine",
+                   "base: \"base/stand\" name: \"mine\"\n"
+                   "variant { name: \"long\" set: \"duration=1000\" }\nreference: \"long\"\n");
+  const std::string latest = deploy_.runs() + "/latest";
+  PoiseProgram program({"run", "mine"});
+  ASSERT_TRUE(WaitForLog(latest + "/reference", 100'000));
+  EXPECT_TRUE(fs::read_symlink(latest).string().ends_with("-mine"));
+  EXPECT_TRUE(fs::exists(latest + "/run_spec.pbtxt"));
+  EXPECT_TRUE(IsLocked(latest));
+  EXPECT_FALSE(fs::exists(latest + "/run.lcm"));
+  kill(program.pid(), SIGINT);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  // Without a log, too, there is a verdict.
+  EXPECT_TRUE(result.output.ends_with("FAILED\n")) << result.output;
+  EXPECT_FALSE(ReadSummary(latest)["passed"].get<bool>());
+  ExpectUsageError({"report", "--no-html"}, {"latest/run.lcm", "never came to start"});
+}
+
+TEST_F(AblationTest, LatestIsTheRunInProgressOfSeveral) {
+  deploy_.Scenario("first", std::string(kBase) + "name: \"first\" paper_section: \"7\"");
+  deploy_.Scenario("second",
+                   "base: \"base/stand\" duration: 1000 name: \"second\" paper_section: \"8\"");
+  const fs::path latest = deploy_.runs() + "/latest";
+  PoiseProgram program({"run", "all"});
+  ASSERT_TRUE(WaitUntil([&] { return fs::exists(latest / "../second/run.lcm"); }));
+  EXPECT_TRUE(fs::read_symlink(latest).string().ends_with("-all/second"));
+  EXPECT_FALSE(IsLocked(latest / "../first"));
+  EXPECT_TRUE(IsLocked(latest));
+  const ProgramResult echo = RunPoise({"echo", "ROBOT_STATE", "--count", "1"});
+  EXPECT_EQ(echo.exit_code, 0) << echo.output;
+  kill(program.pid(), SIGINT);
+  program.Wait();
+  EXPECT_FALSE(IsLocked(latest));
+}
+
+TEST_F(AblationTest, ARunThatCannotBeMadeFailsAndTheOthersGoOn) {
+  deploy_.Scenario("first", std::string(kBase) + "name: \"first\"");
+  deploy_.Scenario("second", std::string(kBase) + "name: \"second\"");
+  const std::string out = deploy_ / "several";
+  fs::create_directory(out);
+  std::ofstream(out + "/first") << "a file where the run's folder should be";
+  const ProgramResult result = RunPoise({"run", "first", "second", "--inline", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_TRUE(ReadSummary(out + "/second")["passed"].get<bool>());
+  ASSERT_NE(result.output.find("section  scenario"), std::string::npos) << result.output;
+  const std::string overview = result.output.substr(result.output.find("section  scenario"));
+  EXPECT_NE(overview.find("first     FAILED   --out " + out + "/first: cannot be made"),
+            std::string::npos)
+      << overview;
+  EXPECT_NE(overview.find("second    passed"), std::string::npos) << overview;
 }
 
 TEST_F(AblationTest, AllRunsTheExperimentsInTheOrderOfTheirSections) {

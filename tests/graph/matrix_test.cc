@@ -112,6 +112,35 @@ TEST_F(MatrixTest, HasEveryCheckOfEveryRun) {
   EXPECT_NE(result.output.find("push, largest  60 N"), std::string::npos) << result.output;
 }
 
+TEST_F(MatrixTest, MarksWhatFailedWhereItIsShown) {
+  deploy_.Scenario("marks",
+                   "base: \"base/stand\" name: \"marks\" duration: 0.3\n"
+                   "check { metric: \"push_peak\" label: \"upper\" paper: \"1 N\" }\n"
+                   "check { metric: \"push_peak\" label: \"lower\" paper: \"2 N\" }\n"
+                   "variant { name: \"unseen\" check { metric: \"push_peak\" at_most: 1 } }\n"
+                   "variant { name: \"seen\" check { metric: \"push_peak\" label: \"upper\""
+                   " at_most: 1 } }\n");
+  const ProgramResult result =
+      RunPoise({"matrix", "marks", "--ablation", "full", "--out", deploy_ / "matrix"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  std::map<std::string, std::vector<std::string>> rows;  // by their first word
+  std::istringstream lines(result.output);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string first;
+    words >> first;
+    for (std::string word; words >> word;) rows[first].push_back(word);
+  }
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(rows["outcome"], (Words{"stands", "stands", "!", "stands"})) << result.output;
+  // Columns: the paper's figure, full, and only `seen` has a check of this label.
+  const Words upper = rows["upper"];
+  ASSERT_EQ(upper.size(), 7u) << result.output;
+  EXPECT_EQ((Words{upper[0], upper[1], upper[3], upper[5], upper[6]}),
+            (Words{"1", "N", "N", "N", "!"}));
+  EXPECT_EQ(rows["lower"].size(), 4u) << result.output;
+}
+
 TEST_F(MatrixTest, FailsWhenAnExperimentItselfFails) {
   deploy_.Scenario("bad",
                    "base: \"base/stand\" name: \"bad\" duration: 0.2\n"
@@ -169,6 +198,22 @@ TEST_F(MatrixTest, AnInterruptEndsAndRemovesWhatRuns) {
   EXPECT_TRUE(ProcessesWith(out).empty());
   EXPECT_FALSE(std::filesystem::exists(out + "/long/full"));
   EXPECT_TRUE(std::filesystem::exists(out + "/quiet/full/summary.json"));
+}
+
+TEST_F(MatrixTest, AnInterruptLeavesLatestOnTheRunBefore) {
+  deploy_.Scenario("long", "base: \"base/stand\" name: \"long\" duration: 1000\n");
+  ASSERT_EQ(RunPoise({"run", "quiet", "--inline", "--quiet"}).exit_code, 0);
+  PoiseProgram program({"matrix", "long", "--ablation", "full"});
+  const std::string runs = deploy_.runs();
+  ASSERT_TRUE(WaitUntil([&] {
+    for (const auto& entry : std::filesystem::directory_iterator(runs)) {
+      if (std::filesystem::exists(entry.path() / "long/full/run.lcm")) return true;
+    }
+    return false;
+  }));
+  kill(program.pid(), SIGINT);
+  EXPECT_EQ(program.Wait().exit_code, 1);
+  EXPECT_EQ(ReadSummary(runs + "/latest")["scenario"], "quiet");
 }
 
 }  // namespace
