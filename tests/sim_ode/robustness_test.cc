@@ -117,7 +117,8 @@ TEST(Determinism, InstancesAndRepetitionsAgreeBitForBit) {
       "block { x: 0.1 y: 0.105 height: 0.003 irregularity: 0.002 }");
   const robot::RobotModel model = PaperRobot();
   Simulation a(model, config, kTick, 9), b(model, config, kTick, 9);
-  Sensors sensors_a(model, true, 0.2, 9), sensors_b(model, true, 0.2, 9);
+  Sensors sensors_a(model, SimulatedNoise(model, config), 9),
+      sensors_b(model, SimulatedNoise(model, config), 9);
   SensorReadings readings_a(12), readings_b(12);
   const PostureHolder holder(a);
   std::vector<Eigen::VectorXd> history;
@@ -158,7 +159,7 @@ TEST(TickPath, OurCodeDoesNotAllocate) {
       StandingConfig("push { start: 0.02 duration: 0.1 peak: 50 direction_y: 1 }");
   const robot::RobotModel model = PaperRobot();
   Simulation simulation(model, config, kTick, 1);
-  Sensors sensors(model, true, 0.2, 1);
+  Sensors sensors(model, SimulatedNoise(model, config), 1);
   SensorReadings readings(model.num_joints());
   const std::vector<double> current(12, 0.5);
   const std::vector<int8_t> enabled(12, 1);
