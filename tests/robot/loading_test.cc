@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "components/framework/configuration.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::robot {
@@ -43,7 +44,8 @@ TEST(Loading, DyrosIsThePapersRobot) {
   const MotorModel& motor = model.motors()[model.FindJoint("left_knee_pitch") * 1u];
   EXPECT_NEAR(motor.reflected_inertia, 0.10, 1e-12);
   EXPECT_NEAR(motor.torque_per_ampere() * motor.rated_current, 75, 1e-12);
-  EXPECT_EQ(motor.static_friction, motor.coulomb_friction);
+  EXPECT_EQ(motor.coulomb_friction, 2);
+  EXPECT_EQ(motor.static_friction, 2.4);
   EXPECT_EQ(model.FindJoint("no_such_joint"), -1);
   // Standing straight, all joints at zero: the soles lie 0.72 + 0.105 + 0.10 m below the base.
   const RobotData data = Evaluate(model, RobotState(12));
@@ -51,6 +53,16 @@ TEST(Loading, DyrosIsThePapersRobot) {
               1e-12);
   EXPECT_NEAR((data.foot_pose[kLeftFoot].translation() - Vector3d(0.03, 0.105, -0.925)).norm(), 0,
               1e-12);
+}
+
+TEST(Loading, StaticFrictionIsCoulombsWhenNotGiven) {
+  Robot description;
+  ReadTextProto(RobotPath(TestRobot::kDyros), &description);
+  description.mutable_motor(0)->clear_static_friction();
+  const RobotModel model = RobotModel::Load(description, ReadWhole(UrdfPath(TestRobot::kDyros)));
+  for (const MotorModel& motor : model.motors()) {
+    EXPECT_EQ(motor.static_friction, motor.coulomb_friction);
+  }
 }
 
 TEST(Loading, JointsAreInDepthFirstOrderOfTheText) {
