@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "components/framework/configuration.h"
+#include "components/robot/robot_files.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::robot {
@@ -56,10 +57,9 @@ TEST(Loading, DyrosIsThePapersRobot) {
 }
 
 TEST(Loading, StaticFrictionIsCoulombsWhenNotGiven) {
-  Robot description;
-  ReadTextProto(RobotPath(TestRobot::kDyros), &description);
-  description.mutable_motor(0)->clear_static_friction();
-  const RobotModel model = RobotModel::Load(description, ReadWhole(UrdfPath(TestRobot::kDyros)));
+  std::string text = ReadWhole(RobotPath(TestRobot::kDyros));
+  text.erase(text.find("static_friction: 2.4"), std::string("static_friction: 2.4").size());
+  const RobotModel model = LoadRobotTexts(text, ReadWhole(UrdfPath(TestRobot::kDyros)));
   for (const MotorModel& motor : model.motors()) {
     EXPECT_EQ(motor.static_friction, motor.coulomb_friction);
   }
