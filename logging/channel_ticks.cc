@@ -11,7 +11,9 @@ namespace {
 
 // A tick beyond this is damage, not a run: 5 hours at 500 Hz.
 constexpr int64_t kMaxTicks = 10'000'000;
-constexpr int32_t kMaxCount = 4096;  // as for ports
+constexpr int64_t kMinRecordSize = 29;  // bytes, of an event's header and a channel's name
+constexpr double kMaxTickPeriod = 10;   // s
+constexpr int32_t kMaxCount = 4096;     // as for ports
 
 PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
   const MessageType& type = ChannelType(channel);
@@ -23,9 +25,10 @@ PacketFilter MakeFilter(const RunSpec& spec, const Channel& channel) {
 
 void CheckLogSpec(const RunSpec& spec, const std::string& path) {
   const double period = spec.tick_period();
-  if (!std::isfinite(period) || period <= 0) {
+  if (!(period > 0 && period <= kMaxTickPeriod)) {
     throw LogError(
-        fmt::format("{}: RUN_INFO: tick_period is {} s; must be positive", path, period));
+        fmt::format("{}: RUN_INFO: tick_period is {} s; must be above 0 and at most {} s", path,
+                    period, kMaxTickPeriod));
   }
   if (spec.num_ticks() < 0) {
     throw LogError(
@@ -59,14 +62,18 @@ bool IsKept(const RunSpec& spec, const std::string& channel) {
   return kept.empty() || std::find(kept.begin(), kept.end(), channel) != kept.end();
 }
 
-ChannelTicks::ChannelTicks(const RunSpec& spec, const Channel& channel)
+ChannelTicks::ChannelTicks(const RunSpec& spec, const Channel& channel, uint64_t log_size)
     : filter_(MakeFilter(spec, channel)),
-      max_ticks_(spec.num_ticks() > 0 ? std::min(spec.num_ticks(), kMaxTicks) : kMaxTicks) {
+      first_tick_(spec.cut().first_tick()),
+      end_tick_(spec.num_ticks() > 0 ? std::min(spec.num_ticks(), kMaxTicks) : kMaxTicks) {
+  const auto records = static_cast<int64_t>(log_size) / kMinRecordSize;
+  end_tick_ = std::min(end_tick_, first_tick_ + records);
   completeness_.name = channel.name();
 }
 
 std::optional<int64_t> ChannelTicks::Check(std::span<const uint8_t> data) {
-  if (filter_.Check(data.data(), data.size(), 0, max_ticks_ - 1) != PacketVerdict::kAccepted) {
+  if (filter_.Check(data.data(), data.size(), first_tick_, end_tick_ - 1) !=
+      PacketVerdict::kAccepted) {
     ++completeness_.refused;
     return {};
   }

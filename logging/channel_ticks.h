@@ -30,8 +30,8 @@ struct TickRange {
 };
 
 /// What is read from a log's RUN_INFO may be damaged. Throws LogError naming `path` and the field:
-/// a tick period or number of ticks that is none, a channel whose type is not known or has strings
-/// or whose counts do not fit it.
+/// a tick period outside (0, 10] s, a number of ticks that is none, a channel whose type is not
+/// known or has strings or whose counts do not fit it.
 void CheckLogSpec(const RunSpec& spec, const std::string& path);
 
 /// The type of a channel that CheckLogSpec has passed.
@@ -43,8 +43,9 @@ bool IsKept(const RunSpec& spec, const std::string& channel);
 /// Checks the messages of one channel, not an external one, and keeps account of its ticks.
 class ChannelTicks {
  public:
-  /// CheckLogSpec must have passed.
-  ChannelTicks(const RunSpec& spec, const Channel& channel);
+  /// CheckLogSpec must have passed. `log_size` (bytes) bounds the ticks that can be: each that the
+  /// log is to hold has a record of each channel.
+  ChannelTicks(const RunSpec& spec, const Channel& channel, uint64_t log_size);
 
   /// The tick of a message that belongs to the run and is the first of its tick; then Take or
   /// Refuse must follow. Empty: counted as refused or duplicate.
@@ -61,7 +62,8 @@ class ChannelTicks {
 
  private:
   PacketFilter filter_;
-  int64_t max_ticks_;
+  int64_t first_tick_;  // that may be
+  int64_t end_tick_;    // first that may not
   std::vector<bool> seen_;
   int64_t newest_ = -1;
   ChannelCompleteness completeness_;

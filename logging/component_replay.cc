@@ -66,7 +66,8 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
   std::map<std::string, size_t, std::less<>> index;
   for (const Channel& channel : spec().graph().channel()) {
     index[channel.name()] = lanes_.size();
-    lanes_.push_back({ChannelTicks(spec(), channel), &ChannelType(channel), {}});
+    lanes_.push_back(
+        {ChannelTicks(spec(), channel, messages_.reader().file_size()), &ChannelType(channel), {}});
   }
   external_.resize(lanes_.size());
   LogEvent event;
@@ -86,9 +87,7 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
     if (!tick) continue;
     lane.ticks.Take(*tick);
     newest = std::max(newest, *tick);
-    const auto t = static_cast<size_t>(*tick);
-    if (t >= lane.by_tick.size()) lane.by_tick.resize(t + 1);
-    lane.by_tick[t] = event.data;
+    lane.by_tick.Set(*tick, event.data);
   }
 }
 
@@ -292,7 +291,8 @@ class ReplayedStages {
     return log_.lanes_[static_cast<size_t>(channel)];
   }
   std::span<const uint8_t> Logged(int channel, int64_t tick) const {
-    return lane(channel).by_tick[static_cast<size_t>(tick)];
+    const std::span<const uint8_t>* const data = lane(channel).by_tick.at(tick);
+    return data == nullptr ? std::span<const uint8_t>() : *data;
   }
 
   const LogReplay& log_;

@@ -10,6 +10,7 @@
 #include "components/framework/graph.pb.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_messages.h"
+#include "logging/tick_series.h"
 
 namespace poise::logging {
 
@@ -64,7 +65,7 @@ class LogReplay {
   struct Lane {
     ChannelTicks ticks;
     const MessageType* type;
-    std::vector<std::span<const uint8_t>> by_tick;  // into the reader's file
+    Series<std::span<const uint8_t>> by_tick;  // into the reader's file
   };
   struct External {
     int64_t from_tick;

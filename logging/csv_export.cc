@@ -12,6 +12,7 @@
 #include "fmt/format.h"
 #include "logging/log_export.h"
 #include "logging/log_messages.h"
+#include "logging/partial_file.h"
 
 namespace poise::logging {
 namespace {
@@ -65,10 +66,11 @@ class Row final : public ScalarVisitor {
   size_t columns_ = 0;
 };
 
-/// One file; what is written is checked at Close.
+/// One file, there when Close has checked what is written.
 class File {
  public:
-  explicit File(const std::string& path) : path_(path), out_(path, std::ios::binary) {
+  explicit File(const std::string& path)
+      : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
     if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
   }
   void Write(const std::string& text) {
@@ -77,10 +79,12 @@ class File {
   void Close() {
     out_.close();
     if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+    file_.Keep();
   }
 
  private:
   std::string path_;
+  PartialFile file_;
   std::ofstream out_;
 };
 
@@ -136,6 +140,7 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   fs::create_directories(folder, error);
   if (error) throw LogError(fmt::format("{}: cannot be made: {}", folder, error.message()));
   struct Table {
+    Table(const std::string& path, Shape s) : file(path), shape(std::move(s)) {}
     File file;
     Shape shape;
   };
@@ -155,8 +160,8 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
     if (table == tables.end()) {
       const std::string name(event.channel);
       table = tables
-                  .emplace(name, Table{File((fs::path(folder) / (name + ".csv")).string()),
-                                       Shape(type, event.data)})
+                  .try_emplace(name, (fs::path(folder) / (name + ".csv")).string(),
+                               Shape(type, event.data))
                   .first;
       result.type = type->name;
       row = "time,tick";

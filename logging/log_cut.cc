@@ -12,6 +12,7 @@
 #include "fmt/format.h"
 #include "logging/event_log_writer.h"
 #include "logging/log_survey.h"
+#include "logging/partial_file.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
@@ -70,13 +71,20 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
   google::protobuf::TextFormat::PrintToString(spec, &info.run_spec);
 
   LogReader reader(from);
-  EventLogWriter writer(to);
+  PartialFile file(to);
+  EventLogWriter writer(file.part());
   std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
   info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   writer.Write(kRunInfoChannel, 0, bytes);
   CutResult result{0, spec.cut().first_tick(), spec.cut().last_tick(), 0};
   const int64_t first_utime = MakeTick(result.first_tick, spec.tick_period()).utime;
   const int64_t last_utime = MakeTick(result.last_tick, spec.tick_period()).utime;
+  // Of what came before the first tick of all or after the last nothing is cut off.
+  const bool from_start = range.first_tick <= survey.first_tick;
+  const bool to_end = range.last_tick >= survey.end_tick - 1;
+  const auto in_time = [&](int64_t utime) {
+    return (from_start || utime >= first_utime) && (to_end || utime <= last_utime);
+  };
   std::map<std::string, bool, std::less<>> external;
   for (const Channel& channel : spec.graph().channel()) {
     external[channel.name()] = channel.external();
@@ -89,17 +97,21 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
     if (type == nullptr || !type->has_header ||
         type->well_formed_size(event.data.data(), static_cast<int64_t>(event.data.size())) !=
             static_cast<int64_t>(event.data.size())) {
-      ++result.refused;
+      result.refused += in_time(event.utime) ? 1 : 0;
       continue;
     }
     const auto channel = external.find(event.channel);
-    const bool by_tick = channel == external.end() || !channel->second;
     const int64_t tick = ReadInt64(event.data.data() + type->run_id_offset + 8);
-    const bool inside = by_tick ? tick >= result.first_tick && tick <= result.last_tick
-                                : event.utime >= first_utime && event.utime <= last_utime;
+    const bool after_start = tick >= result.first_tick;
+    const bool before_end = tick <= result.last_tick;
+    const bool inside = channel == external.end()
+                            ? (from_start || after_start) && (to_end || before_end)
+                        : channel->second ? in_time(event.utime)
+                                          : after_start && before_end;
     if (inside) writer.Write(event.channel, event.utime, event.data);
   }
   writer.Close();
+  file.Keep();
   result.events = writer.events();
   return result;
 }

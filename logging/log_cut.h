@@ -17,7 +17,8 @@ struct CutResult {
   int64_t events = 0;      ///< written, RUN_INFO included
   int64_t first_tick = 0;  ///< that the cut log is to hold
   int64_t last_tick = 0;
-  int64_t refused = 0;  ///< events in the range that could not be read, left out
+  int64_t refused =
+      0;  ///< events in the range (by their event times) that could not be read, left out
 };
 
 /// Ticks of the times [from, to] s, both included, of ticks of `period` s.
@@ -25,8 +26,10 @@ CutRange TicksOfTimes(double from, double to, double period);
 
 /// Copies the messages of the range's ticks and channels, of RUN_INFO all, with the cut noted in
 /// its run_spec: whoever reads the log knows what it is to hold. Messages that came without a tick
-/// of their own (external channels) are taken by their event times. Throws LogError: `from` is no
-/// run's log, a channel is not in it, the range holds no tick, `to` exists or cannot be written.
+/// of their own (external channels) are taken by their event times. What came before the log's
+/// first tick or after its last goes with that tick: HEALTH_* of a component that starts. Throws
+/// LogError: `from` is no run's log, a channel is not in it, the range holds no tick, `to` exists
+/// or cannot be written.
 CutResult CutLog(const std::string& from, const CutRange& range, const std::string& to);
 
 }  // namespace poise::logging

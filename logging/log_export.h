@@ -24,7 +24,8 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file);
 
 /// An MCAP file with every message as Protobuf (ProtobufMessages), a topic a channel, in the log's
-/// order; times in ns of the run. Throws LogError.
+/// order; times in ns of the run. Channels whose names are not printable UTF-8 are refused. Throws
+/// LogError, also for more channels than MCAP can hold.
 std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file);
 
 }  // namespace poise::logging

@@ -43,7 +43,9 @@ PlayResult PlayLog(const std::string& path, const std::string& url, double speed
   const RunSpec& spec = messages.spec();
   std::map<std::string, ChannelTicks, std::less<>> own_ticks;
   for (const Channel& channel : spec.graph().channel()) {
-    if (!channel.external()) own_ticks.emplace(channel.name(), ChannelTicks(spec, channel));
+    if (!channel.external()) {
+      own_ticks.emplace(channel.name(), ChannelTicks(spec, channel, messages.reader().file_size()));
+    }
   }
   std::vector<Event> events;
   LogEvent event;

@@ -30,6 +30,9 @@ struct LogDamage {
   std::optional<int64_t> lost_events() const;
 };
 
+/// True when the file begins as an event log does.
+bool IsEventLog(const std::string& path);
+
 /// Events in the order of the file. Lengths are checked against the file before they are used; what
 /// is no record is skipped up to the next one and counted.
 class LogReader {

@@ -5,6 +5,7 @@
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
@@ -17,14 +18,6 @@ class FiniteCheck final : public ScalarVisitor {
   void Text(std::string_view, std::string_view) override {}
   bool finite = true;
 };
-
-/// Damage may put anything into a name.
-std::string Printable(std::string name) {
-  for (char& c : name) {
-    if (c < ' ' || c > '~') c = '?';
-  }
-  return name;
-}
 
 bool Usable(const MessageType& type, std::span<const uint8_t> data) {
   FiniteCheck check;
@@ -46,7 +39,7 @@ class Surveyor {
     for (const Channel& channel : survey_.spec.graph().channel()) {
       if (!IsKept(survey_.spec, channel.name())) continue;
       index_[channel.name()] = lanes_.size();
-      lanes_.push_back({ChannelTicks(survey_.spec, channel), &channel});
+      lanes_.push_back({ChannelTicks(survey_.spec, channel, reader_.file_size()), &channel});
       survey_.channels.push_back({channel.type(), channel.external(), {channel.name()}, {}, {}});
     }
   }
@@ -61,7 +54,7 @@ class Surveyor {
       std::optional<Neighbour> now;
       if (more) {
         ++survey_.events;
-        now = {Printable(std::string(event.channel)), Add(event)};
+        now = {std::string(event.channel), Add(event)};
       }
       if (all.damages() > damages) survey_.damage.push_back({all.damage().back(), before, now});
       if (!more) break;
@@ -118,7 +111,7 @@ class Surveyor {
 
   std::optional<int64_t> AddOther(const LogEvent& event) {
     ChannelSurvey& other = others_[std::string(event.channel)];
-    other.ticks.name = Printable(std::string(event.channel));
+    other.ticks.name = event.channel;
     other.bytes += static_cast<int64_t>(event.data.size());
     const MessageType* type =
         event.data.size() < 8 ? nullptr : FindMessageType(ReadInt64(event.data.data()));
@@ -210,6 +203,20 @@ void AddChannelProblems(const ChannelSurvey& channel, size_t limit,
   }
 }
 
+void AddEndProblem(const LogSurvey& survey, std::vector<std::string>* problems) {
+  if (!survey.info_problem.empty() || survey.spec.has_cut()) return;
+  const auto ended = [](const auto& entry) {
+    return entry.second.state == health_t::STATE_FINISHED ||
+           entry.second.state == health_t::STATE_FAILED;
+  };
+  if (std::none_of(survey.health.begin(), survey.health.end(), ended)) {
+    problems->push_back(fmt::format(
+        "no component's end is in the log: the recording ended at tick {} of {}, before the run or "
+        "with a run that was interrupted",
+        survey.end_tick, survey.spec.num_ticks()));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> LogSurvey::Problems(size_t limit) const {
@@ -234,17 +241,8 @@ std::vector<std::string> LogSurvey::Problems(size_t limit) const {
                                      channel.ticks.messages + channel.ticks.refused));
     }
   }
-  if (!info_problem.empty() || spec.has_cut()) return problems;
-  const auto ended = [](const auto& entry) {
-    return entry.second.state == health_t::STATE_FINISHED ||
-           entry.second.state == health_t::STATE_FAILED;
-  };
-  if (std::none_of(health.begin(), health.end(), ended)) {
-    problems.push_back(fmt::format(
-        "no component's end is in the log: the recording ended at tick {} of {}, before the run or "
-        "with a run that was interrupted",
-        end_tick, spec.num_ticks()));
-  }
+  AddEndProblem(*this, &problems);
+  for (std::string& problem : problems) problem = ForTerminal(problem);
   return problems;
 }
 

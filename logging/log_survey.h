@@ -18,6 +18,7 @@ namespace poise::logging {
 struct ChannelSurvey {
   std::string type;  ///< empty: not known
   bool external = false;
+  /// Names as the log has them, any bytes: ForTerminal.
   ChannelCompleteness ticks;         ///< external channels and others: name, messages, refused
   std::vector<TickRange> missing;    ///< ticks
   std::vector<uint64_t> refused_at;  ///< bytes, offsets of the refused messages' records
@@ -52,8 +53,8 @@ struct LogSurvey {
   std::vector<DamageSurvey> damage;
 
   double tick_time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
-  /// Lines that say what is wrong; none: the log is whole. `limit`: places named at most of each
-  /// kind, 0: all.
+  /// Lines that say what is wrong, fit for a terminal; none: the log is whole. `limit`: places
+  /// named at most of each kind, 0: all.
   std::vector<std::string> Problems(size_t limit) const;
 };
 

@@ -5,6 +5,7 @@
 #include "logging/log_export.h"
 #include "logging/log_messages.h"
 #include "logging/mcap_writer.h"
+#include "logging/printable.h"
 #include "logging/protobuf_messages.h"
 
 namespace poise::logging {
@@ -21,7 +22,9 @@ McapWriter::Texts RunTexts(const LogMessages& messages) {
     const size_t space = version.find(' ');
     if (space != std::string::npos) texts[version.substr(0, space)] = version.substr(space + 1);
   }
-  return texts;
+  McapWriter::Texts utf8;  // as MCAP's texts are; a log may hold any bytes
+  for (const auto& [name, text] : texts) utf8[ForTerminal(name)] = ForTerminal(text);
+  return utf8;
 }
 
 }  // namespace
@@ -50,7 +53,8 @@ std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::strin
     }
     ExportedChannel& result = results[topic->second.result];
     std::optional<std::string> bytes;
-    if (type != nullptr && event.utime >= 0 && event.utime < INT64_MAX / 1000 &&
+    if (type != nullptr && IsPlainUtf8(event.channel) && event.utime >= 0 &&
+        event.utime < INT64_MAX / 1000 &&
         (topic->second.type == nullptr || topic->second.type == type)) {
       bytes = protobuf.Convert(type->name, event.data);
     }

@@ -84,7 +84,7 @@ void McapWriter::Times::Add(uint64_t time, bool is_first) {
 }
 
 McapWriter::McapWriter(const std::string& path, const std::string& library)
-    : path_(path), out_(path, std::ios::binary) {
+    : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
   if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
   Write(kMagic);
   WriteRecord(kHeader, Fields().AddString("").AddString(library).bytes());
@@ -101,8 +101,15 @@ void McapWriter::WriteRecord(uint8_t opcode, std::string_view content) {
   Write(Record(static_cast<Opcode>(opcode), content));
 }
 
+void McapWriter::CheckFree(uint16_t used, const char* what) const {
+  if (used < UINT16_MAX) return;
+  throw LogError(
+      fmt::format("{}: MCAP holds at most {} {}, the log has more", path_, UINT16_MAX, what));
+}
+
 uint16_t McapWriter::AddSchema(const std::string& name, const std::string& encoding,
                                const std::string& data) {
+  CheckFree(num_schemas_, "schemas");
   Fields fields;
   fields.Add(++num_schemas_).AddString(name).AddString(encoding).AddString(data);
   const std::string record = Record(kSchema, fields.bytes());
@@ -113,6 +120,7 @@ uint16_t McapWriter::AddSchema(const std::string& name, const std::string& encod
 
 uint16_t McapWriter::AddChannel(uint16_t schema, const std::string& topic,
                                 const std::string& encoding, const Texts& metadata) {
+  CheckFree(num_channels_, "channels");
   Fields fields;
   fields.Add(++num_channels_).Add(schema).AddString(topic).AddString(encoding).AddTexts(metadata);
   const std::string record = Record(kChannel, fields.bytes());
@@ -210,6 +218,7 @@ void McapWriter::Close() {
   Write(kMagic);
   out_.close();
   if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+  file_.Keep();
 }
 
 }  // namespace poise::logging

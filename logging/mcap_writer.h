@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "logging/partial_file.h"
+
 namespace poise::logging {
 
 /// One file. Messages go into uncompressed chunks of about 1 MiB, each with its CRC-32, an index by
@@ -18,9 +20,11 @@ class McapWriter {
  public:
   using Texts = std::map<std::string, std::string>;
 
-  /// Replaces a file of that name.
+  /// The file is there, in place of one of that name, after Close. Throws LogError also for what
+  /// PartialFile refuses.
   McapWriter(const std::string& path, const std::string& library);
 
+  /// Texts must be UTF-8; at most 65,535 schemas and as many channels.
   /// Its id; a channel names it. `encoding` e.g. "protobuf".
   uint16_t AddSchema(const std::string& name, const std::string& encoding, const std::string& data);
   /// Its id. `encoding` of its messages, e.g. "protobuf".
@@ -44,8 +48,10 @@ class McapWriter {
   void Write(std::string_view bytes);
   void WriteRecord(uint8_t opcode, std::string_view content);
   void EndChunk();
+  void CheckFree(uint16_t used, const char* what) const;
 
   std::string path_;
+  PartialFile file_;
   std::ofstream out_;
   uint64_t position_ = 0;  // bytes written
   uint32_t crc_ = 0;       // of them, from the section's start

@@ -8,6 +8,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/packet_filter.h"
+#include "components/framework/run.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
@@ -15,7 +16,7 @@
 namespace poise::logging {
 
 RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info)
-    : log_(path) {
+    : log_(path), tick_period_(spec.tick_period()), num_ticks_(spec.num_ticks()) {
   health_utime_offset_ = FindMessageType("health_t")->run_id_offset + 16;
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
@@ -47,7 +48,7 @@ void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t
         fmt::format("{}: {} bytes instead of {}", lane.name, data.size(), lane.size));
   }
   if (lane.external) {
-    log_.Write(lane.name, ReadInt64(data.data() + lane.utime_offset), data);
+    log_.Write(lane.name, TimeUnderWay(), data);
     return;
   }
   if (tick != lane.next_tick) {
@@ -64,6 +65,11 @@ void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t
 
 void RunLogWriter::AddHealth(std::string_view channel, std::span<const uint8_t> data) {
   log_.Write(channel, ReadInt64(data.data() + health_utime_offset_), data);
+}
+
+int64_t RunLogWriter::TimeUnderWay() const {
+  const int64_t last = num_ticks_ > 0 ? num_ticks_ - 1 : next_tick_;
+  return MakeTick(std::min(next_tick_, last), tick_period_).utime;
 }
 
 void RunLogWriter::Grow() {

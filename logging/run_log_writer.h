@@ -17,7 +17,8 @@ inline constexpr char kRunInfoChannel[] = "RUN_INFO";
 
 /// RUN_INFO first; then tick by tick the message of every channel in the graph's order; messages of
 /// the services port and of external channels where they came. Event times are the messages' own
-/// utime: us of the run. Two runs of the same scenario differ in run_id, RUN_INFO and HEALTH_*
+/// utime, us of the run; of external channels, whose senders know no tick, the time of the first
+/// tick that is not complete. Two runs of the same scenario differ in run_id, RUN_INFO and HEALTH_*
 /// only.
 class RunLogWriter {
  public:
@@ -51,6 +52,7 @@ class RunLogWriter {
     std::vector<uint8_t> bytes;  // ticks [next_tick_, next_tick), by tick modulo capacity_
   };
   void Grow();
+  int64_t TimeUnderWay() const;  // us
   void WriteTick(int64_t tick);
 
   EventLogWriter log_;
@@ -58,6 +60,8 @@ class RunLogWriter {
   int64_t capacity_ = 16;  // ticks a lane can hold
   int64_t next_tick_ = 0;  // first tick not written
   int64_t missing_ = 0;
+  double tick_period_;  // s
+  int64_t num_ticks_;   // of the run; 0: open
   int health_utime_offset_ = 0;
 };
 

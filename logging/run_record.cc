@@ -93,7 +93,8 @@ RunRecord ReadRun(const std::string& path) {
     if (channel.external() || !IsKept(run.spec, channel.name())) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
-    lanes.push_back({ChannelTicks(run.spec, channel), adder ? adder.mapped() : nullptr});
+    lanes.push_back(
+        {ChannelTicks(run.spec, channel, reader.file_size()), adder ? adder.mapped() : nullptr});
   }
   LogEvent event;
   while (reader.Next(&event)) {

@@ -12,6 +12,7 @@
 #include "components/robot/robot_model.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_reader.h"
+#include "logging/tick_series.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
@@ -25,26 +26,6 @@
 #include "poise/task_torque_t.hpp"
 
 namespace poise::logging {
-
-/// Messages of one channel by tick.
-template <class T>
-class Series {
- public:
-  /// nullptr when the log lacks that tick.
-  const T* at(int64_t tick) const {
-    const auto i = static_cast<size_t>(tick);
-    return tick >= 0 && i < messages_.size() && messages_[i] ? &*messages_[i] : nullptr;
-  }
-  void Set(int64_t tick, T message) {
-    const auto i = static_cast<size_t>(tick);
-    if (i >= messages_.size()) messages_.resize(i + 1);
-    messages_[i] = std::move(message);
-  }
-  bool empty() const { return messages_.empty(); }
-
- private:
-  std::vector<std::optional<T>> messages_;
-};
 
 /// All of one run. Of several channels with one type the graph's first is taken.
 struct RunRecord {

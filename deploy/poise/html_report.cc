@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <sstream>
 
@@ -16,6 +17,7 @@
 #include "fmt/format.h"
 #include "logging/column_codec.h"
 #include "logging/events.h"
+#include "logging/partial_file.h"
 #include "logging/signal_table.h"
 
 namespace poise {
@@ -167,16 +169,28 @@ void WritePage(std::ostream* out, const std::function<void()>& write) {
 }  // namespace
 
 void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
-  std::ofstream out(file, std::ios::binary);
+  for (const ReportedRun& run : runs) {
+    std::error_code other;
+    if (!fs::equivalent(file, run.log, other)) continue;
+    throw ConfigError(
+        fmt::format("{}: is the log itself; name another file with --html", file.string()));
+  }
+  std::optional<logging::PartialFile> partial;
+  try {
+    partial.emplace(file.string());
+  } catch (const logging::LogError& error) {
+    throw ConfigError(fmt::format("{}; name another file with --html", error.what()));
+  }
+  std::ofstream out(partial->part(), std::ios::binary);
   WritePage(&out, [&] {
     for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
   });
-  if (!out.flush()) {
-    std::error_code ignored;
-    if (fs::is_regular_file(file, ignored)) fs::remove(file, ignored);  // half a page
+  out.close();
+  if (!out) {
     throw ConfigError(
         fmt::format("{}: cannot be written; name another file with --html", file.string()));
   }
+  partial->Keep();
 }
 
 std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario, Json channels,

@@ -22,7 +22,8 @@ struct ReportedRun {
 };
 
 /// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
-/// template is not built, `file` cannot be written; LogError for a log that is gone.
+/// template is not built, `file` cannot be written or is a log; LogError for a log that is gone. A
+/// page that is not finished leaves `file` as it was.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in

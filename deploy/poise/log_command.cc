@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "components/framework/configuration.h"
+#include "deploy/poise/cli_checks.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/scenario_loading.h"
@@ -8,12 +9,14 @@
 #include "logging/log_cut.h"
 #include "logging/log_export.h"
 #include "logging/log_survey.h"
+#include "logging/printable.h"
 #include "logging/run_record.h"
 
 namespace poise {
 namespace {
 
 namespace fs = std::filesystem;
+using logging::ForTerminal;
 
 constexpr size_t kPlaces = 20;  // named of each kind of problem, without --all
 
@@ -29,7 +32,7 @@ void PrintRow(const logging::ChannelSurvey& channel, double duration) {
       duration > 0 && ticks.messages > 1
           ? fmt::format("{:.1f}", static_cast<double>(ticks.messages) / duration)
           : "";
-  fmt::print("{:<30} {:<18} {:>9} {:>9} {:>10}\n", ticks.name,
+  fmt::print("{:<30} {:<18} {:>9} {:>9} {:>10}\n", ForTerminal(ticks.name),
              channel.type.empty() ? "(not known)" : channel.type, ticks.messages, rate,
              Bytes(channel.bytes));
 }
@@ -41,7 +44,8 @@ void PrintRun(const logging::LogSurvey& survey) {
   for (const std::string& version : spec.library_version()) versions += ", " + version;
   const int64_t ticks = survey.end_tick - survey.first_tick;
   fmt::print("scenario  {}\nrun       {}\nseed      {}\nstarted   {}\nversions  {}\n",
-             spec.scenario(), spec.run_id(), spec.seed(), survey.info.started_at, versions);
+             ForTerminal(spec.scenario()), spec.run_id(), spec.seed(),
+             ForTerminal(survey.info.started_at), ForTerminal(versions));
   fmt::print("duration  {:.3f} s in the log, {} ticks of {:g} s from tick {}; {} planned\n",
              static_cast<double>(ticks) * spec.tick_period(), ticks, spec.tick_period(),
              survey.first_tick, spec.num_ticks());
@@ -49,9 +53,9 @@ void PrintRun(const logging::LogSurvey& survey) {
     Scenario scenario;
     ParseTextProto(survey.info.scenario, "RUN_INFO.scenario", &scenario);
     const std::string changes = FormatChanges(scenario);
-    if (!changes.empty()) fmt::print("changed   {}\n", changes);
+    if (!changes.empty()) fmt::print("changed   {}\n", logging::LinesForTerminal(changes));
   } catch (const ConfigError& error) {
-    fmt::print("changed   not known: {}\n", error.what());
+    fmt::print("changed   not known: {}\n", ForTerminal(error.what()));
   }
   if (spec.drop_rate() > 0)
     fmt::print("dropped   {} of the messages, on purpose\n", spec.drop_rate());
@@ -70,7 +74,7 @@ int Info(const std::string& run) {
   if (survey.info_problem.empty()) {
     PrintRun(survey);
   } else {
-    fmt::print("run       not known: {}\n", survey.info_problem);
+    fmt::print("run       not known: {}\n", ForTerminal(survey.info_problem));
   }
   fmt::print("\n{:<30} {:<18} {:>9} {:>9} {:>10}\n", "channel", "type", "messages", "per s",
              "data");
@@ -106,6 +110,14 @@ struct CutOptions {
 };
 
 int Cut(const CutOptions& options) {
+  if (options.from && options.to && *options.from > *options.to) {
+    throw ConfigError(
+        fmt::format("log cut: --from {} is after --to {}", *options.from, *options.to));
+  }
+  if (options.first_tick && options.last_tick && *options.first_tick > *options.last_tick) {
+    throw ConfigError(fmt::format("log cut: --first-tick {} is after --last-tick {}",
+                                  *options.first_tick, *options.last_tick));
+  }
   const std::string log = FindLog(options.run).string();
   logging::CutRange range;
   if (options.from || options.to) {
@@ -113,7 +125,7 @@ int Cut(const CutOptions& options) {
     RunSpec spec;
     logging::ReadRunInfo(&reader, log, &spec);
     logging::CheckLogSpec(spec, log);
-    range = logging::TicksOfTimes(options.from.value_or(0), options.to.value_or(1e12),
+    range = logging::TicksOfTimes(options.from.value_or(0), options.to.value_or(1e9),
                                   spec.tick_period());
   }
   if (options.first_tick) range.first_tick = *options.first_tick;
@@ -147,7 +159,7 @@ bool PrintExport(const std::string& to, const std::vector<logging::ExportedChann
     refused += channel.refused;
     if (channel.refused == 0) continue;
     fmt::print(stderr, "poise: {}: {} messages could not be read and are left out\n",
-               channel.channel, channel.refused);
+               ForTerminal(channel.channel), channel.refused);
   }
   fmt::print("{}: {} messages of {} channels\n", to, messages, channels.size());
   return refused == 0;
@@ -210,9 +222,11 @@ void AddCut(CLI::App* log, Command* command) {
   CLI::App* cut = log->add_subcommand(
       "cut", "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole");
   AddRun(cut, &options->run);
+  const auto time = Within("a time of 0 to 1e9 s", [](double s) { return s >= 0 && s <= 1e9; });
   cut->add_option("--out", options->out, "log to write; must not exist")->required();
-  CLI::Option* from = cut->add_option("--from", options->from, "first time, s of the run");
-  CLI::Option* to = cut->add_option("--to", options->to, "last time, s");
+  CLI::Option* from =
+      cut->add_option("--from", options->from, "first time, s of the run")->check(time);
+  CLI::Option* to = cut->add_option("--to", options->to, "last time, s")->check(time);
   const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
   cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);
   cut->add_option("--last-tick", options->last_tick, "last tick")->check(ticks)->excludes(to);

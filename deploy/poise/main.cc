@@ -6,6 +6,7 @@
 #include "components/robot/robot_model.h"
 #include "deploy/poise/commands.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
 
 int main(int argc, char** argv) {
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
@@ -39,13 +40,13 @@ int main(int argc, char** argv) {
   try {
     return command();
   } catch (const poise::ConfigError& error) {
-    fmt::print(stderr, "poise: {}\n", error.what());
+    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
     return poise::kExitUsage;
   } catch (const poise::robot::RobotError& error) {
-    fmt::print(stderr, "poise: {}\n", error.what());
+    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
     return poise::kExitUsage;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "poise: {}\n", error.what());
+    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
     return poise::kExitFailed;
   }
 }

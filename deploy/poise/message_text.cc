@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "fmt/format.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
@@ -14,31 +15,13 @@ bool Selected(const std::vector<Scalar>& fields, std::string_view path) {
                      [&](const Scalar& field) { return field.path == path; });
 }
 
-/// Quotes become `quote`, bytes outside printable ASCII escape sequences.
-std::string Escape(std::string_view text, const char* quote) {
-  std::string escaped;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"') {
-      escaped += quote;
-    } else if (c == '\\') {
-      escaped += "\\\\";
-    } else if (c == '\n') {
-      escaped += "\\n";
-    } else if (byte < 0x20 || byte >= 0x7f) {
-      escaped += fmt::format("\\x{:02x}", byte);
-    } else {
-      escaped += c;
-    }
-  }
-  return escaped;
-}
-
 std::string ShortValue(const Scalar& scalar) {
   struct Format {
     std::string operator()(int64_t value) const { return fmt::format("{}", value); }
     std::string operator()(double value) const { return fmt::format("{:.6g}", value); }
-    std::string operator()(const std::string& value) const { return '"' + Printable(value) + '"'; }
+    std::string operator()(const std::string& value) const {
+      return '"' + logging::Printable(value) + '"';
+    }
   };
   return std::visit(Format{}, scalar.value);
 }
@@ -48,7 +31,7 @@ std::string CsvValue(const Scalar& scalar) {
     std::string operator()(int64_t value) const { return fmt::format("{}", value); }
     std::string operator()(double value) const { return fmt::format("{}", value); }
     std::string operator()(const std::string& value) const {
-      return '"' + Escape(value, "\"\"") + '"';
+      return '"' + logging::Printable(value, "\"\"") + '"';
     }
   };
   return std::visit(Format{}, scalar.value);
@@ -73,8 +56,6 @@ std::string_view ArrayOf(std::string_view path) {
 }
 
 }  // namespace
-
-std::string Printable(std::string_view text) { return Escape(text, "\\\""); }
 
 std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields) {
   std::optional<std::string> first;

@@ -11,9 +11,6 @@
 
 namespace poise {
 
-/// Quotes, backslashes and all but printable ASCII escaped: a message must not drive the terminal.
-std::string Printable(std::string_view text);
-
 /// "tick=120 torque[3]=1.25" and a line feed; tick first unless it is among the fields. Reals with
 /// six digits.
 std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields);
@@ -22,7 +19,8 @@ std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& 
 std::string MessageBlock(std::string_view title, const std::vector<Scalar>& fields);
 
 /// Column names, and a message's row; "tick" first unless it is among the fields. Reals with as
-/// many digits as give the same number back; texts escaped as in Printable, but quotes doubled.
+/// many digits as give the same number back; texts escaped as in logging::Printable, but quotes
+/// doubled.
 std::string CsvHeader(bool has_tick, const std::vector<Scalar>& fields);
 std::string CsvRow(std::optional<int64_t> tick, const std::vector<Scalar>& fields);
 

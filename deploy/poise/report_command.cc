@@ -8,6 +8,7 @@
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/scenario_run.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
@@ -46,10 +47,11 @@ int Report(const ReportOptions& options) {
   runs.push_back(ReadReportedRun(options.run));
   if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
   const ReportedRun& run = runs.front();
-  fmt::print("{} of {}, poise {}\n{}\n{}\n{}{}", run.record.spec.scenario(),
-             run.record.info.started_at, run.record.spec.poise_version(),
-             FormatChanges(run.scenario), FormatTable(run.checks),
-             FormatEvents(logging::Events(run.record)), FormatAssumptions(run.scenario));
+  const std::string text = fmt::format(
+      "{} of {}, poise {}\n{}\n{}\n{}{}", run.record.spec.scenario(), run.record.info.started_at,
+      run.record.spec.poise_version(), FormatChanges(run.scenario), FormatTable(run.checks),
+      FormatEvents(logging::Events(run.record)), FormatAssumptions(run.scenario));
+  fmt::print("{}", logging::LinesForTerminal(text));
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);

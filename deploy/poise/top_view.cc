@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "components/framework/run.h"
-#include "deploy/poise/message_text.h"
 #include "fmt/format.h"
 #include "logging/events.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
@@ -101,8 +101,8 @@ void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
          : stale ? Style::kWarning
                  : Style::kPlain});
     if (!h.detail.empty()) {
-      lines->push_back(
-          {fmt::format("  {}", Printable(h.detail)), failed ? Style::kFailure : Style::kPlain});
+      lines->push_back({fmt::format("  {}", logging::Printable(h.detail)),
+                        failed ? Style::kFailure : Style::kPlain});
     }
   }
 }

@@ -116,6 +116,35 @@ TEST_F(BadInputTest, EveryScenarioOfTheHouseIsGood) {
   EXPECT_GT(checked, 0);
 }
 
+TEST_F(BadInputTest, CutOfALogNeedsTimesInOrder) {
+  const std::string out = folder_ / "cut.lcm";
+  for (const char* time : {"nan", "inf", "-1", "1e300", "soon"}) {
+    ExpectUsageError({"log", "cut", "run.lcm", "--out", out, "--from", time}, {"--from", time});
+    ExpectUsageError({"log", "cut", "run.lcm", "--out", out, "--to", time}, {"--to", time});
+  }
+  const std::string log = folder_ / "run.lcm";
+  std::ofstream(log) << "no log";
+  ExpectUsageError({"log", "cut", log, "--out", out, "--from", "6", "--to", "5"},
+                   {"--from 6", "--to 5"});
+  ExpectUsageError({"log", "cut", log, "--out", out, "--first-tick", "6", "--last-tick", "5"},
+                   {"--first-tick 6", "--last-tick 5"});
+}
+
+TEST_F(BadInputTest, PageReplacesNoLogAndIsThereWholeOrNotAtAll) {
+  const std::string run = folder_ / "run";
+  const std::string log = run + "/run.lcm";
+  ASSERT_EQ(RunPoise({"run", StandScenario(), "--inline", "--out", run}).exit_code, 0);
+  const std::string bytes = ReadFile(log);
+  const ProgramResult result = RunPoise({"report", run, "--html", log});
+  EXPECT_EQ(result.exit_code, 2) << result.output;
+  EXPECT_NE(result.output.find(log + ": is the log itself"), std::string::npos) << result.output;
+  EXPECT_EQ(ReadFile(log), bytes);
+  std::filesystem::copy(log, folder_ / "other.lcm");
+  EXPECT_EQ(RunPoise({"report", run, "--html", folder_ / "other.lcm"}).exit_code, 2);
+  EXPECT_EQ(ReadFile(folder_ / "other.lcm"), bytes);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "other.lcm.part"));
+}
+
 TEST_F(BadInputTest, HelpIsThereForEveryCommand) {
   for (const std::vector<std::string>& command : {std::vector<std::string>{},
                                                   {"run"},

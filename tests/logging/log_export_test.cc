@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "logging/event_log_writer.h"
+#include "logging/mcap_writer.h"
 #include "poise/external_push_t.hpp"
 #include "tests/logging/small_log.h"
 
@@ -127,6 +128,44 @@ TEST_F(LogExportTest, LeavesOutAndCountsWhatIsNoMessageOfItsChannel) {
   }
   EXPECT_EQ(refused, 3);
   EXPECT_EQ(messages + refused, static_cast<int64_t>(events.size()));
+}
+
+TEST_F(LogExportTest, McapRefusesNamesThatAreNoUtf8AndMoreThanItHolds) {
+  std::vector<RawEvent> events = SmallLog(kTicks);
+  events.push_back({"PU\xffH", 0, Push(3)});
+  events.push_back({"PU\x1bH", 0, Push(3)});
+  events.push_back({"M\xc3\x84RZ", 0, Push(3)});
+  WriteRawLog(log_, events);
+  const std::string file = folder_.path("log.mcap");
+  for (const ExportedChannel& channel : ExportMcap(log_, file)) {
+    const bool bad = channel.channel == "PU\xffH" || channel.channel == "PU\x1bH";
+    EXPECT_EQ(channel.refused, bad ? 1 : 0) << channel.channel;
+    EXPECT_EQ(channel.messages == 0, bad) << channel.channel;
+  }
+  const std::string bytes = ReadBytes(file);
+  EXPECT_EQ(bytes.find("PU\xffH"), std::string::npos);
+  EXPECT_NE(bytes.find("M\xc3\x84RZ"), std::string::npos);
+
+  McapWriter writer(folder_.path("many.mcap"), "test");
+  const uint16_t schema = writer.AddSchema("schema", "protobuf", "");
+  for (int i = 1; i <= UINT16_MAX; ++i) {
+    ASSERT_EQ(writer.AddChannel(schema, std::to_string(i), "protobuf", {}), i);
+  }
+  EXPECT_THROW(writer.AddChannel(schema, "one more", "protobuf", {}), LogError);
+}
+
+TEST_F(LogExportTest, ReplacesNoLogAndLeavesNoPart) {
+  WriteRawLog(log_, SmallLog(kTicks));
+  const std::string bytes = ReadBytes(log_);
+  EXPECT_THROW(ExportMcap(log_, log_), LogError);
+  EXPECT_THROW(ExportMergedCsv(log_, log_), LogError);
+  EXPECT_EQ(ReadBytes(log_), bytes);
+  ExportMcap(log_, folder_.path("log.mcap"));
+  ExportMergedCsv(log_, folder_.path("merged.csv"));
+  ExportCsv(log_, out_);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path(""))) {
+    EXPECT_NE(entry.path().extension(), ".part") << entry.path();
+  }
 }
 
 TEST_F(LogExportTest, RefusesWhatCannotBeWritten) {

@@ -127,6 +127,31 @@ TEST_F(LogReaderTest, RandomDamageNeverCrashes) {
   }
 }
 
+/// Headers that overlap, each of a record up to the last one: none ends well but that.
+std::string OverlappingHeaders(size_t count) {
+  const auto append = [](std::string* to, uint64_t value, int bytes) {
+    for (int i = bytes - 1; i >= 0; --i) to->push_back(static_cast<char>(value >> (8 * i)));
+  };
+  std::string bytes;
+  for (size_t i = 0; i <= count; ++i) {
+    append(&bytes, 0xEDA1DA01u, 4);
+    append(&bytes, 7, 8);
+    append(&bytes, 0, 8);
+    append(&bytes, 1, 4);
+    append(&bytes, i < count ? (count - i) * (kHeader + 1) - 2 : 0, 4);
+    bytes.push_back('C');
+  }
+  return bytes;
+}
+
+TEST_F(LogReaderTest, HostileLogOfOverlappingHeadersIsReadAtOnce) {
+  // Each header against all that follow would be 10^9 looks; the test's time limit would find it.
+  const std::string bytes = OverlappingHeaders((2 << 20) / (kHeader + 1));
+  Read(bytes);
+  EXPECT_EQ(damages_, 1);
+  EXPECT_EQ(static_cast<size_t>(skipped_), bytes.size() - (kHeader + 1));
+}
+
 TEST_F(LogReaderTest, MissingFileAndFolderAreNamed) {
   for (const std::string& path : {folder_.path("none"), folder_.path("")}) {
     try {

@@ -7,7 +7,9 @@
 #include "components/framework/configuration.h"
 #include "logging/log_cut.h"
 #include "logging/run_record.h"
+#include "poise/emergency_stop_t.hpp"
 #include "poise/external_push_t.hpp"
+#include "poise/health_t.hpp"
 #include "tests/logging/small_log.h"
 
 namespace poise::logging {
@@ -113,7 +115,7 @@ TEST_F(LogSurveyTest, DamagedRunInfoLeavesTheEvents) {
 TEST_F(LogSurveyTest, StrangersAndAMissingEndAreProblems) {
   std::vector<RawEvent> events = SmallLog(kTicks);
   events.push_back({"PU\x01H", 0, Push(0)});
-  EXPECT_EQ(Problem(events), "'PU?H' is no channel of the run: 1 messages");
+  EXPECT_EQ(Problem(events), "'PU\\x01H' is no channel of the run: 1 messages");
   events = SmallLog(kTicks);
   events.pop_back();
   EXPECT_NE(Problem(events).find("ended at tick 10"), std::string::npos);
@@ -155,6 +157,38 @@ TEST_F(LogSurveyTest, CutLogIsARunsLog) {
   std::string bytes = ReadBytes(cut);
   WriteBytes(cut, bytes.substr(0, bytes.size() - 1));
   EXPECT_EQ(SurveyLog(cut).Problems(0).size(), 2u);
+}
+
+TEST_F(LogSurveyTest, CutKeepsWhatCameBeforeTheFirstTickAndAfterTheLast) {
+  std::vector<RawEvent> events = SmallLog(kTicks);
+  health_t health{};
+  SetHeader(0, &health);
+  health.component = "robot";
+  health.tick = -1;  // it starts
+  events.insert(events.begin() + 1, {"HEALTH_ROBOT", 0, Encode(health)});
+  emergency_stop_t stop{};
+  stop.run_id = 42;
+  events.push_back({"STOP", kTicks * 2000, Encode(stop)});
+  WriteRawLog(path_, events);
+  const auto count = [&](const CutRange& range) {
+    static int number = 0;
+    return CutLog(path_, range, folder_.path("cut" + std::to_string(number++))).events;
+  };
+  EXPECT_EQ(count({}), static_cast<int64_t>(events.size()));
+  EXPECT_EQ(count({0, 4, {}}), 1 + 1 + 2 * 5);
+  EXPECT_EQ(count({5, INT64_MAX, {}}), 1 + 2 * 5 + 2);
+  EXPECT_EQ(count({2, 4, {}}), 1 + 2 * 3);
+}
+
+TEST_F(LogSurveyTest, CutCountsAsUnreadableOnlyWhatIsInItsRange) {
+  std::vector<RawEvent> events = SmallLog(kTicks);
+  events[PushOf(2)].data.resize(30);
+  events[PushOf(6)].data.resize(30);
+  events[PushOf(7)].data.resize(30);
+  WriteRawLog(path_, events);
+  EXPECT_EQ(CutLog(path_, {}, folder_.path("all")).refused, 3);
+  EXPECT_EQ(CutLog(path_, {5, 8, {}}, folder_.path("end")).refused, 2);
+  EXPECT_EQ(CutLog(path_, {3, 5, {}}, folder_.path("middle")).refused, 0);
 }
 
 TEST_F(LogSurveyTest, CutRefusesWhatCannotBe) {

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 #include <lcm/eventlog.h>
 
+#include <algorithm>
+
+#include "logging/log_cut.h"
 #include "logging/log_reader.h"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/health_t.hpp"
@@ -103,20 +106,63 @@ TEST_F(RunLogWriterTest, HealthAndExternalMessagesStandWhereTheyCame) {
   health_t health{};
   SetHeader(7, &health);
   health.component = "redistributor";
-  emergency_stop_t stop{};
-  SetHeader(9, &stop);
+  emergency_stop_t stop{};  // its sender knows no tick: utime 0
+  stop.run_id = 42;
   RunLogWriter writer(path_, spec_, info_);
   writer.AddHealth("HEALTH_REDISTRIBUTOR", Encode(health));
-  writer.AddMessage(2, 9, Encode(stop));
+  writer.AddMessage(2, 0, Encode(stop));
   writer.AddMessage(0, 0, Push(0));
   writer.AddMessage(1, 0, Command(0));
+  writer.AddMessage(0, 1, Push(1));
+  writer.AddMessage(1, 1, Command(1));
+  writer.AddMessage(0, 2, Push(2));
+  writer.AddMessage(2, 0, Encode(stop));  // COMMAND of tick 2 is still to come
+  writer.AddMessage(1, 2, Command(2));
   writer.Close();
-  const std::vector<Seen> expected = {{"RUN_INFO", 0, Encode(info_)},
-                                      {"HEALTH_REDISTRIBUTOR", 14000, Encode(health)},
-                                      {"STOP", 18000, Encode(stop)},
-                                      {"PUSH", 0, Push(0)},
-                                      {"COMMAND", 0, Command(0)}};
+  const std::vector<Seen> expected = {
+      {"RUN_INFO", 0, Encode(info_)}, {"HEALTH_REDISTRIBUTOR", 14000, Encode(health)},
+      {"STOP", 0, Encode(stop)},      {"PUSH", 0, Push(0)},
+      {"COMMAND", 0, Command(0)},     {"PUSH", 2000, Push(1)},
+      {"COMMAND", 2000, Command(1)},  {"STOP", 4000, Encode(stop)},
+      {"PUSH", 4000, Push(2)},        {"COMMAND", 4000, Command(2)}};
   EXPECT_EQ(ReadWithLiblcm(path_), expected);
+}
+
+TEST_F(RunLogWriterTest, ExternalMessageAfterTheLastTickHasItsTime) {
+  spec_.set_num_ticks(2);
+  emergency_stop_t stop{};
+  RunLogWriter writer(path_, spec_, info_);
+  for (int64_t t = 0; t < 2; ++t) {
+    writer.AddMessage(0, t, Push(t));
+    writer.AddMessage(1, t, Command(t));
+  }
+  writer.AddMessage(2, 0, Encode(stop));
+  writer.Close();
+  EXPECT_EQ(ReadWithLiblcm(path_).back(), (Seen{"STOP", 2000, Encode(stop)}));
+}
+
+TEST_F(RunLogWriterTest, ExternalMessageIsInTheCutOfItsTicks) {
+  emergency_stop_t stop{};
+  stop.run_id = 42;
+  {
+    RunLogWriter writer(path_, spec_, info_);
+    for (int64_t t = 0; t < 10; ++t) {
+      if (t == 6) writer.AddMessage(2, 0, Encode(stop));
+      writer.AddMessage(0, t, Push(t));
+      writer.AddMessage(1, t, Command(t));
+    }
+    writer.Close();
+  }
+  const auto stops = [&](int64_t first, int64_t last, const std::string& to) {
+    CutLog(path_, {first, last, {}}, to);
+    const std::vector<Seen> events = ReadWithLiblcm(to);
+    return std::count_if(events.begin(), events.end(),
+                         [](const Seen& event) { return event.channel == "STOP"; });
+  };
+  EXPECT_EQ(stops(5, 7, folder_.path("around")), 1);
+  EXPECT_EQ(stops(6, 6, folder_.path("at")), 1);
+  EXPECT_EQ(stops(0, 5, folder_.path("before")), 0);
+  EXPECT_EQ(stops(7, 9, folder_.path("after")), 0);
 }
 
 TEST_F(RunLogWriterTest, FlushedEventsAreInTheFileBeforeItIsClosed) {

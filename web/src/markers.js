@@ -4,6 +4,7 @@ import {
   Line, LineDashedMaterial, LineLoop, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, RingGeometry,
   Vector3,
 } from 'three';
+import {BLOCK_CORNERS, blockTop} from './spatial.js';
 
 const UP = new Vector3(0, 1, 0);
 const OVERLAY_ORDER = 10;
@@ -82,22 +83,35 @@ export class Outline {
   }
 }
 
-/** The scenario's soft block, undeformed, without its irregularity. Its top is tilted as in sim_ode/terrain.cc. */
-export function blockMesh(block) {
-  const normal = [Math.sin(block.tilt_pitch) * Math.cos(block.tilt_roll), -Math.sin(block.tilt_roll),
-    Math.cos(block.tilt_pitch) * Math.cos(block.tilt_roll)];
-  const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([i, j]) => [i * block.length / 2, j * block.width / 2]);
-  const top = corners.map(([x, y]) => [x, y, block.height - (normal[0] * x + normal[1] * y) / normal[2]]);
-  const bottom = corners.map(([x, y]) => [x, y, 0]);
-  const quad = (a, b, c, d) => [a, b, c, a, c, d].flat();
-  const faces = [quad(...top), ...[0, 1, 2, 3].map((k) => {
-    const next = (k + 1) % 4;
-    return quad(bottom[k], bottom[next], top[next], top[k]);
-  })].flat();
-  const geometry = new BufferGeometry();
-  geometry.setAttribute('position', new Float32BufferAttribute(faces, 3));
-  geometry.computeVertexNormals();
-  const mesh = new Mesh(geometry, new MeshStandardMaterial({color: 0x9c8458, roughness: 1, side: DoubleSide}));
-  mesh.position.set(block.x, block.y, 0.001);
-  return mesh;
+/** The scenario's soft block, undeformed, without its irregularity; setRise sets the height of its tilted top. */
+export class Block {
+  constructor(block) {
+    this.block = block;
+    this.positions = new BufferAttribute(new Float32Array(3 * VERTICES.length), 3);
+    this.geometry = new BufferGeometry().setAttribute('position', this.positions);
+    this.object = new Mesh(this.geometry, new MeshStandardMaterial({color: 0x9c8458, roughness: 1, side: DoubleSide}));
+    this.object.position.set(block.x, block.y, 0.001);
+    this.object.visible = false;
+  }
+
+  /** What blockRise gives. */
+  setRise(rise) {
+    if (rise === this.rise) return;
+    this.rise = rise;
+    this.object.visible = rise !== undefined;
+    if (rise === undefined) return;
+    const {length, width} = this.block;
+    const top = blockTop(this.block, rise);
+    VERTICES.forEach(([corner, high], i) => this.positions.setXYZ(i, BLOCK_CORNERS[corner][0] * length / 2,
+      BLOCK_CORNERS[corner][1] * width / 2, high ? top[corner] : 0));
+    this.positions.needsUpdate = true;
+    this.geometry.computeVertexNormals();
+    this.geometry.computeBoundingSphere();
+  }
 }
+const quad = (a, b, c, d) => [a, b, c, a, c, d];
+/** [corner, whether of the top] of the triangles of the top and the four sides. */
+const VERTICES = [quad([0, 1], [1, 1], [2, 1], [3, 1]), ...[0, 1, 2, 3].map((k) => {
+  const next = (k + 1) % 4;
+  return quad([k, 0], [next, 0], [next, 1], [k, 1]);
+})].flat();

@@ -5,9 +5,9 @@ import {
   Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
-import {Arrow, blockMesh, mark, Outline} from './markers.js';
+import {Arrow, Block, mark, Outline} from './markers.js';
 import {place, RobotView} from './robot_view.js';
-import {add, convexHull, rotate} from './spatial.js';
+import {add, blockRise, convexHull, rotate} from './spatial.js';
 
 const METRES_PER_NEWTON = 1 / 900;
 const METRES_PER_NEWTON_METRE = 1 / 100;
@@ -159,8 +159,8 @@ export class SceneView {
     }
     const block = this.run.scenario.sim_ode?.block;
     if (block) {
-      this.block = blockMesh(block);
-      scene.add(this.block);
+      this.block = new Block(block);
+      scene.add(this.block.object);
     }
     this.colored = [];  // [material, name of COLORS]
     const colored = (material, name) => { this.colored.push([material, name]); };
@@ -241,7 +241,7 @@ export class SceneView {
       this.ghost.setPose(this.overlaySamples.pose('base', other),
         this.overlaySamples.vector('joint', other, this.overlay.robot.joints.length));
     }
-    if (this.block) this.block.visible = this.run.timeAt(row) >= (this.run.scenario.sim_ode.block.start ?? 0);
+    if (this.block) this.block.setRise(blockRise(this.run.scenario.sim_ode.block, this.run.timeAt(row)));
 
     const com = samples.vector('com', row);
     this.com.visible = this.comMark.visible = show.com && com.every(Number.isFinite);

@@ -38,3 +38,23 @@ export function convexHull(points) {
   };
   return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
 }
+
+/**
+ * Share of its height, 0..1, that the top of the scenario's soft block has at a time, s: it rises with minimum jerk, as
+ * in sim_ode/terrain.cc. undefined before it is there.
+ */
+export function blockRise(block, time) {
+  const elapsed = time - (block.start ?? 0);
+  if (!(elapsed >= 0)) return undefined;
+  const s = block.rise > 0 ? Math.min(elapsed / block.rise, 1) : 1;
+  return s * s * s * (10 + s * (6 * s - 15));
+}
+
+/** Of the block, from above, counterclockwise. */
+export const BLOCK_CORNERS = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
+
+/** Heights of the top's corners above the ground, m, as in sim_ode/terrain.cc. */
+export function blockTop(block, rise) {
+  const slope = [-Math.tan(block.tilt_pitch), Math.tan(block.tilt_roll) / Math.cos(block.tilt_pitch)];
+  return BLOCK_CORNERS.map(([i, j]) => block.height * rise + slope[0] * i * block.length / 2 + slope[1] * j * block.width / 2);
+}

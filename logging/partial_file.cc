@@ -1,0 +1,118 @@
+#include "logging/partial_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "fmt/format.h"
+#include "logging/log_reader.h"
+
+namespace poise::logging {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kSignals[] = {SIGINT, SIGTERM, SIGHUP};
+
+/// Keeps the handler out while the list changes.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int signal : kSignals) sigaddset(&signals, signal);
+    pthread_sigmask(SIG_BLOCK, &signals, &before_);
+  }
+  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+
+ private:
+  sigset_t before_;
+};
+
+PartialFile* first = nullptr;
+
+}  // namespace
+
+PartialFile::PartialFile(const std::string& path) : path_(path) {
+  std::error_code error;
+  if (fs::exists(path, error)) {
+    path_ = fs::canonical(path).string();  // a link keeps pointing to it
+    if (!fs::is_regular_file(path_)) {
+      part_ = path_;
+      return;
+    }
+    if (IsEventLog(path_)) {
+      throw LogError(fmt::format("{}: is an event log; choose another file", path));
+    }
+  }
+  part_ = path_ + ".part";
+  const SignalsBlocked blocked;
+  const int fd = open(part_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (fd < 0 && errno == EEXIST) {
+    throw LogError(fmt::format(
+        "{}: exists: is it being written, or left from a writer that was killed? If so, remove it",
+        part_));
+  }
+  if (fd < 0) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  close(fd);
+  Enlist();
+}
+
+PartialFile::~PartialFile() {
+  if (!pending_) return;
+  const SignalsBlocked blocked;
+  unlink(part_.c_str());
+  Delist();
+}
+
+void PartialFile::Keep() {
+  if (!pending_) return;
+  const SignalsBlocked blocked;
+  if (std::rename(part_.c_str(), path_.c_str()) != 0) {
+    throw LogError(fmt::format("{}: cannot be written: {}", path_, std::strerror(errno)));
+  }
+  Delist();
+}
+
+void PartialFile::Enlist() {
+  pending_ = true;
+  next_ = first;
+  first = this;
+  if (next_ != nullptr) return;
+  for (const int signal : kSignals) {
+    struct sigaction action {};
+    sigaction(signal, nullptr, &action);
+    if (action.sa_handler != SIG_DFL) continue;  // ignored, or another's to see to
+    action.sa_handler = OnSignal;
+    sigaction(signal, &action, nullptr);
+  }
+}
+
+void PartialFile::Delist() {
+  pending_ = false;
+  PartialFile** link = &first;
+  while (*link != this) link = &(*link)->next_;
+  *link = next_;
+  if (first != nullptr) return;
+  for (const int signal : kSignals) {
+    struct sigaction action {};
+    sigaction(signal, nullptr, &action);
+    if (action.sa_handler != OnSignal) continue;
+    action.sa_handler = SIG_DFL;
+    sigaction(signal, &action, nullptr);
+  }
+}
+
+void PartialFile::OnSignal(int signal) {
+  for (PartialFile* file = first; file != nullptr; file = file->next_) unlink(file->part_.c_str());
+  std::signal(signal, SIG_DFL);
+  raise(signal);  // delivered as this returns
+}
+
+}  // namespace poise::logging
