@@ -13,6 +13,8 @@ namespace poise::logging {
 
 using Answer = std::optional<double>;
 
+inline constexpr double kMilli = 1e3;  ///< m to mm, rad to mrad
+
 /// Largest and root-mean-square of what `value` gives, over the ticks where it gives something.
 Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t tick)>& value);
 Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t tick)>& value);

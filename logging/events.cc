@@ -5,6 +5,7 @@
 
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
+#include "logging/analysis.h"
 #include "logging/contact_history.h"
 #include "logging/schedule_plan.h"
 
@@ -13,7 +14,6 @@ namespace {
 
 constexpr double kShortestLoss = 0.01;  // s; shorter is the foot's rattle, and the sensor's noise
 
-constexpr double kMilli = 1e3;
 // A push that comes back sooner is the same push, s.
 constexpr double kPushGap = 0.05;
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "logging/analysis.h"
 #include "logging/metrics.h"
 
 namespace poise::logging {
@@ -15,7 +16,6 @@ using MetricList = std::vector<Metric>;
 
 inline constexpr const char* kAxis[] = {"x", "y", "z"};
 inline constexpr const char* kFoot[] = {"right", "left"};
-inline constexpr double kMilli = 1e3;  // m to mm, rad to mrad
 
 inline Answer Scaled(Answer value, double factor) {
   if (value) *value *= factor;

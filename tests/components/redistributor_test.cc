@@ -465,34 +465,39 @@ TEST(RatioMoves, ATransitionRampsFromWhereTheyStand) {
   EXPECT_NEAR(run().eta, before.eta, 1e-12);
 }
 
-TEST(RatioMoves, RefuseAScheduleThatCannotBe) {
+// The field that a configuration is refused for; "accepted" when it is not.
+std::string RefusedField(const std::string& extra) {
   ControlContext context(TestRobot::kDyros);
-  const auto field_of = [&](const std::string& extra) -> std::string {
-    try {
-      Harness<Redistributor> harness(&context, RedistributorText(extra));
-    } catch (const ConfigError& error) {
-      return error.field();
-    }
-    return "accepted";
-  };
+  try {
+    Harness<Redistributor> harness(&context, RedistributorText(extra));
+  } catch (const ConfigError& error) {
+    return error.field();
+  }
+  return "accepted";
+}
+
+TEST(RatioMoves, RefuseAScheduleThatCannotBe) {
   const std::string first = "ratio_move { start: 1 duration: 2 position: 1 } ";
-  EXPECT_EQ(field_of(first), "accepted");
-  EXPECT_EQ(field_of(first + "ratio_move { start: 3 duration: 1 position: 0 }"), "accepted");
-  EXPECT_EQ(field_of(first + "ratio_move { start: 2.9 duration: 1 position: 0 }"),
+  EXPECT_EQ(RefusedField(first), "accepted");
+  EXPECT_EQ(RefusedField(first + "ratio_move { start: 3 duration: 1 position: 0 }"), "accepted");
+  EXPECT_EQ(RefusedField(first + "ratio_move { start: 2.9 duration: 1 position: 0 }"),
             "ratio_move[1].start");
-  EXPECT_EQ(field_of(first + "ratio_move { start: 0 duration: 1 position: 0 }"),
+  EXPECT_EQ(RefusedField(first + "ratio_move { start: 0 duration: 1 position: 0 }"),
             "ratio_move[1].start");
-  EXPECT_EQ(field_of("ratio_move { duration: 1 position: 0 }"), "ratio_move[0].start");
-  EXPECT_EQ(field_of("ratio_move { start: -1 duration: 1 position: 0 }"), "ratio_move[0].start");
-  EXPECT_EQ(field_of("ratio_move { start: inf duration: 1 position: 0 }"), "ratio_move[0].start");
-  EXPECT_EQ(field_of("ratio_move { start: 1 position: 0 }"), "ratio_move[0].duration");
-  EXPECT_EQ(field_of("ratio_move { start: 1 duration: 0 position: 0 }"), "ratio_move[0].duration");
-  EXPECT_EQ(field_of("ratio_move { start: 1 duration: inf position: 0 }"),
+  EXPECT_EQ(RefusedField("ratio_move { duration: 1 position: 0 }"), "ratio_move[0].start");
+  EXPECT_EQ(RefusedField("ratio_move { start: -1 duration: 1 position: 0 }"),
+            "ratio_move[0].start");
+  EXPECT_EQ(RefusedField("ratio_move { start: inf duration: 1 position: 0 }"),
+            "ratio_move[0].start");
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 position: 0 }"), "ratio_move[0].duration");
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 duration: 0 position: 0 }"),
             "ratio_move[0].duration");
-  EXPECT_EQ(field_of("ratio_move { start: 1 duration: 1 }"), "ratio_move[0].position");
-  EXPECT_EQ(field_of("ratio_move { start: 1 duration: 1 position: 1.1 }"),
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 duration: inf position: 0 }"),
+            "ratio_move[0].duration");
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 duration: 1 }"), "ratio_move[0].position");
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 duration: 1 position: 1.1 }"),
             "ratio_move[0].position");
-  EXPECT_EQ(field_of("ratio_move { start: 1 duration: 1 position: nan }"),
+  EXPECT_EQ(RefusedField("ratio_move { start: 1 duration: 1 position: nan }"),
             "ratio_move[0].position");
 }
 
@@ -511,20 +516,11 @@ TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
 }
 
 TEST(Redistributor, RefusesRatiosThatCannotBe) {
-  ControlContext context(TestRobot::kDyros);
-  const auto field_of = [&](const std::string& extra) -> std::string {
-    try {
-      Harness<Redistributor> harness(&context, RedistributorText(extra));
-    } catch (const ConfigError& error) {
-      return error.field();
-    }
-    return "accepted";
-  };
-  EXPECT_EQ(field_of("eta_min: -0.1"), "eta_min");
-  EXPECT_EQ(field_of("eta_max: 1.1"), "eta_max");
-  EXPECT_EQ(field_of("eta_max: nan"), "eta_max");
-  EXPECT_EQ(field_of("eta_min: 0.6 eta_max: 0.4"), "eta_min");
-  EXPECT_EQ(field_of("eta_min: 0 eta_max: 1"), "accepted");
+  EXPECT_EQ(RefusedField("eta_min: -0.1"), "eta_min");
+  EXPECT_EQ(RefusedField("eta_max: 1.1"), "eta_max");
+  EXPECT_EQ(RefusedField("eta_max: nan"), "eta_max");
+  EXPECT_EQ(RefusedField("eta_min: 0.6 eta_max: 0.4"), "eta_min");
+  EXPECT_EQ(RefusedField("eta_min: 0 eta_max: 1"), "accepted");
 }
 
 }  // namespace
