@@ -60,7 +60,12 @@ void Wiring::AddOutput(OutputPort* port, std::string name, MessageCounts counts)
 }
 
 void Wiring::AddStage(std::string name, std::vector<InputPort*> inputs,
-                      std::vector<OutputPort*> outputs, std::function<void(const Tick&)> run) {
+                      std::vector<OutputPort*> outputs, std::function<void(const Tick&)> run,
+                      double deadline) {
+  if (!(deadline >= 0 && deadline <= 1)) {
+    throw ConfigError(
+        fmt::format("stage {}: its deadline is {} of the period; 0 to 1", name, deadline));
+  }
   for (const InputPort* input : inputs) {
     if (std::find(inputs_.begin(), inputs_.end(), input) == inputs_.end()) {
       throw ConfigError(fmt::format("stage {}: an input of it was not added before", name));
@@ -77,7 +82,8 @@ void Wiring::AddStage(std::string name, std::vector<InputPort*> inputs,
       }
     }
   }
-  stages_.push_back({std::move(name), std::move(inputs), std::move(outputs), std::move(run)});
+  stages_.push_back(
+      {std::move(name), std::move(inputs), std::move(outputs), std::move(run), deadline});
 }
 
 void ComponentRegistry::Add(std::string type, std::string summary, ComponentFactory factory) {

@@ -13,6 +13,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/ports.h"
+#include "components/framework/state_archive.h"
 
 namespace poise {
 
@@ -21,6 +22,20 @@ struct Tick {
   int64_t index = 0;
   int64_t utime = 0;  ///< us since the start of the run, time of validity
   double time = 0;    ///< s, the same
+  /// s that this cycle began after its time, for the component that owns the clock in real time;
+  /// else 0.
+  double lateness = 0;
+};
+
+/// Hardware at the other end of a file descriptor, which a component answers for while its process
+/// waits for messages. Only processes serve devices. No call may allocate, throw or block.
+class Device {
+ public:
+  virtual ~Device() = default;
+  /// Readable when there is something to serve.
+  virtual int fd() const = 0;
+  /// Called whenever fd() is readable, and at least once a tick period.
+  virtual void Serve() = 0;
 };
 
 /// Objects that components inside one process share (e.g. the robot's dynamics of this tick), by
@@ -68,6 +83,9 @@ struct Stage {
   std::vector<InputPort*> inputs;
   std::vector<OutputPort*> outputs;
   std::function<void(const Tick&)> run;
+  /// Share of the period after the cycle's start at which the owner of the clock runs this stage in
+  /// real time, whether its inputs are there or not. Others wait.
+  double deadline = 1;
 };
 
 /// Collects the ports and stages that a component declares in Configure. Port names are unique per
@@ -80,9 +98,9 @@ class Wiring {
                 InputKind kind = InputKind::kSameTick);
   void AddOutput(OutputPort* port, std::string name, MessageCounts counts);
   /// An output belongs to exactly one stage and is sent when that stage returns. An input may serve
-  /// several.
+  /// several. `deadline`: see Stage, 0 to 1.
   void AddStage(std::string name, std::vector<InputPort*> inputs, std::vector<OutputPort*> outputs,
-                std::function<void(const Tick&)> run);
+                std::function<void(const Tick&)> run, double deadline = 1);
 
   const std::vector<InputPort*>& inputs() const { return inputs_; }
   const std::vector<OutputPort*>& outputs() const { return outputs_; }
@@ -103,6 +121,32 @@ class Component {
   /// Called once, before any tick: reads the configuration, declares ports and stages, allocates
   /// everything. Throws ConfigError on a configuration it cannot work with.
   virtual void Configure(const ComponentContext& context, Wiring* wiring) = 0;
+
+  /// Called by processes only, once, after Configure and before the component says that it is
+  /// ready: starts hardware. May block; devices() of the other processes are served meanwhile.
+  /// Throws std::runtime_error with what to do.
+  virtual void Open() {}
+  /// Called by processes only, once a tick period from Open until the first tick and from the last
+  /// tick until Close: keeps hardware alive that Open has started.
+  virtual void Idle() {}
+  /// Called by processes only, once, when the run has ended in whatever way, after Open has
+  /// returned: brings hardware to rest. May block for a second or two. Empty: done; else what went
+  /// wrong.
+  virtual std::string Close() { return {}; }
+  /// Devices to serve, from Open until after Close. Owned by the component.
+  virtual std::vector<Device*> devices() { return {}; }
+  /// ns by which the next cycle is to begin later (negative: earlier) than a period after this one:
+  /// asked after each tick of the component that owns the clock in real time.
+  virtual int64_t cycle_correction() const { return 0; }
+
+  /// Shows all state that lasts from tick to tick to `archive`, which measures, saves or restores
+  /// it; called between ticks, after Configure. A fresh object with the same configuration and a
+  /// restored state goes on with the same bits. Must not allocate or throw. False: this component
+  /// cannot be taken over.
+  virtual bool Archive(StateArchive* archive) {
+    static_cast<void>(archive);
+    return false;
+  }
 
   /// Non-empty once the component wants the run to end after the current tick, e.g. "robot fell
   /// at 1.234 s". Polled by the runner after each stage. Must stay constant once set.

@@ -17,6 +17,16 @@ void LatencyHistogram::Add(int64_t nanoseconds) {
   max_ = std::max(max_, nanoseconds);
 }
 
+std::array<int64_t, 64> LatencyHistogram::HalfOctaves() const {
+  std::array<int64_t, 64> result{};
+  for (int bucket = 0; bucket < kNumBuckets; ++bucket) {
+    // Buckets 32 to 47 hold the lower half of the octave that starts at 32 ns, and so on.
+    const int half_octave = std::clamp(bucket / 16 - 2, 0, 63);
+    result[static_cast<size_t>(half_octave)] += buckets_[static_cast<size_t>(bucket)];
+  }
+  return result;
+}
+
 double LatencyHistogram::Quantile(double quantile) const {
   if (count_ == 0) return 0;
   const auto wanted = std::clamp<int64_t>(

@@ -19,6 +19,8 @@ class LatencyHistogram {
   double p99() const { return Quantile(0.99); }                    ///< us
   double max() const { return static_cast<double>(max_) * 1e-3; }  ///< us
   int64_t count() const { return count_; }
+  /// Samples by half octaves, as health_t::latency_count describes them.
+  std::array<int64_t, 64> HalfOctaves() const;
 
  private:
   static constexpr int kSubBits = 5;

@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "poise/message_traits.hpp"  // generated from lcmtypes
@@ -117,6 +118,13 @@ class OutputPort {
   /// Stamps run, tick and time; the runner calls it before each stage.
   virtual void Stamp(int64_t run_id, int64_t tick, int64_t utime) = 0;
 
+  /// In real time a stage may have nothing to say in a tick (a sensor did not answer): called in
+  /// it, the message of this tick is not sent. Never in lockstep, where readers wait for every
+  /// tick.
+  void Withhold() { withheld_ = true; }
+  /// True once after Withhold.
+  bool TakeWithheld() { return std::exchange(withheld_, false); }
+
   const std::string& name() const { return name_; }
   const MessageCounts& counts() const { return counts_; }
 
@@ -125,6 +133,9 @@ class OutputPort {
   virtual void Allocate() = 0;
   std::string name_;
   MessageCounts counts_;
+
+ private:
+  bool withheld_ = false;
 };
 
 /// A component's view of one output: fill `*port` during the stage, the runner sends it when the

@@ -441,6 +441,7 @@ void ProcessRunner::Impl::PublishHealth(int64_t now) {
   health.latency_median = latency_.median();
   health.latency_p99 = latency_.p99();
   health.latency_max = latency_.max();
+  std::ranges::copy(latency_.HalfOctaves(), health.latency_count);
   CountSend(service_.SendHealth());
   // Also covers a report that was lost.
   if (must_report_ && tick_ > 0) ReportProgress();

@@ -29,6 +29,24 @@ TEST(LatencyHistogram, AgreesWithSortedSamples) {
   EXPECT_EQ(histogram.count(), 20001);
 }
 
+TEST(LatencyHistogram, CountsByHalfOctaves) {
+  LatencyHistogram histogram;
+  for (const int64_t ns : {-1, 0, 47}) histogram.Add(ns);   // bin 0: what is shorter, and [32, 48)
+  histogram.Add(48);                                        // bin 1: [48, 64)
+  for (const int64_t ns : {1024, 1535}) histogram.Add(ns);  // 2^10: bin 10
+  histogram.Add(1536);
+  histogram.Add(INT64_MAX);
+  const auto bins = histogram.HalfOctaves();
+  EXPECT_EQ(bins[0], 3);
+  EXPECT_EQ(bins[1], 1);
+  EXPECT_EQ(bins[10], 2);
+  EXPECT_EQ(bins[11], 1);
+  EXPECT_EQ(bins[63], 1);
+  int64_t sum = 0;
+  for (const int64_t bin : bins) sum += bin;
+  EXPECT_EQ(sum, histogram.count());
+}
+
 TEST(LatencyHistogram, EdgeValues) {
   LatencyHistogram histogram;
   EXPECT_EQ(histogram.median(), 0);

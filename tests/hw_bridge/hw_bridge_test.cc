@@ -167,7 +167,10 @@ TEST(HwBridge, MissingCommandsLeadToDampingAndToAStop) {
     bridge.Step(false);
     states.push_back(bridge.status().state);
   }
-  EXPECT_THAT(states, testing::ElementsAre(1, 2, 2, 3, 3, 3));
+  using S = bridge_status_t;
+  EXPECT_THAT(states,
+              testing::ElementsAre(S::STATE_RUNNING, S::STATE_DAMPING, S::STATE_DAMPING,
+                                   S::STATE_STOPPING, S::STATE_STOPPING, S::STATE_STOPPING));
   EXPECT_EQ(bridge.drives().enabled, std::vector<int8_t>(kMotors, 0));
 }
 
