@@ -15,10 +15,8 @@ using Eigen::Vector3d;
 constexpr double kMaxRate = 100;          // rad/s, gyro and joints
 constexpr double kMaxAcceleration = 1e3;  // m/s²
 constexpr double kMaxSpeed = 100;         // m/s
-constexpr double kMaxLoad = 100;          // shares of the robot's weight
+constexpr double kLongestStep = 1;        // s: what lies further back is not extrapolated
 constexpr double kMaxGyroBias = 0.05;     // rad/s: any larger is a broken sensor, not a bias
-// Feet without load at first: beyond this difference of height, m, only the lower one stands.
-constexpr double kLevel = 0.01;
 // At rest: for this long, s, no joint leaves its first position by more, rad (a few encoder
 // counts), and no foot its first load, share of the weight.
 constexpr double kRestTime = 0.2;
@@ -44,16 +42,6 @@ Vector3d RotationError(const Matrix3d& to, const Matrix3d& from) {
   return 0.5 * Vector3d(e(2, 1) - e(1, 2), e(0, 2) - e(2, 0), e(1, 0) - e(0, 1));
 }
 
-// One Newton step to the nearest rotation: undoes the rounding of a step.
-Matrix3d Orthonormal(const Matrix3d& m) {
-  return m * (1.5 * Matrix3d::Identity() - 0.5 * m.transpose() * m);
-}
-
-double SmoothStep(double x) {
-  const double s = std::clamp(x, 0.0, 1.0);
-  return s * s * (3 - 2 * s);
-}
-
 }  // namespace
 
 BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
@@ -63,8 +51,7 @@ BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
       period_(period),
       weight_(model_->total_mass() * robot::kGravity),
       velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff),
-      base_frame_state_(model_->num_joints()),
-      data_(*model_),
+      kinematics_(model_),
       state_(model_->num_joints()),
       joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
       rest_position_(Eigen::VectorXd::Zero(model_->num_joints())) {
@@ -74,15 +61,15 @@ BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
 Eigen::Isometry3d BaseEstimator::foot_pose(int foot) const {
   const Foot& f = feet_[static_cast<size_t>(foot)];
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = orientation_ * f.rotation;
+  pose.linear() = orientation_ * kinematics_.sole(static_cast<size_t>(foot)).rotation;
   pose.translation() = state_.base_position + f.last_offset;
   return pose;
 }
 
 void BaseEstimator::Update(const BaseSensors& sensors, double dt) {
-  dt = std::clamp(dt, 0.1 * period_, 10 * period_);
+  dt = std::clamp(dt, 0.1 * period_, std::max(kLongestStep, period_));
   UpdateJoints(sensors, dt);
-  UpdateKinematics();
+  kinematics_.Update(state_.joint_position, state_.joint_velocity);
   UpdateWeights(sensors);
   if (!placed_) {
     Place(sensors);
@@ -96,6 +83,17 @@ void BaseEstimator::Update(const BaseSensors& sensors, double dt) {
   state_.base_angular_velocity = orientation_ * angular_velocity_;
 }
 
+void BaseEstimator::Archive(StateArchive* archive) {
+  velocity_filter_.Archive(archive);
+  archive->Show(state_.base_position, state_.base_orientation, state_.base_linear_velocity,
+                state_.base_angular_velocity, state_.joint_position, state_.joint_velocity,
+                orientation_, gyro_bias_, imu_orientation_, gyro_, imu_rotation_, angular_velocity_,
+                imu_velocity_, imu_acceleration_);
+  for (Foot& foot : feet_) archive->Show(foot.last_offset, foot.anchor);
+  archive->Show(foot_weight_, rest_position_, rest_load_, rest_gyro_, rest_samples_, rest_left_,
+                placed_);
+}
+
 void BaseEstimator::UpdateJoints(const BaseSensors& sensors, double dt) {
   if (placed_) {
     joint_rate_ = ((sensors.joint_position - state_.joint_position) / dt)
@@ -107,75 +105,31 @@ void BaseEstimator::UpdateJoints(const BaseSensors& sensors, double dt) {
   state_.joint_velocity = velocity_filter_.value();
 }
 
-void BaseEstimator::UpdateKinematics() {
-  base_frame_state_.joint_position = state_.joint_position;
-  base_frame_state_.joint_velocity = state_.joint_velocity;
-  robot::ComputeKinematics(*model_, base_frame_state_, &data_);
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    const robot::FootModel& model = model_->feet()[i];
-    const size_t b = static_cast<size_t>(model.body);
-    const Vector3d arm = data_.body_rotation[b] * model.sole.translation();
-    Foot& foot = feet_[i];
-    foot.position = data_.body_position[b] + arm;
-    foot.rotation.noalias() = data_.body_rotation[b] * model.sole.linear();
-    foot.velocity = data_.body_linear_velocity[b] + data_.body_angular_velocity[b].cross(arm);
-  }
-}
-
 void BaseEstimator::UpdateWeights(const BaseSensors& sensors) {
-  std::array<double, 2> pull;
-  double sum = 0, grip = 0;
+  const FootWeights weights =
+      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+  grip_ = weights.standing;
   for (size_t i = 0; i < feet_.size(); ++i) {
-    const double load = std::clamp(sensors.foot_load[i] / weight_, 0.0, kMaxLoad);
-    feet_[i].grip =
-        SmoothStep((load - config_.light_load) / (config_.full_load - config_.light_load));
-    pull[i] = feet_[i].grip * load;
-    sum += pull[i];
-    grip += feet_[i].grip;
-  }
-  grip_ = sum > 0 ? std::min(grip, 1.0) : 0.0;
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    feet_[i].weight = sum > 0 ? pull[i] / sum : 0.0;
+    feet_[i].grip = weights.grip[i];
+    feet_[i].weight = weights.share[i];
     foot_weight_[i] = grip_ * feet_[i].weight;
   }
 }
 
 void BaseEstimator::Place(const BaseSensors& sensors) {
-  std::array<double, 2> weight = {feet_[0].weight, feet_[1].weight};
-  const auto normal = [&] {
-    return Vector3d(weight[0] * feet_[0].rotation.col(2) + weight[1] * feet_[1].rotation.col(2))
-        .normalized();
-  };
-  if (grip_ == 0) {
-    weight = {0.5, 0.5};
-    const double right_above_left = normal().dot(feet_[0].position - feet_[1].position);
-    if (right_above_left > kLevel) weight = {0, 1};
-    if (right_above_left < -kLevel) weight = {1, 0};
-  }
-  const Vector3d up = normal();
-  Vector3d left = feet_[1].position - feet_[0].position;
-  left -= up.dot(left) * up;
-  if (left.norm() < 1e-6) left = up.cross(Vector3d::UnitX());  // soles over each other
-  if (left.norm() < 1e-6) left = Vector3d::UnitY();
-  left.normalize();
-  orientation_.row(0) = left.cross(up);
-  orientation_.row(1) = left;
-  orientation_.row(2) = up;
-  if (!orientation_.allFinite()) orientation_.setIdentity();  // soles facing each other
-  orientation_ = Orthonormal(orientation_);
+  const Placement placement = PlaceOnGround(
+      kinematics_, WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load));
+  orientation_ = placement.orientation;
   state_.base_orientation = Quaterniond(orientation_).normalized();
-
-  const Vector3d right_offset = orientation_ * feet_[0].position;
-  const Vector3d left_offset = orientation_ * feet_[1].position;
-  state_.base_position = -0.5 * (right_offset + left_offset);
-  state_.base_position.z() = -(weight[0] * right_offset.z() + weight[1] * left_offset.z());
+  state_.base_position = placement.position;
   state_.base_linear_velocity.setZero();
   StartGyroBias(sensors);
   ReadImu(sensors);
   imu_orientation_ = Quaterniond(orientation_ * imu_rotation_).normalized();
   for (size_t i = 0; i < feet_.size(); ++i) {
-    feet_[i].last_offset = orientation_ * feet_[i].position;
-    feet_[i].anchor.linear() = orientation_ * feet_[i].rotation;
+    const Sole& sole = kinematics_.sole(i);
+    feet_[i].last_offset = orientation_ * sole.position;
+    feet_[i].anchor.linear() = orientation_ * sole.rotation;
     feet_[i].anchor.translation() = state_.base_position + feet_[i].last_offset;
   }
 }
@@ -211,15 +165,10 @@ void BaseEstimator::AverageGyroBias(const BaseSensors& sensors, double dt) {
 }
 
 void BaseEstimator::ReadImu(const BaseSensors& sensors) {
-  const robot::ImuModel& imu = model_->imu();
-  const size_t b = static_cast<size_t>(imu.body);
-  imu_rotation_.noalias() = data_.body_rotation[b] * imu.pose.linear();
-  const Vector3d arm = data_.body_rotation[b] * imu.pose.translation();
-  const Vector3d& relative_rotation = data_.body_angular_velocity[b];
+  imu_rotation_ = kinematics_.imu_rotation();
   gyro_ = Clamp(sensors.angular_velocity, kMaxRate) - gyro_bias_;
-  angular_velocity_ = imu_rotation_ * gyro_ - relative_rotation;
-  imu_velocity_ = angular_velocity_.cross(data_.body_position[b] + arm) +
-                  data_.body_linear_velocity[b] + relative_rotation.cross(arm);
+  angular_velocity_ = imu_rotation_ * gyro_ - kinematics_.imu_angular_velocity();
+  imu_velocity_ = angular_velocity_.cross(kinematics_.imu_position()) + kinematics_.imu_velocity();
   imu_acceleration_ = imu_rotation_ * Clamp(sensors.acceleration, kMaxAcceleration);
 }
 
@@ -255,8 +204,9 @@ void BaseEstimator::UpdateOrientation(const BaseSensors& sensors, double dt) {
 }
 
 void BaseEstimator::UpdateTrust() {
-  for (Foot& foot : feet_) {
-    foot.turn = RotationError(foot.anchor.linear(), orientation_ * foot.rotation);
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    feet_[i].turn =
+        RotationError(feet_[i].anchor.linear(), orientation_ * kinematics_.sole(i).rotation);
   }
   // Gyro, right and left foot have a vote each: a foot has turned when neither of the others agrees
   // with it.
@@ -271,11 +221,13 @@ void BaseEstimator::UpdateTrust() {
 
 void BaseEstimator::UpdatePosition(double dt) {
   Vector3d step = Vector3d::Zero(), foot_speed = Vector3d::Zero();
-  for (Foot& foot : feet_) {
-    const Vector3d offset = orientation_ * foot.position;
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    Foot& foot = feet_[i];
+    const Sole& sole = kinematics_.sole(i);
+    const Vector3d offset = orientation_ * sole.position;
     step -= foot.weight * (offset - foot.last_offset);
     foot_speed +=
-        foot.weight * (orientation_ * (angular_velocity_.cross(foot.position) + foot.velocity));
+        foot.weight * (orientation_ * (angular_velocity_.cross(sole.position) + sole.velocity));
     foot.last_offset = offset;
   }
   // The IMU's velocity is integrated rather than the base's: that needs no angular acceleration.
@@ -301,16 +253,17 @@ void BaseEstimator::UpdateAnchors(double dt) {
   }
   for (size_t i = 0; i < feet_.size(); ++i) {
     Foot& foot = feet_[i];
+    const Matrix3d rotation = orientation_ * kinematics_.sole(i).rotation;
     if (foot.grip == 0) {
-      foot.anchor.linear() = orientation_ * foot.rotation;
+      foot.anchor.linear() = rotation;
       foot.anchor.translation() += shift[i];
       continue;
     }
     const double loose = 1 - foot.grip, standing = foot.grip * share;
     // Less the mean: disagreement vanishes, while the weighted mean of the anchors stays.
     foot.anchor.translation() += loose * shift[i] + standing * (shift[i] - mean_shift);
-    const Vector3d turn = (loose + standing * (1 - foot.trust)) *
-                          RotationError(orientation_ * foot.rotation, foot.anchor.linear());
+    const Vector3d turn =
+        (loose + standing * (1 - foot.trust)) * RotationError(rotation, foot.anchor.linear());
     foot.anchor.linear() = Orthonormal(Exp(turn).toRotationMatrix() * foot.anchor.linear());
   }
   state_.base_position -= grip_ * share * mean_shift;

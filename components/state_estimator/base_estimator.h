@@ -19,8 +19,10 @@
 #include <array>
 #include <memory>
 
+#include "components/framework/state_archive.h"
 #include "components/robot/dynamics.h"
 #include "components/state_estimator/low_pass.h"
+#include "components/state_estimator/sole_kinematics.h"
 
 namespace poise {
 
@@ -46,7 +48,7 @@ struct BaseSensors {
 
 class BaseEstimator {
  public:
-  /// `period` s, nominal, > 0: steps are taken to last between a tenth and ten of it.
+  /// `period` s, nominal, > 0: steps are taken to last from a tenth of it to 1 s.
   BaseEstimator(std::shared_ptr<const robot::RobotModel> model, const BaseEstimatorConfig& config,
                 double period);
 
@@ -55,6 +57,9 @@ class BaseEstimator {
   /// midpoint between the soles at x = y = 0, y along the line from the right to the left sole; at
   /// rest. Any finite input gives a finite state. Allocates nothing.
   void Update(const BaseSensors& sensors, double dt);
+
+  /// Shows all that lasts from step to step.
+  void Archive(StateArchive* archive);
 
   /// Base and joints; joint velocities filtered.
   const robot::RobotState& state() const { return state_; }
@@ -70,10 +75,6 @@ class BaseEstimator {
 
  private:
   struct Foot {
-    // In the base frame.
-    Eigen::Vector3d position;
-    Eigen::Matrix3d rotation;
-    Eigen::Vector3d velocity;  ///< of the sole's origin, relative to the base
     // From the base origin, world axes, of the step before.
     Eigen::Vector3d last_offset;
     Eigen::Isometry3d anchor;  ///< in the world
@@ -84,7 +85,6 @@ class BaseEstimator {
   };
 
   void UpdateJoints(const BaseSensors& sensors, double dt);
-  void UpdateKinematics();
   void UpdateWeights(const BaseSensors& sensors);
   void Place(const BaseSensors& sensors);
   void StartGyroBias(const BaseSensors& sensors);
@@ -100,9 +100,7 @@ class BaseEstimator {
   double period_;
   double weight_;  // N, of the robot
   LowPass velocity_filter_;
-  robot::RobotState
-      base_frame_state_;  // base at the origin and at rest, for kinematics in the base frame
-  robot::RobotData data_;
+  SoleKinematics kinematics_;
   robot::RobotState state_;
   Eigen::VectorXd joint_rate_;  // rad/s, unfiltered
   Eigen::Matrix3d orientation_ = Eigen::Matrix3d::Identity();

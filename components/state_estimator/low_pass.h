@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 
+#include "components/framework/state_archive.h"
+
 namespace poise {
 
 /// H(s) = ω²/(s² + √2 ω s + ω²), integrated by the trapezoidal rule with the input held over the
@@ -15,6 +17,7 @@ class LowPass {
   /// One step of `dt` s with `input`; the output is value().
   void Step(const Eigen::VectorXd& input, double dt);
   const Eigen::VectorXd& value() const { return value_; }
+  void Archive(StateArchive* archive) { archive->Show(value_, rate_); }
 
  private:
   double omega_;

@@ -61,6 +61,12 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   estimator_ = std::make_unique<BaseEstimator>(model, config, context.tick_period);
 }
 
+bool StateEstimator::Archive(StateArchive* archive) {
+  archive->Show(last_time_);
+  estimator_->Archive(archive);
+  return true;
+}
+
 void StateEstimator::Estimate(const Tick& tick) {
   const robot_sensors_t& in = *robot_sensors_;
   const BaseSensors sensors = {

@@ -15,6 +15,7 @@ class StateEstimator : public Component {
  public:
   /// Resources "robot", "urdf"; configuration StateEstimatorConfig.
   void Configure(const ComponentContext& context, Wiring* wiring) override;
+  bool Archive(StateArchive* archive) override;
 
  private:
   void Estimate(const Tick& tick);

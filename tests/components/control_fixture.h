@@ -54,6 +54,7 @@ class Harness {
     for (OutputPort* output : wiring_.outputs()) output->Stamp(1, tick.index, tick.utime);
     for (const Stage& stage : wiring_.stages()) stage.run(tick);
   }
+  T& component() { return component_; }
   void RunStage(size_t index, const Tick& tick) { wiring_.stages()[index].run(tick); }
   template <class M>
   const M& output() const {

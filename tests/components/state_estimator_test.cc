@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "tests/components/base_motion.h"
 #include "tests/components/control_fixture.h"
 
@@ -88,6 +91,105 @@ TEST(StateEstimator, ReportsTheGyroBias) {
   const Vector3d found(harness.output<robot_state_t>().imu_bias_angular_velocity);
   EXPECT_LT((found - bias).norm(), 0.01 * bias.norm());
 }
+
+template <class Message>
+std::vector<uint8_t> Encoded(const Message& message) {
+  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+  EXPECT_EQ(message.encode(bytes.data(), 0, message.getEncodedSize()), message.getEncodedSize());
+  return bytes;
+}
+
+// Shifts the weight to the right foot, lifts the left one and puts it down again, swaying.
+void Step(BaseMotion* motion) {
+  const Vector3d p = motion->start().base_position;
+  motion->script().base_position = [=](double t) -> Vector3d {
+    return p + Vector3d(0.02 * std::sin(3 * t), -0.03 * std::sin(2 * t), -0.03);
+  };
+  const Eigen::Isometry3d start = motion->script().foot[1](0);
+  motion->script().foot[1] = [=](double t) -> Eigen::Isometry3d {
+    const double s = std::clamp((t - 0.4) / 0.4, 0.0, 1.0);
+    return Eigen::Translation3d(0, 0, 0.02 * std::pow(std::sin(std::numbers::pi * s), 2)) * start;
+  };
+  motion->script().load[1] = [](double t) { return t > 0.4 && t < 0.8 ? 0.0 : 0.5; };
+  motion->script().load[0] = [load = motion->script().load[1]](double t) { return 1 - load(t); };
+}
+
+class AnyMethod : public testing::TestWithParam<std::string> {};
+
+// The state is saved at rest, while the gyro's bias is averaged, in the air and on both feet.
+TEST_P(AnyMethod, AFreshEstimatorGoesOnWithASavedStateAndTheSameBits) {
+  for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
+    for (const int64_t taken_over : {1, 40, 300, 450}) {
+      BaseMotion motion(robot::RobotPath(robot));
+      Step(&motion);
+      motion.errors() = TypicalErrors(*motion.model());
+      ControlContext context(robot);
+      Harness<StateEstimator> first(&context, GetParam());
+      Harness<StateEstimator> second(&context, GetParam());
+      for (int64_t tick = 0; tick < taken_over + 200; ++tick) {
+        motion.Next();
+        const robot_sensors_t sensors = Message(motion.sensors());
+        if (tick == taken_over) {
+          StateArchive measure;
+          ASSERT_TRUE(first.component().Archive(&measure));
+          std::vector<uint8_t> bytes(measure.size());
+          StateArchive save = StateArchive::Saving(bytes);
+          ASSERT_TRUE(first.component().Archive(&save) && save.ok());
+          StateArchive restore = StateArchive::Restoring(bytes);
+          ASSERT_TRUE(second.component().Archive(&restore) && restore.ok());
+          ASSERT_EQ(restore.size(), bytes.size());
+        }
+        first.Bind("robot_sensors", &sensors);
+        first.Run(TickAt(tick));
+        if (tick < taken_over) continue;
+        second.Bind("robot_sensors", &sensors);
+        second.Run(TickAt(tick));
+        ASSERT_EQ(Encoded(second.output<robot_state_t>()), Encoded(first.output<robot_state_t>()))
+            << tick;
+      }
+    }
+  }
+}
+
+// In real time inputs may come too late: the next one is then several periods away.
+TEST_P(AnyMethod, SkippedTicksAreBridged) {
+  BaseMotion motion(robot::RobotPath(TestRobot::kDyros));
+  const Vector3d start = motion.start().base_position;
+  // Constant acceleration, then constant speed: what is skipped lies in both.
+  constexpr double kAcceleration = 0.2, kUntil = 0.5;
+  motion.script().base_position = [=](double t) -> Vector3d {
+    const double s = std::max(t - 0.3, 0.0), a = std::min(s, kUntil);
+    const double way = 0.5 * kAcceleration * a * a + kAcceleration * a * (s - a);
+    return start + Vector3d(0, way, -0.05);
+  };
+  ControlContext context(TestRobot::kDyros);
+  Harness<StateEstimator> harness(&context, GetParam());
+  constexpr int64_t kGap = 25;  // ticks, 50 ms
+  for (int64_t tick = 0; tick < 600; ++tick) {
+    motion.Next();
+    // Every seventh tick beside the gaps, too.
+    if (tick % 7 == 3 || (tick > 200 && tick < 200 + kGap) || (tick > 480 && tick < 480 + kGap)) {
+      continue;
+    }
+    const robot_sensors_t sensors = Message(motion.sensors());
+    harness.Bind("robot_sensors", &sensors);
+    harness.Run(TickAt(tick));
+    const robot_state_t& state = harness.output<robot_state_t>();
+    const robot::RobotState& truth = motion.truth();
+    // The filter of the joint velocities lags by √2 / (2 π 20 Hz), and by half a gap after one.
+    const double lag = 0.0113 + 0.5 * 0.002 * kGap;
+    ASSERT_LT((Vector3d(state.base_linear_velocity) - truth.base_linear_velocity).norm(),
+              kAcceleration * lag + 2e-3)
+        << tick;
+    ASSERT_LT((Vector3d(state.base_position) - truth.base_position).norm(), 1e-3) << tick;
+  }
+  const double speed = motion.truth().base_linear_velocity.y();
+  EXPECT_NEAR(speed, kAcceleration * kUntil, 1e-6);
+  EXPECT_NEAR(harness.output<robot_state_t>().base_linear_velocity[1], speed, 2e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, AnyMethod, testing::Values(""),
+                         [](const auto&) { return "AnchoredFeet"; });
 
 struct ConfigCase {
   const char* text;

@@ -1,0 +1,80 @@
+// Where soles and IMU are in the base frame, and where the base is when the soles stand on the
+// ground.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+
+#include "components/robot/dynamics.h"
+
+namespace poise {
+
+/// A sole in the base frame.
+struct Sole {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< m
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< sole to base
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s, of its origin
+};
+
+/// Kinematics with the base held at the origin: all in the base frame. Allocates nothing after
+/// construction.
+class SoleKinematics {
+ public:
+  explicit SoleKinematics(std::shared_ptr<const robot::RobotModel> model);
+
+  /// `position` rad, `velocity` rad/s, by joint.
+  void Update(const Eigen::Ref<const Eigen::VectorXd>& position,
+              const Eigen::Ref<const Eigen::VectorXd>& velocity);
+
+  const Sole& sole(size_t foot) const { return soles_[foot]; }           ///< right first
+  const Eigen::Matrix3d& imu_rotation() const { return imu_rotation_; }  ///< IMU to base
+  const Eigen::Vector3d& imu_position() const { return imu_position_; }  ///< m
+  const Eigen::Vector3d& imu_velocity() const { return imu_velocity_; }  ///< m/s
+  /// rad/s, of the IMU; not zero only with joints between it and the base.
+  const Eigen::Vector3d& imu_angular_velocity() const { return imu_angular_velocity_; }
+
+  /// What rates of the joints (rad/s) make of a sole's motion relative to the IMU, in base axes:
+  /// column of joint `joint` of the 6×n Jacobian, linear (of the sole's origin, for an observer who
+  /// turns with the IMU) over angular. Zero for a joint between neither.
+  robot::Vector6d RelativeColumn(size_t foot, int joint) const;
+  /// Joints with a column that is not zero.
+  const std::vector<int>& joints(size_t foot) const { return joints_[foot]; }
+
+ private:
+  std::shared_ptr<const robot::RobotModel> model_;
+  robot::RobotState state_;  // base at the origin and at rest
+  robot::RobotData data_;
+  std::array<Sole, 2> soles_;
+  std::array<std::vector<int>, 2> joints_;
+  std::array<std::vector<double>, 2> sign_;  // by joint: 1 between base and sole, −1 base and IMU
+  Eigen::Matrix3d imu_rotation_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d imu_position_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d imu_velocity_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d imu_angular_velocity_ = Eigen::Vector3d::Zero();
+};
+
+/// How far feet stand by their loads.
+struct FootWeights {
+  std::array<double, 2> grip{};   ///< 0: light; 1: stands
+  std::array<double, 2> share{};  ///< among the gripping feet, sums to 1; 0 when none grips
+  double standing = 0;            ///< 0: in flight; 1: the robot stands
+};
+/// `load`: N, upward force on each sole; `robot_weight` N. A foot grips from `light_load` on and
+/// fully from `full_load` on, shares of the weight.
+FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, double light_load,
+                      double full_load);
+
+struct Placement {
+  Eigen::Matrix3d orientation = Eigen::Matrix3d::Identity();  ///< base to world
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();         ///< m, of the base
+};
+/// The base in the world when the soles that carry load stand flat on level ground (without load
+/// the lower one, or both): z = 0 at their height, the midpoint between the soles at x = y = 0, y
+/// along the line from the right to the left sole.
+Placement PlaceOnGround(const SoleKinematics& kinematics, const FootWeights& weights);
+
+/// One Newton step to the nearest rotation: undoes the rounding of a step.
+Eigen::Matrix3d Orthonormal(const Eigen::Matrix3d& m);
+
+}  // namespace poise
