@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
+#include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 
@@ -54,6 +55,12 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   wiring->AddStage("balance", {&robot_state_, &task_torque_}, {&balance_torque_},
                    [this](const Tick&) { Balance(); });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
+}
+
+bool ContactWrenchMonitor::Archive(StateArchive* archive) {
+  archive->Show(in_contact_);
+  ArchiveMessage(&*balance_torque_, archive);
+  return true;
 }
 
 void ContactWrenchMonitor::Prepare() {

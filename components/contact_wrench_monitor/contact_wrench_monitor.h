@@ -24,6 +24,7 @@ namespace poise {
 class ContactWrenchMonitor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
+  bool Archive(StateArchive* archive) override;
 
  private:
   void Prepare();

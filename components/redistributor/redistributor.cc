@@ -5,6 +5,7 @@
 
 #include "components/balance/contact_transition.h"
 #include "components/balance/redistribution.h"
+#include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/redistributor/redistributor.pb.h"
@@ -54,6 +55,11 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("redistribute", {&robot_state_, &task_torque_, &balance_torque_},
                    {&joint_command_}, [this](const Tick& tick) { Redistribute(tick.time); });
+}
+
+bool Redistributor::Archive(StateArchive* archive) {
+  ArchiveMessage(&*joint_command_, archive);
+  return true;
 }
 
 void Redistributor::Prepare() {

@@ -27,6 +27,7 @@ namespace poise {
 class Redistributor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
+  bool Archive(StateArchive* archive) override;
 
  private:
   using Wrenches = std::array<balance::Vector6d, 2>;

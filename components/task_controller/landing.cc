@@ -163,4 +163,12 @@ bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& 
   return true;
 }
 
+void Landing::Archive(StateArchive* archive) {
+  touch_.Archive(archive);
+  archive->Show(state_, time_, period_, load_, touched_, left_, lowered_, move_end_, end_height_);
+  reference_.Archive(archive);
+  archive->Show(rotation_);
+  retreat_.Archive(archive);
+}
+
 }  // namespace poise

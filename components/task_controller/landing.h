@@ -21,6 +21,7 @@ class TouchDetector {
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   bool Update(double time, double load);
   bool touching() const { return touching_; }
+  void Archive(StateArchive* archive) { archive->Show(touching_, changing_, since_); }
 
  private:
   ContactConfirmation config_;
@@ -61,6 +62,7 @@ class Landing {
   bool Update(bool before_touch_down, bool due, const Eigen::Isometry3d& sole,
               PointMotion* reference, Eigen::Matrix3d* rotation);
   State state() const { return state_; }
+  void Archive(StateArchive* archive);
 
  private:
   void Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation);

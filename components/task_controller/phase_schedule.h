@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "components/framework/state_archive.h"
 #include "components/task_controller/task_controller.pb.h"
 
 namespace poise {
@@ -53,6 +54,9 @@ class PhaseSchedule {
   /// The phase under way stands on one foot, the next on both.
   bool BeforeTouchDown() const;
   const ScheduleState& state() const { return state_; }
+  void Archive(StateArchive* archive) {
+    archive->Show(state_, began_, transition_began_, transition_start_, shift_);
+  }
 
  private:
   bool Unloads() const;

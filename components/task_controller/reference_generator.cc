@@ -71,6 +71,25 @@ PointMotion ReferencePoint::At(double time) {
   return move_.At(time);
 }
 
+void ReferencePoint::Archive(StateArchive* archive) {
+  move_.Archive(archive);
+  archive->Show(pending_, target_, start_, duration_);
+}
+
+void References::Archive(StateArchive* archive) {
+  com.Archive(archive);
+  archive->Show(body_rotation);
+  for (PointMotion& motion : foot) motion.Archive(archive);
+  archive->Show(foot_rotation);
+}
+
+void ReferenceGenerator::Archive(StateArchive* archive) {
+  archive->Show(anchored_, foot_free_);
+  com_.Archive(archive);
+  for (ReferencePoint& foot : foot_) foot.Archive(archive);
+  references_.Archive(archive);
+}
+
 Eigen::Vector3d ReferenceGenerator::ComTarget(const ComReference& com,
                                               const EstimatedPose& estimate,
                                               const Eigen::Vector3d& standing) const {

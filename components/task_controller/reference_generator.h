@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
+#include "components/framework/state_archive.h"
 #include "components/task_controller/task_controller.pb.h"
 
 namespace poise {
@@ -14,17 +15,21 @@ struct PointMotion {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
+
+  void Archive(StateArchive* archive) { archive->Show(position, velocity, acceleration); }
 };
 
 /// Quintic in time from a given motion to rest at a target; from rest it is the minimum-jerk line.
 /// Holds before and after.
 class QuinticMove {
  public:
+  QuinticMove() { Hold(Eigen::Vector3d::Zero()); }
   /// At rest at `position` for all time.
   void Hold(const Eigen::Vector3d& position);
   /// From `from` at `start` to rest at `target` at start + duration, s. Duration 0 is a step.
   void Begin(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
   PointMotion At(double time) const;
+  void Archive(StateArchive* archive) { archive->Show(coefficient_, start_, duration_); }
 
  private:
   std::array<Eigen::Vector3d, 6> coefficient_;  // of powers of (time − start) / duration
@@ -43,6 +48,7 @@ class ReferencePoint {
   /// Where and when, s, the last move ends.
   const Eigen::Vector3d& target() const { return target_; }
   double end() const { return start_ + duration_; }
+  void Archive(StateArchive* archive);
 
  private:
   QuinticMove move_;
@@ -65,6 +71,8 @@ struct References {
   std::array<PointMotion, 2> foot;  ///< sole centre; meaningful for a foot out of contact
   std::array<Eigen::Matrix3d, 2> foot_rotation{Eigen::Matrix3d::Identity(),
                                                Eigen::Matrix3d::Identity()};
+
+  void Archive(StateArchive* archive);
 };
 
 /// References start from the estimated pose, and at each phase from where they stand, in position,
@@ -78,6 +86,7 @@ class ReferenceGenerator {
   /// From here on the free foot rests there; its moves under way and to come are dropped.
   void HoldFoot(size_t foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
   const ReferencePoint& foot(size_t index) const { return foot_[index]; }
+  void Archive(StateArchive* archive);
 
  private:
   Eigen::Vector3d ComTarget(const ComReference& com, const EstimatedPose& estimate,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 
@@ -111,6 +112,16 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
     SetPose(Eigen::Isometry3d::Identity(), &task_torque_->foot_pose[i]);
     SetPose(Eigen::Isometry3d::Identity(), &task_torque_->foot_desired[i]);
   }
+}
+
+bool TaskController::Archive(StateArchive* archive) {
+  schedule_->Archive(archive);
+  generator_.Archive(archive);
+  for (Landing& landing : landing_) landing.Archive(archive);
+  references_.Archive(archive);
+  archive->Show(in_contact_, started_, last_controlled_, posture_reference_);
+  ArchiveMessage(&*task_torque_, archive);
+  return true;
 }
 
 void TaskController::Step(const Tick& tick) { task_torque_->status = Control(tick.time); }

@@ -25,6 +25,7 @@ namespace poise {
 class TaskController : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
+  bool Archive(StateArchive* archive) override;
 
  private:
   void Step(const Tick& tick);

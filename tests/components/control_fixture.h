@@ -3,12 +3,15 @@
 // solved as one dense system.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <map>
 #include <memory>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "components/framework/component.h"
 #include "components/robot/dynamics.h"
@@ -56,6 +59,20 @@ class Harness {
   }
   T& component() { return component_; }
   void RunStage(size_t index, const Tick& tick) { wiring_.stages()[index].run(tick); }
+  /// The component's state, as bytes.
+  std::vector<uint8_t> Save() {
+    StateArchive measure;
+    EXPECT_TRUE(component_.Archive(&measure));
+    std::vector<uint8_t> bytes(measure.size());
+    StateArchive save = StateArchive::Saving(bytes);
+    EXPECT_TRUE(component_.Archive(&save) && save.ok());
+    return bytes;
+  }
+  void Restore(const std::vector<uint8_t>& bytes) {
+    StateArchive restore = StateArchive::Restoring(bytes);
+    EXPECT_TRUE(component_.Archive(&restore) && restore.ok());
+    EXPECT_EQ(restore.size(), bytes.size());
+  }
   template <class M>
   const M& output() const {
     return *static_cast<const M*>(wiring_.outputs().front()->message());
