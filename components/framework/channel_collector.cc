@@ -16,6 +16,8 @@ constexpr int64_t kMillisecond = 1'000'000;
 constexpr int64_t kHealthInterval = 50 * kMillisecond;
 constexpr int64_t kFirstRequest = 2 * kMillisecond;
 constexpr int64_t kLastRequest = 50 * kMillisecond;
+constexpr int64_t kGiveUp =
+    100 * kMillisecond;     // in real time, on a message that has been asked for
 constexpr int kBatch = 64;  // packets of a channel handled before the next channel's turn
 
 struct Lane {
@@ -35,7 +37,8 @@ struct Lane {
   ChannelCollector::ChannelStatistics statistics;
   int64_t waiting_since = 0;  // ns; of next_tick
   int64_t wait = kFirstRequest;
-  bool asked = false;  // for next_tick
+  int64_t asked_at = 0;  // ns, first time
+  bool asked = false;    // for next_tick
 };
 
 }  // namespace
@@ -57,10 +60,13 @@ class ChannelCollector::Impl {
   void Deliver(Lane& lane, int64_t now);
   void ReceiveService();
   void Request(int64_t now);
+  /// In real time a component may skip ticks: goes on without what nobody can send.
+  void GiveUp(Lane& lane, int64_t now, int64_t expected);
   void PublishHealth(int64_t now);
 
   Callbacks callbacks_;
   ServiceLink service_;
+  bool realtime_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   std::vector<pollfd> poll_fds_;
   int64_t newest_tick_ = -1;  // seen on any channel
@@ -72,7 +78,7 @@ class ChannelCollector::Impl {
 };
 
 ChannelCollector::Impl::Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks)
-    : callbacks_(std::move(callbacks)), service_(spec, name) {
+    : callbacks_(std::move(callbacks)), service_(spec, name), realtime_(spec.realtime()) {
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (int i = 0; i < spec.graph().channel_size(); ++i) {
     lanes_.push_back(std::make_unique<Lane>(spec, i));
@@ -149,17 +155,33 @@ void ChannelCollector::Impl::Deliver(Lane& lane, int64_t now) {
 void ChannelCollector::Impl::Request(int64_t now) {
   const int64_t expected = std::max(newest_tick_, final_tick_);
   for (const auto& lane : lanes_) {
+    if (realtime_ && !lane->external) GiveUp(*lane, now, expected);
     if (lane->external || lane->statistics.next_tick > expected) {
       lane->waiting_since = now;
       continue;
     }
     if (now - lane->waiting_since < lane->wait) continue;
     service_.SendControl(run_control_t::COMMAND_RESEND, lane->statistics.next_tick, lane->channel);
-    if (!lane->asked) ++lane->statistics.requested;
+    if (!lane->asked) {
+      ++lane->statistics.requested;
+      lane->asked_at = now;
+    }
     lane->asked = true;
     lane->waiting_since = now;
     lane->wait = std::min(2 * lane->wait, kLastRequest);
   }
+}
+
+void ChannelCollector::Impl::GiveUp(Lane& lane, int64_t now, int64_t expected) {
+  // Ahead of what its window would refuse; and after its writer had time to answer.
+  const bool far = expected - lane.packets.next_tick() > kReceiveWindow / 2;
+  const bool long_asked = lane.asked && now - lane.asked_at > kGiveUp;
+  if (!far && !long_asked) return;
+  const int64_t skipped = lane.packets.SkipTo(far ? expected - kReceiveWindow / 4 : expected + 1);
+  lane.statistics.skipped += skipped;
+  lane.asked = false;
+  lane.wait = kFirstRequest;
+  Deliver(lane, now);
 }
 
 void ChannelCollector::Impl::ReceiveService() {
@@ -223,7 +245,8 @@ int64_t ChannelCollector::missing(int64_t last_tick) const {
   int64_t missing = 0;
   for (const auto& lane : impl_->lanes()) {
     if (!lane->external)
-      missing += std::max<int64_t>(0, last_tick + 1 - lane->statistics.next_tick);
+      missing += lane->statistics.skipped +
+                 std::max<int64_t>(0, last_tick + 1 - lane->statistics.next_tick);
   }
   return missing;
 }

@@ -19,8 +19,8 @@ namespace poise {
 class ChannelCollector {
  public:
   struct Callbacks {
-    /// A channel's message: strictly once per tick and in tick order per channel; external channels
-    /// as they come.
+    /// A channel's message: strictly once per tick and in tick order per channel, in real time
+    /// without the ticks that its writer has skipped; external channels as they come.
     std::function<void(int channel, int64_t tick, std::span<const uint8_t> data)> message;
     /// A message of the service port (CONTROL, or HEALTH_* of the process it names), well formed
     /// and of this run.
@@ -50,11 +50,12 @@ class ChannelCollector {
     int64_t requested = 0;  ///< ticks that had to be asked for again
     int64_t duplicates = 0;
     int64_t refused = 0;    ///< failed a check of PacketFilter
-    int64_t next_tick = 0;  ///< first tick not yet delivered
+    int64_t skipped = 0;    ///< real time: ticks that nobody has sent
+    int64_t next_tick = 0;  ///< first tick neither delivered nor skipped
   };
   const ChannelStatistics& statistics(int channel) const;
-  /// Messages of ticks <= `last_tick` that were not delivered, over all channels: 0 in a run
-  /// without loss.
+  /// Messages of ticks <= `last_tick` that were not delivered, over all channels, skipped ones
+  /// included: 0 in a run without loss.
   int64_t missing(int64_t last_tick) const;
 
  private:

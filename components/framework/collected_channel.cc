@@ -84,6 +84,12 @@ PacketVerdict CollectedChannel::Keep(const uint8_t* data, size_t size) {
   return verdict;
 }
 
+int64_t CollectedChannel::SkipTo(int64_t tick) {
+  const int64_t first = next_tick_;
+  while (next_tick_ < tick && Next() == nullptr) ++next_tick_;
+  return next_tick_ - first;
+}
+
 const uint8_t* CollectedChannel::Next() const {
   if (external_) return nullptr;
   const auto slot = static_cast<size_t>(next_tick_ % kSentHistory);

@@ -24,6 +24,8 @@ class CollectedChannel {
   const uint8_t* Next() const;
   /// The packet of next_tick() has been delivered.
   void Advance() { ++next_tick_; }
+  /// Gives up on ticks before the first kept one, but not beyond `tick`. Returns how many.
+  int64_t SkipTo(int64_t tick);
 
   size_t size() const { return size_; }
   int64_t next_tick() const { return next_tick_; }

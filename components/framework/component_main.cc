@@ -15,8 +15,10 @@ namespace poise {
 namespace {
 
 volatile std::sig_atomic_t stop_asked = 0;
+volatile std::sig_atomic_t take_over_asked = 0;
 
 void OnSignal(int) { stop_asked = 1; }
+void OnTakeOver(int) { take_over_asked = 1; }
 
 void CatchSignals() {
   struct sigaction action {};
@@ -24,6 +26,8 @@ void CatchSignals() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
+  action.sa_handler = OnTakeOver;
+  sigaction(SIGUSR2, &action, nullptr);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   prctl(PR_SET_TIMERSLACK, 1000);  // ns: deadlines of a tick are not to be rounded to 50 us
 }
@@ -42,6 +46,12 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
   app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
   app.add_option("--component", name, "name of this component in the run's graph")
       ->capture_default_str();
+  std::string state;
+  bool standby = false;
+  CLI::Option* const state_option = app.add_option(
+      "--state", state, "file that keeps the component's state for a process that takes over");
+  app.add_flag("--standby", standby, "wait for SIGUSR2, then take the place of a process that died")
+      ->needs(state_option);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -60,6 +70,8 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
     }
     ProcessRunnerOptions options;
     options.stop = &stop_asked;
+    options.state_path = state;
+    if (standby) options.take_over = &take_over_asked;
     ProcessRunner runner(spec, name, factory, options);
     if (runner.Run()) return 0;
     fmt::print(stderr, "{}: {}\n", name, runner.error());

@@ -40,9 +40,10 @@ ControlClient::~ControlClient() = default;
 bool ControlClient::SendStart() { return links_->Send(run_id_, run_control_t::COMMAND_START); }
 bool ControlClient::SendStop() { return links_->Send(run_id_, run_control_t::COMMAND_STOP); }
 
-void ControlClient::Spin(int timeout_ms) {
-  pollfd fd{links_->receiver.fd(), POLLIN, 0};
-  if (poll(&fd, 1, timeout_ms) <= 0) return;
+void ControlClient::Spin(int timeout_ms, std::span<const int> wake_fds) {
+  std::vector<pollfd> fds = {{links_->receiver.fd(), POLLIN, 0}};
+  for (const int fd : wake_fds) fds.push_back({fd, POLLIN, 0});
+  if (poll(fds.data(), fds.size(), timeout_ms) <= 0) return;
   BusReceiver::Packet packet;
   while (links_->receiver.Receive(&packet)) {
     if (packet.channel == kControlChannel) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,8 +26,9 @@ class ControlClient {
   bool SendStart();
   bool SendStop();
 
-  /// Handles what arrives within `timeout_ms`; returns after the first batch.
-  void Spin(int timeout_ms);
+  /// Handles what arrives within `timeout_ms`; returns after the first batch, or when one of
+  /// `wake_fds` is readable.
+  void Spin(int timeout_ms, std::span<const int> wake_fds = {});
 
   struct Status {
     bool seen = false;

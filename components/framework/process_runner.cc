@@ -1,17 +1,18 @@
 #include "components/framework/process_runner.h"
 
-#include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "components/framework/clock.h"
-#include "components/framework/inbox.h"
 #include "components/framework/latency_histogram.h"
-#include "components/framework/outbox.h"
+#include "components/framework/process_bus.h"
 #include "components/framework/run.h"
-#include "components/framework/service_link.h"
+#include "components/framework/state_store.h"
+#include "components/framework/timing.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -22,8 +23,10 @@ constexpr int64_t kHealthInterval = 100 * kMillisecond;
 constexpr int64_t kAnnounceInterval = 50 * kMillisecond;  // before the start and after the end
 constexpr int64_t kFirstRequest = 2 * kMillisecond;
 constexpr int64_t kLastRequest = 50 * kMillisecond;
-constexpr int kMaxSendFailures = 20;  // in a row
 constexpr int kDrainBatch = 32;
+constexpr int64_t kLongestOutage = 5000 * kMillisecond;  // between a process and its successor
+
+using BoundStage = ProcessBus::BoundStage;
 
 int FindComponent(const Graph& graph, const std::string& name) {
   std::vector<std::string> names;
@@ -35,43 +38,10 @@ int FindComponent(const Graph& graph, const std::string& name) {
                                 fmt::join(names, ", ")));
 }
 
-/// Decides which received messages a faulty network would have lost.
-class FaultInjector {
- public:
-  FaultInjector(double rate, uint64_t seed) : rate_(rate), state_(seed) {}
-  bool Drop() {
-    if (rate_ <= 0) return false;
-    state_ += 0x9e3779b97f4a7c15u;
-    uint64_t x = state_;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53 < rate_;
-  }
-
- private:
-  double rate_;
-  uint64_t state_;
-};
-
-struct DataLink {
-  DataLink(const std::string& url, int index, const std::string& name)
-      : receiver(url), channel(index), channel_name(name) {}
-  BusReceiver receiver;
-  int channel;
-  std::string channel_name;
-  std::vector<Inbox*> inboxes;
-  int64_t foreign = 0;  // packets of other channels on this port
-};
-
-struct BoundStage {
-  struct BoundInput {
-    Inbox* inbox;
-    int channel;
-  };
-  const Stage* stage;
-  std::vector<BoundInput> inputs;
-  std::vector<Outbox*> outputs;
-};
+Join JoinOf(Timing timing) {
+  if (timing == Timing::kOwner) return Join::kLate;
+  return timing == Timing::kFollower ? Join::kNewest : Join::kEvery;
+}
 
 }  // namespace
 
@@ -84,63 +54,64 @@ class ProcessRunner::Impl {
   const std::string& error() const { return error_; }
 
  private:
-  bool Stopped() const {
-    return stopped_ || (options_.stop != nullptr && *options_.stop != 0) || !error_.empty();
-  }
-  bool RunTicks();
-  bool MayStart() const;
+  /// What a stage's wait or run came to.
+  enum class Outcome { kDone, kOvertaken, kStopped, kEnded };
+
+  bool Asked() const { return bus_.stopped() || (options_.stop != nullptr && *options_.stop != 0); }
+  bool Stopped() const { return Asked() || !error_.empty(); }
+
+  void Open();
   void WaitForStart();
-  void WaitForTime(int64_t time);
+  bool TakeOver();
+  /// Each true when the component has ended by itself.
+  bool RunTicks();
+  bool RunOwner();
+  bool RunFollower();
+  /// The inputs of tick_ are wanted from now on.
+  void Want();
+  Outcome RunTick();
   bool StageReady(const BoundStage& stage) const;
-  bool WaitForInputs(const BoundStage& stage);
-  bool RunStage(const BoundStage& stage, const Tick& tick);
-  void Ask(const BoundStage& stage);
+  Outcome WaitForInputs(const BoundStage& stage);
+  bool ChooseTick();
+  Outcome RunStage(const BoundStage& stage, const Tick& tick);
+  /// Ends tick_. True when the component or the run has come to its end.
+  bool EndTick();
+  void WaitUntil(int64_t time);
+  void KeepState();
   void ReportProgress();
   void End(int8_t state, std::string_view detail);
   void StayUntilStop();
+  void Close();
+  void Fail(std::string message);
 
-  /// Handles what arrives until `deadline` (ns; the past: only what is there); returns after the
-  /// first packets.
   void Poll(int64_t deadline, int batch);
-  void Receive(DataLink& link, int batch);
-  void ReceiveService(int batch);
-  void OnControl(const run_control_t& control);
   void PublishHealth(int64_t now);
-  void CountSend(bool sent);
 
   ProcessRunnerOptions options_;
   double period_;
+  int64_t period_ns_;
   bool realtime_;
   int64_t num_ticks_;
   int64_t run_id_;
   int index_;
+  Timing timing_;
+  RealtimeOptions realtime_options_;
   SharedObjects shared_;
   ConfiguredComponent configured_;
-  ServiceLink service_;
-  FaultInjector faults_;
-  std::vector<std::unique_ptr<Inbox>> inboxes_;
-  std::vector<std::unique_ptr<Outbox>> outboxes_;
-  std::vector<std::unique_ptr<DataLink>> links_;
-  std::vector<BoundStage> stages_;
-  std::vector<pollfd> poll_fds_;  // the service port, then links_
+  ProcessBus bus_;
+  std::unique_ptr<StateStore> store_;
+  bool can_be_taken_over_ = false;
   bool is_source_ = false;
   bool must_report_ = false;
-  struct Reporter {
-    int32_t channel;  // as in run_control_t: component index, -1 the recorder
-    int64_t tick;
-  };
-  std::vector<Reporter> reporters_;
+  bool opened_ = false;
 
   int64_t tick_ = 0;     // the one that runs
   int64_t arrival_ = 0;  // ns, of the last packets
   bool polled_ = false;  // in this tick
   int64_t next_health_ = 0;
-  int send_failures_ = 0;
-  bool started_ = false;
-  bool stopped_ = false;
-  int64_t resends_ = 0;
-  int64_t dropped_ = 0;
-  int64_t publish_errors_ = 0;
+  double lateness_ = 0;    // s, of this cycle
+  int64_t progress_ = 0;   // ns, end of the last tick
+  bool any_tick_ = false;  // taken over without a state: the first tick may be any
   LatencyHistogram latency_;
   std::string error_;
 };
@@ -149,138 +120,260 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& name,
                           const ComponentFactory& factory, const ProcessRunnerOptions& options)
     : options_(options),
       period_(spec.tick_period()),
+      period_ns_(static_cast<int64_t>(spec.tick_period() * 1e9)),
       realtime_(spec.realtime()),
       num_ticks_(spec.num_ticks()),
       run_id_(spec.run_id()),
       index_(FindComponent(spec.graph(), name)),
+      timing_(TimingOf(spec, index_)),
+      realtime_options_(spec.realtime_options()),
       configured_(ConfigureComponent(spec, index_, factory, &shared_)),
-      service_(spec, name),
-      faults_(spec.drop_rate(), InstanceSeed(spec.seed(), name + "/drops")) {
+      bus_(spec, index_, &configured_, JoinOf(timing_), options.take_over == nullptr) {
   const Graph& graph = spec.graph();
   if (!(period_ > 0)) throw ConfigError("run: tick_period must be greater than 0");
   CheckWiring(graph, index_, configured_.wiring);
-  const ComponentInstance& instance = graph.component(index_);
-  const auto channel_of = [&](const auto& connections, const std::string& port) {
-    for (const Connection& connection : connections) {
-      if (connection.port() != port) continue;
-      for (int i = 0; i < graph.channel_size(); ++i) {
-        if (graph.channel(i).name() == connection.channel()) return i;
-      }
-    }
-    throw ConfigError(fmt::format("component {}: port {} is not connected to a channel of graph {}",
-                                  name, port, graph.name()));
-  };
-  const Wiring& wiring = configured_.wiring;
-  poll_fds_.push_back({service_.fd(), POLLIN, 0});
-  std::vector<int> input_channels;
-  for (InputPort* input : wiring.inputs()) {
-    const int channel = channel_of(instance.input(), input->name());
-    input_channels.push_back(channel);
-    inboxes_.push_back(std::make_unique<Inbox>(input, run_id_));
-    auto link = std::find_if(links_.begin(), links_.end(),
-                             [&](const auto& l) { return l->channel == channel; });
-    if (link == links_.end()) {
-      links_.push_back(std::make_unique<DataLink>(ChannelUrl(spec, channel), channel,
-                                                  graph.channel(channel).name()));
-      poll_fds_.push_back({links_.back()->receiver.fd(), POLLIN, 0});
-      link = links_.end() - 1;
-    }
-    (*link)->inboxes.push_back(inboxes_.back().get());
+  const BoundStage& first = bus_.stages()[0];
+  is_source_ = std::none_of(first.inputs.begin(), first.inputs.end(), [](const auto& input) {
+    return input.inbox->port().kind() == InputKind::kSameTick;
+  });
+  if (timing_ == Timing::kFollower && is_source_) {
+    throw ConfigError(
+        fmt::format("graph {}: component {} waits for no message of its tick; in real time it must "
+                    "own the clock "
+                    "(owns_clock) or stand for the robot (plant)",
+                    graph.name(), name));
   }
-  for (OutputPort* output : wiring.outputs()) {
-    const int channel = channel_of(instance.output(), output->name());
-    outboxes_.push_back(std::make_unique<Outbox>(output, channel, graph.channel(channel).name(),
-                                                 ChannelUrl(spec, channel)));
-  }
-  for (const Stage& stage : wiring.stages()) {
-    BoundStage bound{&stage, {}, {}};
-    for (const InputPort* input : stage.inputs) {
-      const auto k =
-          static_cast<size_t>(std::find(wiring.inputs().begin(), wiring.inputs().end(), input) -
-                              wiring.inputs().begin());
-      bound.inputs.push_back({inboxes_[k].get(), input_channels[k]});
+  // The wall clock waits for nobody: in real time the recorder and others must keep up.
+  if (timing_ == Timing::kLockstep) {
+    must_report_ = MustReportProgress(graph, index_);
+    if (is_source_) {
+      for (const int reporter : ProgressReporters(graph, index_)) bus_.WaitFor(reporter);
+      if (options_.wait_for_recorder || spec.recorded()) bus_.WaitFor(-1);
     }
-    for (const OutputPort* output : stage.outputs) {
-      const auto o =
-          static_cast<size_t>(std::find(wiring.outputs().begin(), wiring.outputs().end(), output) -
-                              wiring.outputs().begin());
-      bound.outputs.push_back(outboxes_[o].get());
-    }
-    stages_.push_back(std::move(bound));
   }
-  is_source_ = std::none_of(
-      stages_[0].inputs.begin(), stages_[0].inputs.end(),
-      [](const auto& input) { return input.inbox->port().kind() == InputKind::kSameTick; });
-  must_report_ = MustReportProgress(graph, index_);
-  if (is_source_) {
-    for (const int reporter : ProgressReporters(graph, index_))
-      reporters_.push_back({reporter, -1});
-    if (options_.wait_for_recorder || spec.recorded()) reporters_.push_back({-1, -1});
+  if (!options_.state_path.empty()) {
+    store_ = std::make_unique<StateStore>(options_.state_path);
+    StateArchive measure;
+    can_be_taken_over_ = configured_.component->Archive(&measure);
+    if (measure.size() > StateStore::kCapacity) {
+      throw ConfigError(
+          fmt::format("component {}: its state of {} bytes is more than the {} that are kept", name,
+                      measure.size(), StateStore::kCapacity));
+    }
   }
 }
 
 bool ProcessRunner::Impl::Run() {
-  WaitForStart();
-  if (!Stopped() && RunTicks()) StayUntilStop();
+  if (options_.take_over != nullptr) {
+    if (!TakeOver()) return error_.empty();
+  } else {
+    Open();
+    if (!Stopped()) WaitForStart();
+  }
+  bus_.health().scheduling = AskForRealtime(realtime_options_, timing_);
+  if (progress_ == 0) progress_ = NowNanoseconds();
+  const auto run = [&] {
+    switch (timing_) {
+      case Timing::kOwner:
+        return RunOwner();
+      case Timing::kFollower:
+        return RunFollower();
+      case Timing::kLockstep:
+      case Timing::kPlant:
+        break;
+    }
+    return RunTicks();
+  };
+  if (!Stopped() && run()) StayUntilStop();
+  Close();
   return error_.empty();
 }
 
+void ProcessRunner::Impl::Fail(std::string message) {
+  if (error_.empty()) error_ = std::move(message);
+}
+
+void ProcessRunner::Impl::Open() {
+  try {
+    configured_.component->Open();
+    opened_ = true;
+    bus_.AttachDevices(configured_.component->devices(), period_ns_);
+  } catch (const std::exception& error) {
+    Fail(error.what());
+    End(health_t::STATE_FAILED, error_);
+    PublishHealth(NowNanoseconds());
+  }
+}
+
 void ProcessRunner::Impl::WaitForStart() {
-  service_.health().state = health_t::STATE_READY;
-  service_.health().tick = -1;
-  while (!started_ && !Stopped()) Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
-  service_.health().state = health_t::STATE_RUNNING;
+  bus_.health().state = health_t::STATE_READY;
+  bus_.health().tick = -1;
+  int64_t next_idle = NowNanoseconds();
+  while (!bus_.started() && !Stopped()) {
+    Poll(next_idle, kDrainBatch);
+    if (NowNanoseconds() < next_idle) continue;
+    configured_.component->Idle();
+    next_idle += period_ns_;
+  }
+  bus_.health().state = health_t::STATE_RUNNING;
   next_health_ = 0;  // at once: the launcher waits for it
 }
 
-/// True when the component has ended by itself.
+/// Waits to be needed, then takes the place of a process that died. False when it is not needed.
+bool ProcessRunner::Impl::TakeOver() {
+  store_->set_standby(getpid());
+  while (*options_.take_over == 0) {
+    if (Stopped()) return false;
+    bus_.Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+  }
+  if (store_->tick() >= 0 && can_be_taken_over_) {
+    StateArchive restore = StateArchive::Restoring(store_->latest());
+    configured_.component->Archive(&restore);
+    if (!restore.ok()) {
+      Fail("the stored state does not fit this component");
+      return false;
+    }
+    tick_ = store_->tick() + 1;
+    bus_.health().tick = store_->tick();
+    progress_ = NowNanoseconds() - kLongestOutage;
+  } else {
+    any_tick_ = true;
+  }
+  store_->CountRestart();
+  try {
+    bus_.OpenInputs();
+  } catch (const std::exception& error) {
+    Fail(error.what());
+    return false;
+  }
+  bus_.health().state = health_t::STATE_RUNNING;
+  next_health_ = 0;
+  return true;
+}
+
+void ProcessRunner::Impl::Want() {
+  bus_.set_tick(tick_);
+  for (const auto& inbox : bus_.inboxes()) {
+    if (inbox->port().kind() == InputKind::kSameTick) inbox->Want(tick_);
+    if (inbox->port().kind() == InputKind::kPreviousTick) {
+      inbox->Want(std::max<int64_t>(0, tick_ - 1));
+    }
+  }
+}
+
 bool ProcessRunner::Impl::RunTicks() {
   const int64_t start = NowNanoseconds();
+  const bool paced = realtime_ && timing_ == Timing::kLockstep;
   while (true) {
     polled_ = false;
+    bus_.set_tick(tick_);
     if (is_source_) {
-      while (!MayStart() && !Stopped()) Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
-      if (realtime_)
-        WaitForTime(start + static_cast<int64_t>(static_cast<double>(tick_) * period_ * 1e9));
+      while (!bus_.NearEnough(tick_) && !Stopped()) {
+        Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+      }
+      if (paced)
+        WaitUntil(start + static_cast<int64_t>(static_cast<double>(tick_) * period_ * 1e9));
     }
-    for (const auto& inbox : inboxes_) {
-      if (inbox->port().kind() == InputKind::kSameTick) inbox->Want(tick_);
-      if (inbox->port().kind() == InputKind::kPreviousTick)
-        inbox->Want(std::max<int64_t>(0, tick_ - 1));
-    }
-    const Tick tick = MakeTick(tick_, period_);
-    for (const BoundStage& stage : stages_) {
-      if (!WaitForInputs(stage)) return false;
-      if (!RunStage(stage, tick)) return true;
-    }
+    Want();
+    const Outcome outcome = RunTick();
+    if (outcome != Outcome::kDone) return outcome == Outcome::kEnded;
     if (!polled_) Poll(0, kDrainBatch);
-    service_.health().tick = tick.index;
-    service_.health().utime = tick.utime;
-    ++tick_;
-    if (must_report_ && tick_ % kProgressInterval == 0) ReportProgress();
-    const std::string_view finished = configured_.component->finished();
-    if (!finished.empty()) {
-      End(configured_.component->failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED,
-          finished);
-      return true;
-    }
-    if (num_ticks_ > 0 && tick_ >= num_ticks_) {
-      End(health_t::STATE_FINISHED, "");
-      return true;
-    }
+    if (EndTick()) return true;
     if (Stopped()) return false;
   }
 }
 
-bool ProcessRunner::Impl::MayStart() const {
-  return std::all_of(reporters_.begin(), reporters_.end(),
-                     [&](const Reporter& reporter) { return tick_ - reporter.tick <= kMaxLead; });
+ProcessRunner::Impl::Outcome ProcessRunner::Impl::RunTick() {
+  Tick tick = MakeTick(tick_, period_);
+  tick.lateness = lateness_;
+  for (const BoundStage& stage : bus_.stages()) {
+    const Outcome waited = WaitForInputs(stage);
+    if (waited != Outcome::kDone) return waited;
+    const Outcome ran = RunStage(stage, tick);
+    if (ran != Outcome::kDone) return ran;
+  }
+  return Outcome::kDone;
 }
 
-void ProcessRunner::Impl::WaitForTime(int64_t time) {
+bool ProcessRunner::Impl::RunFollower() {
+  while (true) {
+    if (!ChooseTick()) return false;
+    Want();
+    const Outcome outcome = RunTick();
+    if (outcome == Outcome::kOvertaken) continue;
+    if (outcome != Outcome::kDone) return outcome == Outcome::kEnded;
+    if (EndTick()) return true;
+    if (Stopped()) return false;
+  }
+}
+
+/// The newest tick whose first inputs are there becomes tick_. False: stopped before one came.
+bool ProcessRunner::Impl::ChooseTick() {
+  const BoundStage& first = bus_.stages()[0];
+  const int64_t expected = tick_;
+  polled_ = false;
+  while (true) {
+    int64_t newest = INT64_MAX;
+    for (const auto& input : first.inputs) {
+      if (input.inbox->port().kind() == InputKind::kSameTick) {
+        newest = std::min(newest, input.inbox->newest());
+      }
+    }
+    const bool whole =
+        newest >= tick_ &&
+        std::all_of(first.inputs.begin(), first.inputs.end(), [&](const auto& input) {
+          return input.inbox->port().kind() != InputKind::kSameTick || input.inbox->Has(newest);
+        });
+    if (whole && polled_) {
+      bus_.health().ticks_skipped += newest - expected;
+      tick_ = newest;
+      return true;
+    }
+    if (Stopped()) return false;
+    // Once at least: what waits in the socket may be newer.
+    Poll(whole ? 0 : NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+  }
+}
+
+bool ProcessRunner::Impl::RunOwner() {
+  int64_t time = NowNanoseconds();
+  health_t& health = bus_.health();
+  while (true) {
+    WaitUntil(time);
+    const int64_t start = NowNanoseconds();
+    lateness_ = static_cast<double>(std::max<int64_t>(0, start - time)) * 1e-9;
+    health.lateness_max = std::max(health.lateness_max, lateness_ * 1e6);
+    Want();
+    Tick tick = MakeTick(tick_, period_);
+    tick.lateness = lateness_;
+    for (const BoundStage& stage : bus_.stages()) {
+      const int64_t deadline =
+          time + static_cast<int64_t>(stage.stage->deadline * static_cast<double>(period_ns_));
+      while (!StageReady(stage) && !Stopped() && NowNanoseconds() < deadline) Poll(deadline, 1);
+      if (Stopped()) return false;
+      for (const BoundStage::BoundInput& input : stage.inputs) {
+        if (input.inbox->port().kind() == InputKind::kSameTick) input.inbox->TakeLate();
+      }
+      const Outcome ran = RunStage(stage, tick);
+      if (ran != Outcome::kDone) return true;
+    }
+    const int64_t end = NowNanoseconds();
+    latency_.Add(end - start);
+    if (end > time + period_ns_) ++health.deadline_misses;
+    if (EndTick()) return true;
+    if (Stopped()) return false;
+    time += period_ns_ + configured_.component->cycle_correction();
+    // Whole cycles that are lost stay lost: a burst of them would not help the robot.
+    const int64_t behind = NowNanoseconds() - time;
+    if (behind >= period_ns_) time += behind / period_ns_ * period_ns_;
+  }
+}
+
+void ProcessRunner::Impl::WaitUntil(int64_t time) {
   // Packets are handled until shortly before; the rest is slept through, for an absolute deadline.
-  while (!Stopped() && NowNanoseconds() < time - kMillisecond / 5)
+  while (!Stopped() && NowNanoseconds() < time - kMillisecond / 5) {
     Poll(time - kMillisecond / 5, kDrainBatch);
+  }
   const timespec deadline{time / 1'000'000'000, time % 1'000'000'000};
   while (!Stopped() && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) != 0) {
   }
@@ -294,32 +387,34 @@ bool ProcessRunner::Impl::StageReady(const BoundStage& stage) const {
       });
 }
 
-bool ProcessRunner::Impl::WaitForInputs(const BoundStage& stage) {
+ProcessRunner::Impl::Outcome ProcessRunner::Impl::WaitForInputs(const BoundStage& stage) {
   arrival_ = NowNanoseconds();
-  int64_t wait = kFirstRequest + (realtime_ ? static_cast<int64_t>(period_ * 1e9) : 0);
+  const bool follower = timing_ == Timing::kFollower;
+  int64_t wait = kFirstRequest + (realtime_ ? period_ns_ : 0);
   int64_t next_request = arrival_ + wait;
   while (!StageReady(stage)) {
-    if (Stopped()) return false;
+    if (Stopped()) return Outcome::kStopped;
     Poll(next_request, 1);
+    if (follower) {
+      // Messages of a channel come in order: what is overtaken will not come.
+      const bool overtaken =
+          std::any_of(stage.inputs.begin(), stage.inputs.end(), [&](const auto& input) {
+            return !input.inbox->ready() && input.inbox->newest() > tick_;
+          });
+      if (overtaken) return Outcome::kOvertaken;
+      next_request = NowNanoseconds() + kAnnounceInterval;
+      continue;
+    }
     if (arrival_ < next_request || StageReady(stage)) continue;
-    Ask(stage);
+    bus_.Ask(stage, tick_);
     wait = std::min(2 * wait, kLastRequest);
     next_request = arrival_ + wait;
   }
-  return true;
+  return Outcome::kDone;
 }
 
-void ProcessRunner::Impl::Ask(const BoundStage& stage) {
-  for (const BoundStage::BoundInput& input : stage.inputs) {
-    const InputKind kind = input.inbox->port().kind();
-    if (input.inbox->ready() || (tick_ == 0 && kind == InputKind::kPreviousTick)) continue;
-    input.inbox->CountGap();
-    CountSend(
-        service_.SendControl(run_control_t::COMMAND_RESEND, input.inbox->wanted(), input.channel));
-  }
-}
-
-bool ProcessRunner::Impl::RunStage(const BoundStage& bound, const Tick& tick) {
+ProcessRunner::Impl::Outcome ProcessRunner::Impl::RunStage(const BoundStage& bound,
+                                                           const Tick& tick) {
   for (const BoundStage::BoundInput& input : bound.inputs) {
     input.inbox->Show(tick.index == 0 && input.inbox->port().kind() == InputKind::kPreviousTick);
   }
@@ -327,132 +422,99 @@ bool ProcessRunner::Impl::RunStage(const BoundStage& bound, const Tick& tick) {
   bound.stage->run(tick);
   for (const BoundStage::BoundInput& input : bound.inputs) input.inbox->Hide();
   for (Outbox* outbox : bound.outputs) {
+    if (outbox->port().TakeWithheld() && timing_ == Timing::kOwner) continue;
     if (!outbox->port().Finite()) {
-      error_ = fmt::format("output {} is not finite at tick {}", outbox->port().name(), tick.index);
+      Fail(fmt::format("output {} is not finite at tick {}", outbox->port().name(), tick.index));
       End(health_t::STATE_FAILED, error_);
-      return false;
+      return Outcome::kEnded;
     }
-    CountSend(outbox->Send(tick.index));
+    bus_.CountSend(outbox->Send(tick.index));
   }
-  latency_.Add(NowNanoseconds() - arrival_);
-  return true;
+  // The owner's latency is that of the whole cycle.
+  if (timing_ != Timing::kOwner) latency_.Add(NowNanoseconds() - arrival_);
+  return Outcome::kDone;
+}
+
+bool ProcessRunner::Impl::EndTick() {
+  const Tick tick = MakeTick(tick_, period_);
+  bus_.health().tick = tick.index;
+  bus_.health().utime = tick.utime;
+  if (store_ != nullptr && can_be_taken_over_) KeepState();
+  progress_ = NowNanoseconds();
+  any_tick_ = false;
+  ++tick_;
+  if (must_report_ && tick_ % kProgressInterval == 0) ReportProgress();
+  const std::string_view finished = configured_.component->finished();
+  if (!finished.empty()) {
+    End(configured_.component->failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED,
+        finished);
+    return true;
+  }
+  if (num_ticks_ > 0 && tick_ >= num_ticks_) {
+    End(health_t::STATE_FINISHED, "");
+    return true;
+  }
+  return false;
+}
+
+void ProcessRunner::Impl::KeepState() {
+  StateArchive save = StateArchive::Saving(store_->Next());
+  configured_.component->Archive(&save);
+  if (save.ok()) store_->Commit(tick_, save.size());
 }
 
 void ProcessRunner::Impl::ReportProgress() {
-  CountSend(service_.SendControl(run_control_t::COMMAND_RECORDED, tick_ - 1, index_));
+  bus_.CountSend(bus_.SendControl(run_control_t::COMMAND_RECORDED, tick_ - 1, index_));
 }
 
 void ProcessRunner::Impl::End(int8_t state, std::string_view detail) {
-  service_.health().state = state;
-  service_.SetDetail(detail);
+  bus_.health().state = state;
+  bus_.SetDetail(detail);
   next_health_ = 0;
 }
 
 void ProcessRunner::Impl::StayUntilStop() {
-  const auto stop_asked = [&] {
-    return stopped_ || (options_.stop != nullptr && *options_.stop != 0);
-  };
-  while (!stop_asked()) Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+  int64_t next_idle = NowNanoseconds();
+  while (!Asked()) {
+    Poll(next_idle, kDrainBatch);
+    if (NowNanoseconds() < next_idle) continue;
+    if (opened_) configured_.component->Idle();
+    next_idle += period_ns_;
+  }
+}
+
+void ProcessRunner::Impl::Close() {
+  if (!opened_) return;
+  const std::string problem = configured_.component->Close();
+  if (!problem.empty()) Fail(problem);
 }
 
 void ProcessRunner::Impl::Poll(int64_t deadline, int batch) {
   polled_ = true;
-  int64_t now = NowNanoseconds();
+  const int64_t now = NowNanoseconds();
   if (now >= next_health_) PublishHealth(now);
-  const int64_t wait = std::max<int64_t>(0, std::min(deadline, next_health_) - now);
-  const timespec timeout{wait / 1'000'000'000, wait % 1'000'000'000};
-  const int ready = ppoll(poll_fds_.data(), poll_fds_.size(), &timeout, nullptr);
-  arrival_ = NowNanoseconds();
-  if (ready <= 0) return;  // a timeout or a signal
-  for (size_t i = 1; i < poll_fds_.size(); ++i) {
-    if (poll_fds_[i].revents != 0) Receive(*links_[i - 1], batch);
+  if (timing_ == Timing::kFollower) {
+    // As far ahead as the clock's owner can have come.
+    const int64_t horizon = tick_ + kReceiveWindow - 1 + (now - progress_) / period_ns_;
+    for (const auto& inbox : bus_.inboxes()) inbox->set_horizon(any_tick_ ? INT64_MAX : horizon);
   }
-  if (poll_fds_[0].revents != 0) ReceiveService(batch);
-}
-
-void ProcessRunner::Impl::Receive(DataLink& link, int batch) {
-  BusReceiver::Packet packet;
-  while (batch-- > 0 && link.receiver.Receive(&packet)) {
-    if (packet.channel != link.channel_name) {
-      if (packet.channel != "LCM_SELF_TEST") ++link.foreign;
-    } else if (faults_.Drop()) {
-      ++dropped_;
-    } else {
-      for (Inbox* inbox : link.inboxes) inbox->Offer(packet.data, packet.size);
-    }
-  }
-}
-
-void ProcessRunner::Impl::ReceiveService(int batch) {
-  BusReceiver::Packet packet;
-  run_control_t control;
-  while (batch-- > 0 && service_.receiver().Receive(&packet)) {
-    if (packet.channel != kControlChannel) {
-      service_.filter().CheckHealth(packet);  // of no use here, but what is wrong is counted
-    } else if (service_.filter().DecodeControl(packet, &control)) {
-      OnControl(control);
-    }
-  }
-}
-
-void ProcessRunner::Impl::OnControl(const run_control_t& control) {
-  switch (control.command) {
-    case run_control_t::COMMAND_START:
-      started_ = true;
-      break;
-    case run_control_t::COMMAND_STOP:
-      stopped_ = true;
-      break;
-    case run_control_t::COMMAND_RESEND:
-      for (const auto& outbox : outboxes_) {
-        if (outbox->channel() == control.channel && outbox->Resend(control.tick)) ++resends_;
-      }
-      break;
-    case run_control_t::COMMAND_RECORDED:
-      for (Reporter& reporter : reporters_) {
-        if (reporter.channel == control.channel && control.tick < tick_) {
-          reporter.tick = std::max(reporter.tick, control.tick);
-        }
-      }
-      break;
-    default:
-      break;
-  }
+  arrival_ = bus_.Poll(std::min(deadline, next_health_), batch);
+  if (bus_.broken()) Fail("the bus does not send any more; is the network up? run: poise doctor");
 }
 
 void ProcessRunner::Impl::PublishHealth(int64_t now) {
-  health_t& health = service_.health();
+  health_t& health = bus_.health();
   const bool running = health.state == health_t::STATE_RUNNING;
   next_health_ = now + (running ? kHealthInterval : kAnnounceInterval);
   health.ticks_completed = tick_;
-  health.messages_received = health.messages_duplicate = health.gaps = 0;
-  health.messages_refused = service_.refused();
-  for (const auto& inbox : inboxes_) {
-    health.messages_received += inbox->counters().accepted();
-    health.messages_refused += inbox->counters().refused();
-    health.messages_duplicate += inbox->duplicates();
-    health.gaps += inbox->gaps();
-  }
-  for (const auto& link : links_)
-    health.messages_refused += link->foreign + link->receiver.malformed();
-  health.messages_dropped = dropped_;
-  health.resends = resends_;
-  health.publish_errors = publish_errors_;
   health.latency_median = latency_.median();
   health.latency_p99 = latency_.p99();
   health.latency_max = latency_.max();
   std::ranges::copy(latency_.HalfOctaves(), health.latency_count);
-  CountSend(service_.SendHealth());
+  health.restarts = store_ == nullptr ? 0 : store_->restarts();
+  bus_.SendHealth();
   // Also covers a report that was lost.
   if (must_report_ && tick_ > 0) ReportProgress();
-}
-
-void ProcessRunner::Impl::CountSend(bool sent) {
-  send_failures_ = sent ? 0 : send_failures_ + 1;
-  publish_errors_ += sent ? 0 : 1;
-  if (send_failures_ == kMaxSendFailures && error_.empty()) {
-    error_ = "the bus does not send any more; is the network up? run: poise doctor";
-  }
 }
 
 ProcessRunner::ProcessRunner(const RunSpec& spec, const std::string& name,

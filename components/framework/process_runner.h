@@ -15,20 +15,27 @@ struct ProcessRunnerOptions {
   const volatile std::sig_atomic_t* stop = nullptr;
   /// Tick sources wait for the recorder (COMMAND_RECORDED). Default: RunSpec.recorded.
   bool wait_for_recorder = false;
+  /// A StateStore's file: the state is kept there after each tick in real time. Empty: nowhere.
+  std::string state_path;
+  /// Waits, configured, until set (by a signal handler), then goes on from the stored state in
+  /// place of a process that died. nullptr: starts with the others.
+  const volatile std::sig_atomic_t* take_over = nullptr;
 };
 
 /// Lockstep: joins inputs by tick, runs each stage as soon as its inputs are there, sends its
-/// outputs, asks again for what does not come and answers such requests. The start waits for
-/// COMMAND_START, the end for COMMAND_STOP. After the start nothing allocates, throws or locks.
+/// outputs, asks again for what does not come and answers such requests. Real time: see Timing. The
+/// start waits for COMMAND_START, the end for COMMAND_STOP. After the start nothing allocates,
+/// throws or locks.
 class ProcessRunner {
  public:
-  /// Configures component `name` of the run. Throws GraphError, ConfigError or BusError.
+  /// Configures component `name` of the run. Throws GraphError, ConfigError, BusError or
+  /// std::system_error (the state's file).
   ProcessRunner(const RunSpec& spec, const std::string& name, const ComponentFactory& factory,
                 const ProcessRunnerOptions& options);
   ~ProcessRunner();
 
-  /// Runs until COMMAND_STOP or *options.stop. Returns false when the bus failed or the component
-  /// sent a number that is not finite; error() says which.
+  /// Runs until COMMAND_STOP or *options.stop. Returns false when the bus failed, the component
+  /// sent a number that is not finite, or its hardware did not start or stop; error() says which.
   bool Run();
   const std::string& error() const;
 

@@ -6,6 +6,7 @@
 
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
+#include "components/framework/timing.h"
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"
 
@@ -18,13 +19,17 @@ constexpr int64_t kStartTimeout = 10 * kSecond;
 constexpr int64_t kStallTimeout = 20 * kSecond;  // of wall time without a tick
 constexpr int64_t kRecordTimeout = 10 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
+constexpr int64_t kSilence = 2 * kSecond;       // of a process that can be replaced
 constexpr int kSpin = 20;                       // ms
 constexpr size_t kDetailLines = 5;
 
 }  // namespace
 
-Launcher::Launcher(const RunSpec& spec, LaunchFiles files, Progress* progress)
-    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorderName}) {}
+Launcher::Launcher(const RunSpec& spec, LaunchFiles files, const KillOptions& kills,
+                   Progress* progress)
+    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorderName}) {
+  if (kills.count > 0) kills_ = std::make_unique<KillSchedule>(spec, kills.count, kills.seed);
+}
 
 Launcher::~Launcher() = default;
 
@@ -32,22 +37,27 @@ RunOutcome Launcher::Run() {
   StartProcesses();
   if (WaitUntilReady() && Start()) Watch();
   progress_->Clear();
+  if (kills_ != nullptr) kills_->Finish();
   StopProcesses();
+  if (kills_ != nullptr) outcome_.faults = kills_->faults();
   return outcome_;
 }
 
 void Launcher::StartProcesses() {
-  const auto start = [&](const std::string& name, std::vector<std::string> command) {
+  const auto start = [&](const std::string& name, std::vector<std::string> command,
+                         bool restart = false) {
     command[0] = files_.program_dir + "/" + command[0];
-    processes_.push_back(std::make_unique<ChildProcess>(
-        name, command, fmt::format("{}/{}.log", files_.run_dir, name)));
+    processes_.push_back(std::make_unique<ComponentProcess>(
+        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart));
   };
   start(kRecorderName,
         {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
          files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
+  // In lockstep a successor would lack the messages of its tick; and the run can be repeated.
   for (const ComponentInstance& instance : spec_.graph().component()) {
     start(instance.name(),
-          {TypeOf(instance), "--run", files_.spec_file, "--component", instance.name()});
+          {TypeOf(instance), "--run", files_.spec_file, "--component", instance.name()},
+          spec_.realtime() && instance.restart());
   }
 }
 
@@ -73,9 +83,12 @@ bool Launcher::Healthy() {
     return false;
   }
   // One that died first may have others follow: a non-zero end names the culprit best.
+  const int64_t now = NowNanoseconds();
   ChildProcess* dead = nullptr;
+  outcome_.takeovers = 0;
   for (const auto& process : processes_) {
-    if (process->ended() && (dead == nullptr || dead->succeeded())) dead = process.get();
+    if (!process->Alive(now) && (dead == nullptr || dead->succeeded())) dead = &process->process();
+    outcome_.takeovers += process->takeovers();
   }
   if (dead != nullptr) FailProcess(*dead);
   return dead == nullptr;
@@ -100,7 +113,7 @@ bool Launcher::WaitUntilReady() {
       for (const auto& process : processes_) {
         if (control_.statuses().at(process->name()).seen) continue;
         names += (names.empty() ? "" : ", ") + process->name();
-        for (const std::string& line : LastLines(process->log_path(), 1)) {
+        for (const std::string& line : LastLines(process->process().log_path(), 1)) {
           details.push_back(process->name() + ": " + line);
         }
       }
@@ -145,8 +158,10 @@ void Launcher::Watch() {
   int64_t last_change = NowNanoseconds();
   int64_t ended_at = 0;  // all components, or the run by one of them
   while (true) {
-    control_.Spin(kSpin);
+    Wait(kSpin);
     const int64_t now = NowNanoseconds();
+    if (ended_at == 0) EndSilent(now);
+    if (kills_ != nullptr && ended_at == 0) kills_->Act(now, now - start, processes_);
     const int64_t tick = Tick();
     const double time = static_cast<double>(tick + 1) * spec_.tick_period();
     progress_->Show(time, static_cast<double>(now - start) * 1e-9);
@@ -157,9 +172,12 @@ void Launcher::Watch() {
     bool all_ended = true;
     bool failed = false;
     std::string reason;
+    int index = 0;
     for (const ComponentInstance& instance : spec_.graph().component()) {
       const health_t& health = control_.statuses().at(instance.name()).health;
-      all_ended = all_ended && health.state >= health_t::STATE_FINISHED;
+      // The owner of the clock has the last word: who is late skips the last tick.
+      const bool counts = TimingOf(spec_, index++) != Timing::kFollower;
+      all_ended = all_ended && (!counts || health.state >= health_t::STATE_FINISHED);
       if (health.state >= health_t::STATE_FINISHED && !health.detail.empty()) {
         failed = failed || health.state == health_t::STATE_FAILED;
         reason = fmt::format("{}: {}", instance.name(), health.detail);
@@ -193,10 +211,29 @@ void Launcher::Watch() {
   }
 }
 
+void Launcher::Wait(int timeout_ms) {
+  std::vector<int> fds;
+  for (const auto& process : processes_) {
+    if (process->restarts() && process->fd() >= 0) fds.push_back(process->fd());
+  }
+  if (kills_ != nullptr) fds.push_back(kills_->fd());
+  control_.Spin(kills_ != nullptr ? std::min(timeout_ms, 2) : timeout_ms, fds);
+  if (kills_ != nullptr) kills_->Receive();
+}
+
+void Launcher::EndSilent(int64_t now) {
+  for (const auto& process : processes_) {
+    if (!process->restarts()) continue;
+    const ControlClient::Status& status = control_.statuses().at(process->name());
+    if (status.seen && now - status.last_seen > kSilence) process->process().Signal(SIGKILL);
+  }
+}
+
 void Launcher::StopProcesses() {
+  for (const auto& process : processes_) process->StopRestarts();
   const auto running = [&] {
     return std::any_of(processes_.begin(), processes_.end(),
-                       [](const auto& process) { return !process->ended(); });
+                       [](const auto& process) { return !process->process().ended(); });
   };
   const int signals = StopSignalCount();
   const int64_t start = NowNanoseconds();
@@ -206,14 +243,15 @@ void Launcher::StopProcesses() {
     const bool hurry = StopSignalCount() > signals + 1;
     if (hurry || now > start + 2 * kStopPatience) break;
     if (now > start + kStopPatience && !terminated) {
-      for (const auto& process : processes_) process->Signal(SIGTERM);
+      for (const auto& process : processes_) process->process().Signal(SIGTERM);
       terminated = true;
     }
     control_.SendStop();
     control_.Spin(kSpin / 2);
   }
   if (outcome_.completed) {
-    for (const auto& process : processes_) {
+    for (const auto& component : processes_) {
+      ChildProcess* const process = &component->process();
       if (process->ended() && process->succeeded()) continue;
       outcome_.completed = false;
       const std::string reason = outcome_.message;

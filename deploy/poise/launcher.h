@@ -9,6 +9,8 @@
 #include "components/framework/control_client.h"
 #include "components/framework/graph.pb.h"
 #include "deploy/poise/child_process.h"
+#include "deploy/poise/component_process.h"
+#include "deploy/poise/kill_schedule.h"
 #include "deploy/poise/progress.h"
 #include "deploy/poise/run_outcome.h"
 
@@ -21,11 +23,18 @@ struct LaunchFiles {
   std::string scenario_file;
 };
 
+/// Faults to inject in a run in real time.
+struct KillOptions {
+  int count = 0;
+  uint64_t seed = 1;
+};
+
 /// One run. Leaves no process behind, whatever happens.
 class Launcher {
  public:
-  /// `spec` as written to files.spec_file; `progress` outlives the launcher. Throws BusError.
-  Launcher(const RunSpec& spec, LaunchFiles files, Progress* progress);
+  /// `spec` as written to files.spec_file; `progress` outlives the launcher. Throws BusError, or
+  /// ConfigError for faults that cannot be injected.
+  Launcher(const RunSpec& spec, LaunchFiles files, const KillOptions& kills, Progress* progress);
   ~Launcher();
 
   /// Starts everything, waits until it is ready, runs, and ends everything. Throws
@@ -49,7 +58,13 @@ class Launcher {
   LaunchFiles files_;
   Progress* progress_;
   ControlClient control_;
-  std::vector<std::unique_ptr<ChildProcess>> processes_;
+  /// Waits for health, the end of a process or what the kill schedule listens to.
+  void Wait(int timeout_ms);
+  /// A process that can be replaced and has been silent for long is ended, so that it is.
+  void EndSilent(int64_t now);
+
+  std::unique_ptr<KillSchedule> kills_;
+  std::vector<std::unique_ptr<ComponentProcess>> processes_;  // the recorder's is the first
   RunOutcome outcome_;
 };
 

@@ -122,6 +122,30 @@ std::string FormatMeasured(const CheckResult& check) {
   return check.measured ? FormatNumber(*check.measured, check.unit) : "none";
 }
 
+std::string FormatFaults(const RunOutcome& outcome) {
+  if (outcome.faults.empty()) return "";
+  std::vector<std::vector<std::string>> rows = {
+      {"fault", "process", "at s", "control regained after ms", "cycles without command"}};
+  std::vector<double> regained;
+  for (const InjectedFault& fault : outcome.faults) {
+    const bool known = fault.regained >= 0;
+    if (known) regained.push_back(fault.regained * 1e3);
+    rows.push_back({fault.killed ? "killed" : "stopped 100 ms", fault.component,
+                    fmt::format("{:.3f}", fault.time),
+                    known ? fmt::format("{:.1f}", fault.regained * 1e3) : "never",
+                    fmt::format("{}", fault.cycles)});
+  }
+  std::sort(regained.begin(), regained.end());
+  std::string text = fmt::format("\n{}", FormatColumns(rows));
+  text += fmt::format("{} faults, {} processes replaced, control regained after {}",
+                      outcome.faults.size(), outcome.takeovers, regained.size());
+  if (!regained.empty()) {
+    text += fmt::format(": median {:.1f} ms, worst {:.1f} ms", regained[regained.size() / 2],
+                        regained.back());
+  }
+  return text + "\n";
+}
+
 std::string FormatEvents(const std::vector<logging::Event>& events) {
   constexpr size_t kFirst = 30;
   constexpr size_t kLast = 10;

@@ -39,6 +39,9 @@ std::string FormatTable(const std::vector<CheckResult>& checks);
 /// "12.3 mm", or "none".
 std::string FormatMeasured(const CheckResult& check);
 /// A line each; of a long list the first and the last ones.
+/// The faults that were injected, and how long control was lost by each; empty when there were
+/// none.
+std::string FormatFaults(const RunOutcome& outcome);
 std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);

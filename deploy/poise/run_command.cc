@@ -44,7 +44,18 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
-  run->add_flag("--realtime", options->changes.realtime, "pace the ticks with the wall clock");
+  CLI::Option* const realtime = run->add_flag(
+      "--realtime", options->changes.realtime,
+      "the bridge owns the clock and holds the last command; processes that die are replaced. "
+      "With --inline: pace the ticks with the wall clock");
+  run->add_option(
+         "--kill", options->kills.count,
+         "faults to inject: as often a controller process is killed, or stopped for 100 ms")
+      ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
+      ->needs(realtime)
+      ->excludes(in_process);
+  run->add_option("--kill-seed", options->kills.seed, "of the moments and processes of --kill")
+      ->capture_default_str();
   run->add_option("--variant", options->changes.variant,
                   "run this variant of the scenario (poise list scenarios)");
   run->add_option("--without", options->changes.without, "leave out a part of the controller")

@@ -7,13 +7,24 @@
 
 namespace poise {
 
+/// A fault that the launcher caused on purpose.
+struct InjectedFault {
+  std::string component;
+  bool killed = false;   ///< SIGKILL; else SIGSTOP for 100 ms
+  double time = 0;       ///< s of wall time since the start
+  double regained = -1;  ///< s until control was regained; 0: no command was late; -1: not in time
+  int32_t cycles = 0;    ///< longest age of a command meanwhile
+};
+
 struct RunOutcome {
   bool completed = false;    ///< the planned end was reached, or a component ended the run well
   bool interrupted = false;  ///< by a signal
   std::string message;       ///< why the run ended; empty after the planned end
   std::vector<std::string> details;  ///< last lines of the output of the process at fault
   int64_t refused = 0;               ///< packets that the launcher refused on the service port
-  double wall_time = 0;              ///< s, from the start command to the last tick
+  std::vector<InjectedFault> faults;
+  int32_t takeovers = 0;  ///< processes that took the place of one that died
+  double wall_time = 0;   ///< s, from the start command to the last tick
 };
 
 }  // namespace poise

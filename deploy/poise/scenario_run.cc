@@ -57,8 +57,8 @@ void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
   WriteFile(dir / kScenarioFile, ScenarioText(part.loaded.scenario));
 }
 
-RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process,
-                                bool quiet) {
+RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
+                                const KillOptions& kills) {
   const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), quiet);
   if (in_process) {
@@ -66,7 +66,7 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
   }
   const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
                           (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
-  return Launcher(spec, files, &progress).Run();
+  return Launcher(spec, files, kills, &progress).Run();
 }
 
 void ScenarioRun::PrintHeading() const {
@@ -107,12 +107,15 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   if (reference_) {
     const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name());
     WriteFiles(*reference_, reference.path());
-    summary.reference = RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true);
+    summary.reference =
+        RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true, {});
     PrintEnd(fmt::format("reference run (variant {})", scenario.reference()), *summary.reference);
   }
   if (StopSignal() == 0) {
-    summary.outcome = RunPart(main_, result.dir, options_.in_process, options_.quiet);
+    summary.outcome =
+        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.kills);
     PrintEnd("run", summary.outcome);
+    if (!options_.quiet) fmt::print("{}", FormatFaults(summary.outcome));
   } else {
     summary.outcome = *summary.reference;  // interrupted
   }

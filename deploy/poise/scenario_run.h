@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "components/framework/graph.pb.h"
+#include "deploy/poise/launcher.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/scenario_loading.h"
 
@@ -16,6 +17,7 @@ struct RunOptions {
   RunChanges changes;
   bool in_process = false;
   bool quiet = false;
+  KillOptions kills;
 };
 
 /// What `poise report` and the overview of several runs say of a run's scenario.
@@ -49,7 +51,7 @@ class ScenarioRun {
                bool warn) const;
   static void WriteFiles(const Part& part, const std::filesystem::path& dir);
   static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
-                            bool quiet);
+                            bool quiet, const KillOptions& kills);
   void PrintHeading() const;
 
   RunOptions options_;

@@ -1,0 +1,25 @@
+// What real time asks of each component, by its place in the graph, and of the system.
+#pragma once
+
+#include <cstdint>
+
+#include "components/framework/graph.pb.h"
+
+namespace poise {
+
+/// How a component's ticks are timed.
+enum class Timing {
+  kLockstep,  ///< every tick; waits for every message, asks again for what is lost
+  kOwner,     ///< begins its cycles by the wall clock, runs its stages at their deadlines
+  kPlant,     ///< the robot's side: follows the owner's cycles, every one of them
+  kFollower,  ///< works on the newest tick that has come, skips what it is too late for
+};
+
+/// In lockstep, and in a run in real time whose graph has no owner of the clock: kLockstep for all.
+Timing TimingOf(const RunSpec& spec, int component);
+
+/// Locks memory, sets SCHED_FIFO and pins this process as the run's options ask; what the system
+/// refuses is done without. Returns the granted health_t::SCHEDULING_* bits.
+int8_t AskForRealtime(const RealtimeOptions& options, Timing timing);
+
+}  // namespace poise
