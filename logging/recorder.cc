@@ -34,6 +34,7 @@ void WriteReport(const std::string& path, const RunSpec& spec, const RecorderRep
     json["channels"].push_back({{"name", spec.graph().channel(i).name()},
                                 {"delivered", s.delivered},
                                 {"requested", s.requested},
+                                {"skipped", s.skipped},
                                 {"duplicates", s.duplicates},
                                 {"refused", s.refused}});
   }
@@ -60,6 +61,7 @@ RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
     writer.AddMessage(channel, tick, data);
     send(names[static_cast<size_t>(channel)].c_str(), data);
   };
+  callbacks.skipped = [&](int channel, int64_t tick) { writer.Skip(channel, tick); };
   callbacks.service = [&](std::string_view channel, std::span<const uint8_t> data) {
     if (!channel.starts_with("HEALTH_")) return;
     writer.AddHealth(channel, data);

@@ -32,7 +32,10 @@ RunLogWriter::RunLogWriter(const std::string& path, const RunSpec& spec, const r
     lane.external = channel.external();
     lane.size = static_cast<size_t>(type->encoded_size(counts));
     lane.utime_offset = type->run_id_offset + 16;
-    if (!lane.external) lane.bytes.resize(lane.size * static_cast<size_t>(capacity_));
+    if (!lane.external) {
+      lane.bytes.resize(lane.size * static_cast<size_t>(capacity_));
+      lane.present.resize(static_cast<size_t>(capacity_));
+    }
     lanes_.push_back(std::move(lane));
   }
   std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
@@ -55,10 +58,26 @@ void RunLogWriter::AddMessage(int channel, int64_t tick, std::span<const uint8_t
     throw std::logic_error(
         fmt::format("{}: tick {} where {} was due", lane.name, tick, lane.next_tick));
   }
-  if (tick - next_tick_ >= capacity_) Grow();
+  while (tick - next_tick_ >= capacity_) Grow();
   std::memcpy(lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size, data.data(),
               lane.size);
+  lane.present[static_cast<size_t>(tick % capacity_)] = 1;
   ++lane.next_tick;
+  WriteCompleteTicks();
+}
+
+void RunLogWriter::Skip(int channel, int64_t tick) {
+  Lane& lane = lanes_[static_cast<size_t>(channel)];
+  if (lane.external) return;
+  while (lane.next_tick < tick) {
+    while (lane.next_tick - next_tick_ >= capacity_) Grow();
+    lane.present[static_cast<size_t>(lane.next_tick % capacity_)] = 0;
+    ++lane.next_tick;
+    WriteCompleteTicks();
+  }
+}
+
+void RunLogWriter::WriteCompleteTicks() {
   const auto has_next = [&](const Lane& l) { return l.external || l.next_tick > next_tick_; };
   while (std::all_of(lanes_.begin(), lanes_.end(), has_next)) WriteTick(next_tick_++);
 }
@@ -81,6 +100,12 @@ void RunLogWriter::Grow() {
                   lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size, lane.size);
     }
     lane.bytes = std::move(bytes);
+    std::vector<char> present(lane.present.size() * 2);
+    for (int64_t tick = next_tick_; tick < lane.next_tick; ++tick) {
+      present[static_cast<size_t>(tick % (2 * capacity_))] =
+          lane.present[static_cast<size_t>(tick % capacity_)];
+    }
+    lane.present = std::move(present);
   }
   capacity_ *= 2;
 }
@@ -88,6 +113,7 @@ void RunLogWriter::Grow() {
 void RunLogWriter::WriteTick(int64_t tick) {
   for (const Lane& lane : lanes_) {
     if (lane.external || lane.next_tick <= tick) continue;
+    if (lane.present[static_cast<size_t>(tick % capacity_)] == 0) continue;
     const uint8_t* data = lane.bytes.data() + static_cast<size_t>(tick % capacity_) * lane.size;
     log_.Write(lane.name, ReadInt64(data + lane.utime_offset), {data, lane.size});
   }

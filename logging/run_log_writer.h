@@ -26,9 +26,11 @@ class RunLogWriter {
   RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info);
 
   /// The encoded message of `tick` on channel `channel` of the graph. Every channel's ticks must
-  /// come in order and without a gap (std::logic_error otherwise); channels may run ahead of each
-  /// other. External channels: any tick. Throws LogError.
+  /// come in order and without a gap but for skipped ones (std::logic_error otherwise); channels may
+  /// run ahead of each other. External channels: any tick. Throws LogError.
   void AddMessage(int channel, int64_t tick, std::span<const uint8_t> data);
+  /// Real time: of this channel no message before `tick` will come any more. Throws LogError.
+  void Skip(int channel, int64_t tick);
   /// A HEALTH_* message. Throws LogError.
   void AddHealth(std::string_view channel, std::span<const uint8_t> data);
   /// Hands what is written to the system. Throws LogError.
@@ -37,7 +39,7 @@ class RunLogWriter {
   void Close();
 
   int64_t events() const { return log_.events(); }
-  /// Ticks written with the messages of all channels.
+  /// Ticks written with the messages of all channels, but for skipped ones.
   int64_t complete_ticks() const { return next_tick_; }
   /// After Close: messages that were missing from the last, incomplete ticks.
   int64_t missing() const { return missing_; }
@@ -50,7 +52,9 @@ class RunLogWriter {
     int utime_offset = 0;        // in the encoded message
     int64_t next_tick = 0;       // first tick that has not come
     std::vector<uint8_t> bytes;  // ticks [next_tick_, next_tick), by tick modulo capacity_
+    std::vector<char> present;   // likewise; 0: skipped
   };
+  void WriteCompleteTicks();
   void Grow();
   int64_t TimeUnderWay() const;  // us
   void WriteTick(int64_t tick);

@@ -179,6 +179,9 @@ void ChannelCollector::Impl::GiveUp(Lane& lane, int64_t now, int64_t expected) {
   if (!far && !long_asked) return;
   const int64_t skipped = lane.packets.SkipTo(far ? expected - kReceiveWindow / 4 : expected + 1);
   lane.statistics.skipped += skipped;
+  if (skipped > 0 && callbacks_.skipped) {
+    callbacks_.skipped(lane.channel, lane.packets.next_tick());
+  }
   lane.asked = false;
   lane.wait = kFirstRequest;
   Deliver(lane, now);

@@ -336,6 +336,12 @@ bool ProcessRunner::Impl::ChooseTick() {
 }
 
 bool ProcessRunner::Impl::RunOwner() {
+  // The clock starts with the robot.
+  Want();
+  while (!StageReady(bus_.stages()[0])) {
+    if (Stopped()) return false;
+    Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+  }
   int64_t time = NowNanoseconds();
   health_t& health = bus_.health();
   while (true) {
