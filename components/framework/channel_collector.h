@@ -22,11 +22,11 @@ class ChannelCollector {
     /// A channel's message: strictly once per tick and in tick order per channel, in real time
     /// without the ticks that its writer has skipped; external channels as they come.
     std::function<void(int channel, int64_t tick, std::span<const uint8_t> data)> message;
-    /// Real time: of this channel no message before `tick` will come any more. May be empty.
-    std::function<void(int channel, int64_t tick)> skipped;
     /// A message of the service port (CONTROL, or HEALTH_* of the process it names), well formed
     /// and of this run.
-    std::function<void(std::string_view channel, std::span<const uint8_t> data)> service;
+    std::function<void(std::string_view channel, std::span<const uint8_t> data)> service = nullptr;
+    /// Real time: of this channel no message before `tick` will come any more. May be empty.
+    std::function<void(int channel, int64_t tick)> skipped = nullptr;
   };
 
   /// `spec` must hold the channels' counts (FillCounts). Throws BusError; ConfigError when counts

@@ -66,7 +66,7 @@ class Input final : public InputPort {
                 "a port's message has run_id, tick and utime, and one exact size");
 
  public:
-  /// True when a message is there. Always true for kSameTick inputs inside their stage.
+  /// True when a message is there: in kSameTick inputs always, but at a deadline of real time.
   bool present() const { return message_ != nullptr; }
   /// Precondition: present().
   const T& operator*() const { return *message_; }

@@ -54,19 +54,23 @@ void ComponentProcess::StartSpare() {
       std::make_unique<ChildProcess>(name_, command, fmt::format("{}.{}", log_path_, ++started_));
 }
 
+bool ComponentProcess::NoteDeath(int64_t now) {
+  deaths_.push_back(now);
+  while (now - deaths_.front() > kDeathWindow) deaths_.pop_front();
+  return deaths_.size() <= kMostDeaths;
+}
+
 bool ComponentProcess::Alive(int64_t now) {
-  if (!process_->ended()) {
-    if (restart_ && spare_ != nullptr && spare_->ended()) StartSpare();
-    return true;
+  if (restart_ && spare_ != nullptr && spare_->ended()) {
+    spare_.reset();
+    if (NoteDeath(now)) StartSpare();  // else there is something wrong with it
   }
-  if (!restart_) return false;
+  if (!process_->ended()) return true;
+  if (!restart_ || spare_ == nullptr) return false;
   if (waiting_since_ == 0) {
     waiting_since_ = now;
-    deaths_.push_back(now);
-    while (now - deaths_.front() > kDeathWindow) deaths_.pop_front();
-    if (deaths_.size() > kMostDeaths) return false;
+    if (!NoteDeath(now)) return false;
   }
-  if (spare_ == nullptr || spare_->ended()) StartSpare();
   if (store_->standby() != spare_->pid()) return now - waiting_since_ < kPatience;
   spare_->Signal(SIGUSR2);
   process_ = std::move(spare_);

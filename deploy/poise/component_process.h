@@ -25,8 +25,8 @@ class ComponentProcess {
   ComponentProcess& operator=(const ComponentProcess&) = delete;
 
   /// Looks after it: lets the successor take over when the process has died. False when it has
-  /// ended for good: it is not to be restarted, has died too often (5 times within 2 s), or no
-  /// successor became ready within 5 s. `now`: ns.
+  /// ended for good: it is not to be restarted, it and its successors died more than 5 times within
+  /// 2 s, or none became ready within 5 s. `now`: ns.
   bool Alive(int64_t now);
   /// From now on an end is no reason for a successor; the one that stands by is ended.
   void StopRestarts();
@@ -40,6 +40,8 @@ class ComponentProcess {
 
  private:
   void StartSpare();
+  /// False: too many of late.
+  bool NoteDeath(int64_t now);
   void Watch();
 
   std::string name_;

@@ -106,6 +106,10 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
                              {[&](int channel, int64_t tick, std::span<const uint8_t> data) {
                                 auto& lane = run.messages[static_cast<size_t>(channel)];
                                 if (!spec.graph().channel(channel).external()) {
+                                  // What real time has skipped stays empty.
+                                  if (spec.realtime() && tick > std::ssize(lane)) {
+                                    lane.resize(static_cast<size_t>(tick));
+                                  }
                                   EXPECT_EQ(tick, static_cast<int64_t>(lane.size()))
                                       << "channel " << channel;
                                 }
@@ -140,6 +144,7 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
       next_start = now + std::chrono::milliseconds(50);
     }
     if (running && !stopping && options.while_running) options.while_running();
+    if (running && !stopping && options.disturb) options.disturb(children.pids, run.messages);
     if (running && !ended && options.end && options.end(children.pids)) {
       ended = true;
       for (const auto& [name, pid] : children.pids) kill(pid, SIGTERM);

@@ -14,7 +14,7 @@
 
 namespace poise {
 
-/// [channel][tick] -> bytes.
+/// [channel][tick] -> bytes; in real time empty where a tick was skipped.
 using Messages = std::vector<std::vector<std::vector<uint8_t>>>;
 
 /// The same run inside this process.
@@ -35,6 +35,8 @@ struct HarnessOptions {
   bool collect = true;    ///< a recorder takes part
   int max_seconds = 60;   ///< a run that takes longer is ended and marked
   std::function<void()> while_running = nullptr;  ///< called every few milliseconds once all run
+  /// Called every few milliseconds once all run, with the pids and what has been recorded.
+  std::function<void(const std::map<std::string, pid_t>&, const Messages&)> disturb = nullptr;
   /// Ends the run early, with SIGTERM to all; called with the pids once all run.
   std::function<bool(const std::map<std::string, pid_t>&)> end = nullptr;
 };

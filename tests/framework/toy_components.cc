@@ -95,6 +95,10 @@ class ToyFilter final : public Toy {
       MaybeFinish(tick);
     });
   }
+  bool Archive(StateArchive* archive) override {
+    archive->Show(filtered_);
+    return true;
+  }
 
  private:
   Input<robot_sensors_t> sensors_;
@@ -116,13 +120,14 @@ class ToyController final : public Toy {
     wiring->AddOutput(&torque_, "torque", {joints(), 2});
     wiring->AddOutput(&command_, "command", {joints(), 2});
     wiring->AddStage("prepare", {&sensors_, &before_}, {&torque_}, [this](const Tick&) {
+      if (!sensors_.present()) return torque_.Withhold();  // in real time
       for (size_t i = 0; i < torque_->torque.size(); ++i) {
         torque_->torque[i] = 2 * sensors_->joint_position[i] +
                              (before_.present() ? 0.1 * before_->joint_position[i] : 0);
       }
     });
     wiring->AddStage("control", {&state_, &stop_}, {&command_}, [this](const Tick& tick) {
-      for (size_t i = 0; i < command_->torque.size(); ++i) {
+      for (size_t i = 0; state_.present() && i < command_->torque.size(); ++i) {
         command_->torque[i] = torque_->torque[i] - config_.gains().kd() * state_->joint_position[i];
       }
       command_->status = stop_.present() && stop_->stop != 0 ? 1 : 0;
