@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <fstream>
 
 #include "fmt/format.h"
 
@@ -79,6 +80,14 @@ bool ComponentProcess::Alive(int64_t now) {
   Watch();
   StartSpare();
   return true;
+}
+
+int64_t ComponentProcess::ResidentBytes() const {
+  int64_t size = 0;
+  int64_t resident = 0;
+  std::ifstream statm(fmt::format("/proc/{}/statm", process_->pid()));
+  statm >> size >> resident;
+  return resident * sysconf(_SC_PAGESIZE);
 }
 
 void ComponentProcess::StopRestarts() {

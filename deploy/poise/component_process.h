@@ -35,6 +35,8 @@ class ComponentProcess {
   const std::string& name() const { return name_; }
   bool restarts() const { return restart_; }
   int32_t takeovers() const { return takeovers_; }
+  /// Memory that the process has in RAM now, bytes; 0 when it has none any more.
+  int64_t ResidentBytes() const;
   /// Becomes readable when the process ends.
   int fd() const { return pidfd_; }
 

@@ -19,16 +19,24 @@ constexpr int64_t kStartTimeout = 10 * kSecond;
 constexpr int64_t kStallTimeout = 20 * kSecond;  // of wall time without a tick
 constexpr int64_t kRecordTimeout = 10 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
+constexpr int64_t kSettled = 10 * kSecond;      // memory is measured from here on
 constexpr int64_t kSilence = 2 * kSecond;       // of a process that can be replaced
 constexpr int kSpin = 20;                       // ms
 constexpr size_t kDetailLines = 5;
 
 }  // namespace
 
-Launcher::Launcher(const RunSpec& spec, LaunchFiles files, const KillOptions& kills,
+Launcher::Launcher(const RunSpec& spec, LaunchFiles files, const LaunchOptions& options,
                    Progress* progress)
-    : spec_(spec), files_(std::move(files)), progress_(progress), control_(spec, {kRecorderName}) {
-  if (kills.count > 0) kills_ = std::make_unique<KillSchedule>(spec, kills.count, kills.seed);
+    : spec_(spec),
+      files_(std::move(files)),
+      progress_(progress),
+      control_(spec,
+               options.log ? std::vector<std::string>{kRecorderName} : std::vector<std::string>{}),
+      log_(options.log) {
+  if (options.kills > 0) {
+    kills_ = std::make_unique<KillSchedule>(spec, options.kills, options.kill_seed);
+  }
 }
 
 Launcher::~Launcher() = default;
@@ -37,6 +45,7 @@ RunOutcome Launcher::Run() {
   StartProcesses();
   if (WaitUntilReady() && Start()) Watch();
   progress_->Clear();
+  ReportProcesses();
   if (kills_ != nullptr) kills_->Finish();
   StopProcesses();
   if (kills_ != nullptr) outcome_.faults = kills_->faults();
@@ -50,9 +59,11 @@ void Launcher::StartProcesses() {
     processes_.push_back(std::make_unique<ComponentProcess>(
         name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart));
   };
-  start(kRecorderName,
-        {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
-         files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
+  if (log_) {
+    start(kRecorderName,
+          {"recorder", "--run", files_.spec_file, "--scenario", files_.scenario_file, "--log",
+           files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
+  }
   // In lockstep a successor would lack the messages of its tick; and the run can be repeated.
   for (const ComponentInstance& instance : spec_.graph().component()) {
     start(instance.name(),
@@ -161,6 +172,7 @@ void Launcher::Watch() {
     Wait(kSpin);
     const int64_t now = NowNanoseconds();
     if (ended_at == 0) EndSilent(now);
+    if (ended_at == 0) MeasureMemory(now, start);
     if (kills_ != nullptr && ended_at == 0) kills_->Act(now, now - start, processes_);
     const int64_t tick = Tick();
     const double time = static_cast<double>(tick + 1) * spec_.tick_period();
@@ -185,7 +197,7 @@ void Launcher::Watch() {
     }
     if (ended_at == 0 && (all_ended || !reason.empty())) ended_at = last_change = now;
     const bool recorded =
-        control_.statuses().at(kRecorderName).health.state == health_t::STATE_FINISHED;
+        !log_ || control_.statuses().at(kRecorderName).health.state == health_t::STATE_FINISHED;
     if (ended_at > 0 && recorded) {
       outcome_.completed = !failed;
       if (!reason.empty()) Fail(reason);
@@ -219,6 +231,26 @@ void Launcher::Wait(int timeout_ms) {
   if (kills_ != nullptr) fds.push_back(kills_->fd());
   control_.Spin(kills_ != nullptr ? std::min(timeout_ms, 2) : timeout_ms, fds);
   if (kills_ != nullptr) kills_->Receive();
+}
+
+void Launcher::MeasureMemory(int64_t now, int64_t start) {
+  if (now < next_measure_ || now - start < kSettled) return;
+  next_measure_ = now + kSecond;
+  outcome_.processes.resize(static_cast<size_t>(spec_.graph().component_size()));
+  for (size_t i = 0; i < outcome_.processes.size(); ++i) {
+    ProcessReport& report = outcome_.processes[i];
+    const ComponentProcess& process = *processes_[i + (log_ ? 1 : 0)];
+    report.resident_last = process.ResidentBytes();
+    if (report.resident_first == 0) report.resident_first = report.resident_last;
+  }
+}
+
+void Launcher::ReportProcesses() {
+  outcome_.processes.resize(static_cast<size_t>(spec_.graph().component_size()));
+  size_t i = 0;
+  for (const ComponentInstance& instance : spec_.graph().component()) {
+    outcome_.processes[i++].health = control_.statuses().at(instance.name()).health;
+  }
 }
 
 void Launcher::EndSilent(int64_t now) {

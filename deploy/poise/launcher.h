@@ -23,10 +23,11 @@ struct LaunchFiles {
   std::string scenario_file;
 };
 
-/// Faults to inject in a run in real time.
-struct KillOptions {
-  int count = 0;
-  uint64_t seed = 1;
+/// What else a run of processes may ask for.
+struct LaunchOptions {
+  bool log = true;  ///< false: no recorder takes part
+  int kills = 0;    ///< faults to inject, see KillSchedule; in real time only
+  uint64_t kill_seed = 1;
 };
 
 /// One run. Leaves no process behind, whatever happens.
@@ -34,7 +35,8 @@ class Launcher {
  public:
   /// `spec` as written to files.spec_file; `progress` outlives the launcher. Throws BusError, or
   /// ConfigError for faults that cannot be injected.
-  Launcher(const RunSpec& spec, LaunchFiles files, const KillOptions& kills, Progress* progress);
+  Launcher(const RunSpec& spec, LaunchFiles files, const LaunchOptions& options,
+           Progress* progress);
   ~Launcher();
 
   /// Starts everything, waits until it is ready, runs, and ends everything. Throws
@@ -58,13 +60,17 @@ class Launcher {
   LaunchFiles files_;
   Progress* progress_;
   ControlClient control_;
+  void MeasureMemory(int64_t now, int64_t start);
+  void ReportProcesses();
   /// Waits for health, the end of a process or what the kill schedule listens to.
   void Wait(int timeout_ms);
   /// A process that can be replaced and has been silent for long is ended, so that it is.
   void EndSilent(int64_t now);
 
   std::unique_ptr<KillSchedule> kills_;
-  std::vector<std::unique_ptr<ComponentProcess>> processes_;  // the recorder's is the first
+  bool log_;
+  std::vector<std::unique_ptr<ComponentProcess>> processes_;  // the recorder's is the first, if any
+  int64_t next_measure_ = 0;                                  // ns, of memory
   RunOutcome outcome_;
 };
 

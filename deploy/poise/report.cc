@@ -146,6 +146,29 @@ std::string FormatFaults(const RunOutcome& outcome) {
   return text + "\n";
 }
 
+std::string FormatProcesses(const RunOutcome& outcome) {
+  if (outcome.processes.empty()) return "";
+  std::vector<std::vector<std::string>> rows = {
+      {"process", "ticks", "median us", "p99 us", "worst us", "missed deadlines", "latest start us",
+       "skipped ticks", "replaced", "scheduling", "memory MB", "grown by kB"}};
+  for (const ProcessReport& process : outcome.processes) {
+    const health_t& h = process.health;
+    std::string scheduling = (h.scheduling & health_t::SCHEDULING_FIFO) != 0 ? "FIFO" : "ordinary";
+    if ((h.scheduling & health_t::SCHEDULING_PINNED) != 0) scheduling += ", pinned";
+    if ((h.scheduling & health_t::SCHEDULING_MEMORY_LOCKED) != 0) scheduling += ", locked";
+    const bool measured = process.resident_first > 0;
+    rows.push_back(
+        {h.component, fmt::format("{}", h.ticks_completed), FormatNumber(h.latency_median),
+         FormatNumber(h.latency_p99), FormatNumber(h.latency_max),
+         fmt::format("{}", h.deadline_misses), FormatNumber(h.lateness_max),
+         fmt::format("{}", h.ticks_skipped), fmt::format("{}", h.restarts), scheduling,
+         measured ? FormatNumber(static_cast<double>(process.resident_last) * 1e-6) : "",
+         measured ? fmt::format("{}", (process.resident_last - process.resident_first) / 1024)
+                  : ""});
+  }
+  return fmt::format("\n{}", FormatColumns(rows));
+}
+
 std::string FormatEvents(const std::vector<logging::Event>& events) {
   constexpr size_t kFirst = 30;
   constexpr size_t kLast = 10;

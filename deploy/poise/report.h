@@ -42,6 +42,8 @@ std::string FormatMeasured(const CheckResult& check);
 /// The faults that were injected, and how long control was lost by each; empty when there were
 /// none.
 std::string FormatFaults(const RunOutcome& outcome);
+/// The processes of a run in real time: latencies, deadlines, what the system granted, memory.
+std::string FormatProcesses(const RunOutcome& outcome);
 std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);

@@ -49,12 +49,13 @@ void AddRunCommand(CLI::App* app, Command* command) {
       "the bridge owns the clock and holds the last command; processes that die are replaced. "
       "With --inline: pace the ticks with the wall clock");
   run->add_option(
-         "--kill", options->kills.count,
+         "--kill", options->launch.kills,
          "faults to inject: as often a controller process is killed, or stopped for 100 ms")
       ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
       ->needs(realtime)
       ->excludes(in_process);
-  run->add_option("--kill-seed", options->kills.seed, "of the moments and processes of --kill")
+  run->add_option("--kill-seed", options->launch.kill_seed,
+                  "of the moments and processes of --kill")
       ->capture_default_str();
   run->add_option("--variant", options->changes.variant,
                   "run this variant of the scenario (poise list scenarios)");
@@ -82,6 +83,10 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
+      ->excludes(in_process);
+  run->add_flag(
+         "!--no-log", options->launch.log,
+         "write no log, for a run of hours: nothing is checked but that it stands to the end")
       ->excludes(in_process);
   run->add_flag("--quiet", options->quiet, "only errors and the verdict");
   run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });

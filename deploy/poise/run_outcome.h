@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "poise/health_t.hpp"
+
 namespace poise {
 
 /// A fault that the launcher caused on purpose.
@@ -16,6 +18,13 @@ struct InjectedFault {
   int32_t cycles = 0;    ///< longest age of a command meanwhile
 };
 
+/// What a process of a run says of itself at the end, and its memory.
+struct ProcessReport {
+  health_t health;
+  int64_t resident_first = 0;  ///< bytes, 10 s after the start; 0: the run was shorter
+  int64_t resident_last = 0;   ///< bytes
+};
+
 struct RunOutcome {
   bool completed = false;    ///< the planned end was reached, or a component ended the run well
   bool interrupted = false;  ///< by a signal
@@ -23,8 +32,9 @@ struct RunOutcome {
   std::vector<std::string> details;  ///< last lines of the output of the process at fault
   int64_t refused = 0;               ///< packets that the launcher refused on the service port
   std::vector<InjectedFault> faults;
-  int32_t takeovers = 0;  ///< processes that took the place of one that died
-  double wall_time = 0;   ///< s, from the start command to the last tick
+  std::vector<ProcessReport> processes;  ///< in the graph's order; none of a run in one process
+  int32_t takeovers = 0;                 ///< processes that took the place of one that died
+  double wall_time = 0;                  ///< s, from the start command to the last tick
 };
 
 }  // namespace poise

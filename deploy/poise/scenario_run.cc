@@ -42,7 +42,7 @@ ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunCha
   Part part{LoadScenario(scenario, changes), {}};
   std::vector<std::string> warnings;
   part.spec = MakeRunSpec(part.loaded, changes, &warnings);
-  part.spec.set_recorded(!in_process);
+  part.spec.set_recorded(!in_process && options_.launch.log);
   if (warn) {
     for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   }
@@ -58,7 +58,7 @@ void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
 }
 
 RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
-                                const KillOptions& kills) {
+                                const LaunchOptions& launch) {
   const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), quiet);
   if (in_process) {
@@ -66,7 +66,7 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
   }
   const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
                           (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
-  return Launcher(spec, files, kills, &progress).Run();
+  return Launcher(spec, files, launch, &progress).Run();
 }
 
 void ScenarioRun::PrintHeading() const {
@@ -85,7 +85,8 @@ void ScenarioRun::PrintHeading() const {
   fmt::print("{} s at {} Hz, {}; seed {}; run {}{}\n", scenario.duration(), scenario.tick_rate(),
              options_.in_process
                  ? "in one process"
-                 : fmt::format("{} processes and the recorder", spec.graph().component_size()),
+                 : fmt::format("{} processes{}", spec.graph().component_size(),
+                               options_.launch.log ? " and the recorder" : ", no log"),
              spec.seed(), spec.run_id(),
              options_.in_process ? "" : fmt::format("; listen at {}", MirrorUrl(spec)));
   std::fflush(stdout);
@@ -113,9 +114,12 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   }
   if (StopSignal() == 0) {
     summary.outcome =
-        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.kills);
+        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch);
     PrintEnd("run", summary.outcome);
-    if (!options_.quiet) fmt::print("{}", FormatFaults(summary.outcome));
+    if (!options_.quiet) {
+      fmt::print("{}", FormatFaults(summary.outcome));
+      if (main_.spec.realtime()) fmt::print("{}", FormatProcesses(summary.outcome));
+    }
   } else {
     summary.outcome = *summary.reference;  // interrupted
   }
@@ -134,8 +138,8 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   } else {
     record.spec = main_.spec;
   }
-  summary.passed =
-      recorded && outcome.completed && (!summary.reference || summary.reference->completed);
+  summary.passed = (recorded || !options_.launch.log) && outcome.completed &&
+                   (!summary.reference || summary.reference->completed);
   for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
   WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
   if (!options_.quiet && recorded) {

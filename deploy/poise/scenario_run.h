@@ -17,7 +17,7 @@ struct RunOptions {
   RunChanges changes;
   bool in_process = false;
   bool quiet = false;
-  KillOptions kills;
+  LaunchOptions launch;
 };
 
 /// What `poise report` and the overview of several runs say of a run's scenario.
@@ -51,7 +51,7 @@ class ScenarioRun {
                bool warn) const;
   static void WriteFiles(const Part& part, const std::filesystem::path& dir);
   static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
-                            bool quiet, const KillOptions& kills);
+                            bool quiet, const LaunchOptions& launch);
   void PrintHeading() const;
 
   RunOptions options_;
