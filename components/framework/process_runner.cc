@@ -93,6 +93,7 @@ class ProcessRunner::Impl {
   bool realtime_;
   int64_t num_ticks_;
   int64_t run_id_;
+  int num_components_;
   int index_;
   Timing timing_;
   RealtimeOptions realtime_options_;
@@ -124,6 +125,7 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& name,
       realtime_(spec.realtime()),
       num_ticks_(spec.num_ticks()),
       run_id_(spec.run_id()),
+      num_components_(spec.graph().component_size()),
       index_(FindComponent(spec.graph(), name)),
       timing_(TimingOf(spec, index_)),
       realtime_options_(spec.realtime_options()),
@@ -170,7 +172,8 @@ bool ProcessRunner::Impl::Run() {
     Open();
     if (!Stopped()) WaitForStart();
   }
-  bus_.health().scheduling = AskForRealtime(realtime_options_, timing_);
+  bus_.health().scheduling = AskForRealtime(
+      realtime_options_, timing_, timing_ == Timing::kOwner ? 0 : num_components_ - index_);
   if (progress_ == 0) progress_ = NowNanoseconds();
   const auto run = [&] {
     switch (timing_) {

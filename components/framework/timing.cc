@@ -42,15 +42,14 @@ Timing TimingOf(const RunSpec& spec, int component) {
   return instance.plant() ? Timing::kPlant : Timing::kFollower;
 }
 
-int8_t AskForRealtime(const RealtimeOptions& options, Timing timing) {
+int8_t AskForRealtime(const RealtimeOptions& options, Timing timing, int below) {
   int granted = 0;
   if (timing == Timing::kLockstep) return 0;
   if (options.lock_memory() && LockMemory()) granted |= health_t::SCHEDULING_MEMORY_LOCKED;
   // The simulated robot is no part of the controller: it gets what the others leave.
   if (timing == Timing::kPlant || options.priority() <= 0) return static_cast<int8_t>(granted);
   sched_param parameters{};
-  parameters.sched_priority =
-      std::clamp(options.priority() - (timing == Timing::kOwner ? 0 : 1), 1, 99);
+  parameters.sched_priority = std::clamp(options.priority() - below, 1, 99);
   if (sched_setscheduler(0, SCHED_FIFO, &parameters) == 0) {
     granted |= health_t::SCHEDULING_FIFO;
     // Without FIFO, pinned processes only stand in each other's way.

@@ -19,7 +19,9 @@ enum class Timing {
 Timing TimingOf(const RunSpec& spec, int component);
 
 /// Locks memory, sets SCHED_FIFO and pins this process as the run's options ask; what the system
-/// refuses is done without. Returns the granted health_t::SCHEDULING_* bits.
-int8_t AskForRealtime(const RealtimeOptions& options, Timing timing);
+/// refuses is done without. `below`: by how much its priority is less than the owner's. On one core
+/// a message then goes on at once if its reader stands above its writer: later in the graph,
+/// higher. Returns the granted health_t::SCHEDULING_* bits.
+int8_t AskForRealtime(const RealtimeOptions& options, Timing timing, int below);
 
 }  // namespace poise

@@ -143,7 +143,8 @@ class BareRing {
         prctl(PR_SET_PDEATHSIG, SIGKILL);
         if (getppid() != parent) _exit(1);
         prctl(PR_SET_TIMERSLACK, 1000);
-        AskForRealtime(spec_.realtime_options(), i == 0 ? Timing::kOwner : Timing::kFollower);
+        AskForRealtime(spec_.realtime_options(), i == 0 ? Timing::kOwner : Timing::kFollower,
+                       i == 0 ? 0 : kNumHops - i);
         if (i == 0) Source();
         Answer(i);
       }
