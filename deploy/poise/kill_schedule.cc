@@ -16,7 +16,7 @@ namespace {
 constexpr int64_t kMillisecond = 1'000'000;  // ns
 constexpr int64_t kStop = 100 * kMillisecond;
 constexpr int kFreshCycles = 20;
-constexpr double kShortestSlot = 0.5e9;  // ns
+constexpr double kShortestSlot = 0.5;  // s
 
 int StatusChannel(const Graph& graph) {
   for (int i = 0; i < graph.channel_size(); ++i) {
@@ -37,6 +37,23 @@ PacketFilter StatusFilter(const RunSpec& spec) {
 
 }  // namespace
 
+void KillSchedule::Check(const RunSpec& spec, int count) {
+  StatusChannel(spec.graph());
+  const auto& instances = spec.graph().component();
+  if (std::none_of(instances.begin(), instances.end(),
+                   [](const ComponentInstance& c) { return c.restart(); })) {
+    throw ConfigError(
+        fmt::format("graph {}: --kill needs components with restart: true", spec.graph().name()));
+  }
+  const double slot = static_cast<double>(spec.num_ticks()) * spec.tick_period() / count;
+  if (slot < kShortestSlot) {
+    throw ConfigError(
+        fmt::format("--kill {}: {:.1f} s are too short for so many; 0.5 s each at least, or a "
+                    "longer --duration",
+                    count, slot * count));
+  }
+}
+
 KillSchedule::KillSchedule(const RunSpec& spec, int count, uint64_t seed)
     : slot_(static_cast<double>(spec.num_ticks()) * spec.tick_period() * 1e9 / std::max(1, count)),
       count_(count),
@@ -44,18 +61,7 @@ KillSchedule::KillSchedule(const RunSpec& spec, int count, uint64_t seed)
       filter_(StatusFilter(spec)),
       channel_(spec.graph().channel(StatusChannel(spec.graph())).name()),
       receiver_(ChannelUrl(spec, StatusChannel(spec.graph()))) {
-  const auto& instances = spec.graph().component();
-  if (std::none_of(instances.begin(), instances.end(),
-                   [](const ComponentInstance& c) { return c.restart(); })) {
-    throw ConfigError(
-        fmt::format("graph {}: --kill needs components with restart: true", spec.graph().name()));
-  }
-  if (slot_ < kShortestSlot) {
-    throw ConfigError(
-        fmt::format("--kill {}: {:.1f} s are too short for so many; 0.5 s each at least, or a "
-                    "longer --duration",
-                    count, slot_ * 1e-9 * count));
-  }
+  Check(spec, count);
   next_ = static_cast<int64_t>(std::uniform_real_distribution(0.02, 0.5)(random_) * slot_);
 }
 

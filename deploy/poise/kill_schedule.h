@@ -22,8 +22,10 @@ namespace poise {
 /// cycle, when the commands of the next 20 cycles do, too.
 class KillSchedule {
  public:
-  /// `duration`: s, of the run. Throws BusError, or ConfigError when the graph tells no
-  /// bridge_status_t or has nothing to restart.
+  /// Throws ConfigError when the graph has no bridge_status_t or nothing to restart, or when the
+  /// run is too short for `count` faults.
+  static void Check(const RunSpec& spec, int count);
+  /// Throws BusError or, as Check, ConfigError.
   KillSchedule(const RunSpec& spec, int count, uint64_t seed);
 
   /// To be called often, `elapsed`: ns since the start of the run. Acts when it is time.

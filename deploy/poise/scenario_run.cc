@@ -32,6 +32,7 @@ void PrintEnd(const std::string& what, const RunOutcome& outcome) {
 
 ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
     : options_(options), main_(Prepare(scenario, options.changes, options.in_process, true)) {
+  if (options.launch.kills > 0) KillSchedule::Check(main_.spec, options.launch.kills);
   if (!main_.loaded.scenario.has_reference()) return;
   reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
                        /*in_process=*/true, false);
