@@ -172,8 +172,11 @@ bool ProcessRunner::Impl::Run() {
     Open();
     if (!Stopped()) WaitForStart();
   }
-  bus_.health().scheduling = AskForRealtime(
-      realtime_options_, timing_, timing_ == Timing::kOwner ? 0 : num_components_ - index_);
+  // The simulated robot must not be late either, but stands below the controller.
+  const int below = timing_ == Timing::kOwner   ? 0
+                    : timing_ == Timing::kPlant ? num_components_ + 1
+                                                : num_components_ - index_;
+  bus_.health().scheduling = AskForRealtime(realtime_options_, timing_, below);
   if (progress_ == 0) progress_ = NowNanoseconds();
   const auto run = [&] {
     switch (timing_) {

@@ -46,14 +46,14 @@ int8_t AskForRealtime(const RealtimeOptions& options, Timing timing, int below) 
   int granted = 0;
   if (timing == Timing::kLockstep) return 0;
   if (options.lock_memory() && LockMemory()) granted |= health_t::SCHEDULING_MEMORY_LOCKED;
-  // The simulated robot is no part of the controller: it gets what the others leave.
-  if (timing == Timing::kPlant || options.priority() <= 0) return static_cast<int8_t>(granted);
+  if (options.priority() <= 0) return static_cast<int8_t>(granted);
   sched_param parameters{};
   parameters.sched_priority = std::clamp(options.priority() - below, 1, 99);
   if (sched_setscheduler(0, SCHED_FIFO, &parameters) == 0) {
     granted |= health_t::SCHEDULING_FIFO;
-    // Without FIFO, pinned processes only stand in each other's way.
-    if (Pin(options.cpu())) granted |= health_t::SCHEDULING_PINNED;
+    // Without FIFO, pinned processes only stand in each other's way. The simulated robot works
+    // beside the controller, as a real one would.
+    if (timing != Timing::kPlant && Pin(options.cpu())) granted |= health_t::SCHEDULING_PINNED;
   }
   return static_cast<int8_t>(granted);
 }
