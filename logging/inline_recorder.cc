@@ -1,7 +1,6 @@
 #include "logging/inline_recorder.h"
 
 #include "components/framework/run.h"
-#include "poise/health_t.hpp"
 
 namespace poise::logging {
 
@@ -16,21 +15,26 @@ InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec,
   });
 }
 
+health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component) {
+  const int64_t ticks = runner.ticks_completed();
+  health_t health{};
+  health.run_id = spec.run_id();
+  health.component = spec.graph().component(component).name();
+  health.tick = ticks - 1;
+  health.utime = ticks > 0 ? MakeTick(ticks - 1, spec.tick_period()).utime : 0;
+  health.state = runner.failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED;
+  health.detail = runner.end_detail();
+  health.ticks_completed = ticks;
+  const LatencyHistogram& latency = runner.latency(component);
+  health.latency_median = latency.median();
+  health.latency_p99 = latency.p99();
+  health.latency_max = latency.max();
+  return health;
+}
+
 void InlineRecorder::Close(const RunSpec& spec) {
-  const int64_t ticks = runner_->ticks_completed();
   for (int i = 0; i < spec.graph().component_size(); ++i) {
-    health_t health{};
-    health.run_id = spec.run_id();
-    health.component = spec.graph().component(i).name();
-    health.tick = ticks - 1;
-    health.utime = ticks > 0 ? MakeTick(ticks - 1, spec.tick_period()).utime : 0;
-    health.state = runner_->failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED;
-    health.detail = runner_->end_detail();
-    health.ticks_completed = ticks;
-    const LatencyHistogram& latency = runner_->latency(i);
-    health.latency_median = latency.median();
-    health.latency_p99 = latency.p99();
-    health.latency_max = latency.max();
+    const health_t health = FinalHealth(spec, *runner_, i);
     std::vector<uint8_t> bytes(static_cast<size_t>(health.getEncodedSize()));
     health.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     writer_.AddHealth(HealthChannel(health.component), bytes);

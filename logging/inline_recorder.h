@@ -7,8 +7,12 @@
 
 #include "components/framework/inline_runner.h"
 #include "logging/run_log_writer.h"
+#include "poise/health_t.hpp"
 
 namespace poise::logging {
+
+/// The health of a component (an index in the graph) as it stands.
+health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component);
 
 /// Taps an InlineRunner and writes the log that the recorder's process would write of the same run,
 /// apart from health. Both must outlive the last Step of the runner.

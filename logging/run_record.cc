@@ -36,11 +36,10 @@ using Adders =
     std::map<std::string, std::function<bool(int64_t, std::span<const uint8_t>)>, std::less<>>;
 
 Adders MakeAdders(RunRecord* run) {
-  return {{"robot_sensors_t", AddTo(&run->sensors)}, {"robot_state_t", AddTo(&run->state)},
-          {"task_torque_t", AddTo(&run->task)},      {"balance_torque_t", AddTo(&run->balance)},
-          {"joint_command_t", AddTo(&run->command)}, {"drive_command_t", AddTo(&run->drive)},
-          {"bridge_status_t", AddTo(&run->bridge)},  {"external_push_t", AddTo(&run->push)},
-          {"ground_truth_t", AddTo(&run->truth)}};
+  Adders adders;
+  run->VisitSeries(
+      [&]<class T>(Series<T>* series) { adders.emplace(T::getTypeName(), AddTo(series)); });
+  return adders;
 }
 
 /// Metrics index messages by the robot's joints and feet.

@@ -56,6 +56,20 @@ struct RunRecord {
   std::shared_ptr<RunRecord> reference;
 
   double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
+
+  /// Calls visit(Series<T>*) for the series of each message type.
+  template <class Visit>
+  void VisitSeries(const Visit& visit) {
+    visit(&sensors);
+    visit(&state);
+    visit(&task);
+    visit(&balance);
+    visit(&command);
+    visit(&drive);
+    visit(&bridge);
+    visit(&push);
+    visit(&truth);
+  }
 };
 
 /// Throws LogError: no file, no RUN_INFO, a RUN_INFO that does not parse, whose tick period or

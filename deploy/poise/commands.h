@@ -17,6 +17,8 @@ using Command = std::function<int()>;
 /// anything else (failure).
 void AddRunCommand(CLI::App* app, Command* command);
 void AddMatrixCommand(CLI::App* app, Command* command);
+void AddSweepCommand(CLI::App* app, Command* command);
+void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
 void AddReplayCommand(CLI::App* app, Command* command);

@@ -19,6 +19,8 @@ int main(int argc, char** argv) {
   poise::Command command;
   poise::AddRunCommand(&app, &command);
   poise::AddMatrixCommand(&app, &command);
+  poise::AddSweepCommand(&app, &command);
+  poise::AddLimitCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
   poise::AddReplayCommand(&app, &command);

@@ -71,13 +71,6 @@ std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
   return FormatColumns(rows);
 }
 
-std::string Quoted(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
-  return quoted + '"';
-}
-
 std::string Number(const std::optional<double>& value) {
   return value ? fmt::format("{}", *value) : "";
 }
@@ -135,17 +128,17 @@ std::string MatrixCsv(const std::vector<MatrixCell>& cells) {
       "unit,measured,at_least,at_most,check_passed,paper,paper_value\n";
   for (const MatrixCell& cell : cells) {
     const std::string run =
-        fmt::format("{},{},{},{}", Quoted(cell.scenario), Quoted(cell.paper_section),
-                    Quoted(cell.variant), Quoted(cell.ablation));
+        fmt::format("{},{},{},{}", CsvCell(cell.scenario), CsvCell(cell.paper_section),
+                    CsvCell(cell.variant), CsvCell(cell.ablation));
     if (cell.problem) {
-      csv += fmt::format("{},{},,,,,,,,,,,,\n", run, Quoted("could not be run: " + *cell.problem));
+      csv += fmt::format("{},{},,,,,,,,,,,,\n", run, CsvCell("could not be run: " + *cell.problem));
     }
     for (const CheckResult& check : cell.checks) {
-      csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", run, Quoted(cell.outcome),
+      csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", run, CsvCell(cell.outcome),
                          Number(cell.fell_at), Number(cell.simulated_time), Truth(cell.passed),
-                         Quoted(check.name), Quoted(check.label), Quoted(check.unit),
+                         CsvCell(check.name), CsvCell(check.label), CsvCell(check.unit),
                          Number(check.measured), Number(check.at_least), Number(check.at_most),
-                         check.limited() ? Truth(check.passed) : "", Quoted(check.paper),
+                         check.limited() ? Truth(check.passed) : "", CsvCell(check.paper),
                          Number(check.paper_value));
     }
   }

@@ -49,4 +49,11 @@ std::string FormatColumns(const std::vector<std::vector<std::string>>& rows) {
   return text;
 }
 
+std::string CsvCell(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + '"';
+}
+
 }  // namespace poise

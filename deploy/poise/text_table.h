@@ -14,4 +14,7 @@ std::string FormatNumber(double value, const std::string& unit);
 /// cells as it; UTF-8.
 std::string FormatColumns(const std::vector<std::vector<std::string>>& rows);
 
+/// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
+std::string CsvCell(const std::string& text);
+
 }  // namespace poise

@@ -11,37 +11,7 @@
 namespace poise {
 namespace {
 
-using Row = std::map<std::string, std::string>;  // by column
-
-/// RFC 4180.
-std::vector<Row> ReadCsv(const std::string& file) {
-  std::ifstream in(file);
-  std::vector<std::vector<std::string>> lines(1, std::vector<std::string>(1));
-  bool quoted = false;
-  for (char c = 0; in.get(c);) {
-    if (quoted && c == '"' && in.peek() == '"') {
-      lines.back().back() += static_cast<char>(in.get());
-    } else if (c == '"') {
-      quoted = !quoted;
-    } else if (!quoted && c == ',') {
-      lines.back().emplace_back();
-    } else if (!quoted && c == '\n') {
-      lines.emplace_back(1);
-    } else {
-      lines.back().back() += c;
-    }
-  }
-  EXPECT_FALSE(quoted);
-  lines.pop_back();  // after the last line's end
-  std::vector<Row> rows;
-  for (size_t i = 1; i < lines.size(); ++i) {
-    EXPECT_EQ(lines[i].size(), lines[0].size()) << "line " << i + 1;
-    Row row;
-    for (size_t k = 0; k < lines[i].size(); ++k) row[lines[0].at(k)] = lines[i][k];
-    rows.push_back(row);
-  }
-  return rows;
-}
+using Row = CsvRow;
 
 class MatrixTest : public testing::Test {
  protected:

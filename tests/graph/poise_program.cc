@@ -13,16 +13,12 @@
 #include <stdexcept>
 
 namespace poise {
-namespace {
-
 namespace fs = std::filesystem;
 
 std::string ReadAll(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
-
-}  // namespace
 
 PoiseProgram::PoiseProgram(const std::vector<std::string>& arguments) {
   output_file_ = (fs::temp_directory_path() / "poise_output_XXXXXX").string();
@@ -138,6 +134,35 @@ bool WaitForLog(const std::string& run, uintmax_t size) {
     const uintmax_t now = fs::file_size(fs::path(run) / "run.lcm", error);
     return !error && now >= size;
   });
+}
+
+std::vector<CsvRow> ReadCsv(const std::string& file) {
+  std::ifstream in(file);
+  std::vector<std::vector<std::string>> lines(1, std::vector<std::string>(1));
+  bool quoted = false;
+  for (char c = 0; in.get(c);) {
+    if (quoted && c == '"' && in.peek() == '"') {
+      lines.back().back() += static_cast<char>(in.get());
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (!quoted && c == ',') {
+      lines.back().emplace_back();
+    } else if (!quoted && c == '\n') {
+      lines.emplace_back(1);
+    } else {
+      lines.back().back() += c;
+    }
+  }
+  EXPECT_FALSE(quoted);
+  lines.pop_back();  // after the last line's end
+  std::vector<CsvRow> rows;
+  for (size_t i = 1; i < lines.size(); ++i) {
+    EXPECT_EQ(lines[i].size(), lines[0].size()) << "line " << i + 1;
+    CsvRow row;
+    for (size_t k = 0; k < lines[i].size(); ++k) row[lines[0].at(k)] = lines[i][k];
+    rows.push_back(row);
+  }
+  return rows;
 }
 
 }  // namespace poise

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
@@ -76,6 +77,13 @@ class TestDeploy {
 std::string StandScenario();
 
 nlohmann::json ReadSummary(const std::string& run);
+
+/// A row of a CSV file, by column.
+using CsvRow = std::map<std::string, std::string>;
+/// RFC 4180; expects that all rows have the heading's columns.
+std::vector<CsvRow> ReadCsv(const std::string& file);
+/// A whole file's bytes; empty when there is none.
+std::string ReadAll(const std::filesystem::path& path);
 
 /// Processes whose command line holds `text` (a run's folder), this one aside: by pid.
 std::vector<pid_t> ProcessesWith(const std::string& text);

@@ -1,0 +1,22 @@
+// The files that a sweep's folder holds beside its results.
+#pragma once
+
+#include <filesystem>
+
+#include "deploy/poise/sweep_results.h"
+
+namespace poise {
+
+/// Writes table.csv and maps.html, and limits.csv of a search for limits, of the rows there are.
+/// Throws ConfigError.
+void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
+                 const SweepRows& rows);
+
+/// Prints what the rows came to and which files the folder holds.
+void PrintOutput(const std::filesystem::path& folder, const SweepHeader& header,
+                 const SweepRows& rows);
+
+/// True when no row is kInvalid or kCrashed; else says on stderr which are.
+bool AllRan(const SweepRows& rows);
+
+}  // namespace poise
