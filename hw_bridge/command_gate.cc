@@ -9,6 +9,7 @@ Refusal CommandGate::Check(const joint_command_t& command, int64_t cycle) {
   const Refusal refusal = Find(command, cycle);
   if (refusal == Refusal::kNone) {
     last_tick_ = command.tick;
+    last_utime_ = command.utime;
   } else {
     ++refused_[static_cast<size_t>(refusal)];
   }
@@ -21,7 +22,9 @@ Refusal CommandGate::Find(const joint_command_t& command, int64_t cycle) const {
       command.torque.size() != static_cast<size_t>(num_joints_)) {
     return Refusal::kSize;
   }
-  if (command.tick <= last_tick_ || command.tick > cycle) return Refusal::kSequence;
+  if (command.tick <= last_tick_ || command.tick > cycle || command.utime < last_utime_) {
+    return Refusal::kSequence;
+  }
   // With this status the tick is fresh but the torque is not: the controller has none.
   if (command.status == joint_command_t::STATUS_INVALID_INPUT) return Refusal::kStale;
   if (cycle - command.tick > max_age_) return Refusal::kStale;

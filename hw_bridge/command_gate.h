@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "poise/joint_command_t.hpp"
 
@@ -40,6 +41,7 @@ class CommandGate {
   int num_joints_, max_age_;
   int64_t run_id_ = 0;
   int64_t last_tick_ = -1;
+  int64_t last_utime_ = std::numeric_limits<int64_t>::min();
   std::array<int64_t, kNumRefusals> refused_{};
 };
 

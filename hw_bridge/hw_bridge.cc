@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include "components/messages/robot_resource.h"
-#include "hw_bridge/hw_bridge.pb.h"
+#include "hw_bridge/ethercat/ethercat_drive_bus.h"
+#include "hw_bridge/ethercat/socket_link.h"
 #include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/units.h"
 
@@ -17,17 +18,78 @@ void Require(bool condition, const char* field, const char* problem) {
   if (!condition) throw ConfigError(field, problem);
 }
 
+/// A finite number, not negative.
+void RequireAmount(double value, const char* field, const char* unit) {
+  if (!(value >= 0) || !std::isfinite(value)) {
+    throw ConfigError(field, fmt::format("must be a finite number of {}, not negative", unit));
+  }
+}
+
+void RequirePositive(double value, const char* field, const char* unit) {
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw ConfigError(field, fmt::format("must be a finite number of {} above 0", unit));
+  }
+}
+
 void Validate(const HwBridgeConfig& config) {
   Require(config.torque_limit_share() > 0 && config.torque_limit_share() <= 1, "torque_limit_share",
           "must be above 0 and at most 1");
   Require(config.damping_after_cycles() >= 0, "damping_after_cycles", "must not be negative");
   Require(config.stop_after_cycles() >= 0, "stop_after_cycles", "must not be negative");
-  Require(config.damping() >= 0 && std::isfinite(config.damping()), "damping",
-          "must be a finite number of N·m·s/rad, not negative");
+  RequireAmount(config.damping(), "damping", "N·m·s/rad");
   Require(config.stop_ramp() >= 0 && config.stop_ramp() <= 10, "stop_ramp",
           "must be between 0 and 10 s");
-  Require(config.velocity_cutoff() > 0 && std::isfinite(config.velocity_cutoff()),
-          "velocity_cutoff", "must be a finite number of Hz above 0");
+  RequirePositive(config.velocity_cutoff(), "velocity_cutoff", "Hz");
+  Require(config.hold_time() >= 0 && config.hold_time() <= 60, "hold_time",
+          "must be between 0 and 60 s");
+  RequireAmount(config.hold_stiffness(), "hold_stiffness", "N·m/rad");
+  RequireAmount(config.hold_damping(), "hold_damping", "N·m·s/rad");
+  Require(config.resume_time() >= 0 && config.resume_time() <= 10, "resume_time",
+          "must be between 0 and 10 s");
+  Require(config.first_command_ramp() >= 0 && config.first_command_ramp() <= 60,
+          "first_command_ramp", "must be between 0 and 60 s");
+  RequirePositive(config.start_velocity(), "start_velocity", "rad/s");
+  Require(config.enable_cycles() >= 1, "enable_cycles", "must be at least 1");
+  RequirePositive(config.slew_limit(), "slew_limit", "N·m/s");
+  RequirePositive(config.overload_time(), "overload_time", "s");
+  RequireAmount(config.soft_range(), "soft_range", "rad");
+  RequireAmount(config.position_margin(), "position_margin", "rad");
+  RequirePositive(config.velocity_trip(), "velocity_trip", "times the URDF's limit");
+  Require(config.tilt_limit() > 0 && config.tilt_limit() <= 3.15, "tilt_limit",
+          "must be above 0 and at most half a turn, in rad");
+  RequirePositive(config.tilt_time(), "tilt_time", "s");
+  RequirePositive(config.frozen_time(), "frozen_time", "s");
+  RequirePositive(config.frozen_torque(), "frozen_torque", "N·m");
+  Require(config.torque_error_cycles() >= 1, "torque_error_cycles", "must be at least 1");
+  RequirePositive(config.torque_error(), "torque_error", "N·m");
+  RequirePositive(config.overrun_lateness(), "overrun_lateness", "periods");
+  Require(config.overruns_in_a_row() >= 1, "overruns_in_a_row", "must be at least 1");
+  Require(config.overruns_in_100() >= 1, "overruns_in_100", "must be at least 1");
+  Require(config.sense_deadline() >= 0 && config.sense_deadline() <= 1, "sense_deadline",
+          "must be between 0 and 1");
+  Require(config.command_deadline() >= config.sense_deadline() && config.command_deadline() <= 1,
+          "command_deadline", "must be between sense_deadline and 1");
+}
+
+/// Cycles of a time, at least the time.
+int Cycles(double seconds, double period) {
+  return static_cast<int>(std::ceil(seconds / period - 1e-9));
+}
+
+FeedbackMonitorConfig MakeMonitorConfig(const HwBridgeConfig& config,
+                                        const robot::RobotModel& model, double period) {
+  FeedbackMonitorConfig result;
+  for (const robot::Joint& joint : model.joints()) {
+    result.velocity_limit.push_back(joint.velocity_limit);
+  }
+  result.velocity_cutoff = config.velocity_cutoff();
+  result.num_feet = static_cast<int>(model.feet().size());
+  result.period = period;
+  result.frozen_cycles = std::max(1, Cycles(config.frozen_time(), period));
+  result.frozen_torque = config.frozen_torque();
+  result.torque_error_cycles = config.torque_error_cycles();
+  result.torque_error = config.torque_error();
+  return result;
 }
 
 SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot::RobotModel& model,
@@ -52,27 +114,111 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
           joint.name));
     }
     result.torque_limit.push_back(limit);
-    result.velocity_limit.push_back(joint.velocity_limit);
+    result.lower.push_back(joint.lower);
+    result.upper.push_back(joint.upper);
   }
-  result.num_feet = static_cast<int>(model.feet().size());
-  result.period = period;
+  result.monitor = MakeMonitorConfig(config, model, period);
+  result.soft_range = config.soft_range();
+  result.position_margin = config.position_margin();
+  result.velocity_trip = config.velocity_trip();
+  result.tilt_limit = config.tilt_limit();
+  result.tilt_time = config.tilt_time();
+  result.upright = model.imu().pose.linear().transpose() * Eigen::Vector3d::UnitZ();
+  result.start_velocity = config.start_velocity();
+  result.enable_cycles = config.enable_cycles();
+  result.first_command_ramp = Cycles(config.first_command_ramp(), period);
   result.damping_after_cycles = config.damping_after_cycles();
   result.stop_after_cycles = config.stop_after_cycles();
   result.damping = config.damping();
   result.stop_ramp = config.stop_ramp();
-  result.velocity_cutoff = config.velocity_cutoff();
+  if (config.on_lost_command() == HwBridgeConfig::HOLD) {
+    result.hold_cycles = Cycles(config.hold_time(), period);
+  }
+  result.hold_stiffness = config.hold_stiffness();
+  result.hold_damping = config.hold_damping();
+  result.resume_cycles = Cycles(config.resume_time(), period);
+  result.slew_limit = config.slew_limit();
+  result.overload_time = config.overload_time();
+  result.overrun_lateness = config.overrun_lateness() * period;
+  result.overruns_in_a_row = config.overruns_in_a_row();
+  result.overruns_in_100 = config.overruns_in_100();
   return result;
 }
 
+/// A link that no frame passes, for checking a configuration without the bus.
+class NoLink final : public ethercat::Link {
+ public:
+  int64_t Now() const override { return 0; }
+  bool Send(std::span<const uint8_t>) override { return false; }
+  size_t Receive(std::span<uint8_t>, int64_t) override { return 0; }
+};
+
 }  // namespace
+
+/// The EtherCAT bus's configuration and, once it is open, its link and capture.
+class HwBridge::Ethercat {
+ public:
+  Ethercat(const ethercat::EthercatBusConfig& config, const robot::RobotModel& model, double period)
+      : config_(config) {
+    const auto cycle = static_cast<uint32_t>(std::llround(period * 1e9));
+    if (config.master().has_cycle() && config.master().cycle() != cycle) {
+      throw ConfigError("ethercat.master.cycle",
+                        fmt::format("must be the run's period, {} ns, or be left out", cycle));
+    }
+    config_.mutable_master()->set_cycle(cycle);
+    try {
+      NoLink none;
+      const ethercat::EthercatDriveBus checked(&none, config_, model);
+    } catch (const ethercat::EthercatError& error) {
+      throw ConfigError("ethercat", error.what());
+    }
+  }
+
+  std::unique_ptr<DriveBus> Open(const LinkOpener& open_link, const robot::RobotModel& model) {
+    link_ = open_link(config_.link());
+    ethercat::Link* link = link_.get();
+    if (config_.has_capture()) {
+      using Carrier = ethercat::PcapWriter::Carrier;
+      writer_ = std::make_unique<ethercat::PcapWriter>(
+          config_.capture(), config_.link().has_udp() ? Carrier::kUdp : Carrier::kEthernet);
+      capture_ = std::make_unique<ethercat::CaptureLink>(link, writer_.get());
+      link = capture_.get();
+    }
+    return std::make_unique<ethercat::EthercatDriveBus>(link, config_, model);
+  }
+
+  /// Empty: done; else what could not be written.
+  std::string CloseCapture() {
+    if (!writer_) return {};
+    try {
+      writer_->Close();
+    } catch (const ethercat::EthercatError& error) {
+      return error.what();
+    }
+    return {};
+  }
+
+  const ethercat::EthercatBusConfig& config() const { return config_; }
+
+ private:
+  ethercat::EthercatBusConfig config_;
+  std::unique_ptr<ethercat::Link> link_;
+  std::unique_ptr<ethercat::PcapWriter> writer_;
+  std::unique_ptr<ethercat::CaptureLink> capture_;
+};
+
+HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal)
+    : HwBridge(stop_signal, ethercat::OpenLink) {}
+HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal, LinkOpener open_link)
+    : stop_signal_(stop_signal), open_link_(std::move(open_link)) {}
+HwBridge::~HwBridge() = default;
 
 void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<HwBridgeConfig>();
   Validate(config);
-  const std::shared_ptr<const robot::RobotModel> shared_model = LoadRobot(context);
-  const robot::RobotModel& model = *shared_model;
-  const int n = model.num_joints();
-  const int feet = static_cast<int>(model.feet().size());
+  model_ = LoadRobot(context);
+  const int n = model_->num_joints();
+  const int feet = static_cast<int>(model_->feet().size());
 
   wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
   wiring->AddInput(&joint_command_, "joint_command", {n, feet});
@@ -80,31 +226,135 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
   wiring->AddOutput(&drive_command_, "drive_command", {n});
   wiring->AddOutput(&bridge_status_, "bridge_status", {n});
-  wiring->AddStage("sense", {&drive_feedback_}, {&robot_sensors_},
-                   [this](const Tick& tick) { Sense(tick); });
-  wiring->AddStage("actuate", {&joint_command_, &emergency_stop_},
-                   {&drive_command_, &bridge_status_}, [this](const Tick& tick) { Actuate(tick); });
+  wiring->AddStage(
+      "sense", {&drive_feedback_}, {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
+      config.sense_deadline());
+  wiring->AddStage(
+      "actuate", {&joint_command_, &emergency_stop_}, {&drive_command_, &bridge_status_},
+      [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
 
-  motors_ = model.motors();
   supervisor_ =
-      std::make_unique<Supervisor>(MakeSupervisorConfig(config, model, context.tick_period));
-  bus_ = std::make_unique<SimulatedDriveBus>(&drive_feedback_, &drive_command_);
+      std::make_unique<Supervisor>(MakeSupervisorConfig(config, *model_, context.tick_period));
+  enable_at_start_ = config.enable_at_start();
+  enable_cycles_ = config.enable_cycles();
+  if (config.has_ethercat()) {
+    ethercat_ = std::make_unique<Ethercat>(config.ethercat(), *model_, context.tick_period);
+    simulated_time_ = config.ethercat().simulated_time();
+  } else {
+    bus_ = std::make_unique<SimulatedDriveBus>(&drive_feedback_);
+  }
   MessageTraits<drive_command_t>::Resize(command_, MessageCounts{n});
+  MessageTraits<drive_feedback_t>::Resize(feedback_, MessageCounts{n, feet});
 }
 
-void HwBridge::Sense(const Tick&) {
-  const drive_feedback_t* feedback = bus_->Receive();
-  if (feedback == nullptr) return;  // the message keeps the readings of the cycle before
-  if (!run_known_) {
-    supervisor_->SetRun(feedback->run_id);
-    run_known_ = true;
+void HwBridge::Open() {
+  if (ethercat_) bus_ = ethercat_->Open(open_link_, *model_);
+  try {
+    bus_->Start();
+    if (ethercat_ && enable_at_start_) EnableDrives();
+  } catch (...) {
+    bus_->Stop();  // what went wrong is said already
+    throw;
   }
-  if (!supervisor_->Read(*feedback)) return;  // likewise; the bridge has stopped
+  open_ = true;
+}
+
+void HwBridge::EnableDrives() {
+  const auto waiting = [this] {
+    const std::span<const DriveReport> reports = bus_->reports();
+    return static_cast<size_t>(std::find_if(reports.begin(), reports.end(),
+                                            [](const DriveReport& report) {
+                                              return report.state != bridge_status_t::DRIVE_ENABLED;
+                                            }) -
+                               reports.begin());
+  };
+  const auto num_joints = static_cast<size_t>(model_->num_joints());
+  for (int cycle = 0; waiting() < num_joints; ++cycle) {
+    if (cycle > enable_cycles_) {
+      throw ethercat::EthercatError(
+          fmt::format("the drive of joint \"{}\" is not enabled after {} cycles; is it powered, "
+                      "without a fault "
+                      "and safe torque off?",
+                      model_->joints()[waiting()].name, enable_cycles_));
+    }
+    bus_->Idle(true);
+    bus_->AwaitNextCycle();
+  }
+}
+
+void HwBridge::Idle() {
+  if (!open_) return;
+  if (last_cycle_ < 0) {
+    bus_->Idle(enable_at_start_);
+  } else if (!simulated_time_) {  // which stands still now, and the last tick is still at work
+    supervisor_->Shutdown();
+    RunDown();
+  }
+}
+
+std::string HwBridge::Close() {
+  if (!open_) return {};
+  supervisor_->Shutdown();
+  if (ethercat_) {
+    // One cycle more than the ramp: it tells the drives to stop.
+    for (bool last = false; !last;) {
+      last = supervisor_->at_rest() || !bus_->health().usable;
+      RunDown();
+      bus_->AwaitNextCycle();
+    }
+  }
+  std::string problem = bus_->Stop();
+  if (ethercat_) {
+    const std::string capture = ethercat_->CloseCapture();
+    if (!capture.empty()) problem += (problem.empty() ? "" : "; ") + capture;
+  }
+  open_ = false;
+  return problem;
+}
+
+void HwBridge::RunDown() {
+  if (const drive_feedback_t* drives = bus_->Receive()) {
+    supervisor_->Read(*drives, bus_->reports());
+  }
+  bridge_status_t& status = *bridge_status_;
+  supervisor_->Cycle(++last_cycle_, nullptr, &command_, &status);
+  bus_->Send(command_);
+}
+
+const drive_feedback_t* HwBridge::ReadFeedback() {
+  if (!bus_) return nullptr;  // EtherCAT that nobody has opened: a replay
+  const drive_feedback_t* drives = bus_->Receive();
+  if (drives == nullptr || !ethercat_) return drives;
+  feedback_.position_counts = drives->position_counts;
+  feedback_.current = drives->current;
+  feedback_.drive_status = drives->drive_status;
+  if (drive_feedback_.present()) {
+    std::copy(std::begin(drive_feedback_->imu_angular_velocity),
+              std::end(drive_feedback_->imu_angular_velocity), feedback_.imu_angular_velocity);
+    std::copy(std::begin(drive_feedback_->imu_acceleration),
+              std::end(drive_feedback_->imu_acceleration), feedback_.imu_acceleration);
+    feedback_.foot_wrench = drive_feedback_->foot_wrench;
+  }
+  return &feedback_;
+}
+
+void HwBridge::Sense(const Tick& tick) {
+  supervisor_->CountLateness(tick.lateness);
+  const drive_feedback_t* feedback = ReadFeedback();
+  // In lockstep readers wait for the message, which then keeps the readings of the cycle before.
+  if (!drive_feedback_.present() || (feedback == nullptr && !simulated_time_)) {
+    robot_sensors_.Withhold();
+  }
+  if (bus_) supervisor_->ReadBus(bus_->health());
+  if (feedback == nullptr) return;
+  const auto reports = bus_->reports();
+  if (!supervisor_->Read(*feedback, reports)) return;  // likewise; the bridge has stopped
 
   robot_sensors_t& sensors = *robot_sensors_;
-  for (size_t j = 0; j < motors_.size(); ++j) {
-    sensors.joint_position[j] = JointPosition(motors_[j], feedback->position_counts[j]);
-    sensors.joint_torque[j] = JointTorque(motors_[j], feedback->current[j]);
+  const std::vector<robot::MotorModel>& motors = model_->motors();
+  for (size_t j = 0; j < motors.size(); ++j) {
+    sensors.joint_position[j] = JointPosition(motors[j], feedback->position_counts[j]);
+    sensors.joint_torque[j] = JointTorque(motors[j], feedback->current[j]);
   }
   std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),
             sensors.imu_angular_velocity);
@@ -119,11 +369,30 @@ void HwBridge::Sense(const Tick&) {
   }
 }
 
+void HwBridge::CheckOperator() {
+  if (stop_signal_ != nullptr && *stop_signal_ != 0) {
+    *stop_signal_ = 0;
+    supervisor_->EmergencyStop(bridge_status_t::REASON_SIGNAL);
+  }
+  if (!emergency_stop_.present()) return;
+  if (emergency_stop_->stop != 0) supervisor_->EmergencyStop();
+  const bool reset = emergency_stop_->reset != 0;
+  if (reset && !reset_before_ && emergency_stop_->stop == 0) supervisor_->RequestReset();
+  reset_before_ = reset;
+}
+
 void HwBridge::Actuate(const Tick& tick) {
-  if (emergency_stop_.present() && emergency_stop_->stop != 0) supervisor_->EmergencyStop();
+  // The runner stamps every output with the run that this process belongs to.
+  supervisor_->SetRun(bridge_status_->run_id);
+  CheckOperator();
   supervisor_->Cycle(tick.index, joint_command_.present() ? &*joint_command_ : nullptr, &command_,
                      &*bridge_status_);
+  last_cycle_ = tick.index;
+  drive_command_->current = command_.current;
+  drive_command_->enabled = command_.enabled;
+  if (!bus_) return;
   bus_->Send(command_);
+  if (supervisor_->TakeReset()) bus_->RequestFaultReset();
 }
 
 }  // namespace poise

@@ -1,9 +1,21 @@
+#include <csignal>
 #include <memory>
 
 #include "components/framework/component_main.h"
 #include "hw_bridge/hw_bridge.h"
 
+namespace {
+
+volatile std::sig_atomic_t emergency_stop = 0;
+void OnEmergencyStop(int) { emergency_stop = 1; }
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  struct sigaction action {};
+  action.sa_handler = OnEmergencyStop;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &action, nullptr);
   return poise::ComponentMain(argc, argv, "hw_bridge",
-                              [] { return std::make_unique<poise::HwBridge>(); });
+                              [] { return std::make_unique<poise::HwBridge>(&emergency_stop); });
 }

@@ -8,21 +8,19 @@ namespace poise {
 
 class SimulatedDriveBus final : public DriveBus {
  public:
-  /// Both ports must outlive the bus.
-  SimulatedDriveBus(const Input<drive_feedback_t>* feedback, Output<drive_command_t>* command)
-      : feedback_(feedback), command_(command) {}
+  /// `feedback` must outlive the bus.
+  explicit SimulatedDriveBus(const Input<drive_feedback_t>* feedback) : feedback_(feedback) {}
 
   const drive_feedback_t* Receive() override {
     return feedback_->present() ? &**feedback_ : nullptr;
   }
-  void Send(const drive_command_t& command) override {
-    (*command_)->current = command.current;
-    (*command_)->enabled = command.enabled;
-  }
+  /// The message that the bridge publishes is the command.
+  void Send(const drive_command_t&) override {}
+  const BusHealth& health() const override { return health_; }
 
  private:
   const Input<drive_feedback_t>* feedback_;
-  Output<drive_command_t>* command_;
+  BusHealth health_;
 };
 
 }  // namespace poise

@@ -3,39 +3,45 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+#include <utility>
 
 #include "hw_bridge/units.h"
 
 namespace poise {
 namespace {
 
-// No sensor of a robot reports more, in A, rad/s, m/s², N or N·m: products of readings stay finite.
-constexpr double kImplausible = 1e9;
-
-bool Plausible(double value) { return std::abs(value) <= kImplausible; }  // false for NaN
-
-template <class Range>
-bool AllPlausible(const Range& values) {
-  return std::all_of(std::begin(values), std::end(values), Plausible);
-}
+using Status = bridge_status_t;
 
 int8_t ReasonOf(Refusal refusal) {
   switch (refusal) {
     case Refusal::kRun:
-      return bridge_status_t::REASON_COMMAND_RUN;
+      return Status::REASON_COMMAND_RUN;
     case Refusal::kSize:
-      return bridge_status_t::REASON_COMMAND_SIZE;
+      return Status::REASON_COMMAND_SIZE;
     case Refusal::kSequence:
-      return bridge_status_t::REASON_COMMAND_SEQUENCE;
+      return Status::REASON_COMMAND_SEQUENCE;
     case Refusal::kStale:
-      return bridge_status_t::REASON_COMMAND_STALE;
+      return Status::REASON_COMMAND_STALE;
     case Refusal::kNotFinite:
-      return bridge_status_t::REASON_COMMAND_NOT_FINITE;
+      return Status::REASON_COMMAND_NOT_FINITE;
     case Refusal::kNone:
       break;
   }
-  return bridge_status_t::REASON_NONE;
+  return Status::REASON_NONE;
+}
+
+/// Of a bus that gives no reports.
+int8_t DriveStateOf(int32_t drive_status) {
+  switch (drive_status) {
+    case drive_feedback_t::DRIVE_DISABLED:
+      return Status::DRIVE_SWITCH_ON_DISABLED;
+    case drive_feedback_t::DRIVE_ENABLED:
+      return Status::DRIVE_ENABLED;
+    case drive_feedback_t::DRIVE_FAULT:
+      return Status::DRIVE_FAULT;
+    default:
+      return Status::DRIVE_UNKNOWN;
+  }
 }
 
 }  // namespace
@@ -43,164 +49,337 @@ int8_t ReasonOf(Refusal refusal) {
 Supervisor::Supervisor(const SupervisorConfig& config)
     : config_(config),
       gate_(static_cast<int>(config.motors.size()), config.damping_after_cycles),
-      velocity_gain_(1 - std::exp(-2 * std::numbers::pi * config.velocity_cutoff * config.period)),
-      stop_ramp_cycles_(std::llround(std::ceil(config.stop_ramp / config.period - 1e-9))),
+      monitor_(config.monitor, config.motors),
+      tilt_(config.upright, config.tilt_time),
+      stop_ramp_cycles_(std::llround(std::ceil(config.stop_ramp / config.monitor.period - 1e-9))),
       torque_(config.motors.size(), 0.0),
-      counts_(config.motors.size(), 0),
-      velocity_(config.motors.size(), 0.0),
+      applied_(config.motors.size(), 0.0),
+      hold_torque_(config.motors.size(), 0.0),
+      hold_counts_(config.motors.size(), 0),
+      resume_from_(config.motors.size(), 0.0),
       faulted_(config.motors.size(), 0),
       enabled_(config.motors.size(), 0),
-      disabled_cycles_(config.motors.size(), 0) {
+      drive_state_(config.motors.size(), Status::DRIVE_UNKNOWN) {
   for (size_t j = 0; j < config.motors.size(); ++j) {
     const robot::MotorModel& motor = config.motors[j];
     config_.torque_limit[j] =
         std::min(config.torque_limit[j], JointTorque(motor, motor.peak_current));
+    thermal_.emplace_back(motor.rated_current, motor.peak_current, config.overload_time);
   }
 }
 
-bool Supervisor::Usable(const drive_feedback_t& feedback) const {
-  const size_t n = config_.motors.size();
-  if (feedback.position_counts.size() != n || feedback.current.size() != n ||
-      feedback.drive_status.size() != n ||
-      feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet)) {
-    return false;
-  }
-  return PlausibleCounts(feedback) && AllPlausible(feedback.current) &&
-         AllPlausible(feedback.imu_angular_velocity) && AllPlausible(feedback.imu_acceleration) &&
-         std::all_of(feedback.foot_wrench.begin(), feedback.foot_wrench.end(),
-                     [](const wrench_t& wrench) {
-                       return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
-                     });
-}
-
-// Across a cycle without feedback nothing is known of the way.
-bool Supervisor::PlausibleCounts(const drive_feedback_t& feedback) const {
-  if (!counts_known_ || config_.velocity_limit.empty()) return true;
-  for (size_t j = 0; j < counts_.size(); ++j) {
-    const double change =
-        static_cast<double>(feedback.position_counts[j]) - static_cast<double>(counts_[j]);
-    const double most = config_.velocity_margin * config_.velocity_limit[j] * config_.period;
-    if (std::abs(change) / CountsPerRadian(config_.motors[j]) > most) return false;
-  }
-  return true;
-}
-
-bool Supervisor::Read(const drive_feedback_t& feedback) {
-  if (!Usable(feedback)) {
-    // Of the reasons the nearest: readings that are finite but cannot be are as little to be used.
-    Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_FEEDBACK_NOT_FINITE);
-    return false;
-  }
-  UpdateVelocity(feedback);
-  for (size_t j = 0; j < faulted_.size(); ++j) {
-    const int32_t status = feedback.drive_status[j];
-    if (status != drive_feedback_t::DRIVE_DISABLED && status != drive_feedback_t::DRIVE_ENABLED) {
-      faulted_[j] = 1;
-      Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_DRIVE_FAULT);
-    }
-    const bool refuses = enabled_[j] != 0 && status == drive_feedback_t::DRIVE_DISABLED;
-    disabled_cycles_[j] =
-        refuses ? std::min(disabled_cycles_[j] + 1, config_.enable_cycles + 1) : 0;
-    if (disabled_cycles_[j] > config_.enable_cycles) {
-      faulted_[j] = 1;
-      Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_DRIVE_FAULT);
-    }
-  }
-  return true;
-}
-
-void Supervisor::UpdateVelocity(const drive_feedback_t& feedback) {
-  for (size_t j = 0; j < velocity_.size(); ++j) {
-    const int64_t counts = feedback.position_counts[j];
-    if (counts_known_) {
-      // As doubles: the difference of two 64-bit counts may not fit 64 bits.
-      const double change = static_cast<double>(counts) - static_cast<double>(counts_[j]);
-      const double raw = change / CountsPerRadian(config_.motors[j]) / config_.period;
-      velocity_[j] += velocity_gain_ * (raw - velocity_[j]);
-    }
-    counts_[j] = counts;
-  }
-  counts_known_ = true;
-  feedback_read_ = true;
-}
-
-void Supervisor::Latch(int8_t state, int8_t reason) {
+void Supervisor::Latch(int8_t state, int8_t reason, int joint) {
   if (latched()) {
-    if (state == bridge_status_t::STATE_ESTOP) state_ = state;
+    if (state == Status::STATE_ESTOP) state_ = state;
     return;
   }
-  // Motors that were never enabled are not enabled in order to stop.
-  ramp_left_ = state_ == bridge_status_t::STATE_INIT ? 0 : stop_ramp_cycles_;
+  // Motors that were never given torque are not given any in order to stop.
+  const bool at_rest = state_ <= Status::STATE_ENABLING;
+  ramp_left_ = at_rest ? 0 : stop_ramp_cycles_;
   state_ = state;
   reason_ = reason;
+  reason_joint_ = joint;
+}
+
+bool Supervisor::Read(const drive_feedback_t& feedback, std::span<const DriveReport> reports) {
+  const FeedbackMonitor::Problem problem = monitor_.Update(feedback);
+  if (problem.reason != Status::REASON_NONE) {
+    Latch(Status::STATE_STOPPING, problem.reason, problem.joint);
+    return false;
+  }
+  CheckDrives(feedback, reports);
+  CheckMotion(feedback);
+  return true;
+}
+
+void Supervisor::CheckDrives(const drive_feedback_t& feedback,
+                             std::span<const DriveReport> reports) {
+  for (size_t j = 0; j < faulted_.size(); ++j) {
+    const int32_t status = feedback.drive_status[j];
+    const bool reported = j < reports.size();
+    drive_state_[j] = reported ? reports[j].state : DriveStateOf(status);
+    enabled_[j] = status == drive_feedback_t::DRIVE_ENABLED ? 1 : 0;
+    const bool sto = reported && reports[j].sto;
+    const bool known =
+        status == drive_feedback_t::DRIVE_DISABLED || status == drive_feedback_t::DRIVE_ENABLED;
+    // After the start a drive that is no longer enabled has dropped its torque by itself.
+    const bool dropped = enabled_[j] == 0 && active() && state_ != Status::STATE_ENABLING;
+    if (known && !dropped && !sto) continue;
+    if (fault_grace_ > 0 && state_ == Status::STATE_INIT) continue;
+    faulted_[j] = 1;
+    if (sto) {
+      Latch(Status::STATE_ESTOP, Status::REASON_DRIVE_STO, static_cast<int>(j));
+    } else {
+      Latch(Status::STATE_STOPPING, Status::REASON_DRIVE_FAULT, static_cast<int>(j));
+    }
+  }
+}
+
+void Supervisor::CheckMotion(const drive_feedback_t& feedback) {
+  tilt_.Update(Eigen::Map<const Eigen::Vector3d>(feedback.imu_angular_velocity),
+               Eigen::Map<const Eigen::Vector3d>(feedback.imu_acceleration),
+               config_.monitor.period);
+  if (!active()) return;
+  for (size_t j = 0; j < faulted_.size(); ++j) {
+    const auto joint = static_cast<int>(j);
+    if (!config_.lower.empty() && (Position(j) < config_.lower[j] - config_.position_margin ||
+                                   Position(j) > config_.upper[j] + config_.position_margin)) {
+      Latch(Status::STATE_STOPPING, Status::REASON_JOINT_POSITION, joint);
+    }
+    if (!config_.monitor.velocity_limit.empty() &&
+        std::abs(joint_velocity()[j]) > config_.velocity_trip * config_.monitor.velocity_limit[j]) {
+      Latch(Status::STATE_STOPPING, Status::REASON_JOINT_VELOCITY, joint);
+    }
+  }
+  if (tilt_.tilt() > config_.tilt_limit) Latch(Status::STATE_STOPPING, Status::REASON_BODY_TILT);
+}
+
+void Supervisor::ReadBus(const BusHealth& health) {
+  bus_ = health;
+  if (!health.usable) {
+    Latch(Status::STATE_STOPPING,
+          health.link_lost ? Status::REASON_BUS_LINK : Status::REASON_BUS_INPUTS);
+  }
+}
+
+void Supervisor::CountLateness(double lateness) {
+  lateness_ = lateness;
+  const bool late = lateness > config_.overrun_lateness;
+  late_[static_cast<size_t>(cycles_++ % 100)] = late;
+  overruns_ += late ? 1 : 0;
+  overruns_in_a_row_ = late ? overruns_in_a_row_ + 1 : 0;
+  if (overruns_in_a_row_ >= config_.overruns_in_a_row ||
+      static_cast<int>(late_.count()) >= config_.overruns_in_100) {
+    Latch(Status::STATE_STOPPING, Status::REASON_CYCLE_OVERRUN);
+  }
+}
+
+double Supervisor::Position(size_t joint) const {
+  return JointPosition(config_.motors[joint], monitor_.counts()[joint]);
+}
+
+/// Motors at rest where they can be: else the reason says which is not.
+bool Supervisor::MayStart() {
+  reason_joint_ = -1;
+  if (!monitor_.known()) {
+    reason_ = Status::REASON_START_POSITION;
+    return false;
+  }
+  for (size_t j = 0; j < torque_.size(); ++j) {
+    const bool inside =
+        config_.lower.empty() || (Position(j) >= config_.lower[j] - config_.position_margin &&
+                                  Position(j) <= config_.upper[j] + config_.position_margin);
+    const bool at_rest = std::abs(joint_velocity()[j]) <= config_.start_velocity;
+    if (inside && at_rest) continue;
+    reason_ = inside ? Status::REASON_START_VELOCITY : Status::REASON_START_POSITION;
+    reason_joint_ = static_cast<int>(j);
+    return false;
+  }
+  return true;
+}
+
+bool Supervisor::TakeReset() { return std::exchange(reset_, false); }
+
+void Supervisor::Reset(const joint_command_t* command) {
+  if (!std::exchange(reset_requested_, false) || !at_rest()) return;
+  const bool asks_torque =
+      command != nullptr && !std::all_of(command->torque.begin(), command->torque.end(),
+                                         [](double torque) { return torque == 0; });
+  if (asks_torque) return;
+  state_ = Status::STATE_INIT;
+  reason_ = last_refusal_ = Status::REASON_NO_COMMAND;
+  reason_joint_ = -1;
+  std::fill(faulted_.begin(), faulted_.end(), 0);
+  monitor_.Reset();
+  bus_ = {};
+  late_.reset();
+  overruns_in_a_row_ = 0;
+  fault_grace_ = config_.enable_cycles;
+  reset_ = true;
+  ++resets_;
 }
 
 void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
+  Reset(command);
+  if (fault_grace_ > 0) --fault_grace_;
   if (command != nullptr) {
     const Refusal refusal = gate_.Check(*command, cycle);
     if (refusal != Refusal::kNone) {
       last_refusal_ = ReasonOf(refusal);
     } else if (!latched()) {
       std::copy(command->torque.begin(), command->torque.end(), torque_.begin());
-      state_ = bridge_status_t::STATE_RUNNING;
-      reason_ = bridge_status_t::REASON_NONE;
-      last_refusal_ = bridge_status_t::REASON_NO_COMMAND;
+      last_refusal_ = Status::REASON_NO_COMMAND;
+      const bool starts = state_ == Status::STATE_INIT && fault_grace_ == 0 && MayStart();
+      if (starts) {
+        state_ = Status::STATE_ENABLING;
+        reason_ = Status::REASON_DRIVE_NOT_ENABLED;
+        enabling_cycles_ = start_ramp_ = resume_left_ = 0;
+        slew_known_ = false;
+      }
+      if (state_ == Status::STATE_INIT) return;
     }
   }
   if (latched()) return;
-  if (state_ == bridge_status_t::STATE_INIT) {
+  if (state_ == Status::STATE_INIT) {
     reason_ = last_refusal_;
+    reason_joint_ = -1;
     return;
   }
-  const int64_t age = gate_.Age(cycle);
-  if (age <= config_.damping_after_cycles) return;
-  if (age <= int64_t{config_.damping_after_cycles} + config_.stop_after_cycles) {
-    state_ = bridge_status_t::STATE_DAMPING;
+  Follow(gate_.Age(cycle));
+}
+
+/// The states of a bridge that has accepted a command, which is `age` cycles old.
+void Supervisor::Follow(int64_t age) {
+  const bool fresh = age <= config_.damping_after_cycles;
+  if (state_ == Status::STATE_ENABLING) {
+    if (!fresh) {  // nothing to follow: down again
+      state_ = Status::STATE_INIT;
+      reason_ = last_refusal_;
+      reason_joint_ = -1;
+      return;
+    }
+    const auto waiting = std::find(enabled_.begin(), enabled_.end(), 0);
+    if (waiting != enabled_.end()) {
+      reason_joint_ = static_cast<int>(waiting - enabled_.begin());
+      if (++enabling_cycles_ > config_.enable_cycles) {
+        faulted_[static_cast<size_t>(reason_joint_)] = 1;
+        Latch(Status::STATE_STOPPING, Status::REASON_DRIVE_NOT_ENABLED, reason_joint_);
+      }
+      return;
+    }
+    std::fill(applied_.begin(), applied_.end(), 0.0);
+  } else if (fresh && state_ != Status::STATE_RUNNING) {
+    resume_from_ = applied_;
+    resume_left_ = config_.resume_cycles;
+  }
+  if (!fresh) {
+    UpdateLoss(age);
+    return;
+  }
+  state_ = Status::STATE_RUNNING;
+  reason_ = Status::REASON_NONE;
+  reason_joint_ = -1;
+}
+
+void Supervisor::UpdateLoss(int64_t age) {
+  const int64_t damping_after = int64_t{config_.damping_after_cycles} + config_.hold_cycles;
+  if (age <= damping_after) {
+    if (state_ == Status::STATE_RUNNING) {
+      hold_torque_ = applied_;
+      hold_counts_ = monitor_.counts();
+    }
+    state_ = Status::STATE_HOLDING;
+    reason_ = last_refusal_;
+  } else if (age <= damping_after + config_.stop_after_cycles) {
+    state_ = Status::STATE_DAMPING;
     reason_ = last_refusal_;
   } else {
-    Latch(bridge_status_t::STATE_STOPPING, last_refusal_);
+    Latch(Status::STATE_STOPPING, last_refusal_);
   }
 }
 
 double Supervisor::DampingTorque(size_t joint, double share) const {
-  return feedback_read_ ? -share * config_.damping * velocity_[joint] : 0.0;
+  return monitor_.updated() ? -share * config_.damping * joint_velocity()[joint] : 0.0;
+}
+
+double Supervisor::WantedTorque(size_t joint) const {
+  switch (state_) {
+    case Status::STATE_RUNNING: {
+      double torque = torque_[joint];
+      if (start_ramp_ < config_.first_command_ramp) {
+        torque *= static_cast<double>(start_ramp_ + 1) / (config_.first_command_ramp + 1);
+      }
+      if (resume_left_ > 0) {
+        const double old = static_cast<double>(resume_left_) / (config_.resume_cycles + 1);
+        torque += old * (resume_from_[joint] - torque);
+      }
+      return torque;
+    }
+    case Status::STATE_HOLDING: {
+      const double error = (static_cast<double>(hold_counts_[joint]) -
+                            static_cast<double>(monitor_.counts()[joint])) /
+                           CountsPerRadian(config_.motors[joint]);
+      const double rate = monitor_.updated() ? joint_velocity()[joint] : 0.0;
+      return hold_torque_[joint] + config_.hold_stiffness * error - config_.hold_damping * rate;
+    }
+    case Status::STATE_DAMPING:
+      return DampingTorque(joint, 1);
+    case Status::STATE_STOPPING:
+    case Status::STATE_ESTOP:
+      return ramp_left_ > 0 ? DampingTorque(joint, static_cast<double>(ramp_left_) /
+                                                       static_cast<double>(stop_ramp_cycles_))
+                            : 0.0;
+    default:
+      return 0;
+  }
+}
+
+/// Near a soft limit torque that leads further out fades to nothing at the limit.
+double Supervisor::FadePosition(size_t joint, double torque) const {
+  if (config_.lower.empty() || config_.soft_range <= 0) return torque;
+  const double room =
+      torque > 0 ? config_.upper[joint] - Position(joint) : Position(joint) - config_.lower[joint];
+  return room >= config_.soft_range ? torque : torque * std::max(0.0, room / config_.soft_range);
+}
+
+double Supervisor::Limit(size_t joint, double wanted, int8_t* limits) const {
+  const auto apply = [limits](double before, double after, int8_t bit) {
+    if (after != before) *limits = static_cast<int8_t>(*limits | bit);
+    return after;
+  };
+  const bool follows = state_ == Status::STATE_RUNNING || state_ == Status::STATE_HOLDING;
+  double torque = wanted;
+  if (follows) {
+    torque = apply(torque, FadePosition(joint, torque), Status::LIMIT_POSITION);
+    if (slew_known_) {
+      const double step = config_.slew_limit * config_.monitor.period;
+      torque = apply(torque, std::clamp(torque, applied_[joint] - step, applied_[joint] + step),
+                     Status::LIMIT_SLEW);
+    }
+  }
+  const double limit = config_.torque_limit[joint];
+  torque = apply(torque, std::clamp(torque, -limit, limit), Status::LIMIT_TORQUE);
+  const double thermal = JointTorque(config_.motors[joint], thermal_[joint].CurrentLimit());
+  return apply(torque, std::clamp(torque, -thermal, thermal), Status::LIMIT_THERMAL);
 }
 
 void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_command_t* drives,
                        bridge_status_t* status) {
   UpdateState(cycle, command);
+  if (state_ == Status::STATE_STOPPING && ramp_left_ == 0) state_ = Status::STATE_STOPPED;
 
-  const bool running = state_ == bridge_status_t::STATE_RUNNING;
-  const bool enabled = running || state_ == bridge_status_t::STATE_DAMPING || ramp_left_ > 0;
-  const double share =
-      ramp_left_ > 0 ? static_cast<double>(ramp_left_) / static_cast<double>(stop_ramp_cycles_)
-                     : 1.0;
+  const bool enabled = active() || ramp_left_ > 0;
+  const bool follows = state_ == Status::STATE_RUNNING || state_ == Status::STATE_HOLDING;
   for (size_t j = 0; j < torque_.size(); ++j) {
     const robot::MotorModel& motor = config_.motors[j];
-    const bool follow = enabled && faulted_[j] == 0;
-    double torque = 0;
-    bool saturated = false;
-    if (follow) {
-      const double wanted = running ? torque_[j] : DampingTorque(j, share);
-      const double limit = config_.torque_limit[j];
-      torque = std::clamp(wanted, -limit, limit);
-      saturated = running && torque != wanted;
-    }
+    const bool powered = enabled && faulted_[j] == 0;
+    int8_t limits = 0;
+    const double torque = powered ? Limit(j, WantedTorque(j), &limits) : 0.0;
     const double current =
         std::clamp(MotorCurrent(motor, torque), -motor.peak_current, motor.peak_current);
     drives->current[j] = current;
-    drives->enabled[j] = follow ? 1 : 0;
-    enabled_[j] = follow ? 1 : 0;
-    status->applied_torque[j] = torque;
-    status->saturated[j] = saturated ? 1 : 0;
-    saturations_ += saturated ? 1 : 0;
+    drives->enabled[j] = powered ? 1 : 0;
+    thermal_[j].Advance(current, config_.monitor.period);
+    status->applied_torque[j] = applied_[j] = torque;
+    status->saturated[j] = follows ? limits : int8_t{0};
+    saturations_ += status->saturated[j] != 0 ? 1 : 0;
+    status->thermal_load[j] = thermal_[j].heat();
+    status->drive_state[j] = drive_state_[j];
   }
+  slew_known_ = follows;
   if (ramp_left_ > 0) --ramp_left_;
-  counts_known_ = counts_known_ && feedback_read_;
-  feedback_read_ = false;
+  if (state_ == Status::STATE_RUNNING) {
+    start_ramp_ = std::min(start_ramp_ + 1, config_.first_command_ramp);
+    if (resume_left_ > 0) --resume_left_;
+  }
+  monitor_.EndCycle(drives->current, drives->enabled);
+  FillStatus(cycle, status);
+}
 
+void Supervisor::FillStatus(int64_t cycle, bridge_status_t* status) const {
   status->state = state_;
   status->reason = reason_;
+  status->reason_joint = reason_joint_;
   status->command_age = gate_.any_accepted()
                             ? static_cast<int32_t>(std::min<int64_t>(
                                   gate_.Age(cycle), std::numeric_limits<int32_t>::max()))
@@ -211,6 +390,14 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
   status->refused_size = gate_.refused(Refusal::kSize);
   status->refused_run = gate_.refused(Refusal::kRun);
   status->saturations = saturations_;
+  status->resets = resets_;
+  status->bus_usable = bus_.usable ? 1 : 0;
+  status->al_status = bus_.al_status;
+  status->frames_sent = bus_.frames_sent;
+  status->frames_lost = bus_.frames_lost;
+  status->working_counter_errors = bus_.working_counter_errors;
+  status->lateness = lateness_;
+  status->overruns = overruns_;
 }
 
 }  // namespace poise

@@ -1,12 +1,20 @@
 // Supervisor: the last gate before the motors. Whatever arrives or fails to arrive, the currents
-// that leave are finite, within limits, and zero for good once the bridge has stopped.
+// that leave are finite, within limits, and zero once the bridge has stopped.
 #pragma once
 
+#include <Eigen/Core>
+#include <bitset>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <vector>
 
 #include "components/robot/robot_model.h"
 #include "hw_bridge/command_gate.h"
+#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/feedback_monitor.h"
+#include "hw_bridge/thermal_budget.h"
+#include "hw_bridge/tilt_filter.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
 #include "poise/drive_feedback_t.hpp"
@@ -16,29 +24,47 @@ namespace poise {
 struct SupervisorConfig {
   std::vector<robot::MotorModel> motors;  ///< by joint
   std::vector<double> torque_limit;       ///< N·m, by joint, > 0; the peak current limits too
-  std::vector<double> velocity_limit;     ///< rad/s, by joint; empty: counts are not checked
-  /// From one cycle to the next no joint moves further than this many times velocity_limit ×
-  /// period: a fall or an impact may exceed the limit itself for a while; five times it is a broken
-  /// encoder.
-  double velocity_margin = 5;
-  /// Cycles in which a drive may still report itself disabled after it has been told to enable.
+  FeedbackMonitorConfig monitor;          ///< its period is the cycle's
+  /// rad, by joint; empty: not limited.
+  std::vector<double> lower, upper;
+  double soft_range = 0;       ///< rad before a limit in which torque towards it fades out
+  double position_margin = 0;  ///< rad beyond a limit that trips
+  double velocity_trip = std::numeric_limits<double>::infinity();  ///< times velocity_limit
+  double tilt_limit = std::numeric_limits<double>::infinity();     ///< rad
+  double tilt_time = 1;                                            ///< s, see TiltFilter
+  Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< up in the IMU's frame when standing
+  double start_velocity = std::numeric_limits<double>::infinity();  ///< rad/s, greatest at start
+
+  /// Cycles that a drive may take to report itself enabled after it has been told to.
   int enable_cycles = 2;
-  int num_feet = 2;
-  double period = 0.002;  ///< s, of a cycle
+  int first_command_ramp = 0;  ///< cycles in which torque is faded in after the start; 0: at once
   int damping_after_cycles =
-      3;                        ///< age of the last accepted command beyond which joints are damped
-  int stop_after_cycles = 13;   ///< cycles of damping before the bridge stops
-  double damping = 20;          ///< N·m·s/rad at the joint
-  double stop_ramp = 0.1;       ///< s
-  double velocity_cutoff = 60;  ///< Hz
+      3;                      ///< age of the last accepted command beyond which it is not followed
+  int stop_after_cycles = 9;  ///< cycles of damping before the bridge stops
+  double damping = 20;        ///< N·m·s/rad at the joint
+  double stop_ramp = 0.1;     ///< s
+  /// Cycles of holding between the last command's end and damping; 0: none.
+  int hold_cycles = 0;
+  double hold_stiffness = 0;  ///< N·m/rad
+  double hold_damping = 0;    ///< N·m·s/rad
+  int resume_cycles = 0;      ///< cycles in which a command that is back is faded in
+
+  double slew_limit = std::numeric_limits<double>::infinity();  ///< N·m/s, of a followed command
+  double overload_time = 2;                                     ///< s at the peak current
+  double overrun_lateness = std::numeric_limits<double>::infinity();  ///< s
+  int overruns_in_a_row = 25, overruns_in_100 = 50;                   ///< that stop
 };
 
 /// States of bridge_status_t:
 ///   INIT      no command accepted yet: motors free
+///   ENABLING  told to enable, without torque, until all drives report it
 ///   RUNNING   follows the last accepted command, (54), limited
-///   DAMPING   the last accepted command is too old: −damping × joint velocity; an accepted command
-///   leads back STOPPING  latched: damping ramped out over stop_ramp, then motors free ESTOP the
-///   same, by the operator; also reached from STOPPING
+///   HOLDING   the last accepted command is too old: its torque, and stiffness and damping about
+///             the position where it was lost; an accepted command leads back
+///   DAMPING   the same, −damping × joint velocity
+///   STOPPING  latched: damping ramped out over stop_ramp
+///   STOPPED   latched: motors free
+///   ESTOP     both, by operator, STO or signal
 /// A joint whose drive reports a fault is freed at once. Each cycle: Read, then Cycle. Never
 /// allocates after construction, never throws.
 class Supervisor {
@@ -49,13 +75,27 @@ class Supervisor {
   void SetRun(int64_t run_id) { gate_.set_run(run_id); }
 
   /// Takes the feedback of this cycle. False, and the bridge stops (latched), when it is not
-  /// finite, beyond all reason (a joint's jump included) or wrongly sized. A drive's fault, or its
-  /// staying disabled although it is told to be enabled, stops the bridge too. A cycle
-  /// without feedback simply has no Read: its damping torque is zero, as no velocity is known.
-  bool Read(const drive_feedback_t& feedback);
+  /// to be used: not finite, beyond all reason, wrongly sized, or an encoder that is broken. A
+  /// drive's fault or STO, its being disabled while the bridge runs, and trips of position,
+  /// velocity and tilt stop the bridge too. A cycle without feedback simply has no Read: damping
+  /// has no torque then, as no velocity is known. `reports`: by joint, or empty.
+  bool Read(const drive_feedback_t& feedback, std::span<const DriveReport> reports = {});
+  /// Stops when the bus is no longer usable, and shows how it has been.
+  void ReadBus(const BusHealth& health);
+  /// s that this cycle began after its time; counts overruns and stops after too many.
+  void CountLateness(double lateness);
 
-  /// Operator's stop, latched.
-  void EmergencyStop() { Latch(bridge_status_t::STATE_ESTOP, bridge_status_t::REASON_OPERATOR); }
+  /// By operator or signal (REASON_*), latched.
+  void EmergencyStop(int8_t reason = bridge_status_t::REASON_OPERATOR) {
+    Latch(bridge_status_t::STATE_ESTOP, reason);
+  }
+  /// The planned end: ramps out and stays.
+  void Shutdown() { Latch(bridge_status_t::STATE_STOPPING, bridge_status_t::REASON_SHUTDOWN); }
+  /// Ends a latched stop in this cycle, if its ramp is over and its command asks for no torque.
+  /// Then INIT. True in the cycle in which that happened: see TakeReset.
+  void RequestReset() { reset_requested_ = true; }
+  /// Whether the last Cycle has reset the stop; the drives' faults are to be reset then.
+  bool TakeReset();
 
   /// Ends cycle number `cycle` (increasing, ≥ 0). `command`: what arrived in it, nullptr when
   /// nothing did. Fills currents and enables of `drives` and everything but run, tick and time of
@@ -65,35 +105,62 @@ class Supervisor {
 
   int8_t state() const { return state_; }
   int8_t reason() const { return reason_; }
+  /// Latched, and the ramp is over.
+  bool at_rest() const { return latched() && ramp_left_ == 0; }
   /// rad/s, filtered, from the encoder counts.
-  const std::vector<double>& joint_velocity() const { return velocity_; }
+  const std::vector<double>& joint_velocity() const { return monitor_.velocity(); }
 
  private:
   bool latched() const { return state_ >= bridge_status_t::STATE_STOPPING; }
-  bool Usable(const drive_feedback_t& feedback) const;
-  bool PlausibleCounts(const drive_feedback_t& feedback) const;
-  void UpdateVelocity(const drive_feedback_t& feedback);
-  void Latch(int8_t state, int8_t reason);
+  bool active() const {
+    return state_ >= bridge_status_t::STATE_ENABLING && state_ <= bridge_status_t::STATE_DAMPING;
+  }
+  void Latch(int8_t state, int8_t reason, int joint = -1);
+  void CheckDrives(const drive_feedback_t& feedback, std::span<const DriveReport> reports);
+  void CheckMotion(const drive_feedback_t& feedback);
+  bool MayStart();
+  void Reset(const joint_command_t* command);
   void UpdateState(int64_t cycle, const joint_command_t* command);
+  void UpdateLoss(int64_t age);
+  void Follow(int64_t age);
+  double Position(size_t joint) const;
   double DampingTorque(size_t joint, double share) const;
+  double WantedTorque(size_t joint) const;
+  /// The torque within all limits; adds to `limits` those that have changed it.
+  double Limit(size_t joint, double wanted, int8_t* limits) const;
+  double FadePosition(size_t joint, double torque) const;
+  void FillStatus(int64_t cycle, bridge_status_t* status) const;
 
   SupervisorConfig config_;
   CommandGate gate_;
-  double velocity_gain_;  // of the first-order low-pass, per cycle
+  FeedbackMonitor monitor_;
+  TiltFilter tilt_;
+  std::vector<ThermalBudget> thermal_;
   int64_t stop_ramp_cycles_;
-  std::vector<double> torque_;  // N·m, last accepted command
-  std::vector<int64_t> counts_;
-  std::vector<double> velocity_;
-  std::vector<char> faulted_;
-  std::vector<char> enabled_;         // as last commanded
-  std::vector<int> disabled_cycles_;  // reported disabled while enabled, in a row
-  bool counts_known_ = false;         // counts_ are those of the cycle before
-  bool feedback_read_ = false;        // in this cycle
+  std::vector<double> torque_;           // N·m, last accepted command
+  std::vector<double> applied_;          // N·m, of the cycle before
+  std::vector<double> hold_torque_;      // N·m
+  std::vector<int64_t> hold_counts_;     // where joints are held
+  std::vector<double> resume_from_;      // N·m, applied before the command was back
+  std::vector<char> faulted_, enabled_;  // enabled_: as reported
+  std::vector<int8_t> drive_state_;
   int8_t state_ = bridge_status_t::STATE_INIT;
   int8_t reason_ = bridge_status_t::REASON_NO_COMMAND;
+  int reason_joint_ = -1;
   int8_t last_refusal_ = bridge_status_t::REASON_NO_COMMAND;  // since the last accepted command
-  int64_t ramp_left_ = 0;
-  int64_t saturations_ = 0;
+  int64_t ramp_left_ = 0;                                     // cycles of the stop
+  int enabling_cycles_ = 0;                                   // so far
+  int start_ramp_ = 0;   // cycles since RUNNING began, up to first_command_ramp
+  int resume_left_ = 0;  // cycles of fading in
+  int fault_grace_ = 0;  // cycles in which a reset may still be under way
+  bool reset_requested_ = false, reset_ = false;
+  bool slew_known_ = false;  // applied_ is of a followed command
+  BusHealth bus_;
+  double lateness_ = 0;
+  int64_t cycles_ = 0, overruns_ = 0;
+  int overruns_in_a_row_ = 0;
+  std::bitset<100> late_;  // by cycle, modulo 100
+  int64_t saturations_ = 0, resets_ = 0;
 };
 
 }  // namespace poise

@@ -299,6 +299,12 @@ std::string BridgeStateName(int8_t state) {
       return "damping";
     case bridge_status_t::STATE_STOPPING:
       return "stopping";
+    case bridge_status_t::STATE_ENABLING:
+      return "enabling";
+    case bridge_status_t::STATE_HOLDING:
+      return "holding";
+    case bridge_status_t::STATE_STOPPED:
+      return "stopped";
     case bridge_status_t::STATE_ESTOP:
       return "emergency stop";
     default:
@@ -328,6 +334,36 @@ std::string BridgeReasonName(int8_t reason) {
       return "drive fault";
     case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
       return "feedback not finite";
+    case bridge_status_t::REASON_DRIVE_NOT_ENABLED:
+      return "drive not enabled";
+    case bridge_status_t::REASON_START_POSITION:
+      return "joint out of its range at the start";
+    case bridge_status_t::REASON_START_VELOCITY:
+      return "joint moving at the start";
+    case bridge_status_t::REASON_JOINT_POSITION:
+      return "joint beyond its range";
+    case bridge_status_t::REASON_JOINT_VELOCITY:
+      return "joint too fast";
+    case bridge_status_t::REASON_BODY_TILT:
+      return "body tilted";
+    case bridge_status_t::REASON_BUS_INPUTS:
+      return "inputs of the bus incomplete";
+    case bridge_status_t::REASON_BUS_LINK:
+      return "bus link lost";
+    case bridge_status_t::REASON_CYCLE_OVERRUN:
+      return "cycle overruns";
+    case bridge_status_t::REASON_ENCODER_FROZEN:
+      return "encoder frozen";
+    case bridge_status_t::REASON_ENCODER_JUMP:
+      return "encoder jump";
+    case bridge_status_t::REASON_TORQUE_IMPLAUSIBLE:
+      return "torque implausible";
+    case bridge_status_t::REASON_DRIVE_STO:
+      return "safe torque off";
+    case bridge_status_t::REASON_SIGNAL:
+      return "signal";
+    case bridge_status_t::REASON_SHUTDOWN:
+      return "shutdown";
     default:
       return fmt::format("reason {}", reason);
   }

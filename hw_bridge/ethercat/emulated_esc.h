@@ -76,6 +76,8 @@ class EmulatedEsc {
   uint32_t sync0_cycle() const { return Get<uint32_t>(memory_, reg::kDcSync0Cycle); }
   /// Whether SYNC0 has pulsed since the last call.
   bool TakeSync0();
+  /// System time, ns, of the next pulse; nullopt: none.
+  std::optional<int64_t> next_sync0() const { return next_sync0_; }
   /// ns, this slave's copy of the common time.
   int64_t SystemTime() const;
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "poise/message_traits.hpp"
@@ -15,15 +16,42 @@ const EthercatBusConfig& Checked(const EthercatBusConfig& config) {
     throw EthercatError(
         "EtherCAT configuration: most_bad_in_a_row and most_bad_in_100 must be at least 1");
   }
-  if (int64_t{config.input_wait()} * 1000 >= config.master().cycle()) {
+  if (!config.simulated_time() && int64_t{config.input_wait()} * 1000 >= config.master().cycle()) {
     throw EthercatError("EtherCAT configuration: input_wait must be less than a cycle");
   }
   return config;
 }
 
+int8_t ReportOf(DriveState state) {
+  switch (state) {
+    case DriveState::kNotReadyToSwitchOn:
+      return bridge_status_t::DRIVE_NOT_READY;
+    case DriveState::kSwitchOnDisabled:
+      return bridge_status_t::DRIVE_SWITCH_ON_DISABLED;
+    case DriveState::kReadyToSwitchOn:
+      return bridge_status_t::DRIVE_READY;
+    case DriveState::kSwitchedOn:
+      return bridge_status_t::DRIVE_SWITCHED_ON;
+    case DriveState::kOperationEnabled:
+      return bridge_status_t::DRIVE_ENABLED;
+    case DriveState::kQuickStopActive:
+      return bridge_status_t::DRIVE_QUICK_STOP;
+    case DriveState::kFaultReactionActive:
+      return bridge_status_t::DRIVE_FAULT_REACTION;
+    case DriveState::kFault:
+      return bridge_status_t::DRIVE_FAULT;
+    case DriveState::kUnknown:
+      break;
+  }
+  return bridge_status_t::DRIVE_UNKNOWN;
+}
+
 }  // namespace
 
 MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& model) {
+  if (config.drive().empty()) {
+    for (const robot::Joint& joint : model.joints()) config.add_drive()->set_joint(joint.name);
+  }
   std::vector<bool> has_drive(static_cast<size_t>(model.num_joints()), false);
   for (DriveConfig& drive : *config.mutable_drive()) {
     const int joint = model.FindJoint(drive.joint());
@@ -72,11 +100,10 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
 }
 
 EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
-                                   const robot::RobotModel& model, SensorSource* sensors)
+                                   const robot::RobotModel& model)
     : config_(Checked(config)),
       master_(link, CompleteMasterConfig(config.master(), model)),
       link_(link),
-      sensors_(sensors),
       steering_(config.master().cycle()) {
   const MasterConfig complete = CompleteMasterConfig(config.master(), model);
   for (int j = 0; j < model.num_joints(); ++j) {
@@ -93,19 +120,40 @@ EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
   }
   const int32_t counts[] = {model.num_joints(), static_cast<int32_t>(model.feet().size())};
   MessageTraits<drive_feedback_t>::Resize(feedback_, counts);
+  MessageTraits<drive_command_t>::Resize(idle_, std::span(counts).first(1));
+  reports_.resize(drives_.size());
+}
+
+void EthercatDriveBus::Start() {
+  const int64_t deadline =
+      link_->Now() + static_cast<int64_t>(config_.start_timeout() * static_cast<double>(kSecond));
+  while (!master_.CountSlaves() && link_->Now() < deadline) {
+  }
+  master_.Start();
+}
+
+std::string EthercatDriveBus::Stop() {
+  released_ = sent_ = false;
+  if (master_.Stop()) return {};
+  return "not all slaves of the EtherCAT bus have reached INIT; their watchdogs take the torque";
 }
 
 CycleResult EthercatDriveBus::ReceiveFrames() {
+  cycle_start_ = link_->Now();
   CycleResult result;
-  if (sent_) result = master_.Receive(link_->Now());
-  sent_ = false;
-  if (!config_.fresh_inputs()) return result;
-  if (master_.Send(Exchange::kRead)) {
-    result = master_.Receive(link_->Now() + int64_t{config_.input_wait()} * 1000);
-  } else {
-    result = {};
+  if (answer_) {
+    result = *answer_;
+  } else if (sent_) {
+    result = master_.Receive(cycle_start_);
   }
-  return result;
+  sent_ = false;
+  answer_.reset();
+  if (!config_.fresh_inputs()) return result;
+  const int64_t wait = config_.simulated_time()
+                           ? int64_t{config_.master().frame_timeout()} * kMillisecond
+                           : int64_t{config_.input_wait()} * 1000;
+  if (!master_.Send(Exchange::kRead)) return {};
+  return master_.Receive(link_->Now() + wait);
 }
 
 void EthercatDriveBus::Judge(const CycleResult& result) {
@@ -114,12 +162,14 @@ void EthercatDriveBus::Judge(const CycleResult& result) {
   ++health_.cycles;
   health_.bad_cycles += bad ? 1 : 0;
   health_.bad_in_a_row = bad ? health_.bad_in_a_row + 1 : 0;
+  lost_in_a_row_ = result.returned ? 0 : lost_in_a_row_ + 1;
   bad_[place] = bad;
   health_.bad_in_100 = static_cast<int>(bad_.count());
-  if (result.returned) health_.al_status = result.al_status;
-  if (health_.bad_in_a_row >= static_cast<int>(config_.most_bad_in_a_row()) ||
-      health_.bad_in_100 >= static_cast<int>(config_.most_bad_in_100())) {
+  const auto most = static_cast<int>(config_.most_bad_in_a_row());
+  if (health_.usable && (health_.bad_in_a_row >= most ||
+                         health_.bad_in_100 >= static_cast<int>(config_.most_bad_in_100()))) {
     health_.usable = false;
+    health_.link_lost = lost_in_a_row_ >= most;
   }
 }
 
@@ -136,12 +186,7 @@ int32_t EthercatDriveBus::Status(const Drive& drive, uint16_t statusword) const 
   return drive_feedback_t::DRIVE_DISABLED;
 }
 
-const drive_feedback_t* EthercatDriveBus::Receive() {
-  const CycleResult result = ReceiveFrames();
-  Judge(result);
-  cycle_correction_ = result.system_time ? steering_.Update(*result.system_time) : 0;
-  const bool sensed = sensors_ == nullptr || sensors_->Read(&feedback_);
-  if (!result.complete) return nullptr;
+void EthercatDriveBus::TakeInputs() {
   for (size_t j = 0; j < drives_.size(); ++j) {
     Drive& drive = drives_[j];
     const DriveInputs& inputs = master_.inputs(drive.slave);
@@ -150,11 +195,41 @@ const drive_feedback_t* EthercatDriveBus::Receive() {
     feedback_.position_counts[j] = drive.scale.JointCounts(drive.counter.Update(inputs.position));
     feedback_.current[j] = drive.scale.Current(inputs.torque);
     feedback_.drive_status[j] = Status(drive, inputs.statusword);
+    reports_[j] = {.state = ReportOf(drive.state),
+                   .sto = drive.state != DriveState::kUnknown &&
+                          (inputs.statusword & kStatusVoltageEnabled) == 0};
   }
-  return sensed ? &feedback_ : nullptr;
 }
 
-void EthercatDriveBus::Send(const drive_command_t& command) {
+const drive_feedback_t* EthercatDriveBus::Receive() {
+  if (health_.cycles == 0) {
+    before_ = master_.counts();
+    short_counters_before_ = master_.short_working_counters();
+  }
+  const CycleResult result = ReceiveFrames();
+  if (result.returned) health_.al_status = result.al_status;
+  Judge(result);
+  const FrameCounts& counts = master_.counts();
+  health_.frames_sent = counts.sent - before_.sent;
+  health_.frames_lost = counts.lost - before_.lost;
+  health_.working_counter_errors = master_.short_working_counters() - short_counters_before_;
+  cycle_correction_ = result.system_time ? steering_.Update(*result.system_time) : 0;
+  if (!result.complete) return nullptr;
+  TakeInputs();
+  return &feedback_;
+}
+
+void EthercatDriveBus::Idle(bool enable) {
+  const CycleResult result = ReceiveFrames();
+  if (result.returned) health_.al_status = result.al_status;
+  if (result.complete) TakeInputs();
+  std::fill(idle_.enabled.begin(), idle_.enabled.end(), static_cast<int8_t>(enable ? 1 : 0));
+  SendOutputs(idle_);
+}
+
+void EthercatDriveBus::Send(const drive_command_t& command) { SendOutputs(command); }
+
+void EthercatDriveBus::SendOutputs(const drive_command_t& command) {
   const bool sized =
       command.current.size() == drives_.size() && command.enabled.size() == drives_.size();
   bool any = false, all_enabled = true;
@@ -172,8 +247,8 @@ void EthercatDriveBus::Send(const drive_command_t& command) {
     Drive& drive = drives_[j];
     DriveOutputs outputs;  // of this mode: the way up begins once the drive shows it
     const bool enable = drive.commanded && drive.in_mode;
-    outputs.controlword =
-        drive.control.Controlword(drive.state, enable ? DriveGoal::kEnabled : DriveGoal::kDisabled);
+    outputs.controlword = drive.control.Controlword(
+        drive.state, enable ? DriveGoal::kEnabled : DriveGoal::kQuickStop);
     if (released_ && drive.commanded) {
       const double current = command.current[j];
       const bool finite = std::isfinite(current);
@@ -186,17 +261,29 @@ void EthercatDriveBus::Send(const drive_command_t& command) {
     master_.set_outputs(drive.slave, outputs);
   }
   sent_ = master_.Send(config_.fresh_inputs() ? Exchange::kWrite : Exchange::kReadWrite);
+  // Simulated time goes on only once the drives have what was sent.
+  if (sent_ && config_.simulated_time()) {
+    answer_ =
+        master_.Receive(link_->Now() + int64_t{config_.master().frame_timeout()} * kMillisecond);
+  }
+}
+
+void EthercatDriveBus::AwaitNextCycle() {
+  const int64_t next = cycle_start_ + config_.master().cycle();
+  if (sent_ && !answer_) answer_ = master_.Receive(next);
+  std::array<uint8_t, 1> ignored;
+  while (link_->Receive(ignored, next) != 0) {
+  }
 }
 
 void EthercatDriveBus::RequestFaultReset() {
   for (Drive& drive : drives_) {
     if (!drive.commanded) drive.control.RequestFaultReset();
   }
-}
-
-bool EthercatDriveBus::Stop() {
-  released_ = sent_ = false;
-  return master_.Stop();
+  health_.usable = true;
+  health_.link_lost = false;
+  health_.bad_in_a_row = lost_in_a_row_ = 0;
+  bad_.reset();
 }
 
 }  // namespace poise::ethercat

@@ -3,7 +3,8 @@
 
 #include <bitset>
 #include <cstdint>
-#include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "components/robot/robot_model.h"
@@ -14,56 +15,39 @@
 
 namespace poise::ethercat {
 
-/// The sensors of the robot that are no drives: IMU and feet.
-class SensorSource {
- public:
-  virtual ~SensorSource() = default;
-  /// Fills imu_* and foot_wrench. False: nothing arrived. Must not block, allocate or throw.
-  virtual bool Read(drive_feedback_t* feedback) = 0;
-};
-
 /// `config` with what the robot says of its motors where a drive does not say it. Throws
 /// EthercatError: a joint without a drive or with two, a drive of no joint, ratings that differ
-/// from the robot's by more than 1 %.
+/// from the robot's by more than 1 %. No drive at all: one for each joint, in the robot's order.
 MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& model);
 
-/// How the bus has been of late.
-struct BusHealth {
-  bool usable = true;    ///< false, for good: too many bad cycles in a row or of the last 100
-  int bad_in_a_row = 0;  ///< cycles without usable inputs
-  int bad_in_100 = 0;    ///< of the last 100
-  int64_t cycles = 0, bad_cycles = 0;
-  uint8_t al_status = 0;         ///< of all slaves, or-ed; 0x08: all in OP
-  int64_t refused_currents = 0;  ///< that were not finite, sent as zero
-};
-
-/// Start, then Receive and Send once a cycle each, then Stop. Target and greatest torque (6071,
-/// 6072) are zero until every drive that is to be enabled is, in cyclic synchronous torque; drives
-/// of faulted or disabled joints get none. Receive returns nullptr in a cycle whose inputs are not
-/// whole. In it DRIVE_FAULT stands for a fault, STO, a mode that is not the one commanded, and a
-/// chain that is not in OP.
+/// Target and greatest torque (6071, 6072) are zero until every drive that is to be enabled is, in
+/// cyclic synchronous torque; drives of faulted or disabled joints get none, and a quick stop when
+/// they are enabled. Receive gives counts, currents and states, no sensors, and nullptr in a cycle
+/// whose inputs are not whole. In it DRIVE_FAULT stands for a fault, STO, a mode that is not the
+/// one commanded, and a chain that is not in OP.
 class EthercatDriveBus final : public DriveBus {
  public:
-  /// All but the configuration must outlive this; `sensors` may be nullptr. Throws EthercatError.
-  EthercatDriveBus(Link* link, const EthercatBusConfig& config, const robot::RobotModel& model,
-                   SensorSource* sensors);
+  /// `link` must outlive this. Throws EthercatError.
+  EthercatDriveBus(Link* link, const EthercatBusConfig& config, const robot::RobotModel& model);
 
-  /// Leads the chain to OP without torque. Blocks; throws EthercatError.
-  void Start() { master_.Start(); }
-  /// Takes all torque and leads the chain to INIT. Blocks. False when not all slaves got there.
-  bool Stop();
+  /// Leads the chain to OP without torque; waits for one that is not there yet. Throws
+  /// EthercatError.
+  void Start() override;
+  /// Leads the chain to INIT.
+  std::string Stop() override;
+  void Idle(bool enable) override;
+  void AwaitNextCycle() override;
 
   const drive_feedback_t* Receive() override;
   void Send(const drive_command_t& command) override;
 
-  /// Resets the faults of all drives by one edge, the drives being commanded disabled.
-  void RequestFaultReset();
-  const BusHealth& health() const { return health_; }
+  std::span<const DriveReport> reports() const override { return reports_; }
+  const BusHealth& health() const override { return health_; }
+  void RequestFaultReset() override;
+  /// 0 without distributed clocks.
+  int64_t cycle_correction() const override { return cycle_correction_; }
   /// Of the drive of a joint, as last received.
   DriveState drive_state(size_t joint) const { return drives_[joint].state; }
-  /// ns by which the next cycle should start later (negative: earlier) than a period after this
-  /// one, so that it keeps its place in the drives' common time; 0 without distributed clocks.
-  int64_t cycle_correction() const { return cycle_correction_; }
   const Master& master() const { return master_; }
 
  private:
@@ -80,21 +64,28 @@ class EthercatDriveBus final : public DriveBus {
 
   /// Takes what has come of the last frame; the result of the exchange that has inputs.
   CycleResult ReceiveFrames();
+  void TakeInputs();
+  void SendOutputs(const drive_command_t& command);
   void Judge(const CycleResult& result);
   int32_t Status(const Drive& drive, uint16_t statusword) const;
 
   EthercatBusConfig config_;
   Master master_;
   Link* link_;
-  SensorSource* sensors_;
   CycleSteering steering_;
   std::vector<Drive> drives_;  // by joint
+  std::vector<DriveReport> reports_;
   drive_feedback_t feedback_;
-  bool sent_ = false;      // a frame of the last Send is under way
-  bool released_ = false;  // all drives to be enabled have been
+  drive_command_t idle_;               // no torque
+  bool sent_ = false;                  // a frame of the last Send is under way
+  std::optional<CycleResult> answer_;  // to it, when it has been waited for
+  bool released_ = false;              // all drives to be enabled have been
   BusHealth health_;
+  int lost_in_a_row_ = 0;
+  FrameCounts before_;  // the first cycle
+  int64_t short_counters_before_ = 0;
   std::bitset<100> bad_;  // by cycle, modulo 100
-  int64_t cycle_correction_ = 0;
+  int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
 
 }  // namespace poise::ethercat

@@ -18,6 +18,8 @@ class SocketLink : public Link {
  public:
   ~SocketLink() override;
   int64_t Now() const override;
+  /// Readable when a frame has come.
+  int fd() const { return socket_; }
   int64_t send_errors() const { return send_errors_; }
 
  protected:

@@ -168,9 +168,8 @@ TEST(HwBridge, MissingCommandsLeadToDampingAndToAStop) {
     states.push_back(bridge.status().state);
   }
   using S = bridge_status_t;
-  EXPECT_THAT(states,
-              testing::ElementsAre(S::STATE_RUNNING, S::STATE_DAMPING, S::STATE_DAMPING,
-                                   S::STATE_STOPPING, S::STATE_STOPPING, S::STATE_STOPPING));
+  EXPECT_THAT(states, testing::ElementsAre(S::STATE_RUNNING, S::STATE_DAMPING, S::STATE_DAMPING,
+                                           S::STATE_STOPPING, S::STATE_STOPPING, S::STATE_STOPPED));
   EXPECT_EQ(bridge.drives().enabled, std::vector<int8_t>(kMotors, 0));
 }
 

@@ -30,12 +30,12 @@ inline SupervisorConfig ThreeJoints() {
     config.motors.push_back(motor);
     config.torque_limit.push_back(limit[j]);
   }
-  config.period = 0.002;
+  config.monitor.period = 0.002;
   config.damping_after_cycles = 3;
   config.stop_after_cycles = 13;
   config.damping = 20;
   config.stop_ramp = 0.1;
-  config.velocity_cutoff = 60;
+  config.monitor.velocity_cutoff = 60;
   return config;
 }
 
@@ -71,7 +71,7 @@ class Bench {
 
   /// Feedback of the next cycle: all joints turn on at `velocity`, rad/s.
   drive_feedback_t& Turn(double velocity) {
-    position_ += velocity * config_.period;
+    position_ += velocity * config_.monitor.period;
     for (size_t j = 0; j < kJoints; ++j) {
       feedback_.position_counts[j] = EncoderCounts(config_.motors[j], position_);
     }

@@ -110,7 +110,7 @@ TEST(Supervisor, HoldsTheLastCommandThenDampsThenStops) {
   for (int i = 0; i < 1000; ++i) {
     bench.Step(10.0, 0.5);  // commands no longer help
     ASSERT_TRUE(bench.AllFree());
-    ASSERT_EQ(bench.status().state, Status::STATE_STOPPING);
+    ASSERT_EQ(bench.status().state, Status::STATE_STOPPED);
     ASSERT_EQ(bench.status().reason, Status::REASON_NO_COMMAND);
   }
 }
@@ -335,16 +335,16 @@ TEST(Supervisor, FeedbackThatIsNotFiniteStops) {
 
 TEST(Supervisor, AnEncoderThatJumpsStops) {
   SupervisorConfig config = ThreeJoints();
-  config.velocity_limit = {9, 9, 9};
-  const double most = 5 * 9 * config.period;  // rad in a cycle
+  config.monitor.velocity_limit = {9, 9, 9};
+  const double most = 5 * 9 * config.monitor.period;  // rad in a cycle
   for (const double share : {-1.01, -0.99, 0.99, 1.01}) {
     Bench bench(config);
     bench.Run(10, 10, 0);
-    bench.Step(10.0, share * most / config.period);
+    bench.Step(10.0, share * most / config.monitor.period);
     const bool stops = std::abs(share) > 1;
     EXPECT_EQ(bench.status().state, stops ? Status::STATE_STOPPING : Status::STATE_RUNNING);
-    EXPECT_EQ(bench.status().reason,
-              stops ? Status::REASON_FEEDBACK_NOT_FINITE : Status::REASON_NONE);
+    EXPECT_EQ(bench.status().reason, stops ? Status::REASON_ENCODER_JUMP : Status::REASON_NONE);
+    EXPECT_EQ(bench.status().reason_joint, stops ? 0 : -1);
     if (stops) {
       EXPECT_EQ(bench.drives().current[0], 0);
     }
@@ -356,21 +356,37 @@ TEST(Supervisor, ADriveThatStaysDisabledIsAFault) {
   bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_DISABLED;
   for (int i = 0; i < 10; ++i) bench.Step(nullptr);  // not told to enable yet
   ASSERT_EQ(bench.status().state, Status::STATE_INIT);
-  for (int i = 0; i < 3; ++i) {  // told in the first of them, disabled in the next two
+  for (int i = 0; i < 2; ++i) {  // told in the first of them
     bench.Step(10.0);
-    ASSERT_EQ(bench.status().state, Status::STATE_RUNNING) << i;
+    ASSERT_EQ(bench.status().state, Status::STATE_ENABLING) << i;
+    ASSERT_EQ(bench.status().reason, Status::REASON_DRIVE_NOT_ENABLED);
+    ASSERT_EQ(bench.status().reason_joint, 1);
+    for (size_t j = 0; j < kJoints; ++j) {
+      ASSERT_EQ(bench.drives().enabled[j], 1);
+      ASSERT_EQ(bench.drives().current[j], 0);  // none has torque before all are enabled
+    }
   }
+  bench.Step(10.0);
+  EXPECT_EQ(bench.status().state, Status::STATE_STOPPED);
+  EXPECT_EQ(bench.status().reason, Status::REASON_DRIVE_NOT_ENABLED);
+  EXPECT_EQ(bench.status().reason_joint, 1);
+  EXPECT_TRUE(bench.AllFree());
+}
+
+TEST(Supervisor, ADriveThatDropsOutWhileRunningIsAFault) {
+  Bench bench;
+  bench.Run(10, 10, 0);
+  bench.feedback().drive_status[2] = drive_feedback_t::DRIVE_DISABLED;
   bench.Step(10.0);
   EXPECT_EQ(bench.status().state, Status::STATE_STOPPING);
   EXPECT_EQ(bench.status().reason, Status::REASON_DRIVE_FAULT);
-  EXPECT_EQ(bench.drives().enabled[1], 0);
-  EXPECT_EQ(bench.drives().enabled[0], 1);
+  EXPECT_EQ(bench.status().reason_joint, 2);
 }
 
 TEST(Supervisor, ADriveMayTakeTwoCyclesToEnable) {
   Bench bench;
   bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_DISABLED;
-  for (int i = 0; i < 3; ++i) bench.Step(10.0);
+  for (int i = 0; i < 2; ++i) bench.Step(10.0);
   bench.feedback().drive_status[1] = drive_feedback_t::DRIVE_ENABLED;
   bench.Run(10, 10, 0);
   EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);

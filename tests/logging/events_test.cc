@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "components/task_controller/task_controller.pb.h"
 #include "google/protobuf/text_format.h"
@@ -287,6 +288,20 @@ TEST_F(EventsTest, AMissingMessageEndsNothing) {
   for (size_t t = 20; t < 30; ++t) balance_[t].active_y = 1;
   balance_[25].run_id = 43;  // refused
   EXPECT_EQ(Named("balancing_on").size(), 1u);
+}
+
+TEST(BridgeNames, EveryStateAndReasonHasItsOwn) {
+  std::set<std::string> names;
+  for (int8_t state = bridge_status_t::STATE_INIT; state <= bridge_status_t::STATE_ESTOP; ++state) {
+    EXPECT_EQ(BridgeStateName(state).find("state "), std::string::npos) << int{state};
+    EXPECT_TRUE(names.insert(BridgeStateName(state)).second) << int{state};
+  }
+  EXPECT_EQ(BridgeReasonName(bridge_status_t::REASON_NONE), "");
+  for (int8_t reason = bridge_status_t::REASON_NO_COMMAND;
+       reason <= bridge_status_t::REASON_SHUTDOWN; ++reason) {
+    EXPECT_EQ(BridgeReasonName(reason).find("reason "), std::string::npos) << int{reason};
+    EXPECT_TRUE(names.insert(BridgeReasonName(reason)).second) << int{reason};
+  }
 }
 
 }  // namespace

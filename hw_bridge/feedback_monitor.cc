@@ -1,0 +1,132 @@
+#include "hw_bridge/feedback_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "hw_bridge/units.h"
+#include "poise/bridge_status_t.hpp"
+
+namespace poise {
+namespace {
+
+// No sensor of a robot reports more, in A, rad/s, m/s², N or N·m: products of readings stay finite.
+constexpr double kImplausible = 1e9;
+
+bool Plausible(double value) { return std::abs(value) <= kImplausible; }  // false for NaN
+
+template <class Range>
+bool AllPlausible(const Range& values) {
+  return std::all_of(std::begin(values), std::end(values), Plausible);
+}
+
+}  // namespace
+
+FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
+                                 std::span<const robot::MotorModel> motors)
+    : config_(config),
+      motors_(motors.begin(), motors.end()),
+      velocity_gain_(1 - std::exp(-2 * std::numbers::pi * config.velocity_cutoff * config.period)),
+      counts_(motors.size(), 0),
+      velocity_(motors.size(), 0.0),
+      commanded_(motors.size(), 0.0),
+      enabled_(motors.size(), 0),
+      still_cycles_(motors.size(), 0),
+      error_cycles_(motors.size(), 0),
+      least_torque_(motors.size(), 0.0),
+      greatest_torque_(motors.size(), 0.0) {}
+
+FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback) const {
+  const size_t n = motors_.size();
+  const Problem unusable{bridge_status_t::REASON_FEEDBACK_NOT_FINITE, -1};
+  if (feedback.position_counts.size() != n || feedback.current.size() != n ||
+      feedback.drive_status.size() != n ||
+      feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet)) {
+    return unusable;
+  }
+  if (const int joint = FindJump(feedback); joint >= 0) {
+    return {bridge_status_t::REASON_ENCODER_JUMP, joint};
+  }
+  for (size_t j = 0; j < n; ++j) {
+    if (!Plausible(feedback.current[j])) return {unusable.reason, static_cast<int>(j)};
+  }
+  const bool rest = AllPlausible(feedback.imu_angular_velocity) &&
+                    AllPlausible(feedback.imu_acceleration) &&
+                    std::all_of(feedback.foot_wrench.begin(), feedback.foot_wrench.end(),
+                                [](const wrench_t& wrench) {
+                                  return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
+                                });
+  return rest ? Problem{} : unusable;
+}
+
+// Across a cycle without feedback nothing is known of the way.
+int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
+  if (!consecutive_ || config_.velocity_limit.empty()) return -1;
+  for (size_t j = 0; j < counts_.size(); ++j) {
+    // As doubles: the difference of two 64-bit counts may not fit 64 bits.
+    const double change =
+        static_cast<double>(feedback.position_counts[j]) - static_cast<double>(counts_[j]);
+    const double most = config_.velocity_margin * config_.velocity_limit[j] * config_.period;
+    if (std::abs(change) / CountsPerRadian(motors_[j]) > most) return static_cast<int>(j);
+  }
+  return -1;
+}
+
+FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feedback) {
+  for (size_t j = 0; j < motors_.size(); ++j) {
+    const double torque = JointTorque(motors_[j], commanded_[j]);
+    if (enabled_[j] == 0 || !consecutive_ || feedback.position_counts[j] != counts_[j]) {
+      still_cycles_[j] = 0;
+    } else {
+      if (still_cycles_[j] == 0) least_torque_[j] = greatest_torque_[j] = torque;
+      still_cycles_[j] = std::min(still_cycles_[j] + 1, config_.frozen_cycles);
+      least_torque_[j] = std::min(least_torque_[j], torque);
+      greatest_torque_[j] = std::max(greatest_torque_[j], torque);
+    }
+    if (still_cycles_[j] >= config_.frozen_cycles &&
+        greatest_torque_[j] - least_torque_[j] > config_.frozen_torque) {
+      return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
+    }
+    const bool differs =
+        enabled_[j] != 0 && std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
+                                config_.torque_error;
+    error_cycles_[j] = differs ? std::min(error_cycles_[j] + 1, config_.torque_error_cycles) : 0;
+    if (differs && error_cycles_[j] >= config_.torque_error_cycles) {
+      return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};
+    }
+  }
+  return {};
+}
+
+FeedbackMonitor::Problem FeedbackMonitor::Update(const drive_feedback_t& feedback) {
+  Problem problem = Find(feedback);
+  if (problem.reason != bridge_status_t::REASON_NONE) return problem;
+  problem = FindFault(feedback);
+  for (size_t j = 0; j < velocity_.size(); ++j) {
+    const int64_t counts = feedback.position_counts[j];
+    if (consecutive_) {
+      const double change = static_cast<double>(counts) - static_cast<double>(counts_[j]);
+      const double raw = change / CountsPerRadian(motors_[j]) / config_.period;
+      velocity_[j] += velocity_gain_ * (raw - velocity_[j]);
+    }
+    counts_[j] = counts;
+  }
+  known_ = updated_ = true;
+  return problem;
+}
+
+void FeedbackMonitor::EndCycle(std::span<const double> current, std::span<const int8_t> enabled) {
+  for (size_t j = 0; j < commanded_.size(); ++j) {
+    commanded_[j] = current[j];
+    enabled_[j] = enabled[j] != 0 ? 1 : 0;
+  }
+  consecutive_ = updated_;
+  updated_ = false;
+}
+
+void FeedbackMonitor::Reset() {
+  std::fill(still_cycles_.begin(), still_cycles_.end(), 0);
+  std::fill(error_cycles_.begin(), error_cycles_.end(), 0);
+}
+
+}  // namespace poise

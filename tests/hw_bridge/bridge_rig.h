@@ -1,0 +1,216 @@
+// The whole bridge on an emulated chain in memory, with every byte that goes to the drives in view.
+#pragma once
+
+#include <array>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "components/robot/robot_files.h"
+#include "hw_bridge/ethercat/emulated_chain.h"
+#include "hw_bridge/ethercat/faulty_link.h"
+#include "hw_bridge/ethercat/memory_link.h"
+#include "hw_bridge/hw_bridge.h"
+
+namespace poise {
+
+inline constexpr int kDrives = 12;
+inline constexpr int64_t kPeriod = 2'000'000;  // ns
+inline constexpr double kGear = 50;
+inline constexpr double kGravity = 9.80665;
+/// Joint torque, N·m, of one per mille: 50 × 1.5 N·m / 1000.
+inline constexpr double kStep = 0.075;
+
+inline std::string ReadText(const std::string& name) {
+  std::ifstream file(std::string(POISE_SOURCE_DIR "/deploy/") + name);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// A shaft that the test places; keeps the torque it was told.
+struct Shaft final : ethercat::MotorLoad {
+  void SetTorque(double value) override { torque = value; }
+  double position() const override { return angle; }
+  double velocity() const override { return 0; }
+  double torque = 0, angle = 0;
+};
+
+/// What each drive was told in the last process data frame, from its bytes: 6040, 6060, 6071, 6072,
+/// 607A, 60FF in 15 bytes.
+class WireSpy {
+ public:
+  void Look(std::span<const uint8_t> frame) {
+    ethercat::FrameReader reader(frame);
+    const auto first = reader.Next();
+    if (!first || first->command != ethercat::Command::kLwr) return;
+    std::copy_n(first->data.begin(), std::min(bytes_.size(), first->data.size()), bytes_.begin());
+    ++frames_;
+    for (size_t i = 0; i < kDrives; ++i) {
+      torque_seen_ = torque_seen_ || torque(i) != 0 || limit(i) != 0;
+    }
+  }
+  uint16_t controlword(size_t i) const { return ethercat::Get<uint16_t>(bytes_, 15 * i); }
+  int16_t torque(size_t i) const { return ethercat::Get<int16_t>(bytes_, 15 * i + 3); }
+  uint16_t limit(size_t i) const { return ethercat::Get<uint16_t>(bytes_, 15 * i + 5); }
+  bool torque_seen() const { return torque_seen_; }
+  int64_t frames() const { return frames_; }
+  bool AllQuiet() const {
+    for (size_t i = 0; i < kDrives; ++i) {
+      if (torque(i) != 0 || limit(i) != 0 || controlword(i) == ethercat::kControlEnable) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::array<uint8_t, 15 * kDrives> bytes_{};
+  bool torque_seen_ = false;
+  int64_t frames_ = 0;
+};
+
+class BridgeRig {
+ public:
+  explicit BridgeRig(const std::string& config = "") : config_(config) {
+    for (int i = 0; i < kDrives; ++i) chain_config.add_drive();
+    MessageTraits<drive_feedback_t>::Resize(sensors, MessageCounts{kDrives, 2});
+    sensors.imu_acceleration[2] = kGravity;
+    MessageTraits<joint_command_t>::Resize(command, MessageCounts{kDrives, 2});
+    command.run_id = stop.run_id = kRunId;
+  }
+
+  /// With chain_config as it is then; the drives are in OP, disabled.
+  void Open() {
+    std::vector<ethercat::MotorLoad*> loads;
+    for (Shaft& shaft : shafts) loads.push_back(&shaft);
+    loads.resize(static_cast<size_t>(chain_config.drive_size()));
+    for (const size_t knee : {3, 9}) Place(knee, 0.6);  // off their range's end
+    chain = std::make_unique<ethercat::EmulatedChain>(chain_config, loads);
+    link = std::make_unique<ethercat::MemoryLink>(chain.get());
+    faulty = std::make_unique<ethercat::FaultyLink>(link.get(), 1);
+    bridge = std::make_unique<HwBridge>(&signal, [this](const ethercat::LinkConfig&) {
+      return std::make_unique<Tap>(faulty.get(), &wire);
+    });
+    resources_ = {{"robot", ReadText("robots/dyros/dyros_legs.pbtxt")},
+                  {"urdf", ReadText("robots/dyros/dyros_legs.urdf")}};
+    ComponentContext context;
+    context.name = "hw_bridge";
+    context.config_text = "ethercat { link { udp {} } master { drift_frames: 200 profile {" +
+                          ReadText("drives/elmo_gold.pbtxt") + "} } } " + config_;
+    context.tick_period = 0.002;
+    context.resources = &resources_;
+    context.shared = &shared_;
+    bridge->Configure(context, &wiring_);
+    bridge->Open();
+  }
+
+  /// One cycle. `speed`: every joint turns on, rad/s.
+  void Step(bool with_command = true, double speed = 0, double lateness = 0) {
+    for (size_t j = 0; j < kDrives; ++j) Place(j, shafts[j].angle / kGear + speed * 0.002);
+    const int64_t start = link->Now();
+    command.tick = tick_;
+    command.utime = 2000 * tick_;
+    Port("drive_feedback")->Bind(&sensors);
+    Port("joint_command")->Bind(with_command ? &command : nullptr);
+    Port("emergency_stop")->Bind(stop.stop != 0 || stop.reset != 0 || stop_seen_ ? &stop : nullptr);
+    stop_seen_ = stop_seen_ || stop.stop != 0;
+    const Tick tick{.index = tick_, .utime = 2000 * tick_, .time = 0, .lateness = lateness};
+    for (const Stage& stage : wiring_.stages()) {
+      for (OutputPort* output : stage.outputs) output->Stamp(kRunId, tick.index, tick.utime);
+      stage.run(tick);
+      for (OutputPort* output : stage.outputs) withheld_ = output->TakeWithheld() || withheld_;
+    }
+    link->AdvanceTo(start + kPeriod);
+    ++tick_;
+  }
+  void Run(int cycles, double speed = 0) {
+    for (int i = 0; i < cycles; ++i) Step(true, speed);
+  }
+  /// Leads to RUNNING with `torque`, N·m, on every joint.
+  void Start(double torque = 7.5) {
+    Open();
+    command.torque.assign(kDrives, torque);
+    for (int i = 0; i < 100 && status().state != bridge_status_t::STATE_RUNNING; ++i) Step();
+    Run(3);
+  }
+  /// Steps until `condition` holds; cycles that were needed after the first: 0, the very next frame
+  /// shows it; -1: it never did.
+  template <class Condition>
+  int CyclesUntil(Condition condition, bool with_command = true, double speed = 0,
+                  double lateness = 0) {
+    for (int cycles = 0; cycles < 2000; ++cycles) {
+      Step(with_command, speed, lateness);
+      if (condition()) return cycles;
+    }
+    return -1;
+  }
+
+  void Place(size_t joint, double angle) { shafts[joint].angle = angle * kGear; }
+  const bridge_status_t& status() const {
+    return *static_cast<const bridge_status_t*>(Find("bridge_status")->message());
+  }
+  const robot_sensors_t& readings() const {
+    return *static_cast<const robot_sensors_t*>(Find("robot_sensors")->message());
+  }
+  ethercat::EmulatedSlave& slave(size_t i) { return chain->slave(i); }
+  /// Whether an output was withheld since the last call.
+  bool TakeWithheld() { return std::exchange(withheld_, false); }
+
+  static constexpr int64_t kRunId = 5;
+  volatile std::sig_atomic_t signal = 0;
+  ethercat::EmulatedChainConfig chain_config;
+  std::array<Shaft, kDrives + 1> shafts;  // one more than joints, for a drive too many
+  std::unique_ptr<ethercat::EmulatedChain> chain;
+  std::unique_ptr<ethercat::MemoryLink> link;
+  std::unique_ptr<ethercat::FaultyLink> faulty;
+  WireSpy wire;
+  std::unique_ptr<HwBridge> bridge;
+  drive_feedback_t sensors;
+  joint_command_t command;
+  emergency_stop_t stop{};
+
+ private:
+  class Tap final : public ethercat::Link {
+   public:
+    Tap(ethercat::Link* link, WireSpy* spy) : link_(link), spy_(spy) {}
+    int64_t Now() const override { return link_->Now(); }
+    bool Send(std::span<const uint8_t> frame) override {
+      spy_->Look(frame);
+      return link_->Send(frame);
+    }
+    size_t Receive(std::span<uint8_t> frame, int64_t deadline) override {
+      return link_->Receive(frame, deadline);
+    }
+
+   private:
+    ethercat::Link* link_;
+    WireSpy* spy_;
+  };
+
+  InputPort* Port(const std::string& name) const {
+    for (InputPort* input : wiring_.inputs()) {
+      if (input->name() == name) return input;
+    }
+    throw std::logic_error("no input " + name);
+  }
+  OutputPort* Find(const std::string& name) const {
+    for (OutputPort* output : wiring_.outputs()) {
+      if (output->name() == name) return output;
+    }
+    throw std::logic_error("no output " + name);
+  }
+
+  std::string config_;
+  std::map<std::string, std::string> resources_;
+  SharedObjects shared_;
+  Wiring wiring_;
+  int64_t tick_ = 0;
+  bool stop_seen_ = false, withheld_ = false;
+};
+
+}  // namespace poise

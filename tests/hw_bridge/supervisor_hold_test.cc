@@ -1,0 +1,118 @@
+// Commands that are lost and come back: holding, its end, and torque without a jump.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/hw_bridge/supervisor_fixture.h"
+
+namespace poise {
+namespace {
+
+using Status = bridge_status_t;
+
+SupervisorConfig Holding() {
+  SupervisorConfig config = ThreeJoints();
+  config.hold_cycles = 100;
+  config.hold_stiffness = 600;
+  config.hold_damping = 10;
+  config.resume_cycles = 10;
+  return config;
+}
+
+TEST(SupervisorHold, KeepsTheLastTorqueWhereNothingMoves) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int age = 1; age <= 103; ++age) {
+    bench.Step(nullptr);
+    ASSERT_EQ(bench.status().state, age <= 3 ? Status::STATE_RUNNING : Status::STATE_HOLDING);
+    ASSERT_DOUBLE_EQ(bench.status().applied_torque[0], 20) << age;
+  }
+  EXPECT_EQ(bench.status().reason, Status::REASON_NO_COMMAND);
+  bench.Step(nullptr);  // 100 cycles of holding are over
+  EXPECT_EQ(bench.status().state, Status::STATE_DAMPING);
+  for (int i = 0; i < 13; ++i) bench.Step(nullptr);
+  EXPECT_EQ(bench.status().state, Status::STATE_STOPPING);
+}
+
+TEST(SupervisorHold, IsASpringAndADamperAboutTheLoss) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 4; ++i) bench.Step(nullptr);
+  ASSERT_EQ(bench.status().state, Status::STATE_HOLDING);
+  // 50 cycles at 0.2 rad/s: 0.02 rad; the velocity filter (2.7 ms) has settled.
+  for (int i = 0; i < 50; ++i) bench.Step(nullptr, 0.2);
+  EXPECT_NEAR(bench.status().applied_torque[0], 20 - 600 * 0.02 - 10 * 0.2, 0.1);
+  bench.Step(nullptr, 0);
+  for (int i = 0; i < 20; ++i) bench.Step(nullptr, 0);
+  EXPECT_NEAR(bench.status().applied_torque[0], 20 - 600 * 0.02, 0.1);
+}
+
+TEST(SupervisorHold, RespectsTheLimits) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 4; ++i) bench.Step(nullptr);
+  for (int i = 0; i < 80; ++i) bench.Step(nullptr, -3);  // 0.48 rad: 288 N·m of spring
+  for (size_t j = 0; j < kJoints; ++j) {
+    EXPECT_DOUBLE_EQ(bench.drives().current[j], kCurrentLimit[j]);
+    EXPECT_EQ(bench.status().saturated[j], Status::LIMIT_TORQUE);
+  }
+}
+
+TEST(SupervisorHold, ACommandThatIsBackIsFadedIn) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 30; ++i) bench.Step(nullptr);
+  ASSERT_EQ(bench.status().state, Status::STATE_HOLDING);
+  double before = bench.status().applied_torque[0];
+  for (int i = 1; i <= 10; ++i) {
+    bench.Step(64.0);
+    ASSERT_EQ(bench.status().state, Status::STATE_RUNNING);
+    // Straight from 20 to 64 N·m in eleven equal steps.
+    EXPECT_NEAR(bench.status().applied_torque[0] - before, 4, 1e-9) << i;
+    before = bench.status().applied_torque[0];
+  }
+  bench.Step(64.0);
+  EXPECT_DOUBLE_EQ(bench.status().applied_torque[0], 64);
+}
+
+TEST(SupervisorHold, ALossWhileACommandIsFadedInHoldsWhatWasApplied) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 30; ++i) bench.Step(nullptr);
+  bench.Step(64.0);
+  for (int i = 0; i < 3; ++i) bench.Step(nullptr);
+  const double applied = bench.status().applied_torque[0];
+  bench.Step(nullptr);
+  EXPECT_EQ(bench.status().state, Status::STATE_HOLDING);
+  EXPECT_DOUBLE_EQ(bench.status().applied_torque[0], applied);
+}
+
+TEST(SupervisorHold, RefusedCommandsAreLostOnes) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 4; ++i) bench.Step(kNan);
+  EXPECT_EQ(bench.status().state, Status::STATE_HOLDING);
+  EXPECT_EQ(bench.status().reason, Status::REASON_COMMAND_NOT_FINITE);
+}
+
+TEST(SupervisorHold, AFaultWhileHoldingStops) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 10; ++i) bench.Step(nullptr);
+  bench.feedback().drive_status[2] = drive_feedback_t::DRIVE_FAULT;
+  bench.Step(nullptr);
+  EXPECT_EQ(bench.status().state, Status::STATE_STOPPING);
+  EXPECT_EQ(bench.status().reason_joint, 2);
+}
+
+TEST(SupervisorHold, WithoutFeedbackTheSpringKeepsItsLastLength) {
+  Bench bench(Holding());
+  bench.Run(10, 20, 0);
+  for (int i = 0; i < 4; ++i) bench.Step(nullptr);
+  for (int i = 0; i < 50; ++i) bench.Step(nullptr, 0.2);
+  bench.End(nullptr);
+  EXPECT_NEAR(bench.status().applied_torque[0], 20 - 600 * 0.02, 0.1);
+}
+
+}  // namespace
+}  // namespace poise
