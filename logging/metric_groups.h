@@ -50,6 +50,7 @@ void AddMotion(MetricList* list);     ///< COM, body and swing foot
 void AddBalancing(MetricList* list);  ///< section 5: when it was on, and the CoP
 void AddWrenches(MetricList* list);   ///< section 4: ratio, margins, computed and measured wrenches
 void AddTorques(MetricList* list);    ///< joints and bridge
+void AddDrives(MetricList* list);     ///< what the drives made of the torques, and their bus
 void AddTransitions(MetricList* list);  ///< changes of support and touch-downs
 void AddSensors(MetricList* list);      ///< push and estimator
 void AddLog(MetricList* list);          ///< completeness of the log and of the bus

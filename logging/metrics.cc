@@ -14,6 +14,7 @@ MetricList MakeMetrics() {
   AddBalancing(&list);
   AddWrenches(&list);
   AddTorques(&list);
+  AddDrives(&list);
   AddTransitions(&list);
   AddSensors(&list);
   AddLog(&list);

@@ -4,6 +4,7 @@
 #include "components/redistributor/redistributor.h"
 #include "components/state_estimator/state_estimator.h"
 #include "components/task_controller/task_controller.h"
+#include "hw_bridge/drive_emulator/drive_emulator.h"
 #include "hw_bridge/hw_bridge.h"
 #include "sim_ode/sim_ode.h"
 
@@ -22,6 +23,8 @@ const ComponentRegistry& Components() {
     ComponentRegistry r;
     r.Add("sim_ode", "the robot, the ground and the pushes, simulated in ODE", Make<SimOde>);
     r.Add("hw_bridge", "drives and sensors: units, limits, safety states, e-stop", Make<HwBridge>);
+    r.Add("drive_emulator", "EtherCAT drives on the simulated robot's motors, with faults",
+          Make<DriveEmulator>);
     r.Add("state_estimator", "floating base and joint velocities from IMU, encoders and feet",
           Make<StateEstimator>);
     r.Add("task_controller", "phases, references and the task torque (24)", Make<TaskController>);

@@ -57,6 +57,19 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--kill-seed", options->launch.kill_seed,
                   "of the moments and processes of --kill")
       ->capture_default_str();
+  CLI::Option* drives =
+      run->add_option("--drives", options->changes.drives,
+                      "what moves the simulated robot's motors; ethercat: an emulated chain of "
+                      "servo drives, through real EtherCAT frames")
+          ->check(CLI::IsMember({"ethercat"}))
+          ->excludes(in_process);
+  run->add_option("--link", options->changes.link,
+                  "of EtherCAT: udp (default), or raw:MASTER,DRIVES, two network interfaces; see "
+                  "deploy/veth")
+      ->needs(drives);
+  run->add_option("--capture", options->changes.capture,
+                  "write every EtherCAT frame to this file, for Wireshark")
+      ->needs(drives);
   run->add_option("--variant", options->changes.variant,
                   "run this variant of the scenario (poise list scenarios)");
   run->add_option("--without", options->changes.without, "leave out a part of the controller")

@@ -18,6 +18,8 @@
 #include "components/robot/robot_files.h"
 #include "deploy/poise/registry.h"
 #include "fmt/format.h"
+#include "hw_bridge/drive_emulator/drive_emulator.pb.h"
+#include "hw_bridge/hw_bridge.pb.h"
 
 namespace poise {
 namespace {
@@ -197,14 +199,58 @@ void ChangeConfiguration(const std::string& change, RunSpec* spec) {
   }
 }
 
+namespace {
+
+/// The port of EtherCAT over UDP, for the components at both of its ends.
+void SetEthercatPort(int port, RunSpec* spec) {
+  for (ComponentConfig& config : *spec->mutable_config()) {
+    const auto& components = spec->graph().component();
+    const auto instance = std::find_if(
+        components.begin(), components.end(),
+        [&](const ComponentInstance& each) { return each.name() == config.component(); });
+    if (instance == components.end()) continue;
+    const auto set = [&](auto message, auto link_of) {
+      ParseTextProto(config.text(), "configuration of " + config.component(), &message);
+      ethercat::LinkConfig* const link = link_of(&message);
+      if (link == nullptr || !link->has_udp() || link->udp().has_port()) return;
+      link->mutable_udp()->set_port(static_cast<uint32_t>(port));
+      google::protobuf::TextFormat::PrintToString(message, config.mutable_text());
+    };
+    if (TypeOf(*instance) == "hw_bridge") {
+      set(HwBridgeConfig(), [](HwBridgeConfig* message) {
+        return message->has_ethercat() ? message->mutable_ethercat()->mutable_link() : nullptr;
+      });
+    } else if (TypeOf(*instance) == "drive_emulator") {
+      set(DriveEmulatorConfig(),
+          [](DriveEmulatorConfig* message) { return message->mutable_link(); });
+    }
+  }
+}
+
+}  // namespace
+
+bool SpeaksEthercat(const RunSpec& spec, int component) {
+  const ComponentInstance& instance = spec.graph().component(component);
+  if (TypeOf(instance) == "drive_emulator") return true;
+  if (TypeOf(instance) != "hw_bridge") return false;
+  for (const ComponentConfig& config : spec.config()) {
+    if (config.component() != instance.name()) continue;
+    HwBridgeConfig bridge;
+    ParseTextProto(config.text(), "configuration of " + instance.name(), &bridge);
+    return bridge.has_ethercat();
+  }
+  return false;
+}
+
 void ChoosePorts(RunSpec* spec) {
-  const int count = 2 + spec->graph().channel_size();
+  const int count = 3 + spec->graph().channel_size();  // the last one: EtherCAT over UDP
   std::mt19937_64 random(static_cast<uint64_t>(spec->run_id()));
   std::uniform_int_distribution<int> first(kFirstPort, kLastPort - count);
   for (int i = 0; i < 200; ++i) {
     const int port = first(random);
     if (!PortsFree(port, count)) continue;
     spec->set_first_port(port);
+    SetEthercatPort(port + count - 1, spec);
     return;
   }
   throw ConfigError(

@@ -83,7 +83,7 @@ std::vector<std::string> NamesBeside(const fs::path& file, const fs::path& folde
 
 bool HasField(const Message& message, std::string_view field) { return Count(message, field) > 0; }
 
-ScenarioFiles::ScenarioFiles(const fs::path& file) {
+ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
   fs::path next = file;
   while (true) {
     File read;
@@ -93,7 +93,7 @@ ScenarioFiles::ScenarioFiles(const fs::path& file) {
     const bool has_base = read.fields.has_base();
     const std::string base = read.fields.base();
     files_.insert(files_.begin(), std::move(read));
-    if (!has_base) return;
+    if (!has_base) break;
     const auto fail = [&](const std::string& problem) {
       throw ConfigError(fmt::format("{}:{}: base: {}", files_.front().name,
                                     LocateField(files_.front().text, "base", Scenario()), problem));
@@ -110,6 +110,13 @@ ScenarioFiles::ScenarioFiles(const fs::path& file) {
       fail(fmt::format("{} is based on this file itself; bases may not form a loop", base));
     }
   }
+  own_ = files_.size() - 1;
+  if (overlay.empty()) return;
+  File read;
+  read.name = overlay.string();
+  read.text = ReadFile(read.name);
+  ParseTextProto(read.text, read.name, &read.fields);
+  files_.push_back(std::move(read));
 }
 
 Scenario ScenarioFiles::Merged() const {

@@ -22,12 +22,14 @@ class ScenarioFiles {
  public:
   /// Reads `file`, its base, and so on. Throws ConfigError "file:line: base: problem": no such
   /// file, bases that form a loop; and ParseTextProto's.
-  explicit ScenarioFiles(const std::filesystem::path& file);
+  /// `overlay`: a file of the same kind without a base, whose fields come last; empty: none.
+  explicit ScenarioFiles(const std::filesystem::path& file,
+                         const std::filesystem::path& overlay = {});
 
   /// All fields: the furthest base's first, single values replaced, lists appended. `base` is gone.
   Scenario Merged() const;
   /// File of the scenario itself.
-  const std::string& file() const { return files_.back().name; }
+  const std::string& file() const { return files_[own_].name; }
   /// The place of `field`, a path in the merged scenario, or of the nearest enclosing field that
   /// any file sets; of several files, of the one that counts. `line` 0 and the scenario's own file
   /// when there is none.
@@ -41,7 +43,8 @@ class ScenarioFiles {
     std::string text;
     Scenario fields;  ///< its own alone
   };
-  std::vector<File> files_;  // the furthest base first
+  std::vector<File> files_;  // the furthest base first, the overlay last
+  size_t own_ = 0;           // the scenario's
 };
 
 /// True when `message` sets the field with dotted path `field` ("push[0].peak"; a list without

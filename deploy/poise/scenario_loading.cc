@@ -197,6 +197,43 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
   }
 }
 
+/// The drives' type, their link, and whose time they follow.
+void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
+  Scenario* const scenario = &loaded->scenario;
+  const auto apply = [&](const std::string& set, const char* by) {
+    ApplyChange({set, by}, loaded);
+  };
+  if (scenario->has_drive_profile()) {
+    const std::string file = Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile());
+    ReadTextProto(
+        file,
+        scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_master()->mutable_profile());
+  }
+  if (!changes.realtime) {
+    apply("hw_bridge.ethercat.simulated_time=true", "--drives");
+    apply("drive_emulator.simulated_time=true", "--drives");
+  }
+  constexpr std::string_view kRaw = "raw:";
+  if (changes.link.empty() || changes.link == "udp") {
+    scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_link()->mutable_udp();
+    scenario->mutable_drive_emulator()->mutable_link()->mutable_udp();
+  } else {
+    const size_t comma = changes.link.find(',');
+    if (!changes.link.starts_with(kRaw) || comma == std::string::npos) {
+      throw ConfigError(fmt::format(
+          "--link {}: must be udp, or raw:MASTER,DRIVES with the names of two interfaces",
+          changes.link));
+    }
+    apply("hw_bridge.ethercat.link.interface=" +
+              changes.link.substr(kRaw.size(), comma - kRaw.size()),
+          "--link");
+    apply("drive_emulator.link.interface=" + changes.link.substr(comma + 1), "--link");
+  }
+  if (!changes.capture.empty()) {
+    scenario->mutable_hw_bridge()->mutable_ethercat()->set_capture(changes.capture);
+  }
+}
+
 }  // namespace
 
 void FailField(const LoadedScenario& loaded, std::string_view field, std::string_view problem) {
@@ -218,9 +255,12 @@ void FailField(const LoadedScenario& loaded, std::string_view field, std::string
 }
 
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
-  LoadedScenario loaded(FindFile("scenarios", name, fs::current_path()));
+  const fs::path overlay =
+      changes.drives.empty() ? fs::path() : FindFile("drives", changes.drives, fs::current_path());
+  LoadedScenario loaded(FindFile("scenarios", name, fs::current_path()), overlay);
   Scenario* const scenario = &loaded.scenario;
   CheckVariants(loaded);
+  if (!changes.drives.empty()) ApplyDrives(changes, &loaded);
   for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
     ApplyChange(change, &loaded);
   }
@@ -262,6 +302,7 @@ RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& chan
   RunChanges reference = changes;
   reference.variant = loaded.scenario.reference();
   reference.realtime = false;
+  reference.drives.clear();
   reference.drop_rate = 0;
   return reference;
 }

@@ -25,12 +25,16 @@ struct RunChanges {
   std::optional<uint64_t> seed;
   double drop_rate = 0;
   bool realtime = false;
+  std::string drives;  ///< "ethercat"; empty: the simulated robot's own
+  std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
+  std::string capture;  ///< file for all EtherCAT frames; empty: none
 };
 
 /// A scenario read and resolved to files.
 struct LoadedScenario {
-  explicit LoadedScenario(const std::filesystem::path& file)
-      : files(file), scenario(files.Merged()) {}
+  explicit LoadedScenario(const std::filesystem::path& file,
+                          const std::filesystem::path& overlay = {})
+      : files(file, overlay), scenario(files.Merged()) {}
 
   ScenarioFiles files;
   /// Merged, with the changes. `reference` is empty when none is to be run.
