@@ -261,6 +261,10 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   Scenario* const scenario = &loaded.scenario;
   CheckVariants(loaded);
   if (!changes.drives.empty()) ApplyDrives(changes, &loaded);
+  if (changes.realtime && !scenario->hw_bridge().has_on_lost_command()) {
+    // A process that dies is replaced: worth waiting for.
+    ApplyChange({"hw_bridge.on_lost_command=HOLD", "--realtime"}, &loaded);
+  }
   for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
     ApplyChange(change, &loaded);
   }
