@@ -120,6 +120,14 @@ Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {
   return margins[static_cast<size_t>(margin)];
 }
 
+balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance) {
+  std::array<Eigen::Vector2d, std::extent_v<decltype(balance.corner_x)>> corner;
+  const auto count =
+      static_cast<size_t>(std::clamp<int>(balance.num_corners, 0, static_cast<int>(corner.size())));
+  for (size_t i = 0; i < count; ++i) corner[i] = {balance.corner_x[i], balance.corner_y[i]};
+  return balance::ConvexHull({corner.data(), count});
+}
+
 std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
   const joint_command_t* command = run.command.at(tick);
   const balance_torque_t* balance = run.balance.at(tick);
@@ -130,6 +138,10 @@ std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
       const Answer m = FootMargin(run, foot, margin, tick);
       if (m && !(*m >= -kWrenchTolerance)) return true;
     }
+  }
+  if (balance->region == balance_torque_t::REGION_POLYGON) {
+    const Eigen::Vector2d cop(balance->cop[0], balance->cop[1]);
+    return !(balance::SignedDistance(AcceptableRegion(*balance), cop) >= -kCopTolerance);
   }
   for (int axis = 0; axis < 2; ++axis) {
     if (!(std::abs(balance->cop[axis]) <= balance->cop_limit[axis] + kCopTolerance)) return true;

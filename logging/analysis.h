@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 
+#include "components/balance/convex_polygon.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
@@ -46,6 +47,9 @@ std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int
 /// Margin 0..4 (normal, friction, yaw, roll, pitch) of a foot's computed wrench; empty out of
 /// contact.
 Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick);
+
+/// Where the computed centre of pressure is kept, m, frame O; empty in a message without corners.
+balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 
 /// True when a computed wrench of a foot in contact, or the computed resultant's CoP, breaks its
 /// conditions at `tick`: (29)-(33) by more than 1e-6 N or N·m; (37), (38) by more than 1 nm.

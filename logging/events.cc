@@ -210,6 +210,24 @@ void AddBalancing(const RunRecord& run, EventList* events) {
                        });
 }
 
+void AddCapturePoint(const RunRecord& run, EventList* events) {
+  const auto needed = [&](int64_t tick) -> std::optional<bool> {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    return balance->step_needed != 0;
+  };
+  const std::vector<Interval> intervals = Intervals(run, needed);
+  for (const Interval& interval : intervals) {
+    const balance_torque_t& balance = *run.balance.at(interval.begin);
+    events->Add(interval.begin, "step_needed",
+                fmt::format("a foot at ({:.2f}, {:.2f}) m within {:.2f} s; capture point {:.1f} mm "
+                            "beyond the soles",
+                            balance.step_position[0], balance.step_position[1], balance.step_time,
+                            -kMilli * balance.capture_margin));
+    events->AddEndOf(interval, "step_needed_ends", "capture point inside the soles again");
+  }
+}
+
 void AddBridge(const RunRecord& run, EventList* events) {
   const bridge_status_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
@@ -377,6 +395,7 @@ std::vector<Event> Events(const RunRecord& run) {
   AddWaiting(run, &events);
   AddFeet(run, &events);
   AddBalancing(run, &events);
+  AddCapturePoint(run, &events);
   AddBridge(run, &events);
   AddPush(run, &events);
   AddEnd(run, &events);

@@ -20,7 +20,8 @@ struct Event {
 /// loading_begins, loading_ends, waiting_begins, waiting_ends, searching, touch_down,
 /// contact_early, contact_late, no_surface, contact_lost, contact_regained, balancing_on,
 /// balancing_off, eta_infeasible_begins, eta_infeasible_ends, cop_not_achieved_begins,
-/// cop_not_achieved_ends, bridge_state, push_begins, push_peak, push_ends, fall, run_ended.
+/// cop_not_achieved_ends, step_needed, step_needed_ends, bridge_state, push_begins, push_peak,
+/// push_ends, fall, run_ended.
 std::vector<Event> Events(const RunRecord& run);
 
 /// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty

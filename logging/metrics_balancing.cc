@@ -1,6 +1,9 @@
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "fmt/format.h"
+#include "logging/contact_history.h"
 #include "logging/metric_groups.h"
 
 namespace poise::logging {
@@ -65,11 +68,72 @@ void AddCop(MetricList* list) {
       });
 }
 
+/// First tick of the run in which the robot has fallen.
+std::optional<int64_t> FallTick(const RunRecord& run) {
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (truth != nullptr && truth->fallen != 0) return tick;
+  }
+  return {};
+}
+
+std::vector<Interval> StepNeeded(const RunRecord& run) {
+  return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    return balance->step_needed != 0;
+  });
+}
+
+/// s from the last begin of "step needed" to the fall, 0 when a fall was not announced.
+Answer WarningTime(const RunRecord& run) {
+  const std::optional<int64_t> fall = FallTick(run);
+  if (!fall || run.balance.empty()) return {};
+  double warning = 0;
+  for (const Interval& interval : StepNeeded(run)) {
+    const bool lasts = interval.begin < *fall && interval.end.value_or(*fall) >= *fall;
+    if (lasts) warning = run.time(*fall - interval.begin);
+  }
+  return warning;
+}
+
+void AddCapturePoint(MetricList* list) {
+  list->push_back({"capture_margin_min", "mm",
+                   "capture point inside the soles' hull (negative: outside), smallest",
+                   [](const RunRecord& run) {
+                     return Scaled(Minimum(run,
+                                           [&](int64_t t) -> Answer {
+                                             const balance_torque_t* balance = run.balance.at(t);
+                                             if (balance == nullptr) return {};
+                                             return balance->capture_margin;
+                                           }),
+                                   kMilli);
+                   }});
+  list->push_back({"step_needed_first", "s", "first said that a step is needed",
+                   [](const RunRecord& run) -> Answer {
+                     const std::vector<Interval> needed = StepNeeded(run);
+                     if (needed.empty()) return {};
+                     return run.time(needed.front().begin);
+                   }});
+  list->push_back({"step_needed_time", "s", "time in which a step was said to be needed, in sum",
+                   [](const RunRecord& run) -> Answer {
+                     if (run.balance.empty()) return {};
+                     int64_t ticks = 0;
+                     for (const Interval& interval : StepNeeded(run)) {
+                       ticks += interval.end.value_or(run.num_ticks) - interval.begin;
+                     }
+                     return run.time(ticks);
+                   }});
+  list->push_back({"step_warning_time", "s",
+                   "from saying that a step is needed to the fall; 0: not announced", WarningTime});
+}
+
 }  // namespace
 
 void AddBalancing(MetricList* list) {
   AddIntervals(list);
   AddCop(list);
+  AddCapturePoint(list);
 }
 
 }  // namespace poise::logging

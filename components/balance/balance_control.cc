@@ -72,6 +72,34 @@ BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
                                       const ContactGeometry& geometry, const ContactLimits& limits,
                                       bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
                                       BalanceResult* result) {
+  const auto nearest = [&](const Eigen::Vector2d& cop) {
+    Eigen::Vector2d allowed = cop;
+    if (std::abs(cop.x()) > limits.half_length) {
+      allowed.x() = std::copysign(limits.half_length, cop.x());
+    }
+    if (std::abs(cop.y()) > limits.half_width) {
+      allowed.y() = std::copysign(limits.half_width, cop.y());
+    }
+    return allowed;
+  };
+  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result);
+}
+
+BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
+                                      const TaskDynamics& protected_task,
+                                      const ContactGeometry& geometry, const ConvexPolygon& region,
+                                      bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
+                                      BalanceResult* result) {
+  const auto nearest = [&](const Eigen::Vector2d& cop) { return NearestPoint(region, cop); };
+  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result);
+}
+
+template <class Nearest>
+BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
+                                          const TaskDynamics& protected_task,
+                                          const ContactGeometry& geometry, bool enabled,
+                                          Eigen::Ref<Eigen::VectorXd> torque,
+                                          BalanceResult* result) {
   const ReducedDynamics& reduced = contact.reduced();
   *result = BalanceResult{};
   const int feet = geometry.in_contact[0] + geometry.in_contact[1];
@@ -94,13 +122,11 @@ BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
     if (!(result->resultant_task(2) < 0)) return BalanceStatus::kUnloaded;
 
     // (37), (38)
-    const Eigen::Vector2d half(limits.half_length, limits.half_width);
     result->cop_task = result->cop = result->cop_desired = CenterOfPressure(result->resultant_task);
     if (!result->cop_task.allFinite()) return BalanceStatus::kSingular;
-    result->active_x = std::abs(result->cop_task.x()) > half.x();
-    result->active_y = std::abs(result->cop_task.y()) > half.y();
-    if (result->active_x) result->cop_desired.x() = std::copysign(half.x(), result->cop_task.x());
-    if (result->active_y) result->cop_desired.y() = std::copysign(half.y(), result->cop_task.y());
+    result->cop_desired = nearest(result->cop_task);
+    result->active_x = result->cop_desired.x() != result->cop_task.x();
+    result->active_y = result->cop_desired.y() != result->cop_task.y();
     if (!enabled || !(result->active_x || result->active_y)) return BalanceStatus::kOk;
 
     // (42) with y = L⁻¹ Vᵀ Γ as variable: D = −S_c ᴼᵈK Ψ V L⁻ᵀ, then D (I − T_hᵀ Λ_h T_h).

@@ -7,6 +7,7 @@
 
 #include "components/balance/contact_conditions.h"
 #include "components/balance/contact_dynamics.h"
+#include "components/balance/convex_polygon.h"
 #include "components/balance/task_dynamics.h"
 
 namespace poise::balance {
@@ -51,8 +52,19 @@ class BalanceControl {
   BalanceStatus Compute(const ContactDynamics& contact, const TaskDynamics& protected_task,
                         const ContactGeometry& geometry, const ContactLimits& limits, bool enabled,
                         Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result);
+  /// The same with any convex region of frame O's plane, not empty, in place of the rectangle.
+  BalanceStatus Compute(const ContactDynamics& contact, const TaskDynamics& protected_task,
+                        const ContactGeometry& geometry, const ConvexPolygon& region, bool enabled,
+                        Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result);
 
  private:
+  /// `nearest`: a centre of pressure to the allowed one nearest to it.
+  template <class Nearest>
+  BalanceStatus ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
+                            const TaskDynamics& protected_task, const ContactGeometry& geometry,
+                            bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
+                            BalanceResult* result);
+
   Eigen::MatrixXd moment_;      // r×2, (42) in reduced coordinates, transposed
   Eigen::MatrixXd projection_;  // t_h×2
 };

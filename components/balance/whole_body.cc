@@ -68,6 +68,18 @@ bool WholeBody::UpdateContacts() {
                           contact_bias_.head(6 * feet));
 }
 
+Eigen::Vector3d WholeBody::AngularMomentum() const {
+  // The base's rows of A v are the momentum about the base's origin.
+  const Eigen::MatrixXd& mass = data_.mass_matrix;
+  Eigen::Vector3d about_base = mass.block<3, 3>(3, 0) * state_.base_linear_velocity;
+  about_base += mass.block<3, 3>(3, 3) * state_.base_angular_velocity;
+  for (Eigen::Index j = 0; j < state_.joint_velocity.size(); ++j) {
+    about_base += mass.block<3, 1>(3, 6 + j) * state_.joint_velocity[j];
+  }
+  return about_base -
+         (data_.com - data_.base_position).cross(model_->total_mass() * data_.com_velocity);
+}
+
 ContactGeometry WholeBody::geometry() const {
   return {{data_.foot_pose[0], data_.foot_pose[1]}, in_contact_};
 }

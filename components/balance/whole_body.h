@@ -28,6 +28,8 @@ class WholeBody {
   const robot::RobotModel& model() const { return *model_; }
   const robot::RobotData& data() const { return data_; }
   const ContactDynamics& contact() const { return contact_; }  ///< valid after Update returned true
+  /// About the COM, kg·m²/s, world axes, of the last Update's state.
+  Eigen::Vector3d AngularMomentum() const;
   /// Sole frames and contacts of the last Update.
   ContactGeometry geometry() const;
   /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment]

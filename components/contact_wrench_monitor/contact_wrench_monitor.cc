@@ -1,8 +1,11 @@
 #include "components/contact_wrench_monitor/contact_wrench_monitor.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
@@ -14,9 +17,13 @@ namespace {
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
 constexpr double kCopTolerance = 1e-6;
 
-bool Inside(const Eigen::Vector2d& cop, const balance::ContactLimits& limits) {
-  return std::abs(cop.x()) <= limits.half_length + kCopTolerance &&
-         std::abs(cop.y()) <= limits.half_width + kCopTolerance;
+bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
+  return balance::SignedDistance(region, cop) >= -kCopTolerance;
+}
+
+double ReadNotNegative(double value, const char* field, const char* must) {
+  if (!(value >= 0) || !std::isfinite(value)) throw ConfigError(field, must);
+  return value;
 }
 
 }  // namespace
@@ -25,17 +32,45 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   const auto config = context.config<ContactWrenchMonitorConfig>();
   balancing_ = config.balancing();
   ContactLimitsConfig double_support = config.double_support();
-  if (config.has_half_width_beyond_soles()) {
-    beyond_soles_ = config.half_width_beyond_soles();
-    if (!(*beyond_soles_ >= 0) || !std::isfinite(*beyond_soles_)) {
-      throw ConfigError("half_width_beyond_soles", "must be a number of m, 0 or more");
+  ContactLimitsConfig single_support = config.single_support();
+  polygon_ = config.region() == ContactWrenchMonitorConfig::POLYGON;
+  if (polygon_) {
+    if (config.has_half_width_beyond_soles()) {
+      throw ConfigError("half_width_beyond_soles", "belongs to region RECTANGLE; remove it");
     }
+    // The polygon stands in their place.
+    for (ContactLimitsConfig* limits : {&double_support, &single_support}) {
+      limits->set_half_length(1);
+      limits->set_half_width(1);
+    }
+  }
+  if (config.has_half_width_beyond_soles()) {
+    beyond_soles_ = ReadNotNegative(config.half_width_beyond_soles(), "half_width_beyond_soles",
+                                    "must be a number of m, 0 or more");
     // Replaced in every tick.
     if (!double_support.has_half_width()) double_support.set_half_width(1);
   }
   double_support_ = ReadLimits(double_support, "double_support");
-  single_support_ = ReadLimits(config.single_support(), "single_support");
+  single_support_ = ReadLimits(single_support, "single_support");
   model_ = LoadRobot(context);
+  sole_margin_ = ReadNotNegative(config.sole_margin(), "sole_margin", "must be m, 0 or more");
+  for (const robot::FootModel& foot : model_->feet()) {
+    if (sole_margin_ >= 0.5 * std::min(foot.length, foot.width)) {
+      throw ConfigError("sole_margin",
+                        fmt::format("is {} m and leaves nothing of the {} foot's "
+                                    "sole, {} x {} m",
+                                    sole_margin_, foot.name, foot.length, foot.width));
+    }
+  }
+  const StepWarning& step = config.step();
+  const char* const must = "must be a number, 0 or more";
+  step_reach_ = ReadNotNegative(step.reach(), "step.reach", must);
+  step_ = StepDetector(ReadNotNegative(step.beyond(), "step.beyond", must),
+                       ReadNotNegative(step.persistence(), "step.persistence", must));
+  angular_momentum_ = step.angular_momentum();
+  cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
+  cop_feedback_time_ =
+      ReadNotNegative(config.cop_feedback().time_constant(), "cop_feedback.time_constant", must);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   const int num_joints = model_->num_joints();
@@ -53,12 +88,14 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   wiring->AddOutput(&balance_torque_, "balance_torque", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("balance", {&robot_state_, &task_torque_}, {&balance_torque_},
-                   [this](const Tick&) { Balance(); });
+                   [this](const Tick& tick) { Balance(tick); });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
 }
 
 bool ContactWrenchMonitor::Archive(StateArchive* archive) {
   archive->Show(in_contact_);
+  step_.Archive(archive);
+  archive->Show(cop_error_, balanced_index_, balanced_time_);
   ArchiveMessage(&*balance_torque_, archive);
   return true;
 }
@@ -69,7 +106,7 @@ void ContactWrenchMonitor::Prepare() {
   if (state_valid_) whole_body_->Update(state_, in_contact_);
 }
 
-void ContactWrenchMonitor::Balance() {
+void ContactWrenchMonitor::Balance(const Tick& tick) {
   const task_torque_t& task = *task_torque_;
   balance_torque_t& out = *balance_torque_;
   const std::array<bool, 2> in_contact{task.in_contact[0] != 0, task.in_contact[1] != 0};
@@ -81,7 +118,7 @@ void ContactWrenchMonitor::Balance() {
     out.status = balance_torque_t::STATUS_INVALID_STATE;
   } else {
     in_contact_ = in_contact;
-    out.status = ComputeBalance(in_contact);
+    out.status = ComputeBalance(in_contact, tick);
   }
   if (out.status == balance_torque_t::STATUS_OK ||
       out.status == balance_torque_t::STATUS_NOT_ACHIEVED) {
@@ -102,22 +139,77 @@ int8_t ContactWrenchMonitor::ComputeDynamics(const std::array<bool, 2>& in_conta
              : balance_torque_t::STATUS_SINGULAR;
 }
 
-int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contact) {
+int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contact,
+                                            const Tick& tick) {
   if (const int8_t status = ComputeDynamics(in_contact); status != balance_torque_t::STATUS_OK) {
     return status;
   }
+  const balance::ContactGeometry geometry = whole_body_->geometry();
+  Eigen::Isometry3d frame_o;
+  if (!balance::FrameO(geometry.sole, geometry.in_contact, &frame_o)) {
+    return balance_torque_t::STATUS_SINGULAR;
+  }
   const balance::ContactLimits limits = Limits(in_contact);
+  balance::ConvexPolygon region = polygon_
+                                      ? Soles(frame_o, sole_margin_)
+                                      : balance::Rectangle({limits.half_length, limits.half_width});
+  if (cop_feedback_ > 0) {
+    UpdateCopError(frame_o, in_contact, tick);
+    for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
+  }
+  if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
   balance::BalanceResult result;
+  const auto compute = [&](const auto& bounds) {
+    return balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds,
+                                     balancing_, torque_, &result);
+  };
   const balance::BalanceStatus status =
-      balance_control_->Compute(whole_body_->contact(), *com_height_, whole_body_->geometry(),
-                                limits, balancing_, torque_, &result);
+      polygon_ || cop_feedback_ > 0 ? compute(region) : compute(limits);
   if (status == balance::BalanceStatus::kSingular || !torque_.allFinite()) {
     return balance_torque_t::STATUS_SINGULAR;
   }
-  Report(result, limits, in_contact);
-  const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, limits);
+  Report(result, limits, region, in_contact);
+  ReportCapturePoint(frame_o, tick.time);
+  balanced_index_ = tick.index;
+  balanced_time_ = tick.time;
+  const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, region);
   return achieved || !balancing_ ? balance_torque_t::STATUS_OK
                                  : balance_torque_t::STATUS_NOT_ACHIEVED;
+}
+
+void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
+                                          const std::array<bool, 2>& in_contact, const Tick& tick) {
+  const balance_torque_t& last = *balance_torque_;
+  const bool same_contacts =
+      (last.in_contact[0] != 0) == in_contact[0] && (last.in_contact[1] != 0) == in_contact[1];
+  if (balanced_index_ < 0 || !same_contacts) {
+    cop_error_.setZero();
+    return;
+  }
+  // A reading shows the tick before; after skipped ticks it may show any.
+  if (balanced_index_ != tick.index - 1) return;
+  balance::Vector6d measured = balance::Vector6d::Zero();
+  for (size_t i = 0; i < 2; ++i) {
+    if (!in_contact[i]) continue;
+    measured += balance::WrenchTransform(frame_o, whole_body_->data().foot_pose[i]) *
+                GetWrench(robot_state_->foot_wrench[i]);
+  }
+  const Eigen::Vector2d error =
+      balance::CenterOfPressure(measured) - Eigen::Vector2d(last.cop[0], last.cop[1]);
+  // With a light load the quotient says nothing.
+  if (!(measured(2) < 0.5 * last.resultant.force[2]) || !error.allFinite()) return;
+  const double period = tick.time - balanced_time_;
+  cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
+}
+
+balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o,
+                                                   double margin) const {
+  std::array<Eigen::Vector2d, 2> half;
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+  }
+  return balance::SupportPolygon(frame_o, whole_body_->geometry(), half);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {
@@ -133,6 +225,7 @@ balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& i
 
 void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
                                   const balance::ContactLimits& limits,
+                                  const balance::ConvexPolygon& region,
                                   const std::array<bool, 2>& in_contact) {
   balance_torque_t& out = *balance_torque_;
   for (size_t i = 0; i < out.torque.size(); ++i) {
@@ -155,15 +248,61 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
   out.active_x = balancing_ && result.active_x ? 1 : 0;
   out.active_y = balancing_ && result.active_y ? 1 : 0;
   SetPose(result.frame_o, &out.frame_o);
-  out.cop_limit[0] = limits.half_length;
-  out.cop_limit[1] = limits.half_width;
+  out.region = polygon_ ? balance_torque_t::REGION_POLYGON : balance_torque_t::REGION_RECTANGLE;
+  out.num_corners = static_cast<int8_t>(region.num_corners);
+  std::fill(std::begin(out.corner_x), std::end(out.corner_x), 0.0);
+  std::fill(std::begin(out.corner_y), std::end(out.corner_y), 0.0);
+  out.cop_limit[0] = out.cop_limit[1] = 0;
+  for (size_t i = 0; i < region.corners().size(); ++i) {
+    const Eigen::Vector2d& corner = region.corners()[i];
+    out.corner_x[i] = corner.x();
+    out.corner_y[i] = corner.y();
+    out.cop_limit[0] = std::max(out.cop_limit[0], std::abs(corner.x()));
+    out.cop_limit[1] = std::max(out.cop_limit[1], std::abs(corner.y()));
+  }
   for (int i = 0; i < 2; ++i) {
     out.cop_task[i] = result.cop_task[i];
     out.cop[i] = result.cop[i];
   }
   SetWrench(result.resultant_task, &out.resultant_task);
   SetWrench(result.resultant, &out.resultant);
-  SetMargins(balance::CheckContact(result.resultant, limits), &out.resultant_margins);
+  balance::ContactMargins margins = balance::CheckContact(result.resultant, limits);
+  if (polygon_) {
+    // What the moments lack until the centre of pressure is on the edge.
+    margins.roll = margins.pitch =
+        std::abs(result.resultant(2)) * balance::SignedDistance(region, result.cop);
+  }
+  SetMargins(margins, &out.resultant_margins);
+}
+
+void ContactWrenchMonitor::ReportCapturePoint(const Eigen::Isometry3d& frame_o, double time) {
+  balance_torque_t& out = *balance_torque_;
+  const robot::RobotData& data = whole_body_->data();
+  const balance::ConvexPolygon soles = Soles(frame_o, 0);
+  balance::CapturePoint pendulum, body;
+  const Eigen::Vector3d turning = whole_body_->AngularMomentum() / model_->total_mass();
+  if (soles.num_corners == 0 ||
+      !balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, Eigen::Vector3d::Zero(),
+                                    robot::kGravity, &pendulum) ||
+      !balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
+                                    &body)) {
+    return;
+  }
+  const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
+    return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
+  };
+  SetVector3(world(pendulum.position), out.capture_point);
+  const balance::CapturePoint& counts = angular_momentum_ ? body : pendulum;
+  out.capture_margin = balance::SignedDistance(soles, counts.position);
+  out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
+  balance::Step step;
+  if (out.step_needed != 0 && out.capture_margin < 0) {
+    step = balance::LatestStep(soles, counts, step_reach_);
+    SetVector3(world(step.position), out.step_position);
+  } else if (out.step_needed == 0) {
+    SetVector3(Eigen::Vector3d::Zero(), out.step_position);
+  }
+  out.step_time = step.time;
 }
 
 }  // namespace poise

@@ -7,8 +7,11 @@
 #include <optional>
 
 #include "components/balance/balance_control.h"
+#include "components/balance/capture_point.h"
+#include "components/balance/convex_polygon.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
+#include "components/contact_wrench_monitor/step_detector.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
@@ -28,13 +31,20 @@ class ContactWrenchMonitor : public Component {
 
  private:
   void Prepare();
-  void Balance();
+  void Balance(const Tick& tick);
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
-  int8_t ComputeBalance(const std::array<bool, 2>& in_contact);
+  int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
+  /// Of the soles in contact, `margin` (m) off their edges.
+  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o, double margin) const;
+  /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
+  /// says of the tick before.
+  void UpdateCopError(const Eigen::Isometry3d& frame_o, const std::array<bool, 2>& in_contact,
+                      const Tick& tick);
   void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
-              const std::array<bool, 2>& in_contact);
+              const balance::ConvexPolygon& region, const std::array<bool, 2>& in_contact);
+  void ReportCapturePoint(const Eigen::Isometry3d& frame_o, double time);
 
   Input<robot_state_t> robot_state_;
   Input<task_torque_t> task_torque_;
@@ -47,6 +57,15 @@ class ContactWrenchMonitor : public Component {
   bool balancing_ = true;
   balance::ContactLimits double_support_, single_support_;
   std::optional<double> beyond_soles_;  // m
+  bool polygon_ = false;                // the region is the soles' hull
+  double sole_margin_ = 0;              // m
+  double step_reach_ = 0;               // m
+  bool angular_momentum_ = true;        // counts in the capture point that asks for a step
+  StepDetector step_;
+  double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
+  Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
+  int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none
+  double balanced_time_ = 0;     // s
   robot::RobotState state_;
   bool state_valid_ = false;
   std::array<bool, 2> in_contact_{true, true};  // of the last tick

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <vector>
 
 #include "components/balance/contact_conditions.h"
 #include "components/messages/conversions.h"
@@ -133,6 +135,12 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnItsBoundAndLeavesTheHeightAlone) {
     EXPECT_EQ(out.active_y != 0, std::abs(cop_task.y()) > limit.y());
     EXPECT_EQ(out.cop_limit[0], limit.x());
     EXPECT_EQ(out.cop_limit[1], limit.y());
+    EXPECT_EQ(out.region, balance_torque_t::REGION_RECTANGLE);
+    ASSERT_EQ(out.num_corners, 4);
+    for (const int i : {0, 1, 2, 3}) {
+      EXPECT_EQ(std::abs(out.corner_x[i]), limit.x());
+      EXPECT_EQ(std::abs(out.corner_y[i]), limit.y());
+    }
     EXPECT_NEAR(out.resultant_margins.normal, -balanced[2], 1e-6);
     EXPECT_NEAR(out.resultant_margins.friction,
                 0.9 * std::abs(balanced[2]) - balanced.head<2>().norm(), 1e-6);
@@ -155,6 +163,80 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnItsBoundAndLeavesTheHeightAlone) {
   EXPECT_LT(worst_wrench, 1e-7);  // N, N·m
   EXPECT_LT(worst_height, 1e-8);
   EXPECT_LT(worst_cop, 1e-9);  // m
+}
+
+// The same for the hull of the soles, whatever the feet's heights and angles.
+TEST_P(MonitorCase, PutsTheCentreOfPressureOnTheNearestPointOfTheSolesHull) {
+  constexpr double kMargin = 0.045;
+  Harness<ContactWrenchMonitor> harness(&context_, "region: POLYGON sole_margin: 0.045");
+  int active = 0;
+  double worst_cop = 0, worst_corner = 0, worst_height = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    Draw(trial % 2 == 0 ? 3 : 30);
+    Run(&harness);
+    const auto& out = harness.output<balance_torque_t>();
+    if (out.status == balance_torque_t::STATUS_NOT_ACHIEVED) {
+      EXPECT_GE(out.resultant_task.force[2], 0);
+      continue;
+    }
+    ASSERT_EQ(out.status, balance_torque_t::STATUS_OK);
+    ASSERT_EQ(out.region, balance_torque_t::REGION_POLYGON);
+    const Dynamics dynamics(model_, now_, GetParam().in_contact);
+    Eigen::VectorXd before_q, before, after_q, after;
+    dynamics.Forward(ToEigen(task_.torque), &before_q, &before);
+    dynamics.Forward(ToEigen(out.torque), &after_q, &after);
+    const Eigen::Isometry3d frame = GetPose(out.frame_o);
+    const Eigen::VectorXd task = Resultant(dynamics.data, before, frame);
+    const Eigen::VectorXd balanced = Resultant(dynamics.data, after, frame);
+    const Eigen::Vector2d cop_task(-task[4] / task[2], task[3] / task[2]);
+    const Eigen::Vector2d cop(-balanced[4] / balanced[2], balanced[3] / balanced[2]);
+
+    // Corners of the message: each is a sole's, and all of the soles' lie inside.
+    std::vector<Eigen::Vector2d> corners;
+    for (size_t i = 0; i < static_cast<size_t>(out.num_corners); ++i) {
+      corners.push_back({out.corner_x[i], out.corner_y[i]});
+    }
+    ASSERT_GE(corners.size(), 4u);
+    std::vector<Eigen::Vector2d> soles;
+    for (size_t i = 0; i < 2; ++i) {
+      if (!GetParam().in_contact[i]) continue;
+      const robot::FootModel& foot = model_.feet()[i];
+      for (const int corner : {0, 1, 2, 3}) {
+        const Eigen::Vector3d at((corner % 2 == 0 ? -1 : 1) * (0.5 * foot.length - kMargin),
+                                 (corner < 2 ? -1 : 1) * (0.5 * foot.width - kMargin), 0);
+        const Eigen::Vector3d in_o =
+            frame.linear().transpose() * (dynamics.data.foot_pose[i] * at - frame.translation());
+        soles.push_back(in_o.head<2>());
+      }
+    }
+    for (const Eigen::Vector2d& corner : corners) {
+      double nearest = 1;
+      for (const auto& sole : soles) nearest = std::min(nearest, (sole - corner).norm());
+      worst_corner = std::max(worst_corner, nearest);
+    }
+    // Nearest by brute force: no point of the boundary is nearer, and none when it is inside.
+    double distance = std::numeric_limits<double>::infinity();
+    bool inside = true;
+    for (size_t i = 0; i < corners.size(); ++i) {
+      const Eigen::Vector2d &a = corners[i], b = corners[(i + 1) % corners.size()];
+      const Eigen::Vector2d edge = b - a, normal(-edge.y(), edge.x());
+      for (const auto& sole : soles) EXPECT_GT(normal.dot(sole - a), -1e-12);
+      inside = inside && normal.dot(cop_task - a) >= 0;
+      const double along = std::clamp(edge.dot(cop_task - a) / edge.squaredNorm(), 0.0, 1.0);
+      distance = std::min(distance, (a + along * edge - cop_task).norm());
+    }
+    if (inside) distance = 0;
+    active += inside ? 0 : 1;
+    worst_cop = std::max(worst_cop, std::abs((cop - cop_task).norm() - distance));
+    EXPECT_EQ(ToEigen(out.balance_torque).norm() > 0, !inside);
+    EXPECT_EQ(out.active_x != 0 || out.active_y != 0, !inside);
+    worst_height =
+        std::max(worst_height, std::abs((dynamics.data.com_jacobian * (after_q - before_q))[2]));
+  }
+  EXPECT_GT(active, 20);
+  EXPECT_LT(worst_cop, 1e-9);
+  EXPECT_LT(worst_corner, 1e-12);
+  EXPECT_LT(worst_height, 1e-8);
 }
 
 TEST_P(MonitorCase, OnlyWatchesWhenBalancingIsOff) {
@@ -283,6 +365,13 @@ TEST(ContactWrenchMonitor, RefusesLimitsThatCannotBe) {
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 } half_width_beyond_soles: -1"),
             "half_width_beyond_soles");
   EXPECT_EQ(field_of(single), "double_support.half_length");
+  EXPECT_EQ(field_of("region: POLYGON"), "accepted");
+  EXPECT_EQ(field_of("region: POLYGON sole_margin: 0.075"), "sole_margin");
+  EXPECT_EQ(field_of("region: POLYGON sole_margin: -0.01"), "sole_margin");
+  EXPECT_EQ(field_of("region: POLYGON half_width_beyond_soles: 0.02"), "half_width_beyond_soles");
+  EXPECT_EQ(field_of("region: POLYGON double_support { friction: -1 }"), "double_support.friction");
+  EXPECT_EQ(field_of("region: POLYGON step { reach: -1 }"), "step.reach");
+  EXPECT_EQ(field_of("region: POLYGON step { persistence: nan }"), "step.persistence");
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "double_support.half_width");
   EXPECT_EQ(field_of(single + "double_support { half_length: -0.1 half_width: 0.1 }"),
             "double_support.half_length");

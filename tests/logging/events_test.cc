@@ -252,6 +252,21 @@ TEST_F(EventsTest, BalancingOfEachAxis) {
                           Is(0.198, "balancing_on", "x"), Is(0.2, "run_ended")));
 }
 
+TEST_F(EventsTest, AStepThatIsNeededSaysWhereAndByWhen) {
+  for (size_t t = 30; t < 60; ++t) {
+    balance_[t].step_needed = 1;
+    balance_[t].capture_margin = -0.0125;
+    balance_[t].step_position[0] = 0.1;
+    balance_[t].step_position[1] = -0.45;
+    balance_[t].step_time = 0.32;
+  }
+  EXPECT_THAT(Named("step_needed"),
+              ElementsAre(Is(0.06, "step_needed",
+                             "a foot at (0.10, -0.45) m within 0.32 s; capture point 12.5 mm")));
+  EXPECT_THAT(Named("step_needed_ends"),
+              ElementsAre(Is(0.12, "step_needed_ends", "after 0.060 s")));
+}
+
 TEST_F(EventsTest, BridgeStatesCarryTheirReason) {
   for (size_t t = 0; t < kTicks; ++t) {
     bridge_[t].state = t < 2    ? bridge_status_t::STATE_INIT

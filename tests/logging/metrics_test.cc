@@ -255,5 +255,39 @@ TEST_F(MetricsTest, SingleSupportHasASoleOfItsOwn) {
   EXPECT_NEAR(Measure("right_foot_roll_violation_measured"), 0.1, 1e-12);
 }
 
+TEST_F(MetricsTest, WarningTimeIsFromTheAnnouncementThatHoldsToTheFall) {
+  EXPECT_TRUE(Unanswered("step_warning_time"));  // no fall
+  EXPECT_TRUE(Unanswered("step_needed_first"));
+  EXPECT_EQ(Measure("step_needed_time"), 0);
+  for (size_t t = 90; t < 100; ++t) truth_[t].fallen = 1;
+  EXPECT_EQ(Measure("step_warning_time"), 0);  // not announced
+  for (size_t t = 20; t < 25; ++t) balance_[t].step_needed = 1;
+  EXPECT_EQ(Measure("step_warning_time"), 0);  // taken back before
+  for (size_t t = 40; t < 100; ++t) balance_[t].step_needed = 1;
+  balance_[55].capture_margin = -0.03;
+  EXPECT_NEAR(Measure("step_warning_time"), 50 * kPeriod, 1e-12);
+  EXPECT_NEAR(Measure("step_needed_first"), 20 * kPeriod, 1e-12);
+  EXPECT_NEAR(Measure("step_needed_time"), 65 * kPeriod, 1e-12);
+  EXPECT_NEAR(Measure("capture_margin_min"), -30, 1e-12);
+}
+
+TEST_F(MetricsTest, ACentreOfPressureOutsideItsPolygonBreaksACondition) {
+  const double before = Measure("violated_ticks");
+  for (size_t t = 10; t < 20; ++t) {
+    balance_torque_t& balance = balance_[t];
+    balance.region = balance_torque_t::REGION_POLYGON;
+    balance.num_corners = 3;
+    const double x[] = {0, 0.1, 0}, y[] = {0, 0, 0.1};
+    std::copy_n(x, 3, balance.corner_x);
+    std::copy_n(y, 3, balance.corner_y);
+    // In the triangle's bounding box; beyond its long side from tick 15 on.
+    balance.cop[0] = balance.cop[1] = t < 15 ? 0.049 : 0.051;
+    balance.cop_limit[0] = balance.cop_limit[1] = 0.1;
+  }
+  EXPECT_EQ(Measure("violated_ticks"), before + 5);
+  balance_[12].num_corners = -7;  // hostile: no region at all
+  EXPECT_EQ(Measure("violated_ticks"), before + 6);
+}
+
 }  // namespace
 }  // namespace poise::logging

@@ -78,8 +78,10 @@ function copSignals() {
       deps: both, compute: measuredCop(i)},
     {name: `cop_desired_${AXES[i]}`, unit: 'm', text: 'O_d: the bound while balancing controls this axis, frame O',
       deps: [['balance_torque_t', `cop_task[${i}]`], ['balance_torque_t', `cop_limit[${i}]`],
-        ['balance_torque_t', `active_${AXES[i]}`]],
-      compute: pointwise(([task, limit, active]) => active > 0 ? Math.sign(task) * limit : task)},
+        ['balance_torque_t', `active_${AXES[i]}`], ['balance_torque_t', 'region'], ['balance_torque_t', `cop[${i}]`]],
+      // In a polygon the bound of one axis depends on the other: the computed one is on it.
+      compute: pointwise(([task, limit, active, region, cop]) =>
+        active > 0 ? region > 0 ? cop : Math.sign(task) * limit : task)},
     ...['measured', 'computed'].map((kind) => ({
       name: `cop_${kind}_abs_${AXES[i]}`, unit: 'm', text: `${kind} centre of pressure, frame O, absolute`,
       deps: kind === 'measured' ? both : [['balance_torque_t', `cop[${i}]`]],

@@ -43,6 +43,7 @@ function sceneKey(overlay) {
   return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
     entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
+    entry('capture', '●', 'capture point; ○ a step needed there'),
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
     overlay ? entry('desired', '▒', 'second run') : '');
 }

@@ -26,11 +26,13 @@ const GROUND = 6;      // m, across
 const GRID = 0.1;      // m
 const PIECE = 5;       // squares
 const FOG = [3.2, 6];  // m, where the ground begins to fade and where it ends
+const REGION_CORNERS = 16;  // of a message, at the most
 const GROUND_LAYER = 1;  // what the view from above shows
 
 export const COLORS = {
   computed: {light: '#1f5fd0', dark: '#6ea8ff'}, measured: {light: '#1d1d1f', dark: '#f2f2f2'},
   limit: {light: '#d11f1f', dark: '#ff6b6b'}, com: {light: '#0f8a4b', dark: '#3ecf8e'},
+  capture: {light: '#8a6d00', dark: '#e6c84d'},
   desired: {light: '#a11fb0', dark: '#e58cff'}, push: {light: '#c2410c', dark: '#ff9a4d'},
   support: {light: '#5b6675', dark: '#9fb0c5'},
 };
@@ -94,10 +96,13 @@ function contactSignals(run) {
     ...vector(`computed${f}.moment`, 'joint_command_t', `foot_wrench[${f}].moment`),
     [`contact${f}`]: ['task_torque_t', `in_contact[${f}]`],
   })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
-  vector('limit', 'balance_torque_t', 'cop_limit', 2), vector('push', 'external_push_t', 'force'),
+  vector('corner_x', 'balance_torque_t', 'corner_x', REGION_CORNERS),
+  vector('corner_y', 'balance_torque_t', 'corner_y', REGION_CORNERS),
+  vector('capture', 'balance_torque_t', 'capture_point'), vector('step', 'balance_torque_t', 'step_position'), vector('push', 'external_push_t', 'force'),
   vector('point', 'external_push_t', 'point'), {
     'measured_cop[0]': ['derived', 'cop_measured_x'], 'measured_cop[1]': ['derived', 'cop_measured_y'],
     'desired_cop[0]': ['derived', 'cop_desired_x'], 'desired_cop[1]': ['derived', 'cop_desired_y'],
+    num_corners: ['balance_torque_t', 'num_corners'], step_needed: ['balance_torque_t', 'step_needed'],
     active_x: ['balance_torque_t', 'active_x'], active_y: ['balance_torque_t', 'active_y']});
 }
 
@@ -185,7 +190,9 @@ export class SceneView {
     this.pushArrow = arrow('push', 0.012);
     this.soles = this.run.robot.feet.map(() => outline('support', 4));
     this.polygon = outline('support', 8);
-    this.region = outline('limit', 4, true);
+    this.region = outline('limit', REGION_CORNERS, true);
+    this.capture = flat('disc', 'capture', 0.011);
+    this.step = flat('ring', 'capture', 0.045);
     this.frame = new Group();
     this.marks = {desired: flat('diamond', 'desired', 0.024), computed: flat('ring', 'computed', 0.013),
       measured: flat('disc', 'measured', 0.0075)};
@@ -194,10 +201,10 @@ export class SceneView {
     this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
     this.com.renderOrder = 9;
     colored(this.com.material, 'com');
-    scene.add(this.frame, this.comMark, this.com, this.polygon.object, this.region.object, this.pushArrow.object,
+    scene.add(this.frame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object, this.pushArrow.object,
       ...this.soles.map((s) => s.object),
       ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
-    for (const object of [this.frame, this.comMark, this.polygon.object, this.region.object,
+    for (const object of [this.frame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
       ...this.soles.map((s) => s.object)]) {
       object.traverse((o) => o.layers.enable(GROUND_LAYER));
     }
@@ -297,10 +304,17 @@ export class SceneView {
     const frame = samples.pose('frame', row);
     const known = show.pressure && [...frame.position, ...frame.orientation].every(Number.isFinite);
     this.frame.visible = known;
-    const [x, y] = samples.vector('limit', row, 2);
-    const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
-      .map(([a, b]) => add(frame.position, rotate(frame.orientation, [a, b, 0.001])));
+    const count = samples.at('num_corners', row);
+    const corners = Array.from({length: count > 0 ? count : 0}, (_, i) => add(frame.position,
+      rotate(frame.orientation, [samples.at(`corner_x[${i}]`, row), samples.at(`corner_y[${i}]`, row), 0.001])));
     this.region.set(known && corners.flat().every(Number.isFinite) ? corners : []);
+    const drop = (object, name, on) => {
+      const at = samples.vector(name, row);
+      object.visible = known && on && at.every(Number.isFinite);
+      if (object.visible) object.position.set(at[0], at[1], at[2] + 0.001);
+    };
+    drop(this.capture, 'capture', true);
+    drop(this.step, 'step', samples.at('step_needed', row) > 0);
     if (!known) return;
     place(this.frame, frame);
     const balancing = samples.at('active_x', row) > 0 || samples.at('active_y', row) > 0;

@@ -1,0 +1,155 @@
+// Polygons of the plane against closed forms and against brute force.
+#include "components/balance/convex_polygon.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace poise::balance {
+namespace {
+
+using Eigen::Vector2d;
+
+double Area(const ConvexPolygon& polygon) {
+  double twice = 0;
+  for (int i = 0; i < polygon.num_corners; ++i) {
+    const Vector2d& a = polygon.corner[static_cast<size_t>(i)];
+    const Vector2d& b = polygon.corner[static_cast<size_t>((i + 1) % polygon.num_corners)];
+    twice += a.x() * b.y() - a.y() * b.x();
+  }
+  return 0.5 * twice;
+}
+
+TEST(ConvexHull, OfTwoLevelSolesSideBySideIsARectangle) {
+  std::vector<Vector2d> corners;
+  for (const double y : {-0.105, 0.105}) {
+    for (const double dx : {-0.15, 0.15}) {
+      for (const double dy : {-0.075, 0.075}) corners.push_back({dx, y + dy});
+    }
+  }
+  const ConvexPolygon hull = ConvexHull(corners);
+  ASSERT_EQ(hull.num_corners, 4);
+  EXPECT_NEAR(Area(hull), 0.30 * 0.36, 1e-15);
+}
+
+TEST(ConvexHull, OfASoleAheadOfTheOtherHasSixCorners) {
+  std::vector<Vector2d> corners;
+  for (const Vector2d& at : {Vector2d(0, -0.1), Vector2d(0.2, 0.1)}) {
+    for (const double dx : {-0.15, 0.15}) {
+      for (const double dy : {-0.075, 0.075}) corners.push_back(at + Vector2d(dx, dy));
+    }
+  }
+  const ConvexPolygon hull = ConvexHull(corners);
+  ASSERT_EQ(hull.num_corners, 6);
+  // A rectangle swept along (0.2, 0.2).
+  EXPECT_NEAR(Area(hull), 0.30 * 0.15 + 0.2 * 0.15 + 0.2 * 0.30, 1e-15);
+}
+
+TEST(ConvexHull, OfARegularPolygonIsItselfAndTurnsLeft) {
+  std::vector<Vector2d> corners;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = 2 * M_PI * ((7 * i) % 16) / 16;
+    corners.push_back({std::cos(angle), std::sin(angle)});
+  }
+  const ConvexPolygon hull = ConvexHull(corners);
+  ASSERT_EQ(hull.num_corners, 16);
+  EXPECT_NEAR(Area(hull), 8 * std::sin(M_PI / 8), 1e-14);
+}
+
+TEST(ConvexHull, OfPointsOnALineIsASegmentAndOfEqualOnesAPoint) {
+  const std::vector<Vector2d> line = {{0, 0}, {0.3, 0.1}, {0.6, 0.2}, {0.15, 0.05}};
+  const ConvexPolygon segment = ConvexHull(line);
+  ASSERT_EQ(segment.num_corners, 2);
+  EXPECT_EQ(segment.corner[0], Vector2d(0, 0));
+  EXPECT_EQ(segment.corner[1], Vector2d(0.6, 0.2));
+  EXPECT_EQ(SignedDistance(segment, {0.3, 0.1}), 0);
+  EXPECT_NEAR(SignedDistance(segment, {-0.3, -0.1}), -std::hypot(0.3, 0.1), 1e-15);
+
+  const std::vector<Vector2d> same(5, Vector2d(1, 2));
+  EXPECT_EQ(ConvexHull(same).num_corners, 1);
+  EXPECT_EQ(NearestPoint(ConvexHull(same), {4, 6}), Vector2d(1, 2));
+  EXPECT_EQ(SignedDistance(ConvexHull(same), {4, 6}), -5);
+}
+
+TEST(ConvexHull, OfNothingOrOfWhatIsNotFiniteIsEmpty) {
+  EXPECT_EQ(ConvexHull({}).num_corners, 0);
+  const std::vector<Vector2d> bad = {{0, 0}, {1, 0}, {0, NAN}};
+  EXPECT_EQ(ConvexHull(bad).num_corners, 0);
+  EXPECT_EQ(SignedDistance(ConvexPolygon{}, {0, 0}), -INFINITY);
+}
+
+// By definition: each point is a convex combination exactly when no line separates it; the corners
+// are among the points, and every triangle of points lies inside.
+TEST(ConvexHull, HoldsAllPointsAndNoMore) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::vector<Vector2d> points(static_cast<size_t>(3 + trial % 14));
+    for (Vector2d& p : points) p = {uniform(random), uniform(random)};
+    if (trial % 3 == 0) points.push_back(points.front());
+    if (points.size() > 16) points.resize(16);
+    const ConvexPolygon hull = ConvexHull(points);
+    ASSERT_GE(hull.num_corners, 3);
+    for (const Vector2d& p : points) EXPECT_GE(SignedDistance(hull, p), -1e-12);
+    for (const Vector2d& c : hull.corners()) {
+      EXPECT_TRUE(std::find(points.begin(), points.end(), c) != points.end());
+      EXPECT_LE(std::abs(SignedDistance(hull, c)), 1e-12);
+    }
+    for (int i = 0; i < hull.num_corners; ++i) {
+      const auto at = [&](int j) { return hull.corner[static_cast<size_t>(j % hull.num_corners)]; };
+      const Vector2d in = at(i + 1) - at(i), out = at(i + 2) - at(i + 1);
+      EXPECT_GT(in.x() * out.y() - in.y() * out.x(), 0);
+    }
+  }
+}
+
+TEST(NearestPoint, OfARectangleIsTheClampPerAxis) {
+  const Vector2d half(0.13, 0.07);
+  const ConvexPolygon rectangle = Rectangle(half);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  int inside = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const Vector2d point(uniform(random), uniform(random));
+    const Vector2d clamped = point.cwiseMax(-half).cwiseMin(half);
+    EXPECT_LT((NearestPoint(rectangle, point) - clamped).norm(), 1e-15);
+    const double beyond = (point - clamped).norm();
+    const double within = (half - point.cwiseAbs()).minCoeff();
+    EXPECT_NEAR(SignedDistance(rectangle, point), beyond > 0 ? -beyond : within, 1e-15);
+    inside += beyond > 0 ? 0 : 1;
+    if (beyond == 0) {
+      EXPECT_EQ(NearestPoint(rectangle, point), point);
+    }
+  }
+  EXPECT_GT(inside, 50);
+}
+
+TEST(NearestPoint, BeatsEveryPointOfTheBoundary) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<Vector2d> points(8);
+    for (Vector2d& p : points) p = {uniform(random), uniform(random)};
+    const ConvexPolygon hull = ConvexHull(points);
+    const Vector2d outside = 3 * Vector2d(uniform(random), uniform(random));
+    if (SignedDistance(hull, outside) >= 0) continue;
+    const double distance = (NearestPoint(hull, outside) - outside).norm();
+    EXPECT_NEAR(-SignedDistance(hull, outside), distance, 1e-15);
+    double best = INFINITY;
+    for (int i = 0; i < hull.num_corners; ++i) {
+      const Vector2d& a = hull.corner[static_cast<size_t>(i)];
+      const Vector2d& b = hull.corner[static_cast<size_t>((i + 1) % hull.num_corners)];
+      for (int j = 0; j <= 1000; ++j) {
+        best = std::min(best, (a + (b - a) * (j / 1000.0) - outside).norm());
+      }
+    }
+    EXPECT_LE(distance, best + 1e-12);
+    EXPECT_GE(distance, best - 3e-3);
+  }
+}
+
+}  // namespace
+}  // namespace poise::balance
