@@ -39,6 +39,10 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   CheckRatio(eta_max_, "eta_max");
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
   ratio_moves_ = RatioMoves(config);
+  feedback_ = InternalFeedback(config.feedback());
+  if (feedback_.enabled() && !redistribution_) {
+    throw ConfigError("feedback.enabled", "needs redistribution: true");
+  }
 
   model_ = LoadRobot(context);
   whole_body_ = context.shared->Get<balance::WholeBody>(
@@ -54,10 +58,12 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddOutput(&joint_command_, "joint_command", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
   wiring->AddStage("redistribute", {&robot_state_, &task_torque_, &balance_torque_},
-                   {&joint_command_}, [this](const Tick& tick) { Redistribute(tick.time); });
+                   {&joint_command_}, [this](const Tick& tick) { Redistribute(tick); });
 }
 
 bool Redistributor::Archive(StateArchive* archive) {
+  feedback_.Archive(archive);
+  archive->Show(last_index_, last_time_, last_eta_);
   ArchiveMessage(&*joint_command_, archive);
   return true;
 }
@@ -69,7 +75,7 @@ void Redistributor::Prepare() {
   whole_body_->ContactJacobian(kBoth, &contact_jacobian_);
 }
 
-void Redistributor::Redistribute(double time) {
+void Redistributor::Redistribute(const Tick& tick) {
   const balance_torque_t& balance = *balance_torque_;
   joint_command_t& out = *joint_command_;
   const int8_t task = task_torque_->status;
@@ -88,12 +94,13 @@ void Redistributor::Redistribute(double time) {
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }
-  out.status = in_contact[0] && in_contact[1] ? ComputeDouble(time) : ComputeSingle(in_contact);
+  out.status = in_contact[0] && in_contact[1] ? ComputeDouble(tick) : ComputeSingle(in_contact);
 }
 
 int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
   joint_command_t& out = *joint_command_;
   PassTorqueThrough();
+  ForgetDistribution();
   out.eta = out.eta_optimal = in_contact[0] ? 1.0 : 0.0;
   out.eta_min = out.eta_max = out.eta;
   out.eta_feasible = 1;
@@ -102,7 +109,7 @@ int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
   return joint_command_t::STATUS_OK;
 }
 
-int8_t Redistributor::ComputeDouble(double time) {
+int8_t Redistributor::ComputeDouble(const Tick& tick) {
   joint_command_t& out = *joint_command_;
   const Vector6d resultant = GetWrench(balance_torque_->resultant);
   const Eigen::Isometry3d frame_o = GetPose(balance_torque_->frame_o);
@@ -122,7 +129,8 @@ int8_t Redistributor::ComputeDouble(double time) {
   if (redistribution_ && pressed) {
     const double free_ratio =
         balance::SelectRatio(interval, resultant, sole_in_o, double_support_, eta_min_, eta_max_);
-    out.eta = RampedRatio(ratio_moves_.Ratio(time, interval, free_ratio), resultant, sole_in_o);
+    out.eta =
+        RampedRatio(ratio_moves_.Ratio(tick.time, interval, free_ratio), resultant, sole_in_o);
     const Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
     Eigen::Matrix<double, 12, 1> change;
     change << desired[0] - wrench[0], desired[1] - wrench[1];
@@ -132,8 +140,10 @@ int8_t Redistributor::ComputeDouble(double time) {
       out.torque[i] = balance_torque_->torque[i] + out.redistribution_torque[i];
     }
     wrench = desired;
+    if (feedback_.enabled()) AddFeedback(tick, sole_in_o);
   } else {
     PassTorqueThrough();
+    ForgetDistribution();
     const double right = (sole_in_o[0].linear() * wrench[0].head<3>()).z();
     out.eta = pressed ? right / resultant[2] : 0.5;
   }
@@ -156,10 +166,48 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
   return allowed.feasible ? std::clamp(ramped, allowed.min, allowed.max) : ramped;
 }
 
+double Redistributor::FeedbackShare() const {
+  const task_torque_t& task = *task_torque_;
+  if (task.transition == task_torque_t::TRANSITION_NONE) return 1;
+  const double progress = balance::SmoothStep(task.transition_progress);
+  return task.transition == task_torque_t::TRANSITION_UNLOADING ? 1 - progress : progress;
+}
+
+void Redistributor::AddFeedback(const Tick& tick,
+                                const std::array<Eigen::Isometry3d, 2>& sole_in_o) {
+  joint_command_t& out = *joint_command_;
+  InternalWrench answer = InternalWrench::Zero();
+  const double share = FeedbackShare();
+  // A reading shows the command of the tick before; after skipped ticks it may show any.
+  if (last_index_ >= 0 && last_index_ == tick.index - 1) {
+    const Wrenches measured{GetWrench(robot_state_->foot_wrench[0]),
+                            GetWrench(robot_state_->foot_wrench[1])};
+    answer = feedback_.Update(DistributionError(measured, sole_in_o, last_eta_),
+                              tick.time - last_time_, share);
+  } else if (last_index_ >= 0) {
+    answer = feedback_.Hold(share);
+  }
+  balance::RedistributionTorque(contact_jacobian_, WrenchChange(answer, sole_in_o), torque_);
+  for (size_t i = 0; i < out.torque.size(); ++i) {
+    out.feedback_torque[i] = torque_[static_cast<Eigen::Index>(i)];
+    out.redistribution_torque[i] += out.feedback_torque[i];
+    out.torque[i] = balance_torque_->torque[i] + out.redistribution_torque[i];
+  }
+  last_index_ = tick.index;
+  last_time_ = tick.time;
+  last_eta_ = out.eta;
+}
+
+void Redistributor::ForgetDistribution() {
+  feedback_.Reset();
+  last_index_ = -1;
+}
+
 void Redistributor::PassTorqueThrough() {
   joint_command_t& out = *joint_command_;
   out.torque = balance_torque_->torque;
   std::fill(out.redistribution_torque.begin(), out.redistribution_torque.end(), 0.0);
+  std::fill(out.feedback_torque.begin(), out.feedback_torque.end(), 0.0);
 }
 
 void Redistributor::Report(const Wrenches& wrench, const balance::ContactLimits& limits,

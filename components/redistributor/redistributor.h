@@ -10,6 +10,7 @@
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/redistributor/internal_feedback.h"
 #include "components/redistributor/ratio_moves.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
@@ -33,12 +34,18 @@ class Redistributor : public Component {
   using Wrenches = std::array<balance::Vector6d, 2>;
 
   void Prepare();
-  void Redistribute(double time);
-  int8_t ComputeDouble(double time);
+  void Redistribute(const Tick& tick);
+  int8_t ComputeDouble(const Tick& tick);
   int8_t ComputeSingle(const std::array<bool, 2>& in_contact);
   /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
   double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
                      std::array<Eigen::Isometry3d, 2> sole_in_o) const;
+  /// Adds what answers the measured wrenches to the command; `sole_in_o` as distributed.
+  void AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o);
+  /// Share of the feedback that acts while a foot is loaded or unloaded: none without load, so that
+  /// a change of support makes no step.
+  double FeedbackShare() const;
+  void ForgetDistribution();
   void PassTorqueThrough();
   void Report(const Wrenches& wrench, const balance::ContactLimits& limits,
               const std::array<bool, 2>& in_contact);
@@ -53,6 +60,11 @@ class Redistributor : public Component {
   bool redistribution_ = true, transition_ = true;
   double eta_min_ = 0, eta_max_ = 1;
   RatioMoves ratio_moves_;
+  InternalFeedback feedback_;
+  // Of the last distribution, which a reading answers to; index −1: none.
+  int64_t last_index_ = -1;
+  double last_time_ = 0;  // s
+  double last_eta_ = 0;
   balance::ContactLimits double_support_, single_support_;
   robot::RobotState state_;
   bool state_valid_ = false;

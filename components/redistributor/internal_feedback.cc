@@ -1,0 +1,73 @@
+#include "components/redistributor/internal_feedback.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "components/balance/contact_conditions.h"
+#include "components/balance/distribution_ratio.h"
+#include "components/framework/configuration.h"
+
+namespace poise {
+namespace {
+
+constexpr double kMaxPeriod = 0.02;  // s, counted after a gap of the ticks
+
+double ReadNotNegative(double value, const char* name) {
+  if (!(value >= 0) || !std::isfinite(value)) {
+    throw ConfigError(std::string("feedback.") + name, "must be a number, 0 or more");
+  }
+  return value;
+}
+
+balance::Matrix6d IntoO(const Eigen::Isometry3d& foot) {
+  return balance::WrenchTransform(Eigen::Isometry3d::Identity(), foot);
+}
+
+}  // namespace
+
+InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measured,
+                                 const std::array<Eigen::Isometry3d, 2>& foot, double eta) {
+  const balance::Vector6d right = IntoO(foot[0]) * measured[0];
+  const balance::Vector6d resultant = right + IntoO(foot[1]) * measured[1];
+  const auto wanted = balance::DistributeResultant(resultant, foot, eta);
+  return IntoO(foot[0]) * wanted[0] - right;
+}
+
+Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
+                                          const std::array<Eigen::Isometry3d, 2>& foot) {
+  Eigen::Matrix<double, 12, 1> change;
+  for (int i = 0; i < 2; ++i) {
+    const auto f = static_cast<size_t>(i);
+    // From O into the sole's frame: the transform of the inverse pose.
+    change.segment<6>(6 * i) =
+        (i == 0 ? 1.0 : -1.0) *
+        (balance::WrenchTransform(foot[f], Eigen::Isometry3d::Identity()) * internal);
+  }
+  return change;
+}
+
+InternalFeedback::InternalFeedback(const WrenchFeedback& config)
+    : enabled_(config.enabled()),
+      proportional_(ReadNotNegative(config.proportional(), "proportional")),
+      rate_(ReadNotNegative(config.integral(), "integral")),
+      max_force_(ReadNotNegative(config.max_force(), "max_force")),
+      max_moment_(ReadNotNegative(config.max_moment(), "max_moment")) {}
+
+InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
+  const auto limit = [](auto part, double most) {
+    const double size = part.norm();
+    if (size > most) part *= most / size;
+  };
+  limit(wrench.head<3>(), max_force_);
+  limit(wrench.tail<3>(), max_moment_);
+  return wrench;
+}
+
+InternalWrench InternalFeedback::Update(const InternalWrench& error, double period, double share) {
+  if (!error.allFinite()) return Hold(share);
+  integral_ = Limited(integral_ + share * rate_ * std::clamp(period, 0.0, kMaxPeriod) * error);
+  return share * Limited(integral_ + proportional_ * error);
+}
+
+}  // namespace poise

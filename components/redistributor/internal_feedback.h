@@ -1,0 +1,50 @@
+// Feedback of measured foot wrenches that changes their distribution alone.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/balance/contact_dynamics.h"
+#include "components/framework/state_archive.h"
+#include "components/redistributor/redistributor.pb.h"
+
+namespace poise {
+
+/// Wrench on the right foot in frame O, [F; M]; its negative on the left foot: a resultant of zero.
+using InternalWrench = balance::Vector6d;
+
+/// What the feet lack to share their measured resultant at `eta` as (62)–(67) do. `measured`: robot
+/// on environment, each in its sole frame; `foot`: soles in frame O, right first.
+InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measured,
+                                 const std::array<Eigen::Isometry3d, 2>& foot, double eta);
+
+/// The change of both feet's wrenches, each in its sole frame, 12×1, right first.
+Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
+                                          const std::array<Eigen::Isometry3d, 2>& foot);
+
+/// Proportional and integral, within limits; by time, whatever ticks are skipped.
+class InternalFeedback {
+ public:
+  InternalFeedback() = default;
+  /// Throws ConfigError "feedback.integral" ...: negative or not finite.
+  explicit InternalFeedback(const WrenchFeedback& config);
+
+  bool enabled() const { return enabled_; }
+  /// From zero again.
+  void Reset() { integral_.setZero(); }
+  /// `period`, s, since the last call. A `share` (0..1) of the answer is given, and integrated.
+  InternalWrench Update(const InternalWrench& error, double period, double share);
+  /// Without a reading to go by.
+  InternalWrench Hold(double share) const { return share * integral_; }
+  void Archive(StateArchive* archive) { archive->Show(integral_); }
+
+ private:
+  InternalWrench Limited(InternalWrench wrench) const;
+
+  bool enabled_ = false;
+  double proportional_ = 0, rate_ = 0;
+  double max_force_ = 0, max_moment_ = 0;
+  InternalWrench integral_ = InternalWrench::Zero();
+};
+
+}  // namespace poise
