@@ -60,7 +60,7 @@ class ContactWrenchMonitor : public Component {
   bool polygon_ = false;                // the region is the soles' hull
   double sole_margin_ = 0;              // m
   double step_reach_ = 0;               // m
-  bool angular_momentum_ = true;        // counts in the capture point that asks for a step
+  bool angular_momentum_ = false;       // counts in the capture point that asks for a step
   StepDetector step_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();

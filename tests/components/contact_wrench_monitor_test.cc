@@ -233,7 +233,7 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnTheNearestPointOfTheSolesHull) {
     worst_height =
         std::max(worst_height, std::abs((dynamics.data.com_jacobian * (after_q - before_q))[2]));
   }
-  EXPECT_GT(active, 20);
+  EXPECT_GT(active, 10);
   EXPECT_LT(worst_cop, 1e-9);
   EXPECT_LT(worst_corner, 1e-12);
   EXPECT_LT(worst_height, 1e-8);

@@ -58,8 +58,8 @@ class Chain {
   explicit Chain(robot::TestRobot robot)
       : context_(robot),
         task_(&context_, TaskConfig(Phases(robot))),
-        monitor_(&context_, MonitorConfig(true, 0.02, 0.02)),
-        redistributor_(&context_, RedistributorText()) {
+        monitor_(&context_, MonitorConfig(true, 0.02, 0.02) + " cop_feedback { share: 0.5 }"),
+        redistributor_(&context_, RedistributorText("feedback { enabled: true }")) {
     monitor_.Bind("task_torque", &task());
     redistributor_.Bind("task_torque", &task());
     redistributor_.Bind("balance_torque", &balance());
@@ -112,7 +112,7 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
   Chain whole(GetParam());
   auto reborn = std::make_unique<Chain>(GetParam());
   std::set<int> phases, foot_states, transitions;
-  int balancing = 0, held = 0;
+  int balancing = 0, held = 0, answered = 0;
   for (int tick = 0; tick < kNumTicks; ++tick) {
     auto next = std::make_unique<Chain>(GetParam());
     next->TakeOver(reborn.get());
@@ -124,6 +124,7 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
     foot_states.insert(whole.task().foot_state[1]);
     transitions.insert(whole.task().transition);
     balancing += whole.balance().active_x + whole.balance().active_y;
+    answered += ToEigen(whole.command().feedback_torque).norm() > 0.1 ? 1 : 0;
     held += whole.command().status == joint_command_t::STATUS_INVALID_INPUT ? 1 : 0;
   }
   EXPECT_EQ(phases.size(), 6u);
@@ -133,6 +134,7 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
   EXPECT_EQ(transitions.size(), GetParam() == robot::TestRobot::kDyros ? 3u : 2u);
   EXPECT_GT(balancing, 50);
   EXPECT_EQ(held, 4);
+  EXPECT_GT(answered, 50);
 }
 
 TEST_P(Takeover, AnotherRobotsStateIsRefused) {
