@@ -98,7 +98,8 @@ function contactSignals(run) {
   })), pose('frame', 'balance_torque_t', 'frame_o'), vector('cop', 'balance_torque_t', 'cop', 2),
   vector('corner_x', 'balance_torque_t', 'corner_x', REGION_CORNERS),
   vector('corner_y', 'balance_torque_t', 'corner_y', REGION_CORNERS),
-  vector('capture', 'balance_torque_t', 'capture_point'), vector('step', 'balance_torque_t', 'step_position'), vector('push', 'external_push_t', 'force'),
+  vector('capture', 'balance_torque_t', 'capture_point'), vector('step', 'balance_torque_t', 'step_position'),
+  vector('push', 'external_push_t', 'force'),
   vector('point', 'external_push_t', 'point'), {
     'measured_cop[0]': ['derived', 'cop_measured_x'], 'measured_cop[1]': ['derived', 'cop_measured_y'],
     'desired_cop[0]': ['derived', 'cop_desired_x'], 'desired_cop[1]': ['derived', 'cop_desired_y'],
@@ -201,7 +202,8 @@ export class SceneView {
     this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
     this.com.renderOrder = 9;
     colored(this.com.material, 'com');
-    scene.add(this.frame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object, this.pushArrow.object,
+    scene.add(this.frame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
+      this.pushArrow.object,
       ...this.soles.map((s) => s.object),
       ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
     for (const object of [this.frame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
