@@ -13,6 +13,7 @@
 #include <sstream>
 #include <thread>
 
+#include "components/robot/robot_files.h"
 #include "hw_bridge/hw_bridge.h"
 
 namespace poise {
@@ -29,6 +30,12 @@ std::string ReadText(const std::string& name) {
   std::stringstream text;
   text << file.rdbuf();
   return text.str();
+}
+
+const robot::RobotModel& Model() {
+  static const robot::RobotModel model = robot::LoadRobotFiles(
+      std::string(POISE_SOURCE_DIR) + "/deploy/robots/dyros/dyros_legs.pbtxt");
+  return model;
 }
 
 /// A component and its wiring.
@@ -153,16 +160,9 @@ class Pair {
 TEST(DriveEmulator, GivesInEachTickTheTorqueOfItsFrames) {
   // One drive turns the other way; its counter wraps around while its joint passes zero.
   std::string wiring;
-  const auto model = robot::RobotModel::Load(
-      [] {
-        Robot robot;
-        ParseTextProto(ReadText("robots/dyros/dyros_legs.pbtxt"), "robot", &robot);
-        return robot;
-      }(),
-      ReadText("robots/dyros/dyros_legs.urdf"));
   for (int j = kJoints - 1; j >= 0; --j) {
     wiring +=
-        fmt::format("wiring {{ joint: \"{}\"{} }} ", model.joints()[static_cast<size_t>(j)].name,
+        fmt::format("wiring {{ joint: \"{}\"{} }} ", Model().joints()[static_cast<size_t>(j)].name,
                     j == 2 ? " reversed: true zero_counts: 2147483648" : "");
   }
   Pair pair("enable_at_start: true", "", wiring);
@@ -200,21 +200,45 @@ TEST(DriveEmulator, GivesInEachTickTheTorqueOfItsFrames) {
   EXPECT_EQ(pair.emulator.component.chain().slave(0).al_state(), ethercat::AlState::kInit);
 }
 
-TEST(DriveEmulator, TroubleComesAtItsTime) {
-  Pair pair("enable_at_start: true", "trouble { kind: STO joint: \"left_knee_pitch\" from: 0.05 }",
+struct TroubleCase {
+  const char* trouble;
+  int ticks;  // from the trouble's to the stop
+  int8_t reason;
+  const char* joint;  // whose drive the reason names; nullptr: none
+};
+class EmulatedTrouble : public testing::TestWithParam<TroubleCase> {};
+
+TEST_P(EmulatedTrouble, ComesAtItsTimeAndStopsByItsReason) {
+  Pair pair("enable_at_start: true", fmt::format("trouble {{ {} from: 0.05 }}", GetParam().trouble),
             "");
   pair.bridge.component.Open();
-  for (int i = 0; i < 30; ++i) {
-    pair.bridge.component.Idle();
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
   int tick = 0;
   for (; tick < 100 && pair.status().state <= bridge_status_t::STATE_RUNNING; ++tick) pair.Tick();
-  EXPECT_EQ(tick - 1, 25);
-  EXPECT_EQ(pair.status().reason, bridge_status_t::REASON_DRIVE_STO);
+  EXPECT_EQ(tick - 1, 25 + GetParam().ticks);
+  EXPECT_EQ(pair.status().reason, GetParam().reason);
+  const int joint = pair.status().reason_joint;
+  if (GetParam().joint == nullptr) {
+    EXPECT_EQ(joint, -1);
+    return;
+  }
+  ASSERT_GE(joint, 0);
+  EXPECT_EQ(Model().joints()[static_cast<size_t>(joint)].name, GetParam().joint);
   pair.Tick();
-  EXPECT_EQ(pair.drives().enabled[static_cast<size_t>(pair.status().reason_joint)], 0);
+  EXPECT_EQ(pair.drives().enabled[static_cast<size_t>(joint)], 0);
 }
+
+using S = bridge_status_t;
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, EmulatedTrouble,
+    testing::Values(
+        TroubleCase{"kind: STO joint: \"left_knee_pitch\"", 0, S::REASON_DRIVE_STO,
+                    "left_knee_pitch"},
+        TroubleCase{"kind: DRIVE_FAULT joint: \"right_ankle_roll\"", 0, S::REASON_DRIVE_FAULT,
+                    "right_ankle_roll"},
+        TroubleCase{"kind: SILENT_SLAVE joint: \"left_hip_yaw\"", 4, S::REASON_BUS_INPUTS, nullptr},
+        TroubleCase{"kind: CUT_CABLE joint: \"left_hip_yaw\"", 4, S::REASON_BUS_INPUTS, nullptr},
+        TroubleCase{"kind: FRAMES frames { lost_out: 1 }", 4, S::REASON_BUS_LINK, nullptr},
+        TroubleCase{"kind: FRAMES frames { lost_back: 1 }", 4, S::REASON_BUS_LINK, nullptr}));
 
 TEST(DriveEmulator, RefusesAConfigurationByField) {
   const auto field = [](const std::string& config) -> std::string {
