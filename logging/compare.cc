@@ -8,8 +8,9 @@
 
 #include "components/framework/packet_filter.h"
 #include "fmt/format.h"
+#include "logging/channel_ticks.h"
 #include "logging/message_difference.h"
-#include "logging/run_record.h"
+#include "logging/run_info.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {
@@ -22,8 +23,7 @@ struct Messages {
   std::map<std::pair<int64_t, int>, std::span<const uint8_t>> by_tick;
 
   explicit Messages(const std::string& path) : reader(path) {
-    ReadRunInfo(&reader, path, &spec);
-    CheckLogSpec(spec, path);
+    spec = FindRunInfo(&reader, path).spec;
     std::map<std::string, int, std::less<>> index;
     for (int i = 0; i < spec.graph().channel_size(); ++i) {
       const Channel& channel = spec.graph().channel(i);

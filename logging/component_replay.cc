@@ -79,7 +79,7 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
     Lane& lane = lanes_[found->second];
     if (spec().graph().channel(i).external()) {
       if (messages_.TypeOf(event) == lane.type) {
-        external_[found->second].push_back({newest + 1, event.data});
+        external_[found->second].push_back({newest + 1, false, event.data});
       }
       continue;
     }
@@ -134,6 +134,7 @@ class ReplayedStages {
     InputPort* port;
     int channel;
     OwnedMessage message;
+    std::vector<ExternalMessage> external;  // of kLatest
     size_t next_external = 0;
     bool present = false;
   };
@@ -171,7 +172,7 @@ class ReplayedStages {
     for (InputPort* port : stage.inputs) {
       const int channel = ChannelOf(instance_.input(), port->name());
       CheckSize(channel, port->encoded_size());
-      bound.inputs.push_back({port, channel, OwnedMessage(port)});
+      bound.inputs.push_back({port, channel, OwnedMessage(port), External(port, channel)});
     }
     for (OutputPort* port : stage.outputs) {
       const int channel = ChannelOf(instance_.output(), port->name());
@@ -180,6 +181,20 @@ class ReplayedStages {
       end_ = std::max(end_, lane(channel).ticks.newest() + 1);
     }
     stages_.push_back(std::move(bound));
+  }
+
+  /// The messages of an external channel, placed in the ticks that the component itself tells.
+  std::vector<ExternalMessage> External(const InputPort* port, int channel) const {
+    if (port->kind() != InputKind::kLatest) return {};
+    std::vector<ExternalMessage> messages = log_.external_[static_cast<size_t>(channel)];
+    if (lane(channel).type != FindMessageType("emergency_stop_t")) return messages;
+    for (const OutputPort* output : component_.wiring.outputs()) {
+      const int status = ChannelOf(instance_.output(), output->name());
+      if (lane(status).type == FindMessageType("bridge_status_t")) {
+        PlaceEmergencyStops(lane(status).by_tick, &messages);
+      }
+    }
+    return messages;
   }
 
   void CheckSize(int channel, int size) const {
@@ -242,12 +257,12 @@ class ReplayedStages {
   void Show(Input* input, int64_t tick, ReplayedComponent* result) {
     const InputKind kind = input->port->kind();
     if (kind == InputKind::kLatest) {
-      const auto& messages = log_.external_[static_cast<size_t>(input->channel)];
-      while (input->next_external < messages.size() &&
-             messages[input->next_external].from_tick <= tick) {
-        const auto data = messages[input->next_external++].data;
+      while (input->next_external < input->external.size() &&
+             input->external[input->next_external].tick <= tick) {
+        const ExternalMessage& message = input->external[input->next_external++];
         ++result->external_messages;
-        input->present = Decode(input, data) || input->present;
+        result->unplaced_messages += message.certain ? 0 : 1;
+        input->present = Decode(input, message.data) || input->present;
       }
     } else {
       const int64_t wanted = kind == InputKind::kPreviousTick ? tick - 1 : tick;

@@ -9,6 +9,7 @@
 #include "components/framework/component.h"
 #include "components/framework/graph.pb.h"
 #include "logging/channel_ticks.h"
+#include "logging/external_messages.h"
 #include "logging/log_messages.h"
 #include "logging/tick_series.h"
 
@@ -41,9 +42,10 @@ struct ReplayedComponent {
   int64_t ticks = 0;
   double wall_time = 0;  ///< s, of the component's stages with their messages
   std::vector<ReplayedChannel> outputs;
-  /// External messages it read: the log does not tell in which tick, so they were shown from the
-  /// tick after those logged before them.
+  /// External messages it read, and those among them of which the log does not tell in which tick:
+  /// they were shown from the tick after those logged before them.
   int64_t external_messages = 0;
+  int64_t unplaced_messages = 0;
   bool equal() const;
 };
 
@@ -67,16 +69,12 @@ class LogReplay {
     const MessageType* type;
     Series<std::span<const uint8_t>> by_tick;  // into the reader's file
   };
-  struct External {
-    int64_t from_tick;
-    std::span<const uint8_t> data;
-  };
   friend class ReplayedStages;
 
   std::string path_;
   LogMessages messages_;
-  std::vector<Lane> lanes_;                      // by channel of the graph
-  std::vector<std::vector<External>> external_;  // likewise
+  std::vector<Lane> lanes_;                             // by channel of the graph
+  std::vector<std::vector<ExternalMessage>> external_;  // likewise
 };
 
 }  // namespace poise::logging

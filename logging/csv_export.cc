@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMostChannels = 64;  // of a table whose graph is not known: damage makes up names
+
 /// A field of a row; in quotes when a separator stands in it.
 void AppendText(std::string_view text, std::string* row) {
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
@@ -135,7 +137,7 @@ class Results {
 }  // namespace
 
 std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder) {
-  LogMessages messages(log);
+  LogMessages messages(log, LogMessages::Run::kIfKnown);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw LogError(fmt::format("{}: cannot be made: {}", folder, error.message()));
@@ -179,33 +181,54 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
     table->second.file.Write(row);
     ++result.messages;
   }
+  // A table of another run among these would pass for one of this run.
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() != ".csv" || tables.contains(entry.path().stem().string()))
+      continue;
+    throw LogError(fmt::format(
+        "{}: is no channel of this log and would stand among its tables; remove it or choose "
+        "another folder",
+        entry.path().string()));
+  }
+  if (error) throw LogError(fmt::format("{}: cannot be read: {}", folder, error.message()));
   for (auto& [name, table] : tables) table.file.Close();
   return results.take();
 }
 
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file) {
-  LogMessages messages(log);
+  LogMessages messages(log, LogMessages::Run::kIfKnown);
   struct Column {
     std::optional<Shape> shape;
     std::string names;
     size_t width = 0;
   };
   std::vector<ExportedChannel> results;
+  std::vector<Column> columns;
   std::map<std::string, size_t, std::less<>> index;
+  const auto add = [&](const std::string& channel, const std::string& type) {
+    index[channel] = results.size();
+    results.push_back({channel, type, 0, 0});
+    columns.emplace_back();
+  };
   for (const Channel& channel : messages.spec().graph().channel()) {
-    if (channel.external()) continue;
-    index[channel.name()] = results.size();
-    results.push_back({channel.name(), channel.type(), 0, 0});
+    if (!channel.external()) add(channel.name(), channel.type());
   }
-  std::vector<Column> columns(results.size());
   std::map<int64_t, std::vector<std::span<const uint8_t>>> ticks;  // spans into the reader's file
   LogEvent event;
   while (messages.reader().Next(&event)) {
-    const auto found = index.find(event.channel);
-    if (found == index.end()) continue;
+    const MessageType* const type = messages.TypeOf(event);
+    auto found = index.find(event.channel);
+    if (found == index.end()) {
+      // Without a graph: whatever is no service of the run.
+      if (messages.run_known() || type == nullptr || type->has_strings ||
+          !IsFileName(event.channel) || columns.size() == kMostChannels) {
+        continue;
+      }
+      add(std::string(event.channel), type->name);
+      found = index.find(event.channel);
+    }
     ExportedChannel& result = results[found->second];
     Column& column = columns[found->second];
-    const MessageType* const type = messages.TypeOf(event);
     if (type == nullptr || (column.shape && *column.shape != Shape(type, event.data))) {
       ++result.refused;
       continue;
@@ -233,8 +256,8 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
       row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16), tick);
       break;
     }
-    for (size_t i = 0; i < cells.size(); ++i) {
-      if (cells[i].empty()) {
+    for (size_t i = 0; i < columns.size(); ++i) {
+      if (i >= cells.size() || cells[i].empty()) {
         row.append(columns[i].width, ',');
       } else {
         Append(*columns[i].shape->type, cells[i], false, "", &row);

@@ -1,5 +1,7 @@
 #include "logging/inline_recorder.h"
 
+#include <algorithm>
+
 #include "components/framework/run.h"
 
 namespace poise::logging {
@@ -29,6 +31,7 @@ health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int compon
   health.latency_median = latency.median();
   health.latency_p99 = latency.p99();
   health.latency_max = latency.max();
+  std::ranges::copy(latency.HalfOctaves(), health.latency_count);
   return health;
 }
 

@@ -100,6 +100,7 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
       result.refused += in_time(event.utime) ? 1 : 0;
       continue;
     }
+    if (type->fingerprint == run_info_t::getHash()) continue;  // under a damaged name
     const auto channel = external.find(event.channel);
     const int64_t tick = ReadInt64(event.data.data() + type->run_id_offset + 8);
     const bool after_start = tick >= result.first_tick;

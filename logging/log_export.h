@@ -1,4 +1,5 @@
-// A run's log in formats that other tools read: CSV and MCAP.
+// A run's log in formats that other tools read: CSV and MCAP. Without RUN_INFO and the run's folder
+// (FindRunInfo) types are told by the messages' fingerprints.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +17,12 @@ struct ExportedChannel {
 
 /// FOLDER/CHANNEL.csv for every channel that has messages, RUN_INFO aside: a row a message, in the
 /// log's order; columns time (s), tick and the message's fields, "foot_wrench[1].force[2]", numbers
-/// with all their digits. Makes the folder. Throws LogError.
+/// with all their digits. Makes the folder; no other CSV file may stand there. Throws LogError.
 std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder);
 
 /// One wide file: a row a tick, columns time (s), tick and "CHANNEL.field" of the graph's channels,
-/// external ones aside; empty where a channel lacks the tick. Throws LogError.
+/// external ones aside, or where the graph is not known of the first 64 channels without texts;
+/// empty where a channel lacks the tick. Throws LogError.
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file);
 
 /// An MCAP file with every message as Protobuf (ProtobufMessages), a topic a channel, in the log's

@@ -2,14 +2,18 @@
 
 #include "components/framework/packet_filter.h"
 #include "logging/channel_ticks.h"
-#include "logging/run_record.h"
 
 namespace poise::logging {
 
-LogMessages::LogMessages(const std::string& path)
-    : reader_(path), info_(ReadRunInfo(&reader_, path, &spec_)) {
-  CheckLogSpec(spec_, path);
-  for (const Channel& channel : spec_.graph().channel()) {
+LogMessages::LogMessages(const std::string& path, Run run) : reader_(path) {
+  try {
+    run_ = FindRunInfo(&reader_, path);
+    run_known_ = true;
+  } catch (const LogError&) {
+    if (run == Run::kNeeded) throw;
+    reader_.Rewind();
+  }
+  for (const Channel& channel : spec().graph().channel()) {
     graph_[channel.name()] = &ChannelType(channel);
   }
 }

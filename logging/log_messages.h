@@ -6,19 +6,22 @@
 
 #include "components/framework/graph.pb.h"
 #include "logging/log_reader.h"
+#include "logging/run_info.h"
 #include "poise/message_traits.hpp"
-#include "poise/run_info_t.hpp"
 
 namespace poise::logging {
 
-/// Types by channel: those of the graph as RUN_INFO names them, others by their fingerprints.
+/// Types by channel: those of the run's graph, others by their fingerprints.
 class LogMessages {
  public:
-  /// Throws LogError: no file, no RUN_INFO or one that cannot be.
-  explicit LogMessages(const std::string& path);
+  enum class Run { kNeeded, kIfKnown };
+  /// Throws LogError: no file, or with kNeeded a run that FindRunInfo cannot tell.
+  explicit LogMessages(const std::string& path, Run run = Run::kNeeded);
 
-  const RunSpec& spec() const { return spec_; }
-  const run_info_t& info() const { return info_; }
+  /// False: spec() and info() are empty.
+  bool run_known() const { return run_known_; }
+  const RunSpec& spec() const { return run_.spec; }
+  const run_info_t& info() const { return run_.info; }
   LogReader& reader() { return reader_; }
 
   /// The type of the event's message; nullptr when it is not a message of its channel.
@@ -27,8 +30,8 @@ class LogMessages {
 
  private:
   LogReader reader_;
-  RunSpec spec_;
-  run_info_t info_;
+  RunInfo run_;
+  bool run_known_ = false;
   std::map<std::string, const MessageType*, std::less<>> graph_;
 };
 

@@ -144,6 +144,12 @@ bool LogReader::Next(LogEvent* event) {
   return true;
 }
 
+void LogReader::Rewind() {
+  position_ = 0;
+  number_ = -1;
+  damage_.clear();
+}
+
 int64_t LogReader::skipped_bytes() const {
   uint64_t sum = 0;
   for (const LogDamage& damage : damage_) sum += damage.size;

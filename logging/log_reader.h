@@ -45,6 +45,8 @@ class LogReader {
 
   /// False at the end. The event's channel and data live as long as the reader.
   bool Next(LogEvent* event);
+  /// Back to the beginning.
+  void Rewind();
   /// Places where the file held no record, and the bytes skipped there. A log cut short counts as
   /// damaged at its end.
   int64_t damages() const { return static_cast<int64_t>(damage_.size()); }

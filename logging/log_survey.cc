@@ -29,11 +29,12 @@ class Surveyor {
  public:
   explicit Surveyor(const std::string& path) : reader_(path) {
     try {
-      survey_.info = ReadRunInfo(&reader_, path, &survey_.spec);
-      CheckLogSpec(survey_.spec, path);
+      RunInfo run = FindRunInfo(&reader_, path);
+      survey_.info = std::move(run.info);
+      survey_.spec = std::move(run.spec);
+      survey_.info_warning = std::move(run.warning);
     } catch (const LogError& error) {
       survey_.info_problem = error.what();
-      survey_.spec.Clear();
     }
     survey_.first_tick = survey_.spec.cut().first_tick();
     for (const Channel& channel : survey_.spec.graph().channel()) {
@@ -224,6 +225,7 @@ std::vector<std::string> LogSurvey::Problems(size_t limit) const {
   if (!info_problem.empty()) {
     problems.push_back(info_problem + "; completeness by channel cannot be told");
   }
+  if (!info_warning.empty()) problems.push_back(info_warning);
   const size_t shown = limit == 0 ? damage.size() : std::min(damage.size(), limit);
   for (size_t i = 0; i < shown; ++i) problems.push_back(Describe(damage[i]));
   if (damage.size() > shown) {

@@ -38,9 +38,10 @@ struct DamageSurvey {
 };
 
 struct LogSurvey {
-  /// Why RUN_INFO cannot be used; then there is no info, and channels are told by their events
+  /// Why the run cannot be told; then there is no info, and channels are told by their events
   /// alone.
   std::string info_problem;
+  std::string info_warning;  ///< RunInfo::warning
   run_info_t info;
   RunSpec spec;
   uint64_t file_size = 0;  ///< bytes

@@ -30,10 +30,10 @@ McapWriter::Texts RunTexts(const LogMessages& messages) {
 }  // namespace
 
 std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file) {
-  LogMessages messages(log);
+  LogMessages messages(log, LogMessages::Run::kIfKnown);
   ProtobufMessages protobuf;
   McapWriter writer(file, fmt::format("poise {}", PoiseVersion()));
-  writer.AddMetadata("run", RunTexts(messages));
+  if (messages.run_known()) writer.AddMetadata("run", RunTexts(messages));
   std::map<std::string, uint16_t> schemas;  // by type
   struct Topic {
     uint16_t id;

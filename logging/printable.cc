@@ -26,6 +26,15 @@ std::string Printable(std::string_view text, std::string_view quote) {
   return escaped;
 }
 
+bool IsUtf8(std::string_view text) {
+  try {
+    nlohmann::json(text).dump();  // strict: throws for what is no UTF-8
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+  return true;
+}
+
 bool IsPlainUtf8(std::string_view text) {
   const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
   if (std::any_of(text.begin(), text.end(), control)) return false;
@@ -33,12 +42,7 @@ bool IsPlainUtf8(std::string_view text) {
   for (size_t i = 1; i < text.size(); ++i) {
     if (text[i - 1] == '\xc2' && static_cast<unsigned char>(text[i]) < 0xa0) return false;
   }
-  try {
-    nlohmann::json(text).dump();  // strict: throws for what is no UTF-8
-  } catch (const nlohmann::json::type_error&) {
-    return false;
-  }
-  return true;
+  return IsUtf8(text);
 }
 
 std::string ForTerminal(std::string_view text) {

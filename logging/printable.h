@@ -15,6 +15,7 @@ std::string ForTerminal(std::string_view text);
 /// The same line by line.
 std::string LinesForTerminal(std::string_view text);
 
+bool IsUtf8(std::string_view text);
 /// True for UTF-8 without control characters.
 bool IsPlainUtf8(std::string_view text);
 

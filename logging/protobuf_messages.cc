@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "logging/printable.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {
@@ -87,7 +88,8 @@ void Put(const E& value, const pb::FieldDescriptor* field, pb::Message* to) {
   } else if constexpr (std::is_same_v<E, float>) {
     add ? reflection.AddFloat(to, field, value) : reflection.SetFloat(to, field, value);
   } else if constexpr (std::is_same_v<E, std::string>) {
-    add ? reflection.AddString(to, field, value) : reflection.SetString(to, field, value);
+    const std::string text = IsUtf8(value) ? value : LinesForTerminal(value);  // as Protobuf's are
+    add ? reflection.AddString(to, field, text) : reflection.SetString(to, field, text);
   } else {
     Fill(value, add ? reflection.AddMessage(to, field) : reflection.MutableMessage(to, field));
   }

@@ -24,7 +24,8 @@ class ProtobufMessages {
   const std::string& file_descriptor_set() const { return file_descriptor_set_; }
   /// "poise.robot_state_t"
   static std::string FullName(std::string_view type);
-  /// An encoded LCM message of a type, as Protobuf; empty: not such a message.
+  /// An encoded LCM message of a type, as Protobuf; empty: not such a message. A text that is no
+  /// UTF-8 becomes printable.
   std::optional<std::string> Convert(std::string_view type, std::span<const uint8_t> data);
 
  private:

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 
-#include "components/framework/configuration.h"
 #include "components/framework/packet_filter.h"
 #include "components/framework/run.h"
 #include "components/robot/robot_files.h"
@@ -61,27 +60,12 @@ void CheckRobot(const RunRecord& run, const std::string& path) {
 
 }  // namespace
 
-run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec) {
-  LogEvent event;
-  run_info_t info;
-  if (!reader->Next(&event) || event.channel != kRunInfoChannel ||
-      !DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &info)) {
-    throw LogError(fmt::format(
-        "{}: does not begin with RUN_INFO; is it the log of a Poise run, and whole?", path));
-  }
-  try {
-    ParseTextProto(info.run_spec, path + ": RUN_INFO.run_spec", spec);
-  } catch (const ConfigError& error) {
-    throw LogError(error.what());
-  }
-  return info;
-}
-
 RunRecord ReadRun(const std::string& path) {
   LogReader reader(path);
   RunRecord run;
-  run.info = ReadRunInfo(&reader, path, &run.spec);
-  CheckLogSpec(run.spec, path);
+  RunInfo found = FindRunInfo(&reader, path);
+  run.info = std::move(found.info);
+  run.spec = std::move(found.spec);
   run.robot = robot::LoadRobotTexts(run.info.robot, run.info.urdf);
   CheckRobot(run, path);
 

@@ -12,6 +12,7 @@
 #include "components/robot/robot_model.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_reader.h"
+#include "logging/run_info.h"
 #include "logging/tick_series.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
@@ -22,7 +23,6 @@
 #include "poise/joint_command_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
-#include "poise/run_info_t.hpp"
 #include "poise/task_torque_t.hpp"
 
 namespace poise::logging {
@@ -72,12 +72,9 @@ struct RunRecord {
   }
 };
 
-/// Throws LogError: no file, no RUN_INFO, a RUN_INFO that does not parse, whose tick period or
-/// number of ticks is none, or whose channels do not fit its robot; RobotError for its robot.
+/// Throws LogError: no file, a run that FindRunInfo cannot tell, or whose channels do not fit its
+/// robot; RobotError for its robot.
 RunRecord ReadRun(const std::string& path);
-
-/// RUN_INFO and the spec it holds, the log's first event. Throws LogError.
-run_info_t ReadRunInfo(LogReader* reader, const std::string& path, RunSpec* spec);
 
 /// A HEALTH_* message; empty: unreadable, of another run, or under another component's name.
 std::optional<health_t> ReadHealth(const LogEvent& event, int64_t run_id);

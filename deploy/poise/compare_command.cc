@@ -4,21 +4,27 @@
 #include "deploy/poise/run_dir.h"
 #include "fmt/format.h"
 #include "logging/compare.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
 
+using logging::ForTerminal;
+
 int Compare(const std::string& first, const std::string& second) {
-  const logging::LogComparison result =
-      logging::CompareLogs(FindLog(first).string(), FindLog(second).string());
+  const std::string first_log = FindLog(first).string();
+  const std::string second_log = FindLog(second).string();
+  WarnOfRunInfo(first_log);
+  WarnOfRunInfo(second_log);
+  const logging::LogComparison result = logging::CompareLogs(first_log, second_log);
   fmt::print(
       "{} ticks, {} messages compared; {} differ, {} only in the first, {} only in the "
       "second\n",
       result.ticks, result.messages, result.differing, result.only_first, result.only_second);
   if (result.earliest) {
     const logging::LogDifference& d = *result.earliest;
-    fmt::print("first: tick {}, {}{}{}: {} and {}\n", d.tick, d.channel, d.field.empty() ? "" : ".",
-               d.field, d.first, d.second);
+    fmt::print("first: tick {}, {}{}{}: {} and {}\n", d.tick, ForTerminal(d.channel),
+               d.field.empty() ? "" : ".", d.field, ForTerminal(d.first), ForTerminal(d.second));
   }
   // Nothing to compare is not equality.
   return result.equal() && result.messages > 0 ? kExitOk : kExitFailed;

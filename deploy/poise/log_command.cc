@@ -10,7 +10,7 @@
 #include "logging/log_export.h"
 #include "logging/log_survey.h"
 #include "logging/printable.h"
-#include "logging/run_record.h"
+#include "logging/run_info.h"
 
 namespace poise {
 namespace {
@@ -119,14 +119,12 @@ int Cut(const CutOptions& options) {
                                   *options.first_tick, *options.last_tick));
   }
   const std::string log = FindLog(options.run).string();
+  WarnOfRunInfo(log);
   logging::CutRange range;
   if (options.from || options.to) {
     logging::LogReader reader(log);
-    RunSpec spec;
-    logging::ReadRunInfo(&reader, log, &spec);
-    logging::CheckLogSpec(spec, log);
     range = logging::TicksOfTimes(options.from.value_or(0), options.to.value_or(1e9),
-                                  spec.tick_period());
+                                  logging::FindRunInfo(&reader, log).spec.tick_period());
   }
   if (options.first_tick) range.first_tick = *options.first_tick;
   if (options.last_tick) range.last_tick = *options.last_tick;
@@ -165,18 +163,37 @@ bool PrintExport(const std::string& to, const std::vector<logging::ExportedChann
   return refused == 0;
 }
 
+/// Throws ConfigError where one of the files would take another's place.
+void CheckExportFiles(const ExportOptions& options, const std::string& log) {
+  std::error_code error;
+  for (const std::string& file : {options.merged, options.mcap}) {
+    if (fs::equivalent(file, log, error)) {
+      throw ConfigError(fmt::format("{}: is the log itself; choose another file", file));
+    }
+  }
+  const auto whole = [](const std::string& file) {
+    return fs::weakly_canonical(fs::absolute(file));
+  };
+  if (options.merged.empty()) return;
+  if (!options.mcap.empty() && whole(options.merged) == whole(options.mcap)) {
+    throw ConfigError(
+        fmt::format("log export: --merged and --mcap name the same file {}", options.mcap));
+  }
+  if (!options.csv.empty() && whole(options.merged).parent_path() == whole(options.csv + "/.")) {
+    throw ConfigError(fmt::format(
+        "log export: --merged {} lies in the folder of --csv, where each file is a channel",
+        options.merged));
+  }
+}
+
 int Export(const ExportOptions& options) {
   if (options.csv.empty() && options.merged.empty() && options.mcap.empty()) {
     throw ConfigError("log export: nothing to write; give --csv, --merged or --mcap");
   }
   const std::string log = FindLog(options.run).string();
+  CheckExportFiles(options, log);
+  WarnOfRunInfo(log);
   bool whole = true;
-  for (const std::string& file : {options.merged, options.mcap}) {
-    std::error_code error;
-    if (fs::equivalent(file, log, error)) {
-      throw ConfigError(fmt::format("{}: is the log itself; choose another file", file));
-    }
-  }
   if (!options.csv.empty()) {
     whole = PrintExport(options.csv, logging::ExportCsv(log, options.csv)) && whole;
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <regex>
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
@@ -16,9 +17,15 @@
 #include "fmt/format.h"
 #include "logging/component_replay.h"
 #include "logging/log_player.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
+
+using logging::ForTerminal;
+
+// liblcm's default, where its tools listen without options.
+constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0";
 
 struct ReplayOptions {
   std::string run;
@@ -26,6 +33,7 @@ struct ReplayOptions {
   std::vector<std::string> set;
   bool to_bus = false;
   double speed = 1;
+  std::string url;
 };
 
 /// Indexes in the graph of the components asked for; all when none is.
@@ -51,28 +59,28 @@ std::vector<int> Wanted(const RunSpec& spec, const std::vector<std::string>& nam
 
 void Print(const logging::ReplayedComponent& component, double tick_period) {
   const double simulated = static_cast<double>(component.ticks) * tick_period;
-  fmt::print("{}: {} ticks in {:.3f} s, {:.0f} x real time: {}\n", component.name, component.ticks,
-             component.wall_time, simulated / std::max(component.wall_time, 1e-9),
+  fmt::print("{}: {} ticks in {:.3f} s, {:.0f} x real time: {}\n", ForTerminal(component.name),
+             component.ticks, component.wall_time, simulated / std::max(component.wall_time, 1e-9),
              component.equal() ? "equal" : "DIFFERENT");
-  if (component.external_messages > 0) {
+  if (component.unplaced_messages > 0) {
     fmt::print(
-        "  {} external messages: the log does not tell the tick that they were read in, "
-        "only between which they came\n",
-        component.external_messages);
+        "  {} of {} external messages: the log does not tell the tick that they were read in, "
+        "only between which they came; differences after them may come of that\n",
+        component.unplaced_messages, component.external_messages);
   }
   for (const logging::ReplayedChannel& output : component.outputs) {
     if (output.differing == 0) {
-      fmt::print("  {}: {} messages, the same bits\n", output.channel, output.ticks);
+      fmt::print("  {}: {} messages, the same bits\n", ForTerminal(output.channel), output.ticks);
       continue;
     }
-    fmt::print("  {}: {} of {} messages differ, first {} at tick {}\n", output.channel,
+    fmt::print("  {}: {} of {} messages differ, first {} at tick {}\n", ForTerminal(output.channel),
                output.differing, output.ticks, output.first_field, output.first_differing_tick);
     for (const logging::FieldDifference& field : output.fields) {
       fmt::print(
           "    {}: {} ticks, from {} on; largest {:.3g}: {} at tick {}, logged {}, "
           "replayed {}\n",
           field.field, field.ticks, field.first_tick, field.largest, field.largest_path,
-          field.largest_tick, field.logged, field.replayed);
+          field.largest_tick, ForTerminal(field.logged), ForTerminal(field.replayed));
     }
   }
 }
@@ -96,9 +104,11 @@ int Compare(const ReplayOptions& options, const std::string& log) {
 }
 
 int Play(const ReplayOptions& options, const std::string& log) {
-  RunSpec spec = logging::LogMessages(log).spec();
-  if (!spec.has_first_port()) ChoosePorts(&spec);  // the run had no network
-  const std::string url = MirrorUrl(spec);
+  std::string url = options.url;
+  if (url.empty()) {
+    const RunSpec spec = logging::LogMessages(log).spec();
+    url = spec.has_first_port() ? MirrorUrl(spec) : kDefaultUrl;  // the run had no network
+  }
   fmt::print("playing {} at {}, {} x real time\n", log, url, options.speed);
   std::fflush(stdout);
   CatchStopSignals();
@@ -145,9 +155,22 @@ void AddReplayCommand(CLI::App* app, Command* command) {
       ->check(CLI::Range(1e-3, 1e6))
       ->needs(to_bus)
       ->capture_default_str();
+  replay
+      ->add_option("--url", options->url,
+                   fmt::format("of --to-bus: LCM URL instead of the run's public one; default of a "
+                               "run inside one process: LCM's own, {}",
+                               kDefaultUrl))
+      ->needs(to_bus)
+      ->check(CLI::Validator(
+          [](const std::string& url) {
+            static const std::regex form(R"(udpm://\d+\.\d+\.\d+\.\d+:\d+(\?ttl=\d+)?)");
+            return std::regex_match(url, form) ? "" : url + ": must be udpm://GROUP:PORT?ttl=TTL";
+          },
+          ""));
   replay->callback([options, command] {
     *command = [options] {
       const std::string log = FindLog(options->run).string();
+      WarnOfRunInfo(log);
       return options->to_bus ? Play(*options, log) : Compare(*options, log);
     };
   });

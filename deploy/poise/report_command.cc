@@ -23,7 +23,14 @@ struct ReportOptions {
 ReportedRun ReadReportedRun(const std::string& run) {
   ReportedRun result;
   result.log = FindLog(run).string();
+  WarnOfRunInfo(result.log);
   result.record = logging::ReadRun(result.log);
+  if (result.record.info.scenario.empty()) {
+    throw logging::LogError(
+        fmt::format("{}: RUN_INFO is damaged and scenario.pbtxt is not beside it: put the "
+                    "scenario's text there",
+                    result.log));
+  }
   ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
   ReadReference(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {

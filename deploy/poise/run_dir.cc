@@ -14,6 +14,8 @@
 #include "deploy/poise/catalog.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
+#include "logging/run_info.h"
 
 namespace poise {
 namespace {
@@ -103,6 +105,11 @@ fs::path FindLog(const std::string& run) {
                                   path.string()));
   }
   return path;
+}
+
+void WarnOfRunInfo(const fs::path& log) {
+  const std::string warning = logging::RunInfoWarning(log.string());
+  if (!warning.empty()) fmt::print(stderr, "warning: {}\n", logging::ForTerminal(warning));
 }
 
 RunSpec ReadRunSpec(const std::string& run) {

@@ -44,6 +44,9 @@ void PointLatestTo(const std::filesystem::path& dir);
 /// Throws ConfigError.
 std::filesystem::path FindLog(const std::string& run);
 
+/// Warns on stderr where a log's RUN_INFO is damaged and the run is told by its folder's files.
+void WarnOfRunInfo(const std::filesystem::path& log);
+
 /// The run spec in a run's folder, or beside a log; empty `run`: of the latest run. It is there
 /// before the log is. Throws ConfigError.
 RunSpec ReadRunSpec(const std::string& run);

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <random>
 
+#include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "components/framework/udp_bus.h"
 #include "fmt/format.h"
@@ -119,6 +122,82 @@ TEST_F(ReplayTest, NamesWhatTheLogLacks) {
   EXPECT_HAS(of_cut, "cut from a longer log");
 }
 
+TEST_F(ReplayTest, EmergencyStopActsInItsTickWhereverItWasRecorded) {
+  PoiseProgram program({"run", StandScenario(), "--out", run_, "--duration", "4"});
+  ASSERT_TRUE(WaitForLog(run_, 200'000));
+  std::mt19937 random(static_cast<unsigned>(NowNanoseconds()));
+  std::this_thread::sleep_for(std::chrono::milliseconds(random() % 100));
+  ASSERT_EQ(RunPoise({"estop", run_}).exit_code, 0);
+  program.Wait();  // the robot without torque falls
+  const ProgramResult result = Replay({"--component", "hw_bridge"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_EQ(result.output.find("external messages"), std::string::npos) << result.output;
+
+  // As if the recorder had heard it earlier or later.
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> stops;
+  std::vector<std::pair<std::string, std::vector<uint8_t>>> others;
+  size_t place = 0;
+  logging::LogReader reader(run_ + "/run.lcm");
+  logging::LogEvent event;
+  while (reader.Next(&event)) {
+    const bool stop = event.channel == "EMERGENCY_STOP";
+    if (stop && stops.empty()) place = others.size();
+    (stop ? stops : others)
+        .emplace_back(event.channel, std::vector<uint8_t>(event.data.begin(), event.data.end()));
+  }
+  ASSERT_FALSE(stops.empty());
+  for (const int64_t shift : {-600, -60, 60, 600}) {  // events, some ten a tick
+    const std::string path = folder_ / fmt::format("shifted{}.lcm", shift);
+    logging::EventLogWriter writer(path);
+    const auto at = static_cast<size_t>(
+        std::clamp<int64_t>(static_cast<int64_t>(place) + shift, 1, std::ssize(others)));
+    for (size_t i = 0; i <= others.size(); ++i) {
+      if (i == at) {
+        for (const auto& [channel, data] : stops) writer.Write(channel, 0, data);
+      }
+      if (i < others.size()) writer.Write(others[i].first, 0, others[i].second);
+    }
+    writer.Close();
+    const ProgramResult shifted = Replay({"--component", "hw_bridge"}, path);
+    EXPECT_EQ(shifted.exit_code, 0) << shift << "\n" << shifted.output;
+  }
+}
+
+TEST_F(ReplayTest, DamagedRunInfoIsTakenFromTheFolder) {
+  Run({"--inline"});
+  const auto damage = [](const logging::LogEvent& event, std::vector<uint8_t>* data) {
+    if (event.channel == "RUN_INFO") data->resize(data->size() - 100);
+    return true;
+  };
+  const std::string log = Changed(damage);
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"replay", log},
+        {"report", log, "--no-html"},
+        {"log", "cut", log, "--from", "0.1", "--out", folder_ / "cut.lcm"}}) {
+    const ProgramResult refused = RunPoise(arguments);
+    EXPECT_EQ(refused.exit_code, 1) << refused.output;
+    EXPECT_HAS(refused, "put the run's run_spec.pbtxt and scenario.pbtxt beside the log");
+  }
+  const ProgramResult csv = RunPoise({"log", "export", log, "--csv", folder_ / "csv"});
+  EXPECT_HAS(csv, " messages of ");
+
+  std::filesystem::rename(log, run_ + "/run.lcm");
+  const ProgramResult replay = Replay();
+  EXPECT_EQ(replay.exit_code, 0) << replay.output;
+  EXPECT_HAS(replay, "warning: ");
+  EXPECT_HAS(replay, "taken from run_spec.pbtxt beside the log");
+  const ProgramResult report = RunPoise({"report", run_, "--no-html"});
+  EXPECT_EQ(report.exit_code, 0) << report.output;
+  EXPECT_HAS(report, "taken from run_spec.pbtxt beside the log");
+  const ProgramResult check = RunPoise({"log", "check", run_});
+  EXPECT_EQ(check.exit_code, 1);
+  EXPECT_HAS(check, "NOT WHOLE");
+  std::filesystem::remove(run_ + "/scenario.pbtxt");
+  const ProgramResult no_scenario = RunPoise({"report", run_, "--no-html"});
+  EXPECT_EQ(no_scenario.exit_code, 1);
+  EXPECT_HAS(no_scenario, "scenario.pbtxt is not beside it");
+}
+
 TEST_F(ReplayTest, InterruptedRunReplaysUpToItsEnd) {
   PoiseProgram program({"run", StandScenario(), "--out", run_, "--duration", "600"});
   ASSERT_TRUE(WaitForLog(run_, 200'000));
@@ -138,6 +217,8 @@ TEST_F(ReplayTest, WrongUseIsAnErrorOfUse) {
         {"--set", "nonsense"},
         {"--speed", "2"},
         {"--to-bus", "--speed", "0"},
+        {"--url", "udpm://239.255.76.67:7667?ttl=0"},
+        {"--to-bus", "--url", "udpm:nowhere"},
         {"--to-bus", "--component", "redistributor"}}) {
     const ProgramResult result = Replay(flags);
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(flags) << result.output;

@@ -168,6 +168,25 @@ TEST_F(LogExportTest, ReplacesNoLogAndLeavesNoPart) {
   }
 }
 
+TEST_F(LogExportTest, TablesOfAnotherLogDoNotStandAmongThese) {
+  WriteRawLog(log_, SmallLog(kTicks));
+  ExportCsv(log_, out_);
+  const std::string push = ReadBytes(out_ + "/PUSH.csv");
+  WriteBytes(out_ + "/notes.txt", "mine");
+  ExportCsv(log_, out_);  // the same again
+  EXPECT_EQ(ReadBytes(out_ + "/PUSH.csv"), push);
+  std::vector<RawEvent> fewer = SmallLog(kTicks + 1);
+  std::erase_if(fewer, [](const RawEvent& event) { return event.channel == "COMMAND"; });
+  WriteRawLog(log_, fewer);
+  try {
+    ExportCsv(log_, out_);
+    ADD_FAILURE() << "COMMAND.csv of the other log was left among these";
+  } catch (const LogError& error) {
+    EXPECT_NE(std::string(error.what()).find("COMMAND.csv"), std::string::npos) << error.what();
+  }
+  EXPECT_EQ(ReadBytes(out_ + "/PUSH.csv"), push);  // nothing was replaced
+}
+
 TEST_F(LogExportTest, RefusesWhatCannotBeWritten) {
   WriteRawLog(log_, SmallLog(kTicks));
   EXPECT_THROW(ExportCsv(log_, log_ + "/x"), LogError);
