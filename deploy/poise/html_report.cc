@@ -124,6 +124,12 @@ Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t 
   return json;
 }
 
+/// The log's name in its folder: a page says nothing of the rest of the machine.
+std::string LogName(const std::string& log) {
+  const fs::path path = fs::weakly_canonical(fs::absolute(log));
+  return (path.parent_path().filename() / path.filename()).string();
+}
+
 /// What a page knows of a run beside its ticks.
 Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
               const std::vector<CheckResult>& checks) {
@@ -146,11 +152,8 @@ void WriteMetadata(const Json& json, std::ostream* out) {
 
 void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
   Json json = Metadata(run.record, run.scenario, run.checks);
-  json["run"]["log"] = run.log;
-  for (const logging::Event& event : logging::Events(run.record)) {
-    json["events"].push_back(
-        {{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
-  }
+  json["run"]["log"] = LogName(run.log);
+  json["events"] = EventsJson(logging::Events(run.record));
   BlobWriter blobs(out, index);
   json["channels"] =
       ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);

@@ -19,7 +19,7 @@ struct LiveSnapshot {
   struct Process {
     std::string name;
     bool seen = false;
-    health_t health;        ///< valid when seen
+    health_t health{};      ///< valid when seen
     double tick_rate = -1;  ///< ticks/s, between its reports of health
     double age = -1;        ///< s, of its last report of health
   };

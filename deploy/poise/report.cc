@@ -55,7 +55,87 @@ std::string ValueOf(const Scenario& scenario, const std::string& field) {
   return colon == std::string::npos ? "" : value.substr(colon + 2);
 }
 
+/// Lower edge of bin `bin` of health_t::latency_count, us.
+double BinEdge(int bin) { return std::ldexp(bin % 2 == 0 ? 1.0 : 1.5, 5 + bin / 2) * 1e-3; }
+
+/// The bins from the first to the last that hold something.
+Json HistogramJson(const health_t& health) {
+  const auto& counts = health.latency_count;
+  const auto filled = [](int64_t count) { return count > 0; };
+  const auto first = std::find_if(std::begin(counts), std::end(counts), filled);
+  const auto last = std::find_if(std::make_reverse_iterator(std::end(counts)),
+                                 std::make_reverse_iterator(first), filled)
+                        .base();
+  Json json = Json::array();
+  for (auto count = first; count < last; ++count) {
+    const auto bin = static_cast<int>(count - std::begin(counts));
+    json.push_back({{"from", BinEdge(bin)}, {"to", BinEdge(bin + 1)}, {"count", *count}});
+  }
+  return json;
+}
+
 }  // namespace
+
+std::vector<std::string> SchedulingNames(int8_t scheduling) {
+  std::vector<std::string> names;
+  if ((scheduling & health_t::SCHEDULING_FIFO) != 0) names.emplace_back("fifo");
+  if ((scheduling & health_t::SCHEDULING_PINNED) != 0) names.emplace_back("pinned");
+  if ((scheduling & health_t::SCHEDULING_MEMORY_LOCKED) != 0) names.emplace_back("locked");
+  return names;
+}
+
+Json ComponentsJson(const std::map<std::string, health_t>& components) {
+  Json json = Json::array();
+  for (const auto& [name, health] : components) {
+    json.push_back({{"name", name},
+                    {"ticks", health.ticks_completed},
+                    {"latency_us",
+                     {{"median", health.latency_median},
+                      {"p99", health.latency_p99},
+                      {"max", health.latency_max},
+                      {"histogram", HistogramJson(health)}}},
+                    {"deadline_misses", health.deadline_misses},
+                    {"lateness_max_us", health.lateness_max},
+                    {"ticks_skipped", health.ticks_skipped},
+                    {"restarts", health.restarts},
+                    {"scheduling", SchedulingNames(health.scheduling)},
+                    {"received", health.messages_received},
+                    {"refused", health.messages_refused},
+                    {"duplicates", health.messages_duplicate},
+                    {"dropped", health.messages_dropped},
+                    {"gaps", health.gaps},
+                    {"resends", health.resends},
+                    {"publish_errors", health.publish_errors}});
+  }
+  return json;
+}
+
+Json ChecksJson(const std::vector<CheckResult>& checks) {
+  Json json = Json::array();
+  for (const CheckResult& check : checks) {
+    Json limit = nullptr;
+    if (check.limited()) limit = Limit(check);
+    json.push_back({{"name", check.name},
+                    {"label", check.label},
+                    {"measured", Optional(check.measured)},
+                    {"unit", check.unit},
+                    {"limit", limit},
+                    {"at_most", Optional(check.at_most)},
+                    {"at_least", Optional(check.at_least)},
+                    {"paper", check.paper.empty() ? Json(nullptr) : Json(check.paper)},
+                    {"paper_value", Optional(check.paper_value)},
+                    {"passed", check.passed}});
+  }
+  return json;
+}
+
+Json EventsJson(const std::vector<logging::Event>& events) {
+  Json json = Json::array();
+  for (const logging::Event& event : events) {
+    json.push_back({{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
+  }
+  return json;
+}
 
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run) {
   const double tick = std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9);
@@ -243,7 +323,7 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
     json["changes"].push_back({{"by", change.by()}, {"set", change.set()}});
   }
   json["realtime"] = run.spec.realtime();
-  json["seed"] = run.spec.seed();
+  json["seed"] = std::to_string(run.spec.seed());  // 64 bits: beyond a double's integers
   json["drop_rate"] = run.spec.drop_rate();
   json["tick_period"] = run.spec.tick_period();
   json["planned_ticks"] = run.spec.num_ticks();
@@ -252,22 +332,7 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
   json["real_time_factor"] = Optional(run.real_time_factor);
   json["refused_health"] = run.refused_health;
   json["log"] = "run.lcm";
-  json["components"] = Json::array();
-  for (const auto& [name, health] : run.health) {
-    json["components"].push_back({{"name", name},
-                                  {"ticks", health.ticks_completed},
-                                  {"latency_us",
-                                   {{"median", health.latency_median},
-                                    {"p99", health.latency_p99},
-                                    {"max", health.latency_max}}},
-                                  {"received", health.messages_received},
-                                  {"refused", health.messages_refused},
-                                  {"duplicates", health.messages_duplicate},
-                                  {"dropped", health.messages_dropped},
-                                  {"gaps", health.gaps},
-                                  {"resends", health.resends},
-                                  {"publish_errors", health.publish_errors}});
-  }
+  json["components"] = ComponentsJson(run.health);
   json["channels"] = Json::array();
   for (const logging::ChannelCompleteness& channel : run.channels) {
     json["channels"].push_back({{"name", channel.name},
@@ -277,21 +342,7 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
                                 {"out_of_order", channel.out_of_order},
                                 {"refused", channel.refused}});
   }
-  json["checks"] = Json::array();
-  for (const CheckResult& check : checks) {
-    Json limit = nullptr;
-    if (check.limited()) limit = Limit(check);
-    json["checks"].push_back({{"name", check.name},
-                              {"label", check.label},
-                              {"measured", Optional(check.measured)},
-                              {"unit", check.unit},
-                              {"limit", limit},
-                              {"at_most", Optional(check.at_most)},
-                              {"at_least", Optional(check.at_least)},
-                              {"paper", check.paper.empty() ? Json(nullptr) : Json(check.paper)},
-                              {"paper_value", Optional(check.paper_value)},
-                              {"passed", check.passed}});
-  }
+  json["checks"] = ChecksJson(checks);
   json["assumptions"] = Json::array();
   for (const Assumption& assumption : scenario.assumption()) {
     json["assumptions"].push_back({{"field", assumption.field()},
@@ -320,11 +371,7 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
                          {"log", "reference/run.lcm"}};
   }
   json["launcher"]["refused"] = outcome.refused;
-  json["events"] = Json::array();
-  for (const logging::Event& event : summary.events) {
-    json["events"].push_back(
-        {{"time", event.time}, {"name", event.name}, {"detail", event.detail}});
-  }
+  json["events"] = EventsJson(summary.events);
   // Names and texts of a log may hold any bytes.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

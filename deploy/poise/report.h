@@ -1,6 +1,8 @@
 // The table and the summary at the end of a run.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -47,6 +49,14 @@ std::string FormatProcesses(const RunOutcome& outcome);
 std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);
+
+/// Words for SCHEDULING_* of health_t.
+std::vector<std::string> SchedulingNames(int8_t scheduling);
+
+/// Parts of summary.json: the components' latencies and counters, checks, events.
+nlohmann::ordered_json ComponentsJson(const std::map<std::string, health_t>& components);
+nlohmann::ordered_json ChecksJson(const std::vector<CheckResult>& checks);
+nlohmann::ordered_json EventsJson(const std::vector<logging::Event>& events);
 
 /// What summary.json says of the run itself, without how it was run and how it ended.
 nlohmann::ordered_json RunJson(const Scenario& scenario, const logging::RunRecord& run,

@@ -139,7 +139,8 @@ void AddTopCommand(CLI::App* app, Command* command) {
   top->add_flag("--once", options->once, "measure for one interval, print the view and end");
   top->footer(
       "Latencies: of one tick's work, from a process's last input to its outputs sent, since the "
-      "start. GAPS: messages asked for again; RESENT: answered again; DROPPED: on purpose "
+      "start. LATE: cycles of the clock's owner that missed their deadline, in real time. GAPS: "
+      "messages asked for again; RESENT: answered again; DROPPED: on purpose "
       "(--drop); "
       "UNSENT: refused by the system; MISSED: messages that this view did not get in time (the run "
       "is not affected and the log has them).");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "components/framework/run.h"
+#include "deploy/poise/report.h"
 #include "fmt/format.h"
 #include "logging/events.h"
 #include "logging/printable.h"
@@ -59,26 +60,45 @@ void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& 
   }
   progress += spec.realtime() ? "  paced by the wall clock" : "  as fast as it goes";
   const bool stopped = snapshot.bridge && snapshot.bridge->state >= bridge_status_t::STATE_STOPPING;
-  const bool damping = snapshot.bridge && snapshot.bridge->state == bridge_status_t::STATE_DAMPING;
+  const bool failing = snapshot.bridge && snapshot.bridge->state > bridge_status_t::STATE_RUNNING;
   if (snapshot.bridge) {
     progress += "  bridge: " + logging::BridgeStateName(snapshot.bridge->state);
     const std::string reason = logging::BridgeReasonName(snapshot.bridge->reason);
     if (!reason.empty()) progress += ", " + reason;
   }
   lines->push_back({progress, stopped   ? Style::kFailure
-                              : damping ? Style::kWarning
+                              : failing ? Style::kWarning
                                         : Style::kPlain});
   lines->push_back({fmt::format("{}  refused here: {} packets", MirrorUrl(spec), refused),
                     refused > 0 ? Style::kWarning : Style::kPlain});
+}
+
+std::string Joined(const std::vector<std::string>& parts, const char* separator) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : separator) + part;
+  return text;
+}
+
+/// What only real time brings about, where there is any of it.
+void AddRealTime(const health_t& h, std::vector<ViewLine>* lines) {
+  std::vector<std::string> parts;
+  if (h.lateness_max > 0) parts.push_back(fmt::format("at most {:.1f} us late", h.lateness_max));
+  if (h.ticks_skipped > 0) parts.push_back(fmt::format("{} ticks skipped", h.ticks_skipped));
+  if (h.restarts > 0) parts.push_back(fmt::format("restarted {} times", h.restarts));
+  const std::vector<std::string> granted = SchedulingNames(h.scheduling);
+  if (!granted.empty()) parts.push_back("scheduling: " + Joined(granted, ", "));
+  if (parts.empty()) return;
+  const bool odd = h.ticks_skipped > 0 || h.restarts > 0;
+  lines->push_back({"  " + Joined(parts, "; "), odd ? Style::kWarning : Style::kPlain});
 }
 
 void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t width = 8;
   for (const auto& process : snapshot.processes) width = std::max(width, process.name.size());
   lines->push_back(
-      {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
+      {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
                    "PROCESS", width, "STATE", "TICK", "TICKS/S", "MEDIAN us", "P99 us", "MAX us",
-                   "GAPS", "RESENT", "REFUSED", "DROPPED", "UNSENT", "AGE s"),
+                   "LATE", "GAPS", "RESENT", "REFUSED", "DROPPED", "UNSENT", "AGE s"),
        Style::kTitle});
   for (const auto& process : snapshot.processes) {
     if (!process.seen) {
@@ -91,15 +111,16 @@ void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
     const bool failed = h.state == health_t::STATE_FAILED;
     const bool stale = process.age > kStale && h.state <= health_t::STATE_RUNNING;
     lines->push_back(
-        {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
+        {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
                      process.name, width, StateName(h.state), Count(h.tick),
                      Number(process.tick_rate, 1), Number(timed ? h.latency_median : -1, 1),
                      Number(timed ? h.latency_p99 : -1, 1), Number(timed ? h.latency_max : -1, 1),
-                     h.gaps, h.resends, h.messages_refused, h.messages_dropped, h.publish_errors,
-                     Number(process.age, 1)),
-         failed  ? Style::kFailure
-         : stale ? Style::kWarning
-                 : Style::kPlain});
+                     h.deadline_misses, h.gaps, h.resends, h.messages_refused, h.messages_dropped,
+                     h.publish_errors, Number(process.age, 1)),
+         failed                           ? Style::kFailure
+         : stale || h.deadline_misses > 0 ? Style::kWarning
+                                          : Style::kPlain});
+    AddRealTime(h, lines);
     if (!h.detail.empty()) {
       lines->push_back({fmt::format("  {}", logging::Printable(h.detail)),
                         failed ? Style::kFailure : Style::kPlain});

@@ -14,6 +14,7 @@
 #include "deploy/poise/commands.h"
 #include "deploy/poise/html_report.h"
 #include "deploy/poise/live_run.h"
+#include "deploy/poise/run_status.h"
 #include "deploy/poise/signals.h"
 #include "deploy/poise/tick_ring.h"
 #include "deploy/poise/view_server.h"
@@ -91,7 +92,8 @@ class Viewer {
         run_id_(std::to_string(live->spec().run_id())),
         ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
-                &ring_) {}
+                &ring_),
+        status_((live->dir() / "run.lcm").string(), scenario) {}
 
   int Run() {
     fmt::print(
@@ -107,6 +109,7 @@ class Viewer {
       const auto now = Clock::now();
       if (live_ != nullptr) Listen(now);
       if (now < next_picture) continue;
+      SendStatus();
       server_.SendTicks();
       if (server_.dropped() != dropped_) {
         dropped_ = server_.dropped();
@@ -141,6 +144,14 @@ class Viewer {
     if (ring_.lost() != lost || live_ == nullptr) server_.SetState(State());
   }
 
+  void SendStatus() {
+    std::optional<Json> status = status_.Take();
+    if (!status) return;
+    // Texts of a log may hold any bytes.
+    server_.SetStatus(Json({{"run_id", run_id_}, {"status", std::move(*status)}})
+                          .dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+
   std::string State() const {
     return Json({{"run_id", run_id_},
                  {"state", live_ != nullptr ? "live" : "ended"},
@@ -155,6 +166,7 @@ class Viewer {
   int64_t dropped_ = 0;
   TickRing ring_;
   ViewServer server_;
+  RunStatus status_;
   Clock::time_point last_message_;
 };
 

@@ -80,6 +80,7 @@ class ViewServer::Impl {
   void RunFor(std::chrono::milliseconds duration) { io_.run_for(duration); }
   void SendTicks();
   void SetState(std::string json);
+  void SetStatus(std::string json);
 
  private:
   class Client;
@@ -94,6 +95,7 @@ class ViewServer::Impl {
   const std::string page_;
   const TickRing* ring_;
   std::shared_ptr<const std::string> state_ = std::make_shared<std::string>();
+  std::shared_ptr<const std::string> status_;
   // The batch made last: clients that keep up want the same.
   std::shared_ptr<const std::string> batch_;
   int64_t batch_from_ = -1;
@@ -242,6 +244,9 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     if (sent_state_ != server_->state_) {
       sent_state_ = outgoing_ = server_->state_;
       stream_.text(true);
+    } else if (sent_status_ != server_->status_) {
+      sent_status_ = outgoing_ = server_->status_;
+      stream_.text(true);
     } else if (next_ < ring.end_tick()) {
       next_ = std::max(next_, ring.first_tick());
       const int64_t to = std::min(ring.end_tick(), next_ + static_cast<int64_t>(BatchTicks()));
@@ -267,7 +272,8 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   /// By a whole batch: then it does not wait for the next picture.
   bool Behind() const {
     const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
-    return sent_state_ != server_->state_ || ticks >= static_cast<int64_t>(BatchTicks());
+    return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
+           ticks >= static_cast<int64_t>(BatchTicks());
   }
   size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
 
@@ -284,6 +290,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   int64_t next_ = 0;  // tick
   std::shared_ptr<const std::string> outgoing_;
   std::shared_ptr<const std::string> sent_state_;
+  std::shared_ptr<const std::string> sent_status_;
 };
 
 ViewServer::Impl::Impl(int port, std::string page, const TickRing* ring)
@@ -333,6 +340,10 @@ void ViewServer::Impl::SetState(std::string json) {
   state_ = std::make_shared<const std::string>(std::move(json));
 }
 
+void ViewServer::Impl::SetStatus(std::string json) {
+  status_ = std::make_shared<const std::string>(std::move(json));
+}
+
 std::shared_ptr<const std::string> ViewServer::Impl::Batch(int64_t from, int64_t to) {
   if (from != batch_from_ || to != batch_to_) {
     batch_ = std::make_shared<const std::string>(ring_->Encode(from, to));
@@ -350,5 +361,6 @@ void ViewServer::RunFor(std::chrono::milliseconds duration) { impl_->RunFor(dura
 int64_t ViewServer::dropped() const { return impl_->dropped(); }
 void ViewServer::SendTicks() { impl_->SendTicks(); }
 void ViewServer::SetState(std::string json) { impl_->SetState(std::move(json)); }
+void ViewServer::SetStatus(std::string json) { impl_->SetStatus(std::move(json)); }
 
 }  // namespace poise

@@ -28,6 +28,8 @@ class ViewServer {
   void SendTicks();
   /// What every client is told first, and again when it changes.
   void SetState(std::string json);
+  /// A further text for every client, likewise; none until it is set.
+  void SetStatus(std::string json);
   /// Clients that took nothing for too long.
   int64_t dropped() const;
 

@@ -23,6 +23,7 @@ class TopViewTest : public ::testing::Test {
     process.health.latency_median = 256.5;
     process.health.latency_p99 = 565;
     process.health.latency_max = 1278.4;
+    process.health.deadline_misses = 7;
     process.health.gaps = 11;
     process.health.messages_refused = 22;
     process.health.messages_dropped = 33;
@@ -81,7 +82,20 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
 TEST_F(TopViewTest, ShowsAProcess) {
   EXPECT_THAT(Row("sim_ode"),
               ::testing::ElementsAre("sim_ode", "running", "1520", "499.8", "256.5", "565.0",
-                                     "1278.4", "11", "44", "22", "33", "55", "0.1"));
+                                     "1278.4", "7", "11", "44", "22", "33", "55", "0.1"));
+}
+
+TEST_F(TopViewTest, ShowsRealTimeWhereThereIsAny) {
+  EXPECT_THAT(Text(), Not(HasSubstr("skipped")));
+  EXPECT_THAT(Text(), Not(HasSubstr("restarted")));
+  EXPECT_THAT(Text(), Not(HasSubstr("scheduling")));
+  health_t& health = snapshot.processes[0].health;
+  health.scheduling = health_t::SCHEDULING_FIFO | health_t::SCHEDULING_MEMORY_LOCKED;
+  health.lateness_max = 81.25;
+  EXPECT_THAT(Text(), HasSubstr("\n  at most 81.2 us late; scheduling: fifo, locked\n"));
+  health.ticks_skipped = 12;
+  health.restarts = 2;
+  EXPECT_THAT(Text(), HasSubstr("12 ticks skipped; restarted 2 times;"));
 }
 
 TEST_F(TopViewTest, ShowsAChannel) {
@@ -98,6 +112,8 @@ TEST_F(TopViewTest, MarksWhatIsWrong) {
     }
     return Style::kTitle;
   };
+  EXPECT_EQ(style(), Style::kWarning);  // it missed deadlines
+  snapshot.processes[0].health.deadline_misses = 0;
   EXPECT_EQ(style(), Style::kPlain);
   snapshot.processes[0].age = 3;
   EXPECT_EQ(style(), Style::kWarning);

@@ -183,6 +183,51 @@ test('the page shows the run, plays it, and needs no network', async () => {
   assert.deepEqual([...png.bytes.subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
   assert.ok(png.bytes.length > 3000);
 
+  // Latencies: all that the log's last health counted, a sample a stage and tick.
+  const label = await page.locator('svg.latencies').getAttribute('aria-label');
+  const download = page.waitForEvent('download');
+  await page.getByRole('button', {name: 'Save the latencies as CSV'}).click();
+  await (await download).saveAs(path('latency.csv'));
+  const samples = {};
+  for (const line of readFileSync(path('latency.csv'), 'utf8').trim().split('\r\n').slice(1)) {
+    const [component, from, to, count] = line.split(',');
+    assert.ok(Number(from) < Number(to), line);
+    samples[component] = (samples[component] ?? 0) + Number(count);
+  }
+  const ticks = await page.evaluate(() => window.poise.run.numTicks);
+  assert.ok(Object.keys(samples).length >= 6);
+  for (const [component, count] of Object.entries(samples)) {
+    assert.ok(count >= ticks && count % ticks === 0, `${component}: ${count} samples of ${ticks} ticks`);
+    assert.ok(label.includes(`${component}: median`), component);
+  }
+  const picture = page.waitForEvent('download');
+  await page.getByRole('button', {name: 'Save the latencies as PNG'}).click();
+  await (await picture).saveAs(path('latency.png'));
+  assert.deepEqual([...readFileSync(path('latency.png')).subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
+
+  // Lines added to a plot before it is built and while it is.
+  const added = await page.evaluate(async () => {
+    const {grid, run} = window.poise;
+    const [a, b, c] = ['eta', 'eta_min', 'eta_max'].map((field) => {
+      const signal = run.signals.get(`JOINT_COMMAND.${field}`);
+      return {label: signal.name, role: 'computed', name: signal.name, signal};
+    });
+    const plot = grid.add({title: 'three lines', unit: '', added: true, series: [a]}, true);
+    plot.addLine(b);
+    const built = plot.show();
+    plot.addLine(c);
+    await built;
+    await plot.building;
+    const counts = [plot.lines.length, plot.plot.series.length, plot.data.length];
+    grid.remove(plot);
+    return counts;
+  });
+  assert.deepEqual(added, [3, 4, 4]);
+
+  // Nothing of the machine's folders.
+  assert.match(await page.locator('#tables').innerText(), /a\/run\.lcm/);
+  assert.ok(!readFileSync(path('a/report.html'), 'utf8').includes(folder));
+
   // Every plot can be built.
   const lines = await page.evaluate(async () => {
     const {grid, view} = window.poise;

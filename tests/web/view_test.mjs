@@ -54,6 +54,14 @@ test('a page follows a run in progress, looks back while it goes on, and has all
       && plots.every((p) => p.data.every((values) => values.length > n) && p.plot.scales.x.max === shown.max);
   }, length);
 
+  // Events, checks and the components' health come with the run.
+  await until(page, () => window.poise.feed.status.components.length > 6 && document.querySelector('svg.latencies'));
+  assert.match(await page.locator('#tables').innerText(), /Checks of the first/);
+  assert.match(await page.locator('.events').innerText(), /phase began/);
+  const told = await page.evaluate(() => window.poise.feed.status);
+  assert.ok(told.checks.every((c) => c.name !== 'log_defects' && !c.name.startsWith('duration_reached')));
+  assert.ok(told.checked_ticks > 0);
+
   // Looking back holds still while the run goes on.
   await page.evaluate(() => window.poise.player.seek(window.poise.run.start + 0.1));
   const {time} = await page.evaluate(() => ({time: window.poise.player.time}));

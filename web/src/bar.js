@@ -10,6 +10,7 @@ export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shif
 
 function track(shared) {
   const {run, phases, events} = shared;
+  const inSight = events.filter((e) => e.time >= run.start - run.period);  // a live run lets go of its beginning
   const length = Math.max(run.end - run.start, run.period);
   const share = (t) => 100 * Math.min(1, Math.max(0, (t - run.start) / length));
   const span = (name, {from, to}) => {
@@ -21,7 +22,7 @@ function track(shared) {
   return element('div', {class: 'track', 'aria-hidden': 'true'},
     ...phases.support.filter((p) => p.value !== 'both feet').map((p) => span('single', p)),
     ...phases.balancing.map((p) => span('balancing', p)),
-    ...events.map((e) => {
+    ...inSight.map((e) => {
       const mark = element('span', {class: 'event'});
       mark.style.left = `${share(e.time)}%`;
       return mark;

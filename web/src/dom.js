@@ -12,6 +12,26 @@ export function element(tag, attributes = {}, ...children) {
   return result;
 }
 
+const SVG = 'http://www.w3.org/2000/svg';
+
+/** The same for a picture's shapes. */
+export function shape(tag, attributes = {}, ...children) {
+  const result = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) result.setAttribute(name, value);
+  result.append(...children);
+  return result;
+}
+
+/** A captioned table; `numbers`: indices of the columns of numbers. */
+export function table(caption, columns, rows, {numbers = []} = {}) {
+  return element('section', {class: 'table'}, element('h2', {}, caption),
+    element('div', {class: 'scroll'}, element('table', {},
+      element('thead', {}, element('tr', {}, ...columns.map((c, i) =>
+        element('th', {scope: 'col', class: numbers.includes(i) ? 'number' : null}, c)))),
+      element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
+        element('td', {class: numbers.includes(i) ? 'number' : null}, cell))))))));
+}
+
 /** So many digits, as short as they can be written. */
 export function formatNumber(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';

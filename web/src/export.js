@@ -6,7 +6,7 @@ const MARGIN = 12;  // CSS px
 const LINE = 18;
 
 /** RFC 4180. */
-function quoted(text) {
+export function quoted(text) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 

@@ -47,10 +47,14 @@ export function addBatch(run, {first, count, values}) {
     : Object.fromEntries(Object.entries(values).map(([name, column]) => [name, column.subarray(known)])));
 }
 
-/** Fires 'state': it or the messages lost by the server have changed. A lost connection is made again. */
+/**
+ * Fires 'state': it or the messages lost by the server have changed; 'status': checks, events and components' health have
+ * come. A lost connection is made again.
+ */
 export class LiveFeed extends EventTarget {
   state = 'waiting';
   lost = 0;
+  status = {checks: [], events: [], components: [], checked_ticks: 0, problem: ''};
   #ticks = Infinity;  // of the run, once it has ended
 
   constructor(run) {
@@ -76,8 +80,13 @@ export class LiveFeed extends EventTarget {
     });
   }
 
-  #tell({run_id: id, state, lost, end_tick: ticks}) {
+  #tell({run_id: id, state, lost, end_tick: ticks, status}) {
     if (id !== this.run.meta.run.run_id) return location.reload();  // another run is served here
+    if (status) {
+      Object.assign(this.status, {problem: ''}, status);
+      this.dispatchEvent(new Event('status'));
+      return;
+    }
     this.lost = lost;
     if (state === 'ended') this.#ticks = ticks;
     this.#setState(state);

@@ -10,7 +10,7 @@ import {PanelGrid, TimeView} from './plots.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
-import {tables, verdictBadge} from './table.js';
+import {liveTables, tables, verdictBadge} from './table.js';
 
 const READOUT_PERIOD = 80;  // ms
 
@@ -86,8 +86,9 @@ async function start() {
   const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
   const readout = new Readout(run, phases);
+  const eventPlace = element('div', {}, eventList(events, player));
   document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
-    eventList(events, player), element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
+    eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...KEYS.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
     element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
@@ -96,7 +97,8 @@ async function start() {
     element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: whole run')),
   floatingScene(scene));
   for (const definition of figuresFor(run)) grid.add(definition);
-  document.getElementById('tables').append(...tables(run, overlay));
+  const live = feed && liveTables(run, feed);
+  document.getElementById('tables').append(...(live ? live.elements : tables(run, overlay)));
   await readout.load();
 
   let shown = 0;
@@ -122,7 +124,18 @@ async function start() {
     scene.setRow(player.row);
     update(performance.now());
   });
-  if (feed) showEnd(shared);
+  if (feed) {
+    showEnd(shared);
+    const refreshStatus = () => {
+      live.refresh();
+      shared.events = feed.status.events;
+      eventPlace.replaceChildren(eventList(shared.events, player));
+      bar.refresh();
+      grid.redraw();
+    };
+    feed.addEventListener('status', refreshStatus);
+    refreshStatus();
+  }
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
   window.poise = {run, overlay, player, view, grid, scene, feed};

@@ -319,13 +319,17 @@ export class Panel {
     this.updateCursor();
   }
 
-  /** After a series was added. */
-  async reload() {
-    if (!this.plot) return;
-    await this.#load();
-    this.plot.destroy();
-    this.#create();
-    this.updateCursor();
+  /** A further line. A plot that is being built is built first; one that is not yet will have it. */
+  addLine(line) {
+    this.definition.series.push(line);
+    if (!this.building) return;
+    this.building = this.building.then(async () => {
+      await this.#load();
+      this.plot.destroy();
+      this.#create();
+      this.updateCursor();
+    });
+    this.building.catch((error) => this.fail(error));
   }
 
   async saveCsv() {
@@ -374,6 +378,9 @@ export class PanelGrid {
   }
 
   updateValues() { this.inSight.forEach((p) => p.updateValues()); }
+
+  /** After the events have changed. */
+  redraw() { this.inSight.forEach((p) => p.redraw()); }
 
   /** At the end, or first when it was asked for. */
   add(definition, first = false) {

@@ -29,9 +29,8 @@ export function signalSearch(run, grid) {
     last.element.scrollIntoView({block: 'nearest'});
   };
   const addLine = (signal) => {
-    const {series} = last.definition;
-    series.push({label: signal.name, role: `hue-${series.length}`, name: signal.name, signal});
-    last.reload();
+    if (!grid.panels.includes(last)) return addPlot(signal);  // it was removed meanwhile
+    last.addLine({label: signal.name, role: `hue-${last.definition.series.length}`, name: signal.name, signal});
     close();
   };
   const row = (signal) => element('li', {},

@@ -1,21 +1,13 @@
 // Checks, assumptions, latencies, channels and the run's information.
-import {element, formatNumber, withUnit} from './dom.js';
-
-function table(caption, columns, rows, {numbers = []} = {}) {
-  return element('section', {class: 'table'}, element('h2', {}, caption),
-    element('div', {class: 'scroll'}, element('table', {},
-      element('thead', {}, element('tr', {}, ...columns.map((c, i) =>
-        element('th', {scope: 'col', class: numbers.includes(i) ? 'number' : null}, c)))),
-      element('tbody', {}, ...rows.map((row) => element('tr', {}, ...row.map((cell, i) =>
-        element('td', {class: numbers.includes(i) ? 'number' : null}, cell))))))));
-}
+import {element, formatNumber, table, withUnit} from './dom.js';
+import {latencyFigure, latencyTable} from './latency.js';
 
 const verdict = (check) => check.limit === null ? ''
   : element('span', {class: check.passed ? 'ok' : 'failed'}, check.passed ? 'ok' : 'FAILED');
 
-export function checkTable(run, overlay) {
+function checkTable(run, overlay, caption = 'Checks') {
   const other = new Map((overlay?.meta.run.checks ?? []).map((c) => [`${c.name}|${c.label}`, c]));
-  return table('Checks', ['what', 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
+  return table(caption, ['what', 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
     run.meta.run.checks.map((c) => [c.label || c.name, c.measured === null ? 'none' : withUnit(c.measured, c.unit),
       ...(overlay ? [secondValue(other.get(`${c.name}|${c.label}`))] : []), c.limit ?? '', c.paper ?? '', verdict(c)]),
     {numbers: overlay ? [1, 2] : [1]});
@@ -27,30 +19,6 @@ function assumptionTable(run) {
   const {assumptions} = run.meta.run;
   return assumptions.length === 0 ? '' : table('Not given by the paper', ['field', 'value', 'kind', 'reason'],
     assumptions.map((a) => [element('code', {}, a.field), element('code', {}, a.value), a.kind, a.reason]));
-}
-
-/** Bars of median, 99th percentile and largest, on one logarithmic scale. */
-function latencyTable(run) {
-  const {components} = run.meta.run;
-  if (components.length === 0) return '';
-  const largest = Math.max(1, ...components.map((c) => c.latency_us.max));
-  const width = (us) => `${100 * Math.log10(1 + us) / Math.log10(1 + largest)}%`;
-  const bar = ({median, p99, max}) => {
-    const parts = [['max', max], ['p99', p99], ['median', median]].map(([name, us]) => {
-      const part = element('span', {class: `bar ${name}`, title: `${name}: ${formatNumber(us)} µs`});
-      part.style.width = width(us);
-      return part;
-    });
-    return element('div', {class: 'bars'}, ...parts);
-  };
-  const result = table('Latency of each component (last input of a stage to its outputs sent) and its counters',
-    ['component', 'median, p99, largest (log scale)', 'median (µs)', 'p99 (µs)', 'largest (µs)', 'ticks', 'received', 'refused',
-      'duplicates', 'dropped', 'gaps', 'resends', 'publish errors'],
-    components.map((c) => [c.name, bar(c.latency_us),
-      ...[c.latency_us.median, c.latency_us.p99, c.latency_us.max].map((v) => formatNumber(v, 3)),
-      ...['ticks', 'received', 'refused', 'duplicates', 'dropped', 'gaps', 'resends', 'publish_errors']
-        .map((key) => formatNumber(c[key]))]), {numbers: [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]});
-  return result;
 }
 
 const channelTable = (run) => table('Channels in the log',
@@ -76,11 +44,32 @@ function information(run, title) {
       element('pre', {}, run.meta.scenario_text)));
 }
 
-/** All tables below the plots; a live run's checks and counters are those of its report. */
+/** All tables below the plots. */
 export function tables(run, overlay) {
-  if (run.meta.live) return [assumptionTable(run), information(run, 'This run')].filter(Boolean);
-  return [checkTable(run, overlay), assumptionTable(run), latencyTable(run), channelTable(run),
-    information(run, 'This run'), overlay ? information(overlay, 'The second run') : ''].filter(Boolean);
+  const {components} = run.meta.run;
+  return [checkTable(run, overlay), assumptionTable(run), latencyFigure(components), latencyTable(components),
+    channelTable(run), information(run, 'This run'),
+    overlay ? information(overlay, 'The second run') : ''].filter(Boolean);
+}
+
+/** Those of a run in progress; `refresh()` brings what the feed has told since. Channels are counted by its report. */
+export function liveTables(run, feed) {
+  const checks = element('div', {}), latencies = element('div', {});
+  return {
+    elements: [checks, assumptionTable(run), latencies, information(run, 'This run')].filter(Boolean),
+    refresh: () => {
+      const {checks: found, components, checked_ticks: ticks, problem} = feed.status;
+      run.meta.run.checks = found;
+      if (problem) {
+        checks.replaceChildren(element('p', {class: 'failed', role: 'status'},
+          `checks and events cannot be told: ${problem}`));
+        return;
+      }
+      checks.replaceChildren(...(found.length ? [checkTable(run, undefined,
+        `Checks of the first ${formatNumber(ticks * run.period)} s; what they say may change until the run's end`)] : []));
+      latencies.replaceChildren(...[latencyFigure(components), latencyTable(components)].filter(Boolean));
+    },
+  };
 }
 
 /** "31 of 31 checks hold" with the failed ones. */

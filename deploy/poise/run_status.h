@@ -1,0 +1,43 @@
+// What the log of a run in progress says so far, for its page.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "deploy/poise/scenario.pb.h"
+
+namespace poise {
+
+/// {"checks", "events", "components", "checked_ticks"} of the log as it is, as in summary.json.
+/// What only a run's end decides (its duration, its log being whole) is left out. Throws LogError
+/// or RobotError.
+nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario);
+
+/// Reads the log again and again on a thread of its own, which takes a tenth of one core at most; a
+/// log that has become too large is left as it was read last.
+class RunStatus {
+ public:
+  RunStatus(std::string log, Scenario scenario);
+  /// Waits for a reading under way.
+  ~RunStatus();
+
+  /// The newest that has not been taken.
+  std::optional<nlohmann::ordered_json> Take();
+
+ private:
+  void Run();
+
+  const std::string log_;
+  const Scenario scenario_;
+  std::mutex mutex_;
+  std::condition_variable stop_;
+  bool stopped_ = false;
+  std::optional<nlohmann::ordered_json> newest_;
+  std::thread thread_;
+};
+
+}  // namespace poise
