@@ -88,11 +88,12 @@ class EchoOutput {
   int64_t shown() const { return shown_; }
   size_t pending() const { return text_.size(); }
 
-  /// Throws when stdout takes no more for another reason than that its reader has gone.
+  /// Throws when stdout takes no more for another reason than that its reader has gone, or that a
+  /// signal has ended the wait for it.
   void Write() {
     if (!closed_ && (std::fwrite(text_.data(), 1, text_.size(), stdout) != text_.size() ||
                      std::fflush(stdout) != 0)) {
-      if (errno != EPIPE) {
+      if (errno != EPIPE && !(errno == EINTR && StopSignal() != 0)) {
         throw std::runtime_error(fmt::format("stdout: {}", std::strerror(errno)));
       }
       closed_ = true;
@@ -149,7 +150,7 @@ int EchoLive(const EchoOptions& options) {
   LiveRun live(options.run, fmt::format("poise echo {} --log", options.channel));
   EchoOutput output(options);
   CheckLive(live, options, output);
-  CatchStopSignals();
+  CatchStopSignals(/*interrupt=*/true);
   int64_t last_arrival = NowNanoseconds();
   int64_t newest = -1;
   int64_t missed = 0;

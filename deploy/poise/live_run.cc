@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kBatch = 4096;                     // packets before the caller's turn
+constexpr int64_t kMaxTick = int64_t{1} << 52;   // exact as a double, and ever so long
 constexpr std::chrono::milliseconds kPause{20};  // while a run writes its first files
 constexpr std::chrono::milliseconds kPatience{5'000};
 
@@ -94,7 +95,8 @@ LiveRun::LiveRun(const std::string& run, std::string_view log_command)
     lanes_.emplace(channel.name(), Lane{i, type,
                                         PacketFilter(type->fingerprint,
                                                      static_cast<int>(type->encoded_size(counts)),
-                                                     counts, spec_.run_id())});
+                                                     counts, spec_.run_id()),
+                                        channel.external()});
   }
   for (const ComponentInstance& instance : spec_.graph().component()) {
     health_channels_.push_back(HealthChannel(instance.name()));
@@ -120,7 +122,12 @@ LiveMessage LiveRun::Identify(const BusReceiver::Packet& packet) {
     return message;
   }
   const PacketFilter& filter = lane->second.filter;
-  if (filter.Check(packet.data, packet.size, INT64_MIN, INT64_MAX) != PacketVerdict::kAccepted) {
+  const bool external = lane->second.external;
+  const int64_t last_tick = external                ? INT64_MAX
+                            : spec_.num_ticks() > 0 ? spec_.num_ticks() - 1
+                                                    : kMaxTick;
+  if (filter.Check(packet.data, packet.size, external ? INT64_MIN : 0, last_tick) !=
+      PacketVerdict::kAccepted) {
     ++refused_;
     return message;
   }

@@ -46,7 +46,8 @@ class LiveRun {
 
   /// Waits up to `timeout_ms`, then hands out what has arrived, one batch at most.
   void Spin(int timeout_ms, const std::function<void(const LiveMessage&)>& handle);
-  /// Packets that failed a check: not of this run, unknown channel, wrong type, size or counts.
+  /// Packets that failed a check: not of this run, unknown channel, wrong type, size or counts, a
+  /// tick that the run cannot have.
   int64_t refused() const;
 
  private:
@@ -54,6 +55,7 @@ class LiveRun {
     int index;
     const MessageType* type;
     PacketFilter filter;
+    bool external;
   };
 
   /// Its type stays nullptr when the packet is refused (and counted).

@@ -16,10 +16,10 @@ void OnSignal(int signal) {
 
 }  // namespace
 
-void CatchStopSignals() {
+void CatchStopSignals(bool interrupt) {
   struct sigaction action {};
   action.sa_handler = OnSignal;
-  action.sa_flags = SA_RESTART;
+  action.sa_flags = interrupt ? 0 : SA_RESTART;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 

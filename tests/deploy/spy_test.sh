@@ -88,4 +88,24 @@ ticks "$work/played.lcm" ROBOT_STATE >"$work/played_ticks"
 [ "$(wc -l <"$work/played_ticks")" -gt 100 ] || fail "lcm-logplayer sent too little"
 if grep -Fvxf "$work/logger_ticks" "$work/played_ticks"; then fail "lcm-logplayer sent what was not in the log"; fi
 echo "lcm-logplayer: $(wc -l <"$work/played_ticks") ticks"
-rm -r "$run" "$work"/*.lcm "$work"/*_ticks
+# A run inside one process is played at LCM's own URL, where its tools listen without options and deploy/spy looks.
+"$poise" run "$source_dir/tests/graph/data/stand.pbtxt" --inline --quiet --out "$work/inline" >"$work/inline.txt"
+(unset LCM_DEFAULT_URL; exec lcm-logger "$work/inline.lcm" >"$work/inline_logger.txt" 2>&1) &
+listener=$!
+started+=("$listener")
+wait_for listening 7667
+"$poise" replay "$work/inline" --to-bus
+sleep 0.5 # for the last messages to be written
+kill "$listener"
+wait "$listener" || true
+ticks "$work/inline" ROBOT_STATE >"$work/inline_ticks"
+ticks "$work/inline.lcm" ROBOT_STATE | sort -u >"$work/heard_ticks"
+[ "$(wc -l <"$work/heard_ticks")" -gt 100 ] || fail "poise replay --to-bus sent too little"
+if grep -Fvxf "$work/inline_ticks" "$work/heard_ticks"; then fail "poise replay --to-bus sent what was not in the log"; fi
+echo "poise replay --to-bus: $(wc -l <"$work/heard_ticks") ticks"
+spy_says() { env -u DISPLAY "$source_dir/deploy/spy" "$@" 2>&1 || true; }
+spy_says "$work/inline" | grep -qF 'udpm://239.255.76.67:7667?ttl=0' || fail "deploy/spy looks elsewhere for such a run"
+spy_says "$run" | grep -qF "$url" || fail "deploy/spy looks elsewhere for a run with a network"
+spy_says --url "$url" | grep -qF "$url" || fail "deploy/spy --url looks elsewhere"
+spy_says --url nowhere | grep -q 'is no URL' || fail "deploy/spy takes any URL"
+rm -r "$run" "$work/inline" "$work"/*.lcm "$work"/*_ticks

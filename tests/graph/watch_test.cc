@@ -1,7 +1,11 @@
 // Watching a run in progress from the terminal: it is shown as it is, and not disturbed.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -76,13 +80,13 @@ TEST_F(WatchTest, TopShowsEveryProcessAndChannel) {
   const logging::RunRecord record = End();
   for (const auto& [name, health] : record.health) {
     const std::vector<std::string> row = Row(top.output, name);
-    ASSERT_EQ(row.size(), 13u) << name << " in\n" << top.output;
+    ASSERT_EQ(row.size(), 14u) << name << " in\n" << top.output;
     EXPECT_EQ(row[1], "running");
     // A moment of this run, which its last report may still be.
     EXPECT_GT(std::stoll(row[2]), 0);
     EXPECT_LE(std::stoll(row[2]), health.tick);
     EXPECT_GT(std::stod(row[3]), 0);
-    EXPECT_EQ(row[9], "0");  // refused
+    EXPECT_EQ(row[10], "0");  // refused
   }
   for (const Channel& channel : record.spec.graph().channel()) {
     const std::vector<std::string> row = Row(top.output, channel.name());
@@ -183,6 +187,32 @@ TEST(WatchEndedRunTest, AnEndedRunIsReadFromItsLog) {
     expected += "tick=" + std::to_string(10 * i) + " utime=" + std::to_string(20'000 * i) + "\n";
   }
   EXPECT_EQ(thin.output, expected);
+}
+
+TEST_F(WatchTest, CtrlCEndsEchoWhoseReaderDoesNotRead) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  const pid_t echo = fork();
+  if (echo == 0) {
+    dup2(ends[1], STDOUT_FILENO);
+    execl(POISE_BIN_DIR "/poise", "poise", "echo", "GROUND_TRUTH", "--run", run.c_str(), nullptr);
+    _exit(127);
+  }
+  // Full: it waits inside its write.
+  const auto full = [&] {
+    pollfd end{ends[1], POLLOUT, 0};
+    return poll(&end, 1, 0) == 0;
+  };
+  EXPECT_TRUE(WaitUntil(full));
+  int status = 0;
+  const auto ended = [&] {
+    kill(echo, SIGINT);
+    return waitpid(echo, &status, WNOHANG) == echo;
+  };
+  EXPECT_TRUE(WaitUntil(ended));
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  for (const int end : ends) close(end);
 }
 
 TEST(WatchEndedRunTest, AReaderThatGoesAwayEndsEchoQuietly) {
