@@ -54,6 +54,15 @@ void AddRunCommand(CLI::App* app, Command* command) {
       ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
       ->needs(realtime)
       ->excludes(in_process);
+  run->add_option("--priority", options->changes.priority,
+                  "of the bridge under SCHED_FIFO, where the system grants it (default 40); 0: the "
+                  "ordinary scheduler")
+      ->check(CLI::Range(0, 98))
+      ->needs(realtime);
+  run->add_option("--cpu", options->changes.cpu,
+                  "that the controller is pinned to under SCHED_FIFO; default: the last one")
+      ->check(CLI::Range(0, 1023))
+      ->needs(realtime);
   run->add_option("--kill-seed", options->launch.kill_seed,
                   "of the moments and processes of --kill")
       ->capture_default_str();

@@ -121,6 +121,8 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   AddResource(&spec, "robot", loaded.robot_file);
   AddResource(&spec, "urdf", fs::path(loaded.robot_file).parent_path() / robot.urdf());
   spec.set_realtime(changes.realtime);
+  if (changes.priority) spec.mutable_realtime_options()->set_priority(*changes.priority);
+  if (changes.cpu) spec.mutable_realtime_options()->set_cpu(*changes.cpu);
   spec.set_drop_rate(changes.drop_rate);
   spec.set_poise_version(PoiseVersion());
   spec.add_library_version("lcm " POISE_LCM_VERSION);

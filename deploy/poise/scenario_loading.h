@@ -25,6 +25,8 @@ struct RunChanges {
   std::optional<uint64_t> seed;
   double drop_rate = 0;
   bool realtime = false;
+  std::optional<int> priority;  ///< SCHED_FIFO, in real time; 0: the ordinary scheduler
+  std::optional<int> cpu;       ///< that the controller is pinned to in real time
   std::string drives;  ///< "ethercat"; empty: the simulated robot's own
   std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
   std::string capture;  ///< file for all EtherCAT frames; empty: none
