@@ -21,6 +21,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/robot/dynamics.h"
+#include "components/state_estimator/base_sensors.h"
 #include "components/state_estimator/low_pass.h"
 #include "components/state_estimator/sole_kinematics.h"
 
@@ -36,14 +37,6 @@ struct BaseEstimatorConfig {
   double foot_rotation_tolerance = 0.003;  ///< rad
   double light_load = 0.05;                ///< share of the weight
   double full_load = 0.2;
-};
-
-/// Readings of one instant. Views: nothing is copied.
-struct BaseSensors {
-  Eigen::Map<const Eigen::VectorXd> joint_position;  ///< rad
-  Eigen::Vector3d angular_velocity;                  ///< rad/s, IMU frame
-  Eigen::Vector3d acceleration;                      ///< m/s², IMU frame, specific force
-  std::array<double, 2> foot_load;  ///< N, upward force on the sole (−F_z), right first
 };
 
 class BaseEstimator {

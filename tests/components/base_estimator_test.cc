@@ -23,22 +23,9 @@ std::string Dyros() {
 // Rotated joint frames, tilted soles, arms, and the IMU above a waist joint.
 std::string Mantis() { return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt"; }
 
-// 0 before `start`, 1 after `end`, no jump of acceleration between.
-double Ramp(double t, double start, double end) {
-  const double s = std::clamp((t - start) / (end - start), 0.0, 1.0);
-  return s * s * s * (10 - 15 * s + 6 * s * s);
-}
-
 struct Errors {
   double position = 0, velocity = 0, tilt = 0, yaw = 0, joint_velocity = 0;
 };
-
-// Angle between the estimated and the true vertical.
-double TiltError(const Quaterniond& estimate, const Quaterniond& truth) {
-  const Vector3d a = estimate.conjugate() * Vector3d::UnitZ(),
-                 b = truth.conjugate() * Vector3d::UnitZ();
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 class Follow {
  public:
@@ -80,25 +67,6 @@ class Follow {
   BaseMotion& motion_;
   BaseEstimator estimator_;
 };
-
-// Sway, bob and turn of the body above standing feet, gently begun.
-void Sway(BaseMotion* motion, double amplitude) {
-  const Vector3d p = motion->start().base_position;
-  const Quaterniond q = motion->start().base_orientation;
-  motion->script().base_position = [=](double t) -> Vector3d {
-    const double a = amplitude * Ramp(t, 0, 1);
-    return p + a * Vector3d(std::sin(kTwoPi * 0.4 * t), std::cos(kTwoPi * 0.3 * t),
-                            -0.5 - 0.5 * std::cos(kTwoPi * 0.5 * t));
-  };
-  motion->script().base_orientation = [=](double t) {
-    const double a = 3 * amplitude * Ramp(t, 0, 1);
-    return q * AngleAxisd(a * std::sin(kTwoPi * 0.35 * t), Vector3d::UnitX()) *
-           AngleAxisd(a * std::cos(kTwoPi * 0.45 * t), Vector3d(0, 0.8, 0.6));
-  };
-  motion->script().other_joints = [=](double t) {
-    return 5 * amplitude * Ramp(t, 0, 1) * std::sin(kTwoPi * 0.4 * t);
-  };
-}
 
 // What the bounds are made of.
 constexpr double kLag =
@@ -239,26 +207,6 @@ INSTANTIATE_TEST_SUITE_P(Robots, AnyRobot, testing::Values(Dyros(), Mantis()),
                          [](const auto& test) {
                            return test.param == Dyros() ? "Dyros" : "Mantis";
                          });
-
-// The robot shifts its weight to the right foot, puts the left foot forward and up, and loads it.
-void StepUp(BaseMotion* motion) {
-  const Vector3d p = motion->start().base_position;
-  MotionScript& script = motion->script();
-  script.base_position = [=](double t) -> Vector3d {
-    return p + Vector3d(0.05 * Ramp(t, 3, 4.5), -0.08 * Ramp(t, 0, 1) + 0.10 * Ramp(t, 3, 4.5), 0);
-  };
-  const Eigen::Isometry3d start = script.foot[1](0);
-  script.foot[1] = [=](double t) {
-    Eigen::Isometry3d foot = start;
-    foot.translation().x() += 0.10 * Ramp(t, 1.7, 2.3);
-    foot.translation().z() += 0.10 * Ramp(t, 1.5, 2) - 0.05 * Ramp(t, 2.1, 2.6);
-    return foot;
-  };
-  script.load[1] = [=](double t) {
-    return 0.5 * (1 - Ramp(t, 0.2, 1.2)) + 0.8 * Ramp(t, 2.7, 3.5);
-  };
-  script.load[0] = [load = script.load[1]](double t) { return 1 - load(t); };
-}
 
 TEST(BaseEstimator, AStepUpKeepsTheBaseContinuousAndAnchorsTheFootWhereItLands) {
   BaseMotion motion(Dyros());

@@ -1,6 +1,7 @@
 #include "tests/components/base_motion.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -11,11 +12,14 @@
 namespace poise {
 namespace {
 
+using Eigen::AngleAxisd;
 using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+
+constexpr double kTwoPi = 2 * std::numbers::pi;
 
 Vector3d RotationVector(const Matrix3d& rotation) {
   const Eigen::AngleAxisd difference(rotation);
@@ -174,6 +178,54 @@ BaseSensors BaseMotion::sensors() {
               errors_.load_noise * normal(random_);
   }
   return {{reading_.data(), reading_.size()}, gyro, accelerometer, load};
+}
+
+double Ramp(double t, double start, double end) {
+  const double s = std::clamp((t - start) / (end - start), 0.0, 1.0);
+  return s * s * s * (10 - 15 * s + 6 * s * s);
+}
+
+void Sway(BaseMotion* motion, double amplitude) {
+  const Vector3d p = motion->start().base_position;
+  const Quaterniond q = motion->start().base_orientation;
+  motion->script().base_position = [=](double t) -> Vector3d {
+    const double a = amplitude * Ramp(t, 0, 1);
+    return p + a * Vector3d(std::sin(kTwoPi * 0.4 * t), std::cos(kTwoPi * 0.3 * t),
+                            -0.5 - 0.5 * std::cos(kTwoPi * 0.5 * t));
+  };
+  motion->script().base_orientation = [=](double t) {
+    const double a = 3 * amplitude * Ramp(t, 0, 1);
+    return q * AngleAxisd(a * std::sin(kTwoPi * 0.35 * t), Vector3d::UnitX()) *
+           AngleAxisd(a * std::cos(kTwoPi * 0.45 * t), Vector3d(0, 0.8, 0.6));
+  };
+  motion->script().other_joints = [=](double t) {
+    return 5 * amplitude * Ramp(t, 0, 1) * std::sin(kTwoPi * 0.4 * t);
+  };
+}
+
+void StepUp(BaseMotion* motion) {
+  const Vector3d p = motion->start().base_position;
+  MotionScript& script = motion->script();
+  script.base_position = [=](double t) -> Vector3d {
+    return p + Vector3d(0.05 * Ramp(t, 3, 4.5), -0.08 * Ramp(t, 0, 1) + 0.10 * Ramp(t, 3, 4.5), 0);
+  };
+  const Isometry3d start = script.foot[1](0);
+  script.foot[1] = [=](double t) {
+    Eigen::Isometry3d foot = start;
+    foot.translation().x() += 0.10 * Ramp(t, 1.7, 2.3);
+    foot.translation().z() += 0.10 * Ramp(t, 1.5, 2) - 0.05 * Ramp(t, 2.1, 2.6);
+    return foot;
+  };
+  script.load[1] = [=](double t) {
+    return 0.5 * (1 - Ramp(t, 0.2, 1.2)) + 0.8 * Ramp(t, 2.7, 3.5);
+  };
+  script.load[0] = [load = script.load[1]](double t) { return 1 - load(t); };
+}
+
+double TiltError(const Quaterniond& estimate, const Quaterniond& truth) {
+  const Vector3d a = estimate.conjugate() * Vector3d::UnitZ(),
+                 b = truth.conjugate() * Vector3d::UnitZ();
+  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 }  // namespace poise

@@ -79,4 +79,16 @@ class BaseMotion {
   Eigen::VectorXd reading_;
 };
 
+/// 0 before `start`, 1 after `end`, no jump of acceleration between.
+double Ramp(double t, double start, double end);
+
+/// Sway, bob and turn of the body above standing feet, gently begun; `amplitude` m.
+void Sway(BaseMotion* motion, double amplitude);
+
+/// The robot shifts its weight to the right foot, puts the left foot forward and up, and loads it.
+void StepUp(BaseMotion* motion);
+
+/// rad, angle between the estimated and the true vertical.
+double TiltError(const Eigen::Quaterniond& estimate, const Eigen::Quaterniond& truth);
+
 }  // namespace poise

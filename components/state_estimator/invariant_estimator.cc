@@ -1,0 +1,429 @@
+#include "components/state_estimator/invariant_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace poise {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kLongestStep = 1;     // s: what lies further back is not extrapolated
+constexpr double kMaxJointRate = 100;  // rad/s: no joint is faster
+constexpr double kMaxTorque = 1e4;     // N·m: no motor gives more
+// Beyond the ranges of the IMUs that robots carry (2000 deg/s, 16 g) a reading is a fault; the last
+// good one then stands in for it with this uncertainty.
+constexpr double kGyroRange = 35, kGyroFault = 10;                     // rad/s
+constexpr double kAccelerometerRange = 160, kAccelerometerFault = 50;  // m/s²
+// An encoder of unknown resolution.
+constexpr double kUnknownEncoder = 1e-5;  // rad
+// Standing still at first, as far as feet and IMU can move against each other unseen.
+constexpr double kStartSpeed = 0.01;  // m/s
+// s, in which the ringing of a gear dies away: rotor and link of a tenth of a kg·m² on a harmonic
+// drive, damped by a twentieth of critical.
+constexpr double kRinging = 0.03;
+// A foot that has not come to rest for this long with no other to stand on is the world.
+constexpr double kLongestSlip = 0.5;  // s
+// Beyond these nothing is known of the base: in flight, or on a hoist, for minutes.
+constexpr double kLostTilt = 0.5, kLostSpeed = 10;  // rad, m/s, standard deviations
+constexpr double kRecoverTilt = 0.1, kRecoverSpeed = 1, kRecoverPosition = 1;
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+InvariantEstimator::InvariantEstimator(std::shared_ptr<const robot::RobotModel> model,
+                                       const InvariantEstimatorConfig& config, double period)
+    : model_(std::move(model)),
+      config_(config),
+      period_(period),
+      weight_(model_->total_mass() * robot::kGravity),
+      encoder_noise_(model_->num_joints()),
+      torque_(Eigen::VectorXd::Zero(model_->num_joints())),
+      unrest_(Eigen::VectorXd::Zero(model_->num_joints())),
+      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff),
+      kinematics_(model_),
+      filter_(robot::kGravity),
+      joint_position_(Eigen::VectorXd::Zero(model_->num_joints())),
+      link_position_(Eigen::VectorXd::Zero(model_->num_joints())),
+      joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
+      state_(model_->num_joints()) {
+  const robot::ImuModel& imu = model_->imu();
+  config_.gyro_noise = std::max(config.gyro_noise, imu.gyro_noise);
+  config_.accelerometer_noise = std::max(config.accelerometer_noise, imu.accelerometer_noise);
+  config_.gyro_bias = std::max(config.gyro_bias, imu.gyro_bias);
+  config_.accelerometer_bias = std::max(config.accelerometer_bias, imu.accelerometer_bias);
+  for (int j = 0; j < model_->num_joints(); ++j) {
+    const robot::MotorModel& motor = model_->motors()[static_cast<size_t>(j)];
+    const double counts = motor.gear_ratio * motor.encoder_counts;
+    const double rounding =
+        counts > 0 ? 2 * std::numbers::pi / counts / std::sqrt(12.0) : kUnknownEncoder;
+    encoder_noise_[j] = rounding;
+  }
+}
+
+void InvariantEstimator::Update(const BaseSensors& sensors, double dt) {
+  dt = std::clamp(dt, 0.1 * period_, std::max(kLongestStep, period_));
+  ReadJoints(sensors, dt);
+  ReadImu(sensors);
+  kinematics_.Update(link_position_, velocity_filter_.value());
+  if (!placed_) {
+    Place(sensors);
+    placed_ = true;
+  } else {
+    Propagate(dt);
+    UpdateContacts(sensors);
+    Correct(dt);
+  }
+  Publish();
+  last_gyro_ = gyro_;
+  last_force_ = force_;
+  last_imu_good_ = imu_good_;
+}
+
+void InvariantEstimator::ReadJoints(const BaseSensors& sensors, double dt) {
+  if (placed_) {
+    joint_rate_ = ((sensors.joint_position - joint_position_) / dt)
+                      .cwiseMin(kMaxJointRate)
+                      .cwiseMax(-kMaxJointRate);
+    velocity_filter_.Step(joint_rate_, dt);
+  }
+  joint_position_ = sensors.joint_position;
+  link_position_ = sensors.joint_position;
+  if (!(config_.gear_stiffness > 0) || sensors.joint_torque.size() != torque_.size()) return;
+  // What has just changed of the torque first moves the rotor, and then rings.
+  unrest_ *= std::exp(-dt / kRinging);
+  for (int j = 0; j < torque_.size(); ++j) {
+    const double torque = std::clamp(sensors.joint_torque[j], -kMaxTorque, kMaxTorque);
+    if (placed_) unrest_[j] = std::max(unrest_[j], std::abs(torque - torque_[j]));
+    torque_[j] = torque;
+    link_position_[j] -= torque / config_.gear_stiffness;
+  }
+}
+
+void InvariantEstimator::ReadImu(const BaseSensors& sensors) {
+  const auto within = [](const Vector3d& v, double range) {
+    return v.cwiseAbs().maxCoeff() <= range;  // false for what is not a number
+  };
+  imu_good_ = within(sensors.angular_velocity, kGyroRange) &&
+              within(sensors.acceleration, kAccelerometerRange);
+  if (imu_good_) {
+    gyro_ = sensors.angular_velocity;
+    force_ = sensors.acceleration;
+  }
+}
+
+// Encoders' and gears' errors through the joints, and the timing of the readings through the
+// motion.
+void InvariantEstimator::ReadSoles() {
+  const Matrix3d base = filter_.state().rotation * kinematics_.imu_rotation().transpose();
+  for (size_t f = 0; f < 2; ++f) {
+    const Sole& sole = kinematics_.sole(f);
+    SoleReading& reading = feet_[f].reading;
+    reading.position =
+        kinematics_.imu_rotation().transpose() * (sole.position - kinematics_.imu_position());
+    reading.rotation = kinematics_.imu_rotation().transpose() * sole.rotation;
+    Eigen::Matrix<double, 6, 6> noise = Eigen::Matrix<double, 6, 6>::Zero();
+    robot::Vector6d motion = robot::Vector6d::Zero();
+    for (const int j : kinematics_.joints(f)) {
+      const robot::Vector6d column = kinematics_.RelativeColumn(f, j);
+      double variance = Square(encoder_noise_[j]);
+      if (config_.gear_stiffness > 0) variance += Square(unrest_[j] / config_.gear_stiffness);
+      noise.noalias() += variance * column * column.transpose();
+      motion += velocity_filter_.value()[j] * column;
+    }
+    noise.noalias() += Square(config_.timing) * motion * motion.transpose();
+    for (int row = 0; row < 6; row += 3) {
+      for (int column = 0; column < 6; column += 3) {
+        reading.noise.block<3, 3>(row, column) =
+            base * noise.block<3, 3>(row, column) * base.transpose();
+      }
+    }
+  }
+}
+
+void InvariantEstimator::Place(const BaseSensors& sensors) {
+  const FootWeights weights =
+      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+  const Placement placement = PlaceOnGround(kinematics_, weights);
+  InvariantState state;
+  state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
+  state.position = placement.position + placement.orientation * kinematics_.imu_position();
+  // What is not known of the tilt turns the robot about its soles, at the origin: in ξ the errors
+  // of tilt and position are then independent.
+  InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
+  deviation.segment<3>(InvariantFilter::kRotation) << config_.start_tilt, config_.start_tilt,
+      config_.start_yaw;
+  deviation.segment<3>(InvariantFilter::kVelocity).setConstant(kStartSpeed);
+  deviation.segment<3>(InvariantFilter::kPosition).setConstant(config_.start_position);
+  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
+  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
+  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+  UpdateContacts(sensors);
+  for (Foot& foot : feet_) foot.slip_left = foot.turn_left = 0;  // at rest
+}
+
+void InvariantEstimator::Propagate(double dt) {
+  const Vector3d turn = gyro_ - last_gyro_, push = force_ - last_force_;
+  ImuStep imu;
+  imu.angular_velocity = 0.5 * (last_gyro_ + gyro_);
+  imu.acceleration = 0.5 * (last_force_ + force_);
+  // A step at an unknown instant between two readings: uniform over their difference.
+  imu.angular_velocity_noise =
+      Square(config_.gyro_noise) * Matrix3d::Identity() + turn * turn.transpose() / 12;
+  imu.acceleration_noise =
+      Square(config_.accelerometer_noise) * Matrix3d::Identity() + push * push.transpose() / 12;
+  if (!imu_good_ || !last_imu_good_) {
+    imu.angular_velocity_noise += Square(kGyroFault) * Matrix3d::Identity();
+    imu.acceleration_noise += Square(kAccelerometerFault) * Matrix3d::Identity();
+  }
+  imu.gyro_bias_walk = config_.gyro_bias_walk;
+  imu.accelerometer_bias_walk = config_.accelerometer_bias_walk;
+  filter_.Propagate(imu, dt);
+
+  const InvariantFilter::Covariance& c = filter_.covariance();
+  const bool finite =
+      filter_.state().position.allFinite() && filter_.state().velocity.allFinite() && c.allFinite();
+  const auto worst = [&](int row) { return c.diagonal().segment<3>(row).maxCoeff(); };
+  if (!finite || worst(InvariantFilter::kRotation) > Square(kLostTilt) ||
+      worst(InvariantFilter::kVelocity) > Square(kLostSpeed)) {
+    Recover(finite);
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    const Foot& foot = feet_[f];
+    filter_.Loosen(
+        static_cast<int>(f),
+        foot.slip_left > 0 ? Square(config_.slip_speed * dt) : Square(config_.contact_walk) * dt,
+        foot.turn_left > 0 ? Square(config_.turn_speed * dt) : Square(config_.turn_walk) * dt);
+  }
+}
+
+// Starts the filter again where it is, as one that knows little.
+void InvariantEstimator::Recover(bool finite) {
+  InvariantState state = filter_.state();
+  if (!finite) state = InvariantState();
+  state.velocity.setZero();
+  InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
+  deviation.segment<3>(InvariantFilter::kRotation).setConstant(kRecoverTilt);
+  deviation.segment<3>(InvariantFilter::kVelocity).setConstant(kRecoverSpeed);
+  deviation.segment<3>(InvariantFilter::kPosition).setConstant(kRecoverPosition);
+  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
+  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
+  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+}
+
+void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
+  const FootWeights weights =
+      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+  ReadSoles();
+  for (size_t f = 0; f < 2; ++f) {
+    Foot& foot = feet_[f];
+    const int i = static_cast<int>(f);
+    foot_weight_[f] = weights.standing * weights.share[f];
+    foot.loaded = foot.loaded ? weights.grip[f] > 0 : weights.grip[f] >= 1;
+    if (!foot.loaded) {
+      filter_.ReleasePosition(i);
+      filter_.ReleaseRotation(i);
+      foot.slip_left = foot.turn_left = 0;
+      foot.innovation = 0;
+      continue;
+    }
+    if (!filter_.holds_position(i)) {
+      filter_.HoldPosition(i, foot.reading);
+      LetSlip(f);  // it has yet to settle
+    }
+    const robot::FootModel& model = model_->feet()[f];
+    const double inside = std::min(0.5 * model.length - std::abs(sensors.foot_cop[f].x()),
+                                   0.5 * model.width - std::abs(sensors.foot_cop[f].y()));
+    if (filter_.holds_rotation(i)) {
+      if (!(inside > 0.5 * config_.cop_margin)) filter_.ReleaseRotation(i);
+    } else if (inside > config_.cop_margin) {
+      filter_.HoldRotation(i, foot.reading);
+      LetTurn(f);
+    }
+  }
+}
+
+void InvariantEstimator::LetSlip(size_t foot) {
+  feet_[foot].slip_left = config_.rest_time;
+  feet_[foot].slip_time = 0;
+  feet_[foot].slip_start = SeenPosition(foot);
+}
+
+void InvariantEstimator::LetTurn(size_t foot) {
+  feet_[foot].turn_left = config_.rest_time;
+  feet_[foot].turn_start = SeenRotation(foot);
+}
+
+Vector3d InvariantEstimator::SeenPosition(size_t foot) const {
+  return filter_.state().position + filter_.state().rotation * feet_[foot].reading.position;
+}
+
+Matrix3d InvariantEstimator::SeenRotation(size_t foot) const {
+  return filter_.state().rotation * feet_[foot].reading.rotation;
+}
+
+void InvariantEstimator::Correct(double dt) {
+  // How far each foot is off, if it stands still. One that slips may be off.
+  std::array<bool, 2> moved{};
+  int firm = 0;
+  for (size_t f = 0; f < 2; ++f) {
+    Foot& foot = feet_[f];
+    if (!foot.loaded) continue;
+    const InvariantFilter::Innovation test = filter_.Test(static_cast<int>(f), foot.reading);
+    foot.innovation = test.position;
+    moved[f] = (foot.slip_left <= 0 && test.position > config_.gate) ||
+               (foot.turn_left <= 0 && test.rotation > config_.gate);
+    firm += foot.slip_left <= 0 ? 1 : 0;
+  }
+  // Feet that stand still first: they tell whether the others do.
+  for (const bool after : {false, true}) {
+    for (size_t f = 0; f < 2; ++f) {
+      Foot& foot = feet_[f];
+      const int i = static_cast<int>(f);
+      if (!foot.loaded || moved[f] != after) continue;
+      if (moved[f]) {
+        const InvariantFilter::Innovation test = filter_.Test(i, foot.reading);
+        if (foot.slip_left <= 0 && test.position > config_.gate) {
+          LetSlip(f);
+          filter_.Loosen(i, Square(config_.slip_speed * dt), 0);
+        }
+        if (foot.turn_left <= 0 && test.rotation > config_.gate) {
+          LetTurn(f);
+          filter_.Loosen(i, 0, Square(config_.turn_speed * dt));
+        }
+      }
+      filter_.Correct(i, foot.reading);
+    }
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    if (feet_[f].loaded) ComeToRest(f, firm > 0, dt);
+  }
+}
+
+// A sole has come to rest when it has hardly moved for rest_time.
+void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
+  Foot& foot = feet_[f];
+  if (foot.slip_left > 0) {
+    foot.slip_left -= dt;
+    foot.slip_time += dt;
+    if (foot.slip_left <= 0) {
+      // It may be the base that moves, by as much as is not known of its velocity.
+      const double way = (SeenPosition(f) - foot.slip_start).norm();
+      const double speed =
+          std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
+      if (!other_stands && foot.slip_time > kLongestSlip) {
+        // Then it is the world, and the base's velocity is what is wrong.
+        filter_.Doubt(0, Square(way / config_.rest_time), 0);
+      } else if (way > config_.rest_distance + 3 * speed * config_.rest_time) {
+        foot.slip_left = config_.rest_time;
+        foot.slip_start = SeenPosition(f);
+      }
+    }
+  }
+  if (foot.turn_left > 0) {
+    foot.turn_left -= dt;
+    const double turn = RotationLog(SeenRotation(f) * foot.turn_start.transpose()).norm();
+    if (foot.turn_left <= 0 && turn > config_.rest_turn) LetTurn(f);
+  }
+}
+
+void InvariantEstimator::Publish() {
+  const InvariantState& s = filter_.state();
+  const double d = config_.sensor_delay;
+  const Matrix3d to_base = kinematics_.imu_rotation();
+  const Matrix3d base = s.rotation * to_base.transpose();
+  const Vector3d rate =
+      base * (to_base * (gyro_ - s.gyro_bias) - kinematics_.imu_angular_velocity());
+  const Vector3d lever = base * kinematics_.imu_position();  // from the base to the IMU
+  const Vector3d velocity = s.velocity - rate.cross(lever) - base * kinematics_.imu_velocity();
+  const Vector3d position = s.position - lever;
+  const Vector3d force = s.rotation * (force_ - s.accelerometer_bias);
+  const Vector3d acceleration = force - robot::kGravity * Vector3d::UnitZ();
+
+  const Matrix3d turned = Gamma(d * rate).zero * base;
+  state_.base_orientation = Quaterniond(turned).normalized();
+  state_.base_angular_velocity = rate;
+  state_.base_linear_velocity = velocity + d * acceleration;
+  state_.base_position = position + d * velocity + 0.5 * d * d * acceleration;
+
+  state_.joint_velocity = velocity_filter_.value();
+  state_.joint_position = joint_position_ + d * state_.joint_velocity;
+
+  // Errors of (orientation, velocity, position) by those of ξ's rotation, velocity, position and of
+  // both biases.
+  Eigen::Matrix<double, 9, 15> jacobian = Eigen::Matrix<double, 9, 15>::Zero();
+  const Matrix3d& r = s.rotation;
+  jacobian.block<3, 3>(0, 0).setIdentity();
+  jacobian.block<3, 3>(0, 9) = -d * r;
+  jacobian.block<3, 3>(3, 0) = -Skew(velocity + d * force);
+  jacobian.block<3, 3>(3, 3).setIdentity();
+  jacobian.block<3, 3>(3, 9) = -Skew(lever) * r;
+  jacobian.block<3, 3>(3, 12) = -d * r;
+  jacobian.block<3, 3>(6, 0) = -Skew(position + d * velocity + 0.5 * d * d * force);
+  jacobian.block<3, 3>(6, 3) = d * Matrix3d::Identity();
+  jacobian.block<3, 3>(6, 6).setIdentity();
+  jacobian.block<3, 3>(6, 9) = -d * Skew(lever) * r;
+  jacobian.block<3, 3>(6, 12) = -0.5 * d * d * r;
+  const InvariantFilter::Covariance& p = filter_.covariance();
+  Eigen::Matrix<double, 15, 15> errors;
+  errors.topLeftCorner<9, 9>() = p.topLeftCorner<9, 9>();
+  errors.topRightCorner<9, 6>() = p.block<9, 6>(0, InvariantFilter::kGyroBias);
+  errors.bottomLeftCorner<6, 9>() = p.block<6, 9>(InvariantFilter::kGyroBias, 0);
+  errors.bottomRightCorner<6, 6>() =
+      p.block<6, 6>(InvariantFilter::kGyroBias, InvariantFilter::kGyroBias);
+  base_covariance_.noalias() = jacobian * errors * jacobian.transpose();
+
+  // The gyro's noise at the lever, and what may happen during the delay: a step like that between
+  // the last two readings at an unknown instant of it.
+  const Vector3d turn = r * (gyro_ - last_gyro_), push = r * (force_ - last_force_);
+  const bool fault = !imu_good_;
+  const double gyro_variance = Square(config_.gyro_noise) + (fault ? Square(kGyroFault) : 0);
+  const double force_variance =
+      Square(config_.accelerometer_noise) + (fault ? Square(kAccelerometerFault) : 0);
+  Eigen::Matrix<double, 9, 3> spread = Eigen::Matrix<double, 9, 3>::Zero();
+  spread.middleRows<3>(0) = d * Matrix3d::Identity();
+  spread.middleRows<3>(3) = Skew(lever);
+  base_covariance_.noalias() += gyro_variance * spread * spread.transpose();
+  if (placed_ && d > 0) {
+    Eigen::Matrix<double, 9, 1> step;
+    step << d * turn, d * push, 0.5 * d * d * push;
+    base_covariance_.noalias() += step * step.transpose() / 3;
+    base_covariance_.block<3, 3>(3, 3) += d * d * force_variance * Matrix3d::Identity();
+  }
+  // Of what instant the readings are.
+  Eigen::Matrix<double, 9, 1> motion;
+  motion << rate, acceleration, velocity;
+  base_covariance_.noalias() += Square(config_.timing) * motion * motion.transpose();
+}
+
+FootContact InvariantEstimator::contact(int foot) const {
+  const Foot& f = feet_[static_cast<size_t>(foot)];
+  if (!f.loaded) return FootContact::kNone;
+  return f.slip_left > 0 ? FootContact::kSlipping : FootContact::kFirm;
+}
+
+Isometry3d InvariantEstimator::foot_pose(int foot) const {
+  const auto f = static_cast<size_t>(foot);
+  Isometry3d pose = Isometry3d::Identity();
+  pose.translation() = filter_.holds_position(foot) ? filter_.state().foot[f] : SeenPosition(f);
+  pose.linear() = filter_.holds_rotation(foot) ? filter_.state().foot_rotation[f] : SeenRotation(f);
+  return pose;
+}
+
+void InvariantEstimator::Archive(StateArchive* archive) {
+  velocity_filter_.Archive(archive);
+  filter_.Archive(archive);
+  archive->Show(joint_position_, torque_, unrest_, gyro_, last_gyro_, force_, last_force_,
+                imu_good_, last_imu_good_, placed_);
+  for (Foot& foot : feet_) {
+    archive->Show(foot.loaded, foot.slip_left, foot.slip_time, foot.turn_left, foot.slip_start,
+                  foot.turn_start);
+  }
+}
+
+}  // namespace poise

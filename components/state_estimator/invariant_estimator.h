@@ -1,0 +1,118 @@
+// InvariantEstimator: position, orientation and velocity of the floating base, with their
+// covariance, by an InvariantFilter of the IMU and the soles that stand.
+//
+// Measured load with hysteresis decides which soles stand, the centre of pressure whether a sole
+// stands flat (its rotation is then a measurement, too), the innovation whether it stands still: a
+// sole that slips, sinks or turns is let loose until it has come to rest. Joints are read at the
+// motors: the gears' windup under the measured torque is taken out, friction's part of it remains
+// as a walk of the soles. The readings are sensor_delay old; what is published is predicted to the
+// present.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "components/framework/state_archive.h"
+#include "components/state_estimator/base_sensors.h"
+#include "components/state_estimator/invariant_filter.h"
+#include "components/state_estimator/low_pass.h"
+#include "components/state_estimator/sole_kinematics.h"
+
+namespace poise {
+
+/// SI units; noises are standard deviations per sample, walks per √s.
+struct InvariantEstimatorConfig {
+  double joint_velocity_cutoff = 20;
+  double light_load = 0.05, full_load = 0.2;
+  double sensor_delay = 0, timing = 0.0005, gear_stiffness = 0;
+  double gyro_noise = 1e-4, accelerometer_noise = 1e-2;
+  double gyro_bias = 1e-3, accelerometer_bias = 0.1;
+  double gyro_bias_walk = 1e-6, accelerometer_bias_walk = 1e-4;
+  double start_position = 5e-5, start_tilt = 5e-4, start_yaw = 5e-5;
+  double contact_walk = 2e-5, turn_walk = 2e-5;
+  double slip_speed = 0.3, turn_speed = 1;
+  double cop_margin = 0.02;
+  double gate = 25, rest_time = 0.05, rest_distance = 1e-4, rest_turn = 2e-4;
+};
+
+enum class FootContact : int8_t { kNone, kFirm, kSlipping };
+
+class InvariantEstimator {
+ public:
+  /// Of (estimate − truth) of base orientation, linear velocity, position, world axes.
+  using BaseCovariance = Eigen::Matrix<double, 9, 9>;
+
+  /// `period` s, nominal, > 0: steps are taken to last from a tenth of it to 1 s.
+  InvariantEstimator(std::shared_ptr<const robot::RobotModel> model,
+                     const InvariantEstimatorConfig& config, double period);
+
+  /// Takes the next readings, `dt` s after the last. The first call places the robot as
+  /// PlaceOnGround says, at rest. Any finite input gives a finite state. Allocates nothing.
+  void Update(const BaseSensors& sensors, double dt);
+
+  void Archive(StateArchive* archive);
+
+  /// Base and joints, predicted by sensor_delay; joint velocities filtered.
+  const robot::RobotState& state() const { return state_; }
+  const BaseCovariance& covariance() const { return base_covariance_; }
+  const InvariantFilter& filter() const { return filter_; }
+  /// Share of each foot in what stands, 0..1, as BaseEstimator weighs its anchors.
+  const std::array<double, 2>& foot_weight() const { return foot_weight_; }
+  FootContact contact(int foot) const;
+  /// Squared normalised innovation of the sole's position before the correction; 0 out of contact.
+  double innovation(int foot) const { return feet_[static_cast<size_t>(foot)].innovation; }
+  /// The sole in the world.
+  Eigen::Isometry3d foot_pose(int foot) const;
+
+ private:
+  struct Foot {
+    bool loaded = false;
+    double slip_left = 0, turn_left = 0;  // s, until it may stand still again; 0: it does
+    double slip_time = 0;                 // s, since it began to slip
+    Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();  // where the present rest_time began
+    Eigen::Matrix3d turn_start = Eigen::Matrix3d::Identity();
+    double innovation = 0;
+    SoleReading reading;  // of this step
+  };
+
+  void ReadJoints(const BaseSensors& sensors, double dt);
+  void ReadImu(const BaseSensors& sensors);
+  void ReadSoles();
+  void Place(const BaseSensors& sensors);
+  void Propagate(double dt);
+  void Recover(bool finite);
+  void UpdateContacts(const BaseSensors& sensors);
+  void Correct(double dt);
+  void LetSlip(size_t foot);
+  void LetTurn(size_t foot);
+  void ComeToRest(size_t foot, bool other_stands, double dt);
+  /// The sole in the world as base and joints show it.
+  Eigen::Vector3d SeenPosition(size_t foot) const;
+  Eigen::Matrix3d SeenRotation(size_t foot) const;
+  void Publish();
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  InvariantEstimatorConfig config_;
+  double period_;
+  double weight_;                    // N, of the robot
+  Eigen::VectorXd encoder_noise_;    // rad, standard deviation by joint
+  Eigen::VectorXd torque_, unrest_;  // N·m, read, and what of it the gears do not yet carry
+  LowPass velocity_filter_;
+  SoleKinematics kinematics_;
+  InvariantFilter filter_;
+  Eigen::VectorXd joint_position_, link_position_, joint_rate_;  // rad, rad, rad/s, read
+  robot::RobotState state_;
+  BaseCovariance base_covariance_ = BaseCovariance::Zero();
+  std::array<Foot, 2> feet_;
+  std::array<double, 2> foot_weight_{};
+  // Readings of this step and of the one before: rad/s, m/s², IMU frame.
+  Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero(), last_gyro_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force_ = Eigen::Vector3d::Zero(), last_force_ = Eigen::Vector3d::Zero();
+  bool imu_good_ = true, last_imu_good_ = true;
+  bool placed_ = false;
+};
+
+}  // namespace poise

@@ -1,0 +1,56 @@
+// Closed forms of the rotation group and of SE_K(3): a rotation with K vectors that it turns.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace poise {
+
+/// v^×: Skew(v) w = v × w.
+inline Eigen::Matrix3d Skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// Γ_m(φ) = Σ_n (φ^×)ⁿ / (n + m)!, (Hartley et al. 2020, appendix): Γ_0 is the rotation about φ by
+/// |φ|, Γ_1 the left Jacobian, and with a rate φ = ω t Γ_1 and Γ_2 integrate it once and twice.
+/// Below 0.05 rad by series, to rounding.
+struct Gamma {
+  Eigen::Matrix3d zero, one, two;
+
+  explicit Gamma(const Eigen::Vector3d& rotation) {
+    const double x2 = rotation.squaredNorm(), x = std::sqrt(x2);
+    // (1 − cos x)/x², sin x/x, (x − sin x)/x³, (x² + 2 cos x − 2)/(2 x⁴)
+    double cosine, sine, third, fourth;
+    if (x < 0.05) {
+      cosine = 0.5 - x2 * (1.0 / 24 - x2 * (1.0 / 720 - x2 / 40320));
+      sine = 1 - x2 * (1.0 / 6 - x2 * (1.0 / 120 - x2 / 5040));
+      third = 1.0 / 6 - x2 * (1.0 / 120 - x2 * (1.0 / 5040 - x2 / 362880));
+      fourth = 1.0 / 24 - x2 * (1.0 / 720 - x2 * (1.0 / 40320 - x2 / 3628800));
+    } else {
+      cosine = (1 - std::cos(x)) / x2;
+      sine = std::sin(x) / x;
+      third = (x - std::sin(x)) / (x2 * x);
+      fourth = (x2 + 2 * std::cos(x) - 2) / (2 * x2 * x2);
+    }
+    const Eigen::Matrix3d s = Skew(rotation), s2 = s * s;
+    zero = Eigen::Matrix3d::Identity() + sine * s + cosine * s2;
+    one = Eigen::Matrix3d::Identity() + cosine * s + third * s2;
+    two = 0.5 * Eigen::Matrix3d::Identity() + third * s + fourth * s2;
+  }
+};
+
+/// Rotation vector of a rotation, of length up to π.
+inline Eigen::Vector3d RotationLog(const Eigen::Matrix3d& rotation) {
+  Eigen::Quaterniond q(rotation);
+  if (q.w() < 0) q.coeffs() = -q.coeffs();
+  const double sine = q.vec().norm();
+  // 2 atan2(s, w) / s, which tends to 2.
+  const double scale = sine > 1e-10 ? 2 * std::atan2(sine, q.w()) / sine : 2.0;
+  return scale * q.vec();
+}
+
+}  // namespace poise

@@ -1,0 +1,405 @@
+#include "components/state_estimator/invariant_estimator.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "tests/components/base_motion.h"
+
+namespace poise {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Isometry3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kPeriod = BaseMotion::kPeriod;
+
+std::string Dyros() {
+  return std::string(POISE_SOURCE_DIR) + "/deploy/robots/dyros/dyros_legs.pbtxt";
+}
+// Rotated joint frames, tilted soles, arms, and the IMU above a waist joint.
+std::string Mantis() { return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt"; }
+
+class Follow {
+ public:
+  explicit Follow(BaseMotion* motion, const InvariantEstimatorConfig& config = {})
+      : motion_(*motion), estimator_(motion->model(), config, kPeriod) {}
+
+  void Step() {
+    motion_.Next();
+    estimator_.Update(motion_.sensors(), kPeriod);
+  }
+  void RunTo(double time) {
+    while (motion_.time() < time - 1e-9) Step();
+  }
+  Eigen::Matrix<double, 9, 1> Error() const {
+    const robot::RobotState &estimate = estimator_.state(), &truth = motion_.truth();
+    Eigen::Matrix<double, 9, 1> error;
+    error << RotationLog(
+        (estimate.base_orientation * truth.base_orientation.conjugate()).toRotationMatrix()),
+        estimate.base_linear_velocity - truth.base_linear_velocity,
+        estimate.base_position - truth.base_position;
+    return error;
+  }
+  double Nees() const { return Error().dot(estimator_.covariance().ldlt().solve(Error())); }
+  const InvariantEstimator& estimator() const { return estimator_; }
+
+ private:
+  BaseMotion& motion_;
+  InvariantEstimator estimator_;
+};
+
+class AnyInvariantRobot : public testing::TestWithParam<std::string> {};
+
+INSTANTIATE_TEST_SUITE_P(Robots, AnyInvariantRobot, testing::Values(Dyros(), Mantis()),
+                         [](const auto& test) {
+                           return test.param == Dyros() ? "Dyros" : "Mantis";
+                         });
+
+// Readings without errors: what remains is the second order of integration and, on Mantis, whose
+// IMU turns with the waist, the lag of the joint velocities.
+TEST_P(AnyInvariantRobot, FollowsExactReadings) {
+  BaseMotion motion(GetParam());
+  Sway(&motion, 0.02);
+  Follow follow(&motion);
+  const bool waist = GetParam() == Mantis();
+  while (motion.time() < 10) {
+    follow.Step();
+    const auto error = follow.Error();
+    ASSERT_LT(error.head<3>().norm(), 2e-5) << motion.time();
+    ASSERT_LT(error.segment<3>(3).norm(), waist ? 6e-3 : 5e-4) << motion.time();
+    ASSERT_LT(error.tail<3>().norm(), 1e-4) << motion.time();
+    for (int foot = 0; foot < 2; ++foot) {
+      ASSERT_EQ(follow.estimator().contact(foot), FootContact::kFirm) << motion.time();
+    }
+  }
+}
+
+// Noise, biases and rounding of the robot's file; the loads' noise.
+TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
+  BaseMotion motion(GetParam());
+  Sway(&motion, 0.02);
+  SensorErrors& errors = motion.errors();
+  errors = TypicalErrors(*motion.model());
+  // Mantis has no noise of its own.
+  errors.gyro_noise = 2e-4;
+  errors.gyro_bias = Vector3d(2e-4, -1e-4, 3e-4);
+  errors.accelerometer_noise = 1.7e-2;
+  errors.accelerometer_bias = 0.1 * Vector3d(1, -1, 1) / std::sqrt(3.0);
+  errors.load_noise = 1;
+  InvariantEstimatorConfig config;
+  config.gyro_noise = 2e-4;
+  config.accelerometer_noise = 1.7e-2;
+  Follow follow(&motion, config);
+  const bool waist = GetParam() == Mantis();
+  while (motion.time() < 20) {
+    follow.Step();
+    const auto error = follow.Error();
+    ASSERT_LT(error.head<2>().norm(), 1e-3) << motion.time();
+    ASSERT_LT(error.segment<3>(3).norm(), waist ? 0.02 : 5e-3) << motion.time();
+    ASSERT_LT(error.tail<3>().norm(), 1.5e-3) << motion.time();
+  }
+  EXPECT_LT((follow.estimator().filter().state().gyro_bias - errors.gyro_bias).norm(), 5e-5);
+}
+
+TEST(InvariantEstimator, AStepUpIsFollowedAndTheFootAnchoredWhereItLands) {
+  BaseMotion motion(Dyros());
+  StepUp(&motion);
+  motion.errors() = TypicalErrors(*motion.model());
+  Follow follow(&motion);
+  while (motion.time() < 8) {
+    follow.Step();
+    const double t = motion.time();
+    ASSERT_LT(follow.Error().tail<3>().norm(), 2e-3) << t;
+    if (t > 1.3 && t < 2.7) {
+      ASSERT_EQ(follow.estimator().contact(1), FootContact::kNone) << t;
+    }
+    ASSERT_EQ(follow.estimator().contact(0), FootContact::kFirm) << t;
+  }
+  EXPECT_EQ(follow.estimator().contact(1), FootContact::kFirm);
+  const Isometry3d landed = motion.script().foot[1](8);
+  EXPECT_GT(landed.translation().z(), 0.0499);
+  EXPECT_LT((follow.estimator().foot_pose(1).translation() - landed.translation()).norm(), 2e-3);
+}
+
+// One foot slides, sinks or turns while both carry the same; the other and the IMU tell.
+struct MotionOfAFoot {
+  const char* name;
+  Vector3d way, turn;
+};
+class MovingFoot : public testing::TestWithParam<MotionOfAFoot> {};
+
+TEST_P(MovingFoot, IsFoundAndLeavesTheBaseAlone) {
+  BaseMotion motion(Dyros());
+  motion.errors() = TypicalErrors(*motion.model());
+  const Isometry3d start = motion.script().foot[1](0);
+  motion.script().foot[1] = [=](double t) {
+    const double s = Ramp(t, 1, 1.5);
+    Isometry3d foot = start;
+    foot.translation() += s * GetParam().way;
+    foot.linear() = Gamma(s * GetParam().turn).zero * start.linear();
+    return foot;
+  };
+  Follow follow(&motion);
+  follow.RunTo(1);
+  const auto before = follow.Error();
+  double slipping = 0;
+  while (motion.time() < 2) {
+    follow.Step();
+    const bool slips = follow.estimator().contact(1) == FootContact::kSlipping;
+    slipping += slips ? kPeriod : 0;
+    ASSERT_EQ(follow.estimator().contact(0), FootContact::kFirm) << motion.time();
+  }
+  const auto moved = follow.Error() - before;
+  EXPECT_LT(moved.tail<3>().norm(), 1e-3);
+  EXPECT_LT(moved.head<3>().norm(), 1e-3);
+  EXPECT_EQ(follow.estimator().contact(1), FootContact::kFirm);  // at rest again
+  const Isometry3d end = motion.script().foot[1](2);
+  EXPECT_LT((follow.estimator().foot_pose(1).translation() - end.translation()).norm(), 1.5e-3);
+  EXPECT_LT(RotationLog(follow.estimator().foot_pose(1).linear() * end.linear().transpose()).norm(),
+            2e-3);
+  if (GetParam().way.norm() > 0) {
+    EXPECT_GT(slipping, 0.25);
+    EXPECT_LT(slipping, 0.7);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Motions, MovingFoot,
+    testing::Values(MotionOfAFoot{"Slides", Vector3d(0.03, 0, 0), Vector3d::Zero()},
+                    MotionOfAFoot{"Sinks", Vector3d(0, 0, -0.02), Vector3d(0.03, 0, 0)},
+                    MotionOfAFoot{"Turns", Vector3d::Zero(), Vector3d(0, 0, 0.1)}),
+    [](const auto& test) { return test.param.name; });
+
+TEST(InvariantEstimator, AStandingFootIsSeldomTakenForASlippingOne) {
+  BaseMotion motion(Dyros());
+  Sway(&motion, 0.02);
+  motion.errors() = TypicalErrors(*motion.model());
+  Follow follow(&motion);
+  int slipping = 0;
+  double innovation = 0;
+  for (int i = 0; i < 10000; ++i) {
+    follow.Step();
+    for (int foot = 0; foot < 2; ++foot) {
+      slipping += follow.estimator().contact(foot) == FootContact::kSlipping ? 1 : 0;
+      innovation += follow.estimator().innovation(foot);
+    }
+  }
+  EXPECT_EQ(slipping, 0);
+  // Chi-squared with 3 degrees of freedom has a mean of 3; the noise taken is never less than what
+  // there is.
+  EXPECT_GT(innovation / 20000, 0.1);
+  EXPECT_LT(innovation / 20000, 3.3);
+}
+
+// Rocking on its edge, the sole's rotation says nothing.
+TEST(InvariantEstimator, ASoleOnItsEdgeDoesNotTurnTheBase) {
+  BaseMotion motion(Dyros());
+  const Isometry3d start = motion.script().foot[1](0);
+  const double half_width = motion.model()->feet()[1].width / 2;
+  // About the inner edge, which stays where it is.
+  motion.script().foot[1] = [=](double t) -> Isometry3d {
+    const Eigen::Translation3d edge(0, -half_width, 0);
+    return start * edge * AngleAxisd(0.04 * Ramp(t, 0.5, 1), Vector3d::UnitX()) * edge.inverse();
+  };
+  Follow follow(&motion);
+  double worst = 0;
+  for (int i = 0; i < 1000; ++i) {
+    motion.Next();
+    BaseSensors sensors = motion.sensors();
+    if (motion.time() > 0.48) sensors.foot_cop[1].y() = -half_width;
+    InvariantEstimator& estimator = const_cast<InvariantEstimator&>(follow.estimator());
+    estimator.Update(sensors, kPeriod);
+    worst = std::max(worst, follow.Error().head<3>().norm());
+    if (motion.time() > 0.5) {
+      ASSERT_FALSE(estimator.filter().holds_rotation(1));
+    }
+  }
+  EXPECT_LT(worst, 5e-4);
+  EXPECT_LT(follow.Error().tail<3>().norm(), 1e-3);
+}
+
+// The gears between motors and links wind up under load; the encoders sit at the motors.
+TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
+  constexpr double kStiffness = 2e4;
+  for (const bool known : {false, true}) {
+    BaseMotion motion(Dyros());
+    const int n = motion.model()->num_joints();
+    InvariantEstimatorConfig config;
+    config.gear_stiffness = known ? kStiffness : 0;
+    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    Eigen::VectorXd torque(n), reading(n);
+    for (int j = 0; j < n; ++j) torque[j] = 40 * std::sin(1 + j);
+    motion.Next();
+    BaseSensors sensors = motion.sensors();
+    reading = sensors.joint_position + torque / kStiffness;
+    const BaseSensors wound = {{reading.data(), n}, sensors.angular_velocity, sensors.acceleration,
+                               sensors.foot_load,   sensors.foot_cop,         {torque.data(), n}};
+    estimator.Update(wound, kPeriod);
+    const double off = (estimator.state().base_position - motion.truth().base_position).norm();
+    if (known) {
+      EXPECT_LT(off, 1e-9);
+    } else {
+      EXPECT_GT(off, 2e-4);
+    }
+  }
+}
+
+// Readings of one cycle ago; the base moves at 0.2 m/s and turns.
+TEST(InvariantEstimator, TheDelayOfTheReadingsIsPredicted) {
+  constexpr int kDelay = 5;
+  for (const bool known : {false, true}) {
+    BaseMotion motion(Dyros());
+    Sway(&motion, 0.03);
+    BaseMotion late(Dyros());
+    Sway(&late, 0.03);
+    InvariantEstimatorConfig config;
+    config.sensor_delay = known ? kDelay * kPeriod : 0;
+    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    double worst_position = 0, worst_turn = 0;
+    for (int i = 0; i < 2000; ++i) {
+      motion.Next();
+      if (i < kDelay) continue;
+      late.Next();
+      estimator.Update(late.sensors(), kPeriod);
+      const robot::RobotState& found = estimator.state();
+      worst_position =
+          std::max(worst_position, (found.base_position - motion.truth().base_position).norm());
+      worst_turn = std::max(
+          worst_turn, found.base_orientation.angularDistance(motion.truth().base_orientation));
+    }
+    if (known) {
+      EXPECT_LT(worst_position, 1.5e-4);
+      EXPECT_LT(worst_turn, 1e-4);
+    } else {
+      EXPECT_GT(worst_position, 5e-4);
+      EXPECT_GT(worst_turn, 1e-3);
+    }
+  }
+}
+
+// Thrown up, no load on the feet: only the IMU knows, and the covariance says so.
+TEST(InvariantEstimator, FlightIntegratesTheImuAndTheCovarianceGrows) {
+  BaseMotion motion(Dyros());
+  const Vector3d p = motion.start().base_position - Vector3d(0, 0, 0.06);
+  const auto shift = [](double t) -> Vector3d {
+    const double push = std::clamp(t - 0.2, 0.0, 0.2), fly = std::max(t - 0.4, 0.0);
+    const Vector3d a(1, 0.5, 2);
+    return a * (0.5 * push * push + 0.2 * fly) -
+           0.5 * robot::kGravity * fly * fly * Vector3d::UnitZ();
+  };
+  motion.script().base_position = [=](double t) -> Vector3d { return p + shift(t); };
+  for (size_t f = 0; f < 2; ++f) {
+    const Isometry3d start = motion.script().foot[f](0);
+    motion.script().foot[f] = [=](double t) {
+      return Eigen::Translation3d(shift(std::max(t, 0.4)) - shift(0.4)) * start;
+    };
+    motion.script().load[f] = [](double t) { return t < 0.4 ? 0.5 : 0.0; };
+  }
+  motion.errors() = TypicalErrors(*motion.model());
+  Follow follow(&motion);
+  follow.RunTo(0.42);
+  const double known = follow.estimator().covariance()(3, 3);
+  follow.RunTo(0.8);
+  EXPECT_EQ(follow.estimator().contact(0), FootContact::kNone);
+  EXPECT_LT(follow.Error().segment<3>(3).norm(), 0.05);
+  EXPECT_LT(follow.Error().tail<3>().norm(), 0.02);
+  EXPECT_GT(follow.estimator().covariance()(3, 3), 4 * known);
+}
+
+// Any finite input gives a finite state, and what cannot be an IMU's reading is left out.
+TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
+  BaseMotion motion(Mantis());
+  const int n = motion.model()->num_joints();
+  std::mt19937_64 random(3);
+  const auto garbage = [&]() -> double {
+    switch (random() % 6) {
+      case 0:
+        return std::numeric_limits<double>::max();
+      case 1:
+        return -std::numeric_limits<double>::max();
+      case 2:
+        return std::numeric_limits<double>::denorm_min();
+      case 3:
+        return 0;
+      default:
+        return std::uniform_real_distribution<double>(-10, 10)(random);
+    }
+  };
+  InvariantEstimatorConfig config;
+  config.gear_stiffness = 7e4;
+  config.sensor_delay = 0.002;
+  for (int run = 0; run < 60; ++run) {
+    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    Eigen::VectorXd q(n), torque(n);
+    for (int i = 0; i < 200; ++i) {
+      for (int j = 0; j < n; ++j) {
+        q[j] = garbage();
+        torque[j] = garbage();
+      }
+      const BaseSensors sensors = {
+          {q.data(), n},
+          Vector3d(garbage(), garbage(), garbage()),
+          Vector3d(garbage(), garbage(), garbage()),
+          {garbage(), garbage()},
+          {Eigen::Vector2d(garbage(), garbage()), Eigen::Vector2d(garbage(), garbage())},
+          {torque.data(), n}};
+      estimator.Update(sensors, garbage());
+      const robot::RobotState& s = estimator.state();
+      ASSERT_TRUE(s.base_position.allFinite() && s.base_linear_velocity.allFinite() &&
+                  s.base_angular_velocity.allFinite() && s.joint_velocity.allFinite() &&
+                  s.joint_position.allFinite() && estimator.covariance().allFinite())
+          << run << " " << i;
+      ASSERT_NEAR(s.base_orientation.norm(), 1, 1e-12) << run << " " << i;
+      for (int f = 0; f < 2; ++f) {
+        ASSERT_TRUE(estimator.foot_pose(f).matrix().allFinite());
+        ASSERT_TRUE(std::isfinite(estimator.innovation(f)));
+      }
+    }
+  }
+}
+
+TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
+  BaseMotion motion(Dyros());
+  Sway(&motion, 0.01);
+  InvariantEstimator estimator(motion.model(), {}, kPeriod);
+  double worst_after = 0;
+  for (int i = 0; i < 3000; ++i) {
+    motion.Next();
+    BaseSensors sensors = motion.sensors();
+    if (i >= 500 && i < 505) {
+      sensors.angular_velocity.setConstant(1e300);
+      sensors.acceleration.setConstant(-1e300);
+    }
+    estimator.Update(sensors, kPeriod);
+    if (i < 600) continue;
+    worst_after = std::max(worst_after, TiltError(estimator.state().base_orientation,
+                                                  motion.truth().base_orientation));
+  }
+  EXPECT_LT(worst_after, 1e-3);
+}
+
+// On a hoist for a minute, then put down: it begins again and finds its velocity.
+TEST(InvariantEstimator, ComesBackAfterAMinuteInTheAir) {
+  BaseMotion motion(Dyros());
+  motion.errors() = TypicalErrors(*motion.model());
+  motion.errors().accelerometer_bias = Vector3d(0.2, -0.1, 0.1);
+  for (auto& load : motion.script().load) {
+    load = [](double t) { return t < 1 || t > 61 ? 0.5 : 0.0; };
+  }
+  Follow follow(&motion);
+  follow.RunTo(60.5);
+  EXPECT_GT(std::sqrt(follow.estimator().covariance()(6, 6)), 0.5);
+  follow.RunTo(64);
+  EXPECT_LT(follow.Error().segment<3>(3).norm(), 5e-3);
+  EXPECT_LT(TiltError(follow.estimator().state().base_orientation, motion.truth().base_orientation),
+            0.05);
+}
+
+}  // namespace
+}  // namespace poise
