@@ -82,7 +82,7 @@ void KillSchedule::Act(int64_t now, int64_t elapsed,
   fault.time = static_cast<double>(elapsed) * 1e-9;
   target.process().Signal(fault.killed ? SIGKILL : SIGSTOP);
   if (!fault.killed) {
-    stopped_ = &target.process();
+    stopped_ = &target;
     continue_at_ = now + kStop;
   }
   faults_.push_back(fault);
@@ -94,7 +94,7 @@ void KillSchedule::Act(int64_t now, int64_t elapsed,
 }
 
 void KillSchedule::Finish() {
-  if (stopped_ != nullptr) stopped_->Signal(SIGCONT);
+  if (stopped_ != nullptr) stopped_->process().Signal(SIGCONT);
   stopped_ = nullptr;
 }
 
@@ -125,8 +125,7 @@ void KillSchedule::Judge(int64_t arrival, int32_t command_age) {
   }
   if (fresh_in_a_row_++ == 0) regained_at_ = arrival;
   // A stopped process may have had work in hand that was just done: only what follows counts.
-  const bool over = fault.killed || stopped_ == nullptr;
-  if (over && fresh_in_a_row_ >= kFreshCycles) {
+  if (stopped_ == nullptr && fresh_in_a_row_ >= kFreshCycles) {
     fault.regained = fault.cycles == 0 ? 0 : static_cast<double>(regained_at_ - fault_at_) * 1e-9;
     fault_at_ = 0;
   }

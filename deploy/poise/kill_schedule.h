@@ -50,7 +50,7 @@ class KillSchedule {
   BusReceiver receiver_;
   std::vector<InjectedFault> faults_;
   int64_t next_ = 0;  // ns since the start
-  ChildProcess* stopped_ = nullptr;
+  ComponentProcess* stopped_ = nullptr;
   int64_t continue_at_ = 0;  // ns
   int64_t fault_at_ = 0;     // ns; 0: no fault is being measured
   int64_t regained_at_ = 0;  // ns; 0: not yet

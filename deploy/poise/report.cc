@@ -233,15 +233,14 @@ std::string FormatProcesses(const RunOutcome& outcome) {
        "skipped ticks", "replaced", "scheduling", "memory MB", "grown by kB"}};
   for (const ProcessReport& process : outcome.processes) {
     const health_t& h = process.health;
-    std::string scheduling = (h.scheduling & health_t::SCHEDULING_FIFO) != 0 ? "FIFO" : "ordinary";
-    if ((h.scheduling & health_t::SCHEDULING_PINNED) != 0) scheduling += ", pinned";
-    if ((h.scheduling & health_t::SCHEDULING_MEMORY_LOCKED) != 0) scheduling += ", locked";
+    const std::vector<std::string> granted = SchedulingNames(h.scheduling);
     const bool measured = process.resident_first > 0;
     rows.push_back(
         {h.component, fmt::format("{}", h.ticks_completed), FormatNumber(h.latency_median),
          FormatNumber(h.latency_p99), FormatNumber(h.latency_max),
          fmt::format("{}", h.deadline_misses), FormatNumber(h.lateness_max),
-         fmt::format("{}", h.ticks_skipped), fmt::format("{}", h.restarts), scheduling,
+         fmt::format("{}", h.ticks_skipped), fmt::format("{}", h.restarts),
+         granted.empty() ? "ordinary" : fmt::format("{}", fmt::join(granted, ", ")),
          measured ? FormatNumber(static_cast<double>(process.resident_last) * 1e-6) : "",
          measured ? fmt::format("{}", (process.resident_last - process.resident_first) / 1024)
                   : ""});
