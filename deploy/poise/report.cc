@@ -240,7 +240,7 @@ std::string FormatProcesses(const RunOutcome& outcome) {
          FormatNumber(h.latency_p99), FormatNumber(h.latency_max),
          fmt::format("{}", h.deadline_misses), FormatNumber(h.lateness_max),
          fmt::format("{}", h.ticks_skipped), fmt::format("{}", h.restarts),
-         granted.empty() ? "ordinary" : fmt::format("{}", fmt::join(granted, ", ")),
+         granted.empty() ? "ordinary" : Joined(granted, ", "),
          measured ? FormatNumber(static_cast<double>(process.resident_last) * 1e-6) : "",
          measured ? fmt::format("{}", (process.resident_last - process.resident_first) / 1024)
                   : ""});

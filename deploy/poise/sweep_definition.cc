@@ -13,6 +13,7 @@
 #include "components/framework/suggest.h"
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/run_setup.h"
+#include "deploy/poise/text_table.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
 
@@ -153,12 +154,6 @@ bool ParsesAsScenario(const std::string& file) {
   } catch (const ConfigError&) {
     return false;
   }
-}
-
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 bool IsListed(const std::string& kind, const std::string& name) {
@@ -382,7 +377,7 @@ void SweepDefinition::CheckMaps(const Source& source) const {
       source.Fail({fmt::format("map[{}].value", i),
                    fmt::format("is '{}', which is no column of the table; it is \"stands\" or one "
                                "of {}",
-                               map.value(), Joined(columns_))});
+                               map.value(), Joined(columns_, ", "))});
     }
   }
 }

@@ -56,4 +56,14 @@ std::string CsvCell(const std::string& text) {
   return quoted + '"';
 }
 
+// Not fmt::join, which GCC 12 misreads here.
+std::string Joined(const std::vector<std::string>& parts, std::string_view separator) {
+  std::string text;
+  for (const std::string& part : parts) {
+    if (!text.empty()) text += separator;
+    text += part;
+  }
+  return text;
+}
+
 }  // namespace poise

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace poise {
@@ -9,6 +10,9 @@ namespace poise {
 /// "12.35", "3": at most four digits, or all before the point.
 std::string FormatNumber(double value);
 std::string FormatNumber(double value, const std::string& unit);
+
+/// "a, b, c" of {"a", "b", "c"} and ", ".
+std::string Joined(const std::vector<std::string>& parts, std::string_view separator);
 
 /// The rows in aligned columns, a line below the first one, the heading. All rows have as many
 /// cells as it; UTF-8.

@@ -4,6 +4,7 @@
 
 #include "components/framework/run.h"
 #include "deploy/poise/report.h"
+#include "deploy/poise/text_table.h"
 #include "fmt/format.h"
 #include "logging/events.h"
 #include "logging/printable.h"
@@ -71,12 +72,6 @@ void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& 
                                         : Style::kPlain});
   lines->push_back({fmt::format("{}  refused here: {} packets", MirrorUrl(spec), refused),
                     refused > 0 ? Style::kWarning : Style::kPlain});
-}
-
-std::string Joined(const std::vector<std::string>& parts, const char* separator) {
-  std::string text;
-  for (const std::string& part : parts) text += (text.empty() ? "" : separator) + part;
-  return text;
 }
 
 /// What only real time brings about, where there is any of it.
