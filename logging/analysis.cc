@@ -1,5 +1,6 @@
 #include "logging/analysis.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -154,16 +155,13 @@ double JointTorqueLimit(const RunRecord& run, size_t joint) {
   return std::min(run.robot.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
 }
 
-std::optional<EstimatorError> BaseError(const RunRecord& run, int64_t tick) {
-  const robot_state_t* state = run.state.at(tick);
-  const ground_truth_t* truth = run.truth.at(tick);
-  if (state == nullptr || truth == nullptr) return {};
+EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth) {
   EstimatorError error;
-  error.position = (GetVector3(state->base_position) - GetVector3(truth->base_position)).norm();
+  error.position = (GetVector3(estimate.base_position) - GetVector3(truth.base_position)).norm();
   error.velocity =
-      (GetVector3(state->base_linear_velocity) - GetVector3(truth->base_linear_velocity)).norm();
-  const Eigen::Quaterniond estimated = Rotation(state->base_orientation);
-  const Eigen::Quaterniond actual = Rotation(truth->base_orientation);
+      (GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity)).norm();
+  const Eigen::Quaterniond estimated = Rotation(estimate.base_orientation);
+  const Eigen::Quaterniond actual = Rotation(truth.base_orientation);
   // The world's vertical seen from the base.
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d a = estimated.conjugate() * up;
@@ -172,5 +170,38 @@ std::optional<EstimatorError> BaseError(const RunRecord& run, int64_t tick) {
   error.rotation = estimated.angularDistance(actual);
   return error;
 }
+
+Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
+                                            const ground_truth_t& truth) {
+  Eigen::Quaterniond turn =
+      Rotation(estimate.base_orientation) * Rotation(truth.base_orientation).conjugate();
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+  const Eigen::AngleAxisd rotation(turn);
+  Eigen::Matrix<double, 9, 1> error;
+  error << rotation.angle() * rotation.axis(),
+      GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity),
+      GetVector3(estimate.base_position) - GetVector3(truth.base_position);
+  return error;
+}
+
+Answer Nees(const robot_state_t& estimate, const estimator_status_t& status,
+            const ground_truth_t& truth, NeesPart part) {
+  if (status.has_covariance == 0) return {};
+  Eigen::Matrix<double, 9, 9> covariance;
+  size_t next = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int column = row; column < 9; ++column) {
+      covariance(row, column) = covariance(column, row) = status.covariance[next++];
+    }
+  }
+  const std::vector<int> rows = part == NeesPart::kAll ? std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8}
+                                                       : std::vector<int>{0, 1, 3, 4, 5};
+  const Eigen::VectorXd e = BaseErrorVector(estimate, truth)(rows);
+  const Eigen::LLT<Eigen::MatrixXd> factors(covariance(rows, rows));
+  if (factors.info() != Eigen::Success) return {};
+  return e.dot(factors.solve(e));
+}
+
+double NeesBound(NeesPart part) { return part == NeesPart::kAll ? 16.918978 : 11.070498; }
 
 }  // namespace poise::logging

@@ -65,6 +65,23 @@ struct EstimatorError {
   double tilt = 0;      ///< rad, angle between estimated and true vertical
   double rotation = 0;  ///< rad, whole rotation, heading included
 };
-std::optional<EstimatorError> BaseError(const RunRecord& run, int64_t tick);
+EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth);
+
+/// The same as ESTIMATOR_STATUS orders it: orientation (rotation vector of estimate times truth
+/// inverted, rad), linear velocity (m/s), position (m), world axes.
+Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
+                                            const ground_truth_t& truth);
+
+/// Which errors a normalised estimation error squared (NEES) counts.
+enum class NeesPart {
+  kAll,         ///< 9 degrees of freedom
+  kObservable,  ///< tilt (rotation about x and y) and velocity: 5
+};
+/// eᵀ P⁻¹ e with the covariance that the estimator published: chi-squared distributed when it is
+/// right. Empty without a covariance, or with one that is not positive definite.
+Answer Nees(const robot_state_t& estimate, const estimator_status_t& status,
+            const ground_truth_t& truth, NeesPart part);
+/// The value that chi-squared exceeds with 5 %.
+double NeesBound(NeesPart part);
 
 }  // namespace poise::logging

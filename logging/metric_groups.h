@@ -52,7 +52,8 @@ void AddWrenches(MetricList* list);   ///< section 4: ratio, margins, computed a
 void AddTorques(MetricList* list);    ///< joints and bridge
 void AddDrives(MetricList* list);     ///< what the drives made of the torques, and their bus
 void AddTransitions(MetricList* list);  ///< changes of support and touch-downs
-void AddSensors(MetricList* list);      ///< push and estimator
+void AddSensors(MetricList* list);      ///< push
+void AddEstimator(MetricList* list);    ///< errors of the base's estimate, and their covariance
 void AddLog(MetricList* list);          ///< completeness of the log and of the bus
 
 }  // namespace poise::logging

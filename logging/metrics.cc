@@ -17,6 +17,7 @@ MetricList MakeMetrics() {
   AddDrives(&list);
   AddTransitions(&list);
   AddSensors(&list);
+  AddEstimator(&list);
   AddLog(&list);
   return list;
 }

@@ -15,6 +15,7 @@ struct Metric {
   std::string unit;  ///< empty: a number
   std::string description;
   std::function<Answer(const RunRecord& run)> compute;
+  bool needs_other_estimates = false;  ///< RunRecord::other_estimates
 };
 
 /// All metrics, in the order in which they are listed.

@@ -1,5 +1,4 @@
 #include "components/messages/conversions.h"
-#include "fmt/format.h"
 #include "logging/metric_groups.h"
 
 namespace poise::logging {
@@ -26,36 +25,8 @@ void AddPush(MetricList* list) {
                    }});
 }
 
-void AddEstimator(MetricList* list) {
-  const auto add = [&](const char* name, const char* unit, const char* text,
-                       double EstimatorError::*field, double scale) {
-    const auto value = [field](const RunRecord& run) {
-      return [&run, field](int64_t t) -> Answer {
-        const auto error = BaseError(run, t);
-        if (!error) return {};
-        return (*error).*field;
-      };
-    };
-    list->push_back(
-        {fmt::format("estimator_{}_max", name), unit,
-         fmt::format("estimate less truth of the base's {}, largest", text),
-         [=](const RunRecord& run) { return Scaled(Maximum(run, value(run)), scale); }});
-    list->push_back(
-        {fmt::format("estimator_{}_rms", name), unit,
-         fmt::format("estimate less truth of the base's {}, RMS", text),
-         [=](const RunRecord& run) { return Scaled(RootMeanSquare(run, value(run)), scale); }});
-  };
-  add("position", "mm", "position", &EstimatorError::position, kMilli);
-  add("velocity", "mm/s", "velocity", &EstimatorError::velocity, kMilli);
-  add("tilt", "mrad", "tilt", &EstimatorError::tilt, kMilli);
-  add("rotation", "mrad", "rotation", &EstimatorError::rotation, kMilli);
-}
-
 }  // namespace
 
-void AddSensors(MetricList* list) {
-  AddPush(list);
-  AddEstimator(list);
-}
+void AddSensors(MetricList* list) { AddPush(list); }
 
 }  // namespace poise::logging

@@ -1,6 +1,7 @@
 // A run's log as typed time series.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
+#include "poise/estimator_status_t.hpp"
 #include "poise/external_push_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "poise/health_t.hpp"
@@ -26,6 +28,12 @@
 #include "poise/task_torque_t.hpp"
 
 namespace poise::logging {
+
+/// What a method of the state estimator makes of a run's readings.
+struct Estimates {
+  Series<robot_state_t> state;
+  Series<estimator_status_t> status;
+};
 
 /// All of one run. Of several channels with one type the graph's first is taken.
 struct RunRecord {
@@ -37,6 +45,7 @@ struct RunRecord {
 
   Series<robot_sensors_t> sensors;
   Series<robot_state_t> state;
+  Series<estimator_status_t> estimator;
   Series<task_torque_t> task;
   Series<balance_torque_t> balance;
   Series<joint_command_t> command;
@@ -54,6 +63,9 @@ struct RunRecord {
   /// The run of the scenario's reference variant, for metrics that compare with it; nullptr when
   /// there is none. Not in the log, set by who reads both.
   std::shared_ptr<RunRecord> reference;
+  /// By estimator_status_t::METHOD_*: estimates of the methods that did not run; nullptr for what
+  /// nobody has asked for. Not in the log, set by who can run the estimator.
+  std::array<std::shared_ptr<const Estimates>, 2> other_estimates;
 
   double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
 
@@ -62,6 +74,7 @@ struct RunRecord {
   void VisitSeries(const Visit& visit) {
     visit(&sensors);
     visit(&state);
+    visit(&estimator);
     visit(&task);
     visit(&balance);
     visit(&command);

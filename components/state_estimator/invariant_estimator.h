@@ -23,7 +23,7 @@
 
 namespace poise {
 
-/// SI units; noises are standard deviations per sample, walks per √s.
+/// See InvariantEkfConfig in state_estimator.proto for what each means.
 struct InvariantEstimatorConfig {
   double joint_velocity_cutoff = 20;
   double light_load = 0.05, full_load = 0.2;

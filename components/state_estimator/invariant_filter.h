@@ -5,7 +5,7 @@
 // X = (R, v, p, d_right, d_left) in SE_4(3), IMU and soles' origins in the world, beside both IMU
 // biases and, since soles are flat, each sole's rotation F in SO(3). Errors: ξ = log(X̂ X⁻¹), of a
 // sole's rotation log(F̂ Fᵀ), of a bias estimate − truth. Without biases ξ propagates and is
-// measured independently of the estimate.
+// measured independently of the estimate. docs/estimation.md has the matrices.
 #pragma once
 
 #include <Eigen/Core>

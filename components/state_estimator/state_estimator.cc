@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
 
@@ -11,13 +12,15 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kLongestDelay = 0.05;  // s
+
 void RequirePositive(double value, const char* field, const char* unit) {
   if (!(value > 0) || !std::isfinite(value)) {
     throw ConfigError(field, std::string("must be a finite number of ") + unit + " above 0");
   }
 }
 
-BaseEstimatorConfig ReadConfig(const StateEstimatorConfig& config) {
+BaseEstimatorConfig ReadAnchoredConfig(const StateEstimatorConfig& config) {
   RequirePositive(config.joint_velocity_cutoff(), "joint_velocity_cutoff", "Hz");
   RequirePositive(config.orientation_time_constant(), "orientation_time_constant", "s");
   RequirePositive(config.gravity_time_constant(), "gravity_time_constant", "s");
@@ -46,24 +49,84 @@ BaseEstimatorConfig ReadConfig(const StateEstimatorConfig& config) {
   return result;
 }
 
-void Write(const Vector3d& v, double* out) { std::copy_n(v.data(), 3, out); }
+InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config) {
+  const InvariantEkfConfig& in = config.invariant_ekf();
+  InvariantEstimatorConfig out;
+  const auto read = [](const char* name, double value, double* field, bool zero = false) {
+    if (std::isfinite(value) && (zero ? value >= 0 : value > 0)) {
+      *field = value;
+      return;
+    }
+    throw ConfigError(
+        std::string("invariant_ekf.") + name,
+        zero ? "must be a finite number, not negative" : "must be a finite number above 0");
+  };
+  out.joint_velocity_cutoff = config.joint_velocity_cutoff();
+  out.light_load = config.light_load();
+  out.full_load = config.full_load();
+  read("sensor_delay", in.sensor_delay(), &out.sensor_delay, true);
+  if (out.sensor_delay > kLongestDelay) {
+    throw ConfigError("invariant_ekf.sensor_delay",
+                      "must be at most 0.05 s: the motion is not known further ahead");
+  }
+  read("timing", in.timing(), &out.timing, true);
+  read("gear_stiffness", in.gear_stiffness(), &out.gear_stiffness, true);
+  read("gyro_noise", in.gyro_noise(), &out.gyro_noise);
+  read("accelerometer_noise", in.accelerometer_noise(), &out.accelerometer_noise);
+  read("gyro_bias", in.gyro_bias(), &out.gyro_bias);
+  read("accelerometer_bias", in.accelerometer_bias(), &out.accelerometer_bias);
+  read("gyro_bias_walk", in.gyro_bias_walk(), &out.gyro_bias_walk, true);
+  read("accelerometer_bias_walk", in.accelerometer_bias_walk(), &out.accelerometer_bias_walk, true);
+  read("start_position", in.start_position(), &out.start_position);
+  read("start_tilt", in.start_tilt(), &out.start_tilt);
+  read("start_yaw", in.start_yaw(), &out.start_yaw);
+  read("contact_walk", in.contact_walk(), &out.contact_walk, true);
+  read("turn_walk", in.turn_walk(), &out.turn_walk, true);
+  read("slip_speed", in.slip_speed(), &out.slip_speed);
+  read("turn_speed", in.turn_speed(), &out.turn_speed);
+  read("cop_margin", in.cop_margin(), &out.cop_margin);
+  read("gate", in.gate(), &out.gate);
+  read("rest_time", in.rest_time(), &out.rest_time);
+  read("rest_distance", in.rest_distance(), &out.rest_distance);
+  read("rest_turn", in.rest_turn(), &out.rest_turn);
+  return out;
+}
+
+constexpr double kLeastForce = 1;  // N: below it a sole has no centre of pressure
+
+// The sensor reads what the robot does to the ground; the signs cancel.
+Eigen::Vector2d CenterOfPressure(const wrench_t& wrench) {
+  if (!(wrench.force[2] < -kLeastForce)) return Eigen::Vector2d::Zero();
+  return {-wrench.moment[1] / wrench.force[2], wrench.moment[0] / wrench.force[2]};
+}
 
 }  // namespace
 
 void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) {
-  const BaseEstimatorConfig config = ReadConfig(context.config<StateEstimatorConfig>());
+  const auto config = context.config<StateEstimatorConfig>();
+  const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
+  const InvariantEstimatorConfig invariant = ReadInvariantConfig(config);
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
-  wiring->AddStage("estimate", {&robot_sensors_}, {&robot_state_},
+  wiring->AddOutput(&estimator_status_, "estimator_status", {static_cast<int>(counts[1])});
+  wiring->AddStage("estimate", {&robot_sensors_}, {&robot_state_, &estimator_status_},
                    [this](const Tick& tick) { Estimate(tick); });
-  estimator_ = std::make_unique<BaseEstimator>(model, config, context.tick_period);
+  if (config.method() == StateEstimatorConfig::INVARIANT_EKF) {
+    invariant_ = std::make_unique<InvariantEstimator>(model, invariant, context.tick_period);
+    estimator_status_->method = estimator_status_t::METHOD_INVARIANT_EKF;
+    estimator_status_->has_covariance = 1;
+  } else {
+    anchored_ = std::make_unique<BaseEstimator>(model, anchored, context.tick_period);
+    estimator_status_->method = estimator_status_t::METHOD_ANCHORED_FEET;
+  }
 }
 
 bool StateEstimator::Archive(StateArchive* archive) {
   archive->Show(last_time_);
-  estimator_->Archive(archive);
+  if (anchored_) anchored_->Archive(archive);
+  if (invariant_) invariant_->Archive(archive);
   return true;
 }
 
@@ -74,23 +137,77 @@ void StateEstimator::Estimate(const Tick& tick) {
       Vector3d(in.imu_angular_velocity),
       Vector3d(in.imu_acceleration),
       {-in.foot_wrench[0].force[2], -in.foot_wrench[1].force[2]},
+      {CenterOfPressure(in.foot_wrench[0]), CenterOfPressure(in.foot_wrench[1])},
+      {in.joint_torque.data(), in.num_joints},
   };
-  estimator_->Update(sensors, tick.time - last_time_);
+  const double dt = tick.time - last_time_;
   last_time_ = tick.time;
+  if (invariant_) {
+    invariant_->Update(sensors, dt);
+    PublishInvariant();
+  } else {
+    anchored_->Update(sensors, dt);
+    PublishAnchored();
+  }
+  std::copy(in.foot_wrench.begin(), in.foot_wrench.end(), robot_state_->foot_wrench.begin());
+}
 
-  const robot::RobotState& state = estimator_->state();
+void StateEstimator::PublishState(const robot::RobotState& state) {
   robot_state_t& out = *robot_state_;
-  Write(state.base_position, out.base_position);
-  out.base_orientation[0] = state.base_orientation.w();
-  Write(state.base_orientation.vec(), out.base_orientation + 1);
-  Write(state.base_linear_velocity, out.base_linear_velocity);
-  Write(state.base_angular_velocity, out.base_angular_velocity);
+  SetVector3(state.base_position, out.base_position);
+  const Eigen::Quaterniond& q = state.base_orientation;
+  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
+  std::copy_n(orientation, 4, out.base_orientation);
+  SetVector3(state.base_linear_velocity, out.base_linear_velocity);
+  SetVector3(state.base_angular_velocity, out.base_angular_velocity);
   std::copy_n(state.joint_position.data(), state.joint_position.size(), out.joint_position.data());
   std::copy_n(state.joint_velocity.data(), state.joint_velocity.size(), out.joint_velocity.data());
-  std::copy(in.foot_wrench.begin(), in.foot_wrench.end(), out.foot_wrench.begin());
-  std::copy(estimator_->foot_weight().begin(), estimator_->foot_weight().end(),
-            out.foot_load_share.begin());
-  Write(estimator_->gyro_bias(), out.imu_bias_angular_velocity);
+}
+
+void StateEstimator::PublishAnchored() {
+  PublishState(anchored_->state());
+  std::ranges::copy(anchored_->foot_weight(), robot_state_->foot_load_share.begin());
+  SetVector3(anchored_->gyro_bias(), robot_state_->imu_bias_angular_velocity);
+  estimator_status_t& status = *estimator_status_;
+  SetVector3(anchored_->gyro_bias(), status.imu_bias_angular_velocity);
+  for (size_t f = 0; f < status.foot_contact.size(); ++f) {
+    status.foot_contact[f] = anchored_->foot_weight()[f] > 0 ? estimator_status_t::CONTACT_FIRM
+                                                             : estimator_status_t::CONTACT_NONE;
+    SetPose(anchored_->anchor(static_cast<int>(f)), &status.foot_pose[f]);
+  }
+}
+
+void StateEstimator::PublishInvariant() {
+  PublishState(invariant_->state());
+  const InvariantState& state = invariant_->filter().state();
+  std::ranges::copy(invariant_->foot_weight(), robot_state_->foot_load_share.begin());
+  SetVector3(state.gyro_bias, robot_state_->imu_bias_angular_velocity);
+  estimator_status_t& status = *estimator_status_;
+  SetVector3(state.gyro_bias, status.imu_bias_angular_velocity);
+  SetVector3(state.accelerometer_bias, status.imu_bias_acceleration);
+  const InvariantEstimator::BaseCovariance& covariance = invariant_->covariance();
+  size_t next = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int column = row; column < 9; ++column) {
+      status.covariance[next++] = covariance(row, column);
+    }
+  }
+  for (size_t f = 0; f < status.foot_contact.size(); ++f) {
+    const int i = static_cast<int>(f);
+    switch (invariant_->contact(i)) {
+      case FootContact::kNone:
+        status.foot_contact[f] = estimator_status_t::CONTACT_NONE;
+        break;
+      case FootContact::kFirm:
+        status.foot_contact[f] = estimator_status_t::CONTACT_FIRM;
+        break;
+      case FootContact::kSlipping:
+        status.foot_contact[f] = estimator_status_t::CONTACT_SLIPPING;
+        break;
+    }
+    status.foot_innovation[f] = invariant_->innovation(i);
+    SetPose(invariant_->foot_pose(i), &status.foot_pose[f]);
+  }
 }
 
 }  // namespace poise

@@ -5,12 +5,14 @@
 
 #include "components/framework/component.h"
 #include "components/state_estimator/base_estimator.h"
+#include "components/state_estimator/invariant_estimator.h"
+#include "poise/estimator_status_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
 
 namespace poise {
 
-/// Stage "estimate": robot_sensors → robot_state.
+/// Stage "estimate": robot_sensors → robot_state, estimator_status.
 class StateEstimator : public Component {
  public:
   /// Resources "robot", "urdf"; configuration StateEstimatorConfig.
@@ -19,10 +21,16 @@ class StateEstimator : public Component {
 
  private:
   void Estimate(const Tick& tick);
+  void PublishState(const robot::RobotState& state);
+  void PublishAnchored();
+  void PublishInvariant();
 
   Input<robot_sensors_t> robot_sensors_;
   Output<robot_state_t> robot_state_;
-  std::unique_ptr<BaseEstimator> estimator_;
+  Output<estimator_status_t> estimator_status_;
+  // The method's; the other is null.
+  std::unique_ptr<BaseEstimator> anchored_;
+  std::unique_ptr<InvariantEstimator> invariant_;
   double last_time_ = 0;
 };
 

@@ -15,9 +15,16 @@ const std::vector<std::pair<std::string, std::string>>& PartFields() {
 }
 
 constexpr const char* kIdeal[] = {
-    "sim_ode.joint_friction=false", "sim_ode.sensor_noise=false", "sim_ode.rotor_inertia=true",
-    "sim_ode.push_sensor_noise=0",  "sim_ode.drive_train=",       "sim_ode.model_error=",
+    "sim_ode.joint_friction=false",
+    "sim_ode.sensor_noise=false",
+    "sim_ode.rotor_inertia=true",
+    "sim_ode.push_sensor_noise=0",
+    "sim_ode.drive_train=",
+    "sim_ode.model_error=",
     "sim_ode.motor_change=",
+    // What the estimator knows of the drive train.
+    "state_estimator.invariant_ekf.sensor_delay=0",
+    "state_estimator.invariant_ekf.gear_stiffness=0",
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
 void AddReplayCommand(CLI::App* app, Command* command);
+void AddEstimatorsCommand(CLI::App* app, Command* command);
 void AddLogCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);
 void AddListCommand(CLI::App* app, Command* command);

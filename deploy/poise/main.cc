@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   poise::AddReportCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
   poise::AddReplayCommand(&app, &command);
+  poise::AddEstimatorsCommand(&app, &command);
   poise::AddLogCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);
   poise::AddListCommand(&app, &command);

@@ -143,6 +143,15 @@ int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run
   return tick > 0 ? static_cast<int64_t>(std::min(tick, last)) : 0;
 }
 
+const logging::Metric* MetricOfCheck(const Scenario& scenario, int index) {
+  const std::string& name = scenario.check(index).metric();
+  const logging::Metric* metric = logging::FindMetric(name);
+  if (metric != nullptr) return metric;
+  throw ConfigError(
+      fmt::format("check[{}].metric", index),
+      fmt::format("this version has no metric named '{}'; see `poise list metrics`", name));
+}
+
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
   std::vector<CheckResult> results;
   const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
@@ -168,13 +177,7 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   }
   for (int i = 0; i < scenario.check_size(); ++i) {
     const Check& check = scenario.check(i);
-    const logging::Metric* metric = logging::FindMetric(check.metric());
-    if (metric == nullptr) {
-      throw ConfigError(fmt::format("check[{}].metric", i),
-                        fmt::format("this version has no metric named '{}'; see `poise list "
-                                    "metrics`",
-                                    check.metric()));
-    }
+    const logging::Metric* metric = MetricOfCheck(scenario, i);
     CheckResult result;
     result.label = check.label();
     if (check.has_at_most()) result.at_most = check.at_most();

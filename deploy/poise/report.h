@@ -11,6 +11,7 @@
 #include "deploy/poise/run_outcome.h"
 #include "deploy/poise/scenario.pb.h"
 #include "logging/events.h"
+#include "logging/metrics.h"
 #include "logging/run_record.h"
 
 namespace poise {
@@ -31,6 +32,9 @@ struct CheckResult {
 
 /// First tick at or after check_from.
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run);
+
+/// The metric of scenario.check(index). Throws ConfigError when there is none of its name.
+const logging::Metric* MetricOfCheck(const Scenario& scenario, int index);
 
 /// The scenario's checks on a run, after those of every run: it reached its planned end, so did
 /// its reference, its log is whole, and each component did its work.

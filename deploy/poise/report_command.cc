@@ -32,7 +32,7 @@ ReportedRun ReadReportedRun(const std::string& run) {
                     result.log));
   }
   ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
-  ReadReference(result.log, result.scenario, &result.record);
+  PrepareRecord(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {
     fmt::print(
         stderr, "warning: {}: is missing; what compares with it has no value\n",

@@ -27,7 +27,7 @@ bool OnlyAtTheEnd(const CheckResult& check) {
 
 nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario) {
   logging::RunRecord record = logging::ReadRun(log);
-  ReadReference(log, scenario, &record);
+  PrepareRecord(log, scenario, &record);
   std::vector<CheckResult> checks = EvaluateChecks(scenario, record);
   std::erase_if(checks, OnlyAtTheEnd);
   return {{"checks", ChecksJson(checks)},

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "components/framework/run.h"
+#include "deploy/poise/estimates.h"
 #include "deploy/poise/inline_run.h"
 #include "deploy/poise/launcher.h"
 #include "deploy/poise/run_dir.h"
@@ -130,7 +131,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   logging::RunRecord record;
   if (recorded) {
     record = logging::ReadRun(log);
-    ReadReference(log, scenario, &record);
+    PrepareRecord(log, scenario, &record);
     if (outcome.wall_time > 0) {
       record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
     }
@@ -155,13 +156,16 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   return result;
 }
 
-void ReadReference(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {
+void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {
   record->first_tick = FirstCheckedTick(scenario, *record);
   const fs::path reference = ReferenceDir(log.parent_path()) / "run.lcm";
   if (scenario.has_reference() && fs::exists(reference)) {
     record->reference = std::make_shared<logging::RunRecord>(logging::ReadRun(reference));
     record->reference->first_tick = FirstCheckedTick(scenario, *record->reference);
   }
+  std::vector<const logging::Metric*> metrics;
+  for (int i = 0; i < scenario.check_size(); ++i) metrics.push_back(MetricOfCheck(scenario, i));
+  AddOtherEstimates(metrics, record);
 }
 
 }  // namespace poise

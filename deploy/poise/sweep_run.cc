@@ -11,6 +11,7 @@
 #include "components/framework/configuration.h"
 #include "components/framework/inline_runner.h"
 #include "components/robot/robot_model.h"
+#include "deploy/poise/estimates.h"
 #include "deploy/poise/registry.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
@@ -121,9 +122,12 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
   row.outcome = row.fell_at ? kFell : whole ? kStands : kStopped;
   row.ended_at = run.time(run.num_ticks);
   row.phase = PhaseAtEnd(run);
-  for (const std::string& name : metrics) {
-    const logging::Answer value = logging::FindMetric(name)->compute(run);
-    if (value && std::isfinite(*value)) row.metrics[name] = *value;
+  std::vector<const logging::Metric*> measured;
+  for (const std::string& name : metrics) measured.push_back(logging::FindMetric(name));
+  AddOtherEstimates(measured, &run);
+  for (const logging::Metric* metric : measured) {
+    const logging::Answer value = metric->compute(run);
+    if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
   }
   row.push = FindPushBound(merged, run);
   return row;

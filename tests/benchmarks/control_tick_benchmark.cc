@@ -40,8 +40,8 @@ class Samples {
 Contacts ContactsFor(bool both) { return {true, both}; }
 
 // The whole tick, the clock read at its ends only.
-void Tick(benchmark::State& state, robot::TestRobot robot, bool both) {
-  ControlTick control(robot, ContactsFor(both));
+void Tick(benchmark::State& state, robot::TestRobot robot, bool both, const char* method) {
+  ControlTick control(robot, ContactsFor(both), method);
   const auto sensors = SwayingSensors(control.model(), ContactsFor(both), kNumStates);
   Samples total("tick");
   int tick = 0, failed = 0, balancing = 0;
@@ -64,9 +64,9 @@ void Tick(benchmark::State& state, robot::TestRobot robot, bool both) {
 
 // The same with the clock read between the stages; the shared dynamics are asked for first, so that
 // no stage pays for them.
-void Split(benchmark::State& state, robot::TestRobot robot, bool both) {
+void Split(benchmark::State& state, robot::TestRobot robot, bool both, const char* method) {
   const Contacts in_contact = ContactsFor(both);
-  ControlTick control(robot, in_contact);
+  ControlTick control(robot, in_contact, method);
   const auto sensors = SwayingSensors(control.model(), in_contact, kNumStates);
   robot::RobotState estimated(control.model().num_joints());
   robot::RobotData data(control.model());
@@ -116,11 +116,18 @@ void Configure(benchmark::internal::Benchmark* benchmark) {
 
 constexpr auto kDyros = robot::TestRobot::kDyros;
 constexpr auto kMantis = robot::TestRobot::kMantis;
-BENCHMARK_CAPTURE(Tick, dyros_double, kDyros, true)->Apply(Configure);
-BENCHMARK_CAPTURE(Tick, dyros_single, kDyros, false)->Apply(Configure);
-BENCHMARK_CAPTURE(Tick, mantis_double, kMantis, true)->Apply(Configure);
-BENCHMARK_CAPTURE(Split, dyros_double, kDyros, true)->Apply(Configure);
-BENCHMARK_CAPTURE(Split, dyros_single, kDyros, false)->Apply(Configure);
+constexpr const char* kAnchoredFeet = "";
+constexpr const char* kInvariantEkf =
+    "method: INVARIANT_EKF invariant_ekf { sensor_delay: 0.002 gear_stiffness: 7e4 }";
+BENCHMARK_CAPTURE(Tick, dyros_double, kDyros, true, kAnchoredFeet)->Apply(Configure);
+BENCHMARK_CAPTURE(Tick, dyros_single, kDyros, false, kAnchoredFeet)->Apply(Configure);
+BENCHMARK_CAPTURE(Tick, dyros_double_ekf, kDyros, true, kInvariantEkf)->Apply(Configure);
+BENCHMARK_CAPTURE(Tick, dyros_single_ekf, kDyros, false, kInvariantEkf)->Apply(Configure);
+BENCHMARK_CAPTURE(Tick, mantis_double, kMantis, true, kAnchoredFeet)->Apply(Configure);
+BENCHMARK_CAPTURE(Split, dyros_double, kDyros, true, kAnchoredFeet)->Apply(Configure);
+BENCHMARK_CAPTURE(Split, dyros_single, kDyros, false, kAnchoredFeet)->Apply(Configure);
+BENCHMARK_CAPTURE(Split, dyros_double_ekf, kDyros, true, kInvariantEkf)->Apply(Configure);
+BENCHMARK_CAPTURE(Split, dyros_single_ekf, kDyros, false, kInvariantEkf)->Apply(Configure);
 
 }  // namespace
 }  // namespace poise

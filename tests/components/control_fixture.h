@@ -6,11 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "components/framework/component.h"
@@ -73,9 +75,14 @@ class Harness {
     EXPECT_TRUE(component_.Archive(&restore) && restore.ok());
     EXPECT_EQ(restore.size(), bytes.size());
   }
+  /// The first output of this type.
   template <class M>
   const M& output() const {
-    return *static_cast<const M*>(wiring_.outputs().front()->message());
+    const auto& outputs = wiring_.outputs();
+    const auto found = std::ranges::find_if(outputs, [](const OutputPort* output) {
+      return output->type_name() == std::string_view(M::getTypeName());
+    });
+    return *static_cast<const M*>((*found)->message());
   }
 
  private:

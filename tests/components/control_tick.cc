@@ -96,9 +96,10 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
   return sensors;
 }
 
-ControlTick::ControlTick(robot::TestRobot robot, const Contacts& in_contact)
+ControlTick::ControlTick(robot::TestRobot robot, const Contacts& in_contact,
+                         const std::string& estimator)
     : context_(robot),
-      estimator_(&context_, ""),
+      estimator_(&context_, estimator),
       task_(&context_, TaskConfig(std::string("phase { start: 0 support: ") +
                                   (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }")),
       monitor_(&context_, MonitorConfig(true)),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "components/balance/whole_body.h"
@@ -23,7 +24,9 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
 /// The four components as the inline runner calls them, with one WholeBody between them.
 class ControlTick {
  public:
-  ControlTick(robot::TestRobot robot, const Contacts& in_contact);
+  /// `estimator`: StateEstimatorConfig.
+  ControlTick(robot::TestRobot robot, const Contacts& in_contact,
+              const std::string& estimator = "");
 
   void Estimate(const robot_sensors_t& sensors, const Tick& tick);
   void Task(const Tick& tick) { task_.Run(tick); }

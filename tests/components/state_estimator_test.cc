@@ -129,22 +129,16 @@ TEST_P(AnyMethod, AFreshEstimatorGoesOnWithASavedStateAndTheSameBits) {
       for (int64_t tick = 0; tick < taken_over + 200; ++tick) {
         motion.Next();
         const robot_sensors_t sensors = Message(motion.sensors());
-        if (tick == taken_over) {
-          StateArchive measure;
-          ASSERT_TRUE(first.component().Archive(&measure));
-          std::vector<uint8_t> bytes(measure.size());
-          StateArchive save = StateArchive::Saving(bytes);
-          ASSERT_TRUE(first.component().Archive(&save) && save.ok());
-          StateArchive restore = StateArchive::Restoring(bytes);
-          ASSERT_TRUE(second.component().Archive(&restore) && restore.ok());
-          ASSERT_EQ(restore.size(), bytes.size());
-        }
+        if (tick == taken_over) second.Restore(first.Save());
         first.Bind("robot_sensors", &sensors);
         first.Run(TickAt(tick));
         if (tick < taken_over) continue;
         second.Bind("robot_sensors", &sensors);
         second.Run(TickAt(tick));
         ASSERT_EQ(Encoded(second.output<robot_state_t>()), Encoded(first.output<robot_state_t>()))
+            << tick;
+        ASSERT_EQ(Encoded(second.output<estimator_status_t>()),
+                  Encoded(first.output<estimator_status_t>()))
             << tick;
       }
     }
@@ -188,8 +182,14 @@ TEST_P(AnyMethod, SkippedTicksAreBridged) {
   EXPECT_NEAR(harness.output<robot_state_t>().base_linear_velocity[1], speed, 2e-3);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, AnyMethod, testing::Values(""),
-                         [](const auto&) { return "AnchoredFeet"; });
+INSTANTIATE_TEST_SUITE_P(Methods, AnyMethod,
+                         testing::Values("method: ANCHORED_FEET",
+                                         "method: INVARIANT_EKF invariant_ekf { gear_stiffness: "
+                                         "7e4 sensor_delay: 0.002 }"),
+                         [](const auto& test) {
+                           return test.param.find("EKF") != std::string::npos ? "InvariantEkf"
+                                                                              : "AnchoredFeet";
+                         });
 
 struct ConfigCase {
   const char* text;
@@ -220,7 +220,11 @@ INSTANTIATE_TEST_SUITE_P(
                     ConfigCase{"foot_rotation_tolerance: 0", "foot_rotation_tolerance"},
                     ConfigCase{"light_load: -0.1", "light_load"},
                     ConfigCase{"light_load: 0.3", "full_load"},
-                    ConfigCase{"full_load: 0.6", "full_load"}));
+                    ConfigCase{"full_load: 0.6", "full_load"},
+                    ConfigCase{"invariant_ekf { sensor_delay: 0.1 }", "invariant_ekf.sensor_delay"},
+                    ConfigCase{"invariant_ekf { timing: -1 }", "invariant_ekf.timing"},
+                    ConfigCase{"invariant_ekf { gate: 0 }", "invariant_ekf.gate"},
+                    ConfigCase{"invariant_ekf { gyro_noise: nan }", "invariant_ekf.gyro_noise"}));
 
 }  // namespace
 }  // namespace poise

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <set>
 
 #include "logging/metrics.h"
@@ -156,6 +157,65 @@ TEST_F(AnalysisTest, EstimatorErrors) {
   EXPECT_NEAR(Measure("estimator_velocity_rms"), 20 * std::sqrt(0.5), 1e-9);
   EXPECT_NEAR(Measure("estimator_tilt_max"), 10, 1e-9);  // heading is no tilt
   EXPECT_GT(Measure("estimator_rotation_max"), 300);
+}
+
+TEST(Analysis, NeesIsTheSquaredErrorInStandardDeviations) {
+  robot_state_t estimate{};
+  ground_truth_t truth{};
+  estimator_status_t status{};
+  estimate.base_orientation[0] = truth.base_orientation[0] = 1;
+  EXPECT_FALSE(Nees(estimate, status, truth, NeesPart::kAll).has_value());  // no covariance
+  status.has_covariance = 1;
+  EXPECT_FALSE(Nees(estimate, status, truth, NeesPart::kAll).has_value());  // of nothing
+
+  // Standard deviations 2 mrad, 0.1 m/s, 0.01 m; errors of 1, 2 and 3 of them along one axis each.
+  constexpr double kTurn = 2e-3, kSpeed = 0.1, kWay = 0.01;
+  const auto diagonal = [](int i) { return i * 9 - i * (i - 1) / 2; };  // rows of 9, 8, 7, …
+  for (int i = 0; i < 9; ++i) {
+    const double deviation = i < 3 ? kTurn : i < 6 ? kSpeed : kWay;
+    status.covariance[diagonal(i)] = deviation * deviation;
+  }
+  estimate.base_orientation[0] = std::cos(kTurn / 2);
+  estimate.base_orientation[1] = std::sin(kTurn / 2);
+  truth.base_linear_velocity[2] = 2 * kSpeed;
+  estimate.base_position[0] = 3 * kWay;
+  EXPECT_NEAR(*Nees(estimate, status, truth, NeesPart::kAll), 1 + 4 + 9, 1e-9);
+  EXPECT_NEAR(*Nees(estimate, status, truth, NeesPart::kObservable), 1 + 4, 1e-9);
+
+  // With a correlation ρ of two errors a and b: (a² − 2 ρ a b + b²) / (1 − ρ²).
+  const double rho = 0.5;
+  truth.base_linear_velocity[1] = kSpeed;
+  status.covariance[diagonal(4) + 1] = rho * kSpeed * kSpeed;
+  EXPECT_NEAR(*Nees(estimate, status, truth, NeesPart::kObservable),
+              1 + (1 - 2 * rho * 2 + 4) / (1 - rho * rho), 1e-9);
+
+  // Heading counts in the whole only.
+  estimate.base_orientation[1] = 0;
+  estimate.base_orientation[3] = std::sin(kTurn / 2);
+  EXPECT_NEAR(*Nees(estimate, status, truth, NeesPart::kObservable),
+              (1 - 2 * rho * 2 + 4) / (1 - rho * rho), 1e-9);
+
+  status.covariance[diagonal(8)] = -1;
+  EXPECT_FALSE(Nees(estimate, status, truth, NeesPart::kAll).has_value());
+}
+
+// Chi-squared with 9 and 5 degrees of freedom, by simulation.
+TEST(Analysis, TheNeesBoundsHoldNinetyFivePercent) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 100000;
+  for (const auto& [part, freedom] : {std::pair(NeesPart::kAll, 9), {NeesPart::kObservable, 5}}) {
+    int inside = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      double sum = 0;
+      for (int k = 0; k < freedom; ++k) {
+        const double x = normal(random);
+        sum += x * x;
+      }
+      inside += sum < NeesBound(part) ? 1 : 0;
+    }
+    EXPECT_NEAR(inside / double{kDraws}, 0.95, 4 * std::sqrt(0.95 * 0.05 / kDraws));
+  }
 }
 
 TEST_F(AnalysisTest, FallIsSeen) {
