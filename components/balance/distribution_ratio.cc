@@ -81,6 +81,9 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
   return interval;
 }
 
+// m of centre of pressure that one ratio may be worse than another before it counts.
+constexpr double kIndifference = 1e-3;
+
 double Violation(const Bounds& bounds, double eta) {
   double worst = -HUGE_VAL;
   for (const Bound& bound : bounds)
@@ -119,7 +122,17 @@ double Select(const RatioInterval& interval, const Vector6d& resultant,
       }
     }
   }
-  return best;
+  // Side by side the soles lack as much at any η: noise alone would tell the best, and η, with the
+  // joints' torques, jump from end to end. Of what is as good, the nearest to η*.
+  const double lacking = least + kIndifference * resultant.head<3>().norm();
+  double lower = eta_min, upper = eta_max;
+  for (const Bound& bound : bounds) {
+    if (bound.a == 0) continue;
+    const double half = (bound.c + lacking) / std::abs(bound.a), middle = -bound.b / bound.a;
+    lower = std::max(lower, middle - half);
+    upper = std::min(upper, middle + half);
+  }
+  return lower <= upper ? std::clamp(interval.optimal, lower, upper) : best;
 }
 
 std::array<Eigen::Matrix3d, 2> Level() {

@@ -36,9 +36,10 @@ RatioInterval FeasibleRatio(const Vector6d& resultant,
 RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
                             const ContactLimits& limits, double eta_min, double eta_max);
 
-/// The ratio to use: η* clipped to a feasible interval. Infeasible: the ratio in [eta_min, eta_max]
-/// that minimises the largest violation |a η + b| − |c| (N·m, per unit of load share) of the moment
-/// conditions. Always finite and within [eta_min, eta_max], which lie in [0, 1].
+/// The ratio to use: η* clipped to a feasible interval. Infeasible: η* clipped to the ratios in
+/// [eta_min, eta_max] whose largest violation |a η + b| − |c| (N·m, per unit of load share) of the
+/// moment conditions is the least, to a millimetre of centre of pressure. Always finite and within
+/// [eta_min, eta_max], which lie in [0, 1].
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
                    double eta_min, double eta_max);
