@@ -21,6 +21,10 @@ constexpr double kGyroRange = 35, kGyroFault = 10;                     // rad/s
 constexpr double kAccelerometerRange = 160, kAccelerometerFault = 50;  // m/s²
 // An encoder of unknown resolution.
 constexpr double kUnknownEncoder = 1e-5;  // rad
+// Shares of the compliance that is assumed: no estimate is taken further.
+constexpr double kLeastCompliance = 0.1, kMostCompliance = 10;
+// m between the soles: below it they do not show the heading.
+constexpr double kLeastStance = 0.02;
 // Standing still at first, as far as feet and IMU can move against each other unseen.
 constexpr double kStartSpeed = 0.01;  // m/s
 // s, in which the ringing of a gear dies away: rotor and link of a tenth of a kg·m² on a harmonic
@@ -95,13 +99,15 @@ void InvariantEstimator::ReadJoints(const BaseSensors& sensors, double dt) {
   joint_position_ = sensors.joint_position;
   link_position_ = sensors.joint_position;
   if (!(config_.gear_stiffness > 0) || sensors.joint_torque.size() != torque_.size()) return;
+  const double compliance =
+      std::clamp(1 + filter_.state().compliance, kLeastCompliance, kMostCompliance);
   // What has just changed of the torque first moves the rotor, and then rings.
   unrest_ *= std::exp(-dt / kRinging);
   for (int j = 0; j < torque_.size(); ++j) {
     const double torque = std::clamp(sensors.joint_torque[j], -kMaxTorque, kMaxTorque);
     if (placed_) unrest_[j] = std::max(unrest_[j], std::abs(torque - torque_[j]));
     torque_[j] = torque;
-    link_position_[j] -= torque / config_.gear_stiffness;
+    link_position_[j] -= compliance * torque / config_.gear_stiffness;
   }
 }
 
@@ -128,16 +134,21 @@ void InvariantEstimator::ReadSoles() {
         kinematics_.imu_rotation().transpose() * (sole.position - kinematics_.imu_position());
     reading.rotation = kinematics_.imu_rotation().transpose() * sole.rotation;
     Eigen::Matrix<double, 6, 6> noise = Eigen::Matrix<double, 6, 6>::Zero();
-    robot::Vector6d motion = robot::Vector6d::Zero();
+    robot::Vector6d motion = robot::Vector6d::Zero(), windup = robot::Vector6d::Zero();
     for (const int j : kinematics_.joints(f)) {
       const robot::Vector6d column = kinematics_.RelativeColumn(f, j);
       double variance = Square(encoder_noise_[j]);
-      if (config_.gear_stiffness > 0) variance += Square(unrest_[j] / config_.gear_stiffness);
+      if (config_.gear_stiffness > 0) {
+        variance += Square(unrest_[j] / config_.gear_stiffness);
+        windup -= torque_[j] / config_.gear_stiffness * column;
+      }
       noise.noalias() += variance * column * column.transpose();
       motion += velocity_filter_.value()[j] * column;
     }
     noise.noalias() += Square(config_.timing) * motion * motion.transpose();
+    reading.compliance = filter_.state().compliance;
     for (int row = 0; row < 6; row += 3) {
+      reading.by_compliance.segment<3>(row) = base * windup.segment<3>(row);
       for (int column = 0; column < 6; column += 3) {
         reading.noise.block<3, 3>(row, column) =
             base * noise.block<3, 3>(row, column) * base.transpose();
@@ -162,9 +173,41 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   deviation.segment<3>(InvariantFilter::kPosition).setConstant(config_.start_position);
   deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
   deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
-  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+  InvariantFilter::Covariance covariance = deviation.cwiseAbs2().asDiagonal();
+  filter_.Set(state, covariance);
+  // The soles are where the ground is, so that the compliance's error turns and moves the base.
+  ReadSoles();
+  const InvariantFilter::Error moved = PlacedByCompliance(weights);
+  covariance += Square(config_.gear_stiffness_error) * moved * moved.transpose();
+  filter_.Set(state, covariance);
   UpdateContacts(sensors);
   for (Foot& foot : feet_) foot.slip_left = foot.turn_left = 0;  // at rest
+}
+
+// How all errors at the start depend on that of the compliance: PlaceOnGround, linearised, with the
+// soles' errors of ReadSoles.
+InvariantFilter::Error InvariantEstimator::PlacedByCompliance(const FootWeights& weights) const {
+  std::array<double, 2> share = weights.share;
+  if (weights.standing == 0) share = {0.5, 0.5};
+  const robot::Vector6d &right = feet_[0].reading.by_compliance,
+                        &left = feet_[1].reading.by_compliance;
+  const robot::Vector6d mean = share[0] * right + share[1] * left;
+  InvariantFilter::Error moved = InvariantFilter::Error::Zero();
+  moved[InvariantFilter::kCompliance] = 1;
+  moved.segment<2>(InvariantFilter::kRotation) = -mean.segment<2>(3);
+  const Vector3d apart =
+      filter_.state().rotation * (feet_[1].reading.position - feet_[0].reading.position);
+  if (apart.y() > kLeastStance) {
+    moved[InvariantFilter::kRotation + 2] = (left[0] - right[0]) / apart.y();
+  }
+  // The soles' midpoint is the origin, about which the error of the rotation turns.
+  moved.segment<2>(InvariantFilter::kPosition) = -0.5 * (right + left).head<2>();
+  const InvariantState& s = filter_.state();
+  const Vector3d center = s.position + s.rotation * (share[0] * feet_[0].reading.position +
+                                                     share[1] * feet_[1].reading.position);
+  const Vector3d turn = moved.segment<3>(InvariantFilter::kRotation);
+  moved[InvariantFilter::kPosition + 2] = -mean[2] - turn.cross(center).z();
+  return moved;
 }
 
 void InvariantEstimator::Propagate(double dt) {
@@ -213,6 +256,7 @@ void InvariantEstimator::Recover(bool finite) {
   deviation.segment<3>(InvariantFilter::kPosition).setConstant(kRecoverPosition);
   deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
   deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
+  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
   filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
 }
 
@@ -251,20 +295,12 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
 void InvariantEstimator::LetSlip(size_t foot) {
   feet_[foot].slip_left = config_.rest_time;
   feet_[foot].slip_time = 0;
-  feet_[foot].slip_start = SeenPosition(foot);
+  feet_[foot].slip_start = filter_.SeenPosition(feet_[foot].reading);
 }
 
 void InvariantEstimator::LetTurn(size_t foot) {
   feet_[foot].turn_left = config_.rest_time;
-  feet_[foot].turn_start = SeenRotation(foot);
-}
-
-Vector3d InvariantEstimator::SeenPosition(size_t foot) const {
-  return filter_.state().position + filter_.state().rotation * feet_[foot].reading.position;
-}
-
-Matrix3d InvariantEstimator::SeenRotation(size_t foot) const {
-  return filter_.state().rotation * feet_[foot].reading.rotation;
+  feet_[foot].turn_start = filter_.SeenRotation(feet_[foot].reading);
 }
 
 void InvariantEstimator::Correct(double dt) {
@@ -313,7 +349,7 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
     foot.slip_time += dt;
     if (foot.slip_left <= 0) {
       // It may be the base that moves, by as much as is not known of its velocity.
-      const double way = (SeenPosition(f) - foot.slip_start).norm();
+      const double way = (filter_.SeenPosition(feet_[f].reading) - foot.slip_start).norm();
       const double speed =
           std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
       if (!other_stands && foot.slip_time > kLongestSlip) {
@@ -321,13 +357,14 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
         filter_.Doubt(0, Square(way / config_.rest_time), 0);
       } else if (way > config_.rest_distance + 3 * speed * config_.rest_time) {
         foot.slip_left = config_.rest_time;
-        foot.slip_start = SeenPosition(f);
+        foot.slip_start = filter_.SeenPosition(feet_[f].reading);
       }
     }
   }
   if (foot.turn_left > 0) {
     foot.turn_left -= dt;
-    const double turn = RotationLog(SeenRotation(f) * foot.turn_start.transpose()).norm();
+    const double turn =
+        RotationLog(filter_.SeenRotation(feet_[f].reading) * foot.turn_start.transpose()).norm();
     if (foot.turn_left <= 0 && turn > config_.rest_turn) LetTurn(f);
   }
 }
@@ -410,8 +447,10 @@ FootContact InvariantEstimator::contact(int foot) const {
 Isometry3d InvariantEstimator::foot_pose(int foot) const {
   const auto f = static_cast<size_t>(foot);
   Isometry3d pose = Isometry3d::Identity();
-  pose.translation() = filter_.holds_position(foot) ? filter_.state().foot[f] : SeenPosition(f);
-  pose.linear() = filter_.holds_rotation(foot) ? filter_.state().foot_rotation[f] : SeenRotation(f);
+  pose.translation() = filter_.holds_position(foot) ? filter_.state().foot[f]
+                                                    : filter_.SeenPosition(feet_[f].reading);
+  pose.linear() = filter_.holds_rotation(foot) ? filter_.state().foot_rotation[f]
+                                               : filter_.SeenRotation(feet_[f].reading);
   return pose;
 }
 

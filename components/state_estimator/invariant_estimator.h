@@ -4,9 +4,9 @@
 // Measured load with hysteresis decides which soles stand, the centre of pressure whether a sole
 // stands flat (its rotation is then a measurement, too), the innovation whether it stands still: a
 // sole that slips, sinks or turns is let loose until it has come to rest. Joints are read at the
-// motors: the gears' windup under the measured torque is taken out, friction's part of it remains
-// as a walk of the soles. The readings are sensor_delay old; what is published is predicted to the
-// present.
+// motors: the gears' windup under the measured torque is taken out with a compliance that is
+// estimated, too; friction's part of it remains as a walk of the soles. The readings are
+// sensor_delay old; what is published is predicted to the present.
 #pragma once
 
 #include <Eigen/Core>
@@ -27,7 +27,7 @@ namespace poise {
 struct InvariantEstimatorConfig {
   double joint_velocity_cutoff = 20;
   double light_load = 0.05, full_load = 0.2;
-  double sensor_delay = 0, timing = 0.0005, gear_stiffness = 0;
+  double sensor_delay = 0, timing = 0.0005, gear_stiffness = 0, gear_stiffness_error = 0.2;
   double gyro_noise = 1e-4, accelerometer_noise = 1e-2;
   double gyro_bias = 1e-3, accelerometer_bias = 0.1;
   double gyro_bias_walk = 1e-6, accelerometer_bias_walk = 1e-4;
@@ -82,6 +82,7 @@ class InvariantEstimator {
   void ReadImu(const BaseSensors& sensors);
   void ReadSoles();
   void Place(const BaseSensors& sensors);
+  InvariantFilter::Error PlacedByCompliance(const FootWeights& weights) const;
   void Propagate(double dt);
   void Recover(bool finite);
   void UpdateContacts(const BaseSensors& sensors);
@@ -89,9 +90,6 @@ class InvariantEstimator {
   void LetSlip(size_t foot);
   void LetTurn(size_t foot);
   void ComeToRest(size_t foot, bool other_stands, double dt);
-  /// The sole in the world as base and joints show it.
-  Eigen::Vector3d SeenPosition(size_t foot) const;
-  Eigen::Matrix3d SeenRotation(size_t foot) const;
   void Publish();
 
   std::shared_ptr<const robot::RobotModel> model_;

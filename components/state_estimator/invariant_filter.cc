@@ -101,10 +101,14 @@ void InvariantFilter::Doubt(double rotation_variance, double velocity_variance,
   covariance_.diagonal().segment<3>(kPosition).array() += position_variance;
 }
 
-void InvariantFilter::CopyRows(int from, int to, const Matrix3d& noise) {
-  covariance_.middleRows<3>(to) = covariance_.middleRows<3>(from).eval();
-  covariance_.middleCols<3>(to) = covariance_.middleCols<3>(from).eval();
-  covariance_.block<3, 3>(to, to) = covariance_.block<3, 3>(from, from) + noise;
+void InvariantFilter::CopyRows(int from, int to, const Vector3d& by_compliance,
+                               const Matrix3d& noise) {
+  ClearRows(to);
+  Covariance& c = covariance_;
+  c.middleRows<3>(to) = (c.middleRows<3>(from) + by_compliance * c.row(kCompliance)).eval();
+  c.middleCols<3>(to) =
+      (c.middleCols<3>(from) + c.col(kCompliance) * by_compliance.transpose()).eval();
+  c.block<3, 3>(to, to) += noise;
 }
 
 void InvariantFilter::ClearRows(int row) {
@@ -112,18 +116,30 @@ void InvariantFilter::ClearRows(int row) {
   covariance_.middleCols<3>(row).setZero();
 }
 
+Vector3d InvariantFilter::SeenPosition(const SoleReading& reading) const {
+  return state_.position + state_.rotation * reading.position +
+         (state_.compliance - reading.compliance) * reading.by_compliance.head<3>();
+}
+
+Matrix3d InvariantFilter::SeenRotation(const SoleReading& reading) const {
+  const Gamma turn((state_.compliance - reading.compliance) * reading.by_compliance.tail<3>());
+  return turn.zero * state_.rotation * reading.rotation;
+}
+
 void InvariantFilter::HoldPosition(int foot, const SoleReading& reading) {
   const auto f = static_cast<size_t>(foot);
-  state_.foot[f] = state_.position + state_.rotation * reading.position;
+  state_.foot[f] = SeenPosition(reading);
   // ξ_d = ξ_p + the reading's error.
-  CopyRows(kPosition, FootRow(foot), reading.noise.topLeftCorner<3, 3>());
+  CopyRows(kPosition, FootRow(foot), reading.by_compliance.head<3>(),
+           reading.noise.topLeftCorner<3, 3>());
   holds_position_[f] = true;
 }
 
 void InvariantFilter::HoldRotation(int foot, const SoleReading& reading) {
   const auto f = static_cast<size_t>(foot);
-  state_.foot_rotation[f] = Orthonormal(state_.rotation * reading.rotation);
-  CopyRows(kRotation, FootRotationRow(foot), reading.noise.bottomRightCorner<3, 3>());
+  state_.foot_rotation[f] = Orthonormal(SeenRotation(reading));
+  CopyRows(kRotation, FootRotationRow(foot), reading.by_compliance.tail<3>(),
+           reading.noise.bottomRightCorner<3, 3>());
   holds_rotation_[f] = true;
 }
 
@@ -137,23 +153,27 @@ void InvariantFilter::ReleaseRotation(int foot) {
   holds_rotation_[static_cast<size_t>(foot)] = false;
 }
 
-// R̂ y − (d̂ − p̂) = ξ_p − ξ_d + the reading's error: exact in ξ, whatever the estimate.
+// R̂ y − (d̂ − p̂) = ξ_p − ξ_d + the reading's error: exact in ξ, whatever the estimate; the reading's
+// error is noise and what the compliance's error makes of it.
 Vector3d InvariantFilter::PositionInnovation(int foot, const SoleReading& reading) const {
-  return state_.rotation * reading.position -
-         (state_.foot[static_cast<size_t>(foot)] - state_.position);
+  return SeenPosition(reading) - state_.foot[static_cast<size_t>(foot)];
 }
 
 // log(R̂ C F̂ᵀ) = ξ_R − ξ_F + the reading's error, to first order in ξ.
 Vector3d InvariantFilter::RotationInnovation(int foot, const SoleReading& reading) const {
-  return RotationLog(state_.rotation * reading.rotation *
+  return RotationLog(SeenRotation(reading) *
                      state_.foot_rotation[static_cast<size_t>(foot)].transpose());
 }
 
 InvariantFilter::Innovation InvariantFilter::Test(int foot, const SoleReading& reading) const {
-  const auto spread = [&](int minuend, int subtrahend) -> Matrix3d {
+  const auto spread = [&](int minuend, int subtrahend, const Vector3d& by_compliance) -> Matrix3d {
     const Covariance& c = covariance_;
+    const Vector3d cross =
+        c.block<3, 1>(minuend, kCompliance) - c.block<3, 1>(subtrahend, kCompliance);
     return c.block<3, 3>(minuend, minuend) + c.block<3, 3>(subtrahend, subtrahend) -
-           c.block<3, 3>(minuend, subtrahend) - c.block<3, 3>(subtrahend, minuend);
+           c.block<3, 3>(minuend, subtrahend) - c.block<3, 3>(subtrahend, minuend) +
+           cross * by_compliance.transpose() + by_compliance * cross.transpose() +
+           c(kCompliance, kCompliance) * by_compliance * by_compliance.transpose();
   };
   const auto squared = [](const Vector3d& z, const Matrix3d& s) {
     const Eigen::LLT<Matrix3d> factors(s);
@@ -161,14 +181,15 @@ InvariantFilter::Innovation InvariantFilter::Test(int foot, const SoleReading& r
   };
   Innovation result;
   if (holds_position(foot)) {
-    result.position =
-        squared(PositionInnovation(foot, reading),
-                spread(kPosition, FootRow(foot)) + reading.noise.topLeftCorner<3, 3>());
+    result.position = squared(PositionInnovation(foot, reading),
+                              spread(kPosition, FootRow(foot), reading.by_compliance.head<3>()) +
+                                  reading.noise.topLeftCorner<3, 3>());
   }
   if (holds_rotation(foot)) {
     result.rotation =
         squared(RotationInnovation(foot, reading),
-                spread(kRotation, FootRotationRow(foot)) + reading.noise.bottomRightCorner<3, 3>());
+                spread(kRotation, FootRotationRow(foot), reading.by_compliance.tail<3>()) +
+                    reading.noise.bottomRightCorner<3, 3>());
   }
   return result;
 }
@@ -178,9 +199,11 @@ bool InvariantFilter::Correct(int foot, const SoleReading& reading) {
   Eigen::Matrix<double, kSize, 6> ph;  // P Hᵀ
   ph.leftCols<3>() = c.middleCols<3>(kPosition) - c.middleCols<3>(FootRow(foot));
   ph.rightCols<3>() = c.middleCols<3>(kRotation) - c.middleCols<3>(FootRotationRow(foot));
+  ph.noalias() += c.col(kCompliance) * reading.by_compliance.transpose();
   Eigen::Matrix<double, 6, 6> s;
   s.topRows<3>() = ph.middleRows<3>(kPosition) - ph.middleRows<3>(FootRow(foot));
   s.bottomRows<3>() = ph.middleRows<3>(kRotation) - ph.middleRows<3>(FootRotationRow(foot));
+  s.noalias() += reading.by_compliance * ph.row(kCompliance);
   s += reading.noise;
   if (holds_position(foot) && holds_rotation(foot)) {
     Eigen::Matrix<double, 6, 1> innovation;
@@ -228,12 +251,13 @@ void InvariantFilter::TakeOut(const Error& error) {
   }
   state_.gyro_bias -= error.segment<3>(kGyroBias);
   state_.accelerometer_bias -= error.segment<3>(kAccelerometerBias);
+  state_.compliance -= error[kCompliance];
 }
 
 void InvariantFilter::Archive(StateArchive* archive) {
   InvariantState& s = state_;
   archive->Show(s.rotation, s.velocity, s.position, s.foot, s.foot_rotation, s.gyro_bias,
-                s.accelerometer_bias, covariance_, holds_position_, holds_rotation_);
+                s.accelerometer_bias, s.compliance, covariance_, holds_position_, holds_rotation_);
 }
 
 }  // namespace poise

@@ -5,7 +5,9 @@
 // X = (R, v, p, d_right, d_left) in SE_4(3), IMU and soles' origins in the world, beside both IMU
 // biases and, since soles are flat, each sole's rotation F in SO(3). Errors: ξ = log(X̂ X⁻¹), of a
 // sole's rotation log(F̂ Fᵀ), of a bias estimate − truth. Without biases ξ propagates and is
-// measured independently of the estimate. docs/estimation.md has the matrices.
+// measured independently of the estimate. The last state is the gears' compliance, of which the
+// readings of the soles depend: c, relative to what was assumed. docs/estimation.md has the
+// matrices.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +28,7 @@ struct InvariantState {
                                                   Eigen::Matrix3d::Identity()};
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< rad/s, IMU frame
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< m/s²
+  double compliance = 0;                                         ///< c; −0.2: 20 % stiffer
 };
 
 /// Readings that hold over a step, biases included.
@@ -44,13 +47,16 @@ struct SoleReading {
   Eigen::Matrix3d rotation;  ///< sole to IMU
   /// Covariance of its errors, [position; rotation vector], world axes.
   Eigen::Matrix<double, 6, 6> noise;
+  /// How the same errors depend on the error of the compliance, and with which one it was read.
+  Eigen::Matrix<double, 6, 1> by_compliance = Eigen::Matrix<double, 6, 1>::Zero();
+  double compliance = 0;
 };
 
 class InvariantFilter {
  public:
   /// First of the three rows of each error in the covariance.
   static constexpr int kRotation = 0, kVelocity = 3, kPosition = 6, kFoot = 9, kGyroBias = 15,
-                       kAccelerometerBias = 18, kFootRotation = 21, kSize = 27;
+                       kAccelerometerBias = 18, kFootRotation = 21, kCompliance = 27, kSize = 28;
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
   using Error = Eigen::Matrix<double, kSize, 1>;
 
@@ -77,6 +83,9 @@ class InvariantFilter {
   /// Takes it out.
   void ReleasePosition(int foot);
   void ReleaseRotation(int foot);
+  /// The sole in the world as IMU and joints show it, with the compliance as it is estimated.
+  Eigen::Vector3d SeenPosition(const SoleReading& reading) const;
+  Eigen::Matrix3d SeenRotation(const SoleReading& reading) const;
   bool holds_position(int foot) const { return holds_position_[static_cast<size_t>(foot)]; }
   bool holds_rotation(int foot) const { return holds_rotation_[static_cast<size_t>(foot)]; }
 
@@ -97,8 +106,10 @@ class InvariantFilter {
 
   static int FootRow(int foot) { return kFoot + 3 * foot; }
   static int FootRotationRow(int foot) { return kFootRotation + 3 * foot; }
-  /// Row block `to` becomes that of `from`, columns likewise, and `noise` is added on its diagonal.
-  void CopyRows(int from, int to, const Eigen::Matrix3d& noise);
+  /// The error at row `to` becomes that at `from` plus `by_compliance` times the compliance's plus
+  /// one of covariance `noise`.
+  void CopyRows(int from, int to, const Eigen::Vector3d& by_compliance,
+                const Eigen::Matrix3d& noise);
   void ClearRows(int row);
   template <int N>
   bool CorrectRows(const Eigen::Matrix<double, N, 1>& innovation,

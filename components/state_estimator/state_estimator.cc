@@ -71,6 +71,7 @@ InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config)
   }
   read("timing", in.timing(), &out.timing, true);
   read("gear_stiffness", in.gear_stiffness(), &out.gear_stiffness, true);
+  read("gear_stiffness_error", in.gear_stiffness_error(), &out.gear_stiffness_error, true);
   read("gyro_noise", in.gyro_noise(), &out.gyro_noise);
   read("accelerometer_noise", in.accelerometer_noise(), &out.accelerometer_noise);
   read("gyro_bias", in.gyro_bias(), &out.gyro_bias);

@@ -40,7 +40,8 @@ Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) 
   const std::string& name = spec.graph().component(index).name();
   ChangeConfiguration(fmt::format("{}.method={}", name,
                                   StateEstimatorConfig::Method_Name(
-                                      static_cast<StateEstimatorConfig::Method>(method))), &spec);
+                                      static_cast<StateEstimatorConfig::Method>(method))),
+                      &spec);
   SharedObjects shared;
   const ConfiguredComponent estimator =
       ConfigureComponent(spec, index, *Components().Find("state_estimator"), &shared);
