@@ -23,6 +23,8 @@ constexpr double kAccelerometerRange = 160, kAccelerometerFault = 50;  // m/s²
 constexpr double kUnknownEncoder = 1e-5;  // rad
 // Shares of the compliance that is assumed: no estimate is taken further.
 constexpr double kLeastCompliance = 0.1, kMostCompliance = 10;
+// s, over which innovations larger than their covariance are averaged.
+constexpr double kExcessTime = 0.05;
 // m between the soles: below it they do not show the heading.
 constexpr double kLeastStance = 0.02;
 // Standing still at first, as far as feet and IMU can move against each other unseen.
@@ -274,6 +276,7 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
       filter_.ReleaseRotation(i);
       foot.slip_left = foot.turn_left = 0;
       foot.innovation = 0;
+      foot.excess = 1;
       continue;
     }
     if (!filter_.holds_position(i)) {
@@ -310,11 +313,17 @@ void InvariantEstimator::Correct(double dt) {
   for (size_t f = 0; f < 2; ++f) {
     Foot& foot = feet_[f];
     if (!foot.loaded) continue;
+    const double scale = std::max(1.0, foot.excess);
+    foot.reading.noise *= scale;
     const InvariantFilter::Innovation test = filter_.Test(static_cast<int>(f), foot.reading);
     foot.innovation = test.position;
     moved[f] = (foot.slip_left <= 0 && test.position > config_.gate) ||
                (foot.turn_left <= 0 && test.rotation > config_.gate);
     firm += foot.slip_left <= 0 ? 1 : 0;
+    if (!moved[f]) {
+      const double shown = scale * std::max(test.position, test.rotation) / 3;  // 3: its mean
+      foot.excess += std::min(dt / kExcessTime, 1.0) * (shown - foot.excess);
+    }
   }
   // Feet that stand still first: they tell whether the others do.
   for (const bool after : {false, true}) {
@@ -460,8 +469,8 @@ void InvariantEstimator::Archive(StateArchive* archive) {
   archive->Show(joint_position_, torque_, unrest_, gyro_, last_gyro_, force_, last_force_,
                 imu_good_, last_imu_good_, placed_);
   for (Foot& foot : feet_) {
-    archive->Show(foot.loaded, foot.slip_left, foot.slip_time, foot.turn_left, foot.slip_start,
-                  foot.turn_start);
+    archive->Show(foot.loaded, foot.excess, foot.slip_left, foot.slip_time, foot.turn_left,
+                  foot.slip_start, foot.turn_start);
   }
 }
 

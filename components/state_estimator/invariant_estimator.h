@@ -75,6 +75,9 @@ class InvariantEstimator {
     Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();  // where the present rest_time began
     Eigen::Matrix3d turn_start = Eigen::Matrix3d::Identity();
     double innovation = 0;
+    // Mean of the squared innovation over what is expected: above 1 the readings are worse than
+    // their noise says (a gear that rings), and the noise is taken to be so much larger.
+    double excess = 1;
     SoleReading reading;  // of this step
   };
 
