@@ -27,6 +27,8 @@ constexpr double kLeastCompliance = 0.1, kMostCompliance = 10;
 constexpr double kExcessTime = 0.05;
 // m between the soles: below it they do not show the heading.
 constexpr double kLeastStance = 0.02;
+// Before the ground defines the world, which leaves nothing of it: rad, m.
+constexpr double kUnplacedTurn = 0.1, kUnplaced = 0.1;
 // Standing still at first, as far as feet and IMU can move against each other unseen.
 constexpr double kStartSpeed = 0.01;  // m/s
 // s, in which the ringing of a gear dies away: rotor and link of a tenth of a kg·m² on a harmonic
@@ -141,7 +143,9 @@ void InvariantEstimator::ReadSoles() {
       const robot::Vector6d column = kinematics_.RelativeColumn(f, j);
       double variance = Square(encoder_noise_[j]);
       if (config_.gear_stiffness > 0) {
-        variance += Square(unrest_[j] / config_.gear_stiffness);
+        // The same error for kRinging, of which white noise must be so much larger to tell as
+        // little.
+        variance += kRinging / period_ * Square(unrest_[j] / config_.gear_stiffness);
         windup -= torque_[j] / config_.gear_stiffness * column;
       }
       noise.noalias() += variance * column * column.transpose();
@@ -166,50 +170,82 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   InvariantState state;
   state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
   state.position = placement.position + placement.orientation * kinematics_.imu_position();
-  // What is not known of the tilt turns the robot about its soles, at the origin: in ξ the errors
-  // of tilt and position are then independent.
   InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
-  deviation.segment<3>(InvariantFilter::kRotation) << config_.start_tilt, config_.start_tilt,
-      config_.start_yaw;
+  deviation.segment<3>(InvariantFilter::kRotation).setConstant(kUnplacedTurn);
   deviation.segment<3>(InvariantFilter::kVelocity).setConstant(kStartSpeed);
-  deviation.segment<3>(InvariantFilter::kPosition).setConstant(config_.start_position);
+  deviation.segment<3>(InvariantFilter::kPosition).setConstant(kUnplaced);
   deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
   deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
-  InvariantFilter::Covariance covariance = deviation.cwiseAbs2().asDiagonal();
-  filter_.Set(state, covariance);
-  // The soles are where the ground is, so that the compliance's error turns and moves the base.
-  ReadSoles();
-  const InvariantFilter::Error moved = PlacedByCompliance(weights);
-  covariance += Square(config_.gear_stiffness_error) * moved * moved.transpose();
-  filter_.Set(state, covariance);
+  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
+  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+  unrest_.setConstant(config_.start_torque);
   UpdateContacts(sensors);
-  for (Foot& foot : feet_) foot.slip_left = foot.turn_left = 0;  // at rest
+  for (size_t f = 0; f < 2; ++f) {
+    Foot& foot = feet_[f];
+    const int i = static_cast<int>(f);
+    if (foot.loaded && !filter_.holds_rotation(i)) filter_.HoldRotation(i, foot.reading);
+    foot.slip_left = foot.turn_left = 0;  // at rest
+  }
+  DefineWorld(weights);
 }
 
-// How all errors at the start depend on that of the compliance: PlaceOnGround, linearised, with the
-// soles' errors of ReadSoles.
-InvariantFilter::Error InvariantEstimator::PlacedByCompliance(const FootWeights& weights) const {
-  std::array<double, 2> share = weights.share;
-  if (weights.standing == 0) share = {0.5, 0.5};
-  const robot::Vector6d &right = feet_[0].reading.by_compliance,
-                        &left = feet_[1].reading.by_compliance;
-  const robot::Vector6d mean = share[0] * right + share[1] * left;
-  InvariantFilter::Error moved = InvariantFilter::Error::Zero();
-  moved[InvariantFilter::kCompliance] = 1;
-  moved.segment<2>(InvariantFilter::kRotation) = -mean.segment<2>(3);
-  const Vector3d apart =
-      filter_.state().rotation * (feet_[1].reading.position - feet_[0].reading.position);
-  if (apart.y() > kLeastStance) {
-    moved[InvariantFilter::kRotation + 2] = (left[0] - right[0]) / apart.y();
+// The soles are where the ground is, as PlaceOnGround put them: level on average, at the height 0,
+// about the origin, along y. What is not known of joints and gears is thus the base's.
+void InvariantEstimator::DefineWorld(const FootWeights& weights) {
+  using Row = InvariantFilter::Error;
+  const auto row = [](int first, int axis) { return Row(Row::Unit(first + axis)); };
+  std::array<double, 2> share{};
+  for (size_t f = 0; f < 2; ++f) {
+    if (feet_[f].loaded) share[f] = weights.share[f];
   }
-  // The soles' midpoint is the origin, about which the error of the rotation turns.
-  moved.segment<2>(InvariantFilter::kPosition) = -0.5 * (right + left).head<2>();
-  const InvariantState& s = filter_.state();
-  const Vector3d center = s.position + s.rotation * (share[0] * feet_[0].reading.position +
-                                                     share[1] * feet_[1].reading.position);
-  const Vector3d turn = moved.segment<3>(InvariantFilter::kRotation);
-  moved[InvariantFilter::kPosition + 2] = -mean[2] - turn.cross(center).z();
-  return moved;
+  const double sum = share[0] + share[1];
+  if (!(sum > 0)) {  // on a hoist
+    for (int axis = 0; axis < 3; ++axis) {
+      filter_.Know(row(InvariantFilter::kRotation, axis),
+                   axis < 2 ? config_.start_tilt : config_.start_yaw);
+      filter_.Know(row(InvariantFilter::kPosition, axis), config_.start_position);
+    }
+    return;
+  }
+  // Of right and left sole, weighted: where they are, d̂ − d = ξ_d + ξ_R × d, of a sole that is not
+  // held as the joints show it; and how they are turned.
+  const auto moved = [&](int axis, double right, double left, double deviation) {
+    Row h = Row::Zero();
+    double variance = Square(deviation);
+    for (size_t f = 0; f < 2; ++f) {
+      const double weight = f == 0 ? right : left;
+      const SoleReading& reading = feet_[f].reading;
+      const bool held = filter_.holds_position(static_cast<int>(f));
+      const int place =
+          held ? InvariantFilter::kFoot + 3 * static_cast<int>(f) : InvariantFilter::kPosition;
+      h[place + axis] += weight;
+      h.segment<3>(InvariantFilter::kRotation) -=
+          weight * Skew(filter_.SeenPosition(reading)).row(axis).transpose();
+      if (!held) {
+        h[InvariantFilter::kCompliance] += weight * reading.by_compliance[axis];
+        variance += Square(weight) * reading.noise(axis, axis);
+      }
+    }
+    filter_.Know(h, std::sqrt(variance));
+  };
+  const auto turned = [&](int axis, double right, double left, double deviation) {
+    const Row h = right * row(InvariantFilter::kFootRotation, axis) +
+                  left * row(InvariantFilter::kFootRotation + 3, axis);
+    filter_.Know(h, deviation);
+  };
+  const double right = share[0] / sum, left = share[1] / sum;
+  for (int axis = 0; axis < 2; ++axis) {
+    turned(axis, right, left, config_.start_tilt);
+    moved(axis, 0.5, 0.5, config_.start_position);
+  }
+  moved(2, right, left, config_.start_position);
+  const double apart =
+      filter_.SeenPosition(feet_[1].reading).y() - filter_.SeenPosition(feet_[0].reading).y();
+  if (apart > kLeastStance) {
+    moved(0, -1 / apart, 1 / apart, config_.start_yaw);
+  } else {
+    turned(2, right, left, config_.start_yaw);
+  }
 }
 
 void InvariantEstimator::Propagate(double dt) {

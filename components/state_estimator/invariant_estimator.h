@@ -31,7 +31,7 @@ struct InvariantEstimatorConfig {
   double gyro_noise = 1e-4, accelerometer_noise = 1e-2;
   double gyro_bias = 1e-3, accelerometer_bias = 0.1;
   double gyro_bias_walk = 1e-6, accelerometer_bias_walk = 1e-4;
-  double start_position = 5e-5, start_tilt = 5e-4, start_yaw = 5e-5;
+  double start_position = 5e-5, start_tilt = 5e-4, start_yaw = 5e-5, start_torque = 30;
   double contact_walk = 2e-5, turn_walk = 2e-5;
   double slip_speed = 0.3, turn_speed = 1;
   double cop_margin = 0.02;
@@ -85,7 +85,7 @@ class InvariantEstimator {
   void ReadImu(const BaseSensors& sensors);
   void ReadSoles();
   void Place(const BaseSensors& sensors);
-  InvariantFilter::Error PlacedByCompliance(const FootWeights& weights) const;
+  void DefineWorld(const FootWeights& weights);
   void Propagate(double dt);
   void Recover(bool finite);
   void UpdateContacts(const BaseSensors& sensors);

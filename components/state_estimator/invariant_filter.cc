@@ -101,6 +101,12 @@ void InvariantFilter::Doubt(double rotation_variance, double velocity_variance,
   covariance_.diagonal().segment<3>(kPosition).array() += position_variance;
 }
 
+void InvariantFilter::Know(const Error& row, double deviation) {
+  const Error spread = covariance_ * row;
+  const double variance = row.dot(spread) + deviation * deviation;
+  if (variance > 0) covariance_ -= spread / variance * spread.transpose();
+}
+
 void InvariantFilter::CopyRows(int from, int to, const Vector3d& by_compliance,
                                const Matrix3d& noise) {
   ClearRows(to);

@@ -77,6 +77,10 @@ class InvariantFilter {
   /// Adds to rotation (rad²), velocity ((m/s)²) and position (m²) what the readings cannot explain.
   void Doubt(double rotation_variance, double velocity_variance, double position_variance);
 
+  /// Takes as known that `row` times the errors is 0 within `deviation`, a standard deviation: of
+  /// what defines the world. The state stays as it is.
+  void Know(const Error& row, double deviation);
+
   /// Takes a sole into the state where the reading sees it; what it was before is forgotten.
   void HoldPosition(int foot, const SoleReading& reading);
   void HoldRotation(int foot, const SoleReading& reading);

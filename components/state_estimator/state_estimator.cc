@@ -81,6 +81,7 @@ InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config)
   read("start_position", in.start_position(), &out.start_position);
   read("start_tilt", in.start_tilt(), &out.start_tilt);
   read("start_yaw", in.start_yaw(), &out.start_yaw);
+  read("start_torque", in.start_torque(), &out.start_torque, true);
   read("contact_walk", in.contact_walk(), &out.contact_walk, true);
   read("turn_walk", in.turn_walk(), &out.turn_walk, true);
   read("slip_speed", in.slip_speed(), &out.slip_speed);

@@ -256,6 +256,48 @@ TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
   }
 }
 
+// Drives that are just switched on: the first readings show no torque, though the gears carry the
+// robot. The soles stand on the ground all the while.
+TEST(InvariantEstimator, TorquesThatCannotBeTrustedAtFirstDoNotTiltTheWorld) {
+  constexpr double kStiffness = 2e4;
+  for (const bool trusted : {false, true}) {
+    BaseMotion motion(Dyros());
+    motion.errors() = TypicalErrors(*motion.model());
+    const int n = motion.model()->num_joints();
+    InvariantEstimatorConfig config;
+    config.gear_stiffness = kStiffness;
+    if (trusted) config.start_torque = 0;
+    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    Eigen::VectorXd torque(n), reading(n), shown(n);
+    for (int j = 0; j < n; ++j) torque[j] = 25 * std::sin(1 + j);
+    int inside = 0, ticks = 0;
+    while (motion.time() < 2) {
+      motion.Next();
+      const BaseSensors sensors = motion.sensors();
+      reading = sensors.joint_position + torque / kStiffness;
+      shown = std::min(motion.time() / 0.012, 1.0) * torque;
+      estimator.Update({{reading.data(), n},
+                        sensors.angular_velocity,
+                        sensors.acceleration,
+                        sensors.foot_load,
+                        sensors.foot_cop,
+                        {shown.data(), n}},
+                       kPeriod);
+      const auto error = BaseError(estimator.state(), motion.truth());
+      inside += error.dot(estimator.covariance().ldlt().solve(error)) < kChiSquared9 ? 1 : 0;
+      ++ticks;
+    }
+    const double tilt = BaseError(estimator.state(), motion.truth()).head<2>().norm();
+    if (trusted) {
+      EXPECT_GT(tilt, 2e-4);
+      EXPECT_LT(inside, 0.5 * ticks);
+    } else {
+      EXPECT_LT(tilt, 1e-4);
+      EXPECT_GT(inside, 0.9 * ticks);
+    }
+  }
+}
+
 // Torques that change show how soft the gears are: what the covariance says of the base holds
 // although the stiffness is off by a third, and no longer when it is taken to be certain.
 TEST(InvariantEstimator, AnUncertainStiffnessIsFound) {

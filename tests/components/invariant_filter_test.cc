@@ -511,6 +511,31 @@ TEST(InvariantFilter, HeadingAndPositionAreNotObservable) {
   for (const int i : {0, 1, 3, 4, 5, 15, 16, 17}) EXPECT_LT(last[i], 0.5 * first[i]) << i;
 }
 
+// Conditioning of a Gaussian: of the rest on a sum that is known, by the inverse covariance.
+TEST(InvariantFilter, WhatIsKnownConditionsTheRest) {
+  Random random(13);
+  Covariance root;
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 0; j < kSize; ++j) root(i, j) = random.Normal();
+  }
+  const World world(&random);
+  InvariantFilter filter(kGravity);
+  filter.Set(world.state, root * root.transpose());
+  Error row;
+  for (int i = 0; i < kSize; ++i) row[i] = random.Normal();
+  constexpr double kDeviation = 0.3;
+  const Eigen::MatrixXd information = Eigen::MatrixXd(filter.covariance()).inverse() +
+                                      row * row.transpose() / (kDeviation * kDeviation);
+  filter.Know(row, kDeviation);
+  EXPECT_LT((filter.covariance() - information.inverse()).norm(),
+            1e-6 * information.inverse().norm());
+  EXPECT_EQ(filter.state().position, world.state.position);
+  filter.Know(row, 0);
+  EXPECT_NEAR(row.dot(filter.covariance() * row), 0, 1e-9);
+  filter.Know(row, 0);  // again: nothing to learn
+  EXPECT_TRUE(filter.covariance().allFinite());
+}
+
 TEST(InvariantFilter, StaysPositiveDefiniteOverMinutes) {
   Swaying truth(9);
   InvariantFilter filter = Begin(&truth, Error::Zero(), StartCovariance());
