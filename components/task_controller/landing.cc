@@ -6,7 +6,6 @@ namespace poise {
 namespace {
 
 constexpr double kTimeTolerance = 1e-9;  // s, far below a tick, far above rounding
-constexpr double kMaxPeriod = 0.02;      // s, counted after a gap of the ticks
 // Time constant, s, of the reference's velocity: a search begins and a lowering ends without a
 // step.
 constexpr double kVelocityTime = 0.05;

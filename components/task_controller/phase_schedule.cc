@@ -131,6 +131,9 @@ void CheckTaskControllerConfig(const TaskControllerConfig& config) {
   CheckGains(config.has_orientation(), config.orientation(), "orientation",
              "give kp and kd of the body's orientation");
   if (config.has_posture()) CheckGains(true, config.posture(), "posture", "");
+  if (!(config.com_lag() > 0) || !std::isfinite(config.com_lag())) {
+    throw ConfigError("com_lag", "must be a positive number of m");
+  }
   CheckContact(config.contact());
   if (config.phase_size() == 0) throw ConfigError("phase", "is missing; give at least one phase");
   for (int i = 0; i < config.phase_size(); ++i) {

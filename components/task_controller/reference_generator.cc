@@ -71,6 +71,18 @@ PointMotion ReferencePoint::At(double time) {
   return move_.At(time);
 }
 
+PointMotion ReferencePoint::Slow(double time, double period, double rate) {
+  PointMotion motion = At(time);
+  if (rate >= 1 || !move_.UnderWay(time)) return motion;
+  const double delay = (1 - rate) * period;
+  move_.Postpone(delay);
+  if (!pending_) start_ += delay;
+  motion = move_.At(time);
+  motion.velocity *= rate;
+  motion.acceleration *= rate * rate;
+  return motion;
+}
+
 void ReferencePoint::Archive(StateArchive* archive) {
   move_.Archive(archive);
   archive->Show(pending_, target_, start_, duration_);
@@ -84,7 +96,7 @@ void References::Archive(StateArchive* archive) {
 }
 
 void ReferenceGenerator::Archive(StateArchive* archive) {
-  archive->Show(anchored_, foot_free_);
+  archive->Show(time_, anchored_, foot_free_);
   com_.Archive(archive);
   for (ReferencePoint& foot : foot_) foot.Archive(archive);
   references_.Archive(archive);
@@ -151,8 +163,13 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
   }
 }
 
-const References& ReferenceGenerator::Update(double time) {
-  references_.com = com_.At(time);
+const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d& com) {
+  const PointMotion on_time = com_.At(time);
+  const double speed = on_time.velocity.norm();
+  const double lag = speed > 0 ? (on_time.position - com).dot(on_time.velocity) / speed : 0;
+  const double rate = std::clamp(2 * (1 - lag / com_lag_), 0.0, 1.0);
+  references_.com = com_.Slow(time, std::clamp(time - time_, 0.0, kMaxPeriod), rate);
+  time_ = time;
   for (size_t i = 0; i < 2; ++i) {
     if (foot_free_[i]) references_.foot[i] = foot_[i].At(time);
   }

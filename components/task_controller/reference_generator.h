@@ -10,6 +10,9 @@
 
 namespace poise {
 
+/// s, counted at most for a tick after a gap of the ticks.
+inline constexpr double kMaxPeriod = 0.02;
+
 /// Position, velocity and acceleration of a point, m and s.
 struct PointMotion {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -29,6 +32,9 @@ class QuinticMove {
   /// From `from` at `start` to rest at `target` at start + duration, s. Duration 0 is a step.
   void Begin(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
   PointMotion At(double time) const;
+  bool UnderWay(double time) const { return time > start_ && time < start_ + duration_; }
+  /// What is left of it comes later by `delay`, s.
+  void Postpone(double delay) { start_ += delay; }
   void Archive(StateArchive* archive) { archive->Show(coefficient_, start_, duration_); }
 
  private:
@@ -45,6 +51,9 @@ class ReferencePoint {
   void Schedule(const Eigen::Vector3d& target, double start, double duration);
   /// `time` must not decrease from call to call.
   PointMotion At(double time);
+  /// Goes on with the move under way at the share `rate` of its speed, for the `period` s until
+  /// `time`; the motion there.
+  PointMotion Slow(double time, double period, double rate);
   /// Where and when, s, the last move ends.
   const Eigen::Vector3d& target() const { return target_; }
   double end() const { return start_ + duration_; }
@@ -80,9 +89,14 @@ struct References {
 /// a phase of gravity compensation they start from the estimated pose again.
 class ReferenceGenerator {
  public:
+  /// `com_lag`: m, of the COM behind a move of its reference, at which the move stands still; from
+  /// half of it on it slows down.
+  explicit ReferenceGenerator(double com_lag) : com_lag_(com_lag) {}
+
   /// First tick: everything holds where it is. COM targets of the phase are set relative to that.
   void BeginPhase(const Phase& phase, const EstimatedPose& estimate, double time);
-  const References& Update(double time);
+  /// Once a tick. The COM's move waits for the COM at `com`, m, world.
+  const References& Update(double time, const Eigen::Vector3d& com);
   /// From here on the free foot rests there; its moves under way and to come are dropped.
   void HoldFoot(size_t foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
   const ReferencePoint& foot(size_t index) const { return foot_[index]; }
@@ -92,6 +106,8 @@ class ReferenceGenerator {
   Eigen::Vector3d ComTarget(const ComReference& com, const EstimatedPose& estimate,
                             const Eigen::Vector3d& standing) const;
 
+  double com_lag_;
+  double time_ = 0;  // s, of the last update
   bool anchored_ = false;
   std::array<bool, 2> foot_free_{false, false};
   ReferencePoint com_;

@@ -84,6 +84,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   schedule_.emplace(config);
+  generator_.emplace(config.com_lag());
   landing_.assign(2, Landing(config.contact()));
   tasks_.emplace(*model_, ReadGains(config.com()), ReadGains(config.orientation()),
                  ReadGains(config.foot()));
@@ -116,7 +117,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 
 bool TaskController::Archive(StateArchive* archive) {
   schedule_->Archive(archive);
-  generator_.Archive(archive);
+  generator_->Archive(archive);
   for (Landing& landing : landing_) landing.Archive(archive);
   references_.Archive(archive);
   archive->Show(in_contact_, started_, last_controlled_, posture_reference_);
@@ -158,7 +159,7 @@ int8_t TaskController::Control(double time) {
 bool TaskController::BeginPhase(double time) {
   const Phase& phase = schedule_->phase();
   const EstimatedPose estimate = Estimate();
-  generator_.BeginPhase(phase, estimate, time);
+  generator_->BeginPhase(phase, estimate, time);
   const std::array<bool, 2> last_contact = in_contact_;
   in_contact_ = ContactsOf(phase.support());
   for (size_t i = 0; i < 2; ++i) {
@@ -170,9 +171,9 @@ bool TaskController::BeginPhase(double time) {
     }
     const bool moves = phase.has_foot() && static_cast<size_t>(phase.foot().foot()) == i;
     const PointMotion& standing = references_.foot[i];
-    if (moves && !landing_[i].BeginMove(standing.position.z(), generator_.foot(i).target().z(),
-                                        generator_.foot(i).end())) {
-      generator_.HoldFoot(i, standing.position, references_.foot_rotation[i]);
+    if (moves && !landing_[i].BeginMove(standing.position.z(), generator_->foot(i).target().z(),
+                                        generator_->foot(i).end())) {
+      generator_->HoldFoot(i, standing.position, references_.foot_rotation[i]);
     }
   }
   last_controlled_ = !phase.gravity_compensation();
@@ -180,7 +181,7 @@ bool TaskController::BeginPhase(double time) {
 }
 
 void TaskController::UpdateReferences(double time) {
-  references_ = generator_.Update(time);
+  references_ = generator_->Update(time, whole_body_->data().com);
   if (schedule_->phase().gravity_compensation()) return;
   const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
   for (size_t i = 0; i < 2; ++i) {
@@ -190,7 +191,7 @@ void TaskController::UpdateReferences(double time) {
     if (landing_[i].Update(schedule_->BeforeTouchDown(), due, whole_body_->data().foot_pose[i],
                            foot, rotation)) {
       // Where the landing ends, the scenario goes on from here.
-      generator_.HoldFoot(i, foot->position, *rotation);
+      generator_->HoldFoot(i, foot->position, *rotation);
     }
   }
 }

@@ -51,7 +51,7 @@ class TaskController : public Component {
   std::optional<PhaseSchedule> schedule_;
   std::optional<TaskStack> tasks_;
   std::optional<balance::TaskDynamics> task_dynamics_;
-  ReferenceGenerator generator_;
+  std::optional<ReferenceGenerator> generator_;
   std::vector<Landing> landing_;  // by foot
   References references_;
   robot::RobotState state_;

@@ -204,6 +204,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"com { kp: -1 kd: 1 }", "com.kp"}, Refused{"com { kp: 1 }", "com.kd"},
         Refused{"com { kp: 1 kd: nan }", "com.kd"},
         Refused{"com { kp: 1 kd: 1 } orientation { kp: 1 kd: 0 }", "orientation.kd"},
+        Refused{GAINS "com_lag: 0", "com_lag"}, Refused{GAINS "com_lag: nan", "com_lag"},
         Refused{GAINS "contact { touch_load: 0 }", "contact.touch_load"},
         Refused{GAINS "contact { touch_load: nan }", "contact.touch_load"},
         Refused{GAINS "contact { touch_load: 3 }", "contact.release_load"},
@@ -273,6 +274,8 @@ EstimatedPose Pose() {
   return pose;
 }
 
+constexpr double kNeverWaits = 1e9;  // m, COM lag
+
 Phase ParsePhase(const std::string& text) {
   Phase phase;
   ParseTextProto(text, "phase", &phase);
@@ -280,13 +283,13 @@ Phase ParsePhase(const std::string& text) {
 }
 
 TEST(ReferenceGenerator, MovesAlongTheMinimumJerkLine) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(
       ParsePhase("start: 0 com { target: OVER_RIGHT x: 0.005 z: -0.03 duration: 2 delay: 0.5 }"),
       Pose(), 0);
   const Eigen::Vector3d from = Pose().com, to(0.03 + 0.005, -0.1, 0.7 - 0.03);
   for (double t = 0; t < 3; t += 0.01) {
-    const PointMotion motion = references.Update(t).com;
+    const PointMotion motion = references.Update(t, Pose().com).com;
     // Flash and Hogan's polynomial.
     const double s = std::clamp((t - 0.5) / 2, 0.0, 1.0);
     const double p = 10 * std::pow(s, 3) - 15 * std::pow(s, 4) + 6 * std::pow(s, 5);
@@ -301,10 +304,10 @@ TEST(ReferenceGenerator, MovesAlongTheMinimumJerkLine) {
 TEST(ReferenceGenerator, TargetsOfThePhases) {
   const Eigen::Vector3d middle(0.01, 0.005, 0.7), left(-0.01, 0.11, 0.7), com = Pose().com;
   const auto end = [](const std::string& target) {
-    ReferenceGenerator references;
+    ReferenceGenerator references(kNeverWaits);
     references.BeginPhase(ParsePhase("start: 0 com { target: " + target + " duration: 1 }"), Pose(),
                           0);
-    return references.Update(1.5).com.position;
+    return references.Update(1.5, Pose().com).com.position;
   };
   EXPECT_LT((end("OVER_LEFT y: -0.02") - left - Eigen::Vector3d(0, -0.02, 0)).norm(), 1e-15);
   EXPECT_LT((end("OVER_MIDDLE") - middle).norm(), 1e-15);
@@ -313,44 +316,102 @@ TEST(ReferenceGenerator, TargetsOfThePhases) {
 }
 
 TEST(ReferenceGenerator, PhasesJoinInPositionVelocityAndAcceleration) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
   EstimatedPose moved = Pose();
   moved.com += Eigen::Vector3d(0.05, 0, 0);  // the estimate must not matter any more
-  const PointMotion before = references.Update(0.7).com;
+  const PointMotion before = references.Update(0.7, Pose().com).com;
   references.BeginPhase(ParsePhase("start: 0.7 com { target: OVER_LEFT duration: 1 }"), moved, 0.7);
-  const PointMotion after = references.Update(0.7).com;
+  const PointMotion after = references.Update(0.7, Pose().com).com;
   EXPECT_LT((after.position - before.position).norm(), 1e-14);
   EXPECT_LT((after.velocity - before.velocity).norm(), 1e-14);
   EXPECT_LT((after.acceleration - before.acceleration).norm(), 1e-12);
   EXPECT_GT(before.velocity.norm(), 0.05);
-  const PointMotion end = references.Update(1.7).com;
+  const PointMotion end = references.Update(1.7, Pose().com).com;
   EXPECT_LT((end.position.head<2>() - moved.sole[1].translation().head<2>()).norm(), 1e-14);
   EXPECT_EQ(end.velocity.norm(), 0);
   // Velocity is the derivative of position, acceleration of velocity.
   const double h = 1e-5;
   for (double t = 0.75; t < 1.65; t += 0.05) {
-    ReferenceGenerator again;
+    ReferenceGenerator again(kNeverWaits);
     again.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
-    again.Update(0.7);
+    again.Update(0.7, Pose().com);
     again.BeginPhase(ParsePhase("start: 0.7 com { target: OVER_LEFT duration: 1 }"), moved, 0.7);
-    const PointMotion low = again.Update(t - h).com, mid = again.Update(t).com,
-                      high = again.Update(t + h).com;
+    const PointMotion low = again.Update(t - h, Pose().com).com,
+                      mid = again.Update(t, Pose().com).com,
+                      high = again.Update(t + h, Pose().com).com;
     EXPECT_LT(((high.position - low.position) / (2 * h) - mid.velocity).norm(), 1e-8);
     EXPECT_LT(((high.velocity - low.velocity) / (2 * h) - mid.acceleration).norm(), 1e-7);
   }
 }
 
+constexpr double kLag = 0.03, kPeriod = 0.002;  // m, s
+
+ReferenceGenerator ShiftBegun() {
+  ReferenceGenerator references(kLag);
+  references.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.1 duration: 2 }"), Pose(), 0);
+  return references;
+}
+
+TEST(ReferenceGenerator, WaitsForAComThatStandsAndEndsWhenItFollows) {
+  ReferenceGenerator references = ShiftBegun();
+  const Eigen::Vector3d start = Pose().com;
+  double t = 0, last = 0;
+  for (; t < 10; t += kPeriod) {
+    const double ahead = (references.Update(t, start).com.position - start).y();
+    EXPECT_GE(ahead, last);
+    EXPECT_LT(ahead, kLag);
+    last = ahead;
+  }
+  EXPECT_GT(last, 0.95 * kLag);
+  EXPECT_LT(references.Update(t, start).com.velocity.norm(), 1e-3);
+  EXPECT_LT(references.Update(t, start).com.acceleration.norm(), 1e-3);
+  Eigen::Vector3d com = start;
+  for (; t < 13; t += kPeriod) com = references.Update(t, com).com.position;
+  EXPECT_LT((com - start - Eigen::Vector3d(0, 0.1, 0)).norm(), 1e-14);
+}
+
+TEST(ReferenceGenerator, SlowsDownByTheComsLag) {
+  // Behind by three quarters of the lag at which it stands still: half the speed, twice the time.
+  ReferenceGenerator references = ShiftBegun();
+  double ended = 0;
+  Eigen::Vector3d at = Pose().com;
+  const Eigen::Vector3d behind(0, 0.75 * kLag, 0);
+  for (double t = 0; t < 6; t += kPeriod) {
+    const Eigen::Vector3d before = at;
+    const PointMotion motion = references.Update(t, at - behind).com;
+    at = motion.position;
+    if (t > 0.5 && t < 3.5) {
+      EXPECT_NEAR((at - before).y() / kPeriod, motion.velocity.y(), 2e-3);
+    }
+    if (motion.velocity.norm() > 0) ended = t;
+  }
+  EXPECT_NEAR(ended, 4, 0.08);  // the COM is behind the tick before
+}
+
+TEST(ReferenceGenerator, NeitherAComAheadNorOneBesideTheMoveSlowsItDown) {
+  for (const Eigen::Vector3d& beside :
+       {Eigen::Vector3d(0, 0.05, 0), Eigen::Vector3d(0.05, 0, 0.05)}) {
+    ReferenceGenerator references = ShiftBegun(), on_time = ShiftBegun();
+    Eigen::Vector3d at = Pose().com;
+    for (double t = 0; t < 3; t += kPeriod) {
+      const Eigen::Vector3d expected = on_time.Update(t, at).com.position;
+      at = references.Update(t, at + beside).com.position;
+      EXPECT_EQ(at, expected);
+    }
+  }
+}
+
 TEST(ReferenceGenerator, APhaseWithoutComReferenceLetsTheMotionEnd) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(ParsePhase("start: 0 com { target: SHIFT y: 0.2 duration: 2 }"), Pose(), 0);
-  references.Update(0.7);
+  references.Update(0.7, Pose().com);
   references.BeginPhase(ParsePhase("start: 0.7"), Pose(), 0.7);
-  EXPECT_NEAR(references.Update(2.5).com.position.y(), 0.22, 1e-14);
+  EXPECT_NEAR(references.Update(2.5, Pose().com).com.position.y(), 0.22, 1e-14);
 }
 
 TEST(ReferenceGenerator, TheFreeFootStartsWhereItIsWhenItLeavesTheGround) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(ParsePhase("start: 0"), Pose(), 0);
   EstimatedPose later = Pose();
   later.sole[1].translation() = Eigen::Vector3d(0.07, 0.13, 0.004);
@@ -358,53 +419,56 @@ TEST(ReferenceGenerator, TheFreeFootStartsWhereItIsWhenItLeavesTheGround) {
   references.BeginPhase(ParsePhase("start: 1 support: RIGHT foot { foot: LEFT_FOOT x: 0.05 "
                                    "height_above_support: 0.12 duration: 2 delay: 0.1 }"),
                         later, 1);
-  const References at_lift = references.Update(1.0);
+  const References at_lift = references.Update(1.0, Pose().com);
   EXPECT_EQ(at_lift.foot[1].position, later.sole[1].translation());
   EXPECT_EQ(at_lift.foot_rotation[1], later.sole[1].linear());
-  const References end = references.Update(3.2);
+  const References end = references.Update(3.2, Pose().com);
   EXPECT_LT((end.foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.121)).norm(), 1e-14);
   EXPECT_EQ(end.foot_rotation[1], later.sole[1].linear());
   // A second phase in the air goes on from the reference, not from the estimate.
   references.BeginPhase(
       ParsePhase("start: 4 support: RIGHT foot { foot: LEFT_FOOT z: -0.05 duration: 1 }"), later,
       4);
-  EXPECT_LT((references.Update(5).foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.071)).norm(),
+  EXPECT_LT((references.Update(5, Pose().com).foot[1].position - Eigen::Vector3d(0.12, 0.13, 0.071))
+                .norm(),
             1e-14);
 }
 
 TEST(ReferenceGenerator, AHeldFootRestsAndLaterMovesStartThere) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(ParsePhase("start: 0 support: RIGHT foot { foot: LEFT_FOOT z: 0.1 "
                                    "duration: 1 }"),
                         Pose(), 0);
   EXPECT_NEAR(references.foot(1).target().z(), 0.102, 1e-15);
   EXPECT_NEAR(references.foot(1).end(), 1, 1e-15);
-  references.Update(0.5);
+  references.Update(0.5, Pose().com);
   const Eigen::Vector3d place(0.01, 0.12, 0.07);
   const Eigen::Matrix3d rotation =
       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix();
   references.HoldFoot(1, place, rotation);
   for (const double time : {0.5, 0.7, 2.0}) {
-    const References& held = references.Update(time);
+    const References& held = references.Update(time, Pose().com);
     EXPECT_EQ(held.foot[1].position, place);
     EXPECT_EQ(held.foot[1].velocity.norm(), 0);
     EXPECT_EQ(held.foot_rotation[1], rotation);
   }
   references.BeginPhase(ParsePhase("start: 2 support: RIGHT foot { foot: LEFT_FOOT z: 0.03 }"),
                         Pose(), 2);
-  EXPECT_LT((references.Update(2.1).foot[1].position - place - Eigen::Vector3d(0, 0, 0.03)).norm(),
-            1e-15);
+  EXPECT_LT(
+      (references.Update(2.1, Pose().com).foot[1].position - place - Eigen::Vector3d(0, 0, 0.03))
+          .norm(),
+      1e-15);
 }
 
 TEST(ReferenceGenerator, AfterGravityCompensationTheRobotHoldsWhereItWasLeft) {
-  ReferenceGenerator references;
+  ReferenceGenerator references(kNeverWaits);
   references.BeginPhase(ParsePhase("start: 0 gravity_compensation: true"), Pose(), 0);
   EstimatedPose left = Pose();
   left.com += Eigen::Vector3d(0.02, -0.03, -0.05);
   left.body_rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
   references.BeginPhase(ParsePhase("start: 5"), left, 5);
-  EXPECT_EQ(references.Update(5).com.position, left.com);
-  EXPECT_EQ(references.Update(5).body_rotation, left.body_rotation);
+  EXPECT_EQ(references.Update(5, Pose().com).com.position, left.com);
+  EXPECT_EQ(references.Update(5, Pose().com).body_rotation, left.body_rotation);
 }
 
 }  // namespace
