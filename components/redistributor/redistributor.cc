@@ -38,6 +38,10 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   CheckRatio(eta_min_, "eta_min");
   CheckRatio(eta_max_, "eta_max");
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
+  landed_share_ = config.landed_share();
+  if (!(landed_share_ >= 0 && landed_share_ < 0.5)) {
+    throw ConfigError("landed_share", "must be at least 0 and less than 0.5");
+  }
   ratio_moves_ = RatioMoves(config);
   feedback_ = InternalFeedback(config.feedback());
   if (feedback_.enabled() && !redistribution_) {
@@ -63,7 +67,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
 
 bool Redistributor::Archive(StateArchive* archive) {
   feedback_.Archive(archive);
-  archive->Show(last_index_, last_time_, last_eta_);
+  archive->Show(last_index_, last_time_, last_eta_, landed_foot_);
   ArchiveMessage(&*joint_command_, archive);
   return true;
 }
@@ -101,6 +105,7 @@ int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
   joint_command_t& out = *joint_command_;
   PassTorqueThrough();
   ForgetDistribution();
+  landed_foot_ = -1;
   out.eta = out.eta_optimal = in_contact[0] ? 1.0 : 0.0;
   out.eta_min = out.eta_max = out.eta;
   out.eta_feasible = 1;
@@ -120,7 +125,7 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
     wrench[i] = GetWrench(balance_torque_->foot_wrench[i]);
   }
   const balance::RatioInterval interval =
-      balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_);
+      KeepLanded(balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_));
   const bool pressed = resultant[2] < 0;
   out.eta_feasible = interval.feasible && pressed ? 1 : 0;
   out.eta_min = interval.feasible ? interval.min : 0.0;
@@ -149,6 +154,17 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   }
   Report(wrench, double_support_, kBoth);
   return out.eta_feasible != 0 ? joint_command_t::STATUS_OK : joint_command_t::STATUS_INFEASIBLE;
+}
+
+balance::RatioInterval Redistributor::KeepLanded(balance::RatioInterval interval) {
+  const task_torque_t& task = *task_torque_;
+  if (task.transition == task_torque_t::TRANSITION_LOADING) landed_foot_ = task.transition_foot;
+  if (landed_foot_ == robot::kRightFoot) {
+    interval.min = std::clamp(landed_share_, interval.min, interval.max);
+  } else if (landed_foot_ >= 0) {
+    interval.max = std::clamp(1 - landed_share_, interval.min, interval.max);
+  }
+  return interval;
 }
 
 double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,

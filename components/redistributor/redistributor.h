@@ -37,6 +37,8 @@ class Redistributor : public Component {
   void Redistribute(const Tick& tick);
   int8_t ComputeDouble(const Tick& tick);
   int8_t ComputeSingle(const std::array<bool, 2>& in_contact);
+  /// `interval` less the ratios that leave a landed foot less than its share; never empty.
+  balance::RatioInterval KeepLanded(balance::RatioInterval interval);
   /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
   double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
                      std::array<Eigen::Isometry3d, 2> sole_in_o) const;
@@ -59,6 +61,8 @@ class Redistributor : public Component {
   std::shared_ptr<balance::WholeBody> whole_body_;
   bool redistribution_ = true, transition_ = true;
   double eta_min_ = 0, eta_max_ = 1;
+  double landed_share_ = 0;
+  int landed_foot_ = -1;  // -1: none
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
   // Of the last distribution, which a reading answers to; index −1: none.

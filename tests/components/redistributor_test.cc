@@ -515,7 +515,59 @@ TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
   EXPECT_EQ(chain.Run(standing, 3).status, joint_command_t::STATUS_OK);
 }
 
+// The COM above the right foot would leave the left one the 2 % of eta_max.
+TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
+  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
+              RedistributorText());
+  chain.Run(StandingState(chain.model()), 0);
+  task_torque_t task = chain.task();
+  balance_torque_t balance = chain.balance();
+  const auto sole_y = [&](size_t i) {
+    return (GetPose(balance.frame_o).inverse() * GetPose(task.foot_pose[i])).translation().y();
+  };
+  ControlContext context(TestRobot::kDyros);
+  Harness<Redistributor> alone(&context, RedistributorText("landed_share: 0.1"));
+  alone.Bind("robot_state", &chain.state());
+  alone.Bind("task_torque", &task);
+  alone.Bind("balance_torque", &balance);
+  const auto ratio_with_cop_at = [&](double y) {
+    balance.resultant.moment[0] = balance.resultant.force[2] * y;
+    alone.Run(TickAt(0));
+    return alone.output<joint_command_t>().eta;
+  };
+  const auto transition = [&](int8_t kind, int8_t foot, double progress) {
+    task.transition = kind;
+    task.transition_foot = foot;
+    task.transition_progress = progress;
+  };
+  const double right = sole_y(0), left = sole_y(1);
+  EXPECT_NEAR(ratio_with_cop_at(right), 0.98, 1e-9);  // not landed
+
+  transition(task_torque_t::TRANSITION_LOADING, 1, 0);
+  EXPECT_NEAR(ratio_with_cop_at(right), 1, 1e-9);  // no load yet
+  transition(task_torque_t::TRANSITION_NONE, -1, 0);
+  EXPECT_NEAR(ratio_with_cop_at(right), 0.9, 1e-9);
+  EXPECT_NEAR(ratio_with_cop_at(0), 0.5, 1e-6);  // (71): no more than the least share
+  EXPECT_NEAR(ratio_with_cop_at(left), 0.02, 1e-9);
+  // The right foot may bear M_x up to 0.05 m of its load: with the centre of pressure beyond that
+  // only eta_max remains.
+  EXPECT_NEAR(ratio_with_cop_at(right - 0.048), 0.98, 0.01);
+
+  task.in_contact[1] = 0;  // lifted
+  alone.Run(TickAt(1));
+  task.in_contact[1] = 1;
+  EXPECT_NEAR(ratio_with_cop_at(right), 0.98, 1e-9);
+
+  transition(task_torque_t::TRANSITION_LOADING, 0, 1);
+  ratio_with_cop_at(left);
+  transition(task_torque_t::TRANSITION_NONE, -1, 0);
+  EXPECT_NEAR(ratio_with_cop_at(left), 0.1, 1e-9);
+}
+
 TEST(Redistributor, RefusesRatiosThatCannotBe) {
+  EXPECT_EQ(RefusedField("landed_share: -0.1"), "landed_share");
+  EXPECT_EQ(RefusedField("landed_share: 0.5"), "landed_share");
+  EXPECT_EQ(RefusedField("landed_share: nan"), "landed_share");
   EXPECT_EQ(RefusedField("eta_min: -0.1"), "eta_min");
   EXPECT_EQ(RefusedField("eta_max: 1.1"), "eta_max");
   EXPECT_EQ(RefusedField("eta_max: nan"), "eta_max");
