@@ -8,6 +8,7 @@
 #include "deploy/poise/commands.h"
 #include "deploy/poise/registry.h"
 #include "deploy/poise/scenario_files.h"
+#include "deploy/poise/sweep.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
 
@@ -57,6 +58,13 @@ int List(const std::string& what) {
       return text;
     });
   }
+  if (wanted("sweeps")) {
+    ListFiles("sweeps", [](const std::string& file) {
+      const auto sweep = ReadMessage<Sweep>(file);
+      return fmt::format("{} (poise {}, scenario {})", sweep.description(),
+                         sweep.has_limit() ? "limit" : "sweep", sweep.scenario());
+    });
+  }
   if (wanted("robots")) {
     ListFiles("robots",
               [](const std::string& file) { return "URDF " + ReadMessage<Robot>(file).urdf(); });
@@ -86,8 +94,9 @@ int List(const std::string& what) {
 void AddListCommand(CLI::App* app, Command* command) {
   auto what = std::make_shared<std::string>();
   CLI::App* list = app->add_subcommand("list", "what there is to use");
-  list->add_option("what", *what, "scenarios, robots, graphs, components or metrics; default: all")
-      ->check(CLI::IsMember({"scenarios", "robots", "graphs", "components", "metrics"}));
+  list->add_option("what", *what,
+                   "scenarios, sweeps, robots, graphs, components or metrics; default: all")
+      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "metrics"}));
   list->callback([what, command] { *command = [what] { return List(*what); }; });
 }
 

@@ -35,6 +35,7 @@ constexpr std::array kTroubles = {"contact_early",
                                   "contact_lost",
                                   "eta_infeasible_begins",
                                   "cop_not_achieved_begins",
+                                  "step_needed",
                                   "bridge_state"};
 
 struct Prepared {

@@ -171,6 +171,32 @@ TEST_F(SweepTest, AnotherSweepsFolderIsRefused) {
   ExpectUsageError({"sweep", "merge", out, Out("other"), "--out", Out("both")}, {"another sweep"});
 }
 
+TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {
+  Expect(0, {"sweep", "pushed", "--set", "duration=1.5", "--vary", "sim_ode.push[0].peak=20,2000",
+             "--out", Out("sweep")});
+  int falls = 0;
+  for (const CsvRow& row : ReadCsv(Out("sweep") + "/table.csv")) {
+    const bool fell = row.at("outcome") == "fell";
+    falls += fell;
+    EXPECT_EQ(row.at("trouble").find("step_needed") != std::string::npos, fell)
+        << row.at("run") << ": " << row.at("trouble");
+  }
+  EXPECT_GT(falls, 0);
+}
+
+TEST_F(SweepTest, AreListedWithWhatTheySay) {
+  Sweep("far",
+        "description: \"As far as it goes\" scenario: \"pushed\"\n"
+        "limit { field: \"sim_ode.push[0].peak\" min: 1 max: 2 }\n");
+  Sweep("wrong", "scenari: 1\n");
+  const ProgramResult list = RunPoise({"list", "sweeps"});
+  EXPECT_EQ(list.exit_code, 0) << list.output;
+  for (const char* const part : {"far", "As far as it goes (poise limit, scenario pushed)", "tiny",
+                                 "(poise sweep, scenario pushed)", "wrong.pbtxt:1:", "scenari"}) {
+    EXPECT_NE(list.output.find(part), std::string::npos) << part << "\n" << list.output;
+  }
+}
+
 TEST_F(SweepTest, RunsThatCannotBeMadeAreNamedAndTheOthersGoOn) {
   const ProgramResult result = RunPoise(
       {"sweep", "pushed", "--vary", "sim_ode.ground.friction=0.9,-1", "--out", Out("sweep")});
