@@ -178,7 +178,10 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
   deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
   filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
-  unrest_.setConstant(config_.start_torque);
+  for (size_t f = 0; f < 2; ++f) {
+    if (!(weights.grip[f] > 0)) continue;  // a leg that hangs carries little
+    for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque;
+  }
   UpdateContacts(sensors);
   for (size_t f = 0; f < 2; ++f) {
     Foot& foot = feet_[f];

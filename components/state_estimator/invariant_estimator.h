@@ -32,7 +32,7 @@ struct InvariantEstimatorConfig {
   double gyro_bias = 1e-3, accelerometer_bias = 0.1;
   double gyro_bias_walk = 1e-6, accelerometer_bias_walk = 1e-4;
   double start_position = 5e-5, start_tilt = 5e-4, start_yaw = 5e-5, start_torque = 30;
-  double contact_walk = 2e-5, turn_walk = 2e-5;
+  double contact_walk = 2e-5, turn_walk = 4e-5;
   double slip_speed = 0.3, turn_speed = 1;
   double cop_margin = 0.02;
   double gate = 25, rest_time = 0.05, rest_distance = 1e-4, rest_turn = 2e-4;

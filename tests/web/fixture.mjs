@@ -21,7 +21,7 @@ function paths(type, source) {
 }
 const sourceOf = (type) => readFileSync(new URL(`${type}.lcm`, lcm), 'utf8');
 
-const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'task_torque_t', 'balance_torque_t', 'joint_command_t',
+const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'estimator_status_t', 'task_torque_t', 'balance_torque_t', 'joint_command_t',
   'bridge_status_t', 'external_push_t', 'ground_truth_t'];
 
 /** A robot with a pitch and a roll joint in the right leg, none in the left. */
@@ -36,8 +36,8 @@ export const robot = {
   visuals: [],
 };
 
-/** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. */
-export function makeRun(section, constants = {}, ticks = 4, live = undefined) {
+/** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. `more`: of its scenario. */
+export function makeRun(section, constants = {}, ticks = 4, live = undefined, more = {}) {
   const channels = TYPES.map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
     signals: paths(type, sourceOf(type)).map((field) => ({field, integer: false, value: constants[`${type}.${field}`] ?? 0}))}));
   const limits = {half_length: 0.12, half_width: 0.05, friction: 0.9, yaw_friction: 0.8};
@@ -45,7 +45,7 @@ export function makeRun(section, constants = {}, ticks = 4, live = undefined) {
     format: 1, channels, robot, events: [], live,
     run: {tick_period: 0.002, ticks, checks: [], assumptions: [], components: [], channels: []},
     scenario: {name: 'test', paper_section: section,
-      redistributor: {double_support: limits, single_support: {...limits, half_width: 0.06}}},
+      redistributor: {double_support: limits, single_support: {...limits, half_width: 0.06}}, ...more},
   }, messages, () => { throw new Error('no packed column here'); });
   addDerivedSignals(run);
   return run;

@@ -57,6 +57,17 @@ test('a run without ground truth and push keeps the figures that it can show', (
   assert.ok(!figures.some((f) => f.figure === '9b'));
 });
 
+test('the estimator\'s errors have a bound when its method has a covariance', async () => {
+  const bound = (run) => figuresFor(run).find((f) => f.title === 'Estimator: velocity error').series.find((s) => s.role === 'limit');
+  assert.equal(bound(makeRun('7.2')), undefined);
+  // The upper triangle of 9 x 9 by rows: variances of the velocity at 9+8+7, + 6, + 5.
+  const constants = {'estimator_status_t.has_covariance': 1};
+  for (const [i, deviation] of [[24, 1], [30, 2], [35, 2]]) constants[`estimator_status_t.covariance[${i}]`] = deviation ** 2;
+  const run = makeRun('7.2', constants, 4, undefined, {state_estimator: {method: 'INVARIANT_EKF'}});
+  assert.ok(bound(run));
+  near((await valuesOf(run, 'derived.base_velocity_bound'))[0], 9);  // 3 |(1, 2, 2)|
+});
+
 test('pitch joints are found by their axis', () => {
   assert.deepEqual(pitchJoints(robot, 0), [0]);
   assert.deepEqual(pitchJoints(robot, 1), []);
@@ -142,7 +153,7 @@ test('the search finds signals by all words of name and text', () => {
   const names = (query) => searchSignals(signals, query).map((s) => s.name);
   assert.deepEqual(names('joint command eta max'), ['JOINT_COMMAND.eta_max']);
   assert.deepEqual(names('ROBOT_STATE.base_position[2]'), ['ROBOT_STATE.base_position[2]']);
-  assert.ok(names('gyro bias').length === 0 && names('imu bias').length === 3);
+  assert.ok(names('gyro bias').length === 0 && names('robot state imu bias').length === 3);
   assert.ok(names('peak current').length === 0);
   assert.deepEqual(names('   '), []);
   assert.equal(names('force').length, names('FORCE').length);

@@ -115,7 +115,16 @@ function footSignals(run) {
   });
 }
 
-function estimatorSignals() {
+/** Index in estimator_status_t.covariance of the variance of error `i`: orientation, velocity, position. */
+const variance = (i) => ['estimator_status_t', `covariance[${9 * i - i * (i - 1) / 2}]`];
+
+/** Three standard deviations of an error, or of the norm of several, as the estimator publishes them. */
+const threeSigma = (name, unit, text, ...errors) => ({
+  name, unit, text: `three standard deviations of the estimate of the ${text}`,
+  deps: [['estimator_status_t', 'has_covariance'], ...errors.map(variance)],
+  compute: pointwise(([has, ...v]) => has > 0 ? 3 * Math.sqrt(v.reduce((sum, x) => sum + x, 0)) : NaN)});
+
+function estimatorSignals(run) {
   const both = (field, n) => [...vector('robot_state_t', field, n), ...vector('ground_truth_t', field, n)];
   const up = [0, 0, 1];
   return [
@@ -132,6 +141,10 @@ function estimatorSignals() {
         const a = rotate(conjugate(q.slice(0, 4)), up), b = rotate(conjugate(q.slice(4)), up);
         return 2 * Math.asin(Math.min(1, Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / 2));
       })},
+    ...(run.scenario.state_estimator?.method === 'INVARIANT_EKF' ? [
+      threeSigma('base_position_bound', 'm', 'base\'s position', 6, 7, 8),
+      threeSigma('base_velocity_bound', 'm/s', 'base\'s velocity', 3, 4, 5),
+      threeSigma('base_tilt_bound', 'rad', 'base\'s tilt', 0, 1)] : []),
   ];
 }
 
@@ -191,7 +204,7 @@ class DerivedSignal {
 
 /** Adds to `run` the derived signals for which it has what they need. */
 export function addDerivedSignals(run) {
-  const definitions = [...comSignals(), ...copSignals(), ...footSignals(run), ...estimatorSignals(),
+  const definitions = [...comSignals(), ...copSignals(), ...footSignals(run), ...estimatorSignals(run),
     ...otherSignals(run)];
   for (const definition of definitions) {
     if (definition.deps.every(([type, field]) => run.find(type, field))) run.add(new DerivedSignal(run, definition));

@@ -137,9 +137,12 @@ function common(run, covered) {
     {title: 'Orientation error of the body', unit: 'rad', series: ['x', 'y', 'z'].map((axis, i) =>
       series(axis, `axis-${axis}`, 'task_torque_t', `body_orientation_error[${i}]`))},
     {title: 'Estimator: base position, estimated less true', unit: 'm',
-      series: ['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `base_position_error_${axis}`))},
-    {title: 'Estimator: tilt error', unit: 'rad', series: [derived('tilt', 'computed', 'base_tilt_error')]},
-    {title: 'Estimator: velocity error', unit: 'm/s', series: [derived('norm', 'computed', 'base_velocity_error')]},
+      series: [...['x', 'y', 'z'].map((axis) => derived(axis, `axis-${axis}`, `base_position_error_${axis}`)),
+        derived('3 σ of the norm', 'limit', 'base_position_bound')]},
+    {title: 'Estimator: tilt error', unit: 'rad',
+      series: [derived('tilt', 'computed', 'base_tilt_error'), derived('3 σ', 'limit', 'base_tilt_bound')]},
+    {title: 'Estimator: velocity error', unit: 'm/s',
+      series: [derived('norm', 'computed', 'base_velocity_error'), derived('3 σ', 'limit', 'base_velocity_bound')]},
     ...(covered === '7.1' ? [] : footWrenches(run, '')),
   ];
 }
