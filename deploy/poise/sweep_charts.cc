@@ -19,6 +19,10 @@ constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - k
 constexpr double kCenterX = kLeft + kPlotWidth / 2, kCenterY = kTop + kPlotHeight / 2;
 constexpr double kRadius = kPlotHeight / 2 - 14;
 constexpr size_t kMostTicks = 12;
+constexpr char kOpening[] = "<svg ";
+constexpr char kTextStyle[] =
+    "text{font:11px system-ui,sans-serif;fill:#333} .t{font-size:13px;font-weight:600}\n"
+    ".r{fill:#777;font-size:10px} .g{stroke:#ddd;stroke-width:1}\n";
 // Okabe and Ito's: told apart by colour-blind readers too.
 constexpr std::array kSeriesColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                        "#e69f00", "#56b4e9", "#000000", "#b0a000"};
@@ -64,7 +68,7 @@ std::string Text(double x, double y, const std::string& text, const char* anchor
 }
 
 std::string Open(const ChartLabels& labels) {
-  return fmt::format("<svg viewBox='0 0 {} {}' role='img'>", kWidth, kHeight) +
+  return fmt::format("{}viewBox='0 0 {} {}' role='img'>", kOpening, kWidth, kHeight) +
          Text(kLeft, 18, labels.title, "start", " class='t'");
 }
 
@@ -342,6 +346,15 @@ std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>
   return svg + "</svg>";
 }
 
+std::string StandaloneSvg(const std::string& chart) {
+  const size_t attributes = sizeof(kOpening) - 1, content = chart.find('>') + 1;
+  return fmt::format(
+      "{}xmlns='http://www.w3.org/2000/svg' width='{}' height='{}' {}<style>{}</style>"
+      "<rect width='100%' height='100%' fill='#fff'/>{}\n",
+      kOpening, kWidth, kHeight, chart.substr(attributes, content - attributes), kTextStyle,
+      chart.substr(content));
+}
+
 std::string ChartPage(const std::string& title, const std::vector<std::string>& paragraphs,
                       const std::vector<std::string>& charts) {
   std::string html = fmt::format(
@@ -350,10 +363,8 @@ std::string ChartPage(const std::string& title, const std::vector<std::string>& 
       "pre{{font-size:12px;overflow-x:auto}}\n"
       ".c{{display:flex;flex-wrap:wrap;gap:16px}}\n"
       "svg{{width:{1}px;max-width:100%;border:1px solid #ddd;background:#fff}}\n"
-      "text{{font:11px system-ui,sans-serif;fill:#333}} .t{{font-size:13px;font-weight:600}}\n"
-      ".r{{fill:#777;font-size:10px}} .g{{stroke:#ddd;stroke-width:1}}\n"
-      "</style>\n<h1>{0}</h1>\n",
-      HtmlText(title), kWidth);
+      "{2}</style>\n<h1>{0}</h1>\n",
+      HtmlText(title), kWidth, kTextStyle);
   for (const std::string& paragraph : paragraphs) html += paragraph + "\n";
   html += "<div class='c'>\n";
   for (const std::string& chart : charts) html += chart + "\n";

@@ -53,6 +53,9 @@ std::string PolarHeatMap(const ChartLabels& labels, const std::vector<double>& a
 std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>& cells,
                          const ChartScale& scale);
 
+/// A chart of the above as a file of its own, without a page's style around it.
+std::string StandaloneSvg(const std::string& chart);
+
 /// A whole page: a heading, paragraphs, charts.
 std::string ChartPage(const std::string& title, const std::vector<std::string>& paragraphs,
                       const std::vector<std::string>& charts);

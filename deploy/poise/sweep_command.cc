@@ -129,7 +129,8 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
       "table.csv (a row a run, the same\nbytes whether resumed, split or in parallel) and "
-      "maps.html. A sweep's file: deploy/poise/sweep.proto; docs/sweeps.md.\n"
+      "maps.html, and each map as map_N.svg and map_N.png.\nA sweep's file: "
+      "deploy/poise/sweep.proto; docs/sweeps.md.\n"
       "Exit code: 0 when every run was made, fallen or not; 1 when interrupted or a run could not "
       "be made; 2 wrong usage\nor configuration.");
   CLI::App* merge = sweep->add_subcommand(

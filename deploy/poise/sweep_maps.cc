@@ -286,8 +286,13 @@ std::vector<std::string> Maps::OfLimits() const {
 
 }  // namespace
 
-std::string MapsPage(const SweepHeader& header, const SweepRows& rows) {
+std::vector<std::string> MapCharts(const SweepHeader& header, const SweepRows& rows) {
   const Maps maps(header, rows);
+  return header.sweep.has_limit() ? maps.OfLimits() : maps.OfSweep();
+}
+
+std::string MapsPage(const SweepHeader& header, const SweepRows& rows,
+                     const std::vector<std::string>& charts) {
   const Sweep& sweep = header.sweep;
   std::vector<std::string> paragraphs;
   if (sweep.has_description()) {
@@ -297,7 +302,7 @@ std::string MapsPage(const SweepHeader& header, const SweepRows& rows) {
   if (sweep.has_limit()) {
     paragraphs.push_back("<pre>" + HtmlText(FormatLimits(header, rows)) + "</pre>");
   }
-  return ChartPage(sweep.name(), paragraphs, sweep.has_limit() ? maps.OfLimits() : maps.OfSweep());
+  return ChartPage(sweep.name(), paragraphs, charts);
 }
 
 }  // namespace poise

@@ -1,8 +1,10 @@
 // `poise sweep` and `poise limit`: the same table however it is made, and what is refused.
 #include <gtest/gtest.h>
+#include <png.h>
 #include <signal.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -169,6 +171,38 @@ TEST_F(SweepTest, AnotherSweepsFolderIsRefused) {
   ExpectUsageError({"sweep", "tiny", "--resume", "--out", out}, {"another sweep"});
   Expect(0, {"sweep", "pushed", "--vary", "seed=1,2", "--out", Out("other")});
   ExpectUsageError({"sweep", "merge", out, Out("other"), "--out", Out("both")}, {"another sweep"});
+}
+
+// A heat map of 2 x 2 runs on 560 x 440, drawn twice as large: the colours of the least and the
+// largest value, which is viridis from (68, 1, 84) to (253, 231, 37), and white outside.
+TEST_F(SweepTest, MapsAreThereAsPng) {
+  const std::string sweep =
+      Sweep("heat",
+            "scenario: \"pushed\" column: \"push_peak\"\n"
+            "vary { name: \"force\" field: \"sim_ode.push[0].peak\" value: 20 value: 60 }\n"
+            "vary { field: \"seed\" value: 1 value: 2 }\n"
+            "map { x: \"force\" y: \"seed\" value: \"push_peak\" }\n");
+  Expect(0, {"sweep", sweep, "--out", Out("sweep")});
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_file(&image, (Out("sweep") + "/map_1.png").c_str()), 0)
+      << image.message;
+  image.format = PNG_FORMAT_RGB;
+  EXPECT_EQ(image.width, 1120u);
+  EXPECT_EQ(image.height, 880u);
+  std::vector<uint8_t> pixels(PNG_IMAGE_SIZE(image));
+  ASSERT_NE(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr), 0) << image.message;
+  const auto at = [&](size_t x, size_t y) {
+    const uint8_t* const p = &pixels[3 * (y * 1120 + x)];
+    return std::array<int, 3>{p[0], p[1], p[2]};
+  };
+  const auto near = [](const std::array<int, 3>& a, const std::array<int, 3>& b) {
+    return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
+  };
+  EXPECT_LT(near(at(240, 200), {68, 1, 84}), 12);     // 20 N
+  EXPECT_LT(near(at(600, 200), {253, 231, 37}), 12);  // 60 N
+  EXPECT_EQ(at(4, 4), (std::array<int, 3>{255, 255, 255}));
+  EXPECT_FALSE(fs::exists(Out("sweep") + "/rsvg-convert.log"));
 }
 
 TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {
