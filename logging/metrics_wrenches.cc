@@ -21,6 +21,42 @@ Answer WrenchErrorRms(const RunRecord& run, std::initializer_list<int> feet,
   return mean.Root();
 }
 
+/// The force errors of both feet in the world's axes, and the ratio they were computed for.
+struct ForceErrors {
+  Eigen::Vector3d right, left;
+  double eta;
+};
+
+std::optional<ForceErrors> BothForceErrors(const RunRecord& run, int64_t tick) {
+  const auto right = WrenchError(run, 0, tick), left = WrenchError(run, 1, tick);
+  if (!right || !left) return {};
+  const task_torque_t& task = *run.task.at(tick - 1);
+  return ForceErrors{GetPose(task.foot_pose[0]).linear() * right->head<3>(),
+                     GetPose(task.foot_pose[1]).linear() * left->head<3>(),
+                     run.command.at(tick - 1)->eta};
+}
+
+/// With e = measured less computed and E = e_r + e_l: e_r = eta E + i, e_l = (1 - eta) E - i.
+void AddInternalError(MetricList* list) {
+  const auto add = [&](const char* name, const char* text, auto square) {
+    list->push_back({name, "N", text, [square](const RunRecord& run) {
+                       MeanSquare mean;
+                       for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+                         if (const auto e = BothForceErrors(run, t)) mean.Add(square(*e));
+                       }
+                       return mean.Root();
+                     }});
+  };
+  add("foot_force_error_internal_rms",
+      "the same while on both feet, of the part with opposite signs that moves nothing, RMS",
+      [](const ForceErrors& e) { return ((1 - e.eta) * e.right - e.eta * e.left).squaredNorm(); });
+  add("foot_force_error_resultant_rms",
+      "the same while on both feet, of a foot's share of the resultant's error, RMS",
+      [](const ForceErrors& e) {
+        return 0.5 * (e.eta * e.eta + (1 - e.eta) * (1 - e.eta)) * (e.right + e.left).squaredNorm();
+      });
+}
+
 void AddFootErrors(MetricList* list) {
   const auto add = [&](const char* name, const char* unit, const char* text, auto square) {
     for (int foot = 0; foot < 2; ++foot) {
@@ -147,6 +183,7 @@ void AddWrenches(MetricList* list) {
   };
   error("foot_force_error_rms", "N", "measured less computed foot force, RMS", 0);
   error("foot_moment_error_rms", "N·m", "measured less computed foot moment, RMS", 3);
+  AddInternalError(list);
   AddFootErrors(list);
   AddFootLoads(list);
   AddTangential(list);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "components/balance/contact_conditions.h"
+#include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/framework/configuration.h"
 
@@ -52,7 +53,13 @@ InternalFeedback::InternalFeedback(const WrenchFeedback& config)
       proportional_(ReadNotNegative(config.proportional(), "proportional")),
       rate_(ReadNotNegative(config.integral(), "integral")),
       max_force_(ReadNotNegative(config.max_force(), "max_force")),
-      max_moment_(ReadNotNegative(config.max_moment(), "max_moment")) {}
+      max_moment_(ReadNotNegative(config.max_moment(), "max_moment")),
+      release_time_(ReadNotNegative(config.release_time(), "release_time")),
+      full_load_(ReadNotNegative(config.full_load(), "full_load")) {
+  if (full_load_ > 0.5) {
+    throw ConfigError("feedback.full_load", "must be at most 0.5, the share of even standing");
+  }
+}
 
 InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
   const auto limit = [](auto part, double most) {
@@ -62,6 +69,16 @@ InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
   limit(wrench.head<3>(), max_force_);
   limit(wrench.tail<3>(), max_moment_);
   return wrench;
+}
+
+void InternalFeedback::Release(double period) {
+  const double counted = std::clamp(period, 0.0, kMaxPeriod);
+  integral_ *= counted > 0 ? release_time_ / (release_time_ + counted) : 1.0;
+}
+
+double InternalFeedback::LoadShare(double eta) const {
+  const double lighter = std::min(eta, 1 - eta);
+  return lighter >= full_load_ ? 1.0 : balance::SmoothStep(lighter / full_load_);
 }
 
 InternalWrench InternalFeedback::Update(const InternalWrench& error, double period, double share) {

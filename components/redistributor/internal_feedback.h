@@ -34,6 +34,11 @@ class InternalFeedback {
   void Reset() { integral_.setZero(); }
   /// `period`, s, since the last call. A `share` (0..1) of the answer is given, and integrated.
   InternalWrench Update(const InternalWrench& error, double period, double share);
+  /// Lets the answer go in release_time; `period`, s, since the last call.
+  void Release(double period);
+  /// Share of the answer that acts with this ratio: all while the lighter foot has full_load of the
+  /// load or more, none without load.
+  double LoadShare(double eta) const;
   /// Without a reading to go by.
   InternalWrench Hold(double share) const { return share * integral_; }
   void Archive(StateArchive* archive) { archive->Show(integral_); }
@@ -44,6 +49,8 @@ class InternalFeedback {
   bool enabled_ = false;
   double proportional_ = 0, rate_ = 0;
   double max_force_ = 0, max_moment_ = 0;
+  double release_time_ = 0;  // s
+  double full_load_ = 0;
   InternalWrench integral_ = InternalWrench::Zero();
 };
 

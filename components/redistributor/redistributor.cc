@@ -44,6 +44,14 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   }
   ratio_moves_ = RatioMoves(config);
   feedback_ = InternalFeedback(config.feedback());
+  feedback_pause_ = config.feedback().pause();
+  feedback_edge_ = config.feedback().edge();
+  if (!(feedback_edge_ >= 0) || !std::isfinite(feedback_edge_)) {
+    throw ConfigError("feedback.edge", "must be m, 0 or more");
+  }
+  if (!(feedback_pause_ >= 0) || !std::isfinite(feedback_pause_)) {
+    throw ConfigError("feedback.pause", "must be a time in s, 0 or more");
+  }
   if (feedback_.enabled() && !redistribution_) {
     throw ConfigError("feedback.enabled", "needs redistribution: true");
   }
@@ -67,7 +75,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
 
 bool Redistributor::Archive(StateArchive* archive) {
   feedback_.Archive(archive);
-  archive->Show(last_index_, last_time_, last_eta_, landed_foot_);
+  archive->Show(last_index_, last_time_, last_eta_, learn_from_, landed_foot_);
   ArchiveMessage(&*joint_command_, archive);
   return true;
 }
@@ -145,7 +153,7 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
       out.torque[i] = balance_torque_->torque[i] + out.redistribution_torque[i];
     }
     wrench = desired;
-    if (feedback_.enabled()) AddFeedback(tick, sole_in_o);
+    if (feedback_.enabled()) AddFeedback(tick, sole_in_o, desired);
   } else {
     PassTorqueThrough();
     ForgetDistribution();
@@ -182,20 +190,40 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
   return allowed.feasible ? std::clamp(ramped, allowed.min, allowed.max) : ramped;
 }
 
-double Redistributor::FeedbackShare() const {
+double Redistributor::FeedbackShare(double eta) const {
   const task_torque_t& task = *task_torque_;
-  if (task.transition == task_torque_t::TRANSITION_NONE) return 1;
+  const double loaded = feedback_.LoadShare(eta);
+  if (task.transition == task_torque_t::TRANSITION_NONE) return loaded;
   const double progress = balance::SmoothStep(task.transition_progress);
-  return task.transition == task_torque_t::TRANSITION_UNLOADING ? 1 - progress : progress;
+  return loaded *
+         (task.transition == task_torque_t::TRANSITION_UNLOADING ? 1 - progress : progress);
 }
 
-void Redistributor::AddFeedback(const Tick& tick,
-                                const std::array<Eigen::Isometry3d, 2>& sole_in_o) {
+bool Redistributor::AboutToTip(const Wrenches& desired) const {
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    const Eigen::Vector2d cop = balance::CenterOfPressure(desired[i]).cwiseAbs();
+    if (!(cop.x() <= 0.5 * foot.length - feedback_edge_ &&
+          cop.y() <= 0.5 * foot.width - feedback_edge_)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void Redistributor::AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o,
+                                const Wrenches& desired) {
   joint_command_t& out = *joint_command_;
   InternalWrench answer = InternalWrench::Zero();
-  const double share = FeedbackShare();
+  const double share = FeedbackShare(out.eta);
+  // Soles about to tip share their load as they can, not as commanded.
+  const bool tipping = AboutToTip(desired);
+  if (tipping) {
+    learn_from_ = tick.time + feedback_pause_;
+    if (last_index_ >= 0) feedback_.Release(tick.time - last_time_);
+  }
   // A reading shows the command of the tick before; after skipped ticks it may show any.
-  if (last_index_ >= 0 && last_index_ == tick.index - 1) {
+  if (!tipping && tick.time >= learn_from_ && last_index_ >= 0 && last_index_ == tick.index - 1) {
     const Wrenches measured{GetWrench(robot_state_->foot_wrench[0]),
                             GetWrench(robot_state_->foot_wrench[1])};
     answer = feedback_.Update(DistributionError(measured, sole_in_o, last_eta_),

@@ -42,11 +42,15 @@ class Redistributor : public Component {
   /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
   double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
                      std::array<Eigen::Isometry3d, 2> sole_in_o) const;
-  /// Adds what answers the measured wrenches to the command; `sole_in_o` as distributed.
-  void AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o);
-  /// Share of the feedback that acts while a foot is loaded or unloaded: none without load, so that
+  /// Adds what answers the measured wrenches to the command; `sole_in_o` as distributed, `desired`
+  /// in the sole frames.
+  void AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o,
+                   const Wrenches& desired);
+  /// A foot's centre of pressure is nearer than feedback.edge to the edge of its sole.
+  bool AboutToTip(const Wrenches& desired) const;
+  /// Share of the feedback that acts at this ratio and in a transition: none without load, so that
   /// a change of support makes no step.
-  double FeedbackShare() const;
+  double FeedbackShare(double eta) const;
   void ForgetDistribution();
   void PassTorqueThrough();
   void Report(const Wrenches& wrench, const balance::ContactLimits& limits,
@@ -65,10 +69,13 @@ class Redistributor : public Component {
   int landed_foot_ = -1;  // -1: none
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
+  double feedback_pause_ = 0;  // s
+  double feedback_edge_ = 0;   // m
   // Of the last distribution, which a reading answers to; index −1: none.
   int64_t last_index_ = -1;
   double last_time_ = 0;  // s
   double last_eta_ = 0;
+  double learn_from_ = 0;  // s, when readings tell of the distribution again
   balance::ContactLimits double_support_, single_support_;
   robot::RobotState state_;
   bool state_valid_ = false;

@@ -189,7 +189,8 @@ class ClosedLoop : public testing::Test {
 
 TEST_F(ClosedLoop, FrictionsInternalWrenchIsTakenOutAndTheRobotIsNotMoved) {
   ControlContext context(robot::TestRobot::kDyros);
-  Harness<Redistributor> harness(&context, RedistributorText("feedback { enabled: true }"));
+  Harness<Redistributor> harness(&context,
+                                 RedistributorText("feedback { enabled: true integral: 25 }"));
   Bind(&harness);
   harness.Run(TickAt(0));
   const joint_command_t& out = harness.output<joint_command_t>();
@@ -226,7 +227,8 @@ TEST_F(ClosedLoop, OffByDefault) {
 
 TEST_F(ClosedLoop, AnUnloadedFootAndSingleSupportKnowNone) {
   ControlContext context(robot::TestRobot::kDyros);
-  Harness<Redistributor> harness(&context, RedistributorText("feedback { enabled: true }"));
+  Harness<Redistributor> harness(&context,
+                                 RedistributorText("feedback { enabled: true integral: 25 }"));
   Bind(&harness);
   const joint_command_t& out = harness.output<joint_command_t>();
   double largest_step = 0;
@@ -256,6 +258,52 @@ TEST_F(ClosedLoop, AnUnloadedFootAndSingleSupportKnowNone) {
   task_.in_contact = {1, 1};
   harness.Run(TickAt(301));
   EXPECT_EQ(ToEigen(out.feedback_torque).norm(), 0);
+}
+
+TEST_F(ClosedLoop, ASoleAboutToTipLetsItGoAndItLearnsAgainAfterThePause) {
+  ControlContext context(robot::TestRobot::kDyros);
+  Harness<Redistributor> harness(
+      &context,
+      RedistributorText(
+          "feedback { enabled: true integral: 25 release_time: 0.1 pause: 0.2 edge: 0.02 }"));
+  Bind(&harness);
+  const joint_command_t& out = harness.output<joint_command_t>();
+  int tick = 0;
+  const auto run = [&] {
+    const double last = ToEigen(out.feedback_torque).norm();
+    harness.Run(TickAt(tick++));
+    Read(out);
+    return last;
+  };
+  while (tick < 100) run();
+  const double before = ToEigen(out.feedback_torque).norm();
+  ASSERT_GT(before, 1);
+  // Beyond the toes of soles of 0.30 m.
+  const double moment = balance_.resultant.moment[1];
+  balance_.resultant.moment[1] = -0.17 * balance_.resultant.force[2];
+  for (int i = 0; i < 50; ++i) {
+    const double last = run();
+    EXPECT_LT(ToEigen(out.feedback_torque).norm(), last);
+    EXPECT_GT(ToEigen(out.feedback_torque).norm(), 0.97 * last);  // no step
+  }
+  const double released = ToEigen(out.feedback_torque).norm();
+  EXPECT_NEAR(released, before * std::exp(-1), 0.02 * before);
+  balance_.resultant.moment[1] = moment;
+  for (int i = 0; i < 99; ++i) run();
+  EXPECT_NEAR(ToEigen(out.feedback_torque).norm(), released, 1e-12);
+  for (int i = 0; i < 20; ++i) run();
+  EXPECT_GT(ToEigen(out.feedback_torque).norm(), 1.05 * released);
+}
+
+TEST(InternalFeedback, ALightFootIsGivenLess) {
+  const InternalFeedback feedback(Config(0, 10));
+  EXPECT_EQ(feedback.LoadShare(0.5), 1);
+  EXPECT_EQ(feedback.LoadShare(0.1), 1);
+  EXPECT_NEAR(feedback.LoadShare(0.9), 1, 1e-12);
+  EXPECT_NEAR(feedback.LoadShare(0.05), 0.5, 1e-12);
+  EXPECT_NEAR(feedback.LoadShare(0.95), 0.5, 1e-12);
+  EXPECT_EQ(feedback.LoadShare(0), 0);
+  EXPECT_EQ(feedback.LoadShare(1), 0);
 }
 
 TEST_F(ClosedLoop, SkippedTicksHoldWhatIsKnown) {
@@ -289,6 +337,9 @@ TEST(InternalFeedback, RefusesGainsThatCannotBe) {
   EXPECT_EQ(field_of("feedback { integral: -1 }"), "feedback.integral");
   EXPECT_EQ(field_of("feedback { proportional: nan }"), "feedback.proportional");
   EXPECT_EQ(field_of("feedback { max_force: -1 }"), "feedback.max_force");
+  EXPECT_EQ(field_of("feedback { pause: -1 }"), "feedback.pause");
+  EXPECT_EQ(field_of("feedback { full_load: 0.6 }"), "feedback.full_load");
+  EXPECT_EQ(field_of("feedback { edge: -0.1 }"), "feedback.edge");
   EXPECT_EQ(field_of("feedback { enabled: true } redistribution: false"), "feedback.enabled");
   EXPECT_EQ(field_of("feedback { enabled: true }"), "accepted");
 }

@@ -92,6 +92,24 @@ TEST_F(MetricsTest, FootErrorsByFootAndComponent) {
   EXPECT_NEAR(Measure("left_foot_moment_z_error_rms"), 2 * std::sqrt(50.0 / 99.0), 1e-12);
 }
 
+// Any error of two forces is a share of the resultant's and what moves nothing.
+TEST_F(MetricsTest, ForceErrorsInternalAndResultantParts) {
+  const double eta = 0.3;
+  for (size_t t = 0; t < kTicks; ++t) {
+    command_[t].eta = eta;
+    // Resultant (10, 0, 20), internal (0, 3, 4).
+    const double right[] = {eta * 10, 3, eta * 20 + 4}, left[] = {0.7 * 10, -3, 0.7 * 20 - 4};
+    for (int i = 0; i < 3; ++i) {
+      sensors_[t].foot_wrench[0].force[i] = command_[t].foot_wrench[0].force[i] + right[i];
+      sensors_[t].foot_wrench[1].force[i] = command_[t].foot_wrench[1].force[i] + left[i];
+    }
+  }
+  EXPECT_NEAR(Measure("foot_force_error_internal_rms"), 5, 1e-9);
+  EXPECT_NEAR(Measure("foot_force_error_resultant_rms"), std::sqrt(0.5 * 0.58 * 500), 1e-9);
+  LiftLeft(0, kTicks);
+  EXPECT_TRUE(Unanswered("foot_force_error_internal_rms"));
+}
+
 TEST_F(MetricsTest, FootLoadsAndTangentialParts) {
   for (size_t t = 0; t < kTicks; ++t) {
     command_[t].foot_wrench[0].force[2] = -100 - static_cast<double>(t);
