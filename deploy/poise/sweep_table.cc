@@ -1,7 +1,9 @@
 #include "deploy/poise/sweep_table.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <map>
+#include <vector>
 
 #include "deploy/poise/text_table.h"
 #include "fmt/format.h"
@@ -130,6 +132,39 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
   return csv;
 }
 
+namespace {
+
+/// What the capture point's warnings were worth, of runs with both metrics; else empty.
+std::string FormatWarnings(const SweepRows& rows) {
+  int falls = 0, standing = 0, false_alarms = 0;
+  std::vector<double> warnings;  // s
+  for (const auto& [key, row] : rows) {
+    const auto needed = row.metrics.find("step_needed_time");
+    if (needed == row.metrics.end()) continue;
+    const auto warning = row.metrics.find("step_warning_time");
+    if (row.outcome == kFell) {
+      ++falls;
+      if (warning != row.metrics.end() && warning->second > 0) warnings.push_back(warning->second);
+    } else if (row.outcome == kStands) {
+      ++standing;
+      false_alarms += needed->second > 0 ? 1 : 0;
+    }
+  }
+  if (falls + standing == 0) return "";
+  std::string text =
+      fmt::format("step_needed: {} of {} falls announced, false alarms in {} of {} that stand",
+                  warnings.size(), falls, false_alarms, standing);
+  if (!warnings.empty()) {
+    const auto middle = warnings.begin() + static_cast<std::ptrdiff_t>(warnings.size() / 2);
+    std::nth_element(warnings.begin(), middle, warnings.end());
+    text += fmt::format(", median warning {:.2f} s", *middle);
+  }
+  text += "\n";
+  return text;
+}
+
+}  // namespace
+
 std::string FormatOutcomes(const SweepRows& rows) {
   std::map<std::string, int> outcomes;
   std::map<std::pair<std::string, std::string>, int> ways;
@@ -144,6 +179,7 @@ std::string FormatOutcomes(const SweepRows& rows) {
                         100.0 * outcomes[outcome] / static_cast<double>(rows.size()));
   }
   text += "\n";
+  text += FormatWarnings(rows);
   if (ways.empty()) return text;
   std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
   std::stable_sort(sorted.begin(), sorted.end(),

@@ -32,7 +32,9 @@ std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& 
 /// shares reached; the phase, trouble and reason of the run at fails_at.
 std::string LimitCsv(const SweepHeader& header, const SweepRows& rows);
 
-/// How many of which outcome, and the fallen ones by phase and trouble.
+/// How many of which outcome, and the fallen ones by phase and trouble. Where step_needed_time and
+/// step_warning_time are among the metrics also how many falls the capture point announced, how
+/// many of the runs that stand it announced in vain, and the median of the warning times.
 std::string FormatOutcomes(const SweepRows& rows);
 
 /// The limits in aligned columns.

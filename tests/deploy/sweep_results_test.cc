@@ -9,6 +9,7 @@
 
 #include "components/framework/configuration.h"
 #include "deploy/poise/sweep_session.h"
+#include "deploy/poise/sweep_table.h"
 
 namespace poise {
 namespace {
@@ -137,6 +138,33 @@ TEST_F(SweepResultsTest, OtherSweepsAreRefused) {
   other = header_;
   other.kind = kKindLimit;
   EXPECT_NE(HeaderProblem(header_, other).find("poise limit"), std::string::npos);
+}
+
+TEST(FormatOutcomes, TellsWhatWarningsWereWorth) {
+  SweepRows rows;
+  const auto add = [&](const char* outcome, double needed, std::optional<double> warning) {
+    SweepRow row;
+    row.run = static_cast<int64_t>(rows.size());
+    row.outcome = outcome;
+    row.metrics["step_needed_time"] = needed;
+    if (warning) row.metrics["step_warning_time"] = *warning;
+    rows[{row.run, 0.0}] = row;
+  };
+  add("stands", 0, {});
+  EXPECT_NE(FormatOutcomes(rows).find("0 of 0 falls announced, false alarms in 0 of 1 that stand"),
+            std::string::npos);
+  add("stands", 0.2, {});
+  add("stands", 0, {});
+  add("fell", 0.9, 0.8);
+  add("fell", 0.5, 0.3);
+  add("fell", 0.1, 0);
+  add("fell", 1.1, 0.9);
+  EXPECT_NE(FormatOutcomes(rows).find("3 of 4 falls announced, false alarms in 1 of 3 that stand, "
+                                      "median warning 0.80 s"),
+            std::string::npos)
+      << FormatOutcomes(rows);
+  for (auto& [key, row] : rows) row.metrics.clear();
+  EXPECT_EQ(FormatOutcomes(rows).find("step_needed"), std::string::npos);
 }
 
 TEST(SelectedRuns, PartsMakeTheWhole) {
