@@ -90,7 +90,7 @@ void ReferencePoint::Archive(StateArchive* archive) {
 
 void References::Archive(StateArchive* archive) {
   com.Archive(archive);
-  archive->Show(body_rotation);
+  archive->Show(body_rotation, body_angular_velocity, body_angular_acceleration);
   for (PointMotion& motion : foot) motion.Archive(archive);
   archive->Show(foot_rotation);
 }

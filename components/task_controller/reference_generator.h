@@ -77,6 +77,8 @@ struct EstimatedPose {
 struct References {
   PointMotion com;
   Eigen::Matrix3d body_rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d body_angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s, world
+  Eigen::Vector3d body_angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s², world
   std::array<PointMotion, 2> foot;  ///< sole centre; meaningful for a foot out of contact
   std::array<Eigen::Matrix3d, 2> foot_rotation{Eigen::Matrix3d::Identity(),
                                                Eigen::Matrix3d::Identity()};

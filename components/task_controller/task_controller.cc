@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/balance/capture_point.h"
+#include "components/balance/support_polygon.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
@@ -85,6 +87,18 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   schedule_.emplace(config);
   generator_.emplace(config.com_lag());
+  const HipStrategyConfig& hip = config.hip_strategy();
+  CheckHipStrategyConfig(hip);
+  for (const robot::FootModel& foot : model_->feet()) {
+    if (hip.start() >= 0.5 * std::min(foot.length, foot.width)) {
+      throw ConfigError("hip_strategy.start",
+                        fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
+                                    hip.start(), foot.name, foot.length, foot.width));
+    }
+  }
+  hip_strategy_.emplace(hip);
+  joint_reserve_ = hip.joint_reserve();
+  brake_time_ = hip.brake_time();
   landing_.assign(2, Landing(config.contact()));
   tasks_.emplace(*model_, ReadGains(config.com()), ReadGains(config.orientation()),
                  ReadGains(config.foot()));
@@ -118,6 +132,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 bool TaskController::Archive(StateArchive* archive) {
   schedule_->Archive(archive);
   generator_->Archive(archive);
+  hip_strategy_->Archive(archive);
   for (Landing& landing : landing_) landing.Archive(archive);
   references_.Archive(archive);
   archive->Show(in_contact_, started_, last_controlled_, posture_reference_);
@@ -194,6 +209,57 @@ void TaskController::UpdateReferences(double time) {
       generator_->HoldFoot(i, foot->position, *rotation);
     }
   }
+  if (hip_strategy_->enabled()) TiltBody(time);
+}
+
+void TaskController::TiltBody(double time) {
+  const robot::RobotData& data = whole_body_->data();
+  const balance::ContactGeometry geometry = whole_body_->geometry();
+  HipInput input{.time = time, .near_joint_limit = NearJointLimit()};
+  std::array<Eigen::Vector2d, 2> half;
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    half[i] = {0.5 * foot.length - hip_strategy_->start(),
+               0.5 * foot.width - hip_strategy_->start()};
+  }
+  Eigen::Isometry3d frame_o;
+  balance::CapturePoint capture;
+  if (balance::FrameO(geometry.sole, geometry.in_contact, &frame_o) &&
+      balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, Eigen::Vector3d::Zero(),
+                                   robot::kGravity, &capture)) {
+    const balance::ConvexPolygon region = balance::SupportPolygon(frame_o, geometry, half);
+    if (region.num_corners > 0) {
+      const Eigen::Vector2d out =
+          capture.position - balance::NearestPoint(region, capture.position);
+      input.excess = frame_o.linear().leftCols<2>() * out;
+      input.excess.z() = 0;
+      input.margin = balance::SignedDistance(region, capture.position);
+    }
+  }
+  // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
+  // a turn that goes over into another only nearly.
+  const PointMotion tilt = hip_strategy_->Update(input);
+  const double angle = tilt.position.norm();
+  if (angle > 0) {
+    references_.body_rotation =
+        Eigen::AngleAxisd(angle, tilt.position / angle) * references_.body_rotation;
+  }
+  references_.body_angular_velocity = tilt.velocity;
+  references_.body_angular_acceleration = tilt.acceleration;
+}
+
+bool TaskController::NearJointLimit() const {
+  for (size_t i = 0; i < 2; ++i) {
+    if (!in_contact_[i]) continue;
+    for (const int joint : model_->supporting_joints(model_->feet()[i].body)) {
+      const robot::Joint& limits = model_->joints()[static_cast<size_t>(joint)];
+      const double position = state_.joint_position[joint], speed = state_.joint_velocity[joint];
+      const double room = speed > 0 ? limits.upper - position : position - limits.lower;
+      // At an even deceleration a joint goes on for half of brake_time.
+      if (0.5 * brake_time_ * std::abs(speed) > room - joint_reserve_) return true;
+    }
+  }
+  return false;
 }
 
 int8_t TaskController::WaitingCode() const {

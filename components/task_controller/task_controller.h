@@ -10,6 +10,7 @@
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
+#include "components/task_controller/hip_strategy.h"
 #include "components/task_controller/landing.h"
 #include "components/task_controller/phase_schedule.h"
 #include "components/task_controller/reference_generator.h"
@@ -35,6 +36,10 @@ class TaskController : public Component {
   bool BeginPhase(double time);
   /// The scenario's references where the free foot follows them, else its landing's.
   void UpdateReferences(double time);
+  /// Turns the body's reference by the hip strategy's tilt.
+  void TiltBody(double time);
+  /// A joint of a stance leg that would come too near to its limit before it could be braked.
+  bool NearJointLimit() const;
   EstimatedPose Estimate() const;
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced rectangle. At rest that is the COM's projection, and the CoP.
@@ -52,7 +57,9 @@ class TaskController : public Component {
   std::optional<TaskStack> tasks_;
   std::optional<balance::TaskDynamics> task_dynamics_;
   std::optional<ReferenceGenerator> generator_;
-  std::vector<Landing> landing_;  // by foot
+  std::optional<HipStrategy> hip_strategy_;
+  double joint_reserve_ = 0, brake_time_ = 0;  // rad, s, of the hip strategy
+  std::vector<Landing> landing_;               // by foot
   References references_;
   robot::RobotState state_;
   std::array<bool, 2> in_contact_{true, true};

@@ -43,7 +43,10 @@ void TaskStack::Update(const robot::RobotModel& model, const robot::RobotData& d
   }
   body_error_ = OrientationError(references.body_rotation, data.body_rotation[b]);
   bias_acceleration_.segment<3>(3) = data.body_angular_bias[b];
-  acceleration_.segment<3>(3) = Pd(orientation_, body_error_, -data.body_angular_velocity[b]);
+  acceleration_.segment<3>(3) =
+      references.body_angular_acceleration +
+      Pd(orientation_, body_error_,
+         references.body_angular_velocity - data.body_angular_velocity[b]);
 
   num_rows_ = 6;
   for (size_t i = 0; i < 2; ++i) {

@@ -1,0 +1,55 @@
+// Hip strategy: the body turned as a flywheel when the feet alone cannot stop a push.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "components/framework/state_archive.h"
+#include "components/task_controller/reference_generator.h"
+#include "components/task_controller/task_controller.pb.h"
+
+namespace poise {
+
+/// What the capture point and the joints say in one tick.
+struct HipInput {
+  double time = 0;  ///< s, not decreasing
+  /// m, world, horizontal: the capture point less the nearest point of the soles' hull less
+  /// `start`; zero inside.
+  Eigen::Vector3d excess = Eigen::Vector3d::Zero();
+  double margin = 0;  ///< m, of the capture point inside that hull; negative: outside
+  bool near_joint_limit = false;
+};
+
+/// A capture point with excess e accelerates the body about z × e, head first after it: the
+/// reaction moves the centroidal moment pivot I α / (m g) beyond the edge where the centre of
+/// pressure is. The slower return costs as much, but later, when ω has let it fade by e^{−ωt}
+/// (Pratt et al. 2006, Capture point; Stephens 2007, Humanoid push recovery).
+class HipStrategy {
+ public:
+  enum class State { kUpright, kTilting, kTilted, kReturning };
+
+  explicit HipStrategy(const HipStrategyConfig& config) : config_(config) {}
+
+  bool enabled() const { return config_.enabled(); }
+  double start() const { return config_.start(); }  ///< m
+  /// The body's tilt as a rotation vector in the world, rad, and its derivatives in time.
+  PointMotion Update(const HipInput& input);
+  State state() const { return state_; }
+  void Archive(StateArchive* archive) {
+    archive->Show(state_, since_);
+    tilt_.Archive(archive);
+  }
+
+ private:
+  void Enter(State state, double time, const PointMotion& from, const Eigen::Vector3d& tilt,
+             double duration);
+
+  HipStrategyConfig config_;
+  State state_ = State::kUpright;
+  double since_ = 0;  // s, when the move under way began; while tilted: last time outside `inside`
+  QuinticMove tilt_;
+};
+
+/// Throws ConfigError "hip_strategy.tilt" ...: not finite, or beyond what can work.
+void CheckHipStrategyConfig(const HipStrategyConfig& config);
+
+}  // namespace poise
