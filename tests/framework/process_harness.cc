@@ -157,6 +157,7 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
       break;
     }
   }
+  control.Spin(0);  // the last reports
   for (const auto& [name, status] : control.statuses()) run.health[name] = status.health;
   run.final_tick = collector.final_tick();
   run.missing = collector.missing(run.final_tick);
