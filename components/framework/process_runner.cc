@@ -342,11 +342,17 @@ bool ProcessRunner::Impl::ChooseTick() {
 }
 
 bool ProcessRunner::Impl::RunOwner() {
-  // The clock starts with the robot.
+  // The clock starts with the robot, whose first message may have come before this process could
+  // hear it.
+  const BoundStage& first = bus_.stages()[0];
   Want();
-  while (!StageReady(bus_.stages()[0])) {
+  int64_t next_request = NowNanoseconds() + kAnnounceInterval;
+  while (!StageReady(first)) {
     if (Stopped()) return false;
-    Poll(NowNanoseconds() + kAnnounceInterval, kDrainBatch);
+    Poll(next_request, kDrainBatch);
+    if (NowNanoseconds() < next_request || StageReady(first)) continue;
+    bus_.Ask(first, tick_);
+    next_request = NowNanoseconds() + kAnnounceInterval;
   }
   int64_t time = NowNanoseconds();
   health_t& health = bus_.health();

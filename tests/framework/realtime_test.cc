@@ -156,6 +156,23 @@ TEST(Realtime, EachComponentHasItsPlace) {
   EXPECT_EQ(TimingOf(spec, 0), Timing::kLockstep);
 }
 
+// The robot's first message is sent before the owner of the clock exists.
+TEST(Realtime, TheClocksOwnerMayComeLast) {
+  constexpr size_t kPush = 4;
+  constexpr int64_t kTicks = 50;
+  const RunSpec spec = RealtimeToys(kTicks);
+  ASSERT_TRUE(spec.graph().component(0).owns_clock());
+  HarnessOptions options;
+  options.reverse = true;
+  options.late_after_ms = 300;
+  options.max_seconds = 20;
+  const ProcessRun run = RunAsProcesses(spec, options);
+  ASSERT_FALSE(run.timed_out) << run.messages[kPush].size() << " of the robot's messages";
+  EXPECT_EQ(run.final_tick, kTicks - 1);
+  EXPECT_EQ(std::ssize(run.messages[kPush]), kTicks);
+  for (const auto& [name, code] : run.exit_codes) EXPECT_EQ(code, 0) << name;
+}
+
 TEST(Realtime, TheRobotGetsEveryCycleWhileAProcessIsStopped) {
   constexpr size_t kState = 1, kPush = 4;
   constexpr int64_t kTicks = 1500;
