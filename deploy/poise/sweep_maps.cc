@@ -298,7 +298,7 @@ std::string MapsPage(const SweepHeader& header, const SweepRows& rows,
   if (sweep.has_description()) {
     paragraphs.push_back("<p>" + HtmlText(sweep.description()) + "</p>");
   }
-  paragraphs.push_back("<pre>" + HtmlText(FormatOutcomes(rows)) + "</pre>");
+  paragraphs.push_back("<pre>" + HtmlText(FormatOutcomes(header, rows)) + "</pre>");
   if (sweep.has_limit()) {
     paragraphs.push_back("<pre>" + HtmlText(FormatLimits(header, rows)) + "</pre>");
   }

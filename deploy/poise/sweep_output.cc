@@ -89,7 +89,7 @@ void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
 
 void PrintOutput(const std::filesystem::path& folder, const SweepHeader& header,
                  const SweepRows& rows) {
-  fmt::print("{}", FormatOutcomes(rows));
+  fmt::print("{}", FormatOutcomes(header, rows));
   if (header.sweep.has_limit()) fmt::print("\n{}", FormatLimits(header, rows));
   fmt::print("\n{}\n", (folder / kTableFile).string());
   if (header.sweep.has_limit()) fmt::print("{}\n", (folder / kLimitsFile).string());

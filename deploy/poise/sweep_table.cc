@@ -134,7 +134,7 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
 
 namespace {
 
-/// What the capture point's warnings were worth, of runs with both metrics; else empty.
+/// What the capture point's warnings were worth, of runs with step_needed_time; else empty.
 std::string FormatWarnings(const SweepRows& rows) {
   int falls = 0, standing = 0, false_alarms = 0;
   std::vector<double> warnings;  // s
@@ -165,7 +165,7 @@ std::string FormatWarnings(const SweepRows& rows) {
 
 }  // namespace
 
-std::string FormatOutcomes(const SweepRows& rows) {
+std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
   std::map<std::string, int> outcomes;
   std::map<std::pair<std::string, std::string>, int> ways;
   for (const auto& [key, row] : rows) {
@@ -179,7 +179,10 @@ std::string FormatOutcomes(const SweepRows& rows) {
                         100.0 * outcomes[outcome] / static_cast<double>(rows.size()));
   }
   text += "\n";
-  text += FormatWarnings(rows);
+  const auto has = [&](const char* column) {
+    return std::ranges::find(header.columns, column) != header.columns.end();
+  };
+  if (has("step_needed_time") && has("step_warning_time")) text += FormatWarnings(rows);
   if (ways.empty()) return text;
   std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
   std::stable_sort(sorted.begin(), sorted.end(),

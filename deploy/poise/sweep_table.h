@@ -33,9 +33,9 @@ std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& 
 std::string LimitCsv(const SweepHeader& header, const SweepRows& rows);
 
 /// How many of which outcome, and the fallen ones by phase and trouble. Where step_needed_time and
-/// step_warning_time are among the metrics also how many falls the capture point announced, how
+/// step_warning_time are among the columns also how many falls the capture point announced, how
 /// many of the runs that stand it announced in vain, and the median of the warning times.
-std::string FormatOutcomes(const SweepRows& rows);
+std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows);
 
 /// The limits in aligned columns.
 std::string FormatLimits(const SweepHeader& header, const SweepRows& rows);

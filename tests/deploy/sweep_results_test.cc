@@ -141,6 +141,8 @@ TEST_F(SweepResultsTest, OtherSweepsAreRefused) {
 }
 
 TEST(FormatOutcomes, TellsWhatWarningsWereWorth) {
+  SweepHeader header;
+  header.columns = {"step_needed_time", "step_warning_time"};
   SweepRows rows;
   const auto add = [&](const char* outcome, double needed, std::optional<double> warning) {
     SweepRow row;
@@ -151,7 +153,8 @@ TEST(FormatOutcomes, TellsWhatWarningsWereWorth) {
     rows[{row.run, 0.0}] = row;
   };
   add("stands", 0, {});
-  EXPECT_NE(FormatOutcomes(rows).find("0 of 0 falls announced, false alarms in 0 of 1 that stand"),
+  EXPECT_NE(FormatOutcomes(header, rows)
+                .find("0 of 0 falls announced, false alarms in 0 of 1 that stand"),
             std::string::npos);
   add("stands", 0.2, {});
   add("stands", 0, {});
@@ -159,12 +162,16 @@ TEST(FormatOutcomes, TellsWhatWarningsWereWorth) {
   add("fell", 0.5, 0.3);
   add("fell", 0.1, 0);
   add("fell", 1.1, 0.9);
-  EXPECT_NE(FormatOutcomes(rows).find("3 of 4 falls announced, false alarms in 1 of 3 that stand, "
-                                      "median warning 0.80 s"),
+  EXPECT_NE(FormatOutcomes(header, rows)
+                .find("3 of 4 falls announced, false alarms in 1 of 3 that stand, "
+                      "median warning 0.80 s"),
             std::string::npos)
-      << FormatOutcomes(rows);
+      << FormatOutcomes(header, rows);
+  header.columns.pop_back();  // without the warnings' times nothing can be said
+  EXPECT_EQ(FormatOutcomes(header, rows).find("step_needed"), std::string::npos);
+  header.columns.push_back("step_warning_time");
   for (auto& [key, row] : rows) row.metrics.clear();
-  EXPECT_EQ(FormatOutcomes(rows).find("step_needed"), std::string::npos);
+  EXPECT_EQ(FormatOutcomes(header, rows).find("step_needed"), std::string::npos);
 }
 
 TEST(SelectedRuns, PartsMakeTheWhole) {
