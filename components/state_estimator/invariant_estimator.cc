@@ -163,6 +163,18 @@ void InvariantEstimator::ReadSoles() {
   }
 }
 
+void InvariantEstimator::Begin(const InvariantState& state, double turn, double speed,
+                               double position) {
+  InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
+  deviation.segment<3>(InvariantFilter::kRotation).setConstant(turn);
+  deviation.segment<3>(InvariantFilter::kVelocity).setConstant(speed);
+  deviation.segment<3>(InvariantFilter::kPosition).setConstant(position);
+  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
+  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
+  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
+  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+}
+
 void InvariantEstimator::Place(const BaseSensors& sensors) {
   const FootWeights weights =
       WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
@@ -170,14 +182,7 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   InvariantState state;
   state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
   state.position = placement.position + placement.orientation * kinematics_.imu_position();
-  InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
-  deviation.segment<3>(InvariantFilter::kRotation).setConstant(kUnplacedTurn);
-  deviation.segment<3>(InvariantFilter::kVelocity).setConstant(kStartSpeed);
-  deviation.segment<3>(InvariantFilter::kPosition).setConstant(kUnplaced);
-  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
-  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
-  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
-  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+  Begin(state, kUnplacedTurn, kStartSpeed, kUnplaced);
   for (size_t f = 0; f < 2; ++f) {
     if (!(weights.grip[f] > 0)) continue;  // a leg that hangs carries little
     for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque;
@@ -291,14 +296,7 @@ void InvariantEstimator::Recover(bool finite) {
   InvariantState state = filter_.state();
   if (!finite) state = InvariantState();
   state.velocity.setZero();
-  InvariantFilter::Error deviation = InvariantFilter::Error::Zero();
-  deviation.segment<3>(InvariantFilter::kRotation).setConstant(kRecoverTilt);
-  deviation.segment<3>(InvariantFilter::kVelocity).setConstant(kRecoverSpeed);
-  deviation.segment<3>(InvariantFilter::kPosition).setConstant(kRecoverPosition);
-  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
-  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
-  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
-  filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
+  Begin(state, kRecoverTilt, kRecoverSpeed, kRecoverPosition);
 }
 
 void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {

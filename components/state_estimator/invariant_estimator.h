@@ -84,6 +84,9 @@ class InvariantEstimator {
   void ReadJoints(const BaseSensors& sensors, double dt);
   void ReadImu(const BaseSensors& sensors);
   void ReadSoles();
+  /// The filter with standard deviations of rotation (rad), velocity (m/s) and position (m), and of
+  /// the biases and the compliance as configured.
+  void Begin(const InvariantState& state, double turn, double speed, double position);
   void Place(const BaseSensors& sensors);
   void DefineWorld(const FootWeights& weights);
   void Propagate(double dt);

@@ -364,20 +364,7 @@ TEST(BaseEstimator, FiniteGarbageGivesFiniteStates) {
   BaseMotion motion(Mantis());
   const int n = motion.model()->num_joints();
   std::mt19937_64 random(3);
-  const auto garbage = [&]() -> double {
-    switch (random() % 6) {
-      case 0:
-        return std::numeric_limits<double>::max();
-      case 1:
-        return -std::numeric_limits<double>::max();
-      case 2:
-        return std::numeric_limits<double>::denorm_min();
-      case 3:
-        return 0;
-      default:
-        return std::uniform_real_distribution<double>(-10, 10)(random);
-    }
-  };
+  const auto garbage = [&] { return AnyFinite(&random); };
   for (int run = 0; run < 200; ++run) {
     BaseEstimator estimator(motion.model(), {}, kPeriod);
     Eigen::VectorXd q(n);

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -226,6 +227,21 @@ double TiltError(const Quaterniond& estimate, const Quaterniond& truth) {
   const Vector3d a = estimate.conjugate() * Vector3d::UnitZ(),
                  b = truth.conjugate() * Vector3d::UnitZ();
   return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+double AnyFinite(std::mt19937_64* random) {
+  switch ((*random)() % 6) {
+    case 0:
+      return std::numeric_limits<double>::max();
+    case 1:
+      return -std::numeric_limits<double>::max();
+    case 2:
+      return std::numeric_limits<double>::denorm_min();
+    case 3:
+      return 0;
+    default:
+      return std::uniform_real_distribution<double>(-10, 10)(*random);
+  }
 }
 
 }  // namespace poise

@@ -88,6 +88,9 @@ void Sway(BaseMotion* motion, double amplitude);
 /// The robot shifts its weight to the right foot, puts the left foot forward and up, and loads it.
 void StepUp(BaseMotion* motion);
 
+/// A finite number as broken sensors may give: huge, denormal, zero or of ordinary size.
+double AnyFinite(std::mt19937_64* random);
+
 /// rad, angle between the estimated and the true vertical.
 double TiltError(const Eigen::Quaterniond& estimate, const Eigen::Quaterniond& truth);
 
