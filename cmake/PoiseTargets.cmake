@@ -1,5 +1,6 @@
 # Options, compile flags and the few target functions every folder uses.
-option(POISE_NATIVE "Compile for this machine's processor (-march=native)" ON)
+include(InstructionSet)
+set(POISE_COMPILER "${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}")
 option(POISE_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 option(POISE_BUILD_TESTS "Build tests and benchmarks" ON)
 option(POISE_WERROR "Treat warnings as errors" ON)
@@ -14,12 +15,16 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 set(CMAKE_CXX_FLAGS_RELEASE "-O3")  # assertions stay on
 
+# The commit, for logs and --version: written anew with each commit, and by deploy/setup.
+execute_process(COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${PROJECT_BINARY_DIR}/poise_commit.h
+                        -P ${PROJECT_SOURCE_DIR}/cmake/WriteCommit.cmake)
+if(EXISTS ${PROJECT_SOURCE_DIR}/.git/logs/HEAD)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/.git/logs/HEAD)
+endif()
+
 # One set of code-generation flags for all targets: Eigen's alignment depends on them.
 # -ffp-contract=off: the same source gives the same bits wherever it is inlined.
-add_compile_options(-ffp-contract=off)
-if(POISE_NATIVE)
-  add_compile_options(-march=native)
-endif()
+add_compile_options(-ffp-contract=off ${POISE_MARCH})
 if(POISE_SANITIZE)
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
                       -fno-omit-frame-pointer)

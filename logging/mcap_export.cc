@@ -1,6 +1,6 @@
 #include <map>
 
-#include "components/framework/run.h"
+#include "components/framework/build_info.h"
 #include "fmt/format.h"
 #include "logging/log_export.h"
 #include "logging/log_messages.h"

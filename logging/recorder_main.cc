@@ -4,8 +4,8 @@
 #include <csignal>
 #include <cstdio>
 
+#include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
-#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/recorder.h"
 
@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
 
   CLI::App app{"Records a Poise run as an LCM event log. Usually started by `poise run`.",
                "recorder"};
-  app.set_version_flag("--version", fmt::format("recorder {}", poise::PoiseVersion()));
+  app.set_version_flag("--version", poise::VersionText("recorder"));
   std::string run_file;
   std::string scenario_file;
   poise::logging::RecorderOptions options;

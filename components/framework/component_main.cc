@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 
+#include "components/framework/build_info.h"
 #include "components/framework/process_runner.h"
 #include "components/framework/run.h"
 #include "components/framework/udp_bus.h"
@@ -42,7 +43,7 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
       fmt::format("One process of a Poise run: component {}. Usually started by `poise run`.",
                   type),
       type};
-  app.set_version_flag("--version", fmt::format("{} {}", type, PoiseVersion()));
+  app.set_version_flag("--version", VersionText(type));
   app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
   app.add_option("--component", name, "name of this component in the run's graph")
       ->capture_default_str();

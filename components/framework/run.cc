@@ -81,6 +81,5 @@ bool MustReportProgress(const Graph& graph, int component) {
   return false;
 }
 
-const char* PoiseVersion() { return POISE_VERSION; }
 
 }  // namespace poise

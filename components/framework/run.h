@@ -50,7 +50,4 @@ std::vector<int> ProgressReporters(const Graph& graph, int source);
 /// True when `component` reports progress to someone.
 bool MustReportProgress(const Graph& graph, int component);
 
-/// Poise's version, e.g. "0.1.0".
-const char* PoiseVersion();
-
 }  // namespace poise

@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
 #include "components/framework/udp_bus.h"

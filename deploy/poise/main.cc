@@ -1,8 +1,8 @@
 // The program `poise`: runs, checks and inspects process graphs.
 #include <cstdio>
 
+#include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
-#include "components/framework/run.h"
 #include "components/robot/robot_model.h"
 #include "deploy/poise/commands.h"
 #include "fmt/format.h"
@@ -11,7 +11,7 @@
 int main(int argc, char** argv) {
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
                "poise"};
-  app.set_version_flag("--version", fmt::format("poise {}", poise::PoiseVersion()));
+  app.set_version_flag("--version", poise::VersionText("poise"));
   app.require_subcommand(1);
   app.footer(
       "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <random>
 
+#include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
 #include "components/framework/suggest.h"
@@ -130,6 +131,8 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.add_library_version("eigen " POISE_EIGEN_VERSION);
   spec.add_library_version("protobuf " POISE_PROTOBUF_VERSION);
   spec.add_library_version("compiler " POISE_COMPILER);
+  if (*PoiseCommit() != '\0') spec.set_poise_commit(PoiseCommit());
+  spec.set_instruction_set(InstructionSet());
   return spec;
 }
 

@@ -8,8 +8,8 @@
 #include <charconv>
 #include <filesystem>
 
+#include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
-#include "components/framework/run.h"
 #include "components/framework/suggest.h"
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/run_setup.h"
