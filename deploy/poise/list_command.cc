@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <memory>
 
 #include "components/framework/configuration.h"
 #include "components/robot/robot.pb.h"
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/reference/reference_text.h"
 #include "deploy/poise/registry.h"
 #include "deploy/poise/scenario_files.h"
 #include "deploy/poise/sweep.pb.h"
@@ -39,7 +41,77 @@ void ListFiles(const std::string& kind,
   }
 }
 
-int List(const std::string& what) {
+/// What the command line asks of the list.
+struct ListRequest {
+  std::string what;
+  std::string name;
+  std::string schema = "scenario";
+  bool markdown = false;
+};
+
+constexpr size_t kTextWidth = 80;
+
+ChannelsByType GraphChannels() {
+  ChannelsByType channels;
+  for (const std::string& name : ListNames("graphs")) {
+    const auto graph = ReadMessage<Graph>((DeployDir() / "graphs" / (name + ".pbtxt")).string());
+    for (const Channel& channel : graph.channel()) {
+      std::vector<std::string>& names = channels[channel.type()];
+      if (std::find(names.begin(), names.end(), channel.name()) == names.end()) {
+        names.push_back(channel.name());
+      }
+    }
+  }
+  return channels;
+}
+
+int ListFields(const ListRequest& request) {
+  static const std::map<std::string, Schema> kSchemas = {{"scenario", Schema::kScenario},
+                                                         {"robot", Schema::kRobot},
+                                                         {"sweep", Schema::kSweep},
+                                                         {"graph", Schema::kGraph}};
+  const auto fields = SelectFields(FieldReference(kSchemas.at(request.schema)), request.name);
+  fmt::print("{}", request.markdown ? FieldsAsMarkdown(fields) : FieldsAsText(fields, kTextWidth));
+  return kExitOk;
+}
+
+int ListMessages(const ListRequest& request) {
+  const std::vector<MessageEntry> messages = MessageReference();
+  const ChannelsByType channels = GraphChannels();
+  if (request.name.empty()) {
+    fmt::print("{}", request.markdown ? MessagesAsMarkdown(messages, channels)
+                                      : MessagesAsText(messages, channels, kTextWidth));
+    return kExitOk;
+  }
+  std::string type = request.name;
+  for (const auto& [carried, names] : channels) {
+    if (std::find(names.begin(), names.end(), request.name) != names.end()) type = carried;
+  }
+  const MessageEntry& message = FindMessage(messages, type);
+  fmt::print("{}", request.markdown ? MessagesAsMarkdown({message}, channels)
+                                    : MessageAsText(messages, message, channels, kTextWidth));
+  return kExitOk;
+}
+
+int ListMetricsAsMarkdown() {
+  fmt::print("| metric | unit | meaning |\n|---|---|---|\n");
+  for (const logging::Metric& metric : logging::Metrics()) {
+    fmt::print("| `{}` | {} | {} |\n", metric.name, metric.unit, metric.description);
+  }
+  return kExitOk;
+}
+
+int List(const ListRequest& request) {
+  const std::string& what = request.what;
+  if (what == "fields") return ListFields(request);
+  if (what == "messages") return ListMessages(request);
+  if (!request.name.empty()) {
+    throw ConfigError("NAME goes with `poise list fields` and `poise list messages`");
+  }
+  if (request.markdown) {
+    if (what == "metrics") return ListMetricsAsMarkdown();
+    throw ConfigError("--markdown goes with fields, messages and metrics");
+  }
   const auto wanted = [&](const char* kind) {
     const bool all = what.empty();
     if (all) fmt::print("{}\n", kind);
@@ -86,18 +158,31 @@ int List(const std::string& what) {
       fmt::print("  {:<28}{:<6}{}\n", metric.name, metric.unit, metric.description);
     }
   }
+  if (what.empty()) {
+    fmt::print(
+        "\npoise list fields: every field of a scenario with type, default, unit and meaning\n"
+        "poise list messages: every message of the bus\n");
+  }
   return kExitOk;
 }
 
 }  // namespace
 
 void AddListCommand(CLI::App* app, Command* command) {
-  auto what = std::make_shared<std::string>();
-  CLI::App* list = app->add_subcommand("list", "what there is to use");
-  list->add_option("what", *what,
-                   "scenarios, sweeps, robots, graphs, components or metrics; default: all")
-      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "metrics"}));
-  list->callback([what, command] { *command = [what] { return List(*what); }; });
+  auto request = std::make_shared<ListRequest>();
+  CLI::App* list = app->add_subcommand("list", "what there is to use, and what each field means");
+  list->add_option("what", request->what,
+                   "scenarios, sweeps, robots, graphs, components, metrics, fields or messages; "
+                   "default: all but the last two")
+      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "metrics",
+                             "fields", "messages"}));
+  list->add_option("name", request->name,
+                   "of fields: a path or its beginning (sim_ode.push), or a part of a field's "
+                   "name (stiffness); of messages: a type or a channel (ROBOT_STATE)");
+  list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
+      ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));
+  list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");
+  list->callback([request, command] { *command = [request] { return List(*request); }; });
 }
 
 }  // namespace poise

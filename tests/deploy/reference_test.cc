@@ -1,0 +1,219 @@
+// What the program tells of its files and messages: `poise list fields`, `poise list messages`.
+#include <gmock/gmock.h>
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "components/framework/configuration.h"
+#include "components/framework/graph.pb.h"
+#include "components/robot/robot.pb.h"
+#include "deploy/poise/reference/field_reference.h"
+#include "deploy/poise/reference/message_reference.h"
+#include "deploy/poise/reference/reference_text.h"
+#include "deploy/poise/scenario.pb.h"
+#include "deploy/poise/sweep.pb.h"
+#include "poise/message_traits.hpp"
+
+namespace poise {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+struct SchemaCase {
+  Schema schema;
+  const Message* prototype;
+};
+
+std::vector<SchemaCase> Schemas() {
+  return {{Schema::kScenario, &Scenario::default_instance()},
+          {Schema::kRobot, &Robot::default_instance()},
+          {Schema::kSweep, &Sweep::default_instance()},
+          {Schema::kGraph, &Graph::default_instance()}};
+}
+
+std::string WithIndex(const std::string& path) {
+  return std::regex_replace(path, std::regex("\\[i\\]"), "[0]");
+}
+
+/// The compiled class's field at a path of the reference.
+const FieldDescriptor* CompiledField(const Message& prototype, const std::string& path) {
+  const auto* type = prototype.GetDescriptor();
+  const FieldDescriptor* field = nullptr;
+  std::stringstream parts(path);
+  for (std::string part; std::getline(parts, part, '.');) {
+    if (type == nullptr) return nullptr;
+    field = type->FindFieldByName(part.substr(0, part.find('[')));
+    if (field == nullptr) return nullptr;
+    type = field->message_type();
+  }
+  return field;
+}
+
+size_t CountFields(const google::protobuf::Descriptor& type) {
+  size_t count = 0;
+  for (int i = 0; i < type.field_count(); ++i) {
+    const FieldDescriptor& field = *type.field(i);
+    if (field.full_name() == "poise.Scenario.applied") continue;
+    count += 1 + (field.message_type() != nullptr ? CountFields(*field.message_type()) : 0);
+  }
+  return count;
+}
+
+TEST(FieldReference, HoldsEveryFieldThatTheProgramReads) {
+  for (const SchemaCase& c : Schemas()) {
+    EXPECT_EQ(FieldReference(c.schema).size(), CountFields(*c.prototype->GetDescriptor()))
+        << c.prototype->GetTypeName();
+  }
+}
+
+// A comment is the only place that tells; whoever adds a field writes it, unit first.
+TEST(FieldReference, EveryFieldSaysWhatItMeansAndANumberItsUnit) {
+  const std::regex without_unit("(share|ratio|factor|coefficient|component|number)[ :,].*",
+                                std::regex::icase);
+  for (const SchemaCase& c : Schemas()) {
+    for (const FieldEntry& field : FieldReference(c.schema)) {
+      const std::string name = c.prototype->GetTypeName() + ": " + field.path;
+      EXPECT_THAT(field.meaning, HasSubstr(" ")) << name << ": its comment must say what it means";
+      if (field.type.ends_with("number") || field.type == "list of numbers") {
+        const bool whole = field.type.starts_with("whole");
+        EXPECT_TRUE(whole || !field.unit.empty() || std::regex_match(field.meaning, without_unit))
+            << name << ": its comment must begin with the unit, or with what kind of number it is: "
+            << field.meaning;
+      }
+      for (const auto& [value, meaning] : field.values) {
+        EXPECT_THAT(meaning, Not(IsEmpty())) << name << ": " << value << " needs a comment";
+      }
+    }
+  }
+}
+
+TEST(FieldReference, DefaultsAreThoseOfTheCompiledClasses) {
+  for (const SchemaCase& c : Schemas()) {
+    for (const FieldEntry& field : FieldReference(c.schema)) {
+      SCOPED_TRACE(c.prototype->GetTypeName() + ": " + field.path);
+      const FieldDescriptor* compiled = CompiledField(*c.prototype, field.path);
+      ASSERT_NE(compiled, nullptr);
+      EXPECT_EQ(field.default_value.empty(), !compiled->has_default_value());
+      if (field.default_value.empty() || compiled->is_repeated()) continue;
+      // The printed default, read as any file is, gives the value that a message has without it.
+      const std::unique_ptr<Message> owner(google::protobuf::MessageFactory::generated_factory()
+                                               ->GetPrototype(compiled->containing_type())
+                                               ->New());
+      google::protobuf::TextFormat::Parser parser;
+      parser.AllowPartialMessage(true);
+      ASSERT_TRUE(
+          parser.ParseFromString(compiled->name() + ": " + field.default_value, owner.get()));
+      const auto* reflection = owner->GetReflection();
+      ASSERT_TRUE(reflection->HasField(*owner, compiled));
+      switch (compiled->cpp_type()) {
+        case FieldDescriptor::CPPTYPE_DOUBLE:
+          EXPECT_EQ(reflection->GetDouble(*owner, compiled), compiled->default_value_double());
+          break;
+        case FieldDescriptor::CPPTYPE_BOOL:
+          EXPECT_EQ(reflection->GetBool(*owner, compiled), compiled->default_value_bool());
+          break;
+        case FieldDescriptor::CPPTYPE_ENUM:
+          EXPECT_EQ(reflection->GetEnumValue(*owner, compiled),
+                    compiled->default_value_enum()->number());
+          break;
+        case FieldDescriptor::CPPTYPE_STRING:
+          EXPECT_EQ(reflection->GetString(*owner, compiled), compiled->default_value_string());
+          break;
+        case FieldDescriptor::CPPTYPE_INT32:
+          EXPECT_EQ(reflection->GetInt32(*owner, compiled), compiled->default_value_int32());
+          break;
+        case FieldDescriptor::CPPTYPE_INT64:
+          EXPECT_EQ(reflection->GetInt64(*owner, compiled), compiled->default_value_int64());
+          break;
+        case FieldDescriptor::CPPTYPE_UINT32:
+          EXPECT_EQ(reflection->GetUInt32(*owner, compiled), compiled->default_value_uint32());
+          break;
+        case FieldDescriptor::CPPTYPE_UINT64:
+          EXPECT_EQ(reflection->GetUInt64(*owner, compiled), compiled->default_value_uint64());
+          break;
+        default:
+          ADD_FAILURE() << "a type that this test does not know";
+      }
+    }
+  }
+}
+
+TEST(FieldReference, SetTakesEveryPathThatIsPrinted) {
+  for (const FieldEntry& field : FieldReference(Schema::kScenario)) {
+    if (field.group) continue;
+    std::string value = field.default_value.empty() ? "1" : field.default_value;
+    if (!field.values.empty()) value = field.values.front().first;
+    if (value.starts_with('"')) value = value.substr(1, value.size() - 2);
+    Scenario scenario;
+    EXPECT_NO_THROW(SetField(&scenario, WithIndex(field.path), value)) << field.path;
+  }
+}
+
+TEST(FieldReference, IsSelectedByPathByBeginningAndByPartOfAName) {
+  const std::vector<FieldEntry> all = FieldReference(Schema::kScenario);
+  const auto paths = [&](std::string_view beginning) {
+    std::vector<std::string> result;
+    for (const FieldEntry& field : SelectFields(all, beginning)) result.push_back(field.path);
+    return result;
+  };
+  EXPECT_EQ(paths("").size(), all.size());
+  EXPECT_THAT(paths("sim_ode.push[0].peak"), ElementsAre("sim_ode.push[i].peak"));
+  EXPECT_EQ(paths("sim_ode.push[0]"), paths("sim_ode.push"));
+  EXPECT_EQ(paths("sim_ode.push."), paths("sim_ode.push"));
+  // A beginning ends where a name does: sim_ode.push is not sim_ode.push_sensor_noise.
+  EXPECT_THAT(paths("sim_ode.push"), Not(Contains("sim_ode.push_sensor_noise")));
+  EXPECT_THAT(paths("hw_bridge.hold_st"), ElementsAre("hw_bridge.hold_stiffness"));
+  EXPECT_THAT(paths("stiffness"), Contains("sim_ode.drive_train.gear_stiffness"));
+  try {
+    SelectFields(all, "stifness");
+    FAIL() << "no such field";
+  } catch (const ConfigError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("did you mean stiffness"));
+  }
+}
+
+TEST(FieldReference, TheUnitIsWhatACommentBeginsWith) {
+  using Pair = std::pair<std::string, std::string>;
+  EXPECT_EQ(SplitUnit("N·m at the joint"), Pair("N·m", "at the joint"));
+  EXPECT_EQ(SplitUnit("m, l_x/2"), Pair("m", "l_x/2"));
+  EXPECT_EQ(SplitUnit("s"), Pair("s", ""));
+  EXPECT_EQ(SplitUnit("A foot that stands"), Pair("", "A foot that stands"));
+  EXPECT_EQ(SplitUnit("A, of the motor"), Pair("A", "of the motor"));
+  EXPECT_EQ(SplitUnit("share of the load"), Pair("", "share of the load"));
+}
+
+TEST(FieldReference, TextFitsItsWidth) {
+  for (const SchemaCase& c : Schemas()) {
+    std::istringstream text(FieldsAsText(FieldReference(c.schema), 80));
+    for (std::string line; std::getline(text, line);) {
+      if (!line.starts_with(' ')) continue;  // a path has one line
+      EXPECT_LE(std::count_if(line.begin(), line.end(), [](char b) { return (b & 0xC0) != 0x80; }),
+                80)
+          << line;
+    }
+  }
+}
+
+TEST(MessageReference, HoldsEveryTypeOfTheBusWithItsPurposeAndFields) {
+  const std::vector<MessageEntry> messages = MessageReference();
+  for (const MessageType& type : MessageTypes()) {
+    const MessageEntry& entry = FindMessage(messages, type.name);
+    EXPECT_THAT(entry.summary, HasSubstr(" ")) << type.name;
+    EXPECT_THAT(entry.definition, HasSubstr("int64_t tick")) << type.name;
+    EXPECT_TRUE(entry.definition.ends_with("}\n")) << type.name;
+  }
+  EXPECT_EQ(&FindMessage(messages, "robot_state"), &FindMessage(messages, "robot_state_t"));
+  EXPECT_THAT(FindMessage(messages, "robot_state_t").nested, ElementsAre("wrench_t"));
+  EXPECT_THROW(FindMessage(messages, "robot_stat"), ConfigError);
+}
+
+}  // namespace
+}  // namespace poise
