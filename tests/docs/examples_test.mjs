@@ -1,0 +1,96 @@
+// Runs what README and the tutorials show: every command of their ```sh blocks, page by page, in a copy of deploy/ of
+// the test's own. examples.txt lists those that are not run, and those that end with another exit code than 0, with the
+// reason. Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {chmodSync, cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {dirname, join, resolve} from 'node:path';
+import {test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {linesOf, repositoryFiles, root} from './markdown.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, page: {type: 'string'}}});
+const LIMIT = 400_000;  // ms for a page
+
+/** {kind, begin, reason}, from the lines "KIND | BEGINNING OR PAGE | REASON"; kind: "page", "skip" or "exit N". */
+const rules = readFileSync(new URL('examples.txt', import.meta.url), 'utf8').split('\n')
+    .filter((line) => line.trim() !== '' && !line.startsWith('#')).map((line) => {
+      const [kind, begin, reason] = line.split(' | ').map((part) => part.trim());
+      assert.ok(/^(page|skip|exit \d+)$/.test(kind) && begin && reason, `examples.txt: not a rule: ${line}`);
+      return {kind, begin, reason, used: false};
+    });
+
+/** The exit code that a command shall end with; null: it is not run. */
+function expectedExit(page, {text}) {
+  const rule = rules.find((r) => (r.kind === 'page' ? page === r.begin : text.startsWith(r.begin)));
+  if (rule === undefined) return 0;
+  rule.used = true;
+  return rule.kind.startsWith('exit') ? Number(rule.kind.slice(5)) : null;
+}
+
+/** Commands of a page's ```sh blocks: {line, text}; a here document and lines that end with \ belong to theirs. */
+function commandsOf(page) {
+  const commands = [];
+  let open = null;  // the command that goes on
+  let until = null;  // its here document's last line
+  for (const {number, text, code, mark} of linesOf(page)) {
+    if (mark || code !== 'sh') continue;
+    if (open) {
+      open.text += `\n${text}`;
+    } else {
+      if (text.trim() === '' || text.startsWith('#')) continue;
+      open = {line: number, text};
+      commands.push(open);
+    }
+    until ??= /<<\s*'?(\w+)'?/.exec(text)?.[1] ?? null;
+    if (until !== null ? text === until : !text.endsWith('\\')) open = until = null;
+  }
+  return commands;
+}
+
+/** A folder like a built checkout, but for the sources: deploy/run does without deploy/setup. */
+function sandbox() {
+  const folder = mkdtempSync(join(tmpdir(), 'poise-examples-'));
+  cpSync(join(root, 'deploy'), join(folder, 'deploy'), {recursive: true, filter: (f) => !f.endsWith('deploy/poise')});
+  writeFileSync(join(folder, 'deploy/run'), '#!/bin/sh\nexec "$(dirname "$0")/../build/release/bin/poise" run "$@"\n');
+  chmodSync(join(folder, 'deploy/run'), 0o755);
+  mkdirSync(join(folder, 'build/release'), {recursive: true});
+  symlinkSync(dirname(resolve(options.poise)), join(folder, 'build/release/bin'));
+  return folder;
+}
+
+const pages = ['README.md', ...repositoryFiles('docs/tutorials').filter((f) => f.endsWith('.md'))];
+for (const page of pages) {
+  const commands = commandsOf(page).map((command) => ({...command, exit: expectedExit(page, command)}));
+  const runnable = commands.filter((c) => c.exit !== null);
+  if (runnable.length === 0 || (options.page && options.page !== page)) continue;
+  test(`${page}: ${runnable.length} of ${commands.length} commands`, () => {
+    const folder = sandbox();
+    try {
+      // One shell for the page, so that a folder entered or a variable set stays. A mark follows each command.
+      const script = runnable.map(({line, text}) => `${text}\nprintf '\\n@@@ ${line} %s\\n' "$?"\n`).join('');
+      const PATH = `${folder}/build/release/bin:${process.env.PATH}`;
+      const {stdout} = spawnSync('bash', ['-c', `exec 2>&1\n${script}`], {
+        cwd: folder, encoding: 'utf8', timeout: LIMIT, maxBuffer: 1 << 28, stdio: ['ignore', 'pipe', 'pipe'],
+        env: {...process.env, PATH, POISE_DEPLOY_DIR: join(folder, 'deploy')},
+      });
+      const parts = stdout.split(/\n@@@ (\d+) (\d+)\n/);
+      const problems = [];
+      runnable.forEach(({line, text, exit}, i) => {
+        const output = parts[3 * i] ?? '';
+        const ended = parts[3 * i + 2];
+        if (Number(ended) === exit && Number(parts[3 * i + 1]) === line) return;
+        problems.push(`${page}:${line}: ${text.split('\n')[0]}\n  ended with ${ended ?? 'nothing'}, not ${exit}:\n` +
+                      output.split('\n').slice(-15).join('\n'));
+      });
+      assert.deepEqual(problems, [], problems.join('\n'));
+    } finally {
+      rmSync(folder, {recursive: true, force: true});
+    }
+  });
+}
+
+test('examples.txt has no rule that no command needs', () => {
+  assert.deepEqual(rules.filter((r) => !r.used).map((r) => r.begin), []);
+});
