@@ -74,7 +74,7 @@ class ChainCase : public testing::TestWithParam<Case> {
   std::mt19937 random_{23};
 };
 
-// EQUATIONS.md, "An independent route to the same torque": no matrix of section 3 is formed.
+// The independent route of docs/equations.md: no matrix of section 3 is formed.
 class SquareRoute : public ChainCase {};
 
 TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {

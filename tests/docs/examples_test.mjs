@@ -8,7 +8,7 @@ import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {linesOf, repositoryFiles, root} from './markdown.mjs';
+import {linesOf, programFacts, repositoryFiles, root} from './markdown.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, page: {type: 'string'}}});
 const LIMIT = 400_000;  // ms for a page
@@ -60,7 +60,8 @@ function sandbox() {
   return folder;
 }
 
-const pages = ['README.md', ...repositoryFiles('docs/tutorials').filter((f) => f.endsWith('.md'))];
+const pages = ['README.md', 'docs/reference/README.md',
+               ...repositoryFiles('docs/tutorials').filter((f) => f.endsWith('.md'))];
 for (const page of pages) {
   const commands = commandsOf(page).map((command) => ({...command, exit: expectedExit(page, command)}));
   const runnable = commands.filter((c) => c.exit !== null);
@@ -90,6 +91,27 @@ for (const page of pages) {
     }
   });
 }
+
+test('deploy/docs writes every command, field, message and metric', () => {
+  const folder = mkdtempSync(join(tmpdir(), 'poise-docs-'));
+  try {
+    const {status, stdout, stderr} = spawnSync(join(root, 'deploy/docs'), [folder],
+        {encoding: 'utf8', env: {...process.env, POISE: resolve(options.poise)}});
+    assert.equal(status, 0, stdout + stderr);
+    const page = (name) => readFileSync(join(folder, name), 'utf8');
+    const facts = programFacts(options.poise);
+    for (const command of facts.commands.keys()) {
+      assert.ok(page('commands.md').includes(`\n## \`${`poise ${command}`.trim()}\`\n`), command);
+    }
+    for (const field of facts.fields) assert.ok(page('fields.md').includes(`\`${field}\``), field);
+    assert.ok(page('messages.md').includes(facts.messages));
+    for (const name of ['robot_fields.md', 'sweep_fields.md', 'graph_fields.md', 'metrics.md']) {
+      assert.ok(page(name).split('\n').length > 10, name);
+    }
+  } finally {
+    rmSync(folder, {recursive: true, force: true});
+  }
+});
 
 test('examples.txt has no rule that no command needs', () => {
   assert.deepEqual(rules.filter((r) => !r.used).map((r) => r.begin), []);
