@@ -1,5 +1,5 @@
 // Runs what README and the tutorials show: every command of their ```sh blocks, page by page, in a copy of deploy/ of
-// the test's own. examples.txt lists those that are not run, and those that end with another exit code than 0, with the
+// the test's own; what their ```text blocks quote must have been printed, numbers aside. examples.txt lists those that are not run, and those that end with another exit code than 0, with the
 // reason. Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -49,6 +49,15 @@ function commandsOf(page) {
   return commands;
 }
 
+/** A line without its numbers and its columns' widths, which depend on the machine. */
+const masked = (line) => line.replace(/[\d.]*\d/g, '#').replace(/─+/g, '─').replace(/\s+/g, ' ').trim();
+
+/** Lines of a page's ```text blocks that no line of its commands' output is like: {number, text}. */
+function untrueLines(page, output) {
+  const said = new Set(output.split('\n').map(masked));
+  return linesOf(page).filter(({text, code, mark}) => code === 'text' && !mark && !said.has(masked(text)));
+}
+
 /** A folder like a built checkout, but for the sources: deploy/run does without deploy/setup. */
 function sandbox() {
   const folder = mkdtempSync(join(tmpdir(), 'poise-examples-'));
@@ -85,6 +94,7 @@ for (const page of pages) {
         problems.push(`${page}:${line}: ${text.split('\n')[0]}\n  ended with ${ended ?? 'nothing'}, not ${exit}:\n` +
                       output.split('\n').slice(-15).join('\n'));
       });
+      for (const {number, text} of untrueLines(page, stdout)) problems.push(`${page}:${number}: nothing printed: ${text}`);
       assert.deepEqual(problems, [], problems.join('\n'));
     } finally {
       rmSync(folder, {recursive: true, force: true});
