@@ -1,6 +1,7 @@
-// Runs what README and the tutorials show: every command of their ```sh blocks, page by page, in a copy of deploy/ of
-// the test's own; what their ```text blocks quote must have been printed, numbers aside. examples.txt lists those that are not run, and those that end with another exit code than 0, with the
-// reason. Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
+// Runs what README, docs/reference/README.md and the tutorials show: every command of their ```sh blocks, page by page,
+// in a copy of deploy/ of the test's own. What their ```text blocks quote must have been printed, numbers aside.
+// examples.txt lists the commands that are not run, and those that end with another exit code than 0, with the reason.
+// Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
 import {chmodSync, cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync} from 'node:fs';
@@ -94,7 +95,9 @@ for (const page of pages) {
         problems.push(`${page}:${line}: ${text.split('\n')[0]}\n  ended with ${ended ?? 'nothing'}, not ${exit}:\n` +
                       output.split('\n').slice(-15).join('\n'));
       });
-      for (const {number, text} of untrueLines(page, stdout)) problems.push(`${page}:${number}: nothing printed: ${text}`);
+      for (const {number, text} of untrueLines(page, stdout)) {
+        problems.push(`${page}:${number}: nothing printed: ${text}`);
+      }
       assert.deepEqual(problems, [], problems.join('\n'));
     } finally {
       rmSync(folder, {recursive: true, force: true});
