@@ -20,6 +20,7 @@ void AddMatrixCommand(CLI::App* app, Command* command);
 void AddSweepCommand(CLI::App* app, Command* command);
 void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
+void AddBitsCommand(CLI::App* app, Command* command);
 void AddCompareCommand(CLI::App* app, Command* command);
 void AddReplayCommand(CLI::App* app, Command* command);
 void AddEstimatorsCommand(CLI::App* app, Command* command);

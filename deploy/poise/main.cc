@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   poise::AddSweepCommand(&app, &command);
   poise::AddLimitCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
+  poise::AddBitsCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
   poise::AddReplayCommand(&app, &command);
   poise::AddEstimatorsCommand(&app, &command);

@@ -156,6 +156,14 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   return result;
 }
 
+RunOutcome ScenarioRun::RunOnly(const std::string& out) {
+  if (!options_.in_process) ChoosePorts(&main_.spec);
+  const RunDir dir = MakeRunDir(out, name());
+  WriteFiles(main_, dir.path());
+  CatchStopSignals();
+  return RunPart(main_, dir.path(), options_.in_process, /*quiet=*/true, options_.launch);
+}
+
 void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {
   record->first_tick = FirstCheckedTick(scenario, *record);
   const fs::path reference = ReferenceDir(log.parent_path()) / "run.lcm";

@@ -38,6 +38,11 @@ class ScenarioRun {
   /// starts. Throws ConfigError for the folder, LogError for the log.
   RunResult Run(const std::string& out, bool latest);
 
+  /// Runs without a word, without its reference and without checks: the log and what describes it
+  /// go into `out`. Throws as Run does.
+  RunOutcome RunOnly(const std::string& out);
+
+  const RunSpec& spec() const { return main_.spec; }
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }
 

@@ -1,0 +1,76 @@
+// Every message of the recorded runs has the recorded bits, on any machine of the same instruction
+// set.
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+constexpr int kExitOtherBuild = 3;  // of `poise bits`
+
+nlohmann::json Record() {
+  std::ifstream file(std::string(POISE_SOURCE_DIR) + "/deploy/bits/record.json");
+  return nlohmann::json::parse(file);
+}
+
+std::vector<std::string> Names() {
+  std::vector<std::string> names;
+  for (const auto& run : Record()["runs"]) names.push_back(run["name"]);
+  return names;
+}
+
+class RecordedRun : public testing::TestWithParam<std::string> {};
+
+TEST_P(RecordedRun, HasTheRecordedBits) {
+  const ProgramResult result = RunPoise({"bits", GetParam()});
+  if (result.exit_code == kExitOtherBuild) {
+    GTEST_SKIP() << "the record is of another build\n" << result.output;
+  }
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+}
+
+INSTANTIATE_TEST_SUITE_P(Runs, RecordedRun, testing::ValuesIn(Names()),
+                         [](const auto& run) { return run.param; });
+
+TEST(RecordedBits, HoldEveryExperimentOfThePaper) {
+  std::vector<std::string> recorded;
+  for (const auto& run : Record()["runs"]) recorded.push_back(run["scenario"]);
+  std::istringstream list(RunPoise({"list", "scenarios"}).output);
+  int experiments = 0;
+  for (std::string line; std::getline(list, line);) {
+    if (line.find(", paper section ") == std::string::npos) continue;
+    std::string name;
+    std::istringstream(line) >> name;
+    ++experiments;
+    EXPECT_NE(std::find(recorded.begin(), recorded.end(), name), recorded.end()) << name;
+  }
+  EXPECT_GE(experiments, 5);
+}
+
+TEST(RecordedBits, OfAnotherRunDiffer) {
+  // A record with one bit changed: the tick and the channel are named.
+  const TestDeploy deploy;
+  const std::string bits = deploy / "bits";
+  std::filesystem::create_directories(bits);
+  deploy.Scenario("stand_again", "base: \"base/stand\"\n");
+  std::ofstream(bits + "/record.json")
+      << R"({"runs": [{"name": "stand", "scenario": "stand_again"}]})";
+  ASSERT_EQ(RunPoise({"bits", "--record"}).exit_code, 0);
+  EXPECT_EQ(RunPoise({"bits"}).exit_code, 0);
+  const nlohmann::json record = nlohmann::json::parse(ReadAll(bits + "/record.json"));
+  const auto ticks = record["runs"][0]["channels"][0]["ticks"].get<size_t>();
+  std::string bytes = ReadAll(bits + "/stand.bytes");
+  bytes[2 * ticks + 17] = static_cast<char>(bytes[2 * ticks + 17] ^ 1);  // the third channel's
+  std::ofstream(bits + "/stand.bytes", std::ios::binary) << bytes;
+  const ProgramResult result = RunPoise({"bits"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const auto channel = record["runs"][0]["channels"][2]["name"].get<std::string>();
+  EXPECT_NE(result.output.find("first at tick 17, " + channel), std::string::npos) << result.output;
+  EXPECT_NE(result.output.find("recorded with instruction set "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace poise
