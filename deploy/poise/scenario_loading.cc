@@ -173,6 +173,26 @@ void CheckVariants(const LoadedScenario& loaded) {
   CheckReference(loaded);
 }
 
+/// What the scenario's `ideal` gives and asks of the ideal robot.
+void ApplyIdeal(LoadedScenario* loaded) {
+  const Ideal ideal = loaded->scenario.ideal();
+  for (const std::string& set : ideal.set()) ApplyChange({set, "--ideal"}, loaded);
+  for (int i = 0; i < ideal.check_size(); ++i) {
+    bool known = false;
+    for (Check& check : *loaded->scenario.mutable_check()) {
+      if (check.metric() != ideal.check(i).metric()) continue;
+      known = true;
+      const std::string label = check.label();
+      check = ideal.check(i);
+      if (!check.has_label()) check.set_label(label);
+    }
+    if (!known) {
+      FailField(*loaded, fmt::format("ideal.check[{}].metric", i),
+                fmt::format("the scenario has no check of '{}'", ideal.check(i).metric()));
+    }
+  }
+}
+
 void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
   const std::vector<std::string> names = VariantNames(loaded->scenario);
   const auto found = std::find(names.begin(), names.end(), name);
@@ -268,6 +288,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
     ApplyChange(change, &loaded);
   }
+  if (changes.ideal) ApplyIdeal(&loaded);
   if (!changes.variant.empty()) ApplyVariant(changes.variant, &loaded);
   for (const std::string& set : changes.set) ApplyChange({set, kSetFlag}, &loaded);
   if (changes.duration) {
@@ -319,6 +340,11 @@ std::string FormatChanges(const Scenario& scenario) {
     text += same ? ", " : fmt::format("{}{}: ", text.empty() ? "" : "\n", change.by());
     text += change.set();
     by = change.by();
+  }
+  const auto& ablations = scenario.applied().ablation();
+  if (scenario.ideal().has_reason() &&
+      std::find(ablations.begin(), ablations.end(), "--ideal") != ablations.end()) {
+    text += fmt::format("\n--ideal: {}", scenario.ideal().reason());
   }
   return text.empty() ? "" : text + "\n";
 }

@@ -17,7 +17,8 @@
 namespace poise {
 
 /// Sensor readings of a robot that sways on its feet (double support) or on the right foot with the
-/// left one moving: every tick another state. The feet in contact stand still and level.
+/// left one moving: every tick another state. The feet in contact stand still and level. On one
+/// foot the COM goes as far above it as the robot reaches.
 std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
                                             const Contacts& in_contact, int num_ticks);
 

@@ -364,5 +364,35 @@ TEST_F(AblationTest, AnInterruptEndsAllRuns) {
   EXPECT_TRUE(ProcessesWith(out).empty());
 }
 
+// Joint friction keeps the paper's push from felling the robot: without it the scenario's `ideal`
+// says what is asked.
+TEST(IdealRobot, HoldsWhatTheExperimentsAskOfIt) {
+  const RunFolder folder;
+  for (const char* experiment : {"gravity_compensation", "push_double_support",
+                                 "push_single_support", "contact_transition", "unknown_surface"}) {
+    const ProgramResult result = RunPoise(
+        {"run", experiment, "--ideal", "--inline", "--quiet", "--out", folder / experiment});
+    EXPECT_EQ(result.exit_code, 0) << experiment << "\n" << result.output;
+  }
+  const nlohmann::json summary = ReadSummary(folder / "push_double_support");
+  bool asked = false;
+  for (const auto& check : summary["checks"]) {
+    if (check["name"] != "push_peak") continue;
+    asked = true;
+    EXPECT_NEAR(check["measured"].get<double>(), 160, 1);
+    EXPECT_EQ(check["paper"], "188.91 N");
+  }
+  EXPECT_TRUE(asked);
+}
+
+TEST(IdealRobot, FallsByThePapersPush) {
+  const RunFolder folder;
+  const ProgramResult result =
+      RunPoise({"run", "push_double_support", "--ideal", "--set", "sim_ode.push[0].peak=188.91",
+                "--inline", "--quiet", "--out", folder / "run"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_NE(result.output.find("fell"), std::string::npos) << result.output;
+}
+
 }  // namespace
 }  // namespace poise
