@@ -134,6 +134,7 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
   if (config.on_lost_command() == HwBridgeConfig::HOLD) {
     result.hold_cycles = Cycles(config.hold_time(), period);
   }
+  result.hold_before_command = config.hold_before_command();
   result.hold_stiffness = config.hold_stiffness();
   result.hold_damping = config.hold_damping();
   result.resume_cycles = Cycles(config.resume_time(), period);

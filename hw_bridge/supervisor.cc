@@ -202,6 +202,7 @@ void Supervisor::Reset(const joint_command_t* command) {
 void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
   Reset(command);
   if (fault_grace_ > 0) --fault_grace_;
+  bool accepted = false;
   if (command != nullptr) {
     const Refusal refusal = gate_.Check(*command, cycle);
     if (refusal != Refusal::kNone) {
@@ -209,30 +210,31 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
     } else if (!latched()) {
       std::copy(command->torque.begin(), command->torque.end(), torque_.begin());
       last_refusal_ = Status::REASON_NO_COMMAND;
-      const bool starts = state_ == Status::STATE_INIT && fault_grace_ == 0 && MayStart();
-      if (starts) {
-        state_ = Status::STATE_ENABLING;
-        reason_ = Status::REASON_DRIVE_NOT_ENABLED;
-        enabling_cycles_ = start_ramp_ = resume_left_ = 0;
-        slew_known_ = false;
-      }
-      if (state_ == Status::STATE_INIT) return;
+      accepted = true;
     }
   }
   if (latched()) return;
   if (state_ == Status::STATE_INIT) {
-    reason_ = last_refusal_;
-    reason_joint_ = -1;
-    return;
+    if (!accepted && !AwaitsFirst()) {
+      reason_ = last_refusal_;
+      reason_joint_ = -1;
+      return;
+    }
+    if (fault_grace_ > 0 || !MayStart()) return;
+    state_ = Status::STATE_ENABLING;
+    reason_ = Status::REASON_DRIVE_NOT_ENABLED;
+    enabling_cycles_ = start_ramp_ = resume_left_ = 0;
+    slew_known_ = false;
   }
   Follow(gate_.Age(cycle));
 }
 
 /// The states of a bridge that has accepted a command, which is `age` cycles old.
 void Supervisor::Follow(int64_t age) {
-  const bool fresh = age <= config_.damping_after_cycles;
+  const bool first = AwaitsFirst();
+  const bool fresh = !first && age <= config_.damping_after_cycles;
   if (state_ == Status::STATE_ENABLING) {
-    if (!fresh) {  // nothing to follow: down again
+    if (!fresh && !first) {  // nothing to follow: down again
       state_ = Status::STATE_INIT;
       reason_ = last_refusal_;
       reason_joint_ = -1;
@@ -252,12 +254,26 @@ void Supervisor::Follow(int64_t age) {
     resume_from_ = applied_;
     resume_left_ = config_.resume_cycles;
   }
+  if (first) {
+    HoldStart();
+    return;
+  }
   if (!fresh) {
     UpdateLoss(age);
     return;
   }
   state_ = Status::STATE_RUNNING;
   reason_ = Status::REASON_NONE;
+  reason_joint_ = -1;
+}
+
+void Supervisor::HoldStart() {
+  if (state_ != Status::STATE_HOLDING) {
+    std::fill(hold_torque_.begin(), hold_torque_.end(), 0.0);
+    hold_counts_ = monitor_.counts();
+  }
+  state_ = Status::STATE_HOLDING;
+  reason_ = last_refusal_;
   reason_joint_ = -1;
 }
 

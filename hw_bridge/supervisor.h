@@ -45,9 +45,10 @@ struct SupervisorConfig {
   double stop_ramp = 0.1;     ///< s
   /// Cycles of holding between the last command's end and damping; 0: none.
   int hold_cycles = 0;
-  double hold_stiffness = 0;  ///< N·m/rad
-  double hold_damping = 0;    ///< N·m·s/rad
-  int resume_cycles = 0;      ///< cycles in which a command that is back is faded in
+  bool hold_before_command = false;  ///< hold from the start until the first command, without end
+  double hold_stiffness = 0;         ///< N·m/rad
+  double hold_damping = 0;           ///< N·m·s/rad
+  int resume_cycles = 0;             ///< cycles in which a command that is back is faded in
 
   double slew_limit = std::numeric_limits<double>::infinity();  ///< N·m/s, of a followed command
   double overload_time = 2;                                     ///< s at the peak current
@@ -56,11 +57,13 @@ struct SupervisorConfig {
 };
 
 /// States of bridge_status_t:
-///   INIT      no command accepted yet: motors free
+///   INIT      no command accepted yet: motors free; with hold_before_command only until the
+///             motors may start
 ///   ENABLING  told to enable, without torque, until all drives report it
 ///   RUNNING   follows the last accepted command, (54), limited
 ///   HOLDING   the last accepted command is too old: its torque, and stiffness and damping about
-///             the position where it was lost; an accepted command leads back
+///             the position where it was lost; an accepted command leads back. Before the first
+///             command: no torque but these two, about the position at the start
 ///   DAMPING   the same, −damping × joint velocity
 ///   STOPPING  latched: damping ramped out over stop_ramp
 ///   STOPPED   latched: motors free
@@ -121,7 +124,10 @@ class Supervisor {
   bool MayStart();
   void Reset(const joint_command_t* command);
   void UpdateState(int64_t cycle, const joint_command_t* command);
+  void HoldStart();
   void UpdateLoss(int64_t age);
+  /// The first command is waited for with the joints held.
+  bool AwaitsFirst() const { return config_.hold_before_command && !gate_.any_accepted(); }
   void Follow(int64_t age);
   double Position(size_t joint) const;
   double DampingTorque(size_t joint, double share) const;

@@ -118,7 +118,7 @@ class ReplayedStages {
     }
     const int64_t start = NowNanoseconds();
     for (int64_t t = 0; t < end_; ++t) {
-      const Tick tick = MakeTick(t, spec_.tick_period());
+      const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
       size_t first_output = 0;
       for (BoundStage& stage : stages_) {
         if (t < stage.end) RunStage(&stage, tick, first_output, &result);

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "components/framework/packet_filter.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/log_export.h"
 #include "logging/log_messages.h"
@@ -107,6 +108,13 @@ size_t Append(const MessageType& type, std::span<const uint8_t> data, bool names
   return row.columns();
 }
 
+/// us from the run's start to the scenario's time 0; 0 when the run is not known.
+int64_t LeadTime(const LogMessages& messages) {
+  if (!messages.run_known()) return 0;
+  const RunSpec& spec = messages.spec();
+  return MakeTick(spec.lead_ticks(), spec.tick_period()).utime;
+}
+
 std::string TimeAndTick(int64_t utime, int64_t tick) {
   return fmt::format("{:.6f},{}", static_cast<double>(utime) * 1e-6, tick);
 }
@@ -146,6 +154,7 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
     File file;
     Shape shape;
   };
+  const int64_t lead = LeadTime(messages);
   std::map<std::string, Table, std::less<>> tables;
   Results results;
   LogEvent event;
@@ -174,7 +183,7 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
       ++result.refused;
       continue;
     }
-    row = TimeAndTick(ReadInt64(event.data.data() + type->run_id_offset + 16),
+    row = TimeAndTick(ReadInt64(event.data.data() + type->run_id_offset + 16) - lead,
                       LogMessages::Tick(*type, event));
     Append(*type, event.data, false, "", &row);
     row.push_back('\n');
@@ -244,6 +253,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     ++(cell.empty() ? result.messages : result.refused);
     if (cell.empty()) cell = event.data;
   }
+  const int64_t lead = LeadTime(messages);
   File out(file);
   std::string row = "time,tick";
   for (const Column& column : columns) row += column.names;
@@ -253,7 +263,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     for (size_t i = 0; i < cells.size(); ++i) {
       if (cells[i].empty()) continue;
       const int offset = columns[i].shape->type->run_id_offset;
-      row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16), tick);
+      row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16) - lead, tick);
       break;
     }
     for (size_t i = 0; i < columns.size(); ++i) {

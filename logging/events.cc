@@ -28,7 +28,7 @@ class EventList {
   void AddEndOf(const Interval& interval, std::string name, const std::string& what) {
     if (!interval.end) return;
     std::string detail =
-        fmt::format("{}, after {:.3f} s", what, run_.time(*interval.end - interval.begin));
+        fmt::format("{}, after {:.3f} s", what, run_.duration(*interval.end - interval.begin));
     events_.push_back({{run_.time(*interval.end), std::move(name), std::move(detail)}, true});
   }
   /// `begin` and `end` name the events; `what` tells of the first tick, and the end adds how long
@@ -160,7 +160,7 @@ void AddFeet(const RunRecord& run, EventList* events) {
     };
     std::vector<Interval> intervals = Intervals(run, lost);
     std::erase_if(intervals, [&](const Interval& i) {
-      return i.end && run.time(*i.end - i.begin) < kShortestLoss;
+      return i.end && run.duration(*i.end - i.begin) < kShortestLoss;
     });
     events->AddIntervals(intervals, "contact_lost", "contact_regained", [&](int64_t tick) {
       const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
@@ -290,6 +290,24 @@ void AddPush(const RunRecord& run, EventList* events) {
   }
 }
 
+void AddCrane(const RunRecord& run, EventList* events) {
+  double most = 0;
+  bool held = false;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (truth == nullptr) continue;
+    if (held && truth->crane_share == 0) {
+      events->Add(tick, "crane_let_go",
+                  fmt::format("it carried {:.0f} N at most, {:.3f} s after the start", most,
+                              run.duration(tick)));
+      return;
+    }
+    if (!held && truth->crane_share == 0) return;  // no crane
+    held = true;
+    most = std::max(most, GetVector3(truth->crane_force).norm());
+  }
+}
+
 void AddEnd(const RunRecord& run, EventList* events) {
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const ground_truth_t* truth = run.truth.at(tick);
@@ -300,7 +318,7 @@ void AddEnd(const RunRecord& run, EventList* events) {
   const int64_t planned = run.spec.num_ticks();
   events->Add(run.num_ticks, "run_ended",
               planned > run.num_ticks ? fmt::format("{:.3f} s before its planned end",
-                                                    run.time(planned - run.num_ticks))
+                                                    run.duration(planned - run.num_ticks))
               : planned > 0           ? "planned end"
                                       : "no end was planned");
 }
@@ -398,6 +416,7 @@ std::vector<Event> Events(const RunRecord& run) {
   AddCapturePoint(run, &events);
   AddBridge(run, &events);
   AddPush(run, &events);
+  AddCrane(run, &events);
   AddEnd(run, &events);
   return std::move(events).Sorted();
 }

@@ -21,7 +21,7 @@ struct Event {
 /// contact_early, contact_late, no_surface, contact_lost, contact_regained, balancing_on,
 /// balancing_off, eta_infeasible_begins, eta_infeasible_ends, cop_not_achieved_begins,
 /// cop_not_achieved_ends, step_needed, step_needed_ends, bridge_state, push_begins, push_peak,
-/// push_ends, fall, run_ended.
+/// push_ends, crane_let_go, fall, run_ended.
 std::vector<Event> Events(const RunRecord& run);
 
 /// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty

@@ -47,14 +47,15 @@ LogCut MakeCut(const LogSurvey& survey, const CutRange& range, const std::string
 
 }  // namespace
 
-CutRange TicksOfTimes(double from, double to, double period) {
+CutRange TicksOfTimes(double from, double to, const RunSpec& spec) {
   // Times of ticks are rounded to a whole microsecond in the log.
   constexpr double kHalf = 0.5e-6;
-  const auto tick = [](double value) {
-    return static_cast<int64_t>(std::clamp(value, -1.0, 9e15));
+  const auto tick = [&](double value) {
+    const double run_tick = value + static_cast<double>(spec.lead_ticks());
+    return static_cast<int64_t>(std::clamp(run_tick, -1.0, 9e15));
   };
-  return {std::max<int64_t>(0, tick(std::ceil((from - kHalf) / period))),
-          tick(std::floor((to + kHalf) / period)),
+  return {std::max<int64_t>(0, tick(std::ceil((from - kHalf) / spec.tick_period()))),
+          tick(std::floor((to + kHalf) / spec.tick_period())),
           {}};
 }
 

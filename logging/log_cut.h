@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/graph.pb.h"
+
 namespace poise::logging {
 
 struct CutRange {
@@ -21,8 +23,8 @@ struct CutResult {
       0;  ///< events in the range (by their event times) that could not be read, left out
 };
 
-/// Ticks of the times [from, to] s, both included, of ticks of `period` s.
-CutRange TicksOfTimes(double from, double to, double period);
+/// Ticks of the scenario's times [from, to] s, both included.
+CutRange TicksOfTimes(double from, double to, const RunSpec& spec);
 
 /// Copies the messages of the range's ticks and channels, of RUN_INFO all, with the cut noted in
 /// its run_spec: whoever reads the log knows what it is to hold. Messages that came without a tick

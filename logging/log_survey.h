@@ -53,7 +53,7 @@ struct LogSurvey {
   std::map<std::string, health_t> health;  ///< by component: its last
   std::vector<DamageSurvey> damage;
 
-  double tick_time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
+  double duration(int64_t ticks) const { return static_cast<double>(ticks) * spec.tick_period(); }
   /// Lines that say what is wrong, fit for a terminal; none: the log is whole. `limit`: places
   /// named at most of each kind, 0: all.
   std::vector<std::string> Problems(size_t limit) const;

@@ -92,7 +92,7 @@ Answer WarningTime(const RunRecord& run) {
   double warning = 0;
   for (const Interval& interval : StepNeeded(run)) {
     const bool lasts = interval.begin < *fall && interval.end.value_or(*fall) >= *fall;
-    if (lasts) warning = run.time(*fall - interval.begin);
+    if (lasts) warning = run.duration(*fall - interval.begin);
   }
   return warning;
 }
@@ -122,7 +122,7 @@ void AddCapturePoint(MetricList* list) {
                      for (const Interval& interval : StepNeeded(run)) {
                        ticks += interval.end.value_or(run.num_ticks) - interval.begin;
                      }
-                     return run.time(ticks);
+                     return run.duration(ticks);
                    }});
   list->push_back({"step_warning_time", "s",
                    "from saying that a step is needed to the fall; 0: not announced", WarningTime});

@@ -27,7 +27,8 @@ Answer ComDifference(const RunRecord& run) {
       Maximum(run,
               [&](int64_t t) -> Answer {
                 const ground_truth_t* here = run.truth.at(t);
-                const ground_truth_t* there = run.reference->truth.at(t);
+                const ground_truth_t* there =
+                    run.reference->truth.at(run.reference->TickOf(run, t));
                 if (here == nullptr || there == nullptr) return {};
                 return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
               }),

@@ -67,7 +67,13 @@ struct RunRecord {
   /// nobody has asked for. Not in the log, set by who can run the estimator.
   std::array<std::shared_ptr<const Estimates>, 2> other_estimates;
 
-  double time(int64_t tick) const { return static_cast<double>(tick) * spec.tick_period(); }
+  /// s of the scenario's time, negative in the run's lead.
+  double time(int64_t tick) const { return duration(tick - spec.lead_ticks()); }
+  double duration(int64_t ticks) const { return static_cast<double>(ticks) * spec.tick_period(); }
+  /// This run's tick at the scenario's time of another run's.
+  int64_t TickOf(const RunRecord& other, int64_t tick) const {
+    return tick - other.spec.lead_ticks() + spec.lead_ticks();
+  }
 
   /// Calls visit(Series<T>*) for the series of each message type.
   template <class Visit>

@@ -10,17 +10,21 @@ namespace poise {
 void SimOde::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<SimOdeConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
-  simulation_ = std::make_unique<Simulation>(*model, config, context.tick_period, context.seed);
+  simulation_ = std::make_unique<Simulation>(*model, config, context.tick_period, context.seed,
+                                             context.lead_ticks);
   sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, config), context.seed);
   readings_ = std::make_unique<SensorReadings>(model->num_joints());
 
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&drive_command_, "drive_command", {model->num_joints()},
                    InputKind::kPreviousTick);
+  wiring->AddInput(&bridge_status_, "bridge_status", {model->num_joints()},
+                   InputKind::kPreviousTick);
   wiring->AddOutput(&drive_feedback_, "drive_feedback", counts);
   wiring->AddOutput(&external_push_, "external_push", {});
   wiring->AddOutput(&ground_truth_, "ground_truth", counts);
-  wiring->AddStage("step", {&drive_command_}, {&drive_feedback_, &external_push_, &ground_truth_},
+  wiring->AddStage("step", {&drive_command_, &bridge_status_},
+                   {&drive_feedback_, &external_push_, &ground_truth_},
                    [this](const Tick& tick) { Step(tick); });
 }
 
@@ -35,6 +39,8 @@ void SimOde::Step(const Tick& tick) {
     } else {
       simulation_->SetCurrents({}, {});
     }
+    simulation_->Follow(bridge_status_.present() &&
+                        bridge_status_->state == bridge_status_t::STATE_RUNNING);
     simulation_->Advance();
   }
   sensors_->Measure(simulation_->measured(), readings_.get());
@@ -88,6 +94,9 @@ void SimOde::PublishTruth() {
   }
   SetVector3(truth.push_force, message.push_force);
   message.fallen = simulation_->fallen() ? 1 : 0;
+  SetVector3(truth.crane_point, message.crane_point);
+  SetVector3(truth.crane_force, message.crane_force);
+  message.crane_share = truth.crane_share;
 }
 
 }  // namespace poise

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "components/framework/component.h"
+#include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
 #include "poise/drive_feedback_t.hpp"
 #include "poise/external_push_t.hpp"
@@ -13,9 +14,10 @@
 
 namespace poise {
 
-/// drive_command of tick t - 1 -> one control period of simulation -> drive_feedback, external_push
-/// and ground_truth of tick t. Tick 0 reports the start posture at rest without stepping. Finishes,
-/// as failed, when the robot falls.
+/// drive_command and bridge_status of tick t - 1 -> one control period of simulation ->
+/// drive_feedback, external_push and ground_truth of tick t. The crane, if there is one, lets go
+/// when bridge_status says that the bridge follows. Tick 0 reports the start posture at rest
+/// without stepping. Finishes, as failed, when the robot falls.
 class SimOde : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
@@ -29,6 +31,7 @@ class SimOde : public Component {
   void PublishTruth();
 
   Input<drive_command_t> drive_command_;
+  Input<bridge_status_t> bridge_status_;
   Output<drive_feedback_t> drive_feedback_;
   Output<external_push_t> external_push_;
   Output<ground_truth_t> ground_truth_;

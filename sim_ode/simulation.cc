@@ -92,13 +92,15 @@ SimulationTruth::SimulationTruth(int num_joints)
       imu_angular_velocity(Vector3d::Zero()),
       imu_specific_force(Vector3d::Zero()),
       push_force(Vector3d::Zero()),
-      push_point(Vector3d::Zero()) {
+      push_point(Vector3d::Zero()),
+      crane_point(Vector3d::Zero()),
+      crane_force(Vector3d::Zero()) {
   foot_pose.fill(Isometry3d::Identity());
   foot_wrench.fill(robot::Vector6d::Zero());
 }
 
 Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, double tick_period,
-                       uint64_t seed)
+                       uint64_t seed, int64_t lead_ticks)
     : model_(WithModelErrors(model, config)),
       motors_(SimulatedMotors(model, config)),
       steps_per_tick_(StepsPerTick(config, tick_period)),
@@ -111,6 +113,7 @@ Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, doub
       drive_train_(config.drive_train()),
       drivetrain_options_(DrivetrainOptions(model_, motors_, config)),
       current_loop_(drive_train_, step_),
+      steps_(-lead_ticks * steps_per_tick_),
       command_(Eigen::VectorXd::Zero(model_.num_joints())),
       current_(Eigen::VectorXd::Zero(model_.num_joints())),
       mean_current_(Eigen::VectorXd::Zero(model_.num_joints())),
@@ -136,6 +139,16 @@ Simulation::Simulation(const RobotModel& model, const SimOdeConfig& config, doub
   SetState(SolveStart(model_, config.start()));
   start_com_height_ = truth_.com.z();
   CheckStart();
+  if (!config.has_crane()) return;
+  crane_.emplace(config.crane(), model_, world_.pose(0), truth_.com, step_, tick_period);
+  const double least = config.crane().follow_time() + config.crane().release_time();
+  if (static_cast<double>(lead_ticks) * tick_period < least) {
+    throw ConfigError(
+        "crane", fmt::format("takes {} s at least to let go, before the scenario's time 0; give "
+                             "the scenario a lead of more, or take the crane away",
+                             least));
+  }
+  ReadCrane();
 }
 
 void Simulation::CheckStart() const {
@@ -213,6 +226,7 @@ void Simulation::Advance() {
   if (broken_) return;
   ReadTruth();
   DetectFall();
+  CheckCrane();
 }
 
 void Simulation::Delay() {
@@ -247,6 +261,10 @@ void Simulation::StepOnce() {
     hand.Grip(from, point);
     const Vector3d force = hand.Force(from, point, PointVelocity(hand.body(), point));
     if (!force.isZero(0)) world_.AddForce(hand.body(), force, point);
+  }
+  if (crane_ && !crane_->let_go()) {
+    const Vector3d point = world_.pose(0) * crane_->point();
+    world_.AddForce(0, crane_->Force(point, PointVelocity(0, point)), point);
   }
   std::array<Isometry3d, 2> sole;
   std::array<Vector3d, 2> com;
@@ -345,6 +363,15 @@ void Simulation::ReadTruth() {
   truth_.imu_specific_force = to_imu * (imu_acceleration_ + kGravity * Vector3d::UnitZ());
 
   ReadPush();
+  ReadCrane();
+}
+
+void Simulation::ReadCrane() {
+  if (!crane_) return;
+  const Vector3d point = world_.pose(0) * crane_->point();
+  truth_.crane_point = point;
+  truth_.crane_force = crane_->Force(point, PointVelocity(0, point));
+  truth_.crane_share = crane_->share();
 }
 
 void Simulation::ReadPush() {
@@ -388,6 +415,15 @@ void Simulation::DetectFall() {
                       time(), 100 * share)
          .out = '\0';
   }
+}
+
+void Simulation::CheckCrane() {
+  if (!crane_ || crane_->let_go() || steps_ < 0 || end_reason_[0] != '\0') return;
+  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
+                    "the crane still holds the robot at {:.3f} s: the bridge has followed commands "
+                    "for {:.3f} s without a break; give the scenario a longer lead",
+                    time(), crane_->followed())
+       .out = '\0';
 }
 
 void Simulation::Break(std::string_view reason) {

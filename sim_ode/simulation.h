@@ -1,4 +1,4 @@
-// The simulated robot without a bus: ODE world, drivetrains, terrain, pushes, hands, fall
+// The simulated robot without a bus: ODE world, drivetrains, terrain, pushes, hands, crane, fall
 // detection.
 #pragma once
 
@@ -6,12 +6,14 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_model.h"
+#include "sim_ode/crane.h"
 #include "sim_ode/current_loop.h"
 #include "sim_ode/drivetrain.h"
 #include "sim_ode/hand.h"
@@ -42,21 +44,29 @@ struct SimulationTruth {
   Eigen::Vector3d imu_specific_force;
   Eigen::Vector3d push_force;  ///< N, world, sum of the pushes and hands at this instant
   Eigen::Vector3d push_point;  ///< m, world, of the strongest of them
+  /// The crane's at this instant, all zero without one: where it holds the robot (m, world), its
+  /// force on the robot (N, world), and how much of its stiffness is left.
+  Eigen::Vector3d crane_point, crane_force;
+  double crane_share = 0;
 };
 
 /// Deterministic: the same configuration, seed and commands give the same bits. After construction
 /// no method allocates (ODE does, inside its step) or throws.
 class Simulation {
  public:
-  /// `tick_period` (s) must be a whole number of steps. Throws ConfigError (paths inside
-  /// SimOdeConfig).
+  /// `tick_period` (s) must be a whole number of steps; time begins `lead_ticks` before 0. Throws
+  /// ConfigError (paths inside SimOdeConfig).
   Simulation(const robot::RobotModel& model, const SimOdeConfig& config, double tick_period,
-             uint64_t seed);
+             uint64_t seed, int64_t lead_ticks = 0);
 
   /// Motor currents (A) to follow from now on, rounded to the drives' resolution and limited to the
   /// peak current and the joint's effort if the configuration says so; `enabled` 0: motor free. A
   /// current that is not finite counts as 0 A and is counted.
   void SetCurrents(std::span<const double> current, std::span<const int8_t> enabled);
+  /// Once a tick: whether the bridge follows commands, which lets the crane go.
+  void Follow(bool follows) {
+    if (crane_) crane_->Follow(follows);
+  }
   /// One step of ODE.
   void Step();
   /// One tick period.
@@ -77,7 +87,8 @@ class Simulation {
   /// True once ODE complained or the state was no longer finite; the truth then stays at the last
   /// good state.
   bool broken() const { return broken_; }
-  /// Why fallen or broken, e.g. "the robot fell at 1.234 s (body tilt 0.83 rad)"; empty otherwise.
+  /// Why fallen or broken, e.g. "the robot fell at 1.234 s (body tilt 0.83 rad)", or that the crane
+  /// holds the robot at time 0; empty otherwise.
   std::string_view end_reason() const { return end_reason_; }
   int64_t refused_currents() const { return refused_currents_; }
 
@@ -90,8 +101,10 @@ class Simulation {
   Eigen::Vector3d PointVelocity(int body, const Eigen::Vector3d& point) const;
   void ReadTruth();
   void ReadPush();
+  void ReadCrane();
   void Delay();
   void DetectFall();
+  void CheckCrane();
   void Break(std::string_view reason);
   void CheckStart() const;
 
@@ -105,6 +118,7 @@ class Simulation {
   OdeWorld world_;
   std::vector<PushProfile> pushes_;
   std::vector<HandSpring> hands_;
+  std::optional<CraneSpring> crane_;
   DriveTrain drive_train_;
   Drivetrain::Options drivetrain_options_;
   std::vector<Drivetrain> drivetrains_;

@@ -1,5 +1,6 @@
 #include "sim_ode/terrain.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -81,7 +82,8 @@ Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
 
 Terrain::Surface Terrain::At(double x, double y, double time) const {
   const Surface ground{0, 0, Vector3d::UnitZ(), false};
-  if (!has_block_ || time < start_) return ground;
+  // A block without a start is there from the beginning of the run, before time 0.
+  if (!has_block_ || (start_ > 0 && time < start_)) return ground;
   const Vector2d place = Vector2d(x, y) - center_;
   if (std::abs(place.x()) > half_size_.x() || std::abs(place.y()) > half_size_.y()) return ground;
   double height = height_ + slope_.dot(place);
@@ -94,7 +96,7 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
     }
   }
   // A rising block grows from the ground, its relief with it.
-  const MinimumJerk rise(time - start_, rise_);
+  const MinimumJerk rise(std::max(0.0, time - start_), rise_);
   const double velocity = rise.speed * height;
   height *= rise.position;
   slope *= rise.position;

@@ -21,7 +21,9 @@ namespace poise {
 struct Tick {
   int64_t index = 0;
   int64_t utime = 0;  ///< us since the start of the run, time of validity
-  double time = 0;    ///< s, the same
+  /// s of the scenario's time, negative in the run's lead: phases, pushes and moves are timed by
+  /// it.
+  double time = 0;
   /// s that this cycle began after its time, for the component that owns the clock in real time;
   /// else 0.
   double lateness = 0;
@@ -61,6 +63,7 @@ struct ComponentContext {
   std::string name;         ///< instance name in the graph
   std::string config_text;  ///< protobuf text of the component's own configuration message
   double tick_period = 0;   ///< s
+  int64_t lead_ticks = 0;   ///< before the scenario's time 0
   uint64_t seed = 0;        ///< of this instance: the run's seed mixed with `name`
   const std::map<std::string, std::string>* resources = nullptr;  ///< "robot", "urdf": text by name
   SharedObjects* shared = nullptr;

@@ -359,6 +359,7 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
     if (config.component() == result.name) context.config_text = config.text();
   }
   context.tick_period = spec.tick_period();
+  context.lead_ticks = spec.lead_ticks();
   context.seed = InstanceSeed(spec.seed(), result.name);
   std::map<std::string, std::string> resources;
   for (const Resource& resource : spec.resource()) resources[resource.name()] = resource.text();

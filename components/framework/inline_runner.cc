@@ -40,6 +40,7 @@ struct InlineRunner::BoundStage {
 InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registry)
     : run_id_(spec.run_id()),
       period_(spec.tick_period()),
+      lead_(spec.lead_ticks()),
       num_ticks_(spec.num_ticks()),
       graph_(spec, registry),
       latency_(static_cast<size_t>(graph_.num_components())) {
@@ -139,7 +140,7 @@ bool InlineRunner::RunStage(BoundStage& bound, const Tick& tick) {
 bool InlineRunner::Step() {
   if (ended_) return false;
   const int64_t start = NowNanoseconds();
-  const Tick tick = MakeTick(next_tick_, period_);
+  const Tick tick = MakeTick(next_tick_, period_, lead_);
   for (BoundStage& stage : stages_) {
     if (!RunStage(stage, tick)) return false;
   }

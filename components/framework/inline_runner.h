@@ -62,6 +62,7 @@ class InlineRunner {
 
   int64_t run_id_ = 0;
   double period_ = 0;
+  int64_t lead_ = 0;
   int64_t num_ticks_ = 0;
   BoundGraph graph_;
   Tap tap_;

@@ -91,6 +91,7 @@ class ProcessRunner::Impl {
   double period_;
   int64_t period_ns_;
   bool realtime_;
+  int64_t lead_;  // ticks
   int64_t num_ticks_;
   int64_t run_id_;
   int num_components_;
@@ -123,6 +124,7 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& name,
       period_(spec.tick_period()),
       period_ns_(static_cast<int64_t>(spec.tick_period() * 1e9)),
       realtime_(spec.realtime()),
+      lead_(spec.lead_ticks()),
       num_ticks_(spec.num_ticks()),
       run_id_(spec.run_id()),
       num_components_(spec.graph().component_size()),
@@ -290,7 +292,7 @@ bool ProcessRunner::Impl::RunTicks() {
 }
 
 ProcessRunner::Impl::Outcome ProcessRunner::Impl::RunTick() {
-  Tick tick = MakeTick(tick_, period_);
+  Tick tick = MakeTick(tick_, period_, lead_);
   tick.lateness = lateness_;
   for (const BoundStage& stage : bus_.stages()) {
     const Outcome waited = WaitForInputs(stage);
@@ -362,7 +364,7 @@ bool ProcessRunner::Impl::RunOwner() {
     lateness_ = static_cast<double>(std::max<int64_t>(0, start - time)) * 1e-9;
     health.lateness_max = std::max(health.lateness_max, lateness_ * 1e6);
     Want();
-    Tick tick = MakeTick(tick_, period_);
+    Tick tick = MakeTick(tick_, period_, lead_);
     tick.lateness = lateness_;
     for (const BoundStage& stage : bus_.stages()) {
       const int64_t deadline =
@@ -454,7 +456,7 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::RunStage(const BoundStage& bou
 }
 
 bool ProcessRunner::Impl::EndTick() {
-  const Tick tick = MakeTick(tick_, period_);
+  const Tick tick = MakeTick(tick_, period_, lead_);
   bus_.health().tick = tick.index;
   bus_.health().utime = tick.utime;
   if (store_ != nullptr && can_be_taken_over_) KeepState();

@@ -12,10 +12,11 @@
 
 namespace poise {
 
-/// Tick `index` of a run with ticks of `period` seconds.
-inline Tick MakeTick(int64_t index, double period) {
-  const double time = static_cast<double>(index) * period;
-  return {index, std::llround(time * 1e6), time};
+/// Tick `index` of a run with ticks of `period` seconds, of which `lead` come before the scenario's
+/// time 0.
+inline Tick MakeTick(int64_t index, double period, int64_t lead = 0) {
+  return {index, std::llround(static_cast<double>(index) * period * 1e6),
+          static_cast<double>(index - lead) * period};
 }
 
 /// The run's seed mixed with a name: components that share a seed do not share their noise.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -75,7 +76,8 @@ class Redistributor : public Component {
   int64_t last_index_ = -1;
   double last_time_ = 0;  // s
   double last_eta_ = 0;
-  double learn_from_ = 0;  // s, when readings tell of the distribution again
+  // s, when readings tell of the distribution again.
+  double learn_from_ = -std::numeric_limits<double>::infinity();
   balance::ContactLimits double_support_, single_support_;
   robot::RobotState state_;
   bool state_valid_ = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/run.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
@@ -115,6 +116,7 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   wiring->AddOutput(&estimator_status_, "estimator_status", {static_cast<int>(counts[1])});
   wiring->AddStage("estimate", {&robot_sensors_}, {&robot_state_, &estimator_status_},
                    [this](const Tick& tick) { Estimate(tick); });
+  last_time_ = MakeTick(0, context.tick_period, context.lead_ticks).time;
   if (config.method() == StateEstimatorConfig::INVARIANT_EKF) {
     invariant_ = std::make_unique<InvariantEstimator>(model, invariant, context.tick_period);
     estimator_status_->method = estimator_status_t::METHOD_INVARIANT_EKF;

@@ -174,7 +174,9 @@ int8_t TaskController::Control(double time) {
 bool TaskController::BeginPhase(double time) {
   const Phase& phase = schedule_->phase();
   const EstimatedPose estimate = Estimate();
-  generator_->BeginPhase(phase, estimate, time);
+  // The first phase begins with the run; its moves wait for the scenario's time 0.
+  const bool first = schedule_->state().phase == 0;
+  generator_->BeginPhase(phase, estimate, first ? std::max(time, 0.0) : time);
   const std::array<bool, 2> last_contact = in_contact_;
   in_contact_ = ContactsOf(phase.support());
   for (size_t i = 0; i < 2; ++i) {

@@ -82,6 +82,10 @@ bool ComponentProcess::Alive(int64_t now) {
   return true;
 }
 
+bool ComponentProcess::StandbyReady() const {
+  return !restart_ || (spare_ != nullptr && store_->standby() == spare_->pid());
+}
+
 int64_t ComponentProcess::ResidentBytes() const {
   int64_t size = 0;
   int64_t resident = 0;

@@ -28,6 +28,8 @@ class ComponentProcess {
   /// ended for good: it is not to be restarted, it and its successors died more than 5 times within
   /// 2 s, or none became ready within 5 s. `now`: ns.
   bool Alive(int64_t now);
+  /// The successor can take over at once; true without one.
+  bool StandbyReady() const;
   /// From now on an end is no reason for a successor; the one that stands by is ended.
   void StopRestarts();
 

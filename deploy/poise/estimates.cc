@@ -54,7 +54,7 @@ Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) 
     const robot_sensors_t* readings = run.sensors.at(t);
     if (readings == nullptr) continue;  // as in a run that skips ticks
     sensors->Bind(readings);
-    const Tick tick = MakeTick(t, spec.tick_period());
+    const Tick tick = MakeTick(t, spec.tick_period(), spec.lead_ticks());
     for (OutputPort* output : estimator.wiring.outputs()) {
       output->Stamp(spec.run_id(), tick.index, tick.utime);
     }

@@ -56,7 +56,7 @@ int Compare(const EstimatorsOptions& options) {
   for (const std::string& name : runs) {
     const std::string log = FindLog(name).string();
     logging::RunRecord run = logging::ReadRun(log);
-    run.first_tick = std::llround(options.from / run.spec.tick_period());
+    run.first_tick = std::llround(options.from / run.spec.tick_period()) + run.spec.lead_ticks();
     if (run.truth.empty()) {
       throw logging::LogError(fmt::format(
           "{}: holds no GROUND_TRUTH to compare with: it is not the log of a simulation", log));

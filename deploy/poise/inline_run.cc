@@ -23,9 +23,9 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   int64_t next_flush = start;
   bool more = true;
   while (more && StopSignal() == 0) {
-    const double due = MakeTick(runner.ticks_completed(), spec.tick_period()).time;
+    const Tick next = MakeTick(runner.ticks_completed(), spec.tick_period(), spec.lead_ticks());
     if (spec.realtime()) {
-      const int64_t at = start + static_cast<int64_t>(due * 1e9);
+      const int64_t at = start + 1000 * next.utime;
       const timespec deadline{at / 1'000'000'000, at % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
     }
@@ -34,7 +34,7 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
     if (now >= next_flush) {
       recorder.Flush();
       next_flush = now + kFlushInterval;
-      progress->Show(due, static_cast<double>(now - start) * 1e-9);
+      progress->Show(next.time, static_cast<double>(now - start) * 1e-9);
     }
   }
   outcome.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;

@@ -5,10 +5,7 @@
 
 #include "components/framework/clock.h"
 #include "components/framework/configuration.h"
-#include "components/framework/run.h"
 #include "fmt/format.h"
-#include "poise/bridge_status_t.hpp"
-#include "poise/message_traits.hpp"
 
 namespace poise {
 namespace {
@@ -19,25 +16,31 @@ constexpr int kFreshCycles = 20;
 constexpr double kShortestSlot = 0.5;  // s
 
 int StatusChannel(const Graph& graph) {
-  for (int i = 0; i < graph.channel_size(); ++i) {
-    if (graph.channel(i).type() == "bridge_status_t") return i;
-  }
+  const int channel = FindChannelOfType(graph, "bridge_status_t");
+  if (channel >= 0) return channel;
   throw ConfigError(fmt::format(
       "graph {}: --kill needs a channel of bridge_status_t, to see when control is regained",
       graph.name()));
 }
 
-PacketFilter StatusFilter(const RunSpec& spec) {
-  const Channel& channel = spec.graph().channel(StatusChannel(spec.graph()));
-  const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-  bridge_status_t message{};
-  MessageTraits<bridge_status_t>::Resize(message, counts);
-  return {bridge_status_t::getHash(), message.getEncodedSize(), counts, spec.run_id()};
+double LeadOf(const RunSpec& spec) {
+  return static_cast<double>(spec.lead_ticks()) * spec.tick_period();
+}
+
+/// s of the scenario's time in which faults are injected.
+struct Window {
+  double from, until;
+};
+
+Window WindowOf(const RunSpec& spec, const KillOptions& options) {
+  const double lead = LeadOf(spec);
+  const double end = static_cast<double>(spec.num_ticks()) * spec.tick_period() - lead;
+  return {std::max(options.from, -lead), std::min(options.until.value_or(end), end)};
 }
 
 }  // namespace
 
-void KillSchedule::Check(const RunSpec& spec, int count) {
+void KillSchedule::Check(const RunSpec& spec, const KillOptions& options) {
   StatusChannel(spec.graph());
   const auto& instances = spec.graph().component();
   if (std::none_of(instances.begin(), instances.end(),
@@ -45,24 +48,28 @@ void KillSchedule::Check(const RunSpec& spec, int count) {
     throw ConfigError(
         fmt::format("graph {}: --kill needs components with restart: true", spec.graph().name()));
   }
-  const double slot = static_cast<double>(spec.num_ticks()) * spec.tick_period() / count;
-  if (slot < kShortestSlot) {
+  const Window window = WindowOf(spec, options);
+  const double length = window.until - window.from;
+  if (length / options.count < kShortestSlot) {
     throw ConfigError(
         fmt::format("--kill {}: {:.1f} s are too short for so many; 0.5 s each at least, or a "
                     "longer --duration",
-                    count, slot * count));
+                    options.count, std::max(0.0, length)));
   }
 }
 
-KillSchedule::KillSchedule(const RunSpec& spec, int count, uint64_t seed)
-    : slot_(static_cast<double>(spec.num_ticks()) * spec.tick_period() * 1e9 / std::max(1, count)),
-      count_(count),
-      random_(seed),
-      filter_(StatusFilter(spec)),
-      channel_(spec.graph().channel(StatusChannel(spec.graph())).name()),
-      receiver_(ChannelUrl(spec, StatusChannel(spec.graph()))) {
-  Check(spec, count);
-  next_ = static_cast<int64_t>(std::uniform_real_distribution(0.02, 0.5)(random_) * slot_);
+KillSchedule::KillSchedule(const RunSpec& spec, const KillOptions& options)
+    : count_(options.count), random_(options.seed), status_(spec, StatusChannel(spec.graph())) {
+  Check(spec, options);
+  const Window window = WindowOf(spec, options);
+  first_ = (window.from + LeadOf(spec)) * 1e9;
+  slot_ = (window.until - window.from) * 1e9 / count_;
+  lead_ = LeadOf(spec);
+  next_ = TimeOf(0, std::uniform_real_distribution(0.02, 0.5)(random_));
+}
+
+int64_t KillSchedule::TimeOf(int fault, double share) const {
+  return static_cast<int64_t>(first_ + (fault + share) * slot_);
 }
 
 void KillSchedule::Act(int64_t now, int64_t elapsed,
@@ -79,7 +86,7 @@ void KillSchedule::Act(int64_t now, int64_t elapsed,
   InjectedFault fault;
   fault.component = target.name();
   fault.killed = random_() % 2 == 0;
-  fault.time = static_cast<double>(elapsed) * 1e-9;
+  fault.time = static_cast<double>(elapsed) * 1e-9 - lead_;
   target.process().Signal(fault.killed ? SIGKILL : SIGSTOP);
   if (!fault.killed) {
     stopped_ = &target;
@@ -89,8 +96,8 @@ void KillSchedule::Act(int64_t now, int64_t elapsed,
   fault_at_ = now;
   regained_at_ = 0;
   fresh_in_a_row_ = 0;
-  next_ =
-      static_cast<int64_t>((done + 1 + std::uniform_real_distribution(0.0, 0.5)(random_)) * slot_);
+  lost_ = false;
+  next_ = TimeOf(done + 1, std::uniform_real_distribution(0.0, 0.5)(random_));
 }
 
 void KillSchedule::Finish() {
@@ -99,26 +106,17 @@ void KillSchedule::Finish() {
 }
 
 void KillSchedule::Receive() {
-  BusReceiver::Packet packet;
-  while (receiver_.Receive(&packet)) {
-    if (packet.channel != channel_ ||
-        filter_.Check(packet.data, packet.size, 0, INT64_MAX) != PacketVerdict::kAccepted) {
-      continue;
-    }
-    bridge_status_t status;
-    if (status.decode(packet.data, 0, static_cast<int>(packet.size)) !=
-        static_cast<int>(packet.size)) {
-      continue;
-    }
-    Judge(NowNanoseconds(), status.command_age);
-  }
+  bridge_status_t status;
+  while (status_.Next(&status)) Judge(NowNanoseconds(), status);
 }
 
-void KillSchedule::Judge(int64_t arrival, int32_t command_age) {
+void KillSchedule::Judge(int64_t arrival, const bridge_status_t& status) {
   if (fault_at_ == 0) return;
   InjectedFault& fault = faults_.back();
-  fault.cycles = std::max(fault.cycles, command_age);
-  if (command_age > 0) {
+  fault.cycles = std::max(fault.cycles, status.command_age);
+  // Before the first command the bridge knows no age.
+  if (status.state != bridge_status_t::STATE_RUNNING || status.command_age > 0) {
+    lost_ = true;
     fresh_in_a_row_ = 0;
     regained_at_ = 0;
     return;
@@ -126,7 +124,7 @@ void KillSchedule::Judge(int64_t arrival, int32_t command_age) {
   if (fresh_in_a_row_++ == 0) regained_at_ = arrival;
   // A stopped process may have had work in hand that was just done: only what follows counts.
   if (stopped_ == nullptr && fresh_in_a_row_ >= kFreshCycles) {
-    fault.regained = fault.cycles == 0 ? 0 : static_cast<double>(regained_at_ - fault_at_) * 1e-9;
+    fault.regained = !lost_ ? 0 : static_cast<double>(regained_at_ - fault_at_) * 1e-9;
     fault_at_ = 0;
   }
 }

@@ -34,9 +34,8 @@ Launcher::Launcher(const RunSpec& spec, LaunchFiles files, const LaunchOptions& 
       control_(spec,
                options.log ? std::vector<std::string>{kRecorderName} : std::vector<std::string>{}),
       log_(options.log) {
-  if (options.kills > 0) {
-    kills_ = std::make_unique<KillSchedule>(spec, options.kills, options.kill_seed);
-  }
+  if (options.kills.count > 0) kills_ = std::make_unique<KillSchedule>(spec, options.kills);
+  if (spec.realtime()) crane_ = std::make_unique<CraneWatch>(spec);
 }
 
 Launcher::~Launcher() = default;
@@ -49,6 +48,8 @@ RunOutcome Launcher::Run() {
   if (kills_ != nullptr) kills_->Finish();
   StopProcesses();
   if (kills_ != nullptr) outcome_.faults = kills_->faults();
+  if (spec_.realtime()) outcome_.machine = machine_.Load();
+  if (crane_ != nullptr) outcome_.crane_let_go = crane_->let_go();
   return outcome_;
 }
 
@@ -81,8 +82,10 @@ void Launcher::Fail(std::string message, std::vector<std::string> details) {
 void Launcher::FailProcess(ChildProcess& process) {
   const int64_t tick = Tick();
   Fail(fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
-                   tick < 0 ? " before the start"
-                            : fmt::format(" at {:.3f} s", MakeTick(tick, spec_.tick_period()).time),
+                   tick < 0
+                       ? " before the start"
+                       : fmt::format(" at {:.3f} s",
+                                     MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time),
                    process.log_path()),
        LastLines(process.log_path(), kDetailLines));
 }
@@ -114,16 +117,22 @@ int64_t Launcher::Tick() const {
   return tick;
 }
 
+bool Launcher::Ready() const {
+  return control_.AllReached(health_t::STATE_READY) &&
+         std::ranges::all_of(processes_, [](const auto& each) { return each->StandbyReady(); });
+}
+
 bool Launcher::WaitUntilReady() {
   const int64_t deadline = NowNanoseconds() + kReadyTimeout;
-  while (!control_.AllReached(health_t::STATE_READY)) {
+  while (!Ready()) {
     if (!Healthy()) return false;
     if (NowNanoseconds() > deadline) {
       std::string names;
       std::vector<std::string> details;
       for (const auto& process : processes_) {
-        if (control_.statuses().at(process->name()).seen) continue;
-        names += (names.empty() ? "" : ", ") + process->name();
+        const bool seen = control_.statuses().at(process->name()).seen;
+        if (seen && process->StandbyReady()) continue;
+        names += (names.empty() ? "" : ", ") + process->name() + (seen ? " (its stand-by)" : "");
         for (const std::string& line : LastLines(process->process().log_path(), 1)) {
           details.push_back(process->name() + ": " + line);
         }
@@ -173,9 +182,10 @@ void Launcher::Watch() {
     const int64_t now = NowNanoseconds();
     if (ended_at == 0) EndSilent(now);
     if (ended_at == 0) MeasureMemory(now, start);
+    if (spec_.realtime() && ended_at == 0) machine_.Sample(now);
     if (kills_ != nullptr && ended_at == 0) kills_->Act(now, now - start, processes_);
     const int64_t tick = Tick();
-    const double time = static_cast<double>(tick + 1) * spec_.tick_period();
+    const double time = static_cast<double>(tick + 1 - spec_.lead_ticks()) * spec_.tick_period();
     progress_->Show(time, static_cast<double>(now - start) * 1e-9);
     outcome_.wall_time = static_cast<double>((ended_at > 0 ? ended_at : now) - start) * 1e-9;
     if (!Healthy()) return;
@@ -229,8 +239,10 @@ void Launcher::Wait(int timeout_ms) {
     if (process->restarts() && process->fd() >= 0) fds.push_back(process->fd());
   }
   if (kills_ != nullptr) fds.push_back(kills_->fd());
+  if (crane_ != nullptr && crane_->fd() >= 0) fds.push_back(crane_->fd());
   control_.Spin(kills_ != nullptr ? std::min(timeout_ms, 2) : timeout_ms, fds);
   if (kills_ != nullptr) kills_->Receive();
+  if (crane_ != nullptr) crane_->Receive();
 }
 
 void Launcher::MeasureMemory(int64_t now, int64_t start) {

@@ -10,7 +10,9 @@
 #include "components/framework/graph.pb.h"
 #include "deploy/poise/child_process.h"
 #include "deploy/poise/component_process.h"
+#include "deploy/poise/crane_watch.h"
 #include "deploy/poise/kill_schedule.h"
+#include "deploy/poise/machine_load.h"
 #include "deploy/poise/progress.h"
 #include "deploy/poise/run_outcome.h"
 
@@ -25,9 +27,8 @@ struct LaunchFiles {
 
 /// What else a run of processes may ask for.
 struct LaunchOptions {
-  bool log = true;  ///< false: no recorder takes part
-  int kills = 0;    ///< faults to inject, see KillSchedule; in real time only
-  uint64_t kill_seed = 1;
+  bool log = true;    ///< false: no recorder takes part
+  KillOptions kills;  ///< faults to inject, see KillSchedule; in real time only
 };
 
 /// One run. Leaves no process behind, whatever happens.
@@ -46,6 +47,8 @@ class Launcher {
  private:
   void StartProcesses();
   bool WaitUntilReady();
+  /// All components, and the processes that stand by for them.
+  bool Ready() const;
   bool Start();
   void Watch();
   void StopProcesses();
@@ -68,6 +71,8 @@ class Launcher {
   void EndSilent(int64_t now);
 
   std::unique_ptr<KillSchedule> kills_;
+  std::unique_ptr<CraneWatch> crane_;
+  MachineLoadSampler machine_;
   bool log_;
   std::vector<std::unique_ptr<ComponentProcess>> processes_;  // the recorder's is the first, if any
   int64_t next_measure_ = 0;                                  // ns, of memory

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <memory>
 
 #include "components/framework/configuration.h"
@@ -60,6 +61,9 @@ void PrintRun(const logging::LogSurvey& survey) {
   if (spec.drop_rate() > 0)
     fmt::print("dropped   {} of the messages, on purpose\n", spec.drop_rate());
   if (spec.realtime()) fmt::print("paced     with the wall clock\n");
+  if (spec.lead_ticks() > 0) {
+    fmt::print("lead      the scenario's time 0 is tick {}\n", spec.lead_ticks());
+  }
   if (spec.has_cut()) {
     fmt::print("cut       from a longer log: ticks {} to {}{}\n", spec.cut().first_tick(),
                spec.cut().last_tick(), spec.cut().channel().empty() ? "" : ", not all channels");
@@ -78,7 +82,7 @@ int Info(const std::string& run) {
   }
   fmt::print("\n{:<30} {:<18} {:>9} {:>9} {:>10}\n", "channel", "type", "messages", "per s",
              "data");
-  const double duration = survey.tick_time(survey.end_tick - survey.first_tick);
+  const double duration = survey.duration(survey.end_tick - survey.first_tick);
   for (const logging::ChannelSurvey& channel : survey.channels) PrintRow(channel, duration);
   for (const logging::ChannelSurvey& channel : survey.others) PrintRow(channel, duration);
   const size_t problems = survey.Problems(1).size();
@@ -123,8 +127,8 @@ int Cut(const CutOptions& options) {
   logging::CutRange range;
   if (options.from || options.to) {
     logging::LogReader reader(log);
-    range = logging::TicksOfTimes(options.from.value_or(0), options.to.value_or(1e9),
-                                  logging::FindRunInfo(&reader, log).spec.tick_period());
+    range = logging::TicksOfTimes(options.from.value_or(-1e9), options.to.value_or(1e9),
+                                  logging::FindRunInfo(&reader, log).spec);
   }
   if (options.first_tick) range.first_tick = *options.first_tick;
   if (options.last_tick) range.last_tick = *options.last_tick;
@@ -239,10 +243,10 @@ void AddCut(CLI::App* log, Command* command) {
   CLI::App* cut = log->add_subcommand(
       "cut", "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole");
   AddRun(cut, &options->run);
-  const auto time = Within("a time of 0 to 1e9 s", [](double s) { return s >= 0 && s <= 1e9; });
+  const auto time = Within("a time of -1e9 to 1e9 s", [](double s) { return std::abs(s) <= 1e9; });
   cut->add_option("--out", options->out, "log to write; must not exist")->required();
   CLI::Option* from =
-      cut->add_option("--from", options->from, "first time, s of the run")->check(time);
+      cut->add_option("--from", options->from, "first time, s of the scenario")->check(time);
   CLI::Option* to = cut->add_option("--to", options->to, "last time, s")->check(time);
   const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
   cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);

@@ -32,6 +32,10 @@ void StatusLine::Clear() {
 
 void Progress::Show(double time, double wall) {
   if (!line_.Due(wall)) return;
+  if (time < 0) {
+    line_.Show(fmt::format("{:.2f} s: the robot starts", time), wall);
+    return;
+  }
   line_.Show(fmt::format("{:.2f} of {:.2f} s simulated, {:.1f} x real time", time, duration_,
                          wall > 0 ? time / wall : 0.0),
              wall);

@@ -26,9 +26,10 @@ class StatusLine {
 /// A run's progress.
 class Progress {
  public:
-  /// `duration`: s of the whole run. Quiet: shows nothing.
+  /// `duration`: s of the scenario. Quiet: shows nothing.
   Progress(double duration, bool quiet) : duration_(duration), line_(quiet) {}
-  /// Simulated time and wall time since the start, s. Cheap: shows only when it is time to.
+  /// The scenario's time (negative: the run's lead) and wall time since the start, s. Cheap: shows
+  /// only when it is time to.
   void Show(double time, double wall);
   void Clear() { line_.Clear(); }
 

@@ -60,7 +60,8 @@ std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::
   Vector2d along(push.direction_x(), push.direction_y());
   if (!(along.norm() > 1e-12)) return {};
   along *= (push.peak() < 0 ? -1 : 1) / along.norm();
-  const auto tick = static_cast<int64_t>(std::floor(push.start() / run.spec.tick_period()));
+  const auto tick = static_cast<int64_t>(std::floor(push.start() / run.spec.tick_period())) +
+                    run.spec.lead_ticks();
   const ground_truth_t* truth = run.truth.at(std::min(tick, run.num_ticks - 1));
   if (truth == nullptr) return {};
   std::vector<Vector2d> corners;

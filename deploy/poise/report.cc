@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "components/framework/configuration.h"
+#include "deploy/poise/realtime_verdict.h"
 #include "deploy/poise/scenario_loading.h"
 #include "deploy/poise/text_table.h"
 #include "fmt/format.h"
@@ -138,7 +139,8 @@ Json EventsJson(const std::vector<logging::Event>& events) {
 }
 
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run) {
-  const double tick = std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9);
+  const double tick = std::ceil(scenario.check_from() / run.spec.tick_period() - 1e-9) +
+                      static_cast<double>(run.spec.lead_ticks());
   const auto last = static_cast<double>(run.num_ticks);
   return tick > 0 ? static_cast<int64_t>(std::min(tick, last)) : 0;
 }
@@ -157,7 +159,8 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
     CheckResult duration;
     if (spec.num_ticks() > 0) {
-      duration.at_least = static_cast<double>(spec.num_ticks()) * spec.tick_period();
+      duration.at_least =
+          static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period();
     }
     Evaluate(*logging::FindMetric(metric), run, &duration);
     results.push_back(std::move(duration));
@@ -328,6 +331,7 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
   json["seed"] = std::to_string(run.spec.seed());  // 64 bits: beyond a double's integers
   json["drop_rate"] = run.spec.drop_rate();
   json["tick_period"] = run.spec.tick_period();
+  json["lead_ticks"] = run.spec.lead_ticks();
   json["planned_ticks"] = run.spec.num_ticks();
   json["ticks"] = run.num_ticks;
   json["simulated_time"] = run.time(run.num_ticks);
@@ -362,6 +366,8 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
   json["mode"] = summary.mode;
   json["wall_time"] = outcome.wall_time;
   json["passed"] = summary.passed;
+  json["failed_by_machine"] = summary.failed_by_machine;
+  json["machine"] = RealtimeJson(run.spec, outcome, summary.lost);
   json["end"] = EndOf(outcome);
   json["completed"] = outcome.completed;
   json["interrupted"] = outcome.interrupted;

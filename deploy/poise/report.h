@@ -66,6 +66,14 @@ nlohmann::ordered_json EventsJson(const std::vector<logging::Event>& events);
 nlohmann::ordered_json RunJson(const Scenario& scenario, const logging::RunRecord& run,
                                const std::vector<CheckResult>& checks);
 
+/// Ticks of the scenario in which the bridge did not follow a command, of a run in real time.
+struct LostTicks {
+  int64_t ticks = 0;
+  /// For want of a command in time, while the controller gave none that was wrong: the machine was
+  /// late, or a fault was injected.
+  int64_t late = 0;
+};
+
 /// What a run came to.
 struct RunSummary {
   std::string mode;  ///< "processes" or "inline"
@@ -74,6 +82,8 @@ struct RunSummary {
   std::vector<CheckResult> checks;
   std::vector<logging::Event> events;
   bool passed = false;
+  LostTicks lost;
+  bool failed_by_machine = false;  ///< see FailedByMachine
 };
 
 /// The checks of a summary.json. Throws std::exception when it is none.

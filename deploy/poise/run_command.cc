@@ -24,6 +24,7 @@ int Run(RunArguments arguments) {
   if (names.size() == 1 && names.front() != kAllScenarios) {
     const RunResult result = ScenarioRun(names.front(), arguments.options)
                                  .Run(arguments.out, /*latest=*/arguments.out.empty());
+    if (result.summary.failed_by_machine) return kExitMachine;
     return result.summary.passed ? kExitOk : kExitFailed;
   }
   return RunSeveral(names, arguments.options, arguments.out) ? kExitOk : kExitFailed;
@@ -35,6 +36,10 @@ void AddRunCommand(CLI::App* app, Command* command) {
   auto arguments = std::make_shared<RunArguments>();
   RunOptions* const options = &arguments->options;
   CLI::App* run = app->add_subcommand("run", "run scenarios and check them");
+  run->footer(
+      "Exit codes: 0 all checks hold; 1 a check or the run failed; 2 wrong usage or "
+      "configuration; 3 (real time) nothing failed but what the machine was too late for, or an "
+      "injected fault took.");
   run->add_option("scenario", arguments->scenarios,
                   "names (poise list scenarios) or .pbtxt files; all: every experiment of the "
                   "paper, by section, with an overview")
@@ -49,7 +54,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
       "the bridge owns the clock and holds the last command; processes that die are replaced. "
       "With --inline: pace the ticks with the wall clock");
   run->add_option(
-         "--kill", options->launch.kills,
+         "--kill", options->launch.kills.count,
          "faults to inject: as often a controller process is killed, or stopped for 100 ms")
       ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
       ->needs(realtime)
@@ -63,9 +68,16 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "that the controller is pinned to under SCHED_FIFO; default: the last one")
       ->check(CLI::Range(0, 1023))
       ->needs(realtime);
-  run->add_option("--kill-seed", options->launch.kill_seed,
-                  "of the moments and processes of --kill")
+  KillOptions* const kills = &options->launch.kills;
+  run->add_option("--kill-seed", kills->seed, "of the moments and processes of --kill")
       ->capture_default_str();
+  run->add_option("--kill-from", kills->from,
+                  "first time of a fault, s of the scenario; negative: while the robot starts")
+      ->capture_default_str()
+      ->needs(realtime);
+  run->add_option("--kill-until", kills->until,
+                  "last time of a fault, s of the scenario (default: its end)")
+      ->needs(realtime);
   CLI::Option* drives =
       run->add_option("--drives", options->changes.drives,
                       "what moves the simulated robot's motors; ethercat: an emulated chain of "

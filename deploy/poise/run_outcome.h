@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "deploy/poise/machine_load.h"
 #include "poise/health_t.hpp"
 
 namespace poise {
@@ -13,7 +15,7 @@ namespace poise {
 struct InjectedFault {
   std::string component;
   bool killed = false;   ///< SIGKILL; else SIGSTOP for 100 ms
-  double time = 0;       ///< s of wall time since the start
+  double time = 0;       ///< s of wall time, in the scenario's time
   double regained = -1;  ///< s until control was regained; 0: no command was late; -1: not in time
   int32_t cycles = 0;    ///< longest age of a command meanwhile
 };
@@ -34,6 +36,8 @@ struct RunOutcome {
   std::vector<InjectedFault> faults;
   std::vector<ProcessReport> processes;  ///< in the graph's order; none of a run in one process
   int32_t takeovers = 0;                 ///< processes that took the place of one that died
+  std::optional<MachineLoad> machine;    ///< in real time
+  std::optional<double> crane_let_go;    ///< s of the scenario's time; empty: no crane, or not yet
   double wall_time = 0;                  ///< s, from the start command to the last tick
 };
 

@@ -103,8 +103,9 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   ReadTextProto(loaded.graph_file, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
-  spec.set_num_ticks(
-      std::max<int64_t>(1, std::llround(scenario.duration() * scenario.tick_rate())));
+  spec.set_lead_ticks(std::llround(scenario.lead() * scenario.tick_rate()));
+  spec.set_num_ticks(spec.lead_ticks() + std::max<int64_t>(1, std::llround(scenario.duration() *
+                                                                           scenario.tick_rate())));
   for (const ComponentInstance& instance : spec.graph().component()) {
     ComponentConfig* config = spec.add_config();
     config->set_component(instance.name());

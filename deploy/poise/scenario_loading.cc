@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMaxLead = 60;     // s
 constexpr double kMinRate = 50;     // Hz
 constexpr double kMaxRate = 10000;  // Hz
 constexpr char kSetFlag[] = "--set";
@@ -55,6 +56,9 @@ void CheckScenario(const LoadedScenario& loaded) {
   if (!(s.tick_rate() >= kMinRate && s.tick_rate() <= kMaxRate)) {
     fail("tick_rate",
          fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
+  }
+  if (!(s.lead() >= 0 && s.lead() <= kMaxLead)) {
+    fail("lead", fmt::format("is {} s; must be in [0, {}]", s.lead(), kMaxLead));
   }
   if (!(s.check_from() >= 0)) fail("check_from", "must be in [0, duration)");
   if (!(s.check_from() < s.duration())) {
@@ -217,6 +221,20 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
   }
 }
 
+/// What a robot is given that commands may reach late.
+void ApplyRealtime(LoadedScenario* loaded) {
+  const auto apply = [&](bool given, const char* set) {
+    if (!given) ApplyChange({set, "--realtime"}, loaded);
+  };
+  const Scenario& scenario = loaded->scenario;
+  // A process that dies is replaced: worth waiting for.
+  apply(scenario.hw_bridge().has_on_lost_command(), "hw_bridge.on_lost_command=HOLD");
+  // Until the controller follows, the robot hangs with its joints held.
+  apply(scenario.hw_bridge().has_hold_before_command(), "hw_bridge.hold_before_command=true");
+  apply(scenario.sim_ode().has_crane(), "sim_ode.crane.release_time=1");
+  apply(scenario.has_lead(), "lead=3");
+}
+
 /// The drives' type, their link, and whose time they follow.
 void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   Scenario* const scenario = &loaded->scenario;
@@ -281,10 +299,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   Scenario* const scenario = &loaded.scenario;
   CheckVariants(loaded);
   if (!changes.drives.empty()) ApplyDrives(changes, &loaded);
-  if (changes.realtime && !scenario->hw_bridge().has_on_lost_command()) {
-    // A process that dies is replaced: worth waiting for.
-    ApplyChange({"hw_bridge.on_lost_command=HOLD", "--realtime"}, &loaded);
-  }
+  if (changes.realtime) ApplyRealtime(&loaded);
   for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
     ApplyChange(change, &loaded);
   }
@@ -326,7 +341,11 @@ std::string NameOf(const LoadedScenario& loaded) {
 RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes) {
   RunChanges reference = changes;
   reference.variant = loaded.scenario.reference();
-  reference.realtime = false;
+  if (changes.realtime) {
+    // In lockstep no command is late: what was set of the crane is for the other run.
+    reference.realtime = false;
+    reference.set.insert(reference.set.end(), {"sim_ode.crane=", "lead=0"});
+  }
   reference.drives.clear();
   reference.drop_rate = 0;
   return reference;

@@ -9,6 +9,7 @@
 #include "deploy/poise/estimates.h"
 #include "deploy/poise/inline_run.h"
 #include "deploy/poise/launcher.h"
+#include "deploy/poise/realtime_verdict.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/run_setup.h"
 #include "deploy/poise/signals.h"
@@ -33,7 +34,7 @@ void PrintEnd(const std::string& what, const RunOutcome& outcome) {
 
 ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
     : options_(options), main_(Prepare(scenario, options.changes, options.in_process, true)) {
-  if (options.launch.kills > 0) KillSchedule::Check(main_.spec, options.launch.kills);
+  if (options.launch.kills.count > 0) KillSchedule::Check(main_.spec, options.launch.kills);
   if (!main_.loaded.scenario.has_reference()) return;
   reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
                        /*in_process=*/true, false);
@@ -62,7 +63,8 @@ void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
 RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
                                 const LaunchOptions& launch) {
   const RunSpec& spec = part.spec;
-  Progress progress(static_cast<double>(spec.num_ticks()) * spec.tick_period(), quiet);
+  Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
+                    quiet);
   if (in_process) {
     return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
   }
@@ -137,12 +139,15 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     }
     summary.checks = EvaluateChecks(scenario, record);
     summary.events = logging::Events(record);
+    summary.lost = CountLostTicks(record);
   } else {
     record.spec = main_.spec;
   }
   summary.passed = (recorded || !options_.launch.log) && outcome.completed &&
                    (!summary.reference || summary.reference->completed);
   for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
+  summary.failed_by_machine =
+      !summary.passed && outcome.completed && FailedByMachine(summary.checks, summary.lost);
   WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
   if (!options_.quiet && recorded) {
     fmt::print("\n{}\n{}{}", FormatTable(summary.checks), FormatEvents(summary.events),
@@ -151,7 +156,12 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
                record.time(record.num_ticks), outcome.wall_time,
                record.real_time_factor.value_or(0), result.dir.string());
   }
-  fmt::print("{}\n", summary.passed ? "passed" : "FAILED");
+  if (!options_.quiet) {
+    fmt::print("{}", FormatRealtime(main_.spec, outcome, summary.checks, summary.lost));
+  }
+  fmt::print("{}\n", summary.passed              ? "passed"
+                     : summary.failed_by_machine ? "FAILED by the machine alone"
+                                                 : "FAILED");
   std::fflush(stdout);
   return result;
 }

@@ -53,7 +53,8 @@ void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& 
   std::string progress = fmt::format("tick {}", Count(snapshot.tick));
   if (spec.num_ticks() > 0) progress += fmt::format(" of {}", spec.num_ticks());
   if (snapshot.tick >= 0) {
-    progress += fmt::format("  {:.3f} s", static_cast<double>(snapshot.tick) * period);
+    progress +=
+        fmt::format("  {:.3f} s", static_cast<double>(snapshot.tick - spec.lead_ticks()) * period);
   }
   if (snapshot.tick_rate >= 0) {
     progress += fmt::format("  {:.1f} ticks/s  {:.2f} x real time", snapshot.tick_rate,

@@ -114,5 +114,66 @@ TEST(SupervisorHold, WithoutFeedbackTheSpringKeepsItsLastLength) {
   EXPECT_NEAR(bench.status().applied_torque[0], 20 - 600 * 0.02, 0.1);
 }
 
+SupervisorConfig HoldingFromTheStart() {
+  SupervisorConfig config = Holding();
+  config.hold_before_command = true;
+  config.start_velocity = 0.5;
+  return config;
+}
+
+TEST(SupervisorHold, WithoutItMotorsAreFreeUntilTheFirstCommand) {
+  Bench bench(Holding());
+  for (int i = 0; i < 20; ++i) {
+    bench.Step(nullptr);
+    ASSERT_EQ(bench.status().state, Status::STATE_INIT);
+    ASSERT_TRUE(bench.AllFree());
+  }
+}
+
+TEST(SupervisorHold, BeforeTheFirstCommandIsASpringAboutTheStartForAsLongAsItTakes) {
+  Bench bench(HoldingFromTheStart());
+  for (int i = 0; i < 1000; ++i) {  // ten times hold_cycles
+    bench.Step(nullptr);
+    ASSERT_EQ(bench.status().state, Status::STATE_HOLDING);
+    ASSERT_EQ(bench.status().reason, Status::REASON_NO_COMMAND);
+    ASSERT_EQ(bench.drives().enabled[0], 1);
+    ASSERT_DOUBLE_EQ(bench.status().applied_torque[0], 0);
+  }
+  // 50 cycles at 0.2 rad/s: 0.02 rad from where it started.
+  for (int i = 0; i < 50; ++i) bench.Step(nullptr, 0.2);
+  EXPECT_NEAR(bench.status().applied_torque[0], -600 * 0.02 - 10 * 0.2, 0.1);
+  bench.Step(nullptr, 0);
+  for (int i = 0; i < 20; ++i) bench.Step(nullptr, 0);
+  EXPECT_NEAR(bench.status().applied_torque[0], -600 * 0.02, 0.1);
+}
+
+TEST(SupervisorHold, FadesInTheFirstCommandAndThenKnowsALossLikeAnyOther) {
+  Bench bench(HoldingFromTheStart());
+  for (int i = 0; i < 10; ++i) bench.Step(nullptr);
+  for (int i = 1; i <= 11; ++i) {
+    bench.Step(22, 0);
+    ASSERT_EQ(bench.status().state, Status::STATE_RUNNING);
+    ASSERT_NEAR(bench.status().applied_torque[0], 22.0 * i / 11, 1e-9);
+  }
+  for (int i = 0; i < 4; ++i) bench.Step(nullptr);
+  EXPECT_EQ(bench.status().state, Status::STATE_HOLDING);
+  EXPECT_NEAR(bench.status().applied_torque[0], 22, 1e-9);
+  for (int i = 0; i < 100; ++i) bench.Step(nullptr);
+  EXPECT_EQ(bench.status().state, Status::STATE_DAMPING);
+}
+
+TEST(SupervisorHold, FromTheStartWaitsForJointsThatMove) {
+  Bench bench(HoldingFromTheStart());
+  bench.Step(nullptr, 0);
+  Bench moving(HoldingFromTheStart());
+  for (int i = 0; i < 50; ++i) moving.supervisor().Read(moving.Turn(1));  // the filter settles
+  moving.End(nullptr);
+  EXPECT_EQ(moving.status().state, Status::STATE_INIT);
+  EXPECT_EQ(moving.status().reason, Status::REASON_START_VELOCITY);
+  EXPECT_TRUE(moving.AllFree());
+  for (int i = 0; i < 50; ++i) moving.Step(nullptr, 0);
+  EXPECT_EQ(moving.status().state, Status::STATE_HOLDING);
+}
+
 }  // namespace
 }  // namespace poise

@@ -211,12 +211,18 @@ TEST_F(LogSurveyTest, CutRefusesWhatCannotBe) {
 }
 
 TEST(TicksOfTimes, BoundsAreIncluded) {
-  const CutRange range = TicksOfTimes(0.1, 0.2, 0.002);
+  RunSpec spec;
+  spec.set_tick_period(0.002);
+  const CutRange range = TicksOfTimes(0.1, 0.2, spec);
   EXPECT_EQ(range.first_tick, 50);
   EXPECT_EQ(range.last_tick, 100);
-  EXPECT_EQ(TicksOfTimes(0.1001, 0.1019, 0.002).first_tick, 51);
-  EXPECT_EQ(TicksOfTimes(0.1001, 0.1019, 0.002).last_tick, 50);
-  EXPECT_EQ(TicksOfTimes(-5, 1e300, 0.002).first_tick, 0);
+  EXPECT_EQ(TicksOfTimes(0.1001, 0.1019, spec).first_tick, 51);
+  EXPECT_EQ(TicksOfTimes(0.1001, 0.1019, spec).last_tick, 50);
+  EXPECT_EQ(TicksOfTimes(-5, 1e300, spec).first_tick, 0);
+  spec.set_lead_ticks(1000);
+  EXPECT_EQ(TicksOfTimes(0.1, 0.2, spec).first_tick, 1050);
+  EXPECT_EQ(TicksOfTimes(-2, 0.2, spec).first_tick, 0);
+  EXPECT_EQ(TicksOfTimes(-1, 0.2, spec).first_tick, 500);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ class Bench {
 
   void Run(const drive_command_t* command) {
     wiring_.inputs().at(0)->Bind(command);
+    wiring_.inputs().at(1)->Bind(nullptr);  // no bridge
     const Stage& stage = wiring_.stages().at(0);
     const double time = static_cast<double>(tick_) * kTick;
     const Tick tick{tick_, std::llround(time * 1e6), time};
@@ -73,10 +74,12 @@ drive_command_t Command(double current) {
 TEST(SimOde, DeclaresItsPorts) {
   const Bench bench(StandingConfig());
   const Wiring& wiring = bench.wiring();
-  ASSERT_EQ(wiring.inputs().size(), 1u);
+  ASSERT_EQ(wiring.inputs().size(), 2u);
   EXPECT_EQ(wiring.inputs()[0]->name(), "drive_command");
   EXPECT_EQ(wiring.inputs()[0]->kind(), InputKind::kPreviousTick);
   EXPECT_THAT(wiring.inputs()[0]->counts(), ::testing::ElementsAre(12));
+  EXPECT_EQ(wiring.inputs()[1]->name(), "bridge_status");
+  EXPECT_EQ(wiring.inputs()[1]->kind(), InputKind::kPreviousTick);
   ASSERT_EQ(wiring.stages().size(), 1u);
   EXPECT_EQ(wiring.stages()[0].outputs.size(), 3u);
   EXPECT_EQ(bench.feedback().position_counts.size(), 12u);

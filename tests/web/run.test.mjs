@@ -35,6 +35,15 @@ test('every section of the paper gets its figures', () => {
   }
 });
 
+test("a run's lead lies before the scenario's time 0", () => {
+  const run = makeRun('7.2');
+  run.leadTicks = 3;
+  near(run.start, -0.006);
+  near(run.timeAt(3), 0);
+  assert.deepEqual([-0.006, 0, 0.0019].map((time) => run.rowAt(time)), [0, 3, 3]);
+  assert.equal(run.signals.get('GROUND_TRUTH.crane_force[2]').unit, 'N');
+});
+
 test('conditions have a red limit, another scenario gets the general figures', () => {
   const figures = figuresFor(makeRun('7.2'));
   for (const f of figures.filter((x) => /^1[0-2]/.test(x.figure ?? ''))) {

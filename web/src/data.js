@@ -87,6 +87,7 @@ export class Run extends EventTarget {
     super();
     Object.assign(this, {meta, scenario: meta.scenario, robot: meta.robot});
     this.period = meta.run.tick_period;
+    this.leadTicks = meta.run.lead_ticks ?? 0;  // before the scenario's time 0
     this.firstTick = 0;
     this.numTicks = meta.run.ticks;
     this.keep = meta.live?.keep ?? Infinity;
@@ -101,7 +102,7 @@ export class Run extends EventTarget {
   }
 
   /** Time of the first row and of the last, s. */
-  get start() { return this.firstTick * this.period; }
+  get start() { return this.timeAt(0); }
   get end() { return this.timeAt(Math.max(0, this.numTicks - 1)); }
   add(signal) { this.signals.set(signal.name, signal); }
 
@@ -112,9 +113,9 @@ export class Run extends EventTarget {
   }
 
   rowAt(time) {
-    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period) - this.firstTick));
+    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period) + this.leadTicks - this.firstTick));
   }
-  timeAt(row) { return (this.firstTick + row) * this.period; }
+  timeAt(row) { return (this.firstTick + row - this.leadTicks) * this.period; }
 
   /** `values`: by signal name, `count` numbers each; a signal that is not named gets NaN. */
   appendTicks(count, values) {

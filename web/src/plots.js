@@ -71,9 +71,9 @@ const times = new WeakMap();
 
 /** The other run's values at the first run's ticks. */
 function resampled(values, run, other) {
-  if (run.period === other.period) return nullable(values, run.numTicks);
+  if (run.period === other.period && run.leadTicks === other.leadTicks) return nullable(values, run.numTicks);
   return Array.from({length: run.numTicks}, (_, i) => {
-    const v = values[Math.round(i * run.period / other.period)];
+    const v = values[Math.round(run.timeAt(i) / other.period) + other.leadTicks - other.firstTick];
     return v === undefined || Number.isNaN(v) ? null : v;
   });
 }

@@ -5,6 +5,7 @@ import {
   Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
+import {CraneView} from './crane.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
 import {place, RobotView} from './robot_view.js';
 import {add, blockRise, convexHull, rotate} from './spatial.js';
@@ -82,6 +83,8 @@ function motionSignals(run) {
   return {...vector('base.position', type, 'base_position'),
     ...vector('base.orientation', type, 'base_orientation', 4),
     ...vector('joint', type, 'joint_position', run.robot.joints.length),
+    ...vector('crane', 'ground_truth_t', 'crane_point'), ...vector('crane_force', 'ground_truth_t', 'crane_force'),
+    crane_share: ['ground_truth_t', 'crane_share'],
     ...(type === 'ground_truth_t' ? vector('com', type, 'com_position')
       : vector('com', 'task_torque_t', 'com_position'))};
 }
@@ -189,6 +192,9 @@ export class SceneView {
       measured: arrow('measured', 0.0055), computed: arrow('computed', 0.009),
       measuredMoment: arrow('measured', 0.004), computedMoment: arrow('desired', 0.006)}));
     this.pushArrow = arrow('push', 0.012);
+    this.crane = new CraneView(METRES_PER_NEWTON);
+    colored(this.crane.material, 'support');
+    colored(this.crane.arrow.material, 'push');
     this.soles = this.run.robot.feet.map(() => outline('support', 4));
     this.polygon = outline('support', 8);
     this.region = outline('limit', REGION_CORNERS, true);
@@ -203,7 +209,7 @@ export class SceneView {
     this.com.renderOrder = 9;
     colored(this.com.material, 'com');
     scene.add(this.frame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
-      this.pushArrow.object,
+      this.pushArrow.object, this.crane.object,
       ...this.soles.map((s) => s.object),
       ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
     for (const object of [this.frame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
@@ -263,6 +269,7 @@ export class SceneView {
     const pushed = Math.hypot(...force) > LEAST_PUSH;
     const push = force.map((f) => f * METRES_PER_NEWTON * 1.5);
     this.pushArrow.set(point.map((p, i) => p - push[i]), pushed ? push : [0, 0, 0]);
+    this.crane.set(samples.vector('crane', row), samples.vector('crane_force', row), samples.at('crane_share', row));
     this.#setFeet(row);
     this.#setPressure(row);
     this.draw();
