@@ -2,15 +2,21 @@
 # Kills and stops controller processes at random moments of standing and of the push of section 7.2, in real time.
 # Prints how long control was lost and how often the robot fell.
 #
-# tests/benchmarks/kill_trial.sh [FAULTS]    default: 100, half in standing, half around a push
+# tests/benchmarks/kill_trial.sh [--load N] [--browser] [FAULTS]
+#   FAULTS: default 100, half in standing, half around a push; --load, --browser: what burns beside it (load.sh)
 set -eu
-faults=${1:-100}
-case $faults in *[!0-9]* | '') echo "usage: $0 [FAULTS]" >&2; exit 2 ;; esac
 root=$(cd "$(dirname "$0")/../.." && pwd)
+. "$root/tests/benchmarks/load.sh"
+parse_load "$@"
+# shellcheck disable=SC2086
+set -- $rest
+faults=${1:-100}
+case $faults in *[!0-9]* | '') echo "usage: $0 [--load N] [--browser] [FAULTS]" >&2; exit 2 ;; esac
 poise=$root/build/release/bin/poise
 out=$(mktemp -d)
-trap 'rm -rf "$out"' EXIT
+trap 'stop_load; rm -rf "$out" 2>/dev/null || true' EXIT
 trap 'exit 130' INT TERM
+start_load "$out"
 runs=0 falls=0
 trial() { # SEED FAULTS ARGUMENT...
   seed=$1 count=$2
