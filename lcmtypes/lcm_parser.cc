@@ -2,6 +2,7 @@
 
 #include <cctype>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 namespace poise {
@@ -54,6 +55,7 @@ class Parser {
  private:
   void ParseFields(LcmStruct* result) {
     LcmField field;
+    const size_t first = result->fields.size();
     field.type = Name();
     do {
       field.line = Peek().line;
@@ -67,7 +69,13 @@ class Parser {
       }
       result->fields.push_back(field);
     } while (Next().text == "," || (Back(), false));
+    const int line = Peek().line;
     Expect(";");
+    const auto comment = comments_.find(line);
+    if (comment == comments_.end()) return;
+    for (size_t i = first; i < result->fields.size(); ++i) {
+      result->fields[i].comment = comment->second;
+    }
   }
 
   void Tokenize(const std::string& text) {
@@ -78,7 +86,9 @@ class Parser {
       if (std::isspace(c)) {
         ++i;
       } else if (text.compare(i, 2, "//") == 0) {
+        const size_t begin = text.find_first_not_of(" \t", i + 2);
         i = text.find('\n', i);
+        if (begin < i) comments_[line] = text.substr(begin, i - begin);
         if (i == std::string::npos) break;
       } else if (text.compare(i, 2, "/*") == 0) {
         for (i += 2; i < text.size() && text.compare(i, 2, "*/") != 0; ++i) line += text[i] == '\n';
@@ -120,6 +130,7 @@ class Parser {
 
   std::string path_;
   std::vector<Token> tokens_;
+  std::map<int, std::string> comments_;  // by line
   size_t at_ = 0;
 };
 

@@ -12,6 +12,7 @@ struct LcmField {
   std::string type;  ///< "double", "wrench_t"
   std::string name;
   std::string dimension;  ///< empty: scalar; a literal; or the name of a count
+  std::string comment;    ///< behind // on the line that ends the declaration
   bool literal_dimension() const {
     return !dimension.empty() && dimension[0] >= '0' && dimension[0] <= '9';
   }

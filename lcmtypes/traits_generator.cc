@@ -1,6 +1,6 @@
-// Writes poise/message_traits.hpp and poise/message_table.cc from the .lcm files, and refuses
-// messages that the framework could not check before decoding. Usage: poise_traits_generator
-// OUTPUT_DIR FILE.lcm ...
+// Writes poise/message_traits.hpp, message_table.cc and message_field_table.cc from the .lcm files,
+// and refuses messages that the framework could not check before decoding. Usage:
+// poise_traits_generator OUTPUT_DIR FILE.lcm ...
 #include <algorithm>
 #include <fstream>
 #include <iostream>
@@ -194,6 +194,37 @@ void WriteTraits(const Message& message, const std::map<std::string, LcmStruct>&
   out << "    return walk.position();\n  }\n};\n\n";
 }
 
+/// The unit that a comment begins with; empty when it begins with none.
+std::string UnitOf(const std::string& comment) {
+  for (const std::string unit : {"m/s^2", "rad/s", "m/s", "N·m", "rad", "us", "m", "N", "A", "s"}) {
+    if (!comment.starts_with(unit)) continue;
+    if (comment.size() == unit.size() ||
+        std::string(",;:( ").find(comment[unit.size()]) != std::string::npos) {
+      return unit;
+    }
+  }
+  return "";
+}
+
+void WriteFieldTable(const std::vector<Message>& messages, std::ostream& out) {
+  out << "// Generated from lcmtypes/*.lcm by poise_traits_generator.\n#include "
+         "\"lcmtypes/field_table.h\"\n\nnamespace poise {\nnamespace {\n\n";
+  for (const Message& m : messages) {
+    out << "constexpr FieldInfo k_" << m.lcm.name << "[] = {\n";
+    for (const LcmField& f : m.lcm.fields) {
+      out << "    {\"" << f.name << "\", \"" << f.type << "\", \""
+          << (f.literal_dimension() ? "" : f.dimension) << "\", \"" << UnitOf(f.comment)
+          << "\"},\n";
+    }
+    out << "};\n";
+  }
+  out << "\n}  // namespace\n\nstd::span<const FieldInfo> FieldsOf(std::string_view type) {\n";
+  for (const Message& m : messages) {
+    out << "  if (type == \"" << m.lcm.name << "\") return k_" << m.lcm.name << ";\n";
+  }
+  out << "  return {};\n}\n\n}  // namespace poise\n";
+}
+
 int Generate(const std::string& output_dir, const std::vector<std::string>& files) {
   std::map<std::string, LcmStruct> all;
   for (const std::string& file : files) {
@@ -247,9 +278,12 @@ int Generate(const std::string& output_dir, const std::vector<std::string>& file
         << "  for (const MessageType& type : MessageTypes()) {\n"
         << "    if (fingerprint == type.fingerprint) return &type;\n  }\n  return nullptr;\n}\n\n"
         << "}  // namespace poise\n";
+  std::ofstream fields(output_dir + "/message_field_table.cc");
+  WriteFieldTable(messages, fields);
   traits.close();
   table.close();
-  if (!traits || !table) throw std::runtime_error(output_dir + ": cannot be written");
+  fields.close();
+  if (!traits || !table || !fields) throw std::runtime_error(output_dir + ": cannot be written");
   return 0;
 }
 

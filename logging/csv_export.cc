@@ -5,12 +5,14 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
 #include "components/framework/packet_filter.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "lcmtypes/field_table.h"
 #include "logging/log_export.h"
 #include "logging/log_messages.h"
 #include "logging/partial_file.h"
@@ -19,7 +21,9 @@ namespace poise::logging {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
+constexpr char kUnitsFile[] = "columns.json";
 constexpr size_t kMostChannels = 64;  // of a table whose graph is not known: damage makes up names
 
 /// A field of a row; in quotes when a separator stands in it.
@@ -36,37 +40,49 @@ void AppendText(std::string_view text, std::string* row) {
 /// Values and names of a message's fields; counts and header are left out.
 class Row final : public ScalarVisitor {
  public:
-  /// `names`: write names instead of values, each after `prefix`.
-  Row(const MessageType& type, bool names, std::string prefix, std::string* to)
-      : skip_(type.count_names.size() + 3), names_(names), prefix_(std::move(prefix)), to_(to) {}
+  explicit Row(const MessageType& type, std::string* to)
+      : skip_(type.count_names.size() + 3), to_(to) {}
 
-  void Integer(std::string_view path, int64_t value) override {
-    if (Begin(path)) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  void Integer(std::string_view, int64_t value) override {
+    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
   }
-  void Real(std::string_view path, double value) override {
-    if (Begin(path)) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  void Real(std::string_view, double value) override {
+    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
   }
-  void Text(std::string_view path, std::string_view value) override {
-    if (Begin(path)) AppendText(value, to_);
+  void Text(std::string_view, std::string_view value) override {
+    if (Begin()) AppendText(value, to_);
   }
-  size_t columns() const { return columns_; }
 
  private:
   /// Writes the separator; true when the value is to follow.
-  bool Begin(std::string_view path) {
+  bool Begin() {
     if (seen_++ < skip_) return false;
     to_->push_back(',');
-    ++columns_;
-    if (names_) to_->append(prefix_).append(path);
-    return !names_;
+    return true;
   }
 
   size_t skip_;
-  bool names_;
-  std::string prefix_;
   std::string* to_;
   size_t seen_ = 0;
-  size_t columns_ = 0;
+};
+
+/// Paths of a message's fields, counts and header left out.
+class Paths final : public ScalarVisitor {
+ public:
+  explicit Paths(const MessageType& type) : skip_(type.count_names.size() + 3) {}
+  void Integer(std::string_view path, int64_t) override { Add(path); }
+  void Real(std::string_view path, double) override { Add(path); }
+  void Text(std::string_view path, std::string_view) override { Add(path); }
+  const std::vector<std::string>& paths() const { return paths_; }
+
+ private:
+  void Add(std::string_view path) {
+    if (seen_++ >= skip_) paths_.emplace_back(path);
+  }
+
+  size_t skip_;
+  size_t seen_ = 0;
+  std::vector<std::string> paths_;
 };
 
 /// One file, there when Close has checked what is written.
@@ -101,11 +117,30 @@ struct Shape {
   bool operator==(const Shape&) const = default;
 };
 
-size_t Append(const MessageType& type, std::span<const uint8_t> data, bool names,
-              const std::string& prefix, std::string* to) {
-  Row row(type, names, prefix, to);
+void AppendValues(const MessageType& type, std::span<const uint8_t> data, std::string* to) {
+  Row row(type, to);
   type.visit(data.data(), static_cast<int64_t>(data.size()), &row);
-  return row.columns();
+}
+
+/// Appends the columns' names, each after `prefix`, and adds their units to `units`; returns how
+/// many they are.
+size_t AppendNames(const MessageType& type, std::span<const uint8_t> data,
+                   const ElementNames& elements, const std::string& prefix, std::string* to,
+                   Json* units) {
+  Paths paths(type);
+  type.visit(data.data(), static_cast<int64_t>(data.size()), &paths);
+  for (const std::string& path : paths.paths()) {
+    const std::string name = prefix + elements.Label(type.name, path);
+    to->append(",").append(name);
+    (*units)[name] = UnitOf(type.name, path);
+  }
+  return paths.paths().size();
+}
+
+Json TimeUnits() { return {{"time", "s"}, {"tick", ""}}; }
+
+void WriteUnits(const Json& units, File* file) {
+  file->Write(units.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 /// us from the run's start to the scenario's time 0; 0 when the run is not known.
@@ -156,6 +191,8 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   };
   const int64_t lead = LeadTime(messages);
   std::map<std::string, Table, std::less<>> tables;
+  Json units = Json::object();
+  File units_file((fs::path(folder) / kUnitsFile).string());
   Results results;
   LogEvent event;
   std::string row;
@@ -176,7 +213,8 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
                   .first;
       result.type = type->name;
       row = "time,tick";
-      Append(*type, event.data, true, "", &row);
+      Json& columns = units[name] = TimeUnits();
+      AppendNames(*type, event.data, messages.names(), "", &row, &columns);
       table->second.file.Write(row + "\n");
     }
     if (table->second.shape != Shape(type, event.data)) {
@@ -185,7 +223,7 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
     }
     row = TimeAndTick(ReadInt64(event.data.data() + type->run_id_offset + 16) - lead,
                       LogMessages::Tick(*type, event));
-    Append(*type, event.data, false, "", &row);
+    AppendValues(*type, event.data, &row);
     row.push_back('\n');
     table->second.file.Write(row);
     ++result.messages;
@@ -201,6 +239,8 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
   }
   if (error) throw LogError(fmt::format("{}: cannot be read: {}", folder, error.message()));
   for (auto& [name, table] : tables) table.file.Close();
+  WriteUnits(units, &units_file);
+  units_file.Close();
   return results.take();
 }
 
@@ -212,6 +252,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     size_t width = 0;
   };
   std::vector<ExportedChannel> results;
+  Json units = TimeUnits();
   std::vector<Column> columns;
   std::map<std::string, size_t, std::less<>> index;
   const auto add = [&](const std::string& channel, const std::string& type) {
@@ -244,8 +285,8 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
     }
     if (!column.shape) {
       column.shape.emplace(type, event.data);
-      column.width =
-          Append(*type, event.data, true, std::string(event.channel) + ".", &column.names);
+      column.width = AppendNames(*type, event.data, messages.names(),
+                                 std::string(event.channel) + ".", &column.names, &units);
     }
     auto& cells = ticks[LogMessages::Tick(*type, event)];
     cells.resize(columns.size());
@@ -270,12 +311,15 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
       if (i >= cells.size() || cells[i].empty()) {
         row.append(columns[i].width, ',');
       } else {
-        Append(*columns[i].shape->type, cells[i], false, "", &row);
+        AppendValues(*columns[i].shape->type, cells[i], &row);
       }
     }
     out.Write(row + "\n");
   }
+  File units_file(fs::path(file).replace_extension(kUnitsFile).string());
+  WriteUnits(units, &units_file);
   out.Close();
+  units_file.Close();
   return results;
 }
 

@@ -229,12 +229,13 @@ void AddCapturePoint(const RunRecord& run, EventList* events) {
 }
 
 void AddBridge(const RunRecord& run, EventList* events) {
+  const ElementNames names(run.robot);
   const bridge_status_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const bridge_status_t* bridge = run.bridge.at(tick);
     if (bridge == nullptr) continue;
     if (before != nullptr && bridge->state != before->state) {
-      const std::string reason = BridgeReasonName(bridge->reason);
+      const std::string reason = BridgeReasonText(*bridge, names);
       events->Add(tick, "bridge_state",
                   fmt::format("{} to {}{}", BridgeStateName(before->state),
                               BridgeStateName(bridge->state), reason.empty() ? "" : ": " + reason));
@@ -403,6 +404,12 @@ std::string BridgeReasonName(int8_t reason) {
     default:
       return fmt::format("reason {}", reason);
   }
+}
+
+std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names) {
+  const std::string reason = BridgeReasonName(bridge.reason);
+  if (reason.empty() || bridge.reason_joint < 0) return reason;
+  return fmt::format("{} ({})", reason, names.Joint(bridge.reason_joint));
 }
 
 std::vector<Event> Events(const RunRecord& run) {

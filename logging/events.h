@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "logging/element_names.h"
 #include "logging/run_record.h"
+#include "poise/bridge_status_t.hpp"
 
 namespace poise::logging {
 
@@ -28,5 +30,7 @@ std::vector<Event> Events(const RunRecord& run);
 /// reason for none.
 std::string BridgeStateName(int8_t state);
 std::string BridgeReasonName(int8_t reason);
+/// With the joint that it is about: "joint too fast (right_knee_pitch)".
+std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names);
 
 }  // namespace poise::logging

@@ -16,17 +16,20 @@ struct ExportedChannel {
 };
 
 /// FOLDER/CHANNEL.csv for every channel that has messages, RUN_INFO aside: a row a message, in the
-/// log's order; columns time (s), tick and the message's fields, "foot_wrench[1].force[2]", numbers
-/// with all their digits. Makes the folder; no other CSV file may stand there. Throws LogError.
+/// log's order; columns time (s), tick and the message's fields, "torque[right_knee_pitch]",
+/// "foot_wrench[left].force[2]" (by index where the robot is not known), numbers with all their
+/// digits. FOLDER/columns.json: {channel: {column: unit}}. Makes the folder; no other CSV file may
+/// stand there. Throws LogError.
 std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder);
 
 /// One wide file: a row a tick, columns time (s), tick and "CHANNEL.field" of the graph's channels,
 /// external ones aside, or where the graph is not known of the first 64 channels without texts;
-/// empty where a channel lacks the tick. Throws LogError.
+/// empty where a channel lacks the tick. FILE with its ending replaced by .columns.json: {column:
+/// unit}. Throws LogError.
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file);
 
-/// An MCAP file with every message as Protobuf (ProtobufMessages), a topic a channel, in the log's
-/// order; times in ns of the run. Channels whose names are not printable UTF-8 are refused. Throws
+/// An MCAP file with every message as Protobuf (ProtobufMessages), joints and feet by their names,
+/// a topic a channel, in the log's order; metadata "units": {type.field: unit}; times in ns of the run. Channels whose names are not printable UTF-8 are refused. Throws
 /// LogError, also for more channels than MCAP can hold.
 std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file);
 

@@ -9,6 +9,7 @@ LogMessages::LogMessages(const std::string& path, Run run) : reader_(path) {
   try {
     run_ = FindRunInfo(&reader_, path);
     run_known_ = true;
+    names_ = ElementNames::OfTexts(run_.info.robot, run_.info.urdf);
   } catch (const LogError&) {
     if (run == Run::kNeeded) throw;
     reader_.Rewind();
@@ -28,6 +29,11 @@ const MessageType* LogMessages::TypeOf(const LogEvent& event) const {
   const bool good = type != nullptr && type->has_header && type->fingerprint == fingerprint &&
                     type->well_formed_size(event.data.data(), size) == size;
   return good ? type : nullptr;
+}
+
+std::string LogMessages::Label(std::string_view channel, std::string_view path) const {
+  const auto type = graph_.find(channel);
+  return type != graph_.end() ? names_.Label(type->second->name, path) : std::string(path);
 }
 
 int64_t LogMessages::Tick(const MessageType& type, const LogEvent& event) {

@@ -3,8 +3,10 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "components/framework/graph.pb.h"
+#include "logging/element_names.h"
 #include "logging/log_reader.h"
 #include "logging/run_info.h"
 #include "poise/message_traits.hpp"
@@ -22,6 +24,10 @@ class LogMessages {
   bool run_known() const { return run_known_; }
   const RunSpec& spec() const { return run_.spec; }
   const run_info_t& info() const { return run_.info; }
+  /// Those of the run's robot.
+  const ElementNames& names() const { return names_; }
+  /// A path in a message of this channel, elements by their names.
+  std::string Label(std::string_view channel, std::string_view path) const;
   LogReader& reader() { return reader_; }
 
   /// The type of the event's message; nullptr when it is not a message of its channel.
@@ -32,6 +38,7 @@ class LogMessages {
   LogReader reader_;
   RunInfo run_;
   bool run_known_ = false;
+  ElementNames names_;
   std::map<std::string, const MessageType*, std::less<>> graph_;
 };
 

@@ -2,6 +2,7 @@
 
 #include "components/framework/build_info.h"
 #include "fmt/format.h"
+#include "lcmtypes/field_table.h"
 #include "logging/log_export.h"
 #include "logging/log_messages.h"
 #include "logging/mcap_writer.h"
@@ -27,13 +28,27 @@ McapWriter::Texts RunTexts(const LogMessages& messages) {
   return utf8;
 }
 
+/// By "type.field", of the structs in messages too.
+McapWriter::Texts Units() {
+  McapWriter::Texts units;
+  const auto add = [&](const auto& self, const std::string& type) -> void {
+    for (const FieldInfo& field : FieldsOf(type)) {
+      if (*field.unit != '\0') units[type + "." + field.name] = field.unit;
+      self(self, field.type);
+    }
+  };
+  for (const MessageType& type : MessageTypes()) add(add, type.name);
+  return units;
+}
+
 }  // namespace
 
 std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file) {
   LogMessages messages(log, LogMessages::Run::kIfKnown);
-  ProtobufMessages protobuf;
+  ProtobufMessages protobuf(messages.names());
   McapWriter writer(file, fmt::format("poise {}", PoiseVersion()));
   if (messages.run_known()) writer.AddMetadata("run", RunTexts(messages));
+  writer.AddMetadata("units", Units());
   std::map<std::string, uint16_t> schemas;  // by type
   struct Topic {
     uint16_t id;

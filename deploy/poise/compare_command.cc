@@ -4,6 +4,7 @@
 #include "deploy/poise/run_dir.h"
 #include "fmt/format.h"
 #include "logging/compare.h"
+#include "logging/log_messages.h"
 #include "logging/printable.h"
 
 namespace poise {
@@ -24,7 +25,9 @@ int Compare(const std::string& first, const std::string& second) {
   if (result.earliest) {
     const logging::LogDifference& d = *result.earliest;
     fmt::print("first: tick {}, {}{}{}: {} and {}\n", d.tick, ForTerminal(d.channel),
-               d.field.empty() ? "" : ".", d.field, ForTerminal(d.first), ForTerminal(d.second));
+               d.field.empty() ? "" : ".",
+               ForTerminal(logging::LogMessages(first_log).Label(d.channel, d.field)),
+               ForTerminal(d.first), ForTerminal(d.second));
   }
   // Nothing to compare is not equality.
   return result.equal() && result.messages > 0 ? kExitOk : kExitFailed;

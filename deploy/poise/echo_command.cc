@@ -17,7 +17,7 @@
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"
-#include "logging/log_reader.h"
+#include "logging/log_messages.h"
 #include "poise/health_t.hpp"
 
 namespace poise {
@@ -40,20 +40,27 @@ struct EchoOptions {
 /// Turns messages into text and writes it to stdout.
 class EchoOutput {
  public:
-  explicit EchoOutput(const EchoOptions& options)
-      : options_(options), selection_(options.fields), thinner_(options.rate) {}
+  EchoOutput(const EchoOptions& options, logging::ElementNames names)
+      : options_(options),
+        names_(std::move(names)),
+        selection_(options.fields),
+        thinner_(options.rate) {}
 
-  const FieldSelection& selection() const { return selection_; }
+  /// Throws ConfigError when such a message lacks a field.
+  void Check(const MessageType& type, std::span<const uint8_t> data) {
+    selection_.UseNames(type, names_);
+    selection_.Check(type, ReadScalars(type, data, names_).value());
+  }
 
   /// `time`: what --rate goes by, ns. Throws ConfigError when the first message lacks a field.
   void Add(const MessageType& type, std::span<const uint8_t> data, double time) {
     if (done() || !thinner_.Pass(time)) return;
-    const std::optional<std::vector<Scalar>> scalars = ReadScalars(type, data);
+    const std::optional<std::vector<Scalar>> scalars = ReadScalars(type, data, names_);
     if (!scalars) {
       ++refused_;
       return;
     }
-    if (shown_ == 0) selection_.Check(type, *scalars);
+    if (shown_ == 0) Check(type, data);
     const std::vector<Scalar> fields = selection_.Pick(*scalars);
     const uint8_t* header = data.data() + type.run_id_offset;
     const auto tick = type.has_header ? std::optional(ReadInt64(header + 8)) : std::nullopt;
@@ -115,6 +122,7 @@ class EchoOutput {
 
  private:
   const EchoOptions& options_;
+  logging::ElementNames names_;
   FieldSelection selection_;
   Thinner thinner_;
   std::string text_;
@@ -126,12 +134,12 @@ class EchoOutput {
 };
 
 /// Throws ConfigError for a channel or field that the run does not have, before any message comes.
-void CheckLive(const LiveRun& live, const EchoOptions& options, const EchoOutput& output) {
+void CheckLive(const LiveRun& live, const EchoOptions& options, EchoOutput* output) {
   for (const Channel& channel : live.spec().graph().channel()) {
     if (channel.name() != options.channel) continue;
     const MessageType& type = *FindMessageType(channel.type());
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    output.selection().Check(type, ReadScalars(type, ZeroMessage(type, counts)).value());
+    output->Check(type, ZeroMessage(type, counts));
     return;
   }
   const std::vector<std::string> names = live.ChannelNames();
@@ -143,13 +151,13 @@ void CheckLive(const LiveRun& live, const EchoOptions& options, const EchoOutput
   std::vector<uint8_t> data(static_cast<size_t>(health.getEncodedSize()));
   health.encode(data.data(), 0, static_cast<int>(data.size()));
   const MessageType& type = *FindMessageType(health_t::getHash());
-  output.selection().Check(type, ReadScalars(type, data).value());
+  output->Check(type, data);
 }
 
 int EchoLive(const EchoOptions& options) {
   LiveRun live(options.run, fmt::format("poise echo {} --log", options.channel));
-  EchoOutput output(options);
-  CheckLive(live, options, output);
+  EchoOutput output(options, logging::ElementNames::OfSpec(live.spec()));
+  CheckLive(live, options, &output);
   CatchStopSignals(/*interrupt=*/true);
   int64_t last_arrival = NowNanoseconds();
   int64_t newest = -1;
@@ -181,8 +189,10 @@ int EchoLive(const EchoOptions& options) {
 
 int EchoLog(const EchoOptions& options) {
   const std::string path = FindLog(options.log).string();
-  logging::LogReader reader(path);
-  EchoOutput output(options);
+  logging::LogMessages messages(path, logging::LogMessages::Run::kIfKnown);
+  messages.reader().Rewind();  // RUN_INFO is a message too
+  logging::LogReader& reader = messages.reader();
+  EchoOutput output(options, messages.names());
   std::set<std::string, std::less<>> names;
   logging::LogEvent event;
   while (!output.done() && reader.Next(&event)) {
@@ -226,10 +236,10 @@ void AddEchoCommand(CLI::App* app, Command* command) {
       "echo", "decoded messages of a channel, of a run in progress or from a log");
   echo->add_option("channel", options->channel, "e.g. ROBOT_STATE, HEALTH_SIM_ODE")->required();
   echo->add_option("field", options->fields,
-                   "by path: torque[3], foot_wrench[0].force, com_position; one line a message. "
-                   "Default: the whole message");
-  CLI::Option* run =
-      echo->add_option("--run", options->run, "folder of a run in progress; default: the latest");
+                   "by path: torque[right_knee_pitch] or torque[3], foot_wrench[left].force, "
+                   "com_position; one line a message. Default: the whole message");
+  CLI::Option* run = echo->add_option("--run", options->run,
+                                      "folder of the run; default: the only one that goes on");
   echo->add_option("--log", options->log, "from a log (any LCM log) or a run's folder instead")
       ->excludes(run);
   echo->add_option("--count", options->count, "end after so many messages")

@@ -1,6 +1,7 @@
 #include "deploy/poise/field_selection.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "components/framework/configuration.h"
 #include "components/framework/suggest.h"
@@ -71,9 +72,22 @@ std::string Problem(const MessageType& type, const std::vector<Scalar>& scalars,
     return fmt::format("{} is a single value; leave out '{}'", known, field.substr(known.size()));
   }
   if (parts.front().starts_with('[')) {
-    return fmt::format("{} is an array of {}; write {}[0]{} or {}", known, parts.size(), known,
-                       parts.size() > 1 ? fmt::format(" to {}[{}]", known, parts.size() - 1) : "",
-                       known);
+    const size_t end = wrong.find(']');
+    const bool named = parts.front().find_first_not_of("[]0123456789") != std::string::npos;
+    if (named && wrong.starts_with('[') && end != std::string_view::npos) {
+      std::vector<std::string> names;
+      for (const std::string& part : parts) names.push_back(part.substr(1, part.size() - 2));
+      const std::string_view element = wrong.substr(1, end - 1);
+      std::vector<std::string> holding;  // "knee" means one of the knees
+      std::copy_if(
+          names.begin(), names.end(), std::back_inserter(holding),
+          [&](const std::string& name) { return name.find(element) != std::string::npos; });
+      if (!element.empty() && !holding.empty()) names = std::move(holding);
+      return fmt::format("{} has no element '{}'; {}", known, element, Suggest(element, names));
+    }
+    return fmt::format("{} is an array of {}; write {}{}{} or {}", known, parts.size(), known,
+                       parts.front(),
+                       parts.size() > 1 ? fmt::format(" to {}{}", known, parts.back()) : "", known);
   }
   return fmt::format("{} has no field '{}'; {}", known.empty() ? type.name : known,
                      wrong.substr(0, wrong.find_first_of(wrong.starts_with('[') ? "." : ".[")),
@@ -83,9 +97,11 @@ std::string Problem(const MessageType& type, const std::vector<Scalar>& scalars,
 }  // namespace
 
 std::optional<std::vector<Scalar>> ReadScalars(const MessageType& type,
-                                               std::span<const uint8_t> data) {
+                                               std::span<const uint8_t> data,
+                                               const logging::ElementNames& names) {
   Collect collect;
   if (!type.visit(data.data(), static_cast<int64_t>(data.size()), &collect)) return std::nullopt;
+  for (Scalar& scalar : collect.scalars) scalar.path = names.Label(type.name, scalar.path);
   return std::move(collect.scalars);
 }
 
@@ -101,6 +117,10 @@ std::vector<uint8_t> ZeroMessage(const MessageType& type, std::span<const int32_
     write(8 + 4 * i, static_cast<uint32_t>(counts[i]), 4);
   }
   return data;
+}
+
+void FieldSelection::UseNames(const MessageType& type, const logging::ElementNames& names) {
+  for (std::string& field : fields_) field = names.Label(type.name, field);
 }
 
 void FieldSelection::Check(const MessageType& type, const std::vector<Scalar>& scalars) const {

@@ -15,7 +15,8 @@ namespace poise {
 /// six digits.
 std::string MessageLine(std::optional<int64_t> tick, const std::vector<Scalar>& fields);
 
-/// A title line, then a line for each field, the elements of an array together, then an empty line.
+/// A title line, then a line for each field, the elements of an array together; then the arrays of
+/// named elements as tables, a row an element; then an empty line.
 std::string MessageBlock(std::string_view title, const std::vector<Scalar>& fields);
 
 /// Column names, and a message's row; "tick" first unless it is among the fields. Reals with as

@@ -16,6 +16,7 @@
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"
 #include "logging/component_replay.h"
+#include "logging/log_messages.h"
 #include "logging/log_player.h"
 #include "logging/printable.h"
 
@@ -57,8 +58,8 @@ std::vector<int> Wanted(const RunSpec& spec, const std::vector<std::string>& nam
   return wanted;
 }
 
-void Print(const logging::ReplayedComponent& component, double tick_period) {
-  const double simulated = static_cast<double>(component.ticks) * tick_period;
+void Print(const logging::ReplayedComponent& component, const logging::LogMessages& messages) {
+  const double simulated = static_cast<double>(component.ticks) * messages.spec().tick_period();
   fmt::print("{}: {} ticks in {:.3f} s, {:.0f} x real time: {}\n", ForTerminal(component.name),
              component.ticks, component.wall_time, simulated / std::max(component.wall_time, 1e-9),
              component.equal() ? "equal" : "DIFFERENT");
@@ -74,13 +75,16 @@ void Print(const logging::ReplayedComponent& component, double tick_period) {
       continue;
     }
     fmt::print("  {}: {} of {} messages differ, first {} at tick {}\n", ForTerminal(output.channel),
-               output.differing, output.ticks, output.first_field, output.first_differing_tick);
+               output.differing, output.ticks,
+               ForTerminal(messages.Label(output.channel, output.first_field)),
+               output.first_differing_tick);
     for (const logging::FieldDifference& field : output.fields) {
       fmt::print(
           "    {}: {} ticks, from {} on; largest {:.3g}: {} at tick {}, logged {}, "
           "replayed {}\n",
-          field.field, field.ticks, field.first_tick, field.largest, field.largest_path,
-          field.largest_tick, ForTerminal(field.logged), ForTerminal(field.replayed));
+          field.field, field.ticks, field.first_tick, field.largest,
+          ForTerminal(messages.Label(output.channel, field.largest_path)), field.largest_tick,
+          ForTerminal(field.logged), ForTerminal(field.replayed));
     }
   }
 }
@@ -89,6 +93,7 @@ int Compare(const ReplayOptions& options, const std::string& log) {
   const logging::LogReplay replay(log);
   RunSpec spec = replay.spec();
   for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
+  const logging::LogMessages messages(log);
   bool equal = true;
   for (const int index : Wanted(spec, options.components)) {
     if (SpeaksEthercat(spec, index)) {
@@ -97,7 +102,7 @@ int Compare(const ReplayOptions& options, const std::string& log) {
       continue;
     }
     const logging::ReplayedComponent component = replay.Replay(spec, index, Components());
-    Print(component, spec.tick_period());
+    Print(component, messages);
     equal = equal && component.equal();
   }
   return equal ? kExitOk : kExitFailed;

@@ -36,6 +36,7 @@ class Watch {
   explicit Watch(const std::string& run)
       : live_(run, "poise log info"),
         control_(live_.spec(), {kRecorderName}),
+        names_(logging::ElementNames::OfSpec(live_.spec())),
         statistics_(live_.spec(), NowNanoseconds()),
         last_arrival_(NowNanoseconds()) {}
 
@@ -59,7 +60,7 @@ class Watch {
   }
 
   std::vector<ViewLine> View() {
-    return TopView(live_.spec(), live_.dir().string(), statistics_.Take(NowNanoseconds()),
+    return TopView(live_.spec(), names_, live_.dir().string(), statistics_.Take(NowNanoseconds()),
                    live_.refused() + control_.refused());
   }
   bool HeardNothing() const {
@@ -71,6 +72,7 @@ class Watch {
  private:
   LiveRun live_;
   ControlClient control_;
+  logging::ElementNames names_;
   LiveStatistics statistics_;
   int64_t last_arrival_;
 };
@@ -132,7 +134,7 @@ void AddTopCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<TopOptions>();
   CLI::App* top = app->add_subcommand(
       "top", "live view of a run in progress: its processes and channels; q or Ctrl-C ends it");
-  top->add_option("run", options->run, "folder of the run; default: the latest");
+  top->add_option("run", options->run, "folder of the run; default: the only one that goes on");
   top->add_option("--interval", options->interval, "s between views, over which rates are measured")
       ->capture_default_str()
       ->check(Within("in [0.1, 60]", [](double s) { return s >= 0.1 && s <= 60; }));

@@ -46,8 +46,8 @@ std::string StateName(int8_t state) {
   }
 }
 
-void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& snapshot,
-               int64_t refused, std::vector<ViewLine>* lines) {
+void AddHeader(const RunSpec& spec, const logging::ElementNames& names, const std::string& dir,
+               const LiveSnapshot& snapshot, int64_t refused, std::vector<ViewLine>* lines) {
   const double period = spec.tick_period();
   lines->push_back({fmt::format("{}  run {}  {}", spec.scenario(), spec.run_id(), dir)});
   std::string progress = fmt::format("tick {}", Count(snapshot.tick));
@@ -65,7 +65,7 @@ void AddHeader(const RunSpec& spec, const std::string& dir, const LiveSnapshot& 
   const bool failing = snapshot.bridge && snapshot.bridge->state > bridge_status_t::STATE_RUNNING;
   if (snapshot.bridge) {
     progress += "  bridge: " + logging::BridgeStateName(snapshot.bridge->state);
-    const std::string reason = logging::BridgeReasonName(snapshot.bridge->reason);
+    const std::string reason = logging::BridgeReasonText(*snapshot.bridge, names);
     if (!reason.empty()) progress += ", " + reason;
   }
   lines->push_back({progress, stopped   ? Style::kFailure
@@ -166,10 +166,11 @@ const char* Color(Style style) {
 
 }  // namespace
 
-std::vector<ViewLine> TopView(const RunSpec& spec, const std::string& dir,
-                              const LiveSnapshot& snapshot, int64_t refused) {
+std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& names,
+                              const std::string& dir, const LiveSnapshot& snapshot,
+                              int64_t refused) {
   std::vector<ViewLine> lines;
-  AddHeader(spec, dir, snapshot, refused, &lines);
+  AddHeader(spec, names, dir, snapshot, refused, &lines);
   lines.emplace_back();
   AddProcesses(snapshot, &lines);
   lines.emplace_back();

@@ -7,6 +7,7 @@
 
 #include "components/framework/graph.pb.h"
 #include "deploy/poise/live_statistics.h"
+#include "logging/element_names.h"
 
 namespace poise {
 
@@ -17,9 +18,11 @@ struct ViewLine {
   Style style = Style::kPlain;
 };
 
-/// The whole view; `dir`: the run's folder, `refused`: packets that the listener refused.
-std::vector<ViewLine> TopView(const RunSpec& spec, const std::string& dir,
-                              const LiveSnapshot& snapshot, int64_t refused);
+/// The whole view; `names`: of the run's robot, `dir`: the run's folder, `refused`: packets that
+/// the listener refused.
+std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& names,
+                              const std::string& dir, const LiveSnapshot& snapshot,
+                              int64_t refused);
 
 /// Plain text, a line feed after each line.
 std::string PlainText(const std::vector<ViewLine>& lines);

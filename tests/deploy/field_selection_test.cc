@@ -88,6 +88,37 @@ TEST(FieldSelectionTest, SaysWhatAFieldMayHaveBeen) {
   EXPECT_EQ(ProblemWith("torque[1]."), "torque[1] is a single value; leave out '.'");
 }
 
+TEST(FieldSelectionTest, JointsAndFeetHaveTheirNames) {
+  const logging::ElementNames names = logging::ElementNames::OfSpec(logging::MakeTestSpec());
+  const std::vector<Scalar> scalars = ReadScalars(Balance(), Encode(Message()), names).value();
+  const auto picked = [&](const std::string& field) {
+    FieldSelection selection({field});
+    selection.UseNames(Balance(), names);
+    selection.Check(Balance(), scalars);
+    return Paths(selection.Pick(scalars));
+  };
+  const std::string joint = "torque[" + names.Of("balance_torque_t", "torque").at(1) + "]";
+  EXPECT_THAT(picked(joint), ElementsAre(joint));
+  EXPECT_THAT(picked("torque[1]"), ElementsAre(joint));
+  EXPECT_THAT(picked("foot_wrench[left].force[2]"), ElementsAre("foot_wrench[left].force[2]"));
+  EXPECT_THAT(picked("foot_wrench[left_foot].force[2]"), ElementsAre("foot_wrench[left].force[2]"));
+  const auto problem = [&](const std::string& field) -> std::string {
+    try {
+      picked(field);
+    } catch (const ConfigError& error) {
+      return error.problem();
+    }
+    return "";
+  };
+  EXPECT_EQ(problem("foot_wrench[rihgt]"),
+            "foot_wrench has no element 'rihgt'; did you mean right?");
+  EXPECT_EQ(problem("torque[roll]"), "torque has no element 'roll'; it has right_hip_roll");
+  EXPECT_EQ(problem("foot_wrench[2]"), "foot_wrench has no element '2'; it has left, right");
+  EXPECT_EQ(problem("foot_wrench.force"),
+            "foot_wrench is an array of 2; write foot_wrench[right] to foot_wrench[left] or "
+            "foot_wrench");
+}
+
 TEST(FieldSelectionTest, OddTextsAreNoFields) {
   for (const char* field :
        {"", ".", "[", "[[", "..", "torque[", "torque[]", "torque[1", "torque[-1]", "torque[1]]",

@@ -38,6 +38,25 @@ TEST(MessageTextTest, ABlockPutsAnArrayOnOneLine) {
   EXPECT_EQ(MessageBlock("C", {kFields[1]}), "C\n  torque  [0.333333]\n\n");
 }
 
+TEST(MessageTextTest, ABlockPutsArraysOfTheSameNamesInATable) {
+  EXPECT_EQ(MessageBlock("C", {{"torque[hip]", 1.5},
+                               {"torque[knee_pitch]", -20.25},
+                               {"in_contact[right]", int64_t{1}},
+                               {"eta", 0.5},
+                               {"feedback[hip]", 0.0},
+                               {"feedback[knee_pitch]", 3.0},
+                               {"foot_wrench[right].force[0]", 4.0}}),
+            "C\n"
+            "  eta                       0.5\n"
+            "  foot_wrench[right].force  [4]\n"
+            "              torque  feedback\n"
+            "  hip            1.5         0\n"
+            "  knee_pitch  -20.25         3\n"
+            "         in_contact\n"
+            "  right           1\n"
+            "\n");
+}
+
 TEST(MessageTextTest, CsvHasAColumnForEachField) {
   EXPECT_EQ(CsvHeader(true, {kFields[1], kFields[6]}), "tick,torque[0],detail\n");
   EXPECT_EQ(CsvHeader(true, {kFields[1], kFields[0]}), "torque[0],tick\n");

@@ -45,7 +45,7 @@ class TopViewTest : public ::testing::Test {
     snapshot.tick = 1521;
     snapshot.tick_rate = 250;
   }
-  std::string Text() const { return PlainText(TopView(spec, "runs/a", snapshot, 3)); }
+  std::string Text() const { return PlainText(TopView(spec, names, "runs/a", snapshot, 3)); }
   /// The words of the first line that begins with `name`.
   std::vector<std::string> Row(const std::string& name) const {
     std::istringstream lines(Text());
@@ -57,6 +57,7 @@ class TopViewTest : public ::testing::Test {
   }
 
   RunSpec spec = logging::MakeTestSpec();
+  logging::ElementNames names = logging::ElementNames::OfSpec(spec);
   LiveSnapshot snapshot;
 };
 
@@ -72,11 +73,17 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
   snapshot.bridge.emplace();
   snapshot.bridge->state = bridge_status_t::STATE_RUNNING;
   snapshot.bridge->reason = bridge_status_t::REASON_NONE;
+  snapshot.bridge->reason_joint = -1;
   EXPECT_THAT(Text(), HasSubstr("bridge: running\n"));
+  snapshot.bridge->state = bridge_status_t::STATE_STOPPING;
+  snapshot.bridge->reason = bridge_status_t::REASON_JOINT_VELOCITY;
+  snapshot.bridge->reason_joint = 3;
+  EXPECT_THAT(Text(), HasSubstr("bridge: stopping, joint too fast (right_knee_pitch)\n"));
+  snapshot.bridge->reason_joint = -1;
   snapshot.bridge->state = bridge_status_t::STATE_ESTOP;
   snapshot.bridge->reason = bridge_status_t::REASON_OPERATOR;
   EXPECT_THAT(Text(), HasSubstr("bridge: emergency stop, operator\n"));
-  EXPECT_EQ(TopView(spec, "", snapshot, 0)[1].style, ViewLine::Style::kFailure);
+  EXPECT_EQ(TopView(spec, names, "", snapshot, 0)[1].style, ViewLine::Style::kFailure);
 }
 
 TEST_F(TopViewTest, ShowsAProcess) {
@@ -107,7 +114,7 @@ TEST_F(TopViewTest, ShowsAChannel) {
 TEST_F(TopViewTest, MarksWhatIsWrong) {
   using Style = ViewLine::Style;
   const auto style = [&] {
-    for (const ViewLine& line : TopView(spec, "", snapshot, 0)) {
+    for (const ViewLine& line : TopView(spec, names, "", snapshot, 0)) {
       if (line.text.starts_with("sim_ode")) return line.style;
     }
     return Style::kTitle;

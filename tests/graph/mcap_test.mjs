@@ -88,6 +88,25 @@ async function readMcap() {
   return {reader, topics};
 }
 
+// Named elements, as the robot's file and its URDF have them: arrays that num_joints, num_motors and num_feet size.
+const robotFile = (name) => readFileSync(here(`../../deploy/robots/dyros/${name}`), 'utf8');
+const inOrder = (text, names) => [...names].sort((a, b) => text.indexOf(`<joint name="${a}"`) - text.indexOf(`<joint name="${b}"`));
+const joints = inOrder(robotFile('dyros_legs.urdf'), [...robotFile('dyros_legs.pbtxt').matchAll(/joint: "(\w+)"/g)].map((m) => m[1]));
+const feet = [...robotFile('dyros_legs.pbtxt').matchAll(/foot \{\s+name: "(\w+)"/g)].map((m) => m[1]);
+const elements = {num_joints: joints, num_motors: joints, num_feet: feet};
+
+/** A decoded LCM message as the MCAP file has it: named elements in place of their arrays. */
+function named(type, message) {
+  const result = {...message};
+  for (const {field, size} of fieldsOf[type]) {
+    const names = elements[size];
+    if (!names) continue;
+    assert.equal(message[field].length, names.length);
+    result[field] = Object.fromEntries(names.map((name, i) => [name, message[field][i]]));
+  }
+  return result;
+}
+
 /** Big integers as text on both sides; -0 and 0 differ. */
 const comparable = (value) => JSON.parse(JSON.stringify(value, (_, v) =>
   typeof v === 'bigint' ? String(v) : Object.is(v, -0) ? 'negative zero' : v));
@@ -104,7 +123,7 @@ test('every message, bit for bit', async () => {
     count += events.length;
     for (const [i, event] of events.entries()) {
       const {message, value} = topics[channel][i];
-      const decoded = decodeLcm(typeOf[channel], event.data);
+      const decoded = named(typeOf[channel], decodeLcm(typeOf[channel], event.data));
       assert.deepEqual(comparable(value), comparable(decoded), `${channel} ${i}`);
       assert.equal(message.logTime, event.head.readBigInt64BE(12) * 1000n);
     }
@@ -118,12 +137,16 @@ test('read from the beginning, with all checksums', () => {
   reader.append(readFileSync(file));
   let messages = 0;
   const seen = new Set();
+  const metadata = {};
   for (let record; (record = reader.nextRecord());) {
     seen.add(record.type);
     if (record.type === 'Message') messages++;
-    if (record.type === 'Metadata') assert.equal(record.metadata.get('scenario'), 'stand');
+    if (record.type === 'Metadata') metadata[record.name] = record.metadata;
   }
   assert.ok(reader.done());
+  assert.equal(metadata.run.get('scenario'), 'stand');
+  assert.equal(metadata.units.get('joint_command_t.torque'), 'N·m');
+  assert.equal(metadata.units.get('wrench_t.force'), 'N');
   assert.equal(messages, readLog(log).length);
   for (const type of ['Header', 'Metadata', 'Schema', 'Channel', 'Statistics', 'ChunkIndex', 'SummaryOffset', 'Footer']) {
     assert.ok(seen.has(type), type);

@@ -109,7 +109,8 @@ TEST_F(WatchTest, EchoShowsTheMessagesThatTheLogGets) {
   const logging::RunRecord record = End();
   const std::vector<std::string> lines = Lines(live.output);
   ASSERT_GE(lines.size(), 51u) << live.output;
-  EXPECT_EQ(lines[0], "tick,base_position[0],base_position[1],base_position[2],joint_position[3]");
+  const std::string joint = "joint_position[" + record.robot.joints()[3].name + "]";
+  EXPECT_EQ(lines[0], "tick,base_position[0],base_position[1],base_position[2]," + joint);
   int64_t before = -1;
   for (size_t i = 1; i <= 50; ++i) {
     const std::vector<std::string> cells = Words(lines[i], ',');
@@ -125,8 +126,8 @@ TEST_F(WatchTest, EchoShowsTheMessagesThatTheLogGets) {
     EXPECT_EQ(std::strtod(cells[4].c_str(), nullptr), state->joint_position[3]);
   }
   // The log says the same of these ticks.
-  const ProgramResult logged = RunPoise(
-      {"echo", "ROBOT_STATE", "base_position", "joint_position[3]", "--csv", "--log", run});
+  const ProgramResult logged =
+      RunPoise({"echo", "ROBOT_STATE", "base_position", joint, "--csv", "--log", run});
   EXPECT_EQ(logged.exit_code, 0);
   for (size_t i = 0; i <= 50; ++i) EXPECT_THAT(logged.output, HasSubstr(lines[i] + "\n"));
   int64_t states = 0;  // in real time not of every tick
@@ -152,6 +153,10 @@ TEST_F(WatchTest, UnknownChannelsAndFieldsAreUsageErrors) {
                    {"robot_state_t has no field 'base_positon'; did you mean base_position?"});
   ExpectUsageError({"echo", "ROBOT_STATE", "base_position[3]", "--run", run},
                    {"base_position is an array of 3"});
+  ExpectUsageError({"echo", "JOINT_COMMAND", "torque[right_knee_pich]", "--run", run},
+                   {"torque has no element 'right_knee_pich'; did you mean right_knee_pitch?"});
+  ExpectUsageError({"echo", "JOINT_COMMAND", "foot_wrench[lef]", "--run", run},
+                   {"foot_wrench has no element 'lef'; did you mean left?"});
   ExpectUsageError({"echo", "HEALTH_SIM_ODE", "stat", "--run", run}, {"did you mean state"});
   ExpectUsageError({"top", run}, {"stdout is no terminal", "--once"});
 }
@@ -178,6 +183,12 @@ TEST(WatchEndedRunTest, AnEndedRunIsReadFromItsLog) {
   EXPECT_EQ(whole.exit_code, 0);
   EXPECT_THAT(whole.output, HasSubstr("BALANCE_TORQUE  balance_torque_t  tick 0  0.000000 s\n"));
   EXPECT_THAT(whole.output, HasSubstr("\n  num_joints                  12\n"));
+  // Joints as rows, in the order of the robot's.
+  EXPECT_THAT(whole.output, HasSubstr("torque  balance_torque\n  right_hip_yaw "));
+  EXPECT_THAT(whole.output, HasSubstr("foot_wrench[left].force "));
+  const ProgramResult foot = RunPoise(
+      {"echo", "JOINT_COMMAND", "foot_wrench[left_foot].force[2]", "--log", run, "--count", "1"});
+  EXPECT_THAT(foot.output, HasSubstr("tick=0 foot_wrench[left].force[2]=-"));
   // 200 ticks of 2 ms thinned out to 50 Hz: every tenth.
   const ProgramResult thin =
       RunPoise({"echo", "ROBOT_STATE", "utime", "--log", run, "--rate", "50"});

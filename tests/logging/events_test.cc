@@ -280,6 +280,18 @@ TEST_F(EventsTest, BridgeStatesCarryTheirReason) {
                           Is(0.1, "bridge_state", "running to damping: command stale")));
 }
 
+TEST_F(EventsTest, AStopNamesTheJointThatItIsAbout) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    bridge_[t].state = t < 50 ? bridge_status_t::STATE_RUNNING : bridge_status_t::STATE_STOPPING;
+    bridge_[t].reason =
+        t < 50 ? bridge_status_t::REASON_NONE : bridge_status_t::REASON_JOINT_VELOCITY;
+    bridge_[t].reason_joint = t < 50 ? -1 : 3;
+  }
+  EXPECT_THAT(Named("bridge_state"),
+              ElementsAre(Is(0.1, "bridge_state",
+                             "running to stopping: joint too fast (right_knee_pitch)")));
+}
+
 TEST_F(EventsTest, APushStandsOutOfItsSensorsNoise) {
   // Noise of a sign that changes: differences of 0.4 N everywhere; a push of 20 ticks upon it.
   for (size_t t = 0; t < kTicks; ++t) push_[t].force[0] = t % 2 == 0 ? 0.2 : -0.2;

@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "logging/event_log_writer.h"
 #include "logging/mcap_writer.h"
 #include "poise/external_push_t.hpp"
+#include "poise/joint_command_t.hpp"
+#include "poise/message_traits.hpp"
 #include "tests/logging/small_log.h"
 
 namespace poise::logging {
@@ -82,6 +86,42 @@ TEST_F(LogExportTest, CsvHoldsEveryMessageOfEveryChannel) {
   EXPECT_EQ(commands[6][Column(commands[0], "enabled[0]")], "1");
   const std::vector<Row> health = ReadCsv(out_ + "/HEALTH_ROBOT.csv");
   EXPECT_EQ(health[1][Column(health[0], "detail")], "ended, as \"planned\"");
+}
+
+TEST_F(LogExportTest, CsvCallsJointsAndFeetByNameAndTellsUnits) {
+  joint_command_t command;
+  MessageTraits<joint_command_t>::Resize(command, std::array<int32_t, 2>{12, 2});
+  SetHeader(0, &command);
+  command.torque[3] = 7;
+  command.foot_wrench[1].force[2] = -250;
+  std::vector<RawEvent> events = {RunInfoEvent(MakeTestSpec()),
+                                  {"JOINT_COMMAND", 0, Encode(command)}};
+  WriteRawLog(log_, events);
+  const auto check = [](const std::string& table, const std::string& units_file,
+                        const std::string& channel, const std::string& prefix) {
+    const std::vector<Row> rows = ReadCsv(table);
+    ASSERT_EQ(rows.size(), 2u);
+    EXPECT_EQ(rows[1][Column(rows[0], prefix + "torque[right_knee_pitch]")], "7");
+    EXPECT_EQ(rows[1][Column(rows[0], prefix + "foot_wrench[left].force[2]")], "-250");
+    nlohmann::json units = nlohmann::json::parse(ReadBytes(units_file));
+    if (!channel.empty()) units = units.at(channel);
+    ASSERT_EQ(units.size(), rows[0].size());
+    for (const std::string& column : rows[0]) EXPECT_TRUE(units.contains(column)) << column;
+    EXPECT_EQ(units.at("time"), "s");
+    EXPECT_EQ(units.at(prefix + "torque[right_knee_pitch]"), "N·m");
+    EXPECT_EQ(units.at(prefix + "foot_wrench[left].force[2]"), "N");
+    EXPECT_EQ(units.at(prefix + "eta"), "");
+  };
+  ExportCsv(log_, out_);
+  check(out_ + "/JOINT_COMMAND.csv", out_ + "/columns.json", "JOINT_COMMAND", "");
+  ExportMergedCsv(log_, folder_.path("wide.csv"));
+  check(folder_.path("wide.csv"), folder_.path("wide.columns.json"), "", "JOINT_COMMAND.");
+
+  events.erase(events.begin());  // whose robot is not known
+  WriteRawLog(log_, events);
+  ExportMergedCsv(log_, folder_.path("wide.csv"));
+  const std::vector<Row> rows = ReadCsv(folder_.path("wide.csv"));
+  EXPECT_EQ(rows[1][Column(rows[0], "JOINT_COMMAND.torque[3]")], "7");
 }
 
 TEST_F(LogExportTest, MergedHasARowATick) {
