@@ -1,23 +1,41 @@
-// Where scenarios, robots and graphs are found by name.
+// Where scenarios, sweeps, robots, graphs and drives are found.
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace poise {
 
-/// The deploy folder: $POISE_DEPLOY_DIR, else that of the source this program was built from.
+/// The installed files: $POISE_DEPLOY_DIR, else deploy/ of the source this program was built from.
 std::filesystem::path DeployDir();
 
-/// File of the scenario, robot or graph (`kind`: "scenarios", ...) that `name` means: a path (it
-/// holds a '/' and exists relative to `base`, or ends in .pbtxt), or the name of a file of
-/// deploy/`kind` without its ending. Throws ConfigError naming what there is.
-std::filesystem::path FindFile(const std::string& kind, const std::string& name,
-                               const std::filesystem::path& base);
+/// Whether a name may mean a file in a folder named base: one that others are based on, not to be
+/// used by itself.
+enum class BaseFiles { kRefused, kTaken };
 
-/// Names that FindFile takes, sorted. What is in a folder named base is not: files that others are
-/// based on.
+/// The file of a `kind` ("scenarios", "robots", ...) that `name` means, by the one rule for all of
+/// them: NAME or NAME.pbtxt beside the file that names it, in `beside` (for a name of the command
+/// line: the current folder), then in deploy/`kind`. A name that ends in .pbtxt means no other
+/// ending; an absolute one is looked for only there.
+std::optional<std::filesystem::path> LookForFile(const std::string& kind, const std::string& name,
+                                                 const std::filesystem::path& beside,
+                                                 BaseFiles bases = BaseFiles::kRefused);
+
+/// The same. Throws ConfigError naming the paths that were searched, and names that are near.
+std::filesystem::path FindFile(const std::string& kind, const std::string& name,
+                               const std::filesystem::path& beside,
+                               BaseFiles bases = BaseFiles::kRefused);
+
+/// FindFile of a name that may be of several kinds: the first kind that has it.
+std::filesystem::path FindFileOfKinds(const std::vector<std::string>& kinds,
+                                      const std::string& name, const std::filesystem::path& beside);
+
+/// Names of the files in deploy/`kind`, sorted, those in a folder named base aside.
 std::vector<std::string> ListNames(const std::string& kind);
+
+/// The file of deploy/`kind` with one of these names.
+std::filesystem::path InstalledFile(const std::string& kind, const std::string& name);
 
 }  // namespace poise

@@ -13,22 +13,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files are told apart by what they hold, names by where they lie.
-bool IsScenario(const std::string& name) {
-  if (!name.ends_with(".pbtxt")) {
-    return fs::exists(DeployDir() / "scenarios" / (name + ".pbtxt"));
-  }
+/// Files are told apart by what they hold, whatever folder they lie in.
+bool IsScenario(const std::string& file) {
   Scenario scenario;
   try {
-    ReadTextProto(name, &scenario);
+    ReadTextProto(file, &scenario);
   } catch (const ConfigError&) {
     Graph graph;
     try {
-      ReadTextProto(name, &graph);
+      ReadTextProto(file, &graph);
       return false;
     } catch (const ConfigError&) {
       // Neither parses: the file's folder decides which error is shown.
-      return fs::path(name).parent_path().filename() != "graphs";
+      return fs::path(file).parent_path().filename() != "graphs";
     }
   }
   return true;
@@ -59,8 +56,9 @@ void ShowRun(const RunSpec& spec) {
 }
 
 int CheckByName(const std::string& name) {
-  if (!IsScenario(name)) {
-    const std::string file = FindFile("graphs", name, fs::current_path()).string();
+  const std::string file =
+      FindFileOfKinds({"scenarios", "graphs"}, name, fs::current_path()).string();
+  if (!IsScenario(file)) {
     CheckGraphFile(file);
     fmt::print(
         "{}: names, types and connections are good; check a scenario to have the "
@@ -68,14 +66,14 @@ int CheckByName(const std::string& name) {
         file);
     return kExitOk;
   }
-  const LoadedScenario loaded = LoadScenario(name, {});
+  const LoadedScenario loaded = LoadScenario(file, {});
   RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
   CheckRun(loaded, &spec);
   std::string variants;
   for (const Variant& variant : loaded.scenario.variant()) {
     RunChanges changes;
     changes.variant = variant.name();
-    const LoadedScenario changed = LoadScenario(name, changes);
+    const LoadedScenario changed = LoadScenario(file, changes);
     RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
     CheckRun(changed, &changed_spec);
     variants += ", " + variant.name();

@@ -33,7 +33,7 @@ void ListFiles(const std::string& kind,
   for (const std::string& name : names) {
     std::string text;
     try {
-      text = describe((DeployDir() / kind / (name + ".pbtxt")).string());
+      text = describe(InstalledFile(kind, name).string());
     } catch (const ConfigError& error) {
       text = error.what();
     }

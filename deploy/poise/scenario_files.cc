@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "deploy/poise/catalog.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -16,8 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
-
-constexpr char kEnding[] = ".pbtxt";
 
 /// Elements that `message` has at `field`: of a list, or 1 and 0 for a single field that is set and
 /// not. `field` may hold indexes.
@@ -68,17 +66,6 @@ std::optional<std::string> ShiftFirstIndex(std::string_view field, int shift) {
                      std::string_view(end, field.data() + field.size()));
 }
 
-/// Names that `base` could have had: scenarios in the folder that it names, relative to `folder`.
-std::vector<std::string> NamesBeside(const fs::path& file, const fs::path& folder) {
-  std::vector<std::string> names;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(file.parent_path(), error)) {
-    if (entry.path().extension() != kEnding) continue;
-    names.push_back(entry.path().lexically_relative(folder).replace_extension().string());
-  }
-  return names;
-}
-
 }  // namespace
 
 bool HasField(const Message& message, std::string_view field) { return Count(message, field) > 0; }
@@ -98,13 +85,12 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
       throw ConfigError(fmt::format("{}:{}: base: {}", files_.front().name,
                                     LocateField(files_.front().text, "base", Scenario()), problem));
     };
-    const fs::path folder = next.parent_path();
-    next = (folder / (base + kEnding)).lexically_normal();
-    std::error_code error;
-    if (base.empty() || !fs::is_regular_file(next, error)) {
-      fail(fmt::format("there is no file {}; {}; it is relative to this file and without ending",
-                       next.string(), Suggest(base, NamesBeside(next, folder))));
+    try {
+      next = FindFile("scenarios", base, next.parent_path(), BaseFiles::kTaken);
+    } catch (const ConfigError& error) {
+      fail(error.what());
     }
+    std::error_code error;
     for (const File& earlier : files_) {
       if (!fs::equivalent(earlier.name, next, error)) continue;
       fail(fmt::format("{} is based on this file itself; bases may not form a loop", base));

@@ -20,7 +20,7 @@ struct FieldPlace {
 /// Scenario.base followed to its end. Immutable.
 class ScenarioFiles {
  public:
-  /// Reads `file`, its base, and so on. Throws ConfigError "file:line: base: problem": no such
+  /// Reads `file`, its base (FindFile), and so on. Throws ConfigError "file:line: base: problem": no such
   /// file, bases that form a loop; and ParseTextProto's.
   /// `overlay`: a file of the same kind without a base, whose fields come last; empty: none.
   explicit ScenarioFiles(const std::filesystem::path& file,

@@ -31,14 +31,15 @@ std::vector<int64_t> SectionNumbers(std::string_view section) {
   return numbers;
 }
 
-/// Every scenario with a paper_section, by section, then by name.
+/// Files of every scenario with a paper_section, by section, then by name.
 std::vector<std::string> Experiments() {
-  std::vector<std::pair<std::vector<int64_t>, std::string>> found;
+  std::vector<std::pair<std::vector<int64_t>, std::string>> found;  // sections and files
   for (const std::string& name : ListNames("scenarios")) {
-    const Scenario scenario =
-        ScenarioFiles(FindFile("scenarios", name, fs::current_path())).Merged();
+    // By its path: a file of that name in the current folder is not the experiment.
+    const std::string file = InstalledFile("scenarios", name).string();
+    const Scenario scenario = ScenarioFiles(file).Merged();
     if (!scenario.paper_section().empty()) {
-      found.emplace_back(SectionNumbers(scenario.paper_section()), name);
+      found.emplace_back(SectionNumbers(scenario.paper_section()), file);
     }
   }
   std::sort(found.begin(), found.end());

@@ -156,11 +156,6 @@ bool ParsesAsScenario(const std::string& file) {
   }
 }
 
-bool IsListed(const std::string& kind, const std::string& name) {
-  const std::vector<std::string> names = ListNames(kind);
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 }  // namespace
 
 /// Where each part of a sweep was written.
@@ -203,36 +198,26 @@ SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(st
 
 void SweepDefinition::Source::Read(const std::string& what) {
   if (what.empty()) throw ConfigError("no sweep or scenario is named; see --help");
-  const bool path = what.ends_with(".pbtxt");
-  if (!path && !IsListed("sweeps", what)) {
-    if (!IsListed("scenarios", what)) {
-      std::vector<std::string> names = ListNames("sweeps");
-      for (const std::string& name : ListNames("scenarios")) names.push_back(name);
-      throw ConfigError(
-          fmt::format("no sweep or scenario named '{}'; {}; or give the path of a "
-                      ".pbtxt file",
-                      what, Suggest(what, names)));
-    }
-    written.set_scenario(what);
-    written.set_name(what);
-    return;
-  }
-  const std::string found = FindFile("sweeps", what, fs::current_path()).string();
+  const fs::path place = FindFileOfKinds({"sweeps", "scenarios"}, what, fs::current_path());
+  const std::string found = place.string();
   text = ReadFile(found);
   try {
     ParseTextProto(text, found, &written);
   } catch (const ConfigError&) {
     if (!ParsesAsScenario(found)) throw;
     written.Clear();
-    written.set_scenario(fs::absolute(found).string());
+    written.set_scenario(found);
     written.set_name(fs::path(found).stem().string());
     return;
   }
   file = found;
   if (!written.has_name()) written.set_name(fs::path(found).stem().string());
   if (!written.has_scenario()) Fail({"scenario", "is missing; name one of deploy/scenarios"});
-  if (written.scenario().ends_with(".pbtxt")) {
-    written.set_scenario((fs::absolute(found).parent_path() / written.scenario()).string());
+  try {
+    const fs::path scenario = FindFile("scenarios", written.scenario(), place.parent_path());
+    written.set_scenario(scenario.string());
+  } catch (const ConfigError& error) {
+    Fail({"scenario", error.what()});
   }
 }
 

@@ -144,7 +144,7 @@ TEST_F(ScenarioBaseTest, BasesNestAndRelativeNamesAreThoseOfTheirFile) {
   ExpectRefused(File("derived"), {File("base/robot") + ":2: check[0].metric"});
   Write("base/robot", "base: \"parts/robot\"\n");
   ExpectRefused(File("derived"),
-                {File("base/parts/robot") + ":", "robot: ", folder_ / "base/parts/../legs.pbtxt"});
+                {File("base/parts/robot") + ":", "robot: ", folder_ / "base/legs.pbtxt"});
 }
 
 TEST_F(ScenarioBaseTest, ALoopOrAMissingBaseIsAnError) {
