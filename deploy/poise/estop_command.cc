@@ -1,5 +1,8 @@
 #include <poll.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,8 +13,11 @@
 #include "components/framework/run.h"
 #include "components/framework/udp_bus.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/live_run.h"
 #include "deploy/poise/run_dir.h"
+#include "deploy/poise/run_registry.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"
@@ -35,92 +41,197 @@ int FindChannel(const Graph& graph, const std::string& type, bool external) {
 /// The operator's line to a running bridge.
 class Line {
  public:
-  explicit Line(const RunSpec& spec)
-      : channel_(FindChannel(spec.graph(), "emergency_stop_t", true)),
-        name_(spec.graph().channel(channel_).name()),
-        run_id_(spec.run_id()),
-        sender_(ChannelUrl(spec, channel_)),
-        answers_(ChannelUrl(spec, FindChannel(spec.graph(), "bridge_status_t", false))) {}
+  /// Throws ConfigError when no bridge can be reached from here.
+  explicit Line(const std::string& run) : run_(run), spec_(ReadNetworkedSpec(run)) {
+    const int channel = FindChannel(spec_.graph(), "emergency_stop_t", true);
+    name_ = spec_.graph().channel(channel).name();
+    sender_ = std::make_unique<BusSender>(ChannelUrl(spec_, channel));
+    answers_ = std::make_unique<BusReceiver>(
+        ChannelUrl(spec_, FindChannel(spec_.graph(), "bridge_status_t", false)));
+  }
 
-  /// Sends the message again and again until the bridge's status satisfies `done`. False: it has
-  /// not within `patience` ns.
-  template <class Done>
-  bool SendUntil(bool stop, bool reset, int64_t patience, Done done) {
+  /// "run 42 (push_double_support, FOLDER)"
+  std::string Name() const {
+    return fmt::format("run {} ({}{}{})", spec_.run_id(), logging::ForTerminal(spec_.scenario()),
+                       run_.empty() ? "" : ", ", logging::ForTerminal(run_));
+  }
+
+  void Send(bool stop, bool reset) {
     emergency_stop_t message{};
-    message.run_id = run_id_;
+    message.run_id = spec_.run_id();
     message.stop = stop ? 1 : 0;
     message.reset = reset ? 1 : 0;
     std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    const int64_t deadline = NowNanoseconds() + patience;
-    while (NowNanoseconds() < deadline) {
-      if (!sender_.Send(name_.c_str(), bytes.data(), bytes.size())) {
-        throw BusError("the message could not be sent; is the network up? run: poise doctor");
-      }
-      pollfd fd{answers_.fd(), POLLIN, 0};
-      poll(&fd, 1, kRepeat);
-      BusReceiver::Packet packet;
-      while (answers_.Receive(&packet)) {
-        bridge_status_t status;
-        if (!DecodeChecked(packet.data, static_cast<int64_t>(packet.size), &status) ||
-            status.run_id != run_id_) {
-          continue;
-        }
+    // Noted, not thrown: the other runs get theirs.
+    sent_ = sender_->Send(name_.c_str(), bytes.data(), bytes.size()) || sent_;
+  }
+  bool sent() const { return sent_; }
+  /// Nothing holds the lock on the run's folder.
+  bool Ended() const {
+    const std::filesystem::path path(run_);
+    std::error_code error;
+    return !RunInProgress(std::filesystem::is_directory(path, error) ? path : path.parent_path());
+  }
+  int fd() const { return answers_->fd(); }
+  /// Takes what the bridge has answered.
+  void Hear() {
+    BusReceiver::Packet packet;
+    while (answers_->Receive(&packet)) {
+      bridge_status_t status;
+      if (DecodeChecked(packet.data, static_cast<int64_t>(packet.size), &status) &&
+          status.run_id == spec_.run_id()) {
         status_ = status;
-        if (done(status)) return true;
       }
     }
-    return false;
   }
   /// The bridge's last word; empty: none was heard.
   const std::optional<bridge_status_t>& status() const { return status_; }
 
  private:
-  int channel_;
-  std::string name_;
-  int64_t run_id_;
-  BusSender sender_;
-  BusReceiver answers_;
-  std::optional<bridge_status_t> status_;
-};
-
-int Estop(const std::string& run, bool reset) {
-  const RunSpec spec = ReadRunSpec(run);
-  if (spec.first_port() == 0) {
+  static RunSpec ReadNetworkedSpec(const std::string& run) {
+    RunSpec spec = ReadRunSpec(run);
+    if (spec.first_port() != 0) return spec;
     throw ConfigError(
         fmt::format("run {}: runs inside one process; end that with Ctrl-C", spec.run_id()));
   }
-  Line line(spec);
-  if (!reset) {
-    const auto stops = [](const bridge_status_t& status) {
-      return status.state >= bridge_status_t::STATE_STOPPING;
-    };
-    if (line.SendUntil(true, false, kPatience, stops)) {
-      fmt::print("run {}: the bridge has stopped the robot\n", spec.run_id());
-      return kExitOk;
+
+  std::string run_;
+  RunSpec spec_;
+  std::string name_;
+  std::unique_ptr<BusSender> sender_;
+  std::unique_ptr<BusReceiver> answers_;
+  std::optional<bridge_status_t> status_;
+  bool sent_ = false;
+};
+
+/// Whether the status of lines[line] says that what was asked for has come.
+using Done = std::function<bool(size_t line, const Line&)>;
+
+/// Sends the message to all, again and again, until `done` holds of every line's status. Returns
+/// whether that came within `patience` ns.
+bool SendUntil(std::vector<Line>& lines, bool stop, bool reset, int64_t patience,
+               const Done& done) {
+  const int64_t deadline = NowNanoseconds() + patience;
+  std::vector<bool> reached(lines.size(), false);
+  while (NowNanoseconds() < deadline) {
+    std::vector<pollfd> fds;
+    // All first: no run waits for another's answer.
+    for (size_t i = 0; i < lines.size(); ++i) {
+      if (reached[i]) continue;
+      lines[i].Send(stop, reset);
+      fds.push_back({lines[i].fd(), POLLIN, 0});
     }
-    fmt::print(stderr,
-               "poise: run {}: the stop was sent, but no bridge has confirmed it for {} s; "
-               "has the run ended, or does its reference still run?\n",
-               spec.run_id(), kPatience / kSecond);
-    return kExitFailed;
+    poll(fds.data(), fds.size(), kRepeat);
+    for (size_t i = 0; i < lines.size(); ++i) {
+      lines[i].Hear();
+      reached[i] = reached[i] || (lines[i].status() && done(i, lines[i]));
+    }
+    if (std::find(reached.begin(), reached.end(), false) == reached.end()) return true;
   }
+  return false;
+}
+
+constexpr char kUnsent[] = "the message could not be sent; is the network up? run: poise doctor";
+
+bool Stops(const Line& line) {
+  return line.status() && line.status()->state >= bridge_status_t::STATE_STOPPING;
+}
+
+int Stop(std::vector<Line>& lines) {
+  SendUntil(lines, true, false, kPatience, [](size_t, const Line& line) { return Stops(line); });
+  int exit_code = kExitOk;
+  for (const Line& line : lines) {
+    if (Stops(line)) {
+      fmt::print("{}: the bridge has stopped the robot\n", line.Name());
+      continue;
+    }
+    const std::string problem =
+        !line.sent()   ? kUnsent
+        : line.Ended() ? "this run has ended"
+                       : fmt::format(
+                             "the stop was sent, but no bridge has confirmed it for {} s; "
+                             "does the run's reference still go on?",
+                             kPatience / kSecond);
+    fmt::print(stderr, "poise: {}: {}\n", line.Name(), problem);
+    exit_code = kExitFailed;
+  }
+  return exit_code;
+}
+
+int Reset(std::vector<Line>& lines) {
   // The edge: low for a while, then high.
-  line.SendUntil(false, false, kLow, [](const bridge_status_t&) { return false; });
-  const int64_t resets = line.status() ? line.status()->resets : 0;
-  if (line.SendUntil(false, true, kPatience,
-                     [&](const bridge_status_t& status) { return status.resets > resets; })) {
-    fmt::print("run {}: the stop is reset; the bridge follows commands again\n", spec.run_id());
-    return kExitOk;
+  SendUntil(lines, false, false, kLow, [](size_t, const Line&) { return false; });
+  std::vector<int64_t> resets;
+  for (const Line& line : lines) resets.push_back(line.status() ? line.status()->resets : 0);
+  const auto is_reset = [&](size_t i, const Line& line) {
+    return line.status() && line.status()->resets > resets[i];
+  };
+  SendUntil(lines, false, true, kPatience, is_reset);
+  int exit_code = kExitOk;
+  for (size_t i = 0; i < lines.size(); ++i) {
+    const Line& line = lines[i];
+    if (is_reset(i, line)) {
+      fmt::print("{}: the stop is reset; the bridge follows commands again\n", line.Name());
+      continue;
+    }
+    const std::string problem =
+        !line.sent()     ? kUnsent
+        : line.Ended()   ? "this run has ended"
+        : !line.status() ? "no bridge has answered; does the run's reference still go on?"
+        : !Stops(line)   ? "there is no stop to reset"
+                         : "the bridge keeps its stop; it resets only when its motors are at rest "
+                           "and no torque is commanded";
+    fmt::print(stderr, "poise: {}: {}\n", line.Name(), problem);
+    exit_code = kExitFailed;
   }
-  const std::string problem =
-      !line.status() ? "no bridge has answered; has the run ended?"
-      : line.status()->state < bridge_status_t::STATE_STOPPING
-          ? "there is no stop to reset"
-          : "the bridge keeps its stop; it resets only when its motors are at rest and no torque "
-            "is commanded";
-  fmt::print(stderr, "poise: run {}: {}\n", spec.run_id(), problem);
-  return kExitFailed;
+  return exit_code;
+}
+
+/// Lines to every run of this user that goes on. What cannot be reached goes to stderr and lets
+/// `exit_code` fail: no run is passed over in silence.
+std::vector<Line> AllLines(int* exit_code) {
+  const std::vector<RunningRun> runs = RunningRuns();
+  const bool any_own =
+      std::any_of(runs.begin(), runs.end(), [](const RunningRun& run) { return run.own; });
+  if (!any_own) OnlyRunningRun("poise log info");  // throws what there is instead
+  std::vector<Line> lines;
+  for (const RunningRun& run : runs) {
+    if (!run.own) {
+      fmt::print(stderr, "poise: another user's run goes on too; to stop it: poise estop {}\n",
+                 logging::ForTerminal(run.dir.string()));
+      continue;
+    }
+    if (run.readable && !run.networked) {
+      fmt::print(stderr,
+                 "poise: {}: runs inside one process, without a bridge to stop; end that "
+                 "with Ctrl-C\n",
+                 logging::ForTerminal(run.dir.string()));
+      continue;
+    }
+    try {
+      lines.emplace_back(run.dir.string());
+    } catch (const std::exception& error) {
+      fmt::print(stderr, "poise: {}: cannot be reached: {}\n",
+                 logging::ForTerminal(run.dir.string()), logging::LinesForTerminal(error.what()));
+      *exit_code = kExitFailed;
+    }
+  }
+  if (lines.empty()) *exit_code = kExitFailed;
+  return lines;
+}
+
+int Estop(const std::string& run, bool reset) {
+  int exit_code = kExitOk;
+  std::vector<Line> lines;
+  if (run.empty()) {
+    lines = AllLines(&exit_code);
+  } else {
+    lines.emplace_back(run);
+  }
+  if (lines.empty()) return exit_code;
+  const int done = reset ? Reset(lines) : Stop(lines);
+  return done != kExitOk ? done : exit_code;
 }
 
 }  // namespace
@@ -128,8 +239,9 @@ int Estop(const std::string& run, bool reset) {
 void AddEstopCommand(CLI::App* app, Command* command) {
   auto run = std::make_shared<std::string>();
   auto reset = std::make_shared<bool>(false);
-  CLI::App* estop = app->add_subcommand("estop", "emergency stop of a run (latched)");
-  estop->add_option("run", *run, "folder of the run; default: the latest");
+  CLI::App* estop =
+      app->add_subcommand("estop", "emergency stop of every run that goes on, or of one (latched)");
+  estop->add_option("run", *run, "folder of the run; default: every run that goes on");
   estop->add_flag("--reset", *reset,
                   "end a stop: only once the motors are at rest and no torque is commanded");
   estop->callback(

@@ -9,10 +9,12 @@
 #include "deploy/poise/commands.h"
 #include "deploy/poise/reference/reference_text.h"
 #include "deploy/poise/registry.h"
+#include "deploy/poise/run_registry.h"
 #include "deploy/poise/scenario_files.h"
 #include "deploy/poise/sweep.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
+#include "logging/printable.h"
 
 namespace poise {
 namespace {
@@ -47,6 +49,7 @@ struct ListRequest {
   std::string name;
   std::string schema = "scenario";
   bool markdown = false;
+  bool folders = false;
 };
 
 constexpr size_t kTextWidth = 80;
@@ -54,7 +57,7 @@ constexpr size_t kTextWidth = 80;
 ChannelsByType GraphChannels() {
   ChannelsByType channels;
   for (const std::string& name : ListNames("graphs")) {
-    const auto graph = ReadMessage<Graph>((DeployDir() / "graphs" / (name + ".pbtxt")).string());
+    const auto graph = ReadMessage<Graph>(InstalledFile("graphs", name).string());
     for (const Channel& channel : graph.channel()) {
       std::vector<std::string>& names = channels[channel.type()];
       if (std::find(names.begin(), names.end(), channel.name()) == names.end()) {
@@ -101,8 +104,27 @@ int ListMetricsAsMarkdown() {
   return kExitOk;
 }
 
+/// Folders alone, of runs that can be listened to: for scripts.
+void ListRunFolders() {
+  for (const RunningRun& run : RunningRuns()) {
+    if (run.own && run.networked) fmt::print("{}\n", run.dir.string());
+  }
+}
+
+void ListRuns() {
+  const std::vector<RunningRun> runs = RunningRuns();
+  fmt::print("{}", runs.empty() ? "  none is going on\n" : FormatRuns(runs));
+  const std::string ended = LatestEndedRun().string();
+  if (!ended.empty()) fmt::print("  the latest that ended: {}\n", logging::ForTerminal(ended));
+}
+
 int List(const ListRequest& request) {
   const std::string& what = request.what;
+  if (request.folders) {
+    if (what != "runs") throw ConfigError("--folders goes with `poise list runs`");
+    ListRunFolders();
+    return kExitOk;
+  }
   if (what == "fields") return ListFields(request);
   if (what == "messages") return ListMessages(request);
   if (!request.name.empty()) {
@@ -153,6 +175,7 @@ int List(const ListRequest& request) {
       fmt::print("  {:<24}{}\n", type, entry.summary);
     }
   }
+  if (wanted("runs")) ListRuns();
   if (wanted("metrics")) {
     for (const logging::Metric& metric : logging::Metrics()) {
       fmt::print("  {:<28}{:<6}{}\n", metric.name, metric.unit, metric.description);
@@ -171,17 +194,20 @@ int List(const ListRequest& request) {
 void AddListCommand(CLI::App* app, Command* command) {
   auto request = std::make_shared<ListRequest>();
   CLI::App* list = app->add_subcommand("list", "what there is to use, and what each field means");
-  list->add_option("what", request->what,
-                   "scenarios, sweeps, robots, graphs, components, metrics, fields or messages; "
-                   "default: all but the last two")
-      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "metrics",
-                             "fields", "messages"}));
+  list->add_option(
+          "what", request->what,
+          "scenarios, sweeps, robots, graphs, components, runs (that go on), metrics, fields or "
+          "messages; default: all but the last two")
+      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "runs",
+                             "metrics", "fields", "messages"}));
   list->add_option("name", request->name,
                    "of fields: a path or its beginning (sim_ode.push), or a part of a field's "
                    "name (stiffness); of messages: a type or a channel (ROBOT_STATE)");
   list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
       ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));
   list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");
+  list->add_flag("--folders", request->folders,
+                 "of runs: only the folders of those that can be listened to, for scripts");
   list->callback([request, command] { *command = [request] { return List(*request); }; });
 }
 

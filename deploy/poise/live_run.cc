@@ -11,7 +11,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "deploy/poise/run_dir.h"
+#include "deploy/poise/run_registry.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -25,7 +25,8 @@ constexpr std::chrono::milliseconds kPause{20};  // while a run writes its first
 constexpr std::chrono::milliseconds kPatience{5'000};
 
 fs::path FindRunDir(const std::string& run, std::string_view log_command) {
-  const fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
+  if (run.empty()) return OnlyRunningRun(log_command);
+  const fs::path path = run;
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
     throw ConfigError(
@@ -34,8 +35,7 @@ fs::path FindRunDir(const std::string& run, std::string_view log_command) {
   }
   const fs::path dir = fs::canonical(path, error);
   if (error || !fs::is_directory(dir)) {
-    throw ConfigError(run.empty() ? "there is no run yet; start one with poise run"
-                                  : fmt::format("{}: no such run folder", run));
+    throw ConfigError(fmt::format("{}: no such run folder", run));
   }
   return dir;
 }

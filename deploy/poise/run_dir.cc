@@ -6,12 +6,14 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <fstream>
 
 #include "components/framework/configuration.h"
 #include "deploy/poise/catalog.h"
+#include "deploy/poise/run_registry.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
@@ -29,15 +31,30 @@ constexpr const char* kFiles[] = {"run.lcm",        "summary.json",   "recorder.
 fs::path FindRun(const std::string& run) {
   const fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
   if (!fs::exists(path)) {
-    throw ConfigError(run.empty() ? "there is no run yet; start one with poise run"
-                                  : fmt::format("{}: no such log or run folder", run));
+    if (!run.empty()) throw ConfigError(fmt::format("{}: no such log or run folder", run));
+    const fs::path ended = LatestEndedRun();  // elsewhere, or with --out
+    throw ConfigError(fmt::format("there is no run in {} yet; {}", RunsDir().string(),
+                                  ended.empty()
+                                      ? "start one with poise run"
+                                      : fmt::format("name the folder of one; the last was in {}",
+                                                    logging::ForTerminal(ended.string()))));
   }
   return path;
 }
 
 }  // namespace
 
-fs::path RunsDir() { return DeployDir().parent_path() / "runs"; }
+fs::path RunsDir() {
+  if (const char* const dir = std::getenv("POISE_RUNS_DIR"); dir != nullptr && *dir != '\0') {
+    return fs::absolute(dir);
+  }
+  std::error_code error;
+  const fs::path here = fs::current_path();
+  const fs::path home = fs::canonical(DeployDir(), error).parent_path();
+  if (error) return here / "runs";
+  const fs::path within = here.lexically_relative(home);
+  return (within.empty() || *within.begin() == ".." ? here : home) / "runs";
+}
 
 RunDir::RunDir(fs::path path)
     : path_(std::move(path)), fd_(open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
@@ -79,8 +96,9 @@ RunDir MakeRunDir(const std::string& out, const std::string& name) {
     const fs::path path = RunsDir() / (i == 1 ? dated : fmt::format("{}-{}", dated, i));
     if (fs::create_directory(path, error)) return RunDir(path);
   }
-  throw ConfigError(fmt::format("{}: cannot be made: {}; choose another folder with --out",
-                                (RunsDir() / dated).string(), error.message()));
+  throw ConfigError(
+      fmt::format("{}: cannot be made: {}; go to a folder of your own, or name one with --out",
+                  (RunsDir() / dated).string(), error.message()));
 }
 
 fs::path ReferenceDir(const fs::path& dir) { return dir / "reference"; }

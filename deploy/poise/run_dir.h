@@ -9,7 +9,8 @@
 
 namespace poise {
 
-/// runs/ beside deploy/.
+/// Where runs without --out go: $POISE_RUNS_DIR; else runs/ beside deploy/ for who stands in that
+/// checkout, and runs/ in the current folder for who stands elsewhere.
 std::filesystem::path RunsDir();
 
 /// A run's folder, locked against other runs for as long as this lives. Programs that the run

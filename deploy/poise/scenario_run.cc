@@ -11,6 +11,7 @@
 #include "deploy/poise/launcher.h"
 #include "deploy/poise/realtime_verdict.h"
 #include "deploy/poise/run_dir.h"
+#include "deploy/poise/run_registry.h"
 #include "deploy/poise/run_setup.h"
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"
@@ -105,6 +106,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   // Also what runs after its reference can be found and watched from here on.
   WriteFiles(main_, result.dir);
   if (latest) PointLatestTo(result.dir);
+  const RunRegistration registration(result.dir);
   if (!options_.quiet) PrintHeading();
   CatchStopSignals();
   RunSummary& summary = result.summary;

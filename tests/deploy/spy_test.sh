@@ -8,6 +8,8 @@ source_dir=$1 poise=$2 probe=$3 work=$4
 rm -rf "$work"
 mkdir -p "$work"
 run=$work/run
+export POISE_RUNTIME_DIR=$work/registry  # other tests' runs are none of ours
+spy_says() { env -u DISPLAY "$source_dir/deploy/spy" "$@" 2>&1 || true; }
 started=()
 cleanup() {
   for pid in "${started[@]}"; do kill "$pid" 2>/dev/null || true; done
@@ -35,6 +37,7 @@ wait_for grep -q 'listen at' "$work/run.txt"
 url=$(sed -n 's/.*listen at //p' "$work/run.txt")
 port=$(sed 's/.*:\([0-9]*\)?.*/\1/' <<<"$url")
 
+spy_says | grep -qF "$url" || fail "deploy/spy without a run does not find the one that goes on"
 lcm-logger --lcm-url="$url" "$work/logger.lcm" >"$work/logger.txt" 2>&1 &
 logger=$!
 started+=("$logger")
@@ -103,7 +106,6 @@ ticks "$work/inline.lcm" ROBOT_STATE | sort -u >"$work/heard_ticks"
 [ "$(wc -l <"$work/heard_ticks")" -gt 100 ] || fail "poise replay --to-bus sent too little"
 if grep -Fvxf "$work/inline_ticks" "$work/heard_ticks"; then fail "poise replay --to-bus sent what was not in the log"; fi
 echo "poise replay --to-bus: $(wc -l <"$work/heard_ticks") ticks"
-spy_says() { env -u DISPLAY "$source_dir/deploy/spy" "$@" 2>&1 || true; }
 spy_says "$work/inline" | grep -qF 'udpm://239.255.76.67:7667?ttl=0' || fail "deploy/spy looks elsewhere for such a run"
 spy_says "$run" | grep -qF "$url" || fail "deploy/spy looks elsewhere for a run with a network"
 spy_says --url "$url" | grep -qF "$url" || fail "deploy/spy --url looks elsewhere"

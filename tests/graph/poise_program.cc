@@ -92,9 +92,13 @@ TestDeploy::TestDeploy() {
   }
   fs::copy_file(StandScenario(), folder_ / "deploy/scenarios/base/stand.pbtxt");
   setenv("POISE_DEPLOY_DIR", (folder_ / "deploy").c_str(), 1);
+  setenv("POISE_RUNS_DIR", runs().c_str(), 1);
 }
 
-TestDeploy::~TestDeploy() { unsetenv("POISE_DEPLOY_DIR"); }
+TestDeploy::~TestDeploy() {
+  unsetenv("POISE_DEPLOY_DIR");
+  unsetenv("POISE_RUNS_DIR");
+}
 
 std::string TestDeploy::Scenario(const std::string& name, const std::string& text) const {
   const std::string file = folder_ / ("deploy/scenarios/" + name + ".pbtxt");

@@ -1,0 +1,65 @@
+// Which runs go on, wherever their folders are.
+//
+// Each run keeps a small file that it holds a lock on, in every folder of RegistryDirs() that it
+// can write: the file holds the run's folder, the lock tells whether the run lives. The run's own
+// folder need not be readable for that, or be mounted where the reader is.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace poise {
+
+/// Keeps a run registered for as long as this lives. A registry that cannot be written fails no
+/// run: it then cannot be found without its folder, of which stderr is told.
+class RunRegistration {
+ public:
+  explicit RunRegistration(const std::filesystem::path& run_dir);
+  /// The run has become the latest that ended.
+  ~RunRegistration();
+  RunRegistration(const RunRegistration&) = delete;
+  RunRegistration& operator=(const RunRegistration&) = delete;
+
+ private:
+  struct Entry {
+    std::filesystem::path file;
+    int fd;
+  };
+  std::vector<Entry> entries_;
+};
+
+/// A run that goes on, of this user or another.
+struct RunningRun {
+  std::filesystem::path dir;
+  std::string user;        ///< whose it is
+  bool own = true;         ///< this user's; root counts every user's as its own
+  bool readable = true;    ///< false: run_spec.pbtxt cannot be read from here
+  bool networked = false;  ///< heard and stopped from outside; false: inside one process
+  std::string scenario;
+  int64_t run_id = 0;
+  double age = 0;  ///< s since its start
+};
+
+/// Every run that is registered and lives, the newest first; entries of runs that died are removed.
+/// A run that could not register is among them when runs/latest points to it.
+std::vector<RunningRun> RunningRuns();
+
+/// Folder of the run of this user that ended last and is still there; empty: none is known.
+std::filesystem::path LatestEndedRun();
+
+/// A line a run: its folder and what is run there.
+std::string FormatRuns(const std::vector<RunningRun>& runs);
+
+/// The one run that goes on, for a command that was given none. Throws ConfigError: none (with the
+/// latest that ended, to be looked at with `log_command`), or several, which it lists.
+std::filesystem::path OnlyRunningRun(std::string_view log_command);
+
+/// $POISE_RUNTIME_DIR alone, or below both $XDG_RUNTIME_DIR, which ends with the user's last login,
+/// and /tmp, which other programs may clean up.
+std::vector<std::filesystem::path> RegistryDirs();
+
+}  // namespace poise

@@ -1,0 +1,174 @@
+// Commands without a run find what goes on, wherever it was started to write.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+
+#include "logging/run_record.h"
+#include "tests/graph/current_folder.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr uintmax_t kUnderWay = 200'000;  // bytes of log
+
+/// Runs of this test alone are known to the programs that this process starts.
+class OwnRegistry {
+ public:
+  OwnRegistry() {
+    setenv("POISE_RUNTIME_DIR", (folder_ / "registry").c_str(), 1);
+    setenv("POISE_RUNS_DIR", (folder_ / "runs").c_str(), 1);
+  }
+  ~OwnRegistry() {
+    unsetenv("POISE_RUNTIME_DIR");
+    unsetenv("POISE_RUNS_DIR");
+  }
+  OwnRegistry(const OwnRegistry&) = delete;
+  OwnRegistry& operator=(const OwnRegistry&) = delete;
+
+ private:
+  RunFolder folder_;
+};
+
+class RunningRunsTest : public ::testing::Test {
+ protected:
+  /// A run that goes on until its end is asked for.
+  std::unique_ptr<PoiseProgram> Start(const std::string& run) {
+    auto program = std::make_unique<PoiseProgram>(std::vector<std::string>{
+        "run", StandScenario(), "--realtime", "--duration", "300", "--quiet", "--out", run});
+    EXPECT_TRUE(WaitForLog(run, kUnderWay));
+    return program;
+  }
+  static std::string Whole(const std::string& run) { return fs::canonical(run).string(); }
+  static int8_t LastState(const std::string& run) {
+    const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
+    const bridge_status_t* last = nullptr;
+    for (int64_t t = record.num_ticks; t-- > 0 && last == nullptr;) last = record.bridge.at(t);
+    return last != nullptr ? last->state : int8_t{-1};
+  }
+
+  OwnRegistry registry;
+  RunFolder folder;
+};
+
+TEST_F(RunningRunsTest, TheOnlyOneIsMeantAndADeadOneForgotten) {
+  ExpectUsageError({"estop"}, {"no run is going on; start one with poise run"});
+  ExpectUsageError({"top", "--once"}, {"no run is going on"});
+  const std::string run = folder / "elsewhere";
+  const std::unique_ptr<PoiseProgram> program = Start(run);
+  const ProgramResult top = RunPoise({"top", "--once", "--interval", "1"});
+  EXPECT_EQ(top.exit_code, 0) << top.output;
+  EXPECT_THAT(top.output, HasSubstr(Whole(run)));
+  const ProgramResult echo = RunPoise({"echo", "ROBOT_STATE", "tick", "--count", "3"});
+  EXPECT_EQ(echo.exit_code, 0) << echo.output;
+  EXPECT_THAT(RunPoise({"list", "runs"}).output, HasSubstr(Whole(run) + "  (stand, for "));
+  EXPECT_EQ(RunPoise({"list", "runs", "--folders"}).output, Whole(run) + "\n");
+
+  kill(program->pid(), SIGKILL);
+  program->Wait();
+  EXPECT_TRUE(WaitUntil([&] { return RunPoise({"list", "runs", "--folders"}).output.empty(); }));
+  ExpectUsageError({"top", "--once"},
+                   {"no run is going on; the latest has ended: poise log info " + Whole(run)});
+  ExpectUsageError({"view"}, {"no run is going on; the latest has ended: poise report"});
+  ExpectUsageError({"estop", "--reset"}, {"no run is going on"});
+}
+
+TEST_F(RunningRunsTest, AnEmergencyStopWithoutARunStopsEveryOne) {
+  const std::string a = folder / "a";
+  const std::string b = folder / "b";
+  const std::unique_ptr<PoiseProgram> first = Start(a);
+  const std::unique_ptr<PoiseProgram> second = Start(b);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"top", "--once"}, {"echo", "ROBOT_STATE"}, {"view"}}) {
+    const ProgramResult result = RunPoise(command);
+    EXPECT_EQ(result.exit_code, 2) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("several runs are going on; name one:"));
+    EXPECT_THAT(result.output, HasSubstr(Whole(a)));
+    EXPECT_THAT(result.output, HasSubstr(Whole(b)));
+  }
+  const ProgramResult all = RunPoise({"estop"});
+  EXPECT_EQ(all.exit_code, 0) << all.output;
+  for (const std::string& run : {a, b}) {
+    EXPECT_THAT(all.output, HasSubstr(Whole(run) + "): the bridge has stopped the robot"));
+  }
+  first->Wait();  // the robot without torque falls
+  second->Wait();
+  EXPECT_EQ(LastState(a), bridge_status_t::STATE_ESTOP);
+  EXPECT_EQ(LastState(b), bridge_status_t::STATE_ESTOP);
+}
+
+TEST_F(RunningRunsTest, ARunInsideOneProcessIsSaidToHaveNoBridge) {
+  PoiseProgram program({"run", StandScenario(), "--inline", "--realtime", "--duration", "300",
+                        "--quiet", "--out", folder / "inside"});
+  ASSERT_TRUE(WaitForLog(folder / "inside", kUnderWay));
+  const ProgramResult stop = RunPoise({"estop"});
+  EXPECT_EQ(stop.exit_code, 1) << stop.output;
+  EXPECT_THAT(stop.output, HasSubstr("inside one process"));
+  ExpectUsageError({"top", "--once"}, {"inside one process"});
+  kill(program.pid(), SIGINT);
+  program.Wait();
+}
+
+TEST_F(RunningRunsTest, ARegistryThatCannotBeWrittenFailsNoRun) {
+  setenv("POISE_RUNTIME_DIR", "/proc/poise", 1);
+  const ProgramResult result =
+      RunPoise({"run", StandScenario(), "--inline", "--quiet", "--out", folder / "run"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("warning: this run cannot be registered"));
+}
+
+/// A program in a folder that is no checkout.
+class ElsewhereTest : public ::testing::Test {
+ protected:
+  ElsewhereTest() : here(fs::path(folder / "")) { unsetenv("POISE_RUNS_DIR"); }
+  OwnRegistry registry;
+  RunFolder folder;
+  CurrentFolder here;
+};
+
+TEST_F(ElsewhereTest, RunsGoIntoTheCurrentFolder) {
+  const ProgramResult none = RunPoise({"report", "--no-html"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.output,
+              HasSubstr("there is no run in " + (fs::current_path() / "runs").string()));
+  ASSERT_EQ(RunPoise({"run", StandScenario(), "--inline", "--quiet"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists("runs/latest/run.lcm"));
+  EXPECT_EQ(RunPoise({"report", "--no-html"}).exit_code, 0);
+  fs::create_directory("deeper");
+  const CurrentFolder deeper("deeper");
+  EXPECT_EQ(RunPoise({"report", "--no-html"}).exit_code, 2);
+}
+
+TEST_F(ElsewhereTest, RunsOfACheckoutGoBesideItsDeployFolder) {
+  fs::create_directories("checkout/tests");
+  fs::copy(POISE_SOURCE_DIR "/deploy/robots", "checkout/deploy/robots",
+           fs::copy_options::recursive);
+  fs::copy(POISE_SOURCE_DIR "/deploy/graphs", "checkout/deploy/graphs",
+           fs::copy_options::recursive);
+  setenv("POISE_DEPLOY_DIR", fs::absolute("checkout/deploy").c_str(), 1);
+  {
+    const CurrentFolder within("checkout/tests");
+    EXPECT_EQ(RunPoise({"run", StandScenario(), "--inline", "--quiet"}).exit_code, 0);
+  }
+  unsetenv("POISE_DEPLOY_DIR");
+  EXPECT_TRUE(fs::exists("checkout/runs/latest/run.lcm"));
+  EXPECT_FALSE(fs::exists("checkout/tests/runs"));
+}
+
+TEST_F(ElsewhereTest, AFolderThatCannotBeWrittenIsSaid) {
+  std::ofstream("runs") << "a file";
+  ExpectUsageError({"run", StandScenario(), "--inline"},
+                   {fs::current_path().string() + "/runs", "cannot be made", "--out"});
+}
+
+}  // namespace
+}  // namespace poise
