@@ -42,7 +42,9 @@ void PrintRow(const logging::ChannelSurvey& channel, double duration) {
 void PrintRun(const logging::LogSurvey& survey) {
   const RunSpec& spec = survey.spec;
   std::string versions = "poise " + spec.poise_version();
+  if (!spec.poise_commit().empty()) versions += " (commit " + spec.poise_commit() + ")";
   for (const std::string& version : spec.library_version()) versions += ", " + version;
+  if (!spec.instruction_set().empty()) versions += "; built for " + spec.instruction_set();
   const int64_t ticks = survey.end_tick - survey.first_tick;
   fmt::print("scenario  {}\nrun       {}\nseed      {}\nstarted   {}\nversions  {}\n",
              ForTerminal(spec.scenario()), spec.run_id(), spec.seed(),
