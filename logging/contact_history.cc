@@ -60,6 +60,12 @@ std::string FootName(const RunRecord& run, size_t foot) {
   return run.robot.feet()[foot].name + " foot";
 }
 
+std::string SupportName(const RunRecord& run, const std::array<bool, 2>& contacts) {
+  if (contacts[0] && contacts[1]) return "both feet";
+  if (!contacts[0] && !contacts[1]) return "no foot";
+  return FootName(run, contacts[0] ? 0 : 1);
+}
+
 std::vector<SupportChange> SupportChanges(const RunRecord& run) {
   std::vector<SupportChange> changes;
   for (int64_t tick = 1; tick < run.num_ticks; ++tick) {

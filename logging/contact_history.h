@@ -18,6 +18,9 @@ inline constexpr double kLoadedShare = 0.05;
 /// "left foot", by the robot's name for it.
 std::string FootName(const RunRecord& run, size_t foot);
 
+/// "both feet", "no foot", "left foot": which ones carry, by foot.
+std::string SupportName(const RunRecord& run, const std::array<bool, 2>& contacts);
+
 /// The contact state of the command changed from one tick to the next.
 struct SupportChange {
   int64_t tick = 0;  ///< the first with the other support

@@ -74,12 +74,6 @@ void AddPhases(const RunRecord& run, EventList* events) {
   }
 }
 
-std::string SupportName(const RunRecord& run, const std::array<bool, 2>& contacts) {
-  if (contacts[0] && contacts[1]) return "both feet";
-  if (!contacts[0] && !contacts[1]) return "no foot";
-  return FootName(run, contacts[0] ? 0 : 1);
-}
-
 void AddSupport(const RunRecord& run, EventList* events) {
   for (const SupportChange& change : SupportChanges(run)) {
     events->Add(change.tick, "support_changed",

@@ -25,7 +25,7 @@ size_t EditDistance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::string Suggest(std::string_view name, std::vector<std::string> names) {
+std::vector<std::string> Nearest(std::string_view name, std::vector<std::string> names) {
   std::sort(names.begin(), names.end());
   std::vector<std::string> near;
   for (const std::string& candidate : names) {
@@ -36,8 +36,14 @@ std::string Suggest(std::string_view name, std::vector<std::string> names) {
     return EditDistance(name, a) < EditDistance(name, b);
   });
   if (near.size() > 3) near.resize(3);
-  if (near.empty()) return fmt::format("it has {}", fmt::join(names, ", "));
-  return fmt::format("did you mean {}?", fmt::join(near, " or "));
+  return near;
+}
+
+std::string Suggest(std::string_view name, std::vector<std::string> names) {
+  const std::vector<std::string> near = Nearest(name, names);
+  if (!near.empty()) return fmt::format("did you mean {}?", fmt::join(near, " or "));
+  std::sort(names.begin(), names.end());
+  return fmt::format("it has {}", fmt::join(names, ", "));
 }
 
 }  // namespace poise

@@ -27,14 +27,10 @@ struct Column {
   const char* metric;  // without its prefix
 };
 constexpr Column kColumns[] = {
-    {"position RMS", "position_rms"},
-    {"worst", "position_max"},
-    {"velocity RMS", "velocity_rms"},
-    {"worst", "velocity_max"},
-    {"tilt RMS", "tilt_rms"},
-    {"worst", "tilt_max"},
-    {"NEES in 95 %", "nees_share"},
-    {"tilt, velocity", "nees_observable_share"},
+    {"position RMS", "position_rms"}, {"worst", "position_max"},
+    {"velocity RMS", "velocity_rms"}, {"worst", "velocity_max"},
+    {"tilt RMS", "tilt_rms"},         {"worst", "tilt_max"},
+    {"NEES in 95 %", "nees_share"},   {"tilt, velocity", "nees_observable_share"},
 };
 
 struct Method {
@@ -47,7 +43,7 @@ constexpr Method kMethods[] = {
 };
 
 int Compare(const EstimatorsOptions& options) {
-  std::vector<std::vector<std::string>> rows(1);
+  std::vector<TableRow> rows(1);
   rows[0] = {"run", "method"};
   for (const Column& column : kColumns) rows[0].push_back(column.heading);
   rows[0].push_back("a tick");
@@ -79,9 +75,9 @@ int Compare(const EstimatorsOptions& options) {
     for (const auto& [method, prefix] : kMethods) {
       Reestimated result = Reestimate(spec, method, run);
       run.other_estimates[static_cast<size_t>(method)] = std::move(result.estimates);
-      rows.push_back({method == 0 ? run.spec.scenario() : "",
-                      StateEstimatorConfig::Method_Name(
-                          static_cast<StateEstimatorConfig::Method>(method))});
+      rows.push_back(
+          {method == 0 ? run.spec.scenario() : "",
+           StateEstimatorConfig::Method_Name(static_cast<StateEstimatorConfig::Method>(method))});
       for (const Column& column : kColumns) {
         const logging::Metric* metric =
             logging::FindMetric(fmt::format("{}_{}", prefix, column.metric));

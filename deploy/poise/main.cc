@@ -1,14 +1,36 @@
 // The program `poise`: runs, checks and inspects process graphs.
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <string_view>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
 #include "components/robot/robot_model.h"
+#include "deploy/poise/command_line.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/output_style.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
 
+namespace {
+
+void Fail(std::string_view problem) {
+  std::fflush(stdout);
+  fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(problem));
+}
+
+/// `code`, or failure where what was printed has not come out: a full disk behind a redirection.
+int Flushed(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  Fail(fmt::format("standard output: cannot be written: {}", std::strerror(errno)));
+  return code == poise::kExitOk ? poise::kExitFailed : code;
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  poise::UsePlainStreams();
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
                "poise"};
   app.set_version_flag("--version", poise::VersionText("poise"));
@@ -37,21 +59,30 @@ int main(int argc, char** argv) {
   poise::AddViewCommand(&app, &command);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    fmt::print("{}", poise::HelpText(app));
+    return Flushed(poise::kExitOk);
+  } catch (const CLI::CallForVersion& version) {
+    fmt::print("{}\n", version.what());
+    return Flushed(poise::kExitOk);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "poise: {}; see poise --help\n", error.what());
+    if (poise::WantsSubcommand(app, error)) {
+      fmt::print("{}", poise::HelpText(app));
+    } else {
+      Fail(poise::UsageProblem(app, error));
+    }
     return poise::kExitUsage;
   }
   try {
-    return command();
+    return Flushed(command());
   } catch (const poise::ConfigError& error) {
-    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
+    Fail(error.what());
     return poise::kExitUsage;
   } catch (const poise::robot::RobotError& error) {
-    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
+    Fail(error.what());
     return poise::kExitUsage;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(error.what()));
+    Fail(error.what());
     return poise::kExitFailed;
   }
 }

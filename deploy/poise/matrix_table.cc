@@ -29,6 +29,13 @@ const CheckResult* FindCheck(const MatrixCell& cell, const CheckResult& wanted) 
   return nullptr;
 }
 
+/// A cell's outcome in its colour, "!" behind it where a check `failed` that nothing else shows.
+TableCell Outcome(const MatrixCell& cell, const std::string& outcome, bool failed) {
+  if (cell.problem) return {"could not be run", Tone::kBad};
+  return {fmt::format("{}{}", outcome, failed ? " !" : ""),
+          cell.outcome == "stands" && !failed ? Tone::kGood : Tone::kBad};
+}
+
 /// True when the run failed and none of the figures says so.
 bool FailedUnseen(const MatrixCell& cell, const std::vector<const CheckResult*>& figures) {
   if (cell.problem || cell.passed) return false;
@@ -44,31 +51,62 @@ bool FailedUnseen(const MatrixCell& cell, const std::vector<const CheckResult*>&
 
 /// The cells of one scenario.
 std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
-  std::vector<std::vector<std::string>> rows = {{"what", "paper"}, {"outcome", ""}};
+  std::vector<TableRow> rows = {{"what", "paper"}, {"outcome", ""}};
   std::vector<const CheckResult*> figures;  // in the order in which the cells have them
   for (const MatrixCell* cell : cells) {
-    rows[0].push_back(ColumnTitle(*cell));
-    rows[1].push_back(cell->problem ? "could not be run" : cell->outcome);
+    rows[0].emplace_back(ColumnTitle(*cell));
     for (const CheckResult& check : cell->checks) {
       const auto same = [&](const CheckResult* other) { return Same(*other, check); };
       const bool paper = !check.paper.empty() || check.paper_value;
       if (paper && std::none_of(figures.begin(), figures.end(), same)) figures.push_back(&check);
     }
   }
-  for (size_t i = 0; i < cells.size(); ++i) {
-    if (FailedUnseen(*cells[i], figures)) rows[1][i + 2] += " !";
+  for (const MatrixCell* cell : cells) {
+    rows[1].push_back(Outcome(*cell, cell->outcome, FailedUnseen(*cell, figures)));
   }
   for (const CheckResult* figure : figures) {
     std::string paper = figure->paper;
     if (paper.empty()) paper = FormatNumber(*figure->paper_value, figure->unit);
-    rows.push_back({figure->label, paper});
+    TableRow row = {figure->label, paper};
     for (const MatrixCell* cell : cells) {
       const CheckResult* const check = FindCheck(*cell, *figure);
       const bool failed = check != nullptr && !check->passed;
-      rows.back().push_back(check == nullptr ? "" : FormatMeasured(*check) + (failed ? " !" : ""));
+      const std::string text =
+          check == nullptr ? "" : fmt::format("{}{}", FormatMeasured(*check), failed ? " !" : "");
+      row.emplace_back(text, failed ? Tone::kBad : Tone::kPlain);
     }
+    rows.push_back(std::move(row));
   }
   return FormatColumns(rows);
+}
+
+/// What each part of the controller is worth: a row for each ablation, a column for each scenario.
+std::string FormatOverview(const std::vector<MatrixCell>& cells) {
+  std::vector<TableRow> rows(1, TableRow{TableCell("")});
+  std::vector<std::string> scenarios;
+  std::vector<std::string> ablations;
+  const auto index = [](std::vector<std::string>* names, const std::string& name) {
+    const auto found = std::find(names->begin(), names->end(), name);
+    const auto at = static_cast<size_t>(found - names->begin());
+    if (found == names->end()) names->push_back(name);
+    return at;
+  };
+  for (const MatrixCell& cell : cells) {
+    if (!cell.variant.empty()) continue;
+    const size_t column = 1 + index(&scenarios, cell.scenario);
+    const size_t row = 1 + index(&ablations, cell.ablation);
+    if (column == rows[0].size()) {
+      rows[0].emplace_back(cell.paper_section.empty() ? cell.scenario : cell.paper_section);
+    }
+    if (row == rows.size()) rows.push_back({ColumnTitle(cell)});
+    for (TableRow& each : rows) each.resize(rows[0].size(), "");
+    const std::string outcome = cell.fell_at ? fmt::format("fell {:.2f} s", *cell.fell_at)
+                                : cell.outcome.starts_with("stopped") ? "stopped"
+                                                                      : cell.outcome;
+    rows[row][column] = Outcome(cell, outcome, !cell.passed && !cell.fell_at);
+  }
+  const bool grid = scenarios.size() > 1 && ablations.size() > 1;
+  return grid ? FormatColumns(rows) : "";
 }
 
 std::string Number(const std::optional<double>& value) {
@@ -99,7 +137,8 @@ void ReadCellSummary(const std::filesystem::path& file, MatrixCell* cell) {
 }
 
 std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
-  std::string text;
+  std::string text = FormatOverview(cells);
+  if (!text.empty()) text += "\n";
   bool failed = false;
   for (size_t begin = 0; begin < cells.size();) {
     std::vector<const MatrixCell*> group;
@@ -109,15 +148,20 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
       failed = failed || (!cells[end].problem && !cells[end].passed);
     }
     const MatrixCell& first = cells[begin];
-    text += fmt::format("{}{}: {}\n", first.paper_section.empty() ? "" : first.paper_section + "  ",
-                        first.scenario, first.description);
+    text += Wrapped(fmt::format("{}{}{}: {}", first.paper_section,
+                                first.paper_section.empty() ? "" : "  ", first.scenario,
+                                first.description),
+                    ScreenStyle().columns, 2) +
+            "\n";
     text += FormatScenario(group) + "\n";
     begin = end;
   }
   if (failed) {
-    text +=
-        "!: outside the limit that the scenario's check sets; at the outcome: a check that is not "
-        "shown failed, see poise report\n";
+    text += Wrapped(
+                "!: outside the limit that the scenario's check sets; at the outcome: a check "
+                "that is not shown failed, see poise report",
+                ScreenStyle().columns, 3) +
+            "\n";
   }
   return text;
 }

@@ -16,17 +16,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Limit(const CheckResult& check) {
-  if (check.at_most && check.at_least) {
-    if (*check.at_most == *check.at_least) return "= " + FormatNumber(*check.at_most, check.unit);
-    return fmt::format("{} … {}", FormatNumber(*check.at_least),
-                       FormatNumber(*check.at_most, check.unit));
-  }
-  if (check.at_most) return "≤ " + FormatNumber(*check.at_most, check.unit);
-  if (check.at_least) return "≥ " + FormatNumber(*check.at_least, check.unit);
-  return "";
-}
-
 std::string EndOf(const RunOutcome& outcome) {
   return outcome.message.empty() ? "planned end" : outcome.message;
 }
@@ -115,7 +104,7 @@ Json ChecksJson(const std::vector<CheckResult>& checks) {
   Json json = Json::array();
   for (const CheckResult& check : checks) {
     Json limit = nullptr;
-    if (check.limited()) limit = Limit(check);
+    if (check.limited()) limit = FormatLimit(check);
     json.push_back({{"name", check.name},
                     {"label", check.label},
                     {"measured", Optional(check.measured)},
@@ -162,18 +151,21 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
       duration.at_least =
           static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period();
     }
+    duration.of_every_run = true;
     Evaluate(*logging::FindMetric(metric), run, &duration);
     results.push_back(std::move(duration));
   };
   reaches_end("duration_reached", run.spec);
   if (run.reference) reaches_end("duration_reached_reference", run.reference->spec);
   CheckResult defects;
+  defects.of_every_run = true;
   defects.at_most = 0;
   results.push_back(defects);
   Evaluate(*logging::FindMetric("log_defects"), run, &results.back());
   // Whatever a scenario checks: each component did its work in every tick.
   for (const char* name : {"task_not_ok_ticks", "balance_not_ok_ticks", "command_not_ok_ticks"}) {
     CheckResult not_ok;
+    not_ok.of_every_run = true;
     not_ok.at_most = 0;
     Evaluate(*logging::FindMetric(name), run, &not_ok);
     if (not_ok.measured) results.push_back(not_ok);  // else the graph has no such component
@@ -193,15 +185,29 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   return results;
 }
 
+std::string FormatLimit(const CheckResult& check) {
+  if (check.at_most && check.at_least) {
+    if (*check.at_most == *check.at_least) return "= " + FormatNumber(*check.at_most, check.unit);
+    return fmt::format("{} … {}", FormatNumber(*check.at_least),
+                       FormatNumber(*check.at_most, check.unit));
+  }
+  if (check.at_most) return "≤ " + FormatNumber(*check.at_most, check.unit);
+  if (check.at_least) return "≥ " + FormatNumber(*check.at_least, check.unit);
+  return "";
+}
+
 std::string FormatTable(const std::vector<CheckResult>& checks) {
-  std::vector<std::vector<std::string>> rows = {{"what", "measured", "limit", "paper", "verdict"}};
+  std::vector<TableRow> rows = {{"what", "measured", "limit", "paper", "verdict"}};
   for (const CheckResult& check : checks) {
-    rows.push_back({check.label, FormatMeasured(check), Limit(check), check.paper,
-                    !check.limited() ? ""
-                    : check.passed   ? "ok"
-                                     : "FAILED"});
+    rows.push_back(
+        {check.label, FormatMeasured(check), FormatLimit(check), check.paper, VerdictCell(check)});
   }
   return FormatColumns(rows);
+}
+
+TableCell VerdictCell(const CheckResult& check) {
+  if (!check.limited()) return "";
+  return check.passed ? TableCell("ok", Tone::kGood) : TableCell("FAILED", Tone::kBad);
 }
 
 std::string FormatMeasured(const CheckResult& check) {
@@ -210,7 +216,7 @@ std::string FormatMeasured(const CheckResult& check) {
 
 std::string FormatFaults(const RunOutcome& outcome) {
   if (outcome.faults.empty()) return "";
-  std::vector<std::vector<std::string>> rows = {
+  std::vector<TableRow> rows = {
       {"fault", "process", "at s", "control regained after ms", "cycles without command"}};
   std::vector<double> regained;
   for (const InjectedFault& fault : outcome.faults) {
@@ -234,9 +240,9 @@ std::string FormatFaults(const RunOutcome& outcome) {
 
 std::string FormatProcesses(const RunOutcome& outcome) {
   if (outcome.processes.empty()) return "";
-  std::vector<std::vector<std::string>> rows = {
-      {"process", "ticks", "median us", "p99 us", "worst us", "missed deadlines", "latest start us",
-       "skipped ticks", "replaced", "scheduling", "memory MB", "grown by kB"}};
+  std::vector<TableRow> rows = {{"process", "ticks", "median us", "p99 us", "worst us",
+                                 "missed deadlines", "latest start us", "skipped ticks", "replaced",
+                                 "scheduling", "memory MB", "grown by kB"}};
   for (const ProcessReport& process : outcome.processes) {
     const health_t& h = process.health;
     const std::vector<std::string> granted = SchedulingNames(h.scheduling);
@@ -268,7 +274,10 @@ std::string FormatEvents(const std::vector<logging::Event>& events) {
     }
     std::string name = events[i].name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    text += fmt::format("  {:7.3f} s  {:<{}}  {}\n", events[i].time, name, width, events[i].detail);
+    text += Wrapped(fmt::format("  {:7.3f} s  {:<{}}  {}", events[i].time, name, width,
+                                events[i].detail),
+                    ScreenStyle().columns, static_cast<int>(width) + 15) +
+            "\n";
   }
   return text;
 }
@@ -278,9 +287,11 @@ std::string FormatAssumptions(const Scenario& scenario) {
   std::string text = "Not given by the paper:\n";
   for (const Assumption& assumption : scenario.assumption()) {
     const std::string value = ValueOf(scenario, assumption.field());
-    text += fmt::format("  {:<7}  {}{}{}\n", assumption.kind(), assumption.field(),
-                        value.empty() ? "" : " = " + value,
-                        assumption.has_reason() ? ": " + assumption.reason() : "");
+    text += Wrapped(fmt::format("  {:<7}  {}{}{}", assumption.kind(), assumption.field(),
+                                value.empty() ? "" : " = " + value,
+                                assumption.has_reason() ? ": " + assumption.reason() : ""),
+                    ScreenStyle().columns, 11) +
+            "\n";
   }
   return text;
 }

@@ -10,6 +10,7 @@
 
 #include "deploy/poise/run_outcome.h"
 #include "deploy/poise/scenario.pb.h"
+#include "deploy/poise/text_table.h"
 #include "logging/events.h"
 #include "logging/metrics.h"
 #include "logging/run_record.h"
@@ -26,7 +27,8 @@ struct CheckResult {
   std::optional<double> at_least;
   std::string paper;
   std::optional<double> paper_value;
-  bool passed = true;  ///< a row without limit always passes
+  bool passed = true;         ///< a row without limit always passes
+  bool of_every_run = false;  ///< no check of the scenario's own
   bool limited() const { return at_most || at_least; }
 };
 
@@ -40,16 +42,20 @@ const logging::Metric* MetricOfCheck(const Scenario& scenario, int index);
 /// its reference, its log is whole, and each component did its work.
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run);
 
-/// Columns what, measured, limit, paper, verdict.
+/// Columns what, measured, limit, paper, verdict; every row.
 std::string FormatTable(const std::vector<CheckResult>& checks);
 /// "12.3 mm", or "none".
 std::string FormatMeasured(const CheckResult& check);
-/// A line each; of a long list the first and the last ones.
+/// "≤ 45 mm", "0.35 … 0.6 s"; empty without a limit.
+std::string FormatLimit(const CheckResult& check);
+/// "ok", "FAILED", or nothing without a limit.
+TableCell VerdictCell(const CheckResult& check);
 /// The faults that were injected, and how long control was lost by each; empty when there were
 /// none.
 std::string FormatFaults(const RunOutcome& outcome);
 /// The processes of a run in real time: latencies, deadlines, what the system granted, memory.
 std::string FormatProcesses(const RunOutcome& outcome);
+/// A line each; of a long list the first and the last ones.
 std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);

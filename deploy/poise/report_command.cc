@@ -6,6 +6,7 @@
 #include "deploy/poise/html_report.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
+#include "deploy/poise/run_screen.h"
 #include "deploy/poise/scenario_run.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
@@ -18,6 +19,7 @@ struct ReportOptions {
   std::string overlay;
   std::string html;
   bool no_html = false;
+  bool full = false;
 };
 
 ReportedRun ReadReportedRun(const std::string& run) {
@@ -54,16 +56,23 @@ int Report(const ReportOptions& options) {
   runs.push_back(ReadReportedRun(options.run));
   if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
   const ReportedRun& run = runs.front();
-  const std::string text = fmt::format(
-      "{} of {}, poise {}\n{}\n{}\n{}{}", run.record.spec.scenario(), run.record.info.started_at,
-      run.record.spec.poise_version(), FormatChanges(run.scenario), FormatTable(run.checks),
-      FormatEvents(logging::Events(run.record)), FormatAssumptions(run.scenario));
-  fmt::print("{}", logging::LinesForTerminal(text));
+  const std::string commit = run.record.spec.poise_commit().empty()
+                                 ? ""
+                                 : fmt::format(" ({})", run.record.spec.poise_commit());
+  std::string text = Wrapped(
+      logging::LinesForTerminal(fmt::format(
+          "{} of {}, poise {}{}\n{}", run.record.spec.scenario(), run.record.info.started_at,
+          run.record.spec.poise_version(), commit, FormatChanges(run.scenario))),
+      ScreenStyle().columns, 2);
+  const std::vector<logging::Event> events = logging::Events(run.record);
+  const ShownRun shown{run.scenario, run.record, run.checks, events, "", {}};
+  text += fmt::format("\n{}\n", options.full ? FormatFullScreen(shown) : FormatScreen(shown));
+  fmt::print("{}{}", text, FormatVerdictLines(run.checks, ""));
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
     WriteHtmlReport(html, runs);
-    fmt::print("\n{}\n", html.string());
+    fmt::print("\nThe run, step by step: {}\n", FileAddress(html));
   }
   for (const CheckResult& check : run.checks) {
     if (!check.passed) return kExitFailed;
@@ -82,6 +91,7 @@ void AddReportCommand(CLI::App* app, Command* command) {
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
   report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report->add_flag("--full", options->full, "every figure, the events and the assumptions");
   report->callback([options, command] { *command = [options] { return Report(*options); }; });
 }
 

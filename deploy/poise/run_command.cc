@@ -122,7 +122,10 @@ void AddRunCommand(CLI::App* app, Command* command) {
          "!--no-log", options->launch.log,
          "write no log, for a run of hours: nothing is checked but that it stands to the end")
       ->excludes(in_process);
-  run->add_flag("--quiet", options->quiet, "only errors and the verdict");
+  CLI::Option* const quiet =
+      run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
+  run->add_flag("--full", options->full, "every figure, the events and the assumptions")
+      ->excludes(quiet);
   run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });
 }
 

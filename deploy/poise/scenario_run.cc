@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "components/framework/build_info.h"
 #include "components/framework/run.h"
 #include "deploy/poise/estimates.h"
 #include "deploy/poise/inline_run.h"
@@ -12,6 +13,7 @@
 #include "deploy/poise/realtime_verdict.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/run_registry.h"
+#include "deploy/poise/run_screen.h"
 #include "deploy/poise/run_setup.h"
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"
@@ -24,7 +26,7 @@ namespace fs = std::filesystem;
 constexpr char kSpecFile[] = "run_spec.pbtxt";
 constexpr char kScenarioFile[] = "scenario.pbtxt";
 
-void PrintEnd(const std::string& what, const RunOutcome& outcome) {
+void PrintOutcome(const std::string& what, const RunOutcome& outcome) {
   if (outcome.message.empty()) return;
   fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
              outcome.message);
@@ -77,24 +79,68 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
 void ScenarioRun::PrintHeading() const {
   const Scenario& scenario = main_.loaded.scenario;
   const RunSpec& spec = main_.spec;
-  fmt::print("{}: {}\n", spec.scenario(), scenario.description());
+  std::string text = fmt::format("{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong),
+                                 scenario.has_paper_section()
+                                     ? fmt::format(" (the paper's {})", scenario.paper_section())
+                                     : "",
+                                 scenario.description());
   if (main_.loaded.variant && main_.loaded.variant->has_description()) {
-    fmt::print("variant {}: {}\n", main_.loaded.variant->name(),
-               main_.loaded.variant->description());
+    text += fmt::format("variant {}: {}\n", main_.loaded.variant->name(),
+                        main_.loaded.variant->description());
   }
-  fmt::print("{}", FormatChanges(scenario));
+  text += FormatChanges(scenario);
   if (reference_) {
-    fmt::print("compared with variant {}, which runs first, in one process\n",
-               scenario.reference());
+    text += fmt::format("compared with variant {}, which runs first, in one process\n",
+                        scenario.reference());
   }
-  fmt::print("{} s at {} Hz, {}; seed {}; run {}{}\n", scenario.duration(), scenario.tick_rate(),
-             options_.in_process
-                 ? "in one process"
-                 : fmt::format("{} processes{}", spec.graph().component_size(),
-                               options_.launch.log ? " and the recorder" : ", no log"),
-             spec.seed(), spec.run_id(),
-             options_.in_process ? "" : fmt::format("; listen at {}", MirrorUrl(spec)));
+  text += fmt::format(
+      "{} s at {} Hz, {}; seed {}; poise {}{}\n", scenario.duration(), scenario.tick_rate(),
+      options_.in_process ? "in one process"
+                          : fmt::format("{} processes{}", spec.graph().component_size(),
+                                        options_.launch.log ? " and the recorder" : ", no log"),
+      spec.seed(), PoiseVersion(),
+      *PoiseCommit() == '\0' ? "" : fmt::format(" ({})", PoiseCommit()));
+  if (!options_.in_process) {
+    text += fmt::format("run {}; listen at {}\n", spec.run_id(), MirrorUrl(spec));
+  }
+  fmt::print("{}", Wrapped(text, ScreenStyle().columns, 2));
   std::fflush(stdout);
+}
+
+void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& result,
+                           bool latest) const {
+  const RunSummary& summary = result.summary;
+  const RunOutcome& outcome = summary.outcome;
+  const std::string realtime = FormatRealtime(main_.spec, outcome, summary.checks, summary.lost);
+  std::string problem;
+  if (!outcome.completed) {
+    problem = outcome.message.empty() ? "the run did not reach its end" : outcome.message;
+  } else if (summary.reference && !summary.reference->completed) {
+    problem = fmt::format("the reference run: {}", summary.reference->message);
+  } else if (!summary.passed && summary.checks.empty()) {
+    problem = "there is no log";
+  }
+  const char* const by = summary.failed_by_machine ? ", by the machine alone" : "";
+  if (options_.quiet || summary.checks.empty()) {
+    if (!options_.quiet) fmt::print("{}", realtime);
+    fmt::print("{}{}\n", FormatVerdict(summary.checks, problem), by);
+    return;
+  }
+  // Whoever stops a run does not ask for its figures.
+  if (outcome.interrupted) {
+    fmt::print("{}\nIts log up to {:.3f} s: {}\n", FormatVerdict({}, problem),
+               record.time(record.num_ticks), (result.dir / "run.lcm").string());
+    return;
+  }
+  const ShownRun shown{main_.loaded.scenario, record,          summary.checks,
+                       summary.events,        outcome.message, {}};
+  fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
+             Wrapped(realtime, ScreenStyle().columns, 2),
+             FormatVerdictLines(summary.checks, problem));
+  if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
+  fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n", record.time(record.num_ticks),
+             outcome.wall_time, record.real_time_factor.value_or(0));
+  fmt::print("{}", FormatNext(main_.loaded.scenario, result.dir, latest));
 }
 
 RunResult ScenarioRun::Run(const std::string& out, bool latest) {
@@ -116,13 +162,14 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     WriteFiles(*reference_, reference.path());
     summary.reference =
         RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true, {});
-    PrintEnd(fmt::format("reference run (variant {})", scenario.reference()), *summary.reference);
+    PrintOutcome(fmt::format("reference run (variant {})", scenario.reference()),
+                 *summary.reference);
   }
   if (StopSignal() == 0) {
     summary.outcome =
         RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch);
-    PrintEnd("run", summary.outcome);
-    if (!options_.quiet) {
+    PrintOutcome("run", summary.outcome);
+    if (!options_.quiet && !summary.outcome.interrupted) {
       fmt::print("{}", FormatFaults(summary.outcome));
       if (main_.spec.realtime()) fmt::print("{}", FormatProcesses(summary.outcome));
     }
@@ -151,19 +198,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   summary.failed_by_machine =
       !summary.passed && outcome.completed && FailedByMachine(summary.checks, summary.lost);
   WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
-  if (!options_.quiet && recorded) {
-    fmt::print("\n{}\n{}{}", FormatTable(summary.checks), FormatEvents(summary.events),
-               FormatAssumptions(scenario));
-    fmt::print("\n{:.3f} s simulated in {:.2f} s, {:.1f} x real time; {}\n",
-               record.time(record.num_ticks), outcome.wall_time,
-               record.real_time_factor.value_or(0), result.dir.string());
-  }
-  if (!options_.quiet) {
-    fmt::print("{}", FormatRealtime(main_.spec, outcome, summary.checks, summary.lost));
-  }
-  fmt::print("{}\n", summary.passed              ? "passed"
-                     : summary.failed_by_machine ? "FAILED by the machine alone"
-                                                 : "FAILED");
+  PrintEnd(record, result, latest);
   std::fflush(stdout);
   return result;
 }

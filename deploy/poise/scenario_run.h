@@ -16,7 +16,8 @@ namespace poise {
 struct RunOptions {
   RunChanges changes;
   bool in_process = false;
-  bool quiet = false;
+  bool quiet = false;  ///< only the verdict
+  bool full = false;   ///< every figure, events, assumptions, processes
   LaunchOptions launch;
 };
 
@@ -58,6 +59,8 @@ class ScenarioRun {
   static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
                             bool quiet, const LaunchOptions& launch);
   void PrintHeading() const;
+  /// What happened, the table, the verdict, where to look next.
+  void PrintEnd(const logging::RunRecord& record, const RunResult& result, bool latest) const;
 
   RunOptions options_;
   Part main_;

@@ -51,25 +51,32 @@ std::vector<std::string> Experiments() {
 
 std::string FormatOverview(const std::vector<ScenarioRun>& runs,
                            const std::vector<RunResult>& results) {
-  std::vector<std::vector<std::string>> rows = {
-      {"section", "scenario", "verdict", "what", "measured", "paper"}};
+  std::vector<TableRow> rows = {{"section", "scenario", "verdict", "what", "measured", "paper"}};
+  std::string problems;
   for (size_t i = 0; i < runs.size(); ++i) {
     const bool ran = i < results.size();
-    const std::string verdict = !ran ? "not run" : results[i].summary.passed ? "passed" : "FAILED";
-    rows.push_back({runs[i].scenario().paper_section(), runs[i].name(), verdict, "", "", ""});
+    const bool passed = ran && results[i].summary.passed;
+    rows.push_back({runs[i].scenario().paper_section(), runs[i].name(),
+                    TableCell(!ran     ? "not run"
+                              : passed ? "passed"
+                                       : "FAILED",
+                              passed ? Tone::kGood : Tone::kBad),
+                    "", "", ""});
     if (!ran) continue;
-    rows.back()[3] = results[i].problem;
+    if (!results[i].problem.empty()) {
+      problems += fmt::format("{}: {}\n", runs[i].name(), results[i].problem);
+    }
     bool first = true;
     for (const CheckResult& check : results[i].summary.checks) {
       if (check.paper.empty()) continue;
       if (!first) rows.push_back({"", "", "", "", "", ""});
       first = false;
       rows.back()[3] = check.label;
-      rows.back()[4] = FormatMeasured(check);
+      rows.back()[4] = {FormatMeasured(check), check.passed ? Tone::kPlain : Tone::kBad};
       rows.back()[5] = check.paper;
     }
   }
-  return FormatColumns(rows);
+  return fmt::format("{}{}", FormatColumns(rows), problems);
 }
 
 }  // namespace

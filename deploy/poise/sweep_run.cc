@@ -3,7 +3,6 @@
 #include <google/protobuf/text_format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -16,6 +15,7 @@
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/run_setup.h"
+#include "deploy/poise/run_story.h"
 #include "logging/events.h"
 #include "logging/inline_record.h"
 #include "logging/inline_recorder.h"
@@ -27,16 +27,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
-
-constexpr std::array kTroubles = {"contact_early",
-                                  "contact_late",
-                                  "searching",
-                                  "no_surface",
-                                  "contact_lost",
-                                  "eta_infeasible_begins",
-                                  "cop_not_achieved_begins",
-                                  "step_needed",
-                                  "bridge_state"};
 
 struct Prepared {
   LoadedScenario loaded;
@@ -86,9 +76,8 @@ void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
       row->fell_at = event.time;
       break;
     }
-    const bool trouble =
-        std::find(kTroubles.begin(), kTroubles.end(), event.name) != kTroubles.end();
-    if (trouble && std::find(troubles.begin(), troubles.end(), event.name) == troubles.end()) {
+    if (IsTrouble(event.name) &&
+        std::find(troubles.begin(), troubles.end(), event.name) == troubles.end()) {
       troubles.push_back(event.name);
     }
   }

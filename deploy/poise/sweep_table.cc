@@ -187,7 +187,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
   std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
-  std::vector<std::vector<std::string>> table = {{"fell", "in phase", "after"}};
+  std::vector<TableRow> table = {{"fell", "in phase", "after"}};
   for (const auto& [way, count] : sorted) {
     table.push_back({fmt::format("{}", count), way.first, way.second.empty() ? "-" : way.second});
   }
@@ -205,7 +205,7 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
   const bool push = std::any_of(found.begin(), found.end(),
                                 [](const LimitPoint& p) { return p.any->push.has_value(); });
   if (push) heading.insert(heading.end(), {"N·s", "of pendulum", "for the duration"});
-  std::vector<std::vector<std::string>> table = {heading};
+  std::vector<TableRow> table = {TableRow(heading.begin(), heading.end())};
   for (const LimitPoint& point : found) {
     std::vector<std::string> cells = Place(points, point.run);
     const LimitSearch& search = point.search;
@@ -226,7 +226,7 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
       cells.push_back(percent(bound.lip_impulse));
       cells.push_back(percent(bound.lip_impulse_of_duration));
     }
-    table.push_back(cells);
+    table.emplace_back(cells.begin(), cells.end());
   }
   return FormatColumns(table);
 }

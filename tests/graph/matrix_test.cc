@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -16,6 +17,7 @@ using Row = CsvRow;
 class MatrixTest : public testing::Test {
  protected:
   MatrixTest() {
+    setenv("COLUMNS", "200", 1);  // the tables' columns side by side
     // The variant's push of 382 N s is ten times what a robot of this size can stand
     // (fall_test.cc).
     deploy_.Scenario("pushed",
@@ -28,6 +30,8 @@ class MatrixTest : public testing::Test {
     deploy_.Scenario("quiet",
                      "base: \"base/stand\" name: \"quiet\" paper_section: \"7.1\" duration: 0.2\n");
   }
+
+  ~MatrixTest() override { unsetenv("COLUMNS"); }
 
   TestDeploy deploy_;
 };

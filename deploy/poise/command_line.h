@@ -1,0 +1,18 @@
+// What a person reads of a command line: its help, and what is wrong with it.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace poise {
+
+/// The help of the command that was asked about, in the terminal's width.
+std::string HelpText(const CLI::App& app);
+
+/// True when a command that only has subcommands was called without one, and nothing else is wrong.
+bool WantsSubcommand(const CLI::App& app, const CLI::ParseError& error);
+
+/// What is wrong, what was meant, and whose help says more, in one line without "poise: ".
+std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error);
+
+}  // namespace poise

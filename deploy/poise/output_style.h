@@ -1,0 +1,38 @@
+// What the standard output can show, and texts that fit it.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace poise {
+
+struct OutputStyle {
+  int columns = 80;
+  bool colour = false;
+  bool unicode = true;
+};
+
+/// The style of stdout, found once: columns of the terminal, else $COLUMNS, else 80; colour on a
+/// terminal unless $NO_COLOR is set or $TERM is dumb; Unicode where the locale is UTF-8.
+const OutputStyle& ScreenStyle();
+
+enum class Tone { kPlain, kStrong, kDim, kGood, kBad };
+
+/// `text` in the colour of `tone`, where stdout shows colours.
+std::string Toned(std::string_view text, Tone tone);
+
+/// Columns that a UTF-8 text takes on stdout; colours take none.
+int DisplayWidth(std::string_view text);
+
+/// Breaks `text` at spaces into lines of at most `width` columns, each but the first after `indent`
+/// spaces; a longer word stands alone. Its own line breaks stay. Ends without one.
+std::string Wrapped(std::string_view text, int width, int indent = 0);
+
+/// `text` with the characters that Poise uses in ASCII: "-" for "─", ">=" for "≥". Others stay.
+std::string PlainText(std::string_view text);
+
+/// Where the locale cannot show Unicode: what is written to stdout and stderr becomes PlainText.
+/// Call once, before anything is written.
+void UsePlainStreams();
+
+}  // namespace poise
