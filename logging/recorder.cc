@@ -1,5 +1,7 @@
 #include "logging/recorder.h"
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -40,7 +42,9 @@ void WriteReport(const std::string& path, const RunSpec& spec, const RecorderRep
   }
   std::ofstream out(path);
   out << json.dump(2) << "\n";
-  if (!out.flush()) throw LogError(fmt::format("{}: cannot be written", path));
+  if (!out.flush()) {
+    throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
 }
 
 }  // namespace
@@ -70,15 +74,21 @@ RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
   ChannelCollector collector(spec, "recorder", std::move(callbacks));
 
   int64_t next_flush = 0;
-  while (!collector.stopped() && (options.stop == nullptr || *options.stop == 0)) {
-    collector.Spin(kSpin);
-    const int64_t now = NowNanoseconds();
-    if (now >= next_flush) {
-      writer.Flush();
-      next_flush = now + kFlushInterval;
+  try {
+    while (!collector.stopped() && (options.stop == nullptr || *options.stop == 0)) {
+      collector.Spin(kSpin);
+      const int64_t now = NowNanoseconds();
+      if (now >= next_flush) {
+        writer.Flush();
+        next_flush = now + kFlushInterval;
+      }
     }
+    writer.Close();
+  } catch (const LogError& error) {
+    // What this process prints may go to the same full disk.
+    collector.Fail(error.what());
+    throw;
   }
-  writer.Close();
 
   report.complete = collector.complete();
   report.ticks = writer.complete_ticks();

@@ -6,6 +6,7 @@
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
+#include "components/framework/say_error.h"
 #include "fmt/format.h"
 #include "logging/recorder.h"
 
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
   sigaction(SIGTERM, &action, nullptr);
   sigaction(SIGINT, &action, nullptr);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
 
   CLI::App app{"Records a Poise run as an LCM event log. Usually started by `poise run`.",
                "recorder"};
@@ -41,7 +43,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "recorder: {}; see recorder --help\n", error.what());
+    poise::SayError(fmt::format("recorder: {}; see recorder --help", error.what()));
     return 2;
   }
   try {
@@ -51,10 +53,10 @@ int main(int argc, char** argv) {
     poise::logging::Record(spec, options);
     return 0;
   } catch (const poise::ConfigError& error) {
-    fmt::print(stderr, "recorder: {}\n", error.what());
+    poise::SayError(fmt::format("recorder: {}", error.what()));
     return 2;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "recorder: {}\n", error.what());
+    poise::SayError(fmt::format("recorder: {}", error.what()));
     return 1;
   }
 }

@@ -16,6 +16,7 @@ constexpr int64_t kMillisecond = 1'000'000;
 constexpr int64_t kHealthInterval = 50 * kMillisecond;
 constexpr int64_t kFirstRequest = 2 * kMillisecond;
 constexpr int64_t kLastRequest = 50 * kMillisecond;
+constexpr int64_t kFailing = 1000 * kMillisecond;
 constexpr int64_t kGiveUp =
     100 * kMillisecond;     // in real time, on a message that has been asked for
 constexpr int kBatch = 64;  // packets of a channel handled before the next channel's turn
@@ -47,6 +48,7 @@ class ChannelCollector::Impl {
  public:
   Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks);
   void Spin(int timeout_ms);
+  void Fail(std::string_view reason);
 
   int64_t recorded_tick() const;
   int64_t final_tick() const { return final_tick_; }
@@ -115,6 +117,19 @@ void ChannelCollector::Impl::Spin(int timeout_ms) {
     service_.SendControl(run_control_t::COMMAND_RECORDED, recorded, -1);
   }
   if (arrival >= next_health_) PublishHealth(arrival);
+}
+
+void ChannelCollector::Impl::Fail(std::string_view reason) {
+  callbacks_ = {};
+  callbacks_.message = [](int, int64_t, std::span<const uint8_t>) {};
+  service_.SetDetail(reason);
+  service_.health().state = health_t::STATE_FAILED;
+  const int64_t end = NowNanoseconds() + kFailing;
+  for (int64_t now = 0; !stopped_ && now < end; now = NowNanoseconds()) {
+    service_.SendHealth();  // again and again: one may be lost
+    pollfd service{service_.fd(), POLLIN, 0};
+    if (poll(&service, 1, static_cast<int>(kHealthInterval / kMillisecond)) > 0) ReceiveService();
+  }
 }
 
 void ChannelCollector::Impl::Receive(Lane& lane, int64_t now) {
@@ -235,6 +250,7 @@ ChannelCollector::ChannelCollector(const RunSpec& spec, const std::string& name,
     : impl_(std::make_unique<Impl>(spec, name, std::move(callbacks))) {}
 ChannelCollector::~ChannelCollector() = default;
 void ChannelCollector::Spin(int timeout_ms) { impl_->Spin(timeout_ms); }
+void ChannelCollector::Fail(std::string_view reason) { impl_->Fail(reason); }
 int64_t ChannelCollector::recorded_tick() const { return impl_->recorded_tick(); }
 int64_t ChannelCollector::final_tick() const { return impl_->final_tick(); }
 bool ChannelCollector::complete() const { return impl_->complete(); }

@@ -38,6 +38,10 @@ class ChannelCollector {
   /// batch.
   void Spin(int timeout_ms);
 
+  /// Says on HEALTH_<name>, until COMMAND_STOP or for a second, that it cannot go on, and why: its
+  /// own output may be what cannot be written.
+  void Fail(std::string_view reason);
+
   /// Last tick of which every (not external) channel has been delivered; -1 at first.
   int64_t recorded_tick() const;
   /// Earliest final tick that a component reported with its end; -1 while the run goes on.

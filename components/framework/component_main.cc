@@ -9,6 +9,7 @@
 #include "components/framework/build_info.h"
 #include "components/framework/process_runner.h"
 #include "components/framework/run.h"
+#include "components/framework/say_error.h"
 #include "components/framework/udp_bus.h"
 #include "fmt/format.h"
 
@@ -57,7 +58,7 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "{}: {}; see {} --help\n", type, error.what(), type);
+    SayError(fmt::format("{}: {}; see {} --help", type, error.what(), type));
     return 2;
   }
   try {
@@ -75,13 +76,13 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
     if (standby) options.take_over = &take_over_asked;
     ProcessRunner runner(spec, name, factory, options);
     if (runner.Run()) return 0;
-    fmt::print(stderr, "{}: {}\n", name, runner.error());
+    SayError(fmt::format("{}: {}", name, runner.error()));
     return 1;
   } catch (const ConfigError& error) {
-    fmt::print(stderr, "{}: {}\n", name, error.what());
+    SayError(fmt::format("{}: {}", name, error.what()));
     return 2;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "{}: {}\n", name, error.what());
+    SayError(fmt::format("{}: {}", name, error.what()));
     return 1;
   }
 }

@@ -1,4 +1,6 @@
-// Dotted paths into protobuf messages: LocateField and SetField.
+// Dotted paths into protobuf messages: LocateField, SetField and ResolvePath.
+#include "components/framework/field_path.h"
+
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/message.h>
@@ -24,10 +26,14 @@ using google::protobuf::Reflection;
 
 struct Step {
   std::string name;
-  int index = -1;  ///< -1: none given
+  int index = -1;   ///< -1: none given
+  std::string key;  ///< in place of an index: the element's own name
 };
 
-/// nullopt when the path is not NAME or NAME[INDEX], joined by dots.
+// What an element of a list is called by, where its type has such a field.
+constexpr const char* kNameFields[] = {"name", "metric", "joint", "component", "channel", "link"};
+
+/// nullopt when the path is not NAME, NAME[INDEX] or NAME[ELEMENT], joined by dots.
 std::optional<std::vector<Step>> SplitPath(std::string_view path) {
   std::vector<Step> steps;
   while (true) {
@@ -36,13 +42,19 @@ std::optional<std::vector<Step>> SplitPath(std::string_view path) {
     Step step;
     const size_t bracket = part.find('[');
     if (bracket != std::string_view::npos) {
-      const std::string_view index = part.substr(bracket + 1);
+      std::string_view index = part.substr(bracket + 1);
+      if (index.size() < 2 || index.back() != ']') return std::nullopt;
+      index.remove_suffix(1);
       const auto [end, error] =
           std::from_chars(index.data(), index.data() + index.size(), step.index);
-      if (error != std::errc() || step.index < 0 || end + 1 != index.data() + index.size() ||
-          *end != ']') {
+      if (error == std::errc::result_out_of_range) return std::nullopt;
+      if (error != std::errc() || end != index.data() + index.size()) {
+        step.index = -1;
+        step.key = index;
+      } else if (step.index < 0) {
         return std::nullopt;
       }
+      if (step.key.find_first_of("[]\"'") != std::string::npos) return std::nullopt;
       part = part.substr(0, bracket);
     }
     if (part.empty()) return std::nullopt;
@@ -87,6 +99,79 @@ std::optional<Number> ParseNumber(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return number;
+}
+
+const FieldDescriptor* NameField(const Descriptor& type) {
+  for (const char* name : kNameFields) {
+    const FieldDescriptor* const field = type.FindFieldByName(name);
+    const bool text = field != nullptr && !field->is_repeated() &&
+                      field->cpp_type() == FieldDescriptor::CPPTYPE_STRING;
+    if (text) return field;
+  }
+  return nullptr;
+}
+
+/// Index of the element of `list` that is called `key`. Throws ConfigError with `path` and the
+/// names that there are.
+int FindElement(const Message& message, const FieldDescriptor& list, const std::string& key,
+                std::string_view path) {
+  const FieldDescriptor* const name_field =
+      list.message_type() == nullptr ? nullptr : NameField(*list.message_type());
+  if (name_field == nullptr) {
+    throw ConfigError(path, fmt::format("elements of {} have no names; write an index, {}[0]",
+                                        list.name(), list.name()));
+  }
+  const Reflection& reflection = *message.GetReflection();
+  std::vector<std::string> names;
+  std::vector<std::string> found;
+  int index = -1;
+  for (int i = 0; i < reflection.FieldSize(message, &list); ++i) {
+    const Message& element = reflection.GetRepeatedMessage(message, &list, i);
+    names.push_back(element.GetReflection()->GetString(element, name_field));
+    if (names.back() != key) continue;
+    if (index < 0) index = i;
+    found.push_back(fmt::format("{}[{}]", list.name(), i));
+  }
+  if (found.size() > 1) {
+    throw ConfigError(path, fmt::format("{} elements are called '{}'; write one of {}",
+                                        found.size(), key, fmt::join(found, ", ")));
+  }
+  if (index < 0) {
+    throw ConfigError(
+        path, names.empty()
+                  ? fmt::format("{} is empty; {}[0] adds an element", list.name(), list.name())
+                  : fmt::format("no {} is called '{}'; {}", list.name(), key, Suggest(key, names)));
+  }
+  return index;
+}
+
+/// "push[0].peak, or push[1].peak to add one": what `path` may mean, whose step `at` names the list
+/// `field` without saying which element.
+std::string WhichElement(const Message& message, const FieldDescriptor& field,
+                         const std::vector<Step>& steps, size_t at) {
+  const auto written = [&](const std::string& element) {
+    std::string path;
+    for (size_t i = 0; i < steps.size(); ++i) {
+      if (i > 0) path += '.';
+      path += steps[i].name;
+      if (i == at) {
+        path += fmt::format("[{}]", element);
+      } else if (!steps[i].key.empty()) {
+        path += fmt::format("[{}]", steps[i].key);
+      } else if (steps[i].index >= 0) {
+        path += fmt::format("[{}]", steps[i].index);
+      }
+    }
+    return path;
+  };
+  const int size = message.GetReflection()->FieldSize(message, &field);
+  if (size == 0) return fmt::format("is an empty list; {} adds an element", written("0"));
+  const bool named = field.message_type() != nullptr && NameField(*field.message_type()) != nullptr;
+  const std::string last =
+      size == 1 ? "" : fmt::format(" to {}", written(std::to_string(size - 1)));
+  return fmt::format("is a list of {}; write {}{}{}; {} adds an element", size, written("0"), last,
+                     named ? ", or the element's name for its number" : "",
+                     written(std::to_string(size)));
 }
 
 /// Appends an element to be overwritten, so that the rest of SetField sees one that exists.
@@ -218,6 +303,34 @@ int LocateField(std::string_view text, std::string_view field, const Message& pr
   return line;
 }
 
+std::string ResolvePath(const Message& message, std::string_view path) {
+  const auto steps = SplitPath(path);
+  if (!steps.has_value()) return std::string(path);
+  const Message* level = &message;
+  std::string resolved;
+  for (const Step& step : *steps) {
+    if (!resolved.empty()) resolved += '.';
+    resolved += step.name;
+    const FieldDescriptor* field =
+        level == nullptr ? nullptr : level->GetDescriptor()->FindFieldByName(step.name);
+    int index = step.index;
+    if (!step.key.empty() && field != nullptr && field->is_repeated()) {
+      index = FindElement(*level, *field, step.key, path);
+    }
+    if (index >= 0) resolved += fmt::format("[{}]", index);
+    const bool group = field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+    if (!group) {
+      level = nullptr;
+    } else if (!field->is_repeated()) {
+      level = &level->GetReflection()->GetMessage(*level, field);
+    } else {
+      const bool there = index >= 0 && index < level->GetReflection()->FieldSize(*level, field);
+      level = there ? &level->GetReflection()->GetRepeatedMessage(*level, field, index) : nullptr;
+    }
+  }
+  return resolved;
+}
+
 void SetField(Message* message, std::string_view path, std::string_view value) {
   const auto steps = SplitPath(path);
   const auto fail = [&](const std::string& problem) { throw ConfigError(path, problem); };
@@ -236,23 +349,23 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
     walked += (walked.empty() ? "" : ".") + step.name;
     const Reflection* reflection = level->GetReflection();
     const bool is_message = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
-    if (last && value.empty() && step.index < 0 && (field->is_repeated() || is_message)) {
+    const bool text = field->cpp_type() == FieldDescriptor::CPPTYPE_STRING;
+    const bool whole = step.index < 0 && step.key.empty();
+    if (last && value.empty() && whole && (field->is_repeated() || !text)) {
       reflection->ClearField(level, field);
       return;
     }
     int index = -1;
     if (field->is_repeated()) {
       const int size = reflection->FieldSize(*level, field);
-      if (step.index < 0) {
-        fail(fmt::format("{} is a list of {}; write {}[0] to {}[{}]", walked, size, walked, walked,
-                         size));
+      if (whole) fail(fmt::format("{} {}", walked, WhichElement(*level, *field, *steps, i)));
+      index = step.key.empty() ? step.index : FindElement(*level, *field, step.key, path);
+      if (index > size) {
+        fail(fmt::format("{} has {} element{}; the index may be 0 to {}", walked, size,
+                         size == 1 ? "" : "s", size));
       }
-      if (step.index > size) {
-        fail(fmt::format("{} has {} elements; the index may be 0 to {}", walked, size, size));
-      }
-      index = step.index;
       walked.append("[").append(std::to_string(index)).append("]");
-    } else if (step.index >= 0) {
+    } else if (!whole) {
       fail(fmt::format("{} is not a list; leave out the index", walked));
     }
     if (last == is_message) {

@@ -98,7 +98,13 @@ std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<std::string> extra = command.remaining();
   const std::string see = fmt::format("see {} --help", name);
   if (extra.empty()) {
-    return fmt::format("{}: {}; {}", name, error.what(), see);
+    std::string what = error.what();
+    const size_t colon = what.find(':');
+    // CLI11 says "--out: 1 required TEXT missing".
+    if (colon != std::string::npos && dynamic_cast<const CLI::ArgumentMismatch*>(&error)) {
+      what = fmt::format("{} needs a value", what.substr(0, colon));
+    }
+    return fmt::format("{}: {}; {}", name, what, see);
   }
   std::string problem;
   if (extra.front().starts_with("-") && extra.front().size() > 1) {
@@ -108,7 +114,7 @@ std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
   } else {
     problem = fmt::format("does not know what to do with '{}'", extra.front());
   }
-  return fmt::format("{} {}; {}", name, problem, see);
+  return fmt::format("{} {}{} {}", name, problem, problem.ends_with('?') ? " or" : ";", see);
 }
 
 }  // namespace poise

@@ -3,7 +3,9 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -73,6 +75,35 @@ Json ScenarioJson(const Scenario& scenario) {
   }
   return Json::parse(text);
 }
+
+/// A file that remembers why the first of its writes failed.
+class PageFile final : public std::filebuf {
+ public:
+  int problem() const { return problem_; }
+
+ protected:
+  int_type overflow(int_type c) override {
+    const int_type result = std::filebuf::overflow(c);
+    if (result == traits_type::eof()) Note();
+    return result;
+  }
+  std::streamsize xsputn(const char* data, std::streamsize size) override {
+    const std::streamsize written = std::filebuf::xsputn(data, size);
+    if (written != size) Note();
+    return written;
+  }
+  int sync() override {
+    const int result = std::filebuf::sync();
+    if (result != 0) Note();
+    return result;
+  }
+
+ private:
+  void Note() {
+    if (problem_ == 0) problem_ = errno;
+  }
+  int problem_ = 0;  // errno
+};
 
 /// Packs columns and writes each distinct one once, as an element of the page.
 class BlobWriter {
@@ -184,14 +215,17 @@ void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs)
   } catch (const logging::LogError& error) {
     throw ConfigError(fmt::format("{}; name another file with --html", error.what()));
   }
-  std::ofstream out(partial->part(), std::ios::binary);
+  PageFile page;
+  page.open(partial->part(), std::ios::out | std::ios::binary);
+  std::ostream out(&page);
   WritePage(&out, [&] {
     for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
   });
-  out.close();
-  if (!out) {
-    throw ConfigError(
-        fmt::format("{}: cannot be written; name another file with --html", file.string()));
+  out.flush();
+  if (!out || page.close() == nullptr) {
+    const int problem = page.problem() != 0 ? page.problem() : errno;
+    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with --html",
+                                  file.string(), std::strerror(problem)));
   }
   partial->Keep();
 }

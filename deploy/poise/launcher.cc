@@ -80,6 +80,11 @@ void Launcher::Fail(std::string message, std::vector<std::string> details) {
 }
 
 void Launcher::FailProcess(ChildProcess& process) {
+  const health_t& health = control_.statuses().at(process.name()).health;
+  if (health.state == health_t::STATE_FAILED && !health.detail.empty()) {
+    Fail(fmt::format("{}: {}", process.name(), health.detail));
+    return;
+  }
   const int64_t tick = Tick();
   Fail(fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
                    tick < 0
@@ -106,6 +111,14 @@ bool Launcher::Healthy() {
   }
   if (dead != nullptr) FailProcess(*dead);
   return dead == nullptr;
+}
+
+bool Launcher::RecorderFailed() {
+  if (!log_) return false;
+  const health_t& health = control_.statuses().at(kRecorderName).health;
+  if (health.state != health_t::STATE_FAILED) return false;
+  Fail(fmt::format("the recorder cannot go on: {}", health.detail));
+  return true;
 }
 
 int64_t Launcher::Tick() const {
@@ -189,6 +202,7 @@ void Launcher::Watch() {
     progress_->Show(time, static_cast<double>(now - start) * 1e-9);
     outcome_.wall_time = static_cast<double>((ended_at > 0 ? ended_at : now) - start) * 1e-9;
     if (!Healthy()) return;
+    if (RecorderFailed()) return;
 
     // A component with a reason ends the run for all; without, each has come to the planned end.
     bool all_ended = true;

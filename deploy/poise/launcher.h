@@ -55,6 +55,8 @@ class Launcher {
 
   /// Notes the end of the run when a process died or a signal came. True when the run goes on.
   bool Healthy();
+  /// Notes the end of the run when the recorder says that it cannot go on.
+  bool RecorderFailed();
   void Fail(std::string message, std::vector<std::string> details = {});
   void FailProcess(ChildProcess& process);
   int64_t Tick() const;  ///< last tick that any component has completed

@@ -7,6 +7,8 @@
 #include "components/robot/robot.pb.h"
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/output_style.h"
+#include "deploy/poise/plain_streams.h"
 #include "deploy/poise/reference/reference_text.h"
 #include "deploy/poise/registry.h"
 #include "deploy/poise/run_registry.h"
@@ -39,7 +41,8 @@ void ListFiles(const std::string& kind,
     } catch (const ConfigError& error) {
       text = error.what();
     }
-    fmt::print("  {:<{}}  {}\n", name, width, text);
+    fmt::print("{}\n",
+               Wrapped(fmt::format("  {:<{}}  {}", name, width, text), ScreenStyle().columns, 6));
   }
 }
 
@@ -52,7 +55,7 @@ struct ListRequest {
   bool folders = false;
 };
 
-constexpr size_t kTextWidth = 80;
+size_t TextWidth() { return static_cast<size_t>(std::min(ScreenStyle().columns, 100)); }
 
 ChannelsByType GraphChannels() {
   ChannelsByType channels;
@@ -74,7 +77,7 @@ int ListFields(const ListRequest& request) {
                                                          {"sweep", Schema::kSweep},
                                                          {"graph", Schema::kGraph}};
   const auto fields = SelectFields(FieldReference(kSchemas.at(request.schema)), request.name);
-  fmt::print("{}", request.markdown ? FieldsAsMarkdown(fields) : FieldsAsText(fields, kTextWidth));
+  fmt::print("{}", request.markdown ? FieldsAsMarkdown(fields) : FieldsAsText(fields, TextWidth()));
   return kExitOk;
 }
 
@@ -83,7 +86,7 @@ int ListMessages(const ListRequest& request) {
   const ChannelsByType channels = GraphChannels();
   if (request.name.empty()) {
     fmt::print("{}", request.markdown ? MessagesAsMarkdown(messages, channels)
-                                      : MessagesAsText(messages, channels, kTextWidth));
+                                      : MessagesAsText(messages, channels, TextWidth()));
     return kExitOk;
   }
   std::string type = request.name;
@@ -92,7 +95,7 @@ int ListMessages(const ListRequest& request) {
   }
   const MessageEntry& message = FindMessage(messages, type);
   fmt::print("{}", request.markdown ? MessagesAsMarkdown({message}, channels)
-                                    : MessageAsText(messages, message, channels, kTextWidth));
+                                    : MessageAsText(messages, message, channels, TextWidth()));
   return kExitOk;
 }
 
@@ -118,6 +121,29 @@ void ListRuns() {
   if (!ended.empty()) fmt::print("  the latest that ended: {}\n", logging::ForTerminal(ended));
 }
 
+/// Name, unit and meaning in columns; where these leave little room, the meaning below.
+void PrintMetrics() {
+  constexpr int kLeastRoom = 26;
+  int name = 0;
+  int unit = 0;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    name = std::max(name, DisplayWidth(metric.name));
+    unit = std::max(unit, DisplayWidth(metric.unit));
+  }
+  const int indent = 2 + name + 2 + unit + 2;
+  const int columns = ScreenStyle().columns;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    const std::string line =
+        columns - indent >= kLeastRoom
+            ? Wrapped(fmt::format("  {:<{}}  {:<{}}  {}", metric.name, name, metric.unit, unit,
+                                  metric.description),
+                      columns, indent)
+            : fmt::format("  {}  {}\n{}", metric.name, metric.unit,
+                          Wrapped(fmt::format("      {}", metric.description), columns, 6));
+    fmt::print("{}\n", line);
+  }
+}
+
 int List(const ListRequest& request) {
   const std::string& what = request.what;
   if (request.folders) {
@@ -125,6 +151,7 @@ int List(const ListRequest& request) {
     ListRunFolders();
     return kExitOk;
   }
+  if (request.markdown) KeepUnicode();
   if (what == "fields") return ListFields(request);
   if (what == "messages") return ListMessages(request);
   if (!request.name.empty()) {
@@ -177,9 +204,7 @@ int List(const ListRequest& request) {
   }
   if (wanted("runs")) ListRuns();
   if (wanted("metrics")) {
-    for (const logging::Metric& metric : logging::Metrics()) {
-      fmt::print("  {:<28}{:<6}{}\n", metric.name, metric.unit, metric.description);
-    }
+    PrintMetrics();
   }
   if (what.empty()) {
     fmt::print(

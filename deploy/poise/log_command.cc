@@ -4,6 +4,7 @@
 #include "components/framework/configuration.h"
 #include "deploy/poise/cli_checks.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/scenario_loading.h"
 #include "fmt/format.h"
@@ -21,12 +22,6 @@ using logging::ForTerminal;
 
 constexpr size_t kPlaces = 20;  // named of each kind of problem, without --all
 
-std::string Bytes(int64_t bytes) {
-  if (bytes < 10'000) return fmt::format("{} B", bytes);
-  return bytes < 10'000'000 ? fmt::format("{:.1f} kB", static_cast<double>(bytes) * 1e-3)
-                            : fmt::format("{:.1f} MB", static_cast<double>(bytes) * 1e-6);
-}
-
 void PrintRow(const logging::ChannelSurvey& channel, double duration) {
   const logging::ChannelCompleteness& ticks = channel.ticks;
   const std::string rate =
@@ -35,7 +30,7 @@ void PrintRow(const logging::ChannelSurvey& channel, double duration) {
           : "";
   fmt::print("{:<30} {:<18} {:>9} {:>9} {:>10}\n", ForTerminal(ticks.name),
              channel.type.empty() ? "(not known)" : channel.type, ticks.messages, rate,
-             Bytes(channel.bytes));
+             FormatBytes(channel.bytes));
 }
 
 /// "field: value" lines of the run.
@@ -75,8 +70,11 @@ void PrintRun(const logging::LogSurvey& survey) {
 int Info(const std::string& run) {
   const std::string log = FindLog(run).string();
   const logging::LogSurvey survey = logging::SurveyLog(log);
-  fmt::print("log       {}, {}, {} events\n", log, Bytes(static_cast<int64_t>(survey.file_size)),
-             survey.events);
+  if (survey.events == 0) {
+    throw ConfigError(fmt::format("{}: is no event log: it holds no event", log));
+  }
+  fmt::print("log       {}, {}, {} events\n", log,
+             FormatBytes(static_cast<int64_t>(survey.file_size)), survey.events);
   if (survey.info_problem.empty()) {
     PrintRun(survey);
   } else {
@@ -108,6 +106,7 @@ int Check(const std::string& run, bool all) {
 struct CutOptions {
   std::string run;
   std::string out;
+  bool force = false;
   std::optional<double> from;
   std::optional<double> to;
   std::optional<int64_t> first_tick;
@@ -135,6 +134,13 @@ int Cut(const CutOptions& options) {
   if (options.first_tick) range.first_tick = *options.first_tick;
   if (options.last_tick) range.last_tick = *options.last_tick;
   range.channels = options.channels;
+  CheckFileFree("--out", options.out, options.force);
+  if (std::error_code error; options.force && fs::is_regular_file(options.out, error)) {
+    if (fs::equivalent(options.out, log, error)) {
+      throw ConfigError(fmt::format("{}: is the log itself; choose another file", options.out));
+    }
+    fs::remove(options.out);
+  }
   const logging::CutResult result = logging::CutLog(log, range, options.out);
   if (result.refused > 0) {
     fmt::print(stderr,
@@ -149,6 +155,7 @@ int Cut(const CutOptions& options) {
 
 struct ExportOptions {
   std::string run;
+  bool force = false;
   std::string csv;
   std::string merged;
   std::string mcap;
@@ -198,6 +205,9 @@ int Export(const ExportOptions& options) {
   }
   const std::string log = FindLog(options.run).string();
   CheckExportFiles(options, log);
+  if (!options.csv.empty()) CheckFolderFree("--csv", options.csv, options.force);
+  if (!options.merged.empty()) CheckFileFree("--merged", options.merged, options.force);
+  if (!options.mcap.empty()) CheckFileFree("--mcap", options.mcap, options.force);
   WarnOfRunInfo(log);
   bool whole = true;
   if (!options.csv.empty()) {
@@ -246,7 +256,8 @@ void AddCut(CLI::App* log, Command* command) {
       "cut", "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole");
   AddRun(cut, &options->run);
   const auto time = Within("a time of -1e9 to 1e9 s", [](double s) { return std::abs(s) <= 1e9; });
-  cut->add_option("--out", options->out, "log to write; must not exist")->required();
+  cut->add_option("--out", options->out, "log to write")->required();
+  cut->add_flag("--force", options->force, "replace a file of that name");
   CLI::Option* from =
       cut->add_option("--from", options->from, "first time, s of the scenario")->check(time);
   CLI::Option* to = cut->add_option("--to", options->to, "last time, s")->check(time);
@@ -269,6 +280,7 @@ void AddExport(CLI::App* log, Command* command) {
   app->add_option("--csv", options->csv, "folder for one CSV file a channel, a row a message");
   app->add_option("--merged", options->merged, "one wide CSV file, a row a tick");
   app->add_option("--mcap", options->mcap, "MCAP file, the messages as Protobuf");
+  app->add_flag("--force", options->force, "replace files of these names");
   app->callback([options, command] { *command = [options] { return Export(*options); }; });
 }
 

@@ -1,11 +1,16 @@
 // The program `poise`: runs, checks and inspects process graphs.
+#include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
+#include "components/framework/say_error.h"
 #include "components/robot/robot_model.h"
 #include "deploy/poise/command_line.h"
 #include "deploy/poise/commands.h"
@@ -17,7 +22,7 @@ namespace {
 
 void Fail(std::string_view problem) {
   std::fflush(stdout);
-  fmt::print(stderr, "poise: {}\n", poise::logging::LinesForTerminal(problem));
+  poise::SayError(fmt::format("poise: {}", poise::logging::LinesForTerminal(problem)));
 }
 
 /// `code`, or failure where what was printed has not come out: a full disk behind a redirection.
@@ -30,6 +35,7 @@ int Flushed(int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
   poise::UsePlainStreams();
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
                "poise"};
@@ -58,7 +64,13 @@ int main(int argc, char** argv) {
   poise::AddTopCommand(&app, &command);
   poise::AddViewCommand(&app, &command);
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    if (!arguments.empty() && arguments.front() == "help") {
+      arguments.erase(arguments.begin());
+      arguments.emplace_back("--help");
+    }
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    app.parse(arguments);
   } catch (const CLI::CallForHelp&) {
     fmt::print("{}", poise::HelpText(app));
     return Flushed(poise::kExitOk);

@@ -13,6 +13,8 @@
 #include "deploy/poise/child_process.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/matrix_table.h"
+#include "deploy/poise/output_place.h"
+#include "deploy/poise/output_style.h"
 #include "deploy/poise/progress.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/run_setup.h"
@@ -32,6 +34,7 @@ struct MatrixOptions {
   std::vector<std::string> scenarios = {kAllScenarios};
   std::vector<std::string> ablations;
   std::string out;
+  bool force = false;
   int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 };
 
@@ -41,6 +44,7 @@ struct Job {
   std::vector<std::string> arguments;  ///< of `poise run`, the folder aside
   std::string name;                    ///< of its folder: "SCENARIO/ABLATION"
   double work = 0;                     ///< s to be simulated
+  int64_t log_size = 0;                ///< bytes, expected
   std::unique_ptr<ChildProcess> process;
   bool done = false;
 };
@@ -67,6 +71,7 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   if (!variant.empty()) job.arguments.insert(job.arguments.end(), {"--variant", variant});
   for (const std::string& flag : ablation.flags()) job.arguments.push_back(flag);
   job.name = fmt::format("{}/{}", unique_name, variant.empty() ? ablation.name : variant);
+  job.log_size = ExpectedLogSize(spec) * (loaded.scenario.has_reference() ? 2 : 1);
   job.work = loaded.scenario.duration() * (loaded.scenario.has_reference() ? 2 : 1);
   return job;
 }
@@ -102,7 +107,7 @@ void StartJob(const std::string& program, const fs::path& folder, Job* job) {
   if (fs::exists(dir / "summary.json")) fs::remove(dir / "summary.json");
   std::vector<std::string> command = {program};
   command.insert(command.end(), job->arguments.begin(), job->arguments.end());
-  command.insert(command.end(), {"--out", dir.string()});
+  command.insert(command.end(), {"--force", "--out", dir.string()});
   job->process = std::make_unique<ChildProcess>(job->name, command, dir.string() + ".log");
 }
 
@@ -185,7 +190,12 @@ bool RunJobs(const fs::path& folder, int at_once, std::vector<Job>* jobs) {
 
 int Matrix(const MatrixOptions& options) {
   std::vector<Job> jobs = MakeJobs(options);
-  const RunDir matrix = MakeRunDir(options.out, "matrix");
+  LogSizes sizes;
+  for (const Job& job : jobs) sizes.Add(job.log_size);
+  const std::string space =
+      CheckSpace(options.out.empty() ? RunsDir() : fs::path(options.out), sizes, options.force);
+  if (!space.empty()) fmt::print("{}\n", Wrapped(space, ScreenStyle().columns, 2));
+  const RunDir matrix = MakeRunDir(options.out, "matrix", options.force);
   const fs::path& folder = matrix.path();
   CatchStopSignals();
   fmt::print("{} runs, {} at a time\n", jobs.size(), options.jobs);
@@ -247,6 +257,9 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
   matrix->add_option("--out", options->out,
                      "folder for a run's folder each and matrix.csv; default: a dated one under "
                      "runs/");
+  matrix->add_flag(
+      "--force", options->force,
+      "replace the matrix that --out holds; start though the logs may not fit the disk");
   matrix->footer(
       "Each run is `poise run --inline` with the flags of its column. matrix.csv has a line for "
       "each check of each run:\nscenario, paper_section, variant, ablation, outcome, fell_at [s], "

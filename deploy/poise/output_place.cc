@@ -36,6 +36,18 @@ std::string Holdings(const fs::path& folder) {
   return "is not empty";
 }
 
+/// Bytes that may still be written below `folder`.
+int64_t FreeSpace(const fs::path& folder) {
+  fs::path existing = fs::absolute(folder);
+  std::error_code error;
+  while (!fs::exists(existing, error) && existing.has_relative_path()) {
+    existing = existing.parent_path();
+  }
+  struct statvfs disk {};
+  if (statvfs(existing.c_str(), &disk) != 0) return INT64_MAX;
+  return static_cast<int64_t>(disk.f_bavail) * static_cast<int64_t>(disk.f_frsize);
+}
+
 }  // namespace
 
 void CheckFolderFree(const std::string& flag, const fs::path& folder, bool force) {
@@ -73,43 +85,32 @@ int64_t ExpectedLogSize(const RunSpec& spec) {
   return spec.num_ticks() == 0 ? 0 : kRunInfo + static_cast<int64_t>(kBesides * channels);
 }
 
-int64_t FreeSpace(const fs::path& folder) {
-  fs::path existing = fs::absolute(folder);
-  std::error_code error;
-  while (!fs::exists(existing, error) && existing.has_relative_path()) {
-    existing = existing.parent_path();
-  }
-  int64_t free = INT64_MAX;
-  struct statvfs disk {};
-  if (statvfs(existing.c_str(), &disk) == 0) {
-    free = static_cast<int64_t>(disk.f_bavail) * static_cast<int64_t>(disk.f_frsize);
-  }
-  rlimit limit{};
-  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(free)) {
-    free = static_cast<int64_t>(limit.rlim_cur);
-  }
-  return free;
-}
-
-std::string CheckSpace(const fs::path& folder, int64_t bytes, bool force) {
+std::string CheckSpace(const fs::path& folder, const LogSizes& logs, bool force) {
+  const auto refuse = [&](const std::string& why) {
+    if (force) return;
+    throw ConfigError(fmt::format(
+        "{}; choose another folder (--out) or a shorter run (--duration), or start all the same "
+        "with --force",
+        why));
+  };
   const int64_t free = FreeSpace(folder);
-  if (bytes <= std::min(kLarge, free / kLargeShare)) return "";
-  const std::string what = fmt::format("the log will take about {}; {} are free in {}",
-                                       FormatBytes(bytes), FormatBytes(free), folder.string());
-  if (bytes > free && !force) {
-    throw ConfigError(
-        what +
-        "; choose another folder (--out) or a shorter run (--duration), or start all the "
-        "same with --force");
+  const std::string take = fmt::format("the log will take about {}", FormatBytes(logs.sum));
+  const std::string there = fmt::format("{} are free in {}", FormatBytes(free), folder.string());
+  if (logs.sum > free) refuse(fmt::format("{}; only {}", take, there));
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(logs.largest)) {
+    refuse(fmt::format("{}; the shell's limit on a file's size is {} (ulimit -f)", take,
+                       FormatBytes(static_cast<int64_t>(limit.rlim_cur))));
   }
-  return what;
+  const bool little = logs.sum <= std::min(kLarge, free / kLargeShare);
+  return little ? "" : fmt::format("{}; {}", take, there);
 }
 
 std::string FormatBytes(int64_t bytes) {
   const auto size = static_cast<double>(bytes);
   if (bytes < 10'000) return fmt::format("{} B", bytes);
-  if (bytes < 10'000'000) return fmt::format("{:.1f} kB", size * 1e-3);
-  if (bytes < 10'000'000'000) return fmt::format("{:.1f} MB", size * 1e-6);
+  if (bytes < 1'000'000) return fmt::format("{:.1f} kB", size * 1e-3);
+  if (bytes < 1'000'000'000) return fmt::format("{:.1f} MB", size * 1e-6);
   return fmt::format("{:.1f} GB", size * 1e-9);
 }
 

@@ -1,6 +1,7 @@
 // Where results go: nothing is destroyed silently, and a disk that is too small is named.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -13,20 +14,25 @@ namespace poise {
 /// ("--out"). Throws ConfigError.
 void CheckFolderFree(const std::string& flag, const std::filesystem::path& folder, bool force);
 
-/// The same for a file; a device or a pipe is always free.
+/// The same for a file; a device or a pipe is always free. Logs are left to who writes: nothing
+/// replaces one (PartialFile).
 void CheckFileFree(const std::string& flag, const std::filesystem::path& file, bool force);
 
 /// Bytes that the log of a run will take: its messages' sizes and rates. `spec` holds the channels'
 /// counts (CheckRun); 0 for a run without a planned end. External messages come on top.
 int64_t ExpectedLogSize(const RunSpec& spec);
 
-/// Bytes that may still be written below `folder`, which need not exist yet: by the disk, and to a
-/// single file by the shell's limit.
-int64_t FreeSpace(const std::filesystem::path& folder);
+/// Logs that are about to be written.
+struct LogSizes {
+  int64_t sum = 0;      ///< bytes
+  int64_t largest = 0;  ///< bytes of one
+  void Add(int64_t size) { sum += size, largest = std::max(largest, size); }
+};
 
-/// What to say before logs of `bytes` in all are written below `folder`: empty when that is little.
-/// Throws ConfigError where they cannot fit, unless `force`.
-std::string CheckSpace(const std::filesystem::path& folder, int64_t bytes, bool force);
+/// What to say before `logs` are written below `folder`, which need not exist yet: empty when they
+/// take little of what is free. Throws ConfigError where the disk, or the limit on a file's size,
+/// cannot hold them, unless `force`.
+std::string CheckSpace(const std::filesystem::path& folder, const LogSizes& logs, bool force);
 
 /// "2.8 MB".
 std::string FormatBytes(int64_t bytes);

@@ -1,5 +1,7 @@
 #include "deploy/poise/output_style.h"
 
+#include "deploy/poise/plain_streams.h"
+
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -67,6 +69,8 @@ size_t EndOfEscape(std::string_view text, size_t at) {
   return end == std::string_view::npos ? at : end + 1;
 }
 
+bool keep_unicode = false;
+
 /// A stream that writes to a file descriptor in plain characters.
 struct PlainStream {
   int fd;
@@ -82,7 +86,7 @@ ssize_t WritePlain(void* cookie, const char* data, size_t size) {
     stream->rest = text.substr(begin - 1);
     text.resize(begin - 1);
   }
-  const std::string plain = PlainText(text);
+  const std::string plain = keep_unicode ? text : PlainText(text);
   for (size_t done = 0; done < plain.size();) {
     const ssize_t written = write(stream->fd, plain.data() + done, plain.size() - done);
     if (written < 0 && errno == EINTR) continue;
@@ -177,6 +181,8 @@ std::string PlainText(std::string_view text) {
   }
   return plain;
 }
+
+void KeepUnicode() { keep_unicode = true; }
 
 void UsePlainStreams() {
   static PlainStream out{STDOUT_FILENO, {}};

@@ -145,9 +145,10 @@ const logging::Metric* MetricOfCheck(const Scenario& scenario, int index) {
 
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
   std::vector<CheckResult> results;
+  const bool part = run.spec.has_cut();  // what the scenario limits is of the whole run
   const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
     CheckResult duration;
-    if (spec.num_ticks() > 0) {
+    if (spec.num_ticks() > 0 && !part) {
       duration.at_least =
           static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period();
     }
@@ -159,6 +160,7 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   if (run.reference) reaches_end("duration_reached_reference", run.reference->spec);
   CheckResult defects;
   defects.of_every_run = true;
+  defects.label = "defects of the log";
   defects.at_most = 0;
   results.push_back(defects);
   Evaluate(*logging::FindMetric("log_defects"), run, &results.back());
@@ -175,8 +177,8 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
     const logging::Metric* metric = MetricOfCheck(scenario, i);
     CheckResult result;
     result.label = check.label();
-    if (check.has_at_most()) result.at_most = check.at_most();
-    if (check.has_at_least()) result.at_least = check.at_least();
+    if (check.has_at_most() && !part) result.at_most = check.at_most();
+    if (check.has_at_least() && !part) result.at_least = check.at_least();
     result.paper = check.paper();
     if (check.has_paper_value()) result.paper_value = check.paper_value();
     Evaluate(*metric, run, &result);

@@ -4,6 +4,7 @@
 #include "components/framework/configuration.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/html_report.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/run_screen.h"
@@ -20,6 +21,7 @@ struct ReportOptions {
   std::string html;
   bool no_html = false;
   bool full = false;
+  bool force = false;
 };
 
 ReportedRun ReadReportedRun(const std::string& run) {
@@ -52,6 +54,7 @@ std::filesystem::path DefaultHtml(const std::string& log) {
 }
 
 int Report(const ReportOptions& options) {
+  if (!options.html.empty()) CheckFileFree("--html", options.html, options.force);
   std::vector<ReportedRun> runs;
   runs.push_back(ReadReportedRun(options.run));
   if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
@@ -67,7 +70,14 @@ int Report(const ReportOptions& options) {
   const std::vector<logging::Event> events = logging::Events(run.record);
   const ShownRun shown{run.scenario, run.record, run.checks, events, "", {}};
   text += fmt::format("\n{}\n", options.full ? FormatFullScreen(shown) : FormatScreen(shown));
-  fmt::print("{}{}", text, FormatVerdictLines(run.checks, ""));
+  fmt::print("{}", text);
+  if (run.record.spec.has_cut()) {
+    fmt::print("{}\n", Wrapped("part of a run: the scenario's checks are of the whole one and are "
+                               "not judged here",
+                               ScreenStyle().columns));
+  } else {
+    fmt::print("{}", FormatVerdictLines(run.checks, ""));
+  }
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
@@ -91,6 +101,7 @@ void AddReportCommand(CLI::App* app, Command* command) {
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
   report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report->add_flag("--force", options->force, "replace the file of --html");
   report->add_flag("--full", options->full, "every figure, the events and the assumptions");
   report->callback([options, command] { *command = [options] { return Report(*options); }; });
 }

@@ -20,6 +20,8 @@ struct RunArguments {
 
 int Run(RunArguments arguments) {
   arguments.options.changes.reference = !arguments.no_reference;
+  const std::string& capture = arguments.options.changes.capture;
+  if (!capture.empty()) CheckFileFree("--capture", capture, arguments.options.force);
   const std::vector<std::string>& names = arguments.scenarios;
   if (names.size() == 1 && names.front() != kAllScenarios) {
     const RunResult result = ScenarioRun(names.front(), arguments.options)
@@ -45,8 +47,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "paper, by section, with an overview")
       ->capture_default_str();
   run->add_option("--out", arguments->out,
-                  "folder of the run (of several: holds a folder each); default: a dated one under "
-                  "runs/");
+                  "folder of the run (of several: holds a folder each), new or empty; default: a "
+                  "dated one under runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
   CLI::Option* const realtime = run->add_flag(
@@ -102,13 +104,15 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
   run->add_option("--set", options->changes.set,
-                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120; "
-                  "no value: empties a list or group")
+                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120 or "
+                  "--set 'check[push_peak].at_most=200' (poise list fields); "
+                  "no value: empties a list or group, unsets a number")
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)
       ->take_all();
   run->add_option("--duration", options->changes.duration, "simulated time, s")
-      ->check(Within("in (0, 36000]", [](double s) { return s > 0 && s <= 36000; }));
+      ->check(Within("a number of seconds in (0, 36000]",
+                     [](double s) { return s > 0 && s <= 36000; }));
   run->add_option("--seed", options->changes.seed, "of all noise")
       ->check([](const std::string& text) -> std::string {
         const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
@@ -122,6 +126,9 @@ void AddRunCommand(CLI::App* app, Command* command) {
          "!--no-log", options->launch.log,
          "write no log, for a run of hours: nothing is checked but that it stands to the end")
       ->excludes(in_process);
+  run->add_flag("--force", options->force,
+                "replace the run that --out holds, or the file of --capture; start though the log "
+                "may not fit the disk");
   CLI::Option* const quiet =
       run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
   run->add_flag("--full", options->full, "every figure, the events and the assumptions")

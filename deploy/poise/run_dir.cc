@@ -9,10 +9,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <fstream>
 
 #include "components/framework/configuration.h"
 #include "deploy/poise/catalog.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/run_registry.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
@@ -72,7 +72,7 @@ RunDir::~RunDir() {
   if (fd_ >= 0) close(fd_);
 }
 
-RunDir MakeRunDir(const std::string& out, const std::string& name) {
+RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {
   std::error_code error;
   if (!out.empty()) {
     const fs::path path = fs::absolute(out);
@@ -82,6 +82,7 @@ RunDir MakeRunDir(const std::string& out, const std::string& name) {
                                     error ? error.message() : "there is a file of that name"));
     }
     RunDir dir(path);
+    CheckFolderFree("--out", out, force);
     for (const char* file : kFiles) {
       fs::remove(path / file, error);
       fs::remove(ReferenceDir(path) / file, error);
@@ -137,12 +138,6 @@ RunSpec ReadRunSpec(const std::string& run) {
   RunSpec spec;
   ReadTextProto(path.string(), &spec);
   return spec;
-}
-
-void WriteFile(const fs::path& path, const std::string& text) {
-  std::ofstream out(path, std::ios::binary);
-  out << text;
-  if (!out.flush()) throw ConfigError(fmt::format("{}: cannot be written", path.string()));
 }
 
 }  // namespace poise

@@ -31,9 +31,10 @@ class RunDir {
   int fd_ = -1;
 };
 
-/// Makes the run's folder: `out`, from which an earlier run's files are removed, or, when empty, a
-/// new one under runs/ named after date and `name`. Throws ConfigError.
-RunDir MakeRunDir(const std::string& out, const std::string& name);
+/// Makes the run's folder: `out`, or, when empty, a new one under runs/ named after date and
+/// `name`. An `out` that holds anything is refused; `force` removes an earlier run's files from it
+/// and leaves the rest. Throws ConfigError.
+RunDir MakeRunDir(const std::string& out, const std::string& name, bool force);
 
 /// In a run's folder, the folder of the run that it is compared with.
 std::filesystem::path ReferenceDir(const std::filesystem::path& dir);
@@ -51,8 +52,5 @@ void WarnOfRunInfo(const std::filesystem::path& log);
 /// The run spec in a run's folder, or beside a log; empty `run`: of the latest run. It is there
 /// before the log is. Throws ConfigError.
 RunSpec ReadRunSpec(const std::string& run);
-
-/// Writes a whole file. Throws ConfigError.
-void WriteFile(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace poise

@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "components/framework/configuration.h"
+#include "components/framework/field_path.h"
 #include "components/framework/suggest.h"
 #include "deploy/poise/catalog.h"
+#include "deploy/poise/reference/field_reference.h"
 #include "fmt/format.h"
 #include "logging/metrics.h"
 
@@ -34,11 +37,63 @@ std::string NameProblem(const std::string& name) {
 
 std::string VariantLabel(const Variant& variant) { return "variant " + variant.name(); }
 
-std::string PathOf(const FieldChange& change) { return change.set.substr(0, change.set.find('=')); }
+/// The path as it was written.
+std::string WrittenPath(const FieldChange& change) {
+  return change.set.substr(0, change.set.find('='));
+}
+
+/// With indexes for elements' names, as the checks below name fields.
+std::string PathOf(const LoadedScenario& loaded, const FieldChange& change) {
+  try {
+    return ResolvePath(loaded.scenario, WrittenPath(change));
+  } catch (const ConfigError&) {
+    return WrittenPath(change);  // what it named is gone by a later change
+  }
+}
+
+/// The unit of a field, and how its value is written; empty when it has none.
+std::string UnitHint(std::string_view path, std::string_view value) {
+  std::string pattern;  // as the reference has it: [i] for every index
+  for (size_t i = 0; i < path.size(); ++i) {
+    pattern += path[i];
+    if (path[i] != '[') continue;
+    pattern += "i]";
+    i = std::min(path.find(']', i), path.size() - 1);
+  }
+  for (const FieldEntry& entry : FieldReference(Schema::kScenario)) {
+    if (entry.path != pattern || entry.unit.empty()) continue;
+    const std::string text(value);
+    char* end = nullptr;
+    std::strtod(text.c_str(), &end);
+    const auto digits = static_cast<size_t>(end - text.c_str());
+    if (digits == 0) return fmt::format("; its unit is {}", entry.unit);
+    return fmt::format("; its unit is {}, which is not written: {}={}", entry.unit, path,
+                       text.substr(0, digits));
+  }
+  return "";
+}
 
 std::string NoVariant(const std::string& name, const std::vector<std::string>& names) {
   return names.empty() ? "the scenario has no variants"
                        : fmt::format("no variant named '{}'; {}", name, Suggest(name, names));
+}
+
+/// at_most is below at_least: says so at the one that was changed, and what to do with the other.
+[[noreturn]] void FailLimits(const LoadedScenario& loaded, int index) {
+  const Check& check = loaded.scenario.check(index);
+  const std::string path = fmt::format("check[{}]", index);
+  const auto changed = [&](const char* field) {
+    return std::any_of(
+        loaded.changes.begin(), loaded.changes.end(),
+        [&](const FieldChange& change) { return PathOf(loaded, change) == path + "." + field; });
+  };
+  const bool least = changed("at_least") && !changed("at_most");
+  const char* const other = least ? "at_most" : "at_least";
+  FailField(loaded, fmt::format("{}.{}", path, least ? "at_least" : "at_most"),
+            fmt::format("is {}, {} the check's {}, {}; change that too, or leave it out with --set "
+                        "'check[{}].{}='",
+                        least ? check.at_least() : check.at_most(), least ? "above" : "below",
+                        other, least ? check.at_most() : check.at_least(), check.metric(), other));
 }
 
 void CheckScenario(const LoadedScenario& loaded) {
@@ -63,8 +118,9 @@ void CheckScenario(const LoadedScenario& loaded) {
   if (!(s.check_from() >= 0)) fail("check_from", "must be in [0, duration)");
   if (!(s.check_from() < s.duration())) {
     const auto changed = [&](const char* field) {
-      return std::any_of(loaded.changes.begin(), loaded.changes.end(),
-                         [&](const FieldChange& change) { return PathOf(change) == field; });
+      return std::any_of(
+          loaded.changes.begin(), loaded.changes.end(),
+          [&](const FieldChange& change) { return PathOf(loaded, change) == field; });
     };
     if (changed("duration") && !changed("check_from")) {
       fail("duration", fmt::format("is {} s; must be more than check_from, {} s, from which on the "
@@ -90,7 +146,7 @@ void CheckScenario(const LoadedScenario& loaded) {
     check_finite("paper_value", s.check(i).paper_value());
     if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
         s.check(i).at_most() < s.check(i).at_least()) {
-      fail(fmt::format("check[{}].at_most", i), "is smaller than at_least");
+      FailLimits(loaded, i);
     }
   }
   for (int i = 0; i < s.assumption_size(); ++i) {
@@ -113,7 +169,14 @@ bool HasOwnChecks(const LoadedScenario& loaded) {
 /// The line of an error in `field`, to which `change` gave its value.
 std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
                      std::string_view field, std::string_view problem) {
-  if (change.by == kSetFlag) return fmt::format("{} {}: {}", change.by, field, problem);
+  if (change.by == kSetFlag) {
+    // As the user wrote it: with the element's name.
+    const std::string path = PathOf(loaded, change);
+    const bool inside = field.starts_with(path);
+    const std::string rest(inside ? field.substr(path.size()) : "");
+    return fmt::format("{} {}: {}", change.by,
+                       inside ? WrittenPath(change) + rest : std::string(field), problem);
+  }
   if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) {
     return fmt::format("{}: {}: {}", change.by, field, problem);
   }
@@ -138,10 +201,14 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
                                                   : "cannot be set here; write it in the "
                                                     "scenario's file"));
   }
+  const std::string value = change.set.substr(equals + 1);
   try {
-    SetField(&loaded->scenario, path, change.set.substr(equals + 1));
+    SetField(&loaded->scenario, path, value);
   } catch (const ConfigError& error) {
-    throw ConfigError(Describe(*loaded, change, error.field(), error.problem()));
+    const bool wrong_value = error.problem().starts_with(fmt::format("'{}' is not ", value));
+    const std::string hint = wrong_value ? UnitHint(path, value) : "";
+    throw ConfigError(
+        Describe(*loaded, change, error.field(), fmt::format("{}{}", error.problem(), hint)));
   }
   loaded->changes.push_back(change);
 }
@@ -281,7 +348,8 @@ void FailField(const LoadedScenario& loaded, std::string_view field, std::string
   };
   // The last one counts.
   for (auto change = loaded.changes.rbegin(); change != loaded.changes.rend(); ++change) {
-    if (concerns(PathOf(*change))) throw ConfigError(Describe(loaded, *change, field, problem));
+    if (concerns(PathOf(loaded, *change)))
+      throw ConfigError(Describe(loaded, *change, field, problem));
   }
   std::string written(field);
   if (HasOwnChecks(loaded) && field.starts_with("check[")) {

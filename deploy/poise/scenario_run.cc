@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "components/framework/build_info.h"
+#include "components/framework/configuration.h"
 #include "components/framework/run.h"
 #include "deploy/poise/estimates.h"
 #include "deploy/poise/inline_run.h"
@@ -143,22 +144,35 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   fmt::print("{}", FormatNext(main_.loaded.scenario, result.dir, latest));
 }
 
+LogSizes ScenarioRun::log_sizes() const {
+  LogSizes sizes;
+  if (options_.in_process || options_.launch.log) sizes.Add(ExpectedLogSize(main_.spec));
+  if (reference_) sizes.Add(ExpectedLogSize(reference_->spec));
+  return sizes;
+}
+
 RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const Scenario& scenario = main_.loaded.scenario;
   if (!options_.in_process) ChoosePorts(&main_.spec);
   RunResult result;
-  const RunDir dir = MakeRunDir(out, name());
+  const std::string space =
+      CheckSpace(out.empty() ? RunsDir() : fs::path(out), log_sizes(), options_.force);
+  const RunDir dir = MakeRunDir(out, name(), options_.force);
   result.dir = dir.path();
   // Also what runs after its reference can be found and watched from here on.
   WriteFiles(main_, result.dir);
   if (latest) PointLatestTo(result.dir);
   const RunRegistration registration(result.dir);
   if (!options_.quiet) PrintHeading();
+  if (!options_.quiet && !space.empty()) {
+    fmt::print("{}\n", Wrapped(space, ScreenStyle().columns, 2));
+    std::fflush(stdout);
+  }
   CatchStopSignals();
   RunSummary& summary = result.summary;
   summary.mode = options_.in_process ? "inline" : "processes";
   if (reference_) {
-    const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name());
+    const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name(), true);
     WriteFiles(*reference_, reference.path());
     summary.reference =
         RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true, {});
@@ -197,8 +211,16 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
   summary.failed_by_machine =
       !summary.passed && outcome.completed && FailedByMachine(summary.checks, summary.lost);
-  WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
+  // What is known is said first: a full disk takes the summary along with the log.
+  std::string unwritten;
+  try {
+    WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
+  } catch (const ConfigError& error) {
+    unwritten = error.what();
+    summary.passed = false;
+  }
   PrintEnd(record, result, latest);
+  if (!unwritten.empty()) fmt::print(stderr, "poise: {}\n", unwritten);
   std::fflush(stdout);
   return result;
 }

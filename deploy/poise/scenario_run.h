@@ -8,6 +8,7 @@
 
 #include "components/framework/graph.pb.h"
 #include "deploy/poise/launcher.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/scenario_loading.h"
 
@@ -18,6 +19,7 @@ struct RunOptions {
   bool in_process = false;
   bool quiet = false;  ///< only the verdict
   bool full = false;   ///< every figure, events, assumptions, processes
+  bool force = false;  ///< replace what the folder holds; start where the log may not fit
   LaunchOptions launch;
 };
 
@@ -46,6 +48,8 @@ class ScenarioRun {
   const RunSpec& spec() const { return main_.spec; }
   const std::string& name() const { return main_.spec.scenario(); }
   const Scenario& scenario() const { return main_.loaded.scenario; }
+  /// Its log's, and its reference's.
+  LogSizes log_sizes() const;
 
  private:
   /// One run of a graph.

@@ -104,8 +104,15 @@ bool RunSeveral(const std::vector<std::string>& names, const RunOptions& options
                 const std::string& out) {
   std::vector<ScenarioRun> runs;
   for (const std::string& name : ExpandScenarios(names)) runs.emplace_back(name, options);
+  LogSizes sizes;
+  for (const ScenarioRun& run : runs) {
+    const LogSizes own = run.log_sizes();
+    sizes.sum += own.sum;
+    sizes.largest = std::max(sizes.largest, own.largest);
+  }
+  CheckSpace(out.empty() ? RunsDir() : fs::path(out), sizes, options.force);
   const bool all = names.size() == 1;
-  const RunDir folder = MakeRunDir(out, all ? kAllScenarios : "several");
+  const RunDir folder = MakeRunDir(out, all ? kAllScenarios : "several", options.force);
   CatchStopSignals();
   std::vector<RunResult> results;
   std::set<std::string> taken;

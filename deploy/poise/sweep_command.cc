@@ -3,6 +3,7 @@
 
 #include "components/framework/configuration.h"
 #include "deploy/poise/commands.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/run_dir.h"
 #include "deploy/poise/sweep_output.h"
 #include "deploy/poise/sweep_session.h"
@@ -17,6 +18,7 @@ namespace fs = std::filesystem;
 struct MergeOptions {
   std::vector<std::string> folders;
   std::string out;
+  bool force = false;
   bool partial = false;
 };
 
@@ -104,10 +106,7 @@ int Merge(const MergeOptions& options) {
     throw ConfigError(fmt::format("--out {}: cannot be made", options.out));
   }
   const RunDir dir(out);
-  if (fs::exists(out / kResultsFile)) {
-    throw ConfigError(fmt::format("{}: is there already; choose another folder with --out",
-                                  (out / kResultsFile).string()));
-  }
+  CheckFolderFree("--out", options.out, options.force);
   {
     SweepResultsWriter writer(out, merged->header, {});
     for (const auto& [key, row] : merged->rows) writer.Append(row);
@@ -138,6 +137,7 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   sweep->require_subcommand(0, 1);
   merge->add_option("folder", merge_options->folders, "folders with results")->required();
   merge->add_option("--out", merge_options->out, "folder for the whole")->required();
+  merge->add_flag("--force", merge_options->force, "replace what --out holds");
   merge->add_flag("--partial", merge_options->partial, "though points are missing");
   merge->callback(
       [merge_options, command] { *command = [merge_options] { return Merge(*merge_options); }; });

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "deploy/poise/child_process.h"
-#include "deploy/poise/run_dir.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/sweep_charts.h"
 #include "deploy/poise/sweep_maps.h"
 #include "deploy/poise/sweep_table.h"

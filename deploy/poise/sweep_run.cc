@@ -11,6 +11,7 @@
 #include "components/framework/inline_runner.h"
 #include "components/robot/robot_model.h"
 #include "deploy/poise/estimates.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/registry.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/run_dir.h"
@@ -48,7 +49,7 @@ logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
     run();
     return record.Take();
   }
-  const RunDir dir = MakeRunDir(log_dir, prepared.spec.scenario());
+  const RunDir dir = MakeRunDir(log_dir, prepared.spec.scenario(), /*force=*/true);
   std::string spec;
   google::protobuf::TextFormat::PrintToString(prepared.spec, &spec);
   WriteFile(dir.path() / "run_spec.pbtxt", spec);

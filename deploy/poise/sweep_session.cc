@@ -11,6 +11,7 @@
 #include "components/framework/configuration.h"
 #include "deploy/poise/ablations.h"
 #include "deploy/poise/cli_checks.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/progress.h"
 #include "deploy/poise/signals.h"
 #include "deploy/poise/sweep_workers.h"
@@ -41,14 +42,20 @@ std::optional<std::pair<int64_t, int64_t>> Pair(std::string_view text, char at) 
 }
 
 /// `out`, made if need be, or a dated one.
-RunDir MakeSweepDir(const std::string& out, const std::string& kind, const std::string& name) {
-  if (out.empty()) return MakeRunDir("", kind + "-" + name);
+RunDir MakeSweepDir(const SessionOptions& options, const std::string& kind,
+                    const std::string& name) {
+  const std::string& out = options.out;
+  if (out.empty()) return MakeRunDir("", kind + "-" + name, false);
   const fs::path path = fs::absolute(out);
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path)) {
     throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
                                   error ? error.message() : "there is a file of that name"));
+  }
+  // Results are refused with a word of --resume.
+  if (!options.resume && !fs::exists(path / kResultsFile)) {
+    CheckFolderFree("--out", out, options.force);
   }
   return RunDir(path);
 }
@@ -102,6 +109,7 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
   CLI::Option* const resume = app->add_flag(
       "--resume", session->resume, "go on with the sweep in --out; an empty folder begins one");
   resume->needs(app->get_option("--out"));
+  app->add_flag("--force", session->force, "replace what --out holds")->excludes(resume);
   CLI::Option* const range =
       app->add_option("--range", session->range, "only points A to B - 1")->type_name("A:B");
   app->add_option("--part", session->part, "only the K-th of N shares, K from 1")
@@ -149,14 +157,15 @@ SweepSession::SweepSession(const SweepDefinition& definition, const std::string&
     : definition_(definition),
       options_(options),
       header_{kind, definition.sweep(), definition.columns(), definition.digest(), ProgramDigest()},
-      dir_(MakeSweepDir(options.out, kind, definition.name())) {
+      dir_(MakeSweepDir(options, kind, definition.name())) {
+  if (options_.force && !options_.resume) fs::remove(folder() / kResultsFile);
   std::optional<SweepResults> results = ReadResults(folder());
   if (results) {
     const std::string where = (folder() / kResultsFile).string();
     if (!options_.resume) {
       throw ConfigError(
-          fmt::format("{}: is there already; --resume goes on with it, or choose "
-                      "another folder with --out",
+          fmt::format("{}: is there already; --resume goes on with it, --force "
+                      "replaces it; or choose another folder with --out",
                       where));
     }
     const std::string problem = HeaderProblem(header_, results->header);

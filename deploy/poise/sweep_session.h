@@ -28,6 +28,7 @@ struct SessionOptions {
   std::string part;   ///< "K/N": the K-th of N shares, K from 1
   int jobs = 1;       ///< at a time
   bool resume = false;
+  bool force = false;  ///< replace what `out` holds
   bool logs = false;
   bool quiet = false;
 };

@@ -102,10 +102,13 @@ std::string Block(const std::vector<TableRow>& rows, const std::vector<size_t>& 
       text += joined + "\n";
     }
     if (r > 0) continue;
+    std::string rule;
     for (size_t k = 0; k < columns.size(); ++k) {
-      for (int i = 0; i < widths[k]; ++i) text += "─";
-      text += k + 1 < columns.size() ? "  " : "\n";
+      if (k > 0) rule += "  ";
+      for (int i = 0; i < widths[k]; ++i) rule += "─";
     }
+    rule.erase(rule.find_last_not_of(' ') + 1);
+    text += rule + "\n";
   }
   return text;
 }

@@ -4,6 +4,7 @@
 
 #include <fstream>
 
+#include "components/framework/field_path.h"
 #include "components/framework/suggest.h"
 #include "tests/framework/toy.pb.h"
 
@@ -105,6 +106,32 @@ TEST(SetField, SetsEveryKindOfField) {
   EXPECT_EQ(config.DebugString(), expected.DebugString());
 }
 
+TEST(SetField, FindsAnElementByItsName) {
+  ToyConfig config;
+  ParseTextProto(
+      "phase { name: \"stand\" kp: 1 } phase { name: \"lift\" kp: 2 } phase { name: \"lift\" }",
+      "text", &config);
+  SetField(&config, "phase[stand].kp", "8");
+  EXPECT_EQ(config.phase(0).kp(), 8);
+  SetField(&config, "phase[stand].kp", "");
+  EXPECT_FALSE(config.phase(0).has_kp());
+  EXPECT_EQ(ResolvePath(config, "phase[stand].kp"), "phase[0].kp");
+  EXPECT_EQ(ResolvePath(config, "phase[1].kp"), "phase[1].kp");
+  EXPECT_EQ(ResolvePath(config, "nothing.kp"), "nothing.kp");
+  const auto error = [&](const std::string& path) {
+    try {
+      SetField(&config, path, "3");
+    } catch (const ConfigError& problem) {
+      return problem.problem();
+    }
+    return std::string("none");
+  };
+  EXPECT_EQ(error("phase[stnad].kp"), "no phase is called 'stnad'; did you mean stand?");
+  EXPECT_EQ(error("phase[lift].kp"),
+            "2 elements are called 'lift'; write one of phase[1], phase[2]");
+  EXPECT_EQ(error("weight[heavy]"), "elements of weight have no names; write an index, weight[0]");
+}
+
 TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
   EXPECT_EQ(SetError("joint", "3"), "joint: ToyConfig has no field 'joint'; did you mean joints?");
   EXPECT_EQ(SetError("gains.kx", "3"), "gains.kx: gains has no field 'kx'; did you mean kd or kp?");
@@ -114,10 +141,12 @@ TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
             "gains: gains is a group of fields; name one of them: kp, kd, name");
   EXPECT_EQ(SetError("joints.x", "3"),
             "joints.x: joints is a whole number (int32), not a group of fields");
-  EXPECT_EQ(SetError("phase.kp", "3"),
-            "phase.kp: phase is a list of 1; write phase[0] to phase[1]");
+  EXPECT_EQ(
+      SetError("phase.kp", "3"),
+      "phase.kp: phase is a list of 1; write phase[0].kp, or the element's name for its number; "
+      "phase[1].kp adds one");
   EXPECT_EQ(SetError("phase[2].kp", "3"),
-            "phase[2].kp: phase has 1 elements; the index may be 0 to 1");
+            "phase[2].kp: phase has 1 element; the index may be 0 to 1");
   EXPECT_EQ(SetError("gains[0].kp", "3"), "gains[0].kp: gains is not a list; leave out the index");
   EXPECT_EQ(SetError("joints", "3.5"), "joints: '3.5' is not a whole number (int32)");
   EXPECT_EQ(SetError("joints", "3000000000"), "joints: '3000000000' is not a whole number (int32)");

@@ -256,7 +256,9 @@ TEST_F(AblationTest, AReferenceThatFallsFailsTheRun) {
   }
   EXPECT_EQ(failed, 1);
   EXPECT_EQ(RunPoise({"report", out, "--no-html"}).exit_code, 1);
-  EXPECT_EQ(RunPoise({"run", "mine", "--inline", "--no-reference", "--out", out}).exit_code, 0);
+  EXPECT_EQ(
+      RunPoise({"run", "mine", "--inline", "--no-reference", "--force", "--out", out}).exit_code,
+      0);
 }
 
 TEST_F(AblationTest, ARunIsTheLatestBeforeItsReferenceRuns) {
@@ -302,7 +304,8 @@ TEST_F(AblationTest, ARunThatCannotBeMadeFailsAndTheOthersGoOn) {
   const std::string out = deploy_ / "several";
   fs::create_directory(out);
   std::ofstream(out + "/first") << "a file where the run's folder should be";
-  const ProgramResult result = RunPoise({"run", "first", "second", "--inline", "--out", out});
+  const ProgramResult result =
+      RunPoise({"run", "first", "second", "--inline", "--force", "--out", out});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_TRUE(ReadSummary(out + "/second")["passed"].get<bool>());
   ASSERT_NE(result.output.find("section  scenario"), std::string::npos) << result.output;

@@ -50,16 +50,18 @@ size_t Columns(const std::string& line) {
   }));
 }
 
-/// A line that is wider holds one word that cannot be broken: an address, a path.
+/// A line that is wider is a command or an address with a path, which are not broken.
 void ExpectFits(const std::string& text, size_t width) {
   for (const std::string& line : Lines(text)) {
     if (Columns(line) <= width) continue;
-    std::istringstream words(line);
-    size_t longest = 0;
-    for (std::string word; words >> word;) longest = std::max(longest, Columns(word));
-    EXPECT_GT(longest + 30, width) << "of " << width << " columns: " << line;
     EXPECT_THAT(line, HasSubstr("/")) << "of " << width << " columns";
   }
+}
+
+/// With its line breaks as spaces.
+std::string Flat(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
 }
 
 class FirstScreenTest : public testing::Test {
@@ -97,8 +99,8 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
   char text[100];
   std::snprintf(text, sizeof text, " with %.1f N at ", peak);
   EXPECT_THAT(run.output, HasSubstr("\nPushed from "));
-  EXPECT_THAT(run.output, HasSubstr(text));
-  EXPECT_THAT(run.output, HasSubstr("the robot stood"));
+  EXPECT_THAT(Flat(run.output), HasSubstr(text));
+  EXPECT_THAT(Flat(run.output), HasSubstr("the robot stood"));
   std::snprintf(text, sizeof text, "passed: %d of %d checks hold\n", limited, limited);
   EXPECT_THAT(run.output, HasSubstr(text));
   // The paper's rows alone; all with --full.
@@ -117,6 +119,9 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
       EXPECT_EQ(report.exit_code, 0) << report.output;
       ExpectFits(report.output, static_cast<size_t>(std::atoi(width)));
     }
+  }
+  for (const char* width : {"80", "60"}) {
+    const Environment columns("COLUMNS", width);
     ExpectFits(RunPoise({"list", "metrics"}).output, static_cast<size_t>(std::atoi(width)));
     ExpectFits(RunPoise({"run", "--help"}).output, static_cast<size_t>(std::atoi(width)));
   }
@@ -134,8 +139,7 @@ TEST_F(FirstScreenTest, TellsOfAFallWhenAndWhatWentWrongBefore) {
     std::snprintf(text, sizeof text, "fell at %.3f s", event["time"].get<double>());
   }
   ASSERT_NE(text[0], '\0') << summary["events"];
-  std::string words = run.output;
-  std::replace(words.begin(), words.end(), '\n', ' ');
+  const std::string words = Flat(run.output);
   EXPECT_THAT(words, HasSubstr(std::string("the robot ") + text + " of 4 s"));
   EXPECT_THAT(words, HasSubstr("Before it fell: at "));
   EXPECT_THAT(words, HasSubstr("FAILED: sim_ode: the robot fell"));
@@ -213,6 +217,7 @@ TEST(CommandLine, SaysWhatWasMeant) {
                    {"--durration", "did you mean --duration", "poise run --help"});
   ExpectUsageError({"report", "--seed", "5"}, {"--seed", "poise run"});
   ExpectUsageError({"compare", "a", "b", "c"}, {"'c'", "poise compare --help"});
+  ExpectUsageError({"run", "--out"}, {"--out needs a value"});
   ExpectUsageError({"run", "--duration", "long"}, {"--duration", "poise run --help"});
 }
 
@@ -222,6 +227,7 @@ TEST(CommandLine, HelpsWhereNothingWasAskedFor) {
   EXPECT_THAT(alone.output, HasSubstr("Usage: poise"));
   EXPECT_THAT(alone.output, HasSubstr("report"));
   EXPECT_THAT(RunPoise({"log"}).output, HasSubstr("export"));
+  EXPECT_EQ(RunPoise({"help", "log"}).output, RunPoise({"log", "--help"}).output);
 }
 
 }  // namespace

@@ -124,7 +124,8 @@ TEST_F(MatrixTest, FailsWhenAnExperimentItselfFails) {
   EXPECT_EQ(full.exit_code, 1) << full.output;
   EXPECT_NE(full.output.find("bad/full failed"), std::string::npos) << full.output;
   // In an ablation the same is a result.
-  const ProgramResult ideal = RunPoise({"matrix", "bad", "--ablation", "ideal", "--out", out});
+  const ProgramResult ideal =
+      RunPoise({"matrix", "bad", "--ablation", "ideal", "--force", "--out", out});
   EXPECT_EQ(ideal.exit_code, 0) << ideal.output;
   for (const Row& row : ReadCsv(out + "/matrix.csv")) EXPECT_EQ(row.at("ablation"), "ideal");
 }
@@ -133,8 +134,8 @@ TEST_F(MatrixTest, ARunThatCannotBeMadeIsNamedAndTheOthersGoOn) {
   const std::string out = deploy_ / "matrix";
   std::filesystem::create_directories(out + "/quiet");
   std::ofstream(out + "/quiet/ideal") << "a file where the run's folder should be";
-  const ProgramResult result =
-      RunPoise({"matrix", "quiet", "--ablation", "full", "--ablation", "ideal", "--out", out});
+  const ProgramResult result = RunPoise(
+      {"matrix", "quiet", "--ablation", "full", "--ablation", "ideal", "--force", "--out", out});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_NE(result.output.find("quiet/ideal could not be run: "), std::string::npos)
       << result.output;
