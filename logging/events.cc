@@ -114,7 +114,7 @@ void AddWaiting(const RunRecord& run, EventList* events) {
   }
 }
 
-void AddFeet(const RunRecord& run, EventList* events) {
+void AddFeet(const RunRecord& run, bool ended, EventList* events) {
   const task_torque_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const task_torque_t* task = run.task.at(tick);
@@ -154,7 +154,8 @@ void AddFeet(const RunRecord& run, EventList* events) {
     };
     std::vector<Interval> intervals = Intervals(run, lost);
     std::erase_if(intervals, [&](const Interval& i) {
-      return i.end && run.duration(*i.end - i.begin) < kShortestLoss;
+      if (!i.end && ended) return false;
+      return run.duration(i.end.value_or(run.num_ticks) - i.begin) < kShortestLoss;
     });
     events->AddIntervals(intervals, "contact_lost", "contact_regained", [&](int64_t tick) {
       const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
@@ -263,7 +264,7 @@ double PushThreshold(const RunRecord& run) {
   return kDeviations * *middle / median_of_difference;
 }
 
-void AddPush(const RunRecord& run, EventList* events) {
+void AddPush(const RunRecord& run, bool ended, EventList* events) {
   const double threshold = PushThreshold(run);
   const auto pushed = [&](int64_t tick) -> std::optional<bool> {
     const Answer force = PushForce(run, tick);
@@ -278,6 +279,7 @@ void AddPush(const RunRecord& run, EventList* events) {
     }
     const Eigen::Vector3d force = GetVector3(run.push.at(peak)->force);
     events->Add(interval.begin, "push_begins", fmt::format("above {:.2g} N", threshold));
+    if (!interval.end && !ended) continue;
     events->Add(peak, "push_peak",
                 fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), force.x(),
                             force.y(), force.z()));
@@ -303,12 +305,17 @@ void AddCrane(const RunRecord& run, EventList* events) {
   }
 }
 
-void AddEnd(const RunRecord& run, EventList* events) {
+void AddEnd(const RunRecord& run, bool ended, EventList* events) {
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const ground_truth_t* truth = run.truth.at(tick);
     if (truth == nullptr || truth->fallen == 0) continue;
     events->Add(tick, "fall", fmt::format("true COM {:.3f} m high", truth->com_position[2]));
     break;
+  }
+  if (!ended) return;
+  if (run.spec.has_cut()) {
+    events->Add(run.num_ticks, "log_ends", "a part of a longer log");
+    return;
   }
   const int64_t planned = run.spec.num_ticks();
   events->Add(run.num_ticks, "run_ended",
@@ -406,20 +413,28 @@ std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& 
   return fmt::format("{} ({})", reason, names.Joint(bridge.reason_joint));
 }
 
-std::vector<Event> Events(const RunRecord& run) {
+std::vector<Event> Events(const RunRecord& run, bool ended) {
   EventList events(run);
   AddPhases(run, &events);
   AddSupport(run, &events);
   AddTransitions(run, &events);
   AddWaiting(run, &events);
-  AddFeet(run, &events);
+  AddFeet(run, ended, &events);
   AddBalancing(run, &events);
   AddCapturePoint(run, &events);
   AddBridge(run, &events);
-  AddPush(run, &events);
+  AddPush(run, ended, &events);
   AddCrane(run, &events);
-  AddEnd(run, &events);
-  return std::move(events).Sorted();
+  AddEnd(run, ended, &events);
+  std::vector<Event> sorted = std::move(events).Sorted();
+  if (run.spec.cut().first_tick() > 0) {
+    const double first = run.time(run.spec.cut().first_tick());
+    for (Event& event : sorted) {
+      if (event.time > first) break;
+      event.detail += "; or earlier, where the log does not reach";
+    }
+  }
+  return sorted;
 }
 
 }  // namespace poise::logging

@@ -18,13 +18,14 @@ struct Event {
 
 /// All of the run, first_tick or not, in order of time, of one tick's events the ends first; found
 /// in its messages alone. What holds at the first tick begins there, and what lasts to the run's
-/// end has no end. Names: phase_began, support_changed, unloading_begins, unloading_ends,
-/// loading_begins, loading_ends, waiting_begins, waiting_ends, searching, touch_down,
-/// contact_early, contact_late, no_surface, contact_lost, contact_regained, balancing_on,
-/// balancing_off, eta_infeasible_begins, eta_infeasible_ends, cop_not_achieved_begins,
-/// cop_not_achieved_ends, step_needed, step_needed_ends, bridge_state, push_begins, push_peak,
-/// push_ends, crane_let_go, fall, run_ended.
-std::vector<Event> Events(const RunRecord& run);
+/// end has no end. `ended`: false leaves out what messages to come may change (the run's end, the
+/// peak of a push under way). A part of a run ends with log_ends. Names: phase_began,
+/// support_changed, unloading_begins, unloading_ends, loading_begins, loading_ends, waiting_begins,
+/// waiting_ends, searching, touch_down, contact_early, contact_late, no_surface, contact_lost,
+/// contact_regained, balancing_on, balancing_off, eta_infeasible_begins, eta_infeasible_ends,
+/// cop_not_achieved_begins, cop_not_achieved_ends, step_needed, step_needed_ends, bridge_state,
+/// push_begins, push_peak, push_ends, crane_let_go, fall, run_ended, log_ends.
+std::vector<Event> Events(const RunRecord& run, bool ended = true);
 
 /// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty
 /// reason for none.

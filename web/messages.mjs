@@ -1,6 +1,6 @@
 // Units, texts and names of constants of the messages' fields, read from the comments of the .lcm files.
 
-const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A'];
+const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A', 's'];
 
 /** The unit that a field's comment begins with; '' when it begins with none. */
 export function unitOf(comment) {
@@ -8,15 +8,18 @@ export function unitOf(comment) {
   return unit === 'm/s^2' ? 'm/s²' : unit === 'us' ? 'µs' : unit ?? '';
 }
 
-/** {name, text, fields: {field: {type, unit, text, values}}} of one .lcm file; values: names by number. */
+/**
+ * {name, text, fields: {field: {type, unit, text, count, values}}} of one .lcm file; count: 'num_joints' or the like, of a
+ * list of such length; values: names by number.
+ */
 export function parseMessage(source) {
   const name = /^struct\s+(\w+)/m.exec(source)[1];
   const head = source.slice(0, source.indexOf('struct'));
   const text = [...head.matchAll(/^\/\/\s?(.*)$/gm)].map((m) => m[1]).join(' ');
   const fields = {};
-  for (const m of source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[\w+\])?;[ \t]*(?:\/\/[ \t]*(.*))?$/gm)) {
-    const comment = m[3] ?? '';
-    fields[m[2]] = {type: m[1], unit: unitOf(comment), text: comment};
+  for (const m of source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[(\w+)\])?;[ \t]*(?:\/\/[ \t]*(.*))?$/gm)) {
+    const comment = m[4] ?? '';
+    fields[m[2]] = {type: m[1], unit: unitOf(comment), text: comment, count: /^num_/.test(m[3] ?? '') ? m[3] : undefined};
   }
   const code = source.replace(/\/\/.*$/gm, '');
   const constants = [...code.matchAll(/\bconst\s+\w+\s+([^;]+);/g)]

@@ -166,9 +166,7 @@ Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
               const std::vector<CheckResult>& checks) {
   Json json;
   json["format"] = 1;
-  json["run"] = RunJson(scenario, record, checks);
-  json["run"]["run_id"] = std::to_string(record.spec.run_id());  // beyond a double's integers
-  json["run"]["damages"] = record.damages;
+  json["run"] = PageRunJson(record, scenario, checks);
   json["scenario"] = ScenarioJson(scenario);
   json["scenario_text"] = record.info.scenario;
   json["robot"] = RobotJson(record);
@@ -201,6 +199,14 @@ void WritePage(std::ostream* out, const std::function<void()>& write) {
 }
 
 }  // namespace
+
+Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
+                 const std::vector<CheckResult>& checks) {
+  Json json = RunJson(scenario, record, checks);
+  json["run_id"] = std::to_string(record.spec.run_id());  // beyond a double's integers
+  json["damages"] = record.damages;
+  return json;
+}
 
 void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
   for (const ReportedRun& run : runs) {

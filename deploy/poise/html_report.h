@@ -21,6 +21,10 @@ struct ReportedRun {
   std::vector<CheckResult> checks;
 };
 
+/// What a page says of a run beside its messages: RunJson, and of its log.
+nlohmann::ordered_json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
+                                   const std::vector<CheckResult>& checks);
+
 /// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
 /// template is not built, `file` cannot be written or is a log; LogError for a log that is gone. A
 /// page that is not finished leaves `file` as it was.

@@ -148,7 +148,9 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
   const bool part = run.spec.has_cut();  // what the scenario limits is of the whole run
   const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
     CheckResult duration;
-    if (spec.num_ticks() > 0 && !part) {
+    if (part) {
+      duration.label = "simulated time at which this part of the run ends";
+    } else if (spec.num_ticks() > 0) {
       duration.at_least =
           static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period();
     }
@@ -326,6 +328,8 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
   json["paper_section"] = scenario.paper_section();
   json["run_id"] = run.spec.run_id();
   json["started_at"] = run.info.started_at;
+  json["poise_commit"] = run.spec.poise_commit();
+  json["instruction_set"] = run.spec.instruction_set();
   json["versions"]["poise"] = run.spec.poise_version();
   for (const std::string& library : run.spec.library_version()) {
     const size_t space = library.find(' ');
@@ -347,6 +351,11 @@ Json RunJson(const Scenario& scenario, const logging::RunRecord& run,
   json["lead_ticks"] = run.spec.lead_ticks();
   json["planned_ticks"] = run.spec.num_ticks();
   json["ticks"] = run.num_ticks;
+  json["cut"] = nullptr;
+  if (run.spec.has_cut()) {
+    json["cut"] = {{"first_tick", run.spec.cut().first_tick()},
+                   {"last_tick", run.spec.cut().last_tick()}};
+  }
   json["simulated_time"] = run.time(run.num_ticks);
   json["real_time_factor"] = Optional(run.real_time_factor);
   json["refused_health"] = run.refused_health;

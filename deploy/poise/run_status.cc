@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <stdexcept>
 #include <utility>
 
+#include "deploy/poise/html_report.h"
 #include "deploy/poise/report.h"
 #include "deploy/poise/scenario_run.h"
+#include "fmt/format.h"
 #include "logging/events.h"
 #include "logging/run_record.h"
 
@@ -25,15 +28,22 @@ bool OnlyAtTheEnd(const CheckResult& check) {
 
 }  // namespace
 
-nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario) {
+nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario, bool ended) {
   logging::RunRecord record = logging::ReadRun(log);
   PrepareRecord(log, scenario, &record);
   std::vector<CheckResult> checks = EvaluateChecks(scenario, record);
-  std::erase_if(checks, OnlyAtTheEnd);
-  return {{"checks", ChecksJson(checks)},
-          {"events", EventsJson(logging::Events(record))},
-          {"components", ComponentsJson(record.health)},
-          {"checked_ticks", record.num_ticks}};
+  if (!ended) std::erase_if(checks, OnlyAtTheEnd);
+  nlohmann::ordered_json json = {{"ended", ended},
+                                 {"checks", ChecksJson(checks)},
+                                 {"events", EventsJson(logging::Events(record, ended))},
+                                 {"components", ComponentsJson(record.health)},
+                                 {"checked_ticks", record.num_ticks}};
+  if (ended) {
+    json["run"] = PageRunJson(record, scenario, checks);
+  } else {
+    for (nlohmann::ordered_json& check : json["checks"]) check["passed"] = nullptr;
+  }
+  return json;
 }
 
 RunStatus::RunStatus(std::string log, Scenario scenario)
@@ -48,29 +58,45 @@ RunStatus::~RunStatus() {
   thread_.join();
 }
 
+void RunStatus::Finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  stop_.notify_one();
+}
+
 std::optional<nlohmann::ordered_json> RunStatus::Take() {
   const std::lock_guard lock(mutex_);
   return std::exchange(newest_, std::nullopt);
 }
 
 void RunStatus::Run() {
-  Clock::duration pause = kPause;
+  bool ended = false;
   while (true) {
     const auto start = Clock::now();
     std::error_code error;
-    if (std::filesystem::file_size(log_, error) <= kMostBytes) {
-      std::optional<nlohmann::ordered_json> status;
+    const bool readable = std::filesystem::file_size(log_, error) <= kMostBytes;
+    if (readable || ended) {
+      nlohmann::ordered_json status;
       try {
-        status = StatusJson(log_, scenario_);
+        if (!readable) {
+          throw std::runtime_error(
+              fmt::format("{}: has more than {} MB, or cannot be read", log_, kMostBytes >> 20));
+        }
+        status = StatusJson(log_, scenario_, ended);
       } catch (const std::exception& problem) {
-        status = {{"problem", problem.what()}};  // the page tells
+        status = {{"ended", ended}, {"problem", problem.what()}};  // the page tells
       }
       const std::lock_guard lock(mutex_);
       newest_ = std::move(status);
     }
-    pause = std::max<Clock::duration>(kPause, kShare * (Clock::now() - start));
+    if (ended) return;
+    const auto pause = std::max<Clock::duration>(kPause, kShare * (Clock::now() - start));
     std::unique_lock lock(mutex_);
-    if (stop_.wait_for(lock, pause, [this] { return stopped_; })) return;
+    stop_.wait_for(lock, pause, [this] { return stopped_ || ended_; });
+    if (stopped_) return;
+    ended = ended_;
   }
 }
 

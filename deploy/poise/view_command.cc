@@ -135,6 +135,7 @@ class Viewer {
       last_message_ = now;
       if (!live_->InProgress()) {
         ring_.Finish();
+        status_.Finish();
         fmt::print("the run has ended; its page stays until Ctrl-C; {} {} checks it\n", kLogCommand,
                    live_->dir().string());
         std::fflush(stdout);

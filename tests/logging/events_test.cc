@@ -311,6 +311,32 @@ TEST_F(EventsTest, APushWithAShortDipIsOne) {
   EXPECT_EQ(Named("push_begins").size(), 2u);
 }
 
+TEST_F(EventsTest, ARunInProgressTellsNothingThatMayChange) {
+  spec_.set_num_ticks(2 * kTicks);
+  for (size_t t = 0; t < kTicks; ++t) {
+    command_[t].foot_wrench[0].force[2] = -300;
+    // Lost for 4 ticks at the end: a rattle, or a loss that only begins.
+    sensors_[t].foot_wrench[0].force[2] = t >= kTicks - 4 ? 2 : -290;
+    if (t >= 90) push_[t].force[1] = static_cast<double>(t);
+  }
+  const RunRecord run = Read();
+  EXPECT_THAT(Events(run, false), ElementsAre(Is(0, "phase_began"), Is(0.18, "push_begins")));
+  EXPECT_THAT(Events(run), ElementsAre(Is(0, "phase_began"), Is(0.18, "push_begins"),
+                                       Is(0.192, "contact_lost"), Is(0.198, "push_peak", "99.0 N"),
+                                       Is(0.2, "run_ended", "0.200 s before")));
+}
+
+TEST_F(EventsTest, APartOfARunNeitherBeginsNorEndsIt) {
+  spec_.set_num_ticks(2 * kTicks);
+  spec_.mutable_cut()->set_first_tick(40);
+  spec_.mutable_cut()->set_last_tick(kTicks - 1);
+  for (size_t t = 0; t < kTicks; ++t) balance_[t].active_y = t < 60 ? 1 : 0;
+  EXPECT_THAT(
+      Events(Read()),
+      ElementsAre(Is(0.08, "phase_began", "or earlier"), Is(0.08, "balancing_on", "or earlier"),
+                  Is(0.12, "balancing_off"), Is(0.2, "log_ends", "part of a longer log")));
+}
+
 TEST_F(EventsTest, AMissingMessageEndsNothing) {
   for (size_t t = 20; t < 30; ++t) balance_[t].active_y = 1;
   balance_[25].run_id = 43;  // refused

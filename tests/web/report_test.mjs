@@ -233,10 +233,166 @@ test('the page shows the run, plays it, and needs no network', async () => {
     const {grid, view} = window.poise;
     view.reset();
     await Promise.all(grid.panels.map((p) => p.show()));
-    return grid.panels.map((p) => [p.definition.title, p.data.slice(1).map((v) => v.some((x) => x !== null))]);
+    return grid.panels.map((p) => [p.definition.title, p.data.slice(1).map((v) => v.some((x) => x !== null)),
+      p.data.every((v) => v.every((x) => x === null || Number.isFinite(x))),
+      ['x', 'y'].every((axis) => Number.isFinite(p.plot.scales[axis].min) && Number.isFinite(p.plot.scales[axis].max))]);
   });
-  for (const [title, filled] of lines) assert.ok(filled.every(Boolean), title);
+  for (const [title, filled, finite, ranges] of lines) {
+    assert.ok(filled.every(Boolean), title);
+    assert.ok(finite && ranges, `${title}: not all of it is finite`);
+  }
   assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('the keys work after a click with the mouse, and a control reached by tab keeps them', async () => {
+  const {page, problems} = await openPage(browser, path('a/report.html'));
+  await page.evaluate(() => window.poise.printer.drawAll());
+  const controls = ['.toolbar button:has-text("front")', '.toolbar input[type=checkbox]', '.toolbar label:has-text("CoP")',
+    '.dock-box input', '.legend .entry', 'button[title="Remove this plot"], .events button', 'summary', '#player button:has-text("all")',
+    'a.badge[href]', '#scrub'];
+  for (const control of controls) {
+    await page.locator(control).first().click();
+    await page.evaluate(() => window.poise.player.seek(0.5));
+    await page.keyboard.press('Space');
+    assert.equal((await state(page)).playing, true, `space after a click on ${control}`);
+    await page.keyboard.press('Space');
+    assert.equal((await state(page)).playing, false, `space after a click on ${control}`);
+  }
+  await page.selectOption('#speed', '2');
+  const keys = {ArrowRight: (s) => s.tick === 251, ArrowLeft: (s) => s.tick === 250, 'Shift+ArrowRight': (s) => s.tick === 300,
+    'Shift+ArrowLeft': (s) => s.tick === 250, End: (s) => s.tick === 999, Home: (s) => s.tick === 0,
+    '[': async () => await page.evaluate(() => window.poise.player.speed) === 1, ']': async () => await page.evaluate(() => window.poise.player.speed) === 2,
+    '+': (s) => s.max - s.min < 1.9, '-': (s) => s.max - s.min > 1.9, '0': (s) => s.max - s.min > 1.99};
+  await page.evaluate(() => window.poise.player.seek(0.5));
+  for (const [key, holds] of Object.entries(keys)) {
+    await page.locator('.toolbar input[type=checkbox]').first().click();
+    await page.keyboard.press(key);
+    assert.ok(await holds(await state(page)), key);
+  }
+  await page.locator('.toolbar button').first().click();
+  await page.keyboard.press('/');
+  assert.equal(await page.evaluate(() => document.activeElement.id), 'signal-search');
+  // Writing is no command.
+  await page.keyboard.type(' 0');
+  assert.equal((await state(page)).playing, false);
+  // By the tab key a box keeps the space bar.
+  await page.locator('.toolbar input[type=checkbox]').first().focus();
+  const checked = await page.locator('.toolbar input[type=checkbox]').first().isChecked();
+  await page.keyboard.press('Space');
+  assert.equal(await page.locator('.toolbar input[type=checkbox]').first().isChecked(), !checked);
+  assert.equal((await state(page)).playing, false);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('joints are found by name, and are named with units in the file', async () => {
+  const {page} = await openPage(browser, path('a/report.html'));
+  await page.fill('#signal-search', 'right knee');
+  const found = (await page.locator('.results .name').allInnerTexts());
+  for (const name of ['JOINT_COMMAND.torque[right_knee_pitch]', 'ROBOT_STATE.joint_position[right_knee_pitch]',
+    'ROBOT_STATE.joint_velocity[right_knee_pitch]']) assert.ok(found.includes(name), `${name} is not among ${found}`);
+  await page.click('text=JOINT_COMMAND.torque[right_knee_pitch]');
+  const panel = page.locator('.panel').first();
+  assert.equal(await panel.locator('h3').innerText(), 'JOINT_COMMAND.torque[right_knee_pitch]');
+  assert.match(await panel.locator('.legend').innerText(), /torque\[right_knee_pitch\]\s+-?[\d.]+ (m|µ)?N·m/);
+  const download = page.waitForEvent('download');
+  await panel.getByRole('button', {name: 'CSV'}).click();
+  await (await download).saveAs(path('knee.csv'));
+  assert.match(readFileSync(path('knee.csv'), 'utf8'), /^time \(s\),torque\[right_knee_pitch\] \(N·m\)\r\n/);
+  await page.context().close();
+});
+
+test('nothing covers the plots and tables, and a phone needs no second direction', async () => {
+  for (const width of [1400, 1000, 400]) {
+    const {page, problems} = await openPage(browser, path('a/report.html'), {viewport: {width, height: 800}});
+    await page.evaluate(() => window.poise.printer.drawAll());
+    const wide = await page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]);
+    assert.equal(wide[0], wide[1], `at ${width} px the page is ${wide[0]} wide`);
+    const docked = (on) => page.waitForFunction((d) => (document.getElementById('scene').parentElement.id === 'dock') === d, on);
+    for (const place of ['#figures', '#tables']) {
+      await page.evaluate((id) => document.querySelector(id).scrollIntoView({block: 'center'}), place);
+      await docked(width >= 900);
+      const covered = await page.evaluate(() => {
+        const box = (e) => e.getBoundingClientRect();
+        const scene = box(document.getElementById('scene')), bar = box(document.getElementById('player'));
+        return [...document.querySelectorAll('.panel, .table')].filter((e) => {
+          const b = box(e);
+          return b.top < bar.top && scene.bottom > 0 && b.left < scene.right && b.right > scene.left && b.top < scene.bottom && b.bottom > scene.top;
+        }).length;
+      });
+      assert.equal(covered, 0, `${place} at ${width} px`);
+    }
+    // Words of tables are whole: none is wider than its cell.
+    const broken = await page.evaluate(() => [...document.querySelectorAll('.table td, .table th')].filter((cell) => {
+      const style = getComputedStyle(cell);
+      return style.overflowWrap === 'anywhere' || style.wordBreak !== 'normal' || cell.scrollWidth > cell.clientWidth + 1;
+    }).map((cell) => cell.textContent));
+    assert.deepEqual(broken, [], `at ${width} px`);
+    await page.evaluate(() => scrollTo(0, 0));
+    await docked(false);
+    assert.deepEqual(problems, []);
+    await page.context().close();
+  }
+});
+
+test('a page that nobody has scrolled prints with all its plots, light', async () => {
+  const {page, problems} = await openPage(browser, path('a/report.html'), {colorScheme: 'dark'});
+  await page.waitForFunction(() => 'drawn' in document.documentElement.dataset);
+  await page.evaluate(() => {
+    addEventListener('beforeprint', () => {
+      const {panels} = window.poise.grid;
+      window.printed = {panels: panels.length, drawn: panels.filter((p) => p.plot).length,
+        paper: getComputedStyle(document.body).backgroundColor, pictures: document.querySelectorAll('img.paper[src^="data:image/png"]').length};
+    });
+  });
+  const pdf = await page.pdf({format: 'A4'});
+  const printed = await page.evaluate(() => window.printed);
+  assert.ok(printed.panels > 15 && printed.drawn === printed.panels, JSON.stringify(printed));
+  assert.equal(printed.paper, 'rgb(244, 246, 249)');
+  assert.equal(printed.pictures, 1);
+  assert.ok((pdf.toString('latin1').match(/\/Type\s*\/Page\b/g) ?? []).length >= 4);
+  // And the screen is as it was.
+  assert.equal(await page.evaluate(() => document.documentElement.hasAttribute('data-paper')), false);
+  assert.equal(await page.locator('img.paper').count(), 0);
+  const filled = await page.evaluate(() => window.poise.grid.panels.map((p) => {
+    const {width, height} = p.plot.ctx.canvas;
+    return p.plot.ctx.getImageData(0, 0, width, height).data.some((x) => x !== 0);
+  }));
+  assert.ok(filled.every(Boolean));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a part of a run is told to be one', async () => {
+  const cut = poise('log', 'cut', path('a'), '--from', '0.5', '--to', '1.1', '--out', path('part.lcm'));
+  assert.equal(cut.status, 0, cut.stderr);
+  poise('report', path('part.lcm'));
+  const {page, problems} = await openPage(browser, path('part.html'));
+  assert.match(await page.locator('#header').innerText(), /part of a run: 0\.5 s to 1\.1/);
+  const checks = await page.locator('#tables table').first().innerText();
+  assert.match(checks, /simulated time at which this part of the run ends/);
+  assert.doesNotMatch(checks.split('\n').find((line) => line.startsWith('simulated time')), /FAILED|ok/);
+  assert.doesNotMatch(await page.locator('.events').innerText(), /before its planned end/);
+  assert.match(await page.locator('.events').innerText(), /or earlier/);
+  const shown = await state(page);
+  near(shown.min, 0.5, 0.003);
+  near(shown.time, 0.5, 0.003);
+  await page.evaluate(() => window.poise.printer.drawAll());
+  assert.ok(await page.evaluate(() => window.poise.grid.panels.every((p) => p.data.slice(1).some((v) => v.some((x) => x !== null)))));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('the build and its commit tell the run apart', async () => {
+  const {page} = await openPage(browser, path('a/report.html'));
+  const spec = readFileSync(path('a/run_spec.pbtxt'), 'utf8');
+  const set = /instruction_set: "([^"]+)"/.exec(spec)[1];
+  const commit = /poise_commit: "([^"]*)"/.exec(spec)?.[1] ?? '';
+  const header = await page.locator('#header').innerText();
+  assert.ok(header.includes(set) && header.includes(commit.slice(0, 12)), header);
+  const tables = await page.locator('#tables').innerText();
+  assert.ok(tables.includes(set) && tables.includes(commit));
   await page.context().close();
 });
 
@@ -256,7 +412,7 @@ test('a run that grows grows in the plots, the bar and the picture', async () =>
   });
   await page.locator('.panel', {hasText: 'External push'}).first().scrollIntoViewIfNeeded();
   await page.waitForFunction((n) => document.getElementById('scrub').max === String(n - 1)
-    && window.poise.grid.inSight.size > 0
+    && [...window.poise.grid.inSight].some((p) => p.definition.title.startsWith('External push'))
     && [...window.poise.grid.inSight].every((p) => p.data[0].length === n), ticks);
   near((await state(page)).max, (ticks - 1) * 0.002, 1e-9);
   const push = await page.evaluate(() => {

@@ -1,9 +1,12 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
-import {findPhases, intervals} from '../../web/src/derived.js';
-import {figuresFor, pitchJoints} from '../../web/src/figures.js';
+import {deflateSync} from 'node:zlib';
+import {Run} from '../../web/src/data.js';
+import {addDerivedSignals, findPhases, lightLoad, noisyLoad} from '../../web/src/derived.js';
+import {figuresFor, panelOf, pitchJoints} from '../../web/src/figures.js';
 import {addBatch, decodeBatch} from '../../web/src/live.js';
 import {searchSignals} from '../../web/src/search.js';
+import {formatNumber, leastSpan, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
 
 const near = (actual, expected, message) => assert.ok(Math.abs(actual - expected) < 1e-6, message ?? `${actual} is not ${expected}`);
@@ -148,13 +151,142 @@ test('a run grows by ticks, and what follows from its signals with it', async ()
   assert.equal((await valuesOf(run, 'derived.push_magnitude')).length, 3501);
 });
 
-test('stretches of the same value, in ticks and as phases', async () => {
-  assert.deepEqual(intervals(6, (i) => i < 2 || i > 4), [{from: 0, to: 1, value: true}, {from: 2, to: 4, value: false},
-    {from: 5, to: 5, value: true}]);
+test('phases of a run, and of one that grows', async () => {
   const run = makeRun('', {'task_torque_t.in_contact[0]': 1, 'balance_torque_t.active_y': 1});
   const phases = await findPhases(run);
   assert.deepEqual(phases.support, [{from: 0, to: 4 * 0.002, value: 'right foot'}]);
   assert.deepEqual(phases.balancing, [{from: 0, to: 4 * 0.002, value: true}]);
+  assert.deepEqual(phases.missing, []);
+});
+
+test('a missed message changes no phase, a long gap is known as one', async () => {
+  const run = makeRun('', {}, 0);
+  const phases = await findPhases(run);
+  const add = (n, right, left, active = 0) => {
+    const fill = (x) => new Float64Array(n).fill(x);
+    run.appendTicks(n, right === undefined ? {} : {'TASK_TORQUE.in_contact[0]': fill(right), 'TASK_TORQUE.in_contact[1]': fill(left),
+      'BALANCE_TORQUE.active_x': fill(0), 'BALANCE_TORQUE.active_y': fill(active)});
+    phases.update();
+  };
+  const ticks = (list) => list.map(({from, to, value}) => [Math.round(from / 0.002), Math.round(to / 0.002), value]);
+  add(10, 1, 1);
+  add(3);  // missed
+  assert.deepEqual(ticks(phases.support), [[0, 13, 'both feet']]);
+  add(10, 1, 1, 1);
+  add(2);
+  add(5, 1, 0, 0);
+  assert.deepEqual(ticks(phases.support), [[0, 25, 'both feet'], [25, 30, 'right foot']]);
+  assert.deepEqual(ticks(phases.balancing), [[13, 25, true]]);
+  assert.deepEqual(phases.missing, []);
+  add(60);  // 0.12 s
+  add(5, 1, 1);
+  assert.deepEqual(ticks(phases.support), [[0, 25, 'both feet'], [25, 30, 'right foot'], [90, 95, 'both feet']]);
+  assert.deepEqual(ticks(phases.missing), [[30, 90, undefined]]);
+});
+
+test('phases of a live run begin with what it keeps', async () => {
+  const run = makeRun('', {}, 0, {keep: 100});
+  const phases = await findPhases(run);
+  for (let k = 0; k < 4; ++k) {
+    run.appendTicks(50, {'TASK_TORQUE.in_contact[0]': new Float64Array(50).fill(1), 'TASK_TORQUE.in_contact[1]': new Float64Array(50).fill(k % 2)});
+    phases.update();
+  }
+  assert.deepEqual(phases.support.map(({from, to, value}) => [Math.round(from / 0.002), Math.round(to / 0.002), value]),
+    [[100, 150, 'right foot'], [150, 200, 'both feet']]);
+});
+
+test('no ratio and no centre of pressure of a sole without load', async () => {
+  const computed = (fz) => makeRun('7.5', {'joint_command_t.in_contact[1]': 1, 'joint_command_t.foot_wrench[1].force[2]': fz,
+    'joint_command_t.foot_wrench[1].moment[0]': 0.01, 'joint_command_t.foot_wrench[1].force[0]': 0.1});
+  const measured = (fz) => makeRun('7.5', {'robot_sensors_t.foot_wrench[1].force[2]': fz,
+    'robot_sensors_t.foot_wrench[1].moment[0]': 0.01, 'task_torque_t.in_contact[1]': 1,
+    'task_torque_t.foot_pose[1].orientation[0]': 1, 'balance_torque_t.frame_o.orientation[0]': 1});
+  const least = lightLoad(makeRun(''));
+  near(least, 0.0980665 * 10);  // a hundredth of 10 kg
+  for (const fz of [0, -6.4e-5, 6.4e-5, -0.99 * least]) {
+    for (const key of ['friction', 'yaw', 'roll', 'pitch']) {
+      assert.deepEqual(await valuesOf(computed(fz), `derived.left_${key}_ratio_computed`), [NaN, NaN, NaN, NaN], `${key} at ${fz} N`);
+      assert.deepEqual(await valuesOf(measured(fz), `derived.left_${key}_ratio_measured`), [NaN, NaN, NaN, NaN], `${key} at ${fz} N`);
+    }
+    for (const name of ['cop_measured_x', 'cop_measured_abs_y']) {
+      assert.ok((await valuesOf(measured(fz), `derived.${name}`)).every(Number.isNaN), `${name} at ${fz} N`);
+    }
+  }
+  near((await valuesOf(computed(-2 * least), 'derived.left_roll_ratio_computed'))[0], 0.01 / (2 * least));
+  const noisy = noisyLoad(makeRun(''));
+  assert.ok((await valuesOf(measured(-0.99 * noisy), 'derived.left_roll_ratio_measured')).every(Number.isNaN));
+  near((await valuesOf(measured(-1.01 * noisy), 'derived.left_roll_ratio_measured'))[0], 0.01 / (1.01 * noisy));
+});
+
+test('no derived signal is infinite, whatever the messages hold', async () => {
+  const constants = {};
+  for (const type of ['robot_sensors_t', 'joint_command_t', 'robot_state_t', 'external_push_t', 'task_torque_t']) {
+    for (const signal of makeRun('').signals.values()) {
+      if (signal.channel.type === type && !signal.integer) constants[`${type}.${signal.field}`] = 3e38;
+    }
+  }
+  const run = makeRun('7.5', constants);
+  for (const name of run.signals.keys()) {
+    if (!name.startsWith('derived.')) continue;
+    for (const value of await valuesOf(run, name)) assert.ok(Number.isFinite(value) || Number.isNaN(value), `${name}: ${value}`);
+  }
+});
+
+test('quantities have units with prefixes', () => {
+  for (const [value, unit, text] of [[7.656e-6, 'm', '7.656 µm'], [-0.0351, 'm', '-35.1 mm'], [1.5, 'm', '1.5 m'], [1234, 'N', '1.234 kN'],
+    [0.00099999, 'm', '1 mm'], [0, 'N', '0 N'], [NaN, 'N', '–'], [Infinity, 'm', '–'], [250000, 'µs', '250 ms'], [0.5, '', '0.5'], [12.345678, '%', '12.35 %'],
+    [3e-9, 'rad', '3 nrad'], [2e-4, 'N·m', '200 µN·m'], [5e-14, 'm', '5e-5 nm']]) {
+    assert.equal(quantity(value, unit), text);
+  }
+  assert.equal(quantity([0.0123, -0.000456, NaN], 'm', 3), '12.3, -0.5, – mm');
+  assert.deepEqual(scaled(0.02, 'm'), {unit: 'mm', factor: 1000});
+  assert.equal(withUnit(12.3, 'mm'), '12.3 mm');
+  assert.equal(withUnit(7.656e-6, 'mm'), '7.656 nm');
+  assert.equal(withUnit(31, ''), '31');
+  assert.equal(formatNumber(-Infinity), '–');
+});
+
+test('a plot\'s range holds its data and no noise fills it', () => {
+  const holds = ([low, high], a, b) => low <= a && b <= high;
+  const noise = paddedRange(-2e-5, 2e-5, leastSpan('m'));
+  assert.ok(noise[1] - noise[0] >= 5e-4 && holds(noise, -2e-5, 2e-5));
+  for (const [a, b] of [[0, 0], [3, 3], [-1e-5, 4], [0, 1e-4], [-500, -499.9], [1e6, 1e6]]) {
+    const range = paddedRange(a, b, leastSpan('N'));
+    assert.ok(holds(range, a, b) && range[1] - range[0] >= 5, `${range} of ${a}, ${b}`);
+    if (a === 0) assert.ok(range[0] > -0.5, `${range} of what is never negative`);
+  }
+  assert.deepEqual(paddedRange(Infinity, -Infinity, 5), [0, 5]);
+  assert.deepEqual(paddedRange(null, null, 0), [0, 1]);
+  const exact = paddedRange(1e-9, 2e-9, 0);
+  assert.ok(exact[1] - exact[0] < 2e-9);
+});
+
+test('signals of joints and feet have their names', () => {
+  const signals = [...makeRun('').signals.values()];
+  const titles = (query) => searchSignals(signals, query).map((s) => s.title);
+  for (const title of ['JOINT_COMMAND.torque[ankle_roll]', 'ROBOT_STATE.joint_position[ankle_roll]', 'ROBOT_STATE.joint_velocity[ankle_roll]',
+    'GROUND_TRUTH.joint_torque[ankle_roll]', 'DRIVE_FEEDBACK.current[ankle_roll]', 'derived.torque_share_ankle_roll']) {
+    assert.ok(titles('ankle').includes(title), title);
+  }
+  assert.deepEqual(titles('robot_sensors left force 2'), ['ROBOT_SENSORS.foot_wrench[left].force[2]']);
+  assert.deepEqual(titles('ROBOT_STATE.joint_position[1]'), ['ROBOT_STATE.joint_position[ankle_roll]']);
+  assert.equal(panelOf(signals.find((s) => s.name === 'JOINT_COMMAND.torque[0]')).series[0].label, 'torque[hip_pitch]');
+});
+
+test('a part of a run begins where it was cut', async () => {
+  const whole = makeRun('7.2', {'task_torque_t.in_contact[0]': 1}, 10);
+  const {meta} = whole;
+  const ticks = {blob: 'ticks', step: 1, order: 0};
+  const zigzag = deflateSync(Uint8Array.from([...[7, 8, 9].map((x) => 2 * x), ...new Array(9).fill(0)])).toString('base64');
+  const part = new Run({...meta, run: {...meta.run, ticks: 10, cut: {first_tick: 7, last_tick: 9}},
+    channels: meta.channels.map((c) => ({...c, count: 3, ticks}))}, messages, () => zigzag);
+  assert.deepEqual([part.firstTick, part.numTicks, part.start, part.rowAt(0.016)], [7, 3, 0.014, 1]);
+  assert.deepEqual(await valuesOf(part, 'TASK_TORQUE.in_contact[0]'), [1, 1, 1]);
+  assert.ok([...part.channels].every((c) => !c.sparse));
+  addDerivedSignals(part);
+  assert.deepEqual((await findPhases(part)).support, [{from: 0.014, to: 0.02, value: 'right foot'}]);
+  assert.match(figuresFor(part).find((f) => f.figure === '9a').note, /0\.014 s/);
+  assert.doesNotMatch(figuresFor(whole).find((f) => f.figure === '9a').note, / s,/);
 });
 
 test('the search finds signals by all words of name and text', () => {

@@ -54,13 +54,37 @@ test('a page follows a run in progress, looks back while it goes on, and has all
       && plots.every((p) => p.data.every((values) => values.length > n) && p.plot.scales.x.max === shown.max);
   }, length);
 
+  // What is shown while it goes on is so: values, not dashes; the cursor inside its plot; nothing has ended or failed.
+  await page.evaluate(() => Promise.all([...window.poise.grid.inSight].map((p) => p.building)));
+  for (let k = 0; k < 8; ++k) {
+    await more(page, 10);
+    const seen = await page.evaluate(() => {
+      const {grid, run: r, player} = window.poise;
+      const plots = [...grid.inSight].filter((p) => p.plot);
+      const box = (e) => e.getBoundingClientRect();
+      return {
+        dashes: plots.flatMap((p) => p.lines.filter((line, i) => line.signal && p.values[i].textContent === '–'
+          && !Number.isNaN(line.signal.values[r.rowAt(player.time)])).map((line) => line.signal.name)),
+        outside: plots.filter((p) => !p.cursor.hidden && (box(p.cursor).left > box(p.plot.over).right + 3 || box(p.cursor).left < box(p.plot.over).left - 3)).length,
+        single: grid.shared.phases.support.filter((p) => p.value !== 'both feet').length,
+        text: document.body.innerText};
+    });
+    assert.deepEqual(seen.dashes, []);
+    assert.equal(seen.outside, 0);
+    assert.equal(seen.single, 0);  // it stands on both feet all the time
+    assert.match(seen.text, /in progress/);
+    assert.doesNotMatch(seen.text, /run ended|FAILED|checks hold|planned end/);
+  }
+
   // Events, checks and the components' health come with the run.
   await until(page, () => window.poise.feed.status.components.length > 6 && document.querySelector('svg.latencies'));
-  assert.match(await page.locator('#tables').innerText(), /Checks of the first/);
+  assert.match(await page.locator('#tables').innerText(), /Checks up to [\d.]+ s: pending/);
   assert.match(await page.locator('.events').innerText(), /phase began/);
   const told = await page.evaluate(() => window.poise.feed.status);
   assert.ok(told.checks.every((c) => c.name !== 'log_defects' && !c.name.startsWith('duration_reached')));
   assert.ok(told.checked_ticks > 0);
+  assert.ok(told.checks.every((c) => c.passed === null));
+  assert.match(await page.locator('#tables table').first().innerText(), /pending/);
 
   // Looking back holds still while the run goes on.
   await page.evaluate(() => window.poise.player.seek(window.poise.run.start + 0.1));
@@ -82,6 +106,14 @@ test('a page follows a run in progress, looks back while it goes on, and has all
   await until(page, () => window.poise.feed.state === 'ended');
   await until(other.page, () => window.poise.feed.state === 'ended');
   await view.prints(/the run has ended/);
+  // Its end: what is said of it is now that of the whole log.
+  await until(page, () => window.poise.feed.status.ended);
+  assert.doesNotMatch(await page.locator('#header').innerText(), /in progress|being checked/);
+  assert.match(await page.locator('#header').innerText(), /FAILED/);  // it was to last longer
+  assert.match(await page.locator('.events').innerText(), /run ended .* before its planned end/);
+  const final = await page.locator('#tables').innerText();
+  assert.match(final, /Channels in the log/);
+  assert.doesNotMatch(final, /pending/);
   const late = await openPage(browser, view.url);  // what it has is still served
   await until(late.page, () => window.poise.feed.state === 'ended');
 

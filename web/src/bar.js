@@ -6,7 +6,7 @@ const LONG_STEP = 0.1;  // s
 const ZOOM_STEP = 1.5;
 
 export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shift ← →', '0.1 s'], ['home end', 'start, end'],
-  ['[ ]', 'slower, faster'], ['+ −', 'zoom the plots at the cursor'], ['0', 'whole run'], ['/', 'search signals']];
+  ['[ ]', 'slower, faster'], ['+ −', 'zoom the plots at the cursor'], ['0', 'all of it in the plots'], ['/', 'search signals']];
 
 function track(shared) {
   const {run, phases, events} = shared;
@@ -22,6 +22,7 @@ function track(shared) {
   return element('div', {class: 'track', 'aria-hidden': 'true'},
     ...phases.support.filter((p) => p.value !== 'both feet').map((p) => span('single', p)),
     ...phases.balancing.map((p) => span('balancing', p)),
+    ...phases.missing.map((p) => span('missing', p)),
     ...inSight.map((e) => {
       const mark = element('span', {class: 'event'});
       mark.style.left = `${share(e.time)}%`;
@@ -29,7 +30,8 @@ function track(shared) {
     }));
 }
 
-const LIVE_TEXTS = {live: '● live', ended: '■ run ended', waiting: '○ no connection: trying again'};
+const LIVE_TEXTS = {connecting: '○ connecting', live: '● live', ended: '■ run ended',
+  waiting: '○ no connection: trying again'};
 
 /** Whether the run goes on; pressed: the page follows it. */
 function liveButton({player, feed}) {
@@ -57,7 +59,7 @@ export function playerBar(host, shared) {
     change: () => player.setSpeed(Number(speed.value))},
   ...SPEEDS.map((s) => element('option', {value: s, selected: s === 1}, `${s}×`)));
   const scrub = element('input', {type: 'range', id: 'scrub', step: 1,
-    'aria-label': 'Time', input: () => player.seek(Number(scrub.value) * run.period),
+    'aria-label': 'Time', input: () => player.seek(run.timeAt(Number(scrub.value) - run.firstTick)),
     keydown: (e) => e.preventDefault()});  // the page's own keys step
   const time = element('output', {id: 'time'});
   const scale = () => {
@@ -72,10 +74,10 @@ export function playerBar(host, shared) {
     element('div', {class: 'scrub'}, marks, scrub), time,
     button('−', 'Zoom the plots out (−)', () => view.zoom(ZOOM_STEP, player.time)),
     button('+', 'Zoom the plots in at the cursor (+)', () => view.zoom(1 / ZOOM_STEP, player.time)),
-    button('whole run', 'Show the whole run in the plots (0)', () => view.reset()));
+    button('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
   const showTime = () => {
     scrub.value = player.tick;
-    time.textContent = `${player.time.toFixed(3)} s  tick ${player.tick}`;
+    time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}`));
   };
   player.addEventListener('time', showTime);
   player.addEventListener('state', () => {
@@ -102,10 +104,19 @@ function listenToKeys({player, view, run, feed}) {
     '-': () => view.zoom(ZOOM_STEP, player.time), '/': () => document.getElementById('signal-search').focus(),
   };
   document.addEventListener('keydown', (e) => {
-    const writing = e.target.matches('input:not([type=range]), select, textarea');
-    const pressing = e.key === ' ' && e.target.matches('button, summary, a');
+    const writing = e.target.matches('input:not([type=range], [type=checkbox]), select, textarea');
+    const pressing = e.key === ' ' && e.target.matches('button, summary, a, [type=checkbox]');
     if (writing || pressing || e.ctrlKey || e.metaKey || e.altKey || !Object.hasOwn(actions, e.key)) return;
     e.preventDefault();
     actions[e.key](e);
   });
+  // What the mouse has pressed does not keep the keys; what the tab key has reached does.
+  const release = (e) => {
+    const control = e.target.closest?.('button, summary, a, label, select, input:not([type=search])');
+    if (control && document.activeElement?.matches('button, summary, a, select, input:not([type=search])')) {
+      document.activeElement.blur();
+    }
+  };
+  document.addEventListener('click', (e) => { if (e.detail > 0 && !e.target.matches('select')) release(e); });
+  document.addEventListener('change', (e) => { if (e.target.matches('select, [type=range]')) release(e); });
 }

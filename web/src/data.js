@@ -2,18 +2,31 @@
 import {unpack} from './codec.js';
 import {Column} from './column.js';
 
-/** Unit, text and names of values of a field path such as "foot_wrench[1].force[2]". */
-export function describeField(messages, type, path) {
+/** Names of the elements of lists by their count in a message; motors stand in the order of the joints that they drive. */
+function elementNames(robot) {
+  const joints = robot.joints.map((joint) => joint.name);
+  return {num_joints: joints, num_motors: joints, num_feet: robot.feet.map((foot) => foot.name)};
+}
+
+/**
+ * Unit, text, names of values and label of a field path such as "foot_wrench[1].force[2]". The label names joints and feet:
+ * "foot_wrench[left].force[2]". `names`: of lists' elements by the message's count.
+ */
+export function describeField(messages, type, path, names = {}) {
   let message = messages[type];
   let result = {unit: '', text: ''};
-  for (const name of path.replace(/\[\d+\]/g, '').split('.')) {
+  const labels = path.split('.');
+  for (const [i, part] of labels.entries()) {
+    const [, name, index] = /^(\w+)(?:\[(\d+)\])?$/.exec(part) ?? [];
     const field = message?.fields[name];
     if (!field) break;
     const text = [result.text, field.text].filter(Boolean).join('; ');
+    const known = names[field.count]?.[index];
+    if (known !== undefined) labels[i] = `${name}[${known}]`;
     result = {unit: field.unit || result.unit, text, valueNames: field.values};
     message = messages[field.type];
   }
-  return result;
+  return {...result, label: labels.join('.')};
 }
 
 /** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
@@ -28,6 +41,8 @@ export class Signal {
     this.name = `${channel.name}.${spec.field}`;
     this.spec = spec;
     Object.assign(this, description);
+    /** As people read it: joints and feet by their names. */
+    this.title = `${channel.name}.${this.label}`;
     if (channel.run.meta.live) this.#start();
   }
 
@@ -53,6 +68,8 @@ export class Signal {
   }
 }
 
+const FEW = 0.2;  // of the ticks: messages of a channel that nothing sends in every tick
+
 class Channel {
   #ticks = null;
 
@@ -62,24 +79,24 @@ class Channel {
     this.name = spec.name;
     this.type = spec.type;
     this.blob = blob;
-    /** False: it has messages in some ticks only. */
-    this.dense = spec.ticks === undefined;
+    /** It has a message in a few ticks only, as of an operator; a channel with gaps has not. */
+    this.sparse = spec.ticks !== undefined && (run.meta.live !== undefined || spec.count < FEW * run.numTicks);
   }
 
   /** A packed column by tick. */
   async read(packed, integer) {
     const column = await unpack(packed, this.spec.count, this.blob, integer);
-    if (this.dense) return column;
+    if (this.spec.ticks === undefined) return column;
     const ticks = await (this.#ticks ??= unpack(this.spec.ticks, this.spec.count, this.blob, true));
     const values = new column.constructor(this.run.numTicks).fill(NaN);
-    ticks.forEach((tick, i) => { values[tick] = column[i]; });
+    ticks.forEach((tick, i) => { values[tick - this.run.firstTick] = column[i]; });
     return values;
   }
 }
 
 /**
  * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.mjs; `blob`: gives the text of a packed
- * column by its id. It holds the ticks from `firstTick` on, a row each. A live run (meta.live) starts without ticks, grows
+ * column by its id. It holds the ticks from `firstTick` on, a row each; a part of a run begins later than 0. A live run (meta.live) starts without ticks, grows
  * by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
  */
 export class Run extends EventTarget {
@@ -88,14 +105,15 @@ export class Run extends EventTarget {
     Object.assign(this, {meta, scenario: meta.scenario, robot: meta.robot});
     this.period = meta.run.tick_period;
     this.leadTicks = meta.run.lead_ticks ?? 0;  // before the scenario's time 0
-    this.firstTick = 0;
-    this.numTicks = meta.run.ticks;
+    this.firstTick = meta.run.cut?.first_tick ?? 0;
+    this.numTicks = Math.max(0, meta.run.ticks - this.firstTick);
     this.keep = meta.live?.keep ?? Infinity;
     this.signals = new Map();
+    const names = elementNames(meta.robot);
     this.channels = meta.channels.map((spec) => {
       const channel = new Channel(this, spec, blob);
       for (const signal of spec.signals) {
-        this.add(new Signal(channel, signal, describeField(messages, spec.type, signal.field)));
+        this.add(new Signal(channel, signal, describeField(messages, spec.type, signal.field, names)));
       }
       return channel;
     });
@@ -112,9 +130,9 @@ export class Run extends EventTarget {
     return channel && this.signals.get(`${channel.name}.${field}`);
   }
 
-  rowAt(time) {
-    return Math.min(this.numTicks - 1, Math.max(0, Math.round(time / this.period) + this.leadTicks - this.firstTick));
-  }
+  /** The row of a time, which may lie outside of what the run holds. */
+  rowOf(time) { return Math.round(time / this.period) + this.leadTicks - this.firstTick; }
+  rowAt(time) { return Math.min(this.numTicks - 1, Math.max(0, this.rowOf(time))); }
   timeAt(row) { return (this.firstTick + row - this.leadTicks) * this.period; }
 
   /** `values`: by signal name, `count` numbers each; a signal that is not named gets NaN. */

@@ -2,8 +2,17 @@
 import {Column} from './column.js';
 import {centerOfPressure, conjugate, rotate, transformWrench} from './spatial.js';
 
-const LIGHT_LOAD = 5;  // N: below it, ratios of a sensor's readings are noise
-const IN_THE_AIR = 1;  // N: below it there is no centre of pressure (logging/analysis.cc)
+const GRAVITY = 9.80665;   // m/s²
+// Of the robot's weight: least |F_z| of which a ratio says something. Of a sole's sensor as in logging/contact_history.h,
+// below which noise decides what it reads.
+const LIGHT_SHARE = 0.01, NOISY_SHARE = 0.05;
+const BRIDGED = 0.1;       // s without a message for which a phase goes on as it was
+
+const weight = (run) => GRAVITY * run.robot.mass;
+
+/** N: least |F_z| with a centre of pressure, and of a computed wrench with ratios; of a sole's sensor with ratios. */
+export const lightLoad = (run) => LIGHT_SHARE * weight(run);
+export const noisyLoad = (run) => NOISY_SHARE * weight(run);
 
 const AXES = ['x', 'y', 'z'];
 const vector = (type, field, n = 3) => Array.from({length: n}, (_, i) => [type, `${field}[${i}]`]);
@@ -34,7 +43,7 @@ const firstNumber = (memory, value) => {
 };
 
 /** A sensor's reading shows the command of the tick before, so frame and soles are those of the tick before. */
-function measuredCop(axis) {
+function measuredCop(axis, least) {
   return (arrays, i) => {
     if (i === 0) return NaN;
     const at = (from, count, row) => arrays.slice(from, from + count).map((a) => a[row]);
@@ -48,7 +57,7 @@ function measuredCop(axis) {
         sum.moment[k] += part.moment[k];
       }
     }
-    return Math.abs(sum.force[2]) > IN_THE_AIR ? centerOfPressure(sum)[axis] : NaN;
+    return Math.abs(sum.force[2]) > least ? centerOfPressure(sum)[axis] : NaN;
   };
 }
 
@@ -69,13 +78,14 @@ function comSignals() {
   ]);
 }
 
-function copSignals() {
+function copSignals(run) {
+  const least = lightLoad(run);
   const both = [...wrench('robot_sensors_t', 0), ...wrench('robot_sensors_t', 1),
     ...pose('task_torque_t', 'foot_pose[0]'), ...pose('task_torque_t', 'foot_pose[1]'),
     ['task_torque_t', 'in_contact[0]'], ['task_torque_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
   return [0, 1].flatMap((i) => [
     {name: `cop_measured_${AXES[i]}`, unit: 'm', text: 'measured centre of pressure, frame O',
-      deps: both, compute: measuredCop(i)},
+      deps: both, compute: measuredCop(i, least)},
     {name: `cop_desired_${AXES[i]}`, unit: 'm', text: 'O_d: the bound while balancing controls this axis, frame O',
       deps: [['balance_torque_t', `cop_task[${i}]`], ['balance_torque_t', `cop_limit[${i}]`],
         ['balance_torque_t', `active_${AXES[i]}`], ['balance_torque_t', 'region'], ['balance_torque_t', `cop[${i}]`]],
@@ -85,23 +95,24 @@ function copSignals() {
     ...['measured', 'computed'].map((kind) => ({
       name: `cop_${kind}_abs_${AXES[i]}`, unit: 'm', text: `${kind} centre of pressure, frame O, absolute`,
       deps: kind === 'measured' ? both : [['balance_torque_t', `cop[${i}]`]],
-      compute: (arrays, k) => Math.abs(kind === 'measured' ? measuredCop(i)(arrays, k) : arrays[0][k]),
+      compute: (arrays, k) => Math.abs(kind === 'measured' ? measuredCop(i, least)(arrays, k) : arrays[0][k]),
     })),
   ]);
 }
 
 function footSignals(run) {
   const config = run.scenario.redistributor ?? {};
+  const loaded = (ratio, w, least) => Math.abs(w[2]) >= least ? ratio(w) / Math.abs(w[2]) : NaN;
   return run.robot.feet.flatMap((foot, f) => {
     const contact = [0, 1].map((k) => ['joint_command_t', `in_contact[${k}]`]);
     return [
       ...CONDITIONS.flatMap(({key, number, unit, ratio, text}) => [
         {name: `${foot.name}_${key}_ratio_computed`, unit, text: `(${number}): ${text}, ${foot.name} foot, computed`,
           deps: [contact[f], ...wrench('joint_command_t', f)],
-          compute: pointwise(([on, ...w]) => on > 0 ? ratio(w) / Math.abs(w[2]) : NaN)},
+          compute: pointwise(([on, ...w]) => on > 0 ? loaded(ratio, w, lightLoad(run)) : NaN)},
         {name: `${foot.name}_${key}_ratio_measured`, unit, text: `(${number}): ${text}, ${foot.name} foot, measured`,
           deps: wrench('robot_sensors_t', f),
-          compute: pointwise((w) => Math.abs(w[2]) > LIGHT_LOAD ? ratio(w) / Math.abs(w[2]) : NaN)},
+          compute: pointwise((w) => loaded(ratio, w, noisyLoad(run)))},
         {name: `${foot.name}_${key}_limit`, unit, text: `(${number}): limit of ${text}, ${foot.name} foot`,
           deps: [contact[f], contact[1 - f]],
           compute: pointwise(([on, other]) => on > 0
@@ -168,9 +179,9 @@ class DerivedSignal {
   constructor(run, definition) {
     Object.assign(this, definition);
     this.run = run;
-    this.field = definition.name;
-    this.channel = {name: 'derived', dense: true};
-    this.name = `derived.${definition.name}`;
+    this.field = this.label = definition.name;
+    this.channel = {name: 'derived', sparse: false};
+    this.name = this.title = `derived.${definition.name}`;
     this.integer = false;
   }
 
@@ -197,44 +208,110 @@ class DerivedSignal {
   #rows(from) {
     const arrays = this.#signals.map((s) => s.values);
     const rows = new Float32Array(this.run.numTicks - from);
-    for (let i = 0; i < rows.length; ++i) rows[i] = this.compute(arrays, from + i, this.#memory);
+    for (let i = 0; i < rows.length; ++i) {
+      const value = Math.fround(this.compute(arrays, from + i, this.#memory));
+      rows[i] = Number.isFinite(value) ? value : NaN;
+    }
     return rows;
   }
 }
 
 /** Adds to `run` the derived signals for which it has what they need. */
 export function addDerivedSignals(run) {
-  const definitions = [...comSignals(), ...copSignals(), ...footSignals(run), ...estimatorSignals(run),
+  const definitions = [...comSignals(), ...copSignals(run), ...footSignals(run), ...estimatorSignals(run),
     ...otherSignals(run)];
   for (const definition of definitions) {
     if (definition.deps.every(([type, field]) => run.find(type, field))) run.add(new DerivedSignal(run, definition));
   }
 }
 
-/** [{from, to, value}] in rows, of stretches in which key(tick) stays the same. */
-export function intervals(n, key) {
-  const result = [];
-  for (let i = 0; i < n; ++i) {
-    const value = key(i);
-    if (result.at(-1)?.value === value) result.at(-1).to = i;
-    else result.push({from: i, to: i, value});
+/** Runs of ticks of the same value, as they come; undefined: no message tells. */
+class Stretches {
+  #list = [];  // {from, to, value}, to included
+
+  add(tick, value) {
+    const last = this.#list.at(-1);
+    if (last && last.value === value && last.to === tick - 1) last.to = tick;
+    else this.#list.push({from: tick, to: tick, value});
   }
-  return result;
+
+  dropBefore(tick) {
+    while (this.#list.length > 0 && this.#list[0].to < tick) this.#list.shift();
+    if (this.#list.length > 0) this.#list[0].from = Math.max(this.#list[0].from, tick);
+  }
+
+  /** Without the gaps of up to `bridged` ticks, which are as what came before them. */
+  list(bridged) {
+    const result = [];
+    for (const {from, to, value: own} of this.#list) {
+      const last = result.at(-1);
+      const value = own === undefined && last && to - from < bridged ? last.value : own;
+      if (last && last.value === value) last.to = to;
+      else result.push({from, to, value});
+    }
+    return result;
+  }
 }
 
-/** {balancing, support} in seconds: where balancing runs; which feet the controller's model stands on. */
+/**
+ * {balancing, support, missing}, lists of {from, to, value} in seconds: where balancing runs; which feet the controller's
+ * model stands on; where no message tells, which the other two leave out.
+ */
+class Phases {
+  #active;
+  #contact;
+  #balancing = new Stretches();
+  #support = new Stretches();
+  #next = 0;  // tick
+
+  constructor(run) {
+    this.run = run;
+    const get = (type, field) => run.find(type, field);
+    this.#active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
+    this.#contact = run.robot.feet.map((_, f) => get('task_torque_t', `in_contact[${f}]`)).filter(Boolean);
+  }
+
+  async load() {
+    await Promise.all([...this.#active, ...this.#contact].map((s) => s.load()));
+    this.update();
+  }
+
+  /** After the run has grown. */
+  update() {
+    const {run} = this;
+    for (let row = Math.max(0, this.#next - run.firstTick); row < run.numTicks; ++row) {
+      const tick = run.firstTick + row;
+      this.#balancing.add(tick, this.#isBalancing(row));
+      this.#support.add(tick, this.#supportOf(row));
+      this.#next = tick + 1;
+    }
+    const at = (tick) => run.timeAt(tick - run.firstTick);
+    const seconds = ({from, to, value}) => ({from: at(from), to: at(to + 1), value});
+    const list = (stretches) => {
+      stretches.dropBefore(run.firstTick);
+      return stretches.list(BRIDGED / run.period).map(seconds);
+    };
+    const support = list(this.#support);
+    this.balancing = list(this.#balancing).filter((p) => p.value);
+    this.support = this.#contact.length ? support.filter((p) => p.value !== undefined) : [];
+    this.missing = this.#contact.length ? support.filter((p) => p.value === undefined) : [];
+  }
+
+  #isBalancing(row) {
+    const values = this.#active.map((s) => s.values[row]);
+    return values.length > 0 && values.every(Number.isNaN) ? undefined : values.some((v) => v > 0);
+  }
+
+  #supportOf(row) {
+    const values = this.#contact.map((s) => s.values[row]);
+    if (values.some(Number.isNaN)) return undefined;
+    const on = this.run.robot.feet.filter((_, f) => values[f] > 0).map((foot) => foot.name);
+    return on.length === values.length ? 'both feet' : on.length ? `${on.join(', ')} foot` : 'no foot';
+  }
+}
+
 export async function findPhases(run) {
-  const get = (type, field) => run.find(type, field);
-  const active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
-  const contact = run.robot.feet.map((_, f) => get('task_torque_t', `in_contact[${f}]`)).filter(Boolean);
-  await Promise.all([...active, ...contact].map((s) => s.load()));
-  const seconds = ({from, to, value}) => ({from: run.timeAt(from), to: run.timeAt(to + 1), value});
-  const name = (i) => {
-    const on = run.robot.feet.filter((_, f) => contact[f].values[i] > 0).map((foot) => foot.name);
-    return on.length === contact.length ? 'both feet' : on.length ? `${on.join(', ')} foot` : 'no foot';
-  };
-  return {
-    balancing: intervals(run.numTicks, (i) => active.some((s) => s.values[i] > 0)).filter((p) => p.value).map(seconds),
-    support: contact.length ? intervals(run.numTicks, name).map(seconds) : [],
-  };
+  const phases = new Phases(run);
+  await phases.load();
+  return phases;
 }

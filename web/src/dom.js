@@ -32,17 +32,6 @@ export function table(caption, columns, rows, {numbers = []} = {}) {
         element('td', {class: numbers.includes(i) ? 'number' : null}, cell))))))));
 }
 
-/** So many digits, as short as they can be written. */
-export function formatNumber(value, digits = 4) {
-  if (value === null || value === undefined || Number.isNaN(value)) return '–';
-  if (Number.isInteger(value) && Math.abs(value) < 1e15) return String(value);
-  const magnitude = Math.abs(value);
-  const rounded = Number(value.toPrecision(digits));
-  return magnitude < 1e-4 || magnitude >= 1e6 ? rounded.toExponential() : String(rounded);
-}
-
-export const withUnit = (value, unit) => unit ? `${formatNumber(value)} ${unit}` : formatNumber(value);
-
 /** Gives the browser a file to save. */
 export function saveFile(name, blob) {
   const url = URL.createObjectURL(blob);

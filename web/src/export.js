@@ -14,14 +14,17 @@ export function quoted(text) {
 export function csvOf(panel) {
   const {view} = panel.shared;
   const shown = panel.lines.map((line, i) => ({line, i})).filter(({line}) => !panel.hidden.has(line.label));
-  const unit = panel.definition.unit ? ` (${panel.definition.unit})` : '';
-  const rows = [['time (s)', ...shown.map(({line}) => `${line.label}${unit}`)].map(quoted).join(',')];
+  const headed = (line) => {
+    const unit = line.signal?.unit || panel.definition.unit;
+    return unit ? `${line.label} (${unit})` : line.label;
+  };
+  const rows = [['time (s)', ...shown.map(({line}) => headed(line))].map(quoted).join(',')];
   const times = panel.data[0];
   for (let k = 0; k < times.length; ++k) {
     if (times[k] < view.min - 1e-9 || times[k] > view.max + 1e-9) continue;
     rows.push([Number(times[k].toPrecision(9)), ...shown.map(({i}) => {
       const v = panel.data[i + 1][k];
-      return v === null || v === undefined ? '' : Number(v.toPrecision(8));
+      return Number.isFinite(v) ? Number(v.toPrecision(8)) : '';
     })].join(','));
   }
   return rows.join('\r\n') + '\r\n';

@@ -6,8 +6,10 @@ const derived = (label, role, name) => ({label, role, type: 'derived', field: na
 
 const SUPPORT_NOTE = 'The yellow areas show when balancing runs.';
 
-function comMotion(figure, title, axes, note) {
-  return {figure, title, unit: 'm', note, series: axes.flatMap((axis) => [
+function comMotion(run, figure, title, axes, note = '') {
+  // Whoever came late, or has a part of the run, knows no earlier place.
+  const origin = run.firstTick > 0 ? ` Motion from where it was at ${run.start.toFixed(3)} s, the first that this page has.` : '';
+  return {figure, title, unit: 'm', note: (note + origin).trim(), series: axes.flatMap((axis) => [
     derived(axes.length > 1 ? axis : 'estimated', axes.length > 1 ? `axis-${axis}` : 'computed', `com_motion_${axis}`),
     derived(axes.length > 1 ? `${axis}, true` : 'true', axes.length > 1 ? `axis-${axis}-thin` : 'truth',
       `com_motion_true_${axis}`),
@@ -87,19 +89,19 @@ const bodyRoll = (figure, note) => ({figure, title: 'Orientation error of the bo
 /** The paper's figures by section. */
 const SECTIONS = {
   '7.1': (run) => [...footWrenches(run, '6'),
-    comMotion('7', 'COM motion', ['x', 'y', 'z'], 'The paper sees 1 to 3 mm.')],
+    comMotion(run, '7', 'COM motion', ['x', 'y', 'z'], 'The paper sees 1 to 3 mm.')],
   '7.2': (run) => [
-    comMotion('9a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 0.035 m.`), push('9b'),
+    comMotion(run, '9a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 35 mm.`), push('9b'),
     ...resultantConditions('10'), ...footConditions(run, '11', 0), ...footConditions(run, '12', 1)],
   '7.3': (run) => [
-    comMotion('14a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 0.0106 m.`),
-    footMotion('14b', run, 1, 1, 'The paper\'s largest error: 0.015 m.'), push('14c'),
+    comMotion(run, '14a', 'COM motion, lateral (y)', ['y'], `${SUPPORT_NOTE} The paper\'s largest: 10.6 mm.`),
+    footMotion('14b', run, 1, 1, 'The paper\'s largest error: 15 mm.'), push('14c'),
     ...footConditions(run, '15', 0)],
   '7.4': (run) => [
     ...pitchJoints(run.robot, 0).map((joint, i) => jointTorque(`16${'abcdef'[i]}`, run, joint)),
     footMotion('17', run, 1, 2)],
   '7.5': (run) => [
-    comMotion('19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
+    comMotion(run, '19a', 'COM motion, lateral (y)', ['y'], SUPPORT_NOTE), footMotion('19b', run, 1, 2),
     footMotion('20a', run, 1, 2, 'As 19b: zoom in on the contact.'),
     {figure: '20b', title: 'Vertical force on the left foot', unit: 'N', series: [
       derived('measured', 'measured', `${run.robot.feet[1].name}_load_measured`),
@@ -109,7 +111,7 @@ const SECTIONS = {
 };
 
 function defaults(run) {
-  return [comMotion('', 'COM motion, lateral (y)', ['y']), comMotion('', 'COM motion', ['x', 'y', 'z']), push(''),
+  return [comMotion(run, '', 'COM motion, lateral (y)', ['y']), comMotion(run, '', 'COM motion', ['x', 'y', 'z']), push(''),
     ...resultantConditions(''), ...run.robot.feet.flatMap((_, f) => footConditions(run, '', f))];
 }
 
@@ -164,6 +166,6 @@ export function findSignal(run, {type, field, name}) {
 
 /** A panel of one signal, from the search. */
 export function panelOf(signal) {
-  return {title: signal.name, unit: signal.unit, note: signal.text, added: true,
-    series: [{label: signal.field, role: 'computed', name: signal.name, signal}]};
+  return {title: signal.title, unit: signal.unit, note: signal.text, added: true,
+    series: [{label: signal.label, role: 'computed', name: signal.name, signal}]};
 }

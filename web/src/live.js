@@ -1,12 +1,9 @@
 // A run in progress: its ticks from the stream of `poise view`, and the page that grows with them.
 import {element} from './dom.js';
-import {findPhases} from './derived.js';
-
 const RETRY = 1000;          // ms
 const SPAN = 10;             // s that the plots show at first
 const GROWTH_PERIOD = 33;    // ms, at least
 const GROWTH_SHARE = 2;      // times what drawing took: the picture goes first
-const PHASES_PERIOD = 1000;  // ms
 const FORMAT = 1;
 const HEADER = 16;           // bytes
 
@@ -52,9 +49,9 @@ export function addBatch(run, {first, count, values}) {
  * come. A lost connection is made again.
  */
 export class LiveFeed extends EventTarget {
-  state = 'waiting';
+  state = 'connecting';  // then 'live', 'ended', or 'waiting' for a lost connection
   lost = 0;
-  status = {checks: [], events: [], components: [], checked_ticks: 0, problem: ''};
+  status = {ended: false, checks: [], events: [], components: [], checked_ticks: 0, problem: ''};
   #ticks = Infinity;  // of the run, once it has ended
 
   constructor(run) {
@@ -74,7 +71,7 @@ export class LiveFeed extends EventTarget {
       else addBatch(run, decodeBatch(data, run));
     });
     socket.addEventListener('close', () => {
-      if (run.firstTick + run.numTicks >= this.#ticks) return;
+      if (this.status.ended && run.firstTick + run.numTicks >= this.#ticks) return;  // all has come
       this.#setState('waiting');
       setTimeout(() => this.#connect(), RETRY);
     });
@@ -84,6 +81,7 @@ export class LiveFeed extends EventTarget {
     if (id !== this.run.meta.run.run_id) return location.reload();  // another run is served here
     if (status) {
       Object.assign(this.status, {problem: ''}, status);
+      if (status.run) Object.assign(this.run.meta.run, status.run);
       this.dispatchEvent(new Event('status'));
       return;
     }
@@ -103,7 +101,8 @@ export async function firstTicks(feed) {
   if (feed.run.numTicks > 0) return;
   const text = element('p', {class: 'soft'});
   const tell = () => {
-    text.textContent = feed.state === 'ended' ? 'The run has ended without a tick.' : 'Waiting for the first tick';
+    text.textContent = {connecting: 'Connecting', live: 'Waiting for the first tick', ended: 'The run has ended without a tick.',
+      waiting: 'No connection: trying again'}[feed.state];
   };
   feed.addEventListener('state', tell);
   tell();
@@ -113,15 +112,12 @@ export async function firstTicks(feed) {
   text.remove();
 }
 
-/** Calls `refresh` after the run has grown, as often as drawing it allows, its phases found anew now and then. */
+/** Calls `refresh` after the run has grown, as often as drawing it allows. */
 export function followGrowth(shared, refresh) {
-  let waiting = false, delay = GROWTH_PERIOD, phasesAt = -Infinity;
+  let waiting = false, delay = GROWTH_PERIOD;
   const grow = async () => {
     const start = performance.now();
-    if (start - phasesAt > PHASES_PERIOD) {
-      phasesAt = start;
-      shared.phases = await findPhases(shared.run);
-    }
+    shared.phases.update();
     waiting = false;
     refresh();
     await null;  // uPlot draws

@@ -7,23 +7,36 @@ import {figuresFor} from './figures.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
+import {Printer} from './print.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
-import {liveTables, tables, verdictBadge} from './table.js';
+import {liveTables, stateBadges, tables} from './table.js';
 
 const READOUT_PERIOD = 80;  // ms
 
-function header(run, overlay) {
+const WIDE = matchMedia('(min-width: 900px)');  // as in style.css: there is a column beside the plots
+
+/** "poise 0.1.0 (0b2aa3d58986, x86-64-v3)": which build ran it. */
+function buildOf({versions, poise_commit: commit, instruction_set: instructions}) {
+  const [hash, ...changes] = (commit ?? '').split('+');
+  const known = [[hash.slice(0, 12), ...changes].filter(Boolean).join('+'), instructions].filter(Boolean);
+  return `poise ${versions.poise}${known.length ? ` (${known.join(', ')})` : ''}`;
+}
+
+function header(run, overlay, feed) {
   const {run: r} = run.meta;
+  const state = element('span', {class: 'badges'});
+  const update = () => state.replaceChildren(...stateBadges(run, feed));
+  for (const event of feed ? ['state', 'status'] : []) feed.addEventListener(event, update);
   document.title = `${r.scenario} – Poise`;
   document.getElementById('header').append(
     element('h1', {}, r.scenario), element('p', {}, run.scenario.description ?? ''),
     r.paper_section ? element('span', {class: 'badge'}, `paper, section ${r.paper_section}`) : '',
-    run.meta.live ? element('span', {class: 'badge'}, 'in progress') : verdictBadge(run),
-    element('span', {class: 'soft'}, `${r.started_at}, poise ${r.versions.poise}`),
+    state, element('span', {class: 'soft'}, `${r.started_at}, ${buildOf(r)}`),
     overlay ? element('span', {class: 'badge second'}, `over it, dashed: ${overlay.meta.run.scenario}, ${overlay.meta.run.started_at}`)
       : '');
+  update();
 }
 
 function sceneToolbar(scene) {
@@ -48,29 +61,32 @@ function sceneKey(overlay) {
     overlay ? entry('desired', '▒', 'second run') : '');
 }
 
-/** Keeps the picture in sight, small, while the plots are read; the box that switches this off. */
-function floatingScene(scene) {
+/** Puts the picture into the side column, small, while the plots are read; the box that switches this off. */
+function dockedScene(scene) {
   let away = false;
+  const place = document.getElementById('scene-place'), dock = document.getElementById('dock');
   const box = element('input', {type: 'checkbox', checked: true});
   const update = () => {
-    scene.host.classList.toggle('floating', away && box.checked);
-    scene.visible = !away || box.checked;
+    const docked = away && box.checked && WIDE.matches;
+    if (docked !== (scene.host.parentElement === dock)) (docked ? dock : place).append(scene.host);
+    scene.visible = docked || !away;
     scene.draw();
   };
   box.addEventListener('change', update);
-  new IntersectionObserver(([entry]) => {
-    away = !entry.isIntersecting;
+  WIDE.addEventListener('change', update);
+  new IntersectionObserver((entries) => {
+    away = !entries.at(-1).isIntersecting;
     update();
-  }, {threshold: 0.12}).observe(document.getElementById('scene-place'));
-  return element('label', {class: 'soft'}, box, ' robot beside the plots');
+  }, {threshold: 0.25}).observe(place);
+  return element('label', {class: 'soft dock-box'}, box, ' robot beside the plots');
 }
 
 async function start() {
   const [run, overlay] = embeddedRuns(document);
   if (!run) throw new Error('this page holds no run: write one with poise report');
   for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
-  header(run, overlay);
   const feed = run.meta.live ? new LiveFeed(run) : undefined;
+  header(run, overlay, feed);
   if (feed) await firstTicks(feed);
   const events = run.meta.events ?? [];
   const player = new Player(run);
@@ -85,7 +101,8 @@ async function start() {
   const shared = {run, overlay, player, view, phases, events, feed};
   const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
-  const readout = new Readout(run, phases);
+  const printer = new Printer(grid, scene);
+  const readout = new Readout(run);
   const eventPlace = element('div', {}, eventList(events, player));
   document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
     eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
@@ -93,9 +110,10 @@ async function start() {
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
     element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
     element('li', {}, element('span', {class: 'area single'}), 'single support'),
+    element('li', {}, element('span', {class: 'area missing'}), 'no message tells'),
     element('li', {}, element('span', {class: 'area event'}), 'event'),
-    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: whole run')),
-  floatingScene(scene));
+    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')),
+  dockedScene(scene), printer.button);
   for (const definition of figuresFor(run)) grid.add(definition);
   const live = feed && liveTables(run, feed);
   document.getElementById('tables').append(...(live ? live.elements : tables(run, overlay)));
@@ -129,16 +147,19 @@ async function start() {
     const refreshStatus = () => {
       live.refresh();
       shared.events = feed.status.events;
-      eventPlace.replaceChildren(eventList(shared.events, player));
+      const {ended, checked_ticks: ticks} = feed.status;
+      eventPlace.replaceChildren(eventList(shared.events, player,
+        ended ? '' : ` up to ${run.timeAt(ticks - run.firstTick).toFixed(1)} s`));
       bar.refresh();
       grid.redraw();
     };
     feed.addEventListener('status', refreshStatus);
     refreshStatus();
   }
+  if (!feed) printer.drawWhenIdle(run);
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
-  window.poise = {run, overlay, player, view, grid, scene, feed};
+  window.poise = {run, overlay, player, view, grid, scene, feed, printer};
 }
 
 start().catch((error) => {

@@ -13,7 +13,13 @@ const COLORS = {
 const HUES = 8;
 
 const query = matchMedia('(prefers-color-scheme: dark)');
-export const isDark = () => query.matches;
+let onPaper = false;
+/** While the page is printed it is light: the root element says so to the style, too. */
+export function setPaper(on) {
+  onPaper = on;
+  document.documentElement.toggleAttribute('data-paper', on);
+}
+export const isDark = () => query.matches && !onPaper;
 export const onThemeChange = (listener) => query.addEventListener('change', listener);
 
 /** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ... */

@@ -13,6 +13,7 @@ export class Player extends EventTarget {
   constructor(run) {
     super();
     this.run = run;
+    this.time = run.start;
     run.addEventListener('append', () => this.#grow());
   }
 

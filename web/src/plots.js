@@ -1,9 +1,10 @@
 // Plots over time: one zoom and one time cursor for all of them.
 import uPlot from 'uplot';
-import {element, formatNumber} from './dom.js';
+import {element} from './dom.js';
 import {csvOf, pngOf, savePanel} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
+import {formatNumber, leastSpan, paddedRange, quantity, scaled} from './units.js';
 
 const HEIGHT = 200;       // px
 const CLICK_SLACK = 4;    // px that a click may move
@@ -54,7 +55,7 @@ function nullable(values, n, from = 0) {
   const result = new Array(n - from);
   for (let i = from; i < n; ++i) {
     const v = i < values.length ? values[i] : NaN;
-    result[i - from] = v === v ? v : null;
+    result[i - from] = Number.isFinite(v) ? v : null;
   }
   return result;
 }
@@ -71,18 +72,16 @@ const times = new WeakMap();
 
 /** The other run's values at the first run's ticks. */
 function resampled(values, run, other) {
-  if (run.period === other.period && run.leadTicks === other.leadTicks) return nullable(values, run.numTicks);
   return Array.from({length: run.numTicks}, (_, i) => {
-    const v = values[Math.round(run.timeAt(i) / other.period) + other.leadTicks - other.firstTick];
-    return v === undefined || Number.isNaN(v) ? null : v;
+    const v = values[other.rowOf(run.timeAt(i))];
+    return Number.isFinite(v) ? v : null;
   });
 }
 
-/** y range around the data, never empty. */
-function paddedRange(_, low, high) {
-  if (low === null || high === null) return [0, 1];
-  const pad = high > low ? 0.07 * (high - low) : Math.max(Math.abs(high) * 0.1, 1e-9);
-  return [low - pad, high + pad];
+/** The last number in a few rows: what a channel with few messages said last. */
+function lastNumber(values, row) {
+  for (let i = row; i >= 0; --i) if (!Number.isNaN(values[i])) return values[i];
+  return NaN;
 }
 
 /** One plot. `definition` as figures.js gives it; `shared`: {run, overlay, player, view, phases, events}. */
@@ -179,22 +178,25 @@ export class Panel {
       ticks: {stroke: () => cssColor('--grid'), size: 4}, font: '11px system-ui, sans-serif',
       labelFont: '11px system-ui, sans-serif', ...more});
     const {unit} = this.definition;
+    const least = this.definition.added ? 0 : leastSpan(unit);
+    const shown = (u) => scaled(Math.max(Math.abs(u.scales.y.min), Math.abs(u.scales.y.max)), unit);
     this.#readAll();
     this.plot = new uPlot({
       width: Math.max(120, this.host.clientWidth), height: HEIGHT, legend: {show: false},
-      scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: paddedRange}},
+      scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: (_, low, high) => paddedRange(low, high, least)}},
       axes: [axis({label: 'time (s)', labelSize: 16, size: 26}),
-        axis({label: unit || '1', labelSize: 16, size: 62,
-          values: (_, splits) => splits.map((v) => formatNumber(Number(v.toPrecision(8)), 6))})],
+        axis({label: (u) => shown(u).unit || '1', labelSize: 16, size: 62,
+          values: (u, splits) => splits.map((v) => formatNumber(Number((v * shown(u).factor).toPrecision(8)), 6))})],
       cursor: {drag: {x: true, y: false, setScale: false}, points: {size: 5}, sync: {key: 'poise', setSeries: false}},
       series: [{}, ...this.lines.map((line) => {
         const style = styleOf(line.role, line.overlay);
-        const sparse = line.signal?.channel.dense === false;  // a few messages a second: each one is shown
+        const sparse = line.signal?.channel.sparse === true;  // a few messages a second: each one is shown
         return {label: line.label, stroke: style.color, dash: style.dash, width: style.width,
           points: {show: sparse, size: 5}, spanGaps: sparse, show: !this.hidden.has(line.label)};
       })],
       hooks: {
         drawClear: [(u) => this.#shade(u)],
+        draw: [() => this.updateCursor()],  // by the scales as they are drawn
         setSelect: [(u) => {
           if (u.select.width > CLICK_SLACK) {
             view.set(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'));
@@ -229,7 +231,7 @@ export class Panel {
       const style = styleOf(line.role, line.overlay);
       const swatch = element('span', {class: 'swatch'});
       swatch.style.borderTop = `2px ${style.dash ? 'dashed' : 'solid'} ${style.color()}`;
-      return element('button', {type: 'button', class: 'entry', title: line.signal?.name ?? 'limit',
+      return element('button', {type: 'button', class: 'entry', title: line.signal?.title ?? 'limit',
         'aria-pressed': String(!this.hidden.has(line.label)), click: (e) => {
           const on = this.hidden.delete(line.label);
           if (!on) this.hidden.add(line.label);
@@ -242,42 +244,49 @@ export class Panel {
     this.#updateValues(null);
   }
 
-  /** Values in the row under the pointer, else at the time cursor. */
+  /** Values in the row under the pointer, else at the time cursor: the signals', which a plot that has still to grow lacks. */
   #updateValues(index) {
     if (!this.values) return;
-    const row = index ?? this.shared.player.tick - this.firstTick;
+    const {run, player} = this.shared;
+    const tick = index === null ? player.tick : this.firstTick + index;
     this.lines.forEach((line, i) => {
-      const value = this.data[i + 1][row];
-      const name = line.signal?.values && line.signal.integer ? this.#nameOf(line.signal, value) : null;
-      this.values[i].textContent = line.constant !== undefined ? '' : name ?? formatNumber(value);
+      if (line.constant !== undefined) return;
+      const {values, integer, channel} = line.signal;
+      const row = line.run.rowOf(run.timeAt(tick - run.firstTick));
+      const value = channel.sparse ? lastNumber(values, row) : values[row] ?? NaN;
+      this.values[i].textContent = (integer && this.#nameOf(line.signal, value)) || quantity(value, this.#unitOf(line));
     });
   }
 
+  #unitOf(line) { return line.signal?.unit || this.definition.unit; }
+
   #nameOf(signal, value) {
     const name = signal.valueNames?.[value];
-    return name === undefined ? null : `${value} ${name}`;
+    return name === undefined ? '' : `${value} ${name}`;
   }
 
   #shade(u) {
     const {ctx, bbox} = u;
-    const {phases, events, view} = this.shared;
+    const {phases, events} = this.shared;
+    const {min, max} = u.scales.x;
     ctx.save();
     const x = (time) => Math.min(bbox.left + bbox.width, Math.max(bbox.left, u.valToPos(time, 'x', true)));
     const fill = (list, color) => {
       ctx.fillStyle = color;
       for (const {from, to} of list) {
-        if (to > view.min && from < view.max) {
+        if (to > min && from < max) {
           ctx.fillRect(x(from), bbox.top, Math.max(1, x(to) - x(from)), bbox.height);
         }
       }
     };
     fill(phases.support.filter((p) => p.value !== 'both feet'), cssColor('--single-support'));
     fill(phases.balancing, cssColor('--balancing'));
+    fill(phases.missing, cssColor('--missing'));
     ctx.strokeStyle = cssColor('--event');
     ctx.lineWidth = 1;
     ctx.setLineDash([2, 3]);
     for (const event of events) {
-      if (event.time < view.min || event.time > view.max) continue;
+      if (event.time < min || event.time > max) continue;
       ctx.beginPath();
       ctx.moveTo(x(event.time), bbox.top);
       ctx.lineTo(x(event.time), bbox.top + bbox.height);
@@ -289,8 +298,9 @@ export class Panel {
   updateCursor() {
     if (!this.plot) return;
     const {time} = this.shared.player;
-    const {min, max} = this.shared.view;
-    this.cursor.style.display = time < min || time > max ? 'none' : '';
+    const {min, max} = this.plot.scales.x;
+    this.cursor.hidden = !(time >= min && time <= max);
+    if (this.cursor.hidden) return;
     this.cursor.style.transform = `translateX(${this.plot.valToPos(time, 'x')}px)`;
   }
 
@@ -303,7 +313,6 @@ export class Panel {
     if (!this.plot) return;
     this.#grow();
     this.plot.setScale('x', {min: this.shared.view.min, max: this.shared.view.max});
-    this.updateCursor();
   }
 
   /** After a change of theme. */
@@ -313,10 +322,9 @@ export class Panel {
     this.#fillLegend();
   }
 
-  resize() {
-    if (!this.plot || this.host.clientWidth === 0) return;
-    this.plot.setSize({width: this.host.clientWidth, height: HEIGHT});
-    this.updateCursor();
+  /** To `width`, px; default: that of its place. */
+  resize(width = this.host.clientWidth) {
+    if (this.plot && width > 0) this.plot.setSize({width, height: HEIGHT});
   }
 
   /** A further line. A plot that is being built is built first; one that is not yet will have it. */
@@ -363,8 +371,11 @@ export class PanelGrid {
       this.inSight.forEach((p) => p.redraw());
       this.panels.forEach((p) => { p.stale = !this.inSight.has(p); });
     });
-    shared.player.addEventListener('time', () => this.inSight.forEach((p) => p.updateCursor()));
-    onThemeChange(() => this.panels.forEach((p) => p.restyle()));
+    shared.player.addEventListener('time', () => {
+      // At a live run's end the plots come with the cursor, in their own time.
+      if (!shared.player.following) this.inSight.forEach((p) => p.updateCursor());
+    });
+    onThemeChange(() => this.restyle());
   }
 
   #enter(panel) {
@@ -378,6 +389,16 @@ export class PanelGrid {
   }
 
   updateValues() { this.inSight.forEach((p) => p.updateValues()); }
+  restyle() { this.panels.forEach((p) => p.restyle()); }
+
+  /** Those out of sight, too. */
+  redrawAll() {
+    for (const panel of this.panels) {
+      panel.redraw();
+      panel.updateValues();
+      panel.stale = false;
+    }
+  }
 
   /** After the events have changed. */
   redraw() { this.inSight.forEach((p) => p.redraw()); }

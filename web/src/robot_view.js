@@ -81,15 +81,16 @@ export class RobotView {
     });
   }
 
-  /** Base pose in the world, joint angles in rad. */
+  /** Base pose in the world, joint angles in rad. False: not all of it is known, and the pose stays as it was. */
   setPose(pose, joints) {
-    if (![...pose.position, ...pose.orientation, ...joints].every(Number.isFinite)) return;
+    if (![...pose.position, ...pose.orientation, ...joints].every(Number.isFinite)) return false;
     place(this.object, pose);
     this.robot.bodies.forEach(({joint}, b) => {
       if (joint < 0) return;
       turn.setFromAxisAngle(this.axes[b], joints[joint]);
       this.groups[b].quaternion.multiplyQuaternions(this.origins[b], turn);
     });
+    return true;
   }
 }
 const turn = new Quaternion();

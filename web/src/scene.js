@@ -6,14 +6,16 @@ import {
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {CraneView} from './crane.js';
+import {lightLoad} from './derived.js';
+import {element} from './dom.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
 import {place, RobotView} from './robot_view.js';
+import {isDark} from './palette.js';
 import {add, blockRise, convexHull, rotate} from './spatial.js';
 
 const METRES_PER_NEWTON = 1 / 900;
 const METRES_PER_NEWTON_METRE = 1 / 100;
 const LEAST_PUSH = 3;  // N: below it the sensor's noise
-const LEAST_LOAD = 5;  // N
 const INSET = 0.34;    // of the picture's smaller side
 const FILL = 1.15;  // of the picture's height that the robot may take, as its inverse
 const ABOVE = 0.26;    // m, half of what the view from above shows, at least
@@ -118,10 +120,13 @@ export class SceneView {
     this.overlaySamples = new Samples();
     this.row = 0;
     this.visible = true;
+    this.leastLoad = lightLoad(run);
     this.show = {forces: true, moments: false, pressure: true, com: true};
     this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
     this.#setRatio(FINEST);
     host.append(this.renderer.domElement);
+    this.note = element('p', {class: 'stale', role: 'status', hidden: true});
+    host.append(this.note);
     this.renderer.domElement.setAttribute('role', 'img');
     this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
     this.scene = new Scene();
@@ -203,23 +208,25 @@ export class SceneView {
     this.frame = new Group();
     this.marks = {desired: flat('diamond', 'desired', 0.024), computed: flat('ring', 'computed', 0.013),
       measured: flat('disc', 'measured', 0.0075)};
-    this.frame.add(...Object.values(this.marks));
+    this.frame.add(this.marks.desired, this.marks.computed);
+    this.measuredFrame = new Group();
+    this.measuredFrame.add(this.marks.measured);
     this.comMark = flat('cross', 'com', 0.014);
     this.com = new Mesh(new SphereGeometry(0.022, 20, 14), new MeshBasicMaterial({depthTest: false, transparent: true}));
     this.com.renderOrder = 9;
     colored(this.com.material, 'com');
-    scene.add(this.frame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
+    scene.add(this.frame, this.measuredFrame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
       this.pushArrow.object, this.crane.object,
       ...this.soles.map((s) => s.object),
       ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
-    for (const object of [this.frame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
+    for (const object of [this.frame, this.measuredFrame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
       ...this.soles.map((s) => s.object)]) {
       object.traverse((o) => o.layers.enable(GROUND_LAYER));
     }
   }
 
   setTheme() {
-    const dark = matchMedia('(prefers-color-scheme: dark)').matches;
+    const dark = isDark();
     for (const [material, name] of this.colored) material.color.set(COLORS[name][dark ? 'dark' : 'light']);
     this.background = new Color(dark ? 0x14171c : 0xeef1f5);
     this.insetBackground = new Color(dark ? 0x20252c : 0xffffff);
@@ -250,7 +257,12 @@ export class SceneView {
   setRow(row) {
     this.row = row;
     const {samples, show} = this;
-    this.robotView.setPose(samples.pose('base', row), samples.vector('joint', row, this.run.robot.joints.length));
+    const posed = this.robotView.setPose(samples.pose('base', row),
+      samples.vector('joint', row, this.run.robot.joints.length));
+    if (posed) this.posedAt = this.run.timeAt(row);
+    this.note.hidden = posed;
+    this.note.textContent = this.posedAt === undefined ? 'no message tells the robot\'s pose'
+      : `no message tells the pose at this time: it is that of ${this.posedAt.toFixed(3)} s`;
     if (this.ghost) {
       const other = this.overlay.rowAt(this.run.timeAt(row));
       this.ghost.setPose(this.overlaySamples.pose('base', other),
@@ -295,7 +307,7 @@ export class SceneView {
         const [fx, fy, fz] = samples.vector(`${kind}${f}.force`, row);
         const moment = samples.vector(`${kind}${f}.moment`, row);
         // What the ground does to the robot, where it acts on the sole.
-        const loaded = Math.abs(fz) > LEAST_LOAD;
+        const loaded = Math.abs(fz) > this.leastLoad;
         const at = loaded ? add(sole.position, rotate(sole.orientation, [-moment[1] / fz, moment[0] / fz, 0]))
           : sole.position;
         const force = rotate(sole.orientation, [-fx, -fy, -fz].map((v) => v * METRES_PER_NEWTON));
@@ -324,6 +336,7 @@ export class SceneView {
     };
     drop(this.capture, 'capture', true);
     drop(this.step, 'step', samples.at('step_needed', row) > 0);
+    if (!known) this.marks.measured.visible = false;
     if (!known) return;
     place(this.frame, frame);
     const balancing = samples.at('active_x', row) > 0 || samples.at('active_y', row) > 0;
@@ -333,7 +346,10 @@ export class SceneView {
       if (object.visible) object.position.set(cop[0], cop[1], 0.001);
     };
     put(this.marks.computed, 'cop');
-    put(this.marks.measured, 'measured_cop');
+    // What is read in this tick is of the command, and in the frame, of the tick before.
+    const before = samples.pose('frame', row - 1);
+    put(this.marks.measured, 'measured_cop', [...before.position, ...before.orientation].every(Number.isFinite));
+    if (this.marks.measured.visible) place(this.measuredFrame, before);
     put(this.marks.desired, 'desired_cop', balancing);
   }
 
@@ -388,6 +404,12 @@ export class SceneView {
     this.#ratio = ratio;
     this.renderer.setPixelRatio(ratio);
     this.draw();
+  }
+
+  /** The picture as it is, as the address of an image. */
+  imageUrl() {
+    this.renderNow();
+    return this.renderer.domElement.toDataURL();
   }
 
   /** At once. */

@@ -4,7 +4,7 @@ import {panelOf} from './figures.js';
 
 const MOST_RESULTS = 40;
 
-/** Signals whose name or text holds every word of the query, those that match by name first. */
+/** Signals whose name, title or text holds every word of the query, those that match by name or title first. */
 export function searchSignals(signals, query) {
   const plain = (text) => text.toLowerCase().replace(/[^a-z0-9]+/g, ' ');
   const words = plain(query).trim().split(' ').filter(Boolean);
@@ -12,8 +12,8 @@ export function searchSignals(signals, query) {
   const holds = (text) => words.every((w) => text.includes(w));
   const byName = [], byText = [];
   for (const signal of signals) {
-    if (holds(plain(signal.name))) byName.push(signal);
-    else if (holds(plain(`${signal.name} ${signal.text}`))) byText.push(signal);
+    if (holds(plain(`${signal.name} ${signal.title}`))) byName.push(signal);
+    else if (holds(plain(`${signal.name} ${signal.title} ${signal.text}`))) byText.push(signal);
   }
   return [...byName, ...byText];
 }
@@ -30,12 +30,12 @@ export function signalSearch(run, grid) {
   };
   const addLine = (signal) => {
     if (!grid.panels.includes(last)) return addPlot(signal);  // it was removed meanwhile
-    last.addLine({label: signal.name, role: `hue-${last.definition.series.length}`, name: signal.name, signal});
+    last.addLine({label: signal.title, role: `hue-${last.definition.series.length}`, name: signal.name, signal});
     close();
   };
   const row = (signal) => element('li', {},
     element('button', {type: 'button', class: 'result', click: () => addPlot(signal)},
-      element('span', {class: 'name'}, signal.name), signal.unit ? element('span', {class: 'unit'}, signal.unit) : '',
+      element('span', {class: 'name', title: signal.name}, signal.title), signal.unit ? element('span', {class: 'unit'}, signal.unit) : '',
       element('span', {class: 'text'}, signal.text ?? '')),
     last && grid.panels.includes(last) && last.definition.unit === signal.unit
       ? element('button', {type: 'button', title: 'Add to the plot that was added last', click: () => addLine(signal)},

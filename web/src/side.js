@@ -1,13 +1,13 @@
 // What holds at the time cursor, and the events.
-import {element, formatNumber} from './dom.js';
+import {element} from './dom.js';
+import {formatNumber, quantity} from './units.js';
 
-const MILLI = 1000;
+const DIGITS = 3;
 
 /** {element, load(), update(row)}. */
 export class Readout {
-  constructor(run, phases) {
+  constructor(run) {
     this.run = run;
-    this.phases = phases;
     this.cells = new Map();
     const row = (name) => {
       const cell = element('td', {class: 'number'});
@@ -24,18 +24,18 @@ export class Readout {
     const find = (type, field) => run.find(type, field);
     const derived = (name) => run.signals.get(`derived.${name}`);
     const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
-    const mm = (values) => `${values.map((v) => formatNumber(v * MILLI, 3)).join(', ')} mm`;
-    const newton = ([v]) => `${formatNumber(v, 3)} N`;
+    const metres = (values) => quantity(values, 'm', DIGITS);
+    const newton = (values) => quantity(values, 'N', DIGITS);
     const status = find('task_torque_t', 'status');
     const bridge = find('bridge_status_t', 'state');
     const phase = find('task_torque_t', 'phase');
     return [
       ['phase', [phase], ([i]) => run.scenario.task_controller?.phase?.[i]?.name ?? formatNumber(i)],
       ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
-      ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, 3)],
-      ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), mm],
-      ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], mm],
-      ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), mm],
+      ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
+      ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
+      ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],
+      ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), metres],
       ['push', [derived('push_magnitude')], newton],
       ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
         [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
@@ -51,10 +51,10 @@ export class Readout {
   }
 }
 
-/** Events as a list; a click goes there. */
-export function eventList(events, player) {
+/** Events as a list; a click goes there. `until`: " up to 3 s" where more may come. */
+export function eventList(events, player, until = '') {
   if (events.length === 0) return '';
-  return element('section', {class: 'events'}, element('h2', {}, 'Events'), element('ol', {}, ...events.map((event) =>
+  return element('section', {class: 'events'}, element('h2', {}, `Events${until}`), element('ol', {}, ...events.map((event) =>
     element('li', {}, element('button', {type: 'button', title: event.detail, click: () => player.seek(event.time)},
       element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ` ${event.name.replaceAll('_', ' ')}`,
       event.detail ? element('span', {class: 'text'}, ` ${event.detail}`) : '')))));

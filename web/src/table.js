@@ -1,14 +1,25 @@
 // Checks, assumptions, latencies, channels and the run's information.
-import {element, formatNumber, table, withUnit} from './dom.js';
+import {element, table} from './dom.js';
 import {latencyFigure, latencyTable} from './latency.js';
+import {formatNumber, withUnit} from './units.js';
 
-const verdict = (check) => check.limit === null ? ''
-  : element('span', {class: check.passed ? 'ok' : 'failed'}, check.passed ? 'ok' : 'FAILED');
+/** Of a check without a limit none; passed is null until the run has ended. */
+const verdict = ({limit, passed}) => limit === null ? '' : passed === null ? element('span', {class: 'soft'}, 'pending')
+  : element('span', {class: passed ? 'ok' : 'failed'}, passed ? 'ok' : 'FAILED');
 
-function checkTable(run, overlay, caption = 'Checks') {
+/** "the part from 1.2 s to 3.4 s of a run", or '' of a whole one. */
+function partOf(run) {
+  const {cut} = run.meta.run;
+  const seconds = (tick) => `${formatNumber(run.timeAt(tick - run.firstTick), 6)} s`;
+  return cut ? `part of a run: ${seconds(cut.first_tick)} to ${seconds(cut.last_tick + 1)}` : '';
+}
+
+function checkTable(run, overlay, caption = partOf(run) ? `Checks of this part of the run (${partOf(run)})` : 'Checks') {
+  const pending = run.meta.run.checks.some((c) => c.passed === null);
   const other = new Map((overlay?.meta.run.checks ?? []).map((c) => [`${c.name}|${c.label}`, c]));
-  return table(caption, ['what', 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
-    run.meta.run.checks.map((c) => [c.label || c.name, c.measured === null ? 'none' : withUnit(c.measured, c.unit),
+  const measured = (c) => c.measured !== null ? withUnit(c.measured, c.unit) : pending ? 'none yet' : 'none';
+  return table(caption, ['what', pending ? 'so far' : 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
+    run.meta.run.checks.map((c) => [c.label || c.name, measured(c),
       ...(overlay ? [secondValue(other.get(`${c.name}|${c.label}`))] : []), c.limit ?? '', c.paper ?? '', verdict(c)]),
     {numbers: overlay ? [1, 2] : [1]});
 }
@@ -27,15 +38,23 @@ const channelTable = (run) => table('Channels in the log',
     ...['messages', 'missing', 'duplicate', 'out_of_order', 'refused'].map((key) => formatNumber(c[key]))]),
   {numbers: [1, 2, 3, 4, 5]});
 
+function ticksOf(run) {
+  const {run: r, live} = run.meta;
+  const rate = `${formatNumber(1 / r.tick_period)} per second`;
+  const planned = r.planned_ticks > 0 ? `, ${r.planned_ticks} planned` : '';
+  if (live && !r.ended) return `${rate}${planned}`;
+  return r.cut ? `${r.cut.first_tick} to ${r.cut.last_tick}; ${rate}${planned} for the whole run` : `${r.ticks}; ${rate}${planned}`;
+}
+
 function information(run, title) {
   const {run: r} = run.meta;
   const rows = [['scenario', r.scenario], ['description', run.scenario.description ?? ''],
     ['paper section', r.paper_section], ['run id', r.run_id], ['started', r.started_at], ['seed', String(r.seed)],
     ['robot', `${run.robot.name}, ${formatNumber(run.robot.mass)} kg, ${run.robot.joints.length} joints`],
-    ['ticks', `${run.meta.live ? '' : `${r.ticks} of `}${formatNumber(1 / r.tick_period)} per second${r.planned_ticks > 0
-      ? `, ${r.planned_ticks} planned` : ''}`],
+    ['ticks', ticksOf(run)],
     ['paced by', r.realtime ? 'the wall clock' : 'lockstep'], ['messages dropped on purpose', `${100 * r.drop_rate} %`],
-    ['log', r.log], ['places of the log without a record', run.meta.live ? '' : String(r.damages)],
+    ['log', r.log], ['places of the log without a record', run.meta.live && !r.ended ? '' : String(r.damages)],
+    ['commit', r.poise_commit || 'not known'], ['instruction set of the build', r.instruction_set || 'not known'],
     ...Object.entries(r.versions).map(([name, version]) => [name, version])];
   return element('section', {class: 'table'}, element('h2', {}, title),
     element('div', {class: 'scroll'}, element('table', {}, element('tbody', {}, ...rows.filter(([, v]) => v)
@@ -52,31 +71,50 @@ export function tables(run, overlay) {
     overlay ? information(overlay, 'The second run') : ''].filter(Boolean);
 }
 
-/** Those of a run in progress; `refresh()` brings what the feed has told since. Channels are counted by its report. */
+/** Those of a run in progress, and of its end; `refresh()` brings what the feed has told since. */
 export function liveTables(run, feed) {
+  const place = element('div', {class: 'tables'});
   const checks = element('div', {}), latencies = element('div', {});
+  place.append(checks, assumptionTable(run), latencies, information(run, 'This run'));
   return {
-    elements: [checks, assumptionTable(run), latencies, information(run, 'This run')].filter(Boolean),
+    elements: [place],
     refresh: () => {
-      const {checks: found, components, checked_ticks: ticks, problem} = feed.status;
+      const {ended, checks: found, components, checked_ticks: ticks, problem} = feed.status;
       run.meta.run.checks = found;
       if (problem) {
         checks.replaceChildren(element('p', {class: 'failed', role: 'status'},
           `checks and events cannot be told: ${problem}`));
         return;
       }
+      if (ended) {
+        run.meta.run.ended = true;
+        place.replaceChildren(...tables(run));
+        return;
+      }
       checks.replaceChildren(...(found.length ? [checkTable(run, undefined,
-        `Checks of the first ${formatNumber(ticks * run.period)} s; what they say may change until the run's end`)] : []));
+        `Checks up to ${formatNumber(run.timeAt(ticks - run.firstTick))} s: pending until the run's end`)] : []));
       latencies.replaceChildren(...[latencyFigure(components), latencyTable(components)].filter(Boolean));
     },
   };
 }
 
-/** "31 of 31 checks hold" with the failed ones. */
+/** "all 31 checks hold", or how many failed, by name under the mouse. */
 export function verdictBadge(run) {
   const limited = run.meta.run.checks.filter((c) => c.limit !== null);
   const failed = limited.filter((c) => !c.passed);
+  const where = partOf(run) ? ' in this part' : '';
+  if (limited.length === 0) return element('a', {href: '#tables', class: 'badge'}, 'no check has a limit');
   return element('a', {href: '#tables', class: `badge ${failed.length ? 'failed' : 'ok'}`,
     title: failed.map((c) => c.label || c.name).join('\n')},
-  failed.length ? `${failed.length} of ${limited.length} checks FAILED` : `all ${limited.length} checks hold`);
+  failed.length ? `${failed.length} of ${limited.length} checks FAILED${where}` : `all ${limited.length} checks hold${where}`);
+}
+
+/** What is known of the run's end: of a run in progress, what its feed says. */
+export function stateBadges(run, feed) {
+  const badge = (text) => element('span', {class: 'badge'}, text);
+  if (!feed) return [partOf(run) ? badge(partOf(run)) : '', verdictBadge(run)];
+  const {status, state} = feed;
+  if (status.ended) return [status.problem ? badge('ended; its checks cannot be told') : verdictBadge(run)];
+  return [badge({connecting: 'connecting', live: 'in progress', ended: 'ended; its log is being checked',
+    waiting: 'connection lost: whether it goes on is not known'}[state])];
 }

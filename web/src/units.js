@@ -1,0 +1,77 @@
+// Quantities in words: a number with its unit and an SI prefix, the same in plots, legends and panels.
+
+const MILLI = {m: 1e-3, µ: 1e-6, n: 1e-9};
+const KILO = {k: 1e3};
+
+/** Prefixes that a reader of robots' data expects, by unit; a unit that is not here takes none. */
+const PREFIXES = {
+  m: MILLI, 'm/s': MILLI, 'm/s²': MILLI, rad: MILLI, 'rad/s': MILLI, s: MILLI, A: MILLI,
+  N: {...MILLI, ...KILO}, 'N·m': {...MILLI, ...KILO},
+};
+
+/** Least stretch of a plot's y axis: less of it is noise, which would fill the plot. */
+const LEAST_SPANS = {
+  m: 5e-4, 'm/s': 5e-3, 'm/s²': 0.1, rad: 1e-3, 'rad/s': 1e-2, N: 5, 'N·m': 1, A: 0.1, '%': 2, '': 1e-2,
+};
+
+export const leastSpan = (unit) => LEAST_SPANS[unit] ?? 0;
+
+/** y range around the data, of `least` at least; what is never negative is not shown as if it were. */
+export function paddedRange(low, high, least) {
+  if (!Number.isFinite(low) || !Number.isFinite(high)) return [0, least || 1];
+  const span = Math.max(high - low, least, 1e-3 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
+  const pad = 0.07 * span;
+  const middle = (low + high) / 2;
+  const bottom = high - low < span && low >= 0 ? Math.max(0, middle - span / 2) : Math.min(low, middle - span / 2);
+  return [bottom - pad, Math.max(high, bottom + span) + pad];
+}
+
+/** Prefixed units of messages and metrics, as those that PREFIXES knows; every other one stays. */
+const PREFIXED = {µs: ['s', 1e-6], ms: ['s', 1e-3], mm: ['m', 1e-3], 'mm/s': ['m/s', 1e-3], mrad: ['rad', 1e-3]};
+
+function basic(unit) {
+  const [base, factor] = PREFIXED[unit] ?? [unit, 1];
+  return {unit: base, factor};
+}
+
+/** So many digits, as short as they can be written; '–' for what is no finite number. */
+export function formatNumber(value, digits = 4) {
+  if (!Number.isFinite(value)) return '–';
+  if (Number.isInteger(value) && Math.abs(value) < 1e15) return String(value);
+  const magnitude = Math.abs(value);
+  const rounded = Number(value.toPrecision(digits));
+  return magnitude < 1e-4 || magnitude >= 1e6 ? rounded.toExponential() : String(rounded);
+}
+
+/** {unit, factor}: the prefixed unit in which a value of this size is best read, and what the value is multiplied by. */
+export function scaled(size, unit) {
+  const base = basic(unit);
+  const prefixes = PREFIXES[base.unit];
+  const magnitude = Math.abs(size) * base.factor;
+  if (!prefixes || !Number.isFinite(magnitude) || magnitude === 0) return base;
+  // 0.9996 would be read as 1 with the digits shown: it takes the larger unit.
+  const fitting = [['', 1], ...Object.entries(prefixes)].sort((a, b) => b[1] - a[1])
+    .find(([, scale]) => magnitude >= 0.9995 * scale);
+  const [prefix, scale] = fitting ?? Object.entries(prefixes).sort((a, b) => a[1] - b[1])[0];
+  return {unit: prefix + base.unit, factor: base.factor / scale};
+}
+
+/** "7.656 µm", "12, 3.4, −0.1 mm" of several values, which share the prefix of the largest; '–' where there is none. */
+export function quantity(values, unit, digits = 4) {
+  const list = Array.isArray(values) ? values : [values];
+  const finite = list.filter(Number.isFinite);
+  if (finite.length === 0) return '–';
+  const shown = scaled(Math.max(...finite.map(Math.abs)), unit);
+  // All of them to the last digit of the largest.
+  const largest = Math.max(...finite.map((v) => Math.abs(v * shown.factor)));
+  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(largest || 1)));
+  const texts = list.map((v) => formatNumber(!Number.isFinite(v) ? v : list.length === 1 ? v * shown.factor
+    : Number((v * shown.factor).toFixed(Math.min(20, decimals))), digits));
+  return shown.unit ? `${texts.join(', ')} ${shown.unit}` : texts.join(', ');
+}
+
+const EXPONENT = 1e-3;  // numbers below it are shorter with another prefix
+
+/** A metric's value in its own unit, which its limit has too, unless it is too small to be read in it. */
+export const withUnit = (value, unit) => !unit ? formatNumber(value)
+  : value !== 0 && Math.abs(value) < EXPONENT ? quantity(value, unit) : `${formatNumber(value)} ${unit}`;
