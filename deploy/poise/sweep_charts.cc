@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "deploy/poise/svg_frame.h"
 #include "deploy/poise/text_table.h"
 #include "fmt/format.h"
 
@@ -12,21 +14,10 @@ namespace poise {
 namespace {
 
 using std::numbers::pi;
-
-constexpr double kWidth = 560, kHeight = 440;
-constexpr double kLeft = 70, kRight = 120, kTop = 34, kBottom = 52;
-constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - kTop - kBottom;
-constexpr double kCenterX = kLeft + kPlotWidth / 2, kCenterY = kTop + kPlotHeight / 2;
-constexpr double kRadius = kPlotHeight / 2 - 14;
-constexpr size_t kMostTicks = 12;
-constexpr char kOpening[] = "<svg ";
-constexpr char kTextStyle[] =
-    "text{font:11px system-ui,sans-serif;fill:#333} .t{font-size:13px;font-weight:600}\n"
-    ".r{fill:#777;font-size:10px} .g{stroke:#ddd;stroke-width:1}\n";
-// Okabe and Ito's: told apart by colour-blind readers too.
-constexpr std::array kSeriesColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                       "#e69f00", "#56b4e9", "#000000", "#b0a000"};
 using Rgb = std::array<double, 3>;
+
+constexpr double kTop = SvgFrame::kTop, kPlotHeight = SvgFrame::kPlotHeight,
+                 kPlotWidth = SvgFrame::kPlotWidth, kBase = kTop + kPlotHeight;
 constexpr std::array<Rgb, 3> kShareStops = {{{213, 94, 0}, {242, 228, 190}, {0, 114, 178}}};
 constexpr std::array<Rgb, 5> kValueStops = {  // viridis
     {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
@@ -43,138 +34,129 @@ std::string Blend(const std::array<Rgb, n>& stops, double share) {
                      std::lround(c[2]));
 }
 
-/// Round numbers that span [low, high] and a little more.
-std::vector<double> Ticks(double low, double high) {
-  if (!(high > low)) high = low + std::max(1.0, std::abs(low));
-  const double rough = (high - low) / 5;
-  const double power = std::pow(10, std::floor(std::log10(rough)));
-  double step = 10 * power;
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= rough) {
-      step = factor * power;
-      break;
-    }
-  }
-  std::vector<double> ticks;
-  const double first = std::floor(low / step);
-  for (double i = first; (i - 1) * step < high - 1e-9 * step; ++i) ticks.push_back(i * step);
-  return ticks;
-}
-
-std::string Text(double x, double y, const std::string& text, const char* anchor,
-                 const std::string& more = "") {
-  return fmt::format("<text x='{:.1f}' y='{:.1f}' text-anchor='{}'{}>{}</text>", x, y, anchor, more,
-                     HtmlText(text));
-}
-
-std::string Open(const ChartLabels& labels) {
-  return fmt::format("{}viewBox='0 0 {} {}' role='img'>", kOpening, kWidth, kHeight) +
-         Text(kLeft, 18, labels.title, "start", " class='t'");
-}
-
-std::string AxisLabels(const ChartLabels& labels) {
-  return Text(kCenterX, kHeight - 10, labels.x, "middle") +
-         Text(16, kCenterY, labels.y, "middle",
-              fmt::format(" transform='rotate(-90 16 {:.1f})'", kCenterY));
-}
-
-std::string Legend(const std::vector<ChartSeries>& series) {
-  std::string svg;
-  if (series.size() < 2 && (series.empty() || series[0].name.empty())) return svg;
-  for (size_t i = 0; i < series.size(); ++i) {
-    const double y = kTop + 12 + 18 * static_cast<double>(i);
-    svg += fmt::format("<rect x='{}' y='{}' width='12' height='12' fill='{}'/>",
-                       kWidth - kRight + 10, y - 10, kSeriesColours[i % kSeriesColours.size()]);
-    svg += Text(kWidth - kRight + 26, y, series[i].name, "start");
-  }
-  return svg;
-}
-
-std::string ColourBar(const ChartScale& scale, const std::string& label) {
-  std::string svg;
-  constexpr int kSteps = 40;
-  const double x = kWidth - kRight + 14, height = kPlotHeight - 20;
-  for (int i = 0; i < kSteps; ++i) {
-    const double share = (i + 0.5) / kSteps;
-    svg += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='14' height='{:.2f}' fill='{}'/>", x,
-                       kTop + 20 + height * (1 - static_cast<double>(i + 1) / kSteps),
-                       height / kSteps + 0.3,
-                       scale.Colour(scale.low + share * (scale.high - scale.low)));
-  }
-  for (const double share : {0.0, 0.5, 1.0}) {
-    svg += Text(x + 18, kTop + 24 + height * (1 - share),
-                FormatNumber(scale.low + share * (scale.high - scale.low)), "start");
-  }
-  return svg + Text(x - 4, kTop + 10, label, "start");
-}
-
-/// A linear axis over data: pixel = place(value).
-struct Axis {
-  std::vector<double> ticks;
-  double from, to;  // pixels
-
-  Axis(double low, double high, double from_pixel, double to_pixel)
-      : ticks(Ticks(low, high)), from(from_pixel), to(to_pixel) {}
-  double operator()(double value) const {
-    return from + (value - ticks.front()) / (ticks.back() - ticks.front()) * (to - from);
-  }
-};
-
-std::string Grid(const Axis& x, const Axis& y) {
-  std::string svg;
-  for (const double tick : x.ticks) {
-    svg +=
-        fmt::format("<path class='g' d='M{0:.1f} {1} V{2}'/>", x(tick), kTop, kTop + kPlotHeight);
-    svg += Text(x(tick), kTop + kPlotHeight + 16, FormatNumber(tick), "middle");
-  }
-  for (const double tick : y.ticks) {
-    svg +=
-        fmt::format("<path class='g' d='M{1} {0:.1f} H{2}'/>", y(tick), kLeft, kLeft + kPlotWidth);
-    svg += Text(kLeft - 6, y(tick) + 4, FormatNumber(tick), "end");
-  }
-  return svg;
-}
-
-template <class Points, class Get>
-std::pair<double, double> Range(const Points& points, const Get& get) {
+/// Least and largest of what `get` gives of the items; [0, 1] of none.
+template <class Items, class Get>
+std::pair<double, double> Range(const Items& items, const Get& get) {
   double low = INFINITY, high = -INFINITY;
-  for (const auto& point : points) {
-    low = std::min(low, get(point));
-    high = std::max(high, get(point));
+  for (const auto& item : items) {
+    const std::optional<double> value = get(item);
+    if (!value || !std::isfinite(*value)) continue;
+    low = std::min(low, *value);
+    high = std::max(high, *value);
   }
   return low <= high ? std::pair{low, high} : std::pair{0.0, 1.0};
 }
 
-std::pair<double, double> PolarPlace(double degrees, double radius) {
-  const double angle = degrees * pi / 180;
-  return {kCenterX - radius * std::sin(angle), kCenterY - radius * std::cos(angle)};
-}
+std::optional<double> XOf(const ChartPoint& point) { return point.x; }
+std::optional<double> YOf(const ChartPoint& point) { return point.fallen ? std::nullopt : point.y; }
 
-std::string Spokes() {
-  std::string svg;
-  for (int degrees = 0; degrees < 360; degrees += 45) {
-    const auto [x, y] = PolarPlace(degrees, kRadius);
-    const auto [tx, ty] = PolarPlace(degrees, kRadius + 16);
-    svg += fmt::format("<path class='g' d='M{:.1f} {:.1f} L{:.1f} {:.1f}'/>", kCenterX, kCenterY, x,
-                       y);
-    svg += Text(tx, ty + 4, fmt::format("{}°", degrees), "middle");
-  }
-  return svg;
-}
-
-std::vector<std::pair<double, double>> AllPoints(const std::vector<ChartSeries>& series) {
-  std::vector<std::pair<double, double>> all;
+std::vector<ChartPoint> AllPoints(const std::vector<ChartSeries>& series) {
+  std::vector<ChartPoint> all;
   for (const ChartSeries& one : series) {
     all.insert(all.end(), one.points.begin(), one.points.end());
   }
   return all;
 }
 
-std::string Tip(const std::string& text) { return "<title>" + HtmlText(text) + "</title>"; }
+bool AnyFell(const std::vector<ChartPoint>& points) {
+  return std::ranges::any_of(points, [](const ChartPoint& p) { return p.fallen; });
+}
+
+/// The axes of curves and points: the strip of what fell is above the range of the others.
+struct PlotAxes {
+  SvgAxis x, y;
+  double strip;  ///< pixel, of what fell
+
+  PlotAxes(const SvgFrame& frame, const std::vector<ChartPoint>& points, bool from_zero)
+      : x(Range(points, XOf).first, Range(points, XOf).second, frame.left, frame.right_edge()),
+        y(from_zero ? std::min(0.0, Range(points, YOf).first) : Range(points, YOf).first,
+          Range(points, YOf).second, kBase, kTop + (AnyFell(points) ? SvgFrame::kStrip : 0)),
+        strip(kTop + SvgFrame::kStrip / 2) {}
+};
+
+std::vector<LegendEntry> SeriesEntries(const std::vector<ChartSeries>& series, bool fallen) {
+  std::vector<LegendEntry> entries;
+  for (size_t i = 0; i < series.size(); ++i) {
+    if (!series[i].name.empty()) entries.push_back(SwatchEntry(SeriesFill(i), series[i].name));
+  }
+  if (fallen) entries.push_back(FallenEntry());
+  return entries;
+}
+
+void FitRight(const std::vector<LegendEntry>& entries, SvgFrame* frame) {
+  std::vector<std::string> texts;
+  for (const LegendEntry& entry : entries) texts.push_back(entry.text);
+  FitRight(texts, frame);
+}
+
+std::string Dot(double x, double y, size_t series, const std::string& tip) {
+  return fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3' {}>{}</circle>", x, y,
+                     SeriesFill(series), SvgTip(tip));
+}
+
+/// "M.. L.." through the places; empty ones interrupt it.
+std::string Path(const std::vector<std::optional<std::pair<double, double>>>& places) {
+  std::string path;
+  bool on = false;
+  for (const auto& place : places) {
+    if (place) {
+      path += fmt::format("{}{:.1f} {:.1f}", on ? " L" : " M", place->first, place->second);
+    }
+    on = place.has_value();
+  }
+  return path;
+}
+
+std::pair<double, double> PolarPlace(const SvgFrame& frame, double degrees, double radius) {
+  const double angle = degrees * pi / 180;
+  return {frame.center_x() - radius * std::sin(angle),
+          SvgFrame::center_y() - radius * std::cos(angle)};
+}
+
+std::string Spokes(const SvgFrame& frame) {
+  std::string svg;
+  for (int degrees = 0; degrees < 360; degrees += 45) {
+    const auto [x, y] = PolarPlace(frame, degrees, SvgFrame::radius());
+    const auto [tx, ty] = PolarPlace(frame, degrees, SvgFrame::radius() + 22);
+    svg += fmt::format("<path class='g' d='M{:.1f} {:.1f} L{:.1f} {:.1f}'/>", frame.center_x(),
+                       SvgFrame::center_y(), x, y);
+    svg += SvgText(tx, ty + 4, fmt::format("{}°", degrees), "middle");
+  }
+  return svg;
+}
+
+/// Whether each cell is one run that stands or does not: a bar of shares would tell nothing more.
+bool AllOrNothing(const std::vector<ChartCell>& cells, const ChartScale& scale) {
+  return scale.share && std::ranges::all_of(cells, [](const ChartCell& c) {
+           return c.value && (*c.value == 0 || *c.value == 1);
+         });
+}
+
+/// `fallen`: how a cell that fell is drawn.
+std::string ScaleLegend(const SvgFrame& frame, const std::vector<ChartCell>& cells,
+                        const ChartScale& scale, const std::string& unit,
+                        const LegendEntry& fallen) {
+  if (!AllOrNothing(cells, scale)) {
+    std::vector<LegendEntry> above;
+    if (std::ranges::any_of(cells, &ChartCell::fallen)) above.push_back(fallen);
+    if (std::ranges::any_of(cells, &ChartCell::some_fallen)) {
+      above.push_back({FallenMark(0, 0, ""), "some did not"});
+    }
+    return ColourBar(frame, scale, unit, above);
+  }
+  const auto swatch = [&](double value, const char* text) {
+    return SwatchEntry(fmt::format("fill='{}'", scale.Colour(value)), text);
+  };
+  return Legend(frame, {swatch(1, "stands"), swatch(0, "does not")});
+}
+
+std::string CellFill(const ChartCell& cell, const ChartScale& scale) {
+  return cell.fallen ? "class='ff'" : fmt::format("fill='{}'", scale.Colour(cell.value));
+}
 
 }  // namespace
 
-std::string HtmlText(const std::string& text) {
+std::string HtmlText(std::string_view text) {
   std::string html;
   for (const char c : text) {
     switch (c) {
@@ -208,88 +190,120 @@ std::string ChartScale::Colour(const std::optional<double>& value) const {
 
 ChartScale ScaleOf(const std::vector<ChartCell>& cells, bool share) {
   if (share) return {0, 1, true};
-  ChartScale scale{INFINITY, -INFINITY, false};
-  for (const ChartCell& cell : cells) {
-    if (!cell.value) continue;
-    scale.low = std::min(scale.low, *cell.value);
-    scale.high = std::max(scale.high, *cell.value);
-  }
-  return scale.low <= scale.high ? scale : ChartScale{0, 1, false};
+  const auto [low, high] =
+      Range(cells, [](const ChartCell& cell) { return cell.fallen ? std::nullopt : cell.value; });
+  return {low, high, false};
 }
 
 std::string CurveChart(const ChartLabels& labels, const std::vector<ChartSeries>& series) {
-  const auto all = AllPoints(series);
-  const auto [left, right] = Range(all, [](const auto& p) { return p.first; });
-  const auto [low, high] = Range(all, [](const auto& p) { return p.second; });
-  const Axis x(left, right, kLeft, kLeft + kPlotWidth);
-  const Axis y(std::min(0.0, low), high, kTop + kPlotHeight, kTop);
-  std::string svg = Open(labels) + Grid(x, y) + AxisLabels(labels) + Legend(series);
+  const std::vector<ChartPoint> all = AllPoints(series);
+  const std::vector<LegendEntry> entries = SeriesEntries(series, AnyFell(all));
+  SvgFrame frame;
+  FitRight(entries, &frame);
+  FitLeft(PlotAxes(frame, all, true).y.texts(), &frame);
+  const PlotAxes axes(frame, all, true);
+  std::string svg = OpenSvg(frame, labels) + SvgGrid(frame, axes.x, axes.y) +
+                    AxisLabels(frame, labels) + Legend(frame, entries);
   for (size_t i = 0; i < series.size(); ++i) {
-    const char* const colour = kSeriesColours[i % kSeriesColours.size()];
-    std::string path;
-    for (const auto& [px, py] : series[i].points) {
-      path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", x(px), y(py));
+    std::vector<std::optional<std::pair<double, double>>> places;
+    std::string marks;
+    for (const ChartPoint& point : series[i].points) {
+      const double x = axes.x(point.x);
+      places.emplace_back();
+      if (point.fallen) {
+        marks += FallenMark(x, axes.strip, point.tip);
+      } else if (point.y && std::isfinite(*point.y)) {
+        places.back() = {x, axes.y(*point.y)};
+        marks += Dot(x, axes.y(*point.y), i, point.tip);
+      }
     }
-    svg += fmt::format("<path d='{}' fill='none' stroke='{}' stroke-width='1.5'/>", path, colour);
-    for (const auto& [px, py] : series[i].points) {
-      svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3' fill='{}'>{}</circle>", x(px),
-                         y(py), colour, Tip(fmt::format("{}: {}", px, py)));
+    svg += fmt::format("<path d='{}' {}/>", Path(places), SeriesLine(i)) + marks;
+  }
+  return svg + "</svg>";
+}
+
+std::string PointChart(const ChartLabels& labels, const std::vector<ChartPoint>& points) {
+  std::vector<LegendEntry> entries = {SwatchEntry(SeriesFill(0), "stands")};
+  if (AnyFell(points)) entries.push_back(FallenEntry());
+  SvgFrame frame;
+  FitRight(entries, &frame);
+  FitLeft(PlotAxes(frame, points, false).y.texts(), &frame);
+  const PlotAxes axes(frame, points, false);
+  std::string svg = OpenSvg(frame, labels) + SvgGrid(frame, axes.x, axes.y) +
+                    AxisLabels(frame, labels) + Legend(frame, entries);
+  for (const ChartPoint& point : points) {
+    if (point.fallen) {
+      svg += FallenMark(axes.x(point.x), axes.strip, point.tip);
+    } else if (point.y && std::isfinite(*point.y)) {
+      svg += Dot(axes.x(point.x), axes.y(*point.y), 0, point.tip);
     }
   }
   return svg + "</svg>";
 }
 
 std::string PolarChart(const ChartLabels& labels, const std::vector<ChartSeries>& series) {
-  const double high = Range(AllPoints(series), [](const auto& p) { return p.second; }).second;
-  const Axis radius(0, std::max(high, 1e-12), 0, kRadius);
-  std::string svg = Open(labels) + Spokes() + Legend(series);
-  for (const double tick : radius.ticks) {
+  const std::vector<ChartPoint> all = AllPoints(series);
+  const std::vector<LegendEntry> entries = SeriesEntries(series, AnyFell(all));
+  SvgFrame frame;
+  FitRight(entries, &frame);
+  const SvgAxis radius(0, std::max(Range(all, YOf).second, 1e-12), 0, SvgFrame::radius());
+  std::string svg = OpenSvg(frame, labels) + Spokes(frame) + Legend(frame, entries);
+  const std::vector<std::string> texts = radius.texts();
+  for (size_t i = 1; i < texts.size(); ++i) {
+    const double r = radius(radius.ticks()[i]);
     svg += fmt::format("<circle class='g' cx='{:.1f}' cy='{:.1f}' r='{:.1f}' fill='none'/>",
-                       kCenterX, kCenterY, radius(tick));
-    svg +=
-        Text(kCenterX + 3, kCenterY - radius(tick) - 2, FormatNumber(tick), "start", " class='r'");
+                       frame.center_x(), SvgFrame::center_y(), r);
+    svg += SvgText(frame.center_x() + 3, SvgFrame::center_y() - r + 10, texts[i], "start",
+                   " class='r'");
   }
   for (size_t i = 0; i < series.size(); ++i) {
-    const char* const colour = kSeriesColours[i % kSeriesColours.size()];
-    std::string path;
-    std::string dots;
-    for (const auto& [angle, distance] : series[i].points) {
-      const auto [x, y] = PolarPlace(angle, radius(std::max(0.0, distance)));
-      path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : " L", x, y);
-      dots += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3' fill='{}'>{}</circle>", x, y,
-                          colour, Tip(fmt::format("{} {}°: {}", series[i].name, angle, distance)));
+    std::vector<std::optional<std::pair<double, double>>> places;
+    std::string marks;
+    for (const ChartPoint& point : series[i].points) {
+      places.emplace_back();
+      if (point.fallen) {
+        const auto [x, y] = PolarPlace(frame, point.x, SvgFrame::radius() + 8);
+        marks += FallenMark(x, y, point.tip);
+      } else if (point.y && std::isfinite(*point.y)) {
+        places.back() = PolarPlace(frame, point.x, radius(std::max(0.0, *point.y)));
+        marks += Dot(places.back()->first, places.back()->second, i, point.tip);
+      }
     }
-    svg += fmt::format(
-        "<path d='{}{}' fill='{}' fill-opacity='0.08' stroke='{}' "
-        "stroke-width='1.5'/>{}",
-        path, path.empty() ? "" : " Z", colour, colour, dots);
+    const bool closed = std::ranges::all_of(places, [](const auto& place) { return !!place; });
+    svg += fmt::format("<path d='{}{}' {}/>", Path(places), closed && !places.empty() ? " Z" : "",
+                       SeriesLine(i)) +
+           marks;
   }
-  return svg + Text(kCenterX, kHeight - 6, labels.y, "middle") + "</svg>";
+  return svg +
+         SvgText(frame.center_x(), SvgFrame::height() - 6,
+                 fmt::format("{}; outwards: {}", labels.x, labels.y), "middle") +
+         "</svg>";
 }
 
 std::string HeatMap(const ChartLabels& labels, const std::vector<std::string>& columns,
                     const std::vector<std::string>& rows, const std::vector<ChartCell>& cells,
                     const ChartScale& scale) {
+  SvgFrame frame;
+  FitLeft(rows, &frame);
   const double width = kPlotWidth / static_cast<double>(columns.size());
   const double height = kPlotHeight / static_cast<double>(rows.size());
-  std::string svg = Open(labels) + AxisLabels(labels) + ColourBar(scale, labels.value);
+  std::string svg =
+      OpenSvg(frame, labels) + AxisLabels(frame, labels) +
+      ScaleLegend(frame, cells, scale, labels.unit, SwatchEntry("class='ff'", "none stands"));
   for (const ChartCell& cell : cells) {
-    svg += fmt::format(
-        "<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' fill='{}'>{}"
-        "</rect>",
-        kLeft + cell.x * width, kTop + kPlotHeight - (cell.y + 1) * height, width + 0.2,
-        height + 0.2, scale.Colour(cell.value), Tip(cell.tip));
+    const double x = frame.left + cell.x * width, y = kBase - (cell.y + 1) * height;
+    svg += fmt::format("<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' {}>{}</rect>", x,
+                       y, width + 0.2, height + 0.2, CellFill(cell, scale), SvgTip(cell.tip));
+    if (cell.some_fallen) svg += FallenMark(x + width / 2, y + height / 2, cell.tip);
   }
-  const auto each = [](size_t count) { return (count + kMostTicks - 1) / kMostTicks; };
-  for (size_t i = 0; i < columns.size(); i += each(columns.size())) {
-    svg += Text(kLeft + (static_cast<double>(i) + 0.5) * width, kTop + kPlotHeight + 16, columns[i],
-                "middle");
+  std::vector<std::pair<double, std::string>> below, beside;
+  for (size_t i = 0; i < columns.size(); ++i) {
+    below.emplace_back(frame.left + (static_cast<double>(i) + 0.5) * width, columns[i]);
   }
-  for (size_t i = 0; i < rows.size(); i += each(rows.size())) {
-    svg += Text(kLeft - 6, kTop + kPlotHeight - (static_cast<double>(i) + 0.5) * height + 4,
-                rows[i], "end");
+  for (size_t i = 0; i < rows.size(); ++i) {
+    beside.emplace_back(kBase - (static_cast<double>(i) + 0.5) * height, rows[i]);
   }
-  return svg + "</svg>";
+  return svg + TextsBelow(below, kBase + 16) + TextsBeside(beside, frame.left - 6) + "</svg>";
 }
 
 std::string PolarHeatMap(const ChartLabels& labels, const std::vector<double>& angles,
@@ -300,37 +314,51 @@ std::string PolarHeatMap(const ChartLabels& labels, const std::vector<double>& a
     spread = std::min(spread, std::abs(angles[i] - angles[i - 1]));
   }
   spread = std::min(std::max(spread, 0.1), 359.99);
-  const double ring = kRadius / (static_cast<double>(rows.size()) + 0.5);
-  std::string svg = Open(labels) + ColourBar(scale, labels.value);
+  const SvgFrame frame;
+  const double ring = SvgFrame::radius() / (static_cast<double>(rows.size()) + 0.5);
+  std::string svg = OpenSvg(frame, labels) + ScaleLegend(frame, cells, scale, labels.unit,
+                                                         SwatchEntry("class='ff'", "none stands"));
   for (const ChartCell& cell : cells) {
     const double inner = (cell.y + 0.5) * ring, outer = inner + ring;
     const double begin = cell.x - spread / 2, end = cell.x + spread / 2;
-    const auto [ax, ay] = PolarPlace(begin, inner);
-    const auto [bx, by] = PolarPlace(begin, outer);
-    const auto [cx, cy] = PolarPlace(end, outer);
-    const auto [dx, dy] = PolarPlace(end, inner);
+    const auto [ax, ay] = PolarPlace(frame, begin, inner);
+    const auto [bx, by] = PolarPlace(frame, begin, outer);
+    const auto [cx, cy] = PolarPlace(frame, end, outer);
+    const auto [dx, dy] = PolarPlace(frame, end, inner);
     const int large = spread > 180 ? 1 : 0;
     svg += fmt::format(
         "<path d='M{:.2f} {:.2f} L{:.2f} {:.2f} A{:.2f} {:.2f} 0 {} 0 {:.2f} {:.2f} "
-        "L{:.2f} {:.2f} A{:.2f} {:.2f} 0 {} 1 {:.2f} {:.2f} Z' fill='{}'>{}</path>",
+        "L{:.2f} {:.2f} A{:.2f} {:.2f} 0 {} 1 {:.2f} {:.2f} Z' {}>{}</path>",
         ax, ay, bx, by, outer, outer, large, cx, cy, dx, dy, inner, inner, large, ax, ay,
-        scale.Colour(cell.value), Tip(cell.tip));
+        CellFill(cell, scale), SvgTip(cell.tip));
+    if (!cell.some_fallen) continue;
+    const auto [x, y] = PolarPlace(frame, cell.x, (inner + outer) / 2);
+    svg += FallenMark(x, y, cell.tip);
   }
-  svg += Spokes();
-  for (size_t i = 0; i < rows.size(); i += (rows.size() + 5) / 6) {
-    svg += Text(kCenterX + 3, kCenterY - (static_cast<double>(i) + 1) * ring + 4, rows[i], "start",
-                " class='r'");
+  svg += Spokes(frame);
+  double free = SvgFrame::center_y() + 1e9;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const double y = SvgFrame::center_y() - (static_cast<double>(i) + 1) * ring + 4;
+    if (y > free) continue;
+    svg += SvgText(frame.center_x() + 3, y, rows[i], "start", " class='r h'");
+    free = y - 24;
   }
-  return svg + Text(kCenterX, kHeight - 6, labels.y, "middle") + "</svg>";
+  return svg +
+         SvgText(frame.center_x(), SvgFrame::height() - 6,
+                 fmt::format("{}; outwards: {}", labels.x, labels.y), "middle") +
+         "</svg>";
 }
 
 std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>& cells,
                          const ChartScale& scale) {
-  const auto [left, right] = Range(cells, [](const ChartCell& c) { return c.x; });
-  const auto [low, high] = Range(cells, [](const ChartCell& c) { return c.y; });
-  const Axis x(left, right, kLeft, kLeft + kPlotWidth);
-  const Axis y(low, high, kTop + kPlotHeight, kTop);
-  std::string svg = Open(labels) + Grid(x, y) + AxisLabels(labels) + ColourBar(scale, labels.value);
+  const auto [left, right] = Range(cells, [](const ChartCell& c) { return std::optional(c.x); });
+  const auto [low, high] = Range(cells, [](const ChartCell& c) { return std::optional(c.y); });
+  SvgFrame frame;
+  const SvgAxis y(low, high, kBase, kTop);
+  FitLeft(y.texts(), &frame);
+  const SvgAxis x(left, right, frame.left, frame.right_edge());
+  std::string svg = OpenSvg(frame, labels) + SvgGrid(frame, x, y) + AxisLabels(frame, labels) +
+                    ScaleLegend(frame, cells, scale, labels.unit, FallenEntry());
   // The rare ones, which are those of low share, on top.
   std::vector<const ChartCell*> order;
   for (const ChartCell& cell : cells) order.push_back(&cell);
@@ -338,37 +366,58 @@ std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>
     return a->value.value_or(INFINITY) > b->value.value_or(INFINITY);
   });
   for (const ChartCell* cell : order) {
-    svg += fmt::format(
-        "<circle cx='{:.1f}' cy='{:.1f}' r='4' fill='{}' fill-opacity='0.85' "
-        "stroke='#333' stroke-width='0.4'>{}</circle>",
-        x(cell->x), y(cell->y), scale.Colour(cell->value), Tip(cell->tip));
+    if (cell->fallen) {
+      svg += FallenMark(x(cell->x), y(cell->y), cell->tip);
+      continue;
+    }
+    svg += fmt::format("<circle class='o' cx='{:.1f}' cy='{:.1f}' r='4' fill='{}'>{}</circle>",
+                       x(cell->x), y(cell->y), scale.Colour(cell->value), SvgTip(cell->tip));
   }
   return svg + "</svg>";
 }
 
+std::string ChartStyle(bool dark) {
+  // Okabe and Ito's colours: told apart by colour-blind readers too.
+  constexpr std::array kLight = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                 "#e69f00", "#56b4e9", "#000000", "#b0a000"};
+  constexpr std::array kDark = {"#4db2ff", "#ff8c42", "#2ecc9a", "#e59ac6",
+                                "#f5b82e", "#8fd0f5", "#f2f2f2", "#e0d24a"};
+  const auto series = [](const auto& colours) {
+    std::string css;
+    for (size_t i = 0; i < colours.size(); ++i) {
+      css += fmt::format(".s{0}{{fill:{1}}} .l{0}{{fill:none;stroke:{1};stroke-width:1.5}}\n", i,
+                         colours[i]);
+    }
+    return css;
+  };
+  std::string css =
+      "text{font:11px system-ui,sans-serif;fill:#333} .t{font-size:13px;font-weight:600}\n"
+      ".r{fill:#555;font-size:10px} .h{paint-order:stroke;stroke:#fff;stroke-width:3px}\n"
+      ".g{stroke:#ddd;stroke-width:1} .o{fill-opacity:.85;stroke:#333;stroke-width:.4}\n"
+      ".f{fill:none;stroke:#c81e1e;stroke-width:2} .ff{fill:#e9b4b4;stroke:#c81e1e;"
+      "stroke-width:.5}\n" +
+      series(kLight);
+  if (dark) {
+    css +=
+        "@media(prefers-color-scheme:dark){text{fill:#dfe3ea} .r{fill:#b8c0cc}\n"
+        ".h{stroke:#1a1e25} .g{stroke:#3a4350} .o{stroke:#ddd}\n"
+        ".f{stroke:#ff7b7b} .ff{fill:#5a2a2e;stroke:#ff7b7b}\n" +
+        series(kDark) + "}\n";
+  }
+  return css;
+}
+
 std::string StandaloneSvg(const std::string& chart) {
-  const size_t attributes = sizeof(kOpening) - 1, content = chart.find('>') + 1;
+  constexpr std::string_view kOpening = "<svg ", kViewBox = "viewBox='0 0 ";
+  const size_t content = chart.find('>') + 1;
+  const size_t size = chart.find(kViewBox) + kViewBox.size();
+  const size_t space = chart.find(' ', size), end = chart.find('\'', space);
   return fmt::format(
       "{}xmlns='http://www.w3.org/2000/svg' width='{}' height='{}' {}<style>{}</style>"
       "<rect width='100%' height='100%' fill='#fff'/>{}\n",
-      kOpening, kWidth, kHeight, chart.substr(attributes, content - attributes), kTextStyle,
+      kOpening, chart.substr(size, space - size), chart.substr(space + 1, end - space - 1),
+      chart.substr(kOpening.size(), content - kOpening.size()), ChartStyle(false),
       chart.substr(content));
-}
-
-std::string ChartPage(const std::string& title, const std::vector<std::string>& paragraphs,
-                      const std::vector<std::string>& charts) {
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang='en'><meta charset='utf-8'><title>{0}</title>\n<style>\n"
-      "body{{font:14px system-ui,sans-serif;margin:24px;color:#222;background:#fff}}\n"
-      "pre{{font-size:12px;overflow-x:auto}}\n"
-      ".c{{display:flex;flex-wrap:wrap;gap:16px}}\n"
-      "svg{{width:{1}px;max-width:100%;border:1px solid #ddd;background:#fff}}\n"
-      "{2}</style>\n<h1>{0}</h1>\n",
-      HtmlText(title), kWidth, kTextStyle);
-  for (const std::string& paragraph : paragraphs) html += paragraph + "\n";
-  html += "<div class='c'>\n";
-  for (const std::string& chart : charts) html += chart + "\n";
-  return html + "</div>\n</html>\n";
 }
 
 }  // namespace poise

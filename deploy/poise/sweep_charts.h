@@ -3,29 +3,40 @@
 
 #include <optional>
 #include <string>
-#include <utility>
+#include <string_view>
 #include <vector>
 
 namespace poise {
 
 /// `text` for HTML and SVG.
-std::string HtmlText(const std::string& text);
+std::string HtmlText(std::string_view text);
 
+/// title: what is shown, in words; x, y: the axes with their units; unit: of the values.
 struct ChartLabels {
-  std::string title, x, y, value;
+  std::string title, x, y, unit;
 };
 
-/// A curve: points in the order in which they are joined.
+/// `fallen`: of a run that did not stand. It has a mark of its own and no part in an axis' range.
+struct ChartPoint {
+  double x = 0;
+  std::optional<double> y;
+  std::string tip;  ///< what it says under the mouse
+  bool fallen = false;
+};
+
+/// A curve: points in the order in which they are joined; what fell interrupts it.
 struct ChartSeries {
   std::string name;
-  std::vector<std::pair<double, double>> points;
+  std::vector<ChartPoint> points;
 };
 
-/// A coloured place. `tip`: what it says under the mouse.
+/// A coloured place.
 struct ChartCell {
   double x = 0, y = 0;
   std::optional<double> value;
   std::string tip;
+  bool fallen = false;       ///< none of its runs stands: no value of the scale
+  bool some_fallen = false;  ///< the value is of those that stand
 };
 
 /// Colours of values: from low to high, or of shares from 0 (orange: none stands) to 1 (blue).
@@ -34,12 +45,15 @@ struct ChartScale {
   bool share = false;
   std::string Colour(const std::optional<double>& value) const;
 };
-/// Of the values that there are.
+/// Of the values that there are; what fell is off the scale.
 ChartScale ScaleOf(const std::vector<ChartCell>& cells, bool share);
 
+/// What fell stands in a strip above the plot.
 std::string CurveChart(const ChartLabels& labels, const std::vector<ChartSeries>& series);
+/// Points that are not joined, in two colours: what stands, and what fell in a strip above them.
+std::string PointChart(const ChartLabels& labels, const std::vector<ChartPoint>& points);
 /// x is an angle in degrees, 0 up (the world's x) and counter-clockwise (to its y); y the distance
-/// from the centre, 0 or more. Curves close.
+/// from the centre, 0 or more. Curves close. What fell stands outside.
 std::string PolarChart(const ChartLabels& labels, const std::vector<ChartSeries>& series);
 /// x and y of a cell are indexes of `columns` and `rows`, the values' texts; row 0 is at the
 /// bottom.
@@ -53,11 +67,10 @@ std::string PolarHeatMap(const ChartLabels& labels, const std::vector<double>& a
 std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>& cells,
                          const ChartScale& scale);
 
-/// A chart of the above as a file of its own, without a page's style around it.
-std::string StandaloneSvg(const std::string& chart);
+/// The style of all charts, light; with `dark` also what changes where the reader prefers dark.
+std::string ChartStyle(bool dark);
 
-/// A whole page: a heading, paragraphs, charts.
-std::string ChartPage(const std::string& title, const std::vector<std::string>& paragraphs,
-                      const std::vector<std::string>& charts);
+/// A chart of the above as a file of its own, light, without a page's style around it.
+std::string StandaloneSvg(const std::string& chart);
 
 }  // namespace poise

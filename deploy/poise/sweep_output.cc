@@ -11,6 +11,7 @@
 #include "deploy/poise/child_process.h"
 #include "deploy/poise/output_place.h"
 #include "deploy/poise/sweep_charts.h"
+#include "deploy/poise/sweep_edge.h"
 #include "deploy/poise/sweep_maps.h"
 #include "deploy/poise/sweep_table.h"
 #include "fmt/format.h"
@@ -82,14 +83,15 @@ void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
                  const SweepRows& rows) {
   WriteFile(folder / kTableFile, SweepCsv(header, rows));
   if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
-  const std::vector<std::string> charts = MapCharts(header, rows);
-  WriteFile(folder / kMapsFile, MapsPage(header, rows, charts));
-  WriteMaps(folder, charts);
+  const SweepMaps maps = MapCharts(header, rows);
+  WriteFile(folder / kMapsFile, MapsPage(header, rows, maps));
+  WriteMaps(folder, maps.all());
 }
 
 void PrintOutput(const std::filesystem::path& folder, const SweepHeader& header,
                  const SweepRows& rows) {
-  fmt::print("{}", FormatOutcomes(header, rows));
+  for (const std::string& sentence : SurvivalSentences(header, rows)) fmt::print("{}\n", sentence);
+  fmt::print("\n{}", FormatOutcomes(header, rows));
   if (header.sweep.has_limit()) fmt::print("\n{}", FormatLimits(header, rows));
   fmt::print("\n{}\n", (folder / kTableFile).string());
   if (header.sweep.has_limit()) fmt::print("{}\n", (folder / kLimitsFile).string());

@@ -8,7 +8,8 @@
 namespace poise {
 
 /// Writes table.csv and maps.html, each map as map_N.svg and map_N.png, and limits.csv of a search
-/// for limits, of the rows there are. Says on stderr why there are no PNG files. Throws ConfigError.
+/// for limits, of the rows there are. Says on stderr why there are no PNG files. Throws
+/// ConfigError.
 void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
                  const SweepRows& rows);
 
