@@ -85,10 +85,10 @@ std::string FormatMapsPage(const MapsPageContent& content) {
   html += Grid(content.survival);
   for (const std::string& table : content.tables) html += "<pre>" + HtmlText(table) + "</pre>\n";
   if (!content.metrics.empty()) {
+    const size_t count = content.metrics.size();
     html += fmt::format(
         "<details{}><summary>What the runs measured: {} map{}</summary>\n{}</details>\n",
-        content.metrics.size() <= kFewCharts ? " open" : "", content.metrics.size(),
-        Grid(content.metrics));
+        count <= kFewCharts ? " open" : "", count, count == 1 ? "" : "s", Grid(content.metrics));
   }
   if (!content.constants.empty()) {
     html += "<details><summary>The same in every run that stands</summary>\n";

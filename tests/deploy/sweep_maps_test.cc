@@ -9,6 +9,7 @@
 
 #include "deploy/poise/svg_frame.h"
 #include "deploy/poise/sweep_edge.h"
+#include "deploy/poise/sweep_points.h"
 
 namespace poise {
 namespace {

@@ -3,7 +3,7 @@ import {element} from './dom.js';
 import {setPaper} from './palette.js';
 
 const PLOT_WIDTH = 325;        // CSS px: two beside each other on A4 and on letter
-const MOST_ROWS = 100_000;     // of a run whose plots are all drawn in advance: some 100 MB
+const MOST_ROWS = 30_000;  // of a run whose plots are all drawn in advance: some 100 MB
 
 export class Printer {
   #picture = element('img', {class: 'paper', alt: 'The robot at the time cursor'});
