@@ -104,7 +104,7 @@ TEST_F(SweepMapsTest, AHeatMapLeavesFallsOffItsColours) {
   Add(false, 1e6);
   const SweepMaps maps = MapCharts(header, rows);
   ASSERT_EQ(maps.metrics.size(), 1u);
-  EXPECT_EQ(Count(maps.metrics[0], "class='ff'"), 1u);
+  EXPECT_EQ(Count(maps.metrics[0], "class='ff'"), 2u);  // the cell and the legend
   EXPECT_LE(LargestNumber(maps.metrics[0]), 100);
   EXPECT_THAT(Texts(maps.metrics[0]), Contains("0.2167"));
   EXPECT_THAT(maps.metrics[0], Not(HasSubstr("0.216666")));
