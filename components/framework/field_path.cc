@@ -351,7 +351,8 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
     const bool is_message = field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
     const bool text = field->cpp_type() == FieldDescriptor::CPPTYPE_STRING;
     const bool whole = step.index < 0 && step.key.empty();
-    if (last && value.empty() && whole && (field->is_repeated() || !text)) {
+    if (last && value.empty() && whole &&
+        (field->is_repeated() || is_message || (!text && !field->has_default_value()))) {
       reflection->ClearField(level, field);
       return;
     }

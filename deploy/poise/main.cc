@@ -1,4 +1,7 @@
 // The program `poise`: runs, checks and inspects process graphs.
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
@@ -28,6 +31,10 @@ void Fail(std::string_view problem) {
 /// `code`, or failure where what was printed has not come out: a full disk behind a redirection.
 int Flushed(int code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  struct stat out {};
+  const bool pipe =
+      fstat(STDOUT_FILENO, &out) == 0 && (S_ISFIFO(out.st_mode) || S_ISSOCK(out.st_mode));
+  if (pipe) return code;  // its reader has what it wanted
   Fail(fmt::format("standard output: cannot be written: {}", std::strerror(errno)));
   return code == poise::kExitOk ? poise::kExitFailed : code;
 }

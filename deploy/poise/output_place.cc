@@ -65,10 +65,9 @@ void CheckFolderFree(const std::string& flag, const fs::path& folder, bool force
 
 void CheckFileFree(const std::string& flag, const fs::path& file, bool force) {
   std::error_code error;
-  if (force || !fs::is_regular_file(file, error)) return;
-  throw ConfigError(fmt::format("{} {}: exists{}; choose another name, or replace it with --force",
-                                flag, file.string(),
-                                logging::IsEventLog(file.string()) ? " and is a log" : ""));
+  if (force || !fs::is_regular_file(file, error) || logging::IsEventLog(file.string())) return;
+  throw ConfigError(fmt::format("{} {}: exists; choose another name, or replace it with --force",
+                                flag, file.string()));
 }
 
 int64_t ExpectedLogSize(const RunSpec& spec) {

@@ -106,7 +106,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--set", options->changes.set,
                   "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120 or "
                   "--set 'check[push_peak].at_most=200' (poise list fields); "
-                  "no value: empties a list or group, unsets a number")
+                  "no value: empties a list or group, unsets a number without default")
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)
       ->take_all();

@@ -113,8 +113,9 @@ TEST(SetField, FindsAnElementByItsName) {
       "text", &config);
   SetField(&config, "phase[stand].kp", "8");
   EXPECT_EQ(config.phase(0).kp(), 8);
-  SetField(&config, "phase[stand].kp", "");
-  EXPECT_FALSE(config.phase(0).has_kp());
+  SetField(&config, "fail", "true");
+  SetField(&config, "fail", "");  // no default: unset; what has one is not emptied by accident
+  EXPECT_FALSE(config.has_fail());
   EXPECT_EQ(ResolvePath(config, "phase[stand].kp"), "phase[0].kp");
   EXPECT_EQ(ResolvePath(config, "phase[1].kp"), "phase[1].kp");
   EXPECT_EQ(ResolvePath(config, "nothing.kp"), "nothing.kp");
@@ -144,7 +145,7 @@ TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
   EXPECT_EQ(
       SetError("phase.kp", "3"),
       "phase.kp: phase is a list of 1; write phase[0].kp, or the element's name for its number; "
-      "phase[1].kp adds one");
+      "phase[1].kp adds an element");
   EXPECT_EQ(SetError("phase[2].kp", "3"),
             "phase[2].kp: phase has 1 element; the index may be 0 to 1");
   EXPECT_EQ(SetError("gains[0].kp", "3"), "gains[0].kp: gains is not a list; leave out the index");
@@ -155,8 +156,7 @@ TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
   EXPECT_EQ(SetError("gains.kp", ""), "gains.kp: '' is not a number");
   EXPECT_EQ(SetError("fail", "yes"), "fail: 'yes' is not true or false");
   EXPECT_EQ(SetError("mode", "UP"), "mode: 'UP' is not one of NORMAL, LOOP");
-  for (const char* path :
-       {"", ".", "a..b", "phase[", "phase[x].kp", "phase[-1].kp", "phase[0]x.kp", "[0]"}) {
+  for (const char* path : {"", ".", "a..b", "phase[", "phase[-1].kp", "phase[0]x.kp", "[0]"}) {
     EXPECT_NE(SetError(path, "1").find("not a path"), std::string::npos) << path;
   }
 }

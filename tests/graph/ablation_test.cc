@@ -32,7 +32,8 @@ class AblationTest : public testing::Test {
   /// Runs to the folder `name` with `flags`; expects success. Returns the folder.
   std::string Run(const std::string& name, const std::string& scenario,
                   const std::vector<std::string>& flags = {}) {
-    std::vector<std::string> arguments = {"run", scenario, "--inline", "--out", deploy_ / name};
+    std::vector<std::string> arguments = {"run",     scenario, "--inline",
+                                          "--force", "--out",  deploy_ / name};
     arguments.insert(arguments.end(), flags.begin(), flags.end());
     const ProgramResult result = RunPoise(arguments);
     EXPECT_EQ(result.exit_code, 0) << result.output;
