@@ -227,7 +227,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
 
 RunOutcome ScenarioRun::RunOnly(const std::string& out) {
   if (!options_.in_process) ChoosePorts(&main_.spec);
-  const RunDir dir = MakeRunDir(out, name());
+  const RunDir dir = MakeRunDir(out, name(), options_.force);
   WriteFiles(main_, dir.path());
   CatchStopSignals();
   return RunPart(main_, dir.path(), options_.in_process, /*quiet=*/true, options_.launch);
