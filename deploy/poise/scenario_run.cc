@@ -139,8 +139,9 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
              Wrapped(realtime, ScreenStyle().columns, 2),
              FormatVerdictLines(summary.checks, problem));
   if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
-  fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n", record.time(record.num_ticks),
-             outcome.wall_time, record.real_time_factor.value_or(0));
+  fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
+             record.duration(record.num_ticks), outcome.wall_time,
+             record.real_time_factor.value_or(0));
   fmt::print("{}", FormatNext(main_.loaded.scenario, result.dir, latest));
 }
 
@@ -198,7 +199,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     record = logging::ReadRun(log);
     PrepareRecord(log, scenario, &record);
     if (outcome.wall_time > 0) {
-      record.real_time_factor = record.time(record.num_ticks) / outcome.wall_time;
+      record.real_time_factor = record.duration(record.num_ticks) / outcome.wall_time;
     }
     summary.checks = EvaluateChecks(scenario, record);
     summary.events = logging::Events(record);

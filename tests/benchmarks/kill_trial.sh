@@ -12,7 +12,7 @@ parse_load "$@"
 set -- $rest
 faults=${1:-100}
 case $faults in *[!0-9]* | '') echo "usage: $0 [--load N] [--browser] [FAULTS]" >&2; exit 2 ;; esac
-poise=$root/build/release/bin/poise
+poise=${POISE:-$root/build/release/bin/poise}
 out=$(mktemp -d)
 trap 'stop_load; rm -rf "$out" 2>/dev/null || true' EXIT
 trap 'exit 130' INT TERM

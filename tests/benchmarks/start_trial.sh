@@ -16,7 +16,7 @@ for word in $rest; do
     *) starts=$word ;;
   esac
 done
-poise=$root/build/release/bin/poise
+poise=${POISE:-$root/build/release/bin/poise}
 out=$(mktemp -d)
 trap 'stop_load; rm -rf "$out" 2>/dev/null || true' EXIT
 trap 'exit 130' INT TERM

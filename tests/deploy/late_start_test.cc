@@ -38,7 +38,7 @@ class Loser final : public Component {
     for (const Stage& stage : inner.stages()) {
       wiring->AddStage(stage.name, stage.inputs, stage.outputs, [this, &stage](const Tick& tick) {
         stage.run(tick);
-        if (!lost_(tick.index)) return;
+        if (stage.outputs.empty() || !lost_(tick.index)) return;
         const void* message = stage.outputs.at(0)->message();
         auto* command = static_cast<joint_command_t*>(const_cast<void*>(message));
         command->status = joint_command_t::STATUS_INVALID_INPUT;

@@ -150,6 +150,7 @@ TEST_F(ElsewhereTest, RunsGoIntoTheCurrentFolder) {
 
 TEST_F(ElsewhereTest, RunsOfACheckoutGoBesideItsDeployFolder) {
   fs::create_directories("checkout/tests");
+  fs::create_directory("checkout/deploy");
   fs::copy(POISE_SOURCE_DIR "/deploy/robots", "checkout/deploy/robots",
            fs::copy_options::recursive);
   fs::copy(POISE_SOURCE_DIR "/deploy/graphs", "checkout/deploy/graphs",

@@ -154,7 +154,7 @@ TEST_F(WatchTest, UnknownChannelsAndFieldsAreUsageErrors) {
   ExpectUsageError({"echo", "ROBOT_STATE", "base_position[3]", "--run", run},
                    {"base_position is an array of 3"});
   ExpectUsageError({"echo", "JOINT_COMMAND", "torque[right_knee_pich]", "--run", run},
-                   {"torque has no element 'right_knee_pich'; did you mean right_knee_pitch?"});
+                   {"torque has no element 'right_knee_pich'; did you mean right_knee_pitch"});
   ExpectUsageError({"echo", "JOINT_COMMAND", "foot_wrench[lef]", "--run", run},
                    {"foot_wrench has no element 'lef'; did you mean left?"});
   ExpectUsageError({"echo", "HEALTH_SIM_ODE", "stat", "--run", run}, {"did you mean state"});

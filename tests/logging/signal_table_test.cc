@@ -55,7 +55,7 @@ TEST_F(SignalTableTest, HoldsEveryScalarButTheHeader) {
   EXPECT_EQ(channels[0].type, "ground_truth_t");
   // 3 + 4 + 3 + 3 of the base, 4 of each joint, 6 of the COM, 7 + 6 + 1 of each foot, 3 of the
   // push, fallen and utime.
-  EXPECT_EQ(channels[0].columns.size(), 13u + 4 * 12 + 6 + 14 * 2 + 3 + 2);
+  EXPECT_EQ(channels[0].columns.size(), 13u + 4 * 12 + 6 + 14 * 2 + 3 + 2 + 7);
   for (const char* header : {"run_id", "tick", "num_joints", "num_feet"}) {
     EXPECT_EQ(Find(channels[0], header), nullptr) << header;
   }
