@@ -14,7 +14,7 @@
 #include "deploy/poise/catalog.h"
 #include "deploy/poise/cli_checks.h"
 #include "deploy/poise/commands.h"
-#include "deploy/poise/run_dir.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/scenario_run.h"
 #include "deploy/poise/signals.h"
 #include "fmt/format.h"

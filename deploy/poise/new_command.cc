@@ -11,7 +11,7 @@
 #include "components/framework/configuration.h"
 #include "deploy/poise/commands.h"
 #include "deploy/poise/new_scenario.h"
-#include "deploy/poise/run_dir.h"
+#include "deploy/poise/output_place.h"
 #include "deploy/poise/run_setup.h"
 #include "fmt/format.h"
 
