@@ -94,17 +94,25 @@ class File {
   }
   void Write(const std::string& text) {
     out_.write(text.data(), static_cast<std::streamsize>(text.size()));
+    NoteError();
   }
   void Close() {
     out_.close();
-    if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
+    NoteError();
+    if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(error_)));
     file_.Keep();
   }
 
  private:
+  /// Later calls change errno.
+  void NoteError() {
+    if (!out_ && error_ == 0) error_ = errno;
+  }
+
   std::string path_;
   PartialFile file_;
   std::ofstream out_;
+  int error_ = 0;  // errno of the first failure
 };
 
 /// What a channel's columns depend on.

@@ -1,8 +1,6 @@
 // The same scenario gives the same messages, bit for bit, however it runs.
 #include <gtest/gtest.h>
 
-#include <sstream>
-
 #include "logging/compare.h"
 #include "logging/metrics.h"
 #include "tests/graph/poise_program.h"
@@ -47,14 +45,8 @@ TEST(Equality, ProcessesGiveWhatOneProcessGives) {
 }
 
 TEST(Equality, EveryExperimentOfThePaperIsTheSameAsProcessesAndInOneProcess) {
-  std::vector<std::string> experiments;
-  std::istringstream list(RunPoise({"list", "scenarios"}).output);
-  for (std::string line; std::getline(list, line);) {
-    if (line.find(", paper section ") == std::string::npos) continue;
-    experiments.emplace_back();
-    std::istringstream(line) >> experiments.back();
-  }
-  ASSERT_GE(experiments.size(), 2u);
+  const std::vector<std::string> experiments = Experiments();
+  ASSERT_GE(experiments.size(), 5u);
   for (const std::string& experiment : experiments) {
     SCOPED_TRACE(experiment);
     const RunFolder folder;

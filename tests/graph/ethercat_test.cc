@@ -60,7 +60,8 @@ TEST(Ethercat, ATroubleStopsTheRobotAndIsNamedInTheLog) {
       RunPoise(Arguments(run, {"--set", "drive_emulator.trouble[0].kind=STO", "--set",
                                "drive_emulator.trouble[0].joint=left_knee_pitch", "--set",
                                "drive_emulator.trouble[0].from=0.2"}));
-  EXPECT_NE(result.output.find("safe torque off (left_knee_pitch)"), std::string::npos)
+  EXPECT_NE(ReadSummary(run)["events"].dump().find("safe torque off (left_knee_pitch)"),
+            std::string::npos)
       << result.output;
   const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
   int64_t stopped = 0;

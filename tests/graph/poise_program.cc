@@ -106,6 +106,17 @@ std::string TestDeploy::Scenario(const std::string& name, const std::string& tex
   return file;
 }
 
+std::vector<std::string> Experiments() {
+  std::vector<std::string> names;
+  for (const auto& file :
+       std::filesystem::directory_iterator(std::string(POISE_SOURCE_DIR) + "/deploy/scenarios")) {
+    if (file.path().extension() != ".pbtxt") continue;
+    if (ReadAll(file.path()).find("\npaper_section:") == std::string::npos) continue;
+    names.push_back(file.path().stem().string());
+  }
+  return names;
+}
+
 std::string StandScenario() { return POISE_SOURCE_DIR "/tests/graph/data/stand.pbtxt"; }
 
 nlohmann::json ReadSummary(const std::string& run) {

@@ -73,6 +73,9 @@ class TestDeploy {
   RunFolder folder_;
 };
 
+/// The scenarios of the house that have a section of the paper.
+std::vector<std::string> Experiments();
+
 /// The scenario "stand" of these tests.
 std::string StandScenario();
 
