@@ -27,7 +27,7 @@ bool FitsAPath(std::string_view name) {
 }
 
 /// The names, or none when one of them is no name or two are the same.
-std::vector<std::string> Usable(std::vector<std::string> names) {
+std::vector<std::string> IfUsable(std::vector<std::string> names) {
   std::vector<std::string> sorted = names;
   std::sort(sorted.begin(), sorted.end());
   const bool unique = std::adjacent_find(sorted.begin(), sorted.end()) == sorted.end();
@@ -40,13 +40,13 @@ std::vector<std::string> Usable(std::vector<std::string> names) {
 ElementNames::ElementNames(const robot::RobotModel& robot) {
   std::vector<std::string> joints;
   for (const robot::Joint& joint : robot.joints()) joints.push_back(joint.name);
-  names_[kJoints] = names_[kMotors] = Usable(std::move(joints));
+  names_[kJoints] = names_[kMotors] = IfUsable(std::move(joints));
   std::vector<std::string> feet;
   for (const robot::FootModel& foot : robot.feet()) {
     feet.push_back(foot.name);
     foot_of_link_[robot.bodies().at(static_cast<size_t>(foot.body)).name] = foot.name;
   }
-  names_[kFeet] = Usable(std::move(feet));
+  names_[kFeet] = IfUsable(std::move(feet));
 }
 
 ElementNames ElementNames::OfTexts(std::string_view robot_text, std::string_view urdf_xml) {

@@ -13,7 +13,7 @@
 namespace poise::logging {
 namespace {
 
-constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
+constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 constexpr size_t kChunkSize = 1 << 20;  // bytes; what other writers take as well
 
 enum Opcode : uint8_t {
@@ -71,7 +71,7 @@ std::string Record(Opcode opcode, std::string_view content) {
       .bytes();
 }
 
-uint32_t Crc(uint32_t crc, std::string_view bytes) {
+uint32_t Crc32(uint32_t crc, std::string_view bytes) {
   return static_cast<uint32_t>(
       crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
@@ -86,7 +86,7 @@ void McapWriter::Times::Add(uint64_t time, bool is_first) {
 McapWriter::McapWriter(const std::string& path, const std::string& library)
     : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
   if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
-  Write(kMagic);
+  Write(kMcapMagic);
   WriteRecord(kHeader, Fields().AddString("").AddString(library).bytes());
 }
 
@@ -94,7 +94,7 @@ void McapWriter::Write(std::string_view bytes) {
   out_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
   position_ += bytes.size();
-  crc_ = Crc(crc_, bytes);
+  crc_ = Crc32(crc_, bytes);
 }
 
 void McapWriter::WriteRecord(uint8_t opcode, std::string_view content) {
@@ -156,7 +156,7 @@ void McapWriter::EndChunk() {
   const auto size = static_cast<uint64_t>(chunk_.size());
   const uint64_t start = position_;
   Fields chunk;
-  chunk.Add(chunk_times_.first).Add(chunk_times_.last).Add(size).Add(Crc(0, chunk_));
+  chunk.Add(chunk_times_.first).Add(chunk_times_.last).Add(size).Add(Crc32(0, chunk_));
   chunk.AddString("").Add(size).AddBytes(chunk_);
   WriteRecord(kChunk, chunk.bytes());
   const uint64_t length = position_ - start;
@@ -215,7 +215,7 @@ void McapWriter::Close() {
   footer.Add(summary_start).Add(offset_start);
   Write(footer.bytes());
   Write(Fields().Add(crc_).bytes());
-  Write(kMagic);
+  Write(kMcapMagic);
   out_.close();
   if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
   file_.Keep();

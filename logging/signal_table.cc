@@ -40,7 +40,7 @@ class ColumnAppender : public ScalarVisitor {
   size_t next_ = 0;
 };
 
-struct Lane {
+struct ColumnLane {
   const MessageType* type;
   std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded
   bool external = false;
@@ -85,14 +85,14 @@ bool IsSignal(const MessageType& type, std::string_view path) {
 
 std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run) {
   LogReader reader(path);
-  std::map<std::string, Lane, std::less<>> lanes;
+  std::map<std::string, ColumnLane, std::less<>> lanes;
   std::vector<std::string> order;
   for (const Channel& channel : run.spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
     lanes.try_emplace(
         channel.name(),
-        Lane{type,
+        ColumnLane{type,
              PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)), counts,
                           run.spec.run_id()),
              channel.external(),
@@ -109,10 +109,10 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
       if (!event.channel.starts_with("HEALTH_")) continue;
       order.emplace_back(event.channel);
       found =
-          lanes.try_emplace(order.back(), Lane{health, {}, false, ColumnAppender(health), {}, {}})
+          lanes.try_emplace(order.back(), ColumnLane{health, {}, false, ColumnAppender(health), {}, {}})
               .first;
     }
-    Lane& lane = found->second;
+    ColumnLane& lane = found->second;
     int64_t tick = 0;
     if (lane.filter) {
       if (lane.filter->Check(event.data.data(), event.data.size(), 0, run.num_ticks - 1) !=
@@ -138,7 +138,7 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
 
   std::vector<ChannelColumns> channels;
   for (const std::string& name : order) {
-    Lane& lane = lanes.find(name)->second;
+    ColumnLane& lane = lanes.find(name)->second;
     if (lane.ticks.empty()) continue;
     channels.push_back(
         {name, lane.type->name, std::move(lane.ticks), std::move(lane.appender.columns())});

@@ -13,9 +13,9 @@ namespace poise {
 namespace {
 
 constexpr int64_t kMillisecond = 1'000'000;
-constexpr int64_t kHealthInterval = 50 * kMillisecond;
-constexpr int64_t kFirstRequest = 2 * kMillisecond;
-constexpr int64_t kLastRequest = 50 * kMillisecond;
+constexpr int64_t kCollectorHealthInterval = 50 * kMillisecond;
+constexpr int64_t kFirstServiceRequest = 2 * kMillisecond;
+constexpr int64_t kLastServiceRequest = 50 * kMillisecond;
 constexpr int64_t kFailing = 1000 * kMillisecond;
 constexpr int64_t kGiveUp =
     100 * kMillisecond;     // in real time, on a message that has been asked for
@@ -37,7 +37,7 @@ struct Lane {
   int64_t foreign = 0;
   ChannelCollector::ChannelStatistics statistics;
   int64_t waiting_since = 0;  // ns; of next_tick
-  int64_t wait = kFirstRequest;
+  int64_t wait = kFirstServiceRequest;
   int64_t asked_at = 0;  // ns, first time
   bool asked = false;    // for next_tick
 };
@@ -128,7 +128,7 @@ void ChannelCollector::Impl::Fail(std::string_view reason) {
   for (int64_t now = 0; !stopped_ && now < end; now = NowNanoseconds()) {
     service_.SendHealth();  // again and again: one may be lost
     pollfd service{service_.fd(), POLLIN, 0};
-    if (poll(&service, 1, static_cast<int>(kHealthInterval / kMillisecond)) > 0) ReceiveService();
+    if (poll(&service, 1, static_cast<int>(kCollectorHealthInterval / kMillisecond)) > 0) ReceiveService();
   }
 }
 
@@ -161,7 +161,7 @@ void ChannelCollector::Impl::Deliver(Lane& lane, int64_t now) {
     lane.packets.Advance();
     ++lane.statistics.delivered;
     lane.waiting_since = now;
-    lane.wait = kFirstRequest;
+    lane.wait = kFirstServiceRequest;
     lane.asked = false;
   }
   lane.statistics.next_tick = lane.packets.next_tick();
@@ -183,7 +183,7 @@ void ChannelCollector::Impl::Request(int64_t now) {
     }
     lane->asked = true;
     lane->waiting_since = now;
-    lane->wait = std::min(2 * lane->wait, kLastRequest);
+    lane->wait = std::min(2 * lane->wait, kLastServiceRequest);
   }
 }
 
@@ -198,7 +198,7 @@ void ChannelCollector::Impl::GiveUp(Lane& lane, int64_t now, int64_t expected) {
     callbacks_.skipped(lane.channel, lane.packets.next_tick());
   }
   lane.asked = false;
-  lane.wait = kFirstRequest;
+  lane.wait = kFirstServiceRequest;
   Deliver(lane, now);
 }
 
@@ -225,7 +225,7 @@ void ChannelCollector::Impl::ReceiveService() {
 }
 
 void ChannelCollector::Impl::PublishHealth(int64_t now) {
-  next_health_ = now + kHealthInterval;
+  next_health_ = now + kCollectorHealthInterval;
   health_t& health = service_.health();
   health.state = complete() ? health_t::STATE_FINISHED
                  : started_ ? health_t::STATE_RUNNING

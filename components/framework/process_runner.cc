@@ -18,13 +18,13 @@
 namespace poise {
 namespace {
 
-constexpr int64_t kMillisecond = 1'000'000;
-constexpr int64_t kHealthInterval = 100 * kMillisecond;
-constexpr int64_t kAnnounceInterval = 50 * kMillisecond;  // before the start and after the end
-constexpr int64_t kFirstRequest = 2 * kMillisecond;
-constexpr int64_t kLastRequest = 50 * kMillisecond;
+constexpr int64_t kMillisecondNs = 1'000'000;
+constexpr int64_t kHealthInterval = 100 * kMillisecondNs;
+constexpr int64_t kAnnounceInterval = 50 * kMillisecondNs;  // before the start and after the end
+constexpr int64_t kFirstRequest = 2 * kMillisecondNs;
+constexpr int64_t kLastRequest = 50 * kMillisecondNs;
 constexpr int kDrainBatch = 32;
-constexpr int64_t kLongestOutage = 5000 * kMillisecond;  // between a process and its successor
+constexpr int64_t kLongestOutage = 5000 * kMillisecondNs;  // between a process and its successor
 
 using BoundStage = ProcessBus::BoundStage;
 
@@ -391,8 +391,8 @@ bool ProcessRunner::Impl::RunOwner() {
 
 void ProcessRunner::Impl::WaitUntil(int64_t time) {
   // Packets are handled until shortly before; the rest is slept through, for an absolute deadline.
-  while (!Stopped() && NowNanoseconds() < time - kMillisecond / 5) {
-    Poll(time - kMillisecond / 5, kDrainBatch);
+  while (!Stopped() && NowNanoseconds() < time - kMillisecondNs / 5) {
+    Poll(time - kMillisecondNs / 5, kDrainBatch);
   }
   const timespec deadline{time / 1'000'000'000, time % 1'000'000'000};
   while (!Stopped() && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) != 0) {

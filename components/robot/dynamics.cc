@@ -21,12 +21,6 @@ inline Matrix3d RotatedInertia(const Matrix3d& r, const Matrix3d& inertia) {
   return w;
 }
 
-inline Vector3d SymmetricTimes(const Matrix3d& lower, const Vector3d& v) {
-  return {lower(0, 0) * v.x() + lower(1, 0) * v.y() + lower(2, 0) * v.z(),
-          lower(1, 0) * v.x() + lower(1, 1) * v.y() + lower(2, 1) * v.z(),
-          lower(2, 0) * v.x() + lower(2, 1) * v.y() + lower(2, 2) * v.z()};
-}
-
 }  // namespace
 
 void ComputeDynamics(const RobotModel& model, const RobotState& state, RobotData* data) {

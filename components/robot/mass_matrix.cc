@@ -5,16 +5,6 @@ namespace poise::robot {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-namespace {
-
-inline Vector3d SymmetricTimes(const Matrix3d& lower, const Vector3d& v) {
-  return {lower(0, 0) * v.x() + lower(1, 0) * v.y() + lower(2, 0) * v.z(),
-          lower(1, 0) * v.x() + lower(1, 1) * v.y() + lower(2, 1) * v.z(),
-          lower(2, 0) * v.x() + lower(2, 1) * v.y() + lower(2, 2) * v.z()};
-}
-
-}  // namespace
-
 void ComputeMassMatrix(const RobotModel& model, const RobotState& state, RobotData* data) {
   const KinematicTree& tree = model.tree();
   const Eigen::Index n = data->mass_matrix.rows();

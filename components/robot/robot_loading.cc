@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kContactDimension = 6;
 
-Eigen::Isometry3d ToEigen(const Pose& pose, const std::string& field) {
+Eigen::Isometry3d ToIsometry(const Pose& pose, const std::string& field) {
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
   result.translation() = Eigen::Vector3d(pose.x(), pose.y(), pose.z());
   result.linear() = (Eigen::AngleAxisd(pose.yaw(), Eigen::Vector3d::UnitZ()) *
@@ -130,7 +130,7 @@ FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& fi
   if (result.name.empty()) throw RobotError(field + ".name is missing: e.g. \"right\"");
   const UrdfTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
   result.body = place.body;
-  result.sole = place.pose * ToEigen(foot.sole(), field + ".sole");
+  result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
   result.length = Positive(foot.length(), field + ".length");
   result.width = Positive(foot.width(), field + ".width");
   int joints = 0;
@@ -195,7 +195,7 @@ RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
   const Imu& imu = description.imu();
   const UrdfTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
   model.imu_.body = imu_place.body;
-  model.imu_.pose = imu_place.pose * ToEigen(imu.pose(), "imu.pose");
+  model.imu_.pose = imu_place.pose * ToIsometry(imu.pose(), "imu.pose");
   model.imu_.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");
   model.imu_.gyro_bias = NotNegative(imu.gyro_bias(), "imu.gyro_bias");
   model.imu_.accelerometer_noise =

@@ -12,7 +12,7 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kLongestStep = 1;     // s: what lies further back is not extrapolated
+constexpr double kLongestPrediction = 1;     // s: what lies further back is not extrapolated
 constexpr double kMaxJointRate = 100;  // rad/s: no joint is faster
 constexpr double kMaxTorque = 1e4;     // N·m: no motor gives more
 // Beyond the ranges of the IMUs that robots carry (2000 deg/s, 16 g) a reading is a fault; the last
@@ -75,7 +75,7 @@ InvariantEstimator::InvariantEstimator(std::shared_ptr<const robot::RobotModel> 
 }
 
 void InvariantEstimator::Update(const BaseSensors& sensors, double dt) {
-  dt = std::clamp(dt, 0.1 * period_, std::max(kLongestStep, period_));
+  dt = std::clamp(dt, 0.1 * period_, std::max(kLongestPrediction, period_));
   ReadJoints(sensors, dt);
   ReadImu(sensors);
   kinematics_.Update(link_position_, velocity_filter_.value());

@@ -5,7 +5,7 @@
 namespace poise {
 namespace {
 
-constexpr double kTimeTolerance = 1e-9;  // s, far below a tick, far above rounding
+constexpr double kTouchTolerance = 1e-9;  // s, far below a tick, far above rounding
 // Time constant, s, of the reference's velocity: a search begins and a lowering ends without a
 // step.
 constexpr double kVelocityTime = 0.05;
@@ -30,7 +30,7 @@ bool TouchDetector::Update(double time, double load) {
     changing_ = true;
     since_ = time;
   }
-  if (time - since_ >= config_.touch_duration() - kTimeTolerance) Reset(!touching_);
+  if (time - since_ >= config_.touch_duration() - kTouchTolerance) Reset(!touching_);
   return touching_;
 }
 
@@ -67,12 +67,12 @@ bool Landing::confirmed() const {
   if (!touch_.touching()) return false;
   if (state_ == State::kSwing) return !left_;
   return state_ == State::kTouching &&
-         time_ - touched_ >= config_.settle_duration() - kTimeTolerance;
+         time_ - touched_ >= config_.settle_duration() - kTouchTolerance;
 }
 
 bool Landing::SearchBegins(bool before_touch_down, bool due) const {
   if (!config_.required() || !before_touch_down) return false;
-  return due || (lowered_ && time_ >= move_end_ - kTimeTolerance);
+  return due || (lowered_ && time_ >= move_end_ - kTouchTolerance);
 }
 
 void Landing::Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation) {

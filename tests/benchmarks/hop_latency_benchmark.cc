@@ -30,9 +30,9 @@
 #include "components/framework/run.h"
 #include "components/framework/timing.h"
 #include "components/framework/udp_bus.h"
-#include "deploy/poise/child_process.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
+#include "tools/cli/child_process.h"
 
 namespace poise {
 namespace {

@@ -20,7 +20,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kTwoPi = 2 * std::numbers::pi;
+constexpr double kTurn = 2 * std::numbers::pi;
 
 Vector3d RotationVector(const Matrix3d& rotation) {
   const Eigen::AngleAxisd difference(rotation);
@@ -191,16 +191,16 @@ void Sway(BaseMotion* motion, double amplitude) {
   const Quaterniond q = motion->start().base_orientation;
   motion->script().base_position = [=](double t) -> Vector3d {
     const double a = amplitude * Ramp(t, 0, 1);
-    return p + a * Vector3d(std::sin(kTwoPi * 0.4 * t), std::cos(kTwoPi * 0.3 * t),
-                            -0.5 - 0.5 * std::cos(kTwoPi * 0.5 * t));
+    return p + a * Vector3d(std::sin(kTurn * 0.4 * t), std::cos(kTurn * 0.3 * t),
+                            -0.5 - 0.5 * std::cos(kTurn * 0.5 * t));
   };
   motion->script().base_orientation = [=](double t) {
     const double a = 3 * amplitude * Ramp(t, 0, 1);
-    return q * AngleAxisd(a * std::sin(kTwoPi * 0.35 * t), Vector3d::UnitX()) *
-           AngleAxisd(a * std::cos(kTwoPi * 0.45 * t), Vector3d(0, 0.8, 0.6));
+    return q * AngleAxisd(a * std::sin(kTurn * 0.35 * t), Vector3d::UnitX()) *
+           AngleAxisd(a * std::cos(kTurn * 0.45 * t), Vector3d(0, 0.8, 0.6));
   };
   motion->script().other_joints = [=](double t) {
-    return 5 * amplitude * Ramp(t, 0, 1) * std::sin(kTwoPi * 0.4 * t);
+    return 5 * amplitude * Ramp(t, 0, 1) * std::sin(kTurn * 0.4 * t);
   };
 }
 

@@ -17,13 +17,13 @@ using Eigen::Isometry3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kPeriod = BaseMotion::kPeriod;
+constexpr double kTick = BaseMotion::kPeriod;
 
-std::string Dyros() {
+std::string DyrosPath() {
   return std::string(POISE_SOURCE_DIR) + "/deploy/robots/dyros/dyros_legs.pbtxt";
 }
 // Rotated joint frames, tilted soles, arms, and the IMU above a waist joint.
-std::string Mantis() { return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt"; }
+std::string MantisPath() { return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt"; }
 
 constexpr double kChiSquared9 = 16.919;  // exceeded with 5 % by 9 degrees of freedom
 
@@ -37,14 +37,14 @@ Eigen::Matrix<double, 9, 1> BaseError(const robot::RobotState& estimate,
   return error;
 }
 
-class Follow {
+class FollowMotion {
  public:
-  explicit Follow(BaseMotion* motion, const InvariantEstimatorConfig& config = {})
-      : motion_(*motion), estimator_(motion->model(), config, kPeriod) {}
+  explicit FollowMotion(BaseMotion* motion, const InvariantEstimatorConfig& config = {})
+      : motion_(*motion), estimator_(motion->model(), config, kTick) {}
 
   void Step() {
     motion_.Next();
-    estimator_.Update(motion_.sensors(), kPeriod);
+    estimator_.Update(motion_.sensors(), kTick);
   }
   void RunTo(double time) {
     while (motion_.time() < time - 1e-9) Step();
@@ -62,18 +62,18 @@ class Follow {
 
 class AnyInvariantRobot : public testing::TestWithParam<std::string> {};
 
-INSTANTIATE_TEST_SUITE_P(Robots, AnyInvariantRobot, testing::Values(Dyros(), Mantis()),
+INSTANTIATE_TEST_SUITE_P(Robots, AnyInvariantRobot, testing::Values(DyrosPath(), MantisPath()),
                          [](const auto& test) {
-                           return test.param == Dyros() ? "Dyros" : "Mantis";
+                           return test.param == DyrosPath() ? "Dyros" : "Mantis";
                          });
 
-// Readings without errors: what remains is the second order of integration and, on Mantis, whose
+// Readings without errors: what remains is the second order of integration and, on MantisPath, whose
 // IMU turns with the waist, the lag of the joint velocities.
 TEST_P(AnyInvariantRobot, FollowsExactReadings) {
   BaseMotion motion(GetParam());
   Sway(&motion, 0.02);
-  Follow follow(&motion);
-  const bool waist = GetParam() == Mantis();
+  FollowMotion follow(&motion);
+  const bool waist = GetParam() == MantisPath();
   while (motion.time() < 10) {
     follow.Step();
     const auto error = follow.Error();
@@ -92,7 +92,7 @@ TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
   Sway(&motion, 0.02);
   SensorErrors& errors = motion.errors();
   errors = TypicalErrors(*motion.model());
-  // Mantis has no noise of its own.
+  // MantisPath has no noise of its own.
   errors.gyro_noise = 2e-4;
   errors.gyro_bias = Vector3d(2e-4, -1e-4, 3e-4);
   errors.accelerometer_noise = 1.7e-2;
@@ -101,8 +101,8 @@ TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
   InvariantEstimatorConfig config;
   config.gyro_noise = 2e-4;
   config.accelerometer_noise = 1.7e-2;
-  Follow follow(&motion, config);
-  const bool waist = GetParam() == Mantis();
+  FollowMotion follow(&motion, config);
+  const bool waist = GetParam() == MantisPath();
   while (motion.time() < 20) {
     follow.Step();
     const auto error = follow.Error();
@@ -114,10 +114,10 @@ TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
 }
 
 TEST(InvariantEstimator, AStepUpIsFollowedAndTheFootAnchoredWhereItLands) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   StepUp(&motion);
   motion.errors() = TypicalErrors(*motion.model());
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   while (motion.time() < 8) {
     follow.Step();
     const double t = motion.time();
@@ -141,7 +141,7 @@ struct MotionOfAFoot {
 class MovingFoot : public testing::TestWithParam<MotionOfAFoot> {};
 
 TEST_P(MovingFoot, IsFoundAndLeavesTheBaseAlone) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   motion.errors() = TypicalErrors(*motion.model());
   const Isometry3d start = motion.script().foot[1](0);
   motion.script().foot[1] = [=](double t) {
@@ -151,14 +151,14 @@ TEST_P(MovingFoot, IsFoundAndLeavesTheBaseAlone) {
     foot.linear() = Gamma(s * GetParam().turn).zero * start.linear();
     return foot;
   };
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   follow.RunTo(1);
   const auto before = follow.Error();
   double slipping = 0;
   while (motion.time() < 2) {
     follow.Step();
     const bool slips = follow.estimator().contact(1) == FootContact::kSlipping;
-    slipping += slips ? kPeriod : 0;
+    slipping += slips ? kTick : 0;
     ASSERT_EQ(follow.estimator().contact(0), FootContact::kFirm) << motion.time();
   }
   const auto moved = follow.Error() - before;
@@ -183,10 +183,10 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.param.name; });
 
 TEST(InvariantEstimator, AStandingFootIsSeldomTakenForASlippingOne) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   Sway(&motion, 0.02);
   motion.errors() = TypicalErrors(*motion.model());
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   int slipping = 0;
   double innovation = 0;
   for (int i = 0; i < 10000; ++i) {
@@ -205,7 +205,7 @@ TEST(InvariantEstimator, AStandingFootIsSeldomTakenForASlippingOne) {
 
 // Rocking on its edge, the sole's rotation says nothing.
 TEST(InvariantEstimator, ASoleOnItsEdgeDoesNotTurnTheBase) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   const Isometry3d start = motion.script().foot[1](0);
   const double half_width = motion.model()->feet()[1].width / 2;
   // About the inner edge, which stays where it is.
@@ -213,14 +213,14 @@ TEST(InvariantEstimator, ASoleOnItsEdgeDoesNotTurnTheBase) {
     const Eigen::Translation3d edge(0, -half_width, 0);
     return start * edge * AngleAxisd(0.04 * Ramp(t, 0.5, 1), Vector3d::UnitX()) * edge.inverse();
   };
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   double worst = 0;
   for (int i = 0; i < 1000; ++i) {
     motion.Next();
     BaseSensors sensors = motion.sensors();
     if (motion.time() > 0.48) sensors.foot_cop[1].y() = -half_width;
     InvariantEstimator& estimator = const_cast<InvariantEstimator&>(follow.estimator());
-    estimator.Update(sensors, kPeriod);
+    estimator.Update(sensors, kTick);
     worst = std::max(worst, follow.Error().head<3>().norm());
     if (motion.time() > 0.5) {
       ASSERT_FALSE(estimator.filter().holds_rotation(1));
@@ -234,11 +234,11 @@ TEST(InvariantEstimator, ASoleOnItsEdgeDoesNotTurnTheBase) {
 TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
   constexpr double kStiffness = 2e4;
   for (const bool known : {false, true}) {
-    BaseMotion motion(Dyros());
+    BaseMotion motion(DyrosPath());
     const int n = motion.model()->num_joints();
     InvariantEstimatorConfig config;
     config.gear_stiffness = known ? kStiffness : 0;
-    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    InvariantEstimator estimator(motion.model(), config, kTick);
     Eigen::VectorXd torque(n), reading(n);
     for (int j = 0; j < n; ++j) torque[j] = 40 * std::sin(1 + j);
     motion.Next();
@@ -246,7 +246,7 @@ TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
     reading = sensors.joint_position + torque / kStiffness;
     const BaseSensors wound = {{reading.data(), n}, sensors.angular_velocity, sensors.acceleration,
                                sensors.foot_load,   sensors.foot_cop,         {torque.data(), n}};
-    estimator.Update(wound, kPeriod);
+    estimator.Update(wound, kTick);
     const double off = (estimator.state().base_position - motion.truth().base_position).norm();
     if (known) {
       EXPECT_LT(off, 1e-9);
@@ -261,13 +261,13 @@ TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
 TEST(InvariantEstimator, TorquesThatCannotBeTrustedAtFirstDoNotTiltTheWorld) {
   constexpr double kStiffness = 2e4;
   for (const bool trusted : {false, true}) {
-    BaseMotion motion(Dyros());
+    BaseMotion motion(DyrosPath());
     motion.errors() = TypicalErrors(*motion.model());
     const int n = motion.model()->num_joints();
     InvariantEstimatorConfig config;
     config.gear_stiffness = kStiffness;
     if (trusted) config.start_torque = 0;
-    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    InvariantEstimator estimator(motion.model(), config, kTick);
     Eigen::VectorXd torque(n), reading(n), shown(n);
     for (int j = 0; j < n; ++j) torque[j] = 25 * std::sin(1 + j);
     int inside = 0, ticks = 0;
@@ -282,7 +282,7 @@ TEST(InvariantEstimator, TorquesThatCannotBeTrustedAtFirstDoNotTiltTheWorld) {
                         sensors.foot_load,
                         sensors.foot_cop,
                         {shown.data(), n}},
-                       kPeriod);
+                       kTick);
       const auto error = BaseError(estimator.state(), motion.truth());
       inside += error.dot(estimator.covariance().ldlt().solve(error)) < kChiSquared9 ? 1 : 0;
       ++ticks;
@@ -303,14 +303,14 @@ TEST(InvariantEstimator, TorquesThatCannotBeTrustedAtFirstDoNotTiltTheWorld) {
 TEST(InvariantEstimator, AnUncertainStiffnessIsFound) {
   constexpr double kStiffness = 2e4;
   for (const bool certain : {false, true}) {
-    BaseMotion motion(Dyros());
+    BaseMotion motion(DyrosPath());
     Sway(&motion, 0.02);
     motion.errors() = TypicalErrors(*motion.model());
     const int n = motion.model()->num_joints();
     InvariantEstimatorConfig config;
     config.gear_stiffness = 1.5 * kStiffness;
     config.gear_stiffness_error = certain ? 0 : 0.4;
-    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    InvariantEstimator estimator(motion.model(), config, kTick);
     Eigen::VectorXd torque(n), reading(n);
     int inside = 0, ticks = 0;
     while (motion.time() < 10) {
@@ -321,7 +321,7 @@ TEST(InvariantEstimator, AnUncertainStiffnessIsFound) {
       const BaseSensors wound = {{reading.data(), n},  sensors.angular_velocity,
                                  sensors.acceleration, sensors.foot_load,
                                  sensors.foot_cop,     {torque.data(), n}};
-      estimator.Update(wound, kPeriod);
+      estimator.Update(wound, kTick);
       const auto error = BaseError(estimator.state(), motion.truth());
       inside += error.dot(estimator.covariance().ldlt().solve(error)) < kChiSquared9 ? 1 : 0;
       ++ticks;
@@ -339,11 +339,11 @@ TEST(InvariantEstimator, AnUncertainStiffnessIsFound) {
 // A loop that rings: joints read wrong by ten times an encoder's step, to and fro at 100 Hz, while
 // one sole alone carries the robot. It is not taken for a slipping one, nor for a turning IMU.
 TEST(InvariantEstimator, ReadingsWorseThanTheirNoiseCountLess) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   motion.script().load = {[](double) { return 1.0; }, [](double) { return 0.0; }};
   motion.errors() = TypicalErrors(*motion.model());
   const int n = motion.model()->num_joints();
-  InvariantEstimator estimator(motion.model(), {}, kPeriod);
+  InvariantEstimator estimator(motion.model(), {}, kTick);
   Eigen::VectorXd reading(n);
   int slips = 0;
   while (motion.time() < 4) {
@@ -361,7 +361,7 @@ TEST(InvariantEstimator, ReadingsWorseThanTheirNoiseCountLess) {
                       sensors.acceleration,
                       sensors.foot_load,
                       sensors.foot_cop},
-                     kPeriod);
+                     kTick);
     slips += estimator.contact(0) == FootContact::kSlipping ? 1 : 0;
   }
   EXPECT_EQ(slips, 0);
@@ -375,19 +375,19 @@ TEST(InvariantEstimator, ReadingsWorseThanTheirNoiseCountLess) {
 TEST(InvariantEstimator, TheDelayOfTheReadingsIsPredicted) {
   constexpr int kDelay = 5;
   for (const bool known : {false, true}) {
-    BaseMotion motion(Dyros());
+    BaseMotion motion(DyrosPath());
     Sway(&motion, 0.03);
-    BaseMotion late(Dyros());
+    BaseMotion late(DyrosPath());
     Sway(&late, 0.03);
     InvariantEstimatorConfig config;
-    config.sensor_delay = known ? kDelay * kPeriod : 0;
-    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    config.sensor_delay = known ? kDelay * kTick : 0;
+    InvariantEstimator estimator(motion.model(), config, kTick);
     double worst_position = 0, worst_turn = 0;
     for (int i = 0; i < 2000; ++i) {
       motion.Next();
       if (i < kDelay) continue;
       late.Next();
-      estimator.Update(late.sensors(), kPeriod);
+      estimator.Update(late.sensors(), kTick);
       const robot::RobotState& found = estimator.state();
       worst_position =
           std::max(worst_position, (found.base_position - motion.truth().base_position).norm());
@@ -406,7 +406,7 @@ TEST(InvariantEstimator, TheDelayOfTheReadingsIsPredicted) {
 
 // Thrown up, no load on the feet: only the IMU knows, and the covariance says so.
 TEST(InvariantEstimator, FlightIntegratesTheImuAndTheCovarianceGrows) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   const Vector3d p = motion.start().base_position - Vector3d(0, 0, 0.06);
   const auto shift = [](double t) -> Vector3d {
     const double push = std::clamp(t - 0.2, 0.0, 0.2), fly = std::max(t - 0.4, 0.0);
@@ -423,7 +423,7 @@ TEST(InvariantEstimator, FlightIntegratesTheImuAndTheCovarianceGrows) {
     motion.script().load[f] = [](double t) { return t < 0.4 ? 0.5 : 0.0; };
   }
   motion.errors() = TypicalErrors(*motion.model());
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   follow.RunTo(0.42);
   const double known = follow.estimator().covariance()(3, 3);
   follow.RunTo(0.8);
@@ -435,7 +435,7 @@ TEST(InvariantEstimator, FlightIntegratesTheImuAndTheCovarianceGrows) {
 
 // Any finite input gives a finite state, and what cannot be an IMU's reading is left out.
 TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
-  BaseMotion motion(Mantis());
+  BaseMotion motion(MantisPath());
   const int n = motion.model()->num_joints();
   std::mt19937_64 random(3);
   const auto garbage = [&] { return AnyFinite(&random); };
@@ -443,7 +443,7 @@ TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
   config.gear_stiffness = 7e4;
   config.sensor_delay = 0.002;
   for (int run = 0; run < 60; ++run) {
-    InvariantEstimator estimator(motion.model(), config, kPeriod);
+    InvariantEstimator estimator(motion.model(), config, kTick);
     Eigen::VectorXd q(n), torque(n);
     for (int i = 0; i < 200; ++i) {
       for (int j = 0; j < n; ++j) {
@@ -473,9 +473,9 @@ TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
 }
 
 TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   Sway(&motion, 0.01);
-  InvariantEstimator estimator(motion.model(), {}, kPeriod);
+  InvariantEstimator estimator(motion.model(), {}, kTick);
   double worst_after = 0;
   for (int i = 0; i < 3000; ++i) {
     motion.Next();
@@ -484,7 +484,7 @@ TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
       sensors.angular_velocity.setConstant(1e300);
       sensors.acceleration.setConstant(-1e300);
     }
-    estimator.Update(sensors, kPeriod);
+    estimator.Update(sensors, kTick);
     if (i < 600) continue;
     worst_after = std::max(worst_after, TiltError(estimator.state().base_orientation,
                                                   motion.truth().base_orientation));
@@ -494,13 +494,13 @@ TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
 
 // On a hoist for a minute, then put down: it begins again and finds its velocity.
 TEST(InvariantEstimator, ComesBackAfterAMinuteInTheAir) {
-  BaseMotion motion(Dyros());
+  BaseMotion motion(DyrosPath());
   motion.errors() = TypicalErrors(*motion.model());
   motion.errors().accelerometer_bias = Vector3d(0.2, -0.1, 0.1);
   for (auto& load : motion.script().load) {
     load = [](double t) { return t < 1 || t > 61 ? 0.5 : 0.0; };
   }
-  Follow follow(&motion);
+  FollowMotion follow(&motion);
   follow.RunTo(60.5);
   EXPECT_GT(std::sqrt(follow.estimator().covariance()(6, 6)), 0.5);
   follow.RunTo(64);

@@ -376,7 +376,7 @@ InvariantFilter Begin(Swaying* truth, const Error& error, const Covariance& cova
   return filter;
 }
 
-void Follow(Swaying* truth, InvariantFilter* filter, double duration) {
+void FollowTruth(Swaying* truth, InvariantFilter* filter, double duration) {
   for (int i = 0; i < std::lround(duration / Swaying::kStep); ++i) {
     const ImuStep imu = truth->Next();
     filter->Propagate(imu, Swaying::kStep);
@@ -403,7 +403,7 @@ TEST(InvariantFilter, TheCovarianceIsThatOfTheErrors) {
       }
       error.segment<6>(InvariantFilter::kFoot).setZero();
       InvariantFilter filter = Begin(&truth, error, start);
-      ASSERT_NO_FATAL_FAILURE(Follow(&truth, &filter, duration));
+      ASSERT_NO_FATAL_FAILURE(FollowTruth(&truth, &filter, duration));
       const Error off = Difference(filter.state(), truth.state);
       const double nees =
           off.dot(Eigen::MatrixXd(filter.covariance()).ldlt().solve(Eigen::VectorXd(off)));
@@ -426,9 +426,9 @@ TEST(InvariantFilter, ConvergesFromAWrongTiltAndVelocity) {
   Covariance start = 100 * StartCovariance();
   start.diagonal().segment<3>(InvariantFilter::kAccelerometerBias).setConstant(1e-6);
   InvariantFilter filter = Begin(&truth, error, start);
-  Follow(&truth, &filter, 0.2);
+  FollowTruth(&truth, &filter, 0.2);
   EXPECT_LT(Difference(filter.state(), truth.state).segment<3>(3).norm(), 0.03);
-  Follow(&truth, &filter, 4.8);
+  FollowTruth(&truth, &filter, 4.8);
   const Error off = Difference(filter.state(), truth.state);
   EXPECT_LT(off.head<2>().norm(), 2e-3);
   EXPECT_LT(off.segment<3>(3).norm(), 2e-3);
@@ -451,7 +451,7 @@ TEST(InvariantFilter, FindsTheBiases) {
     filter.HoldPosition(foot, truth.Sole(foot));
     filter.HoldRotation(foot, truth.Sole(foot));
   }
-  Follow(&truth, &filter, 20);
+  FollowTruth(&truth, &filter, 20);
   // The biases walk all the while; what remains is in the covariance.
   const Error off = Difference(filter.state(), truth.state);
   EXPECT_LT(off.segment<3>(InvariantFilter::kGyroBias).norm(), 3e-4);
@@ -470,7 +470,7 @@ TEST(InvariantFilter, FindsTheCompliance) {
       filter.HoldPosition(foot, truth.Sole(foot));
       filter.HoldRotation(foot, truth.Sole(foot));
     }
-    Follow(&truth, &filter, 10);
+    FollowTruth(&truth, &filter, 10);
     const double deviation =
         std::sqrt(filter.covariance()(InvariantFilter::kCompliance, InvariantFilter::kCompliance));
     EXPECT_LT(deviation, 0.05);
@@ -499,7 +499,7 @@ TEST(InvariantFilter, HeadingAndPositionAreNotObservable) {
   }
   for (int step = 0; step < 20; ++step) {
     const Eigen::MatrixXd before = Shown(filter.covariance(), blind);
-    Follow(&truth, &filter, 0.1);
+    FollowTruth(&truth, &filter, 0.1);
     const Eigen::MatrixXd after = Shown(filter.covariance(), blind);
     // Positive semidefinite growth, to rounding.
     EXPECT_GT(LeastEigenvalue(after - before), -1e-9 * before.norm()) << step;
@@ -539,7 +539,7 @@ TEST(InvariantFilter, WhatIsKnownConditionsTheRest) {
 TEST(InvariantFilter, StaysPositiveDefiniteOverMinutes) {
   Swaying truth(9);
   InvariantFilter filter = Begin(&truth, Error::Zero(), StartCovariance());
-  Follow(&truth, &filter, 60);
+  FollowTruth(&truth, &filter, 60);
   const Covariance& c = filter.covariance();
   EXPECT_EQ(c, c.transpose());
   EXPECT_GT(LeastEigenvalue(c), 0);
@@ -549,7 +549,7 @@ TEST(InvariantFilter, StaysPositiveDefiniteOverMinutes) {
 TEST(InvariantFilter, AReleasedFootNoLongerCountsAndComesBackWhereItIs) {
   Swaying truth(11);
   InvariantFilter filter = Begin(&truth, Error::Zero(), StartCovariance());
-  Follow(&truth, &filter, 0.5);
+  FollowTruth(&truth, &filter, 0.5);
   filter.ReleasePosition(1);
   filter.ReleaseRotation(1);
   const Covariance before = filter.covariance();

@@ -1,5 +1,5 @@
 // A process of a real-time graph dies; another takes its place with its state.
-#include "deploy/poise/component_process.h"
+#include "tools/run/component_process.h"
 
 #include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Fields by path, of messages that liblcm itself encodes.
-#include "deploy/poise/field_selection.h"
+#include "tools/live/field_selection.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 
 const MessageType& Balance() { return *FindMessageType("balance_torque_t"); }
 
-balance_torque_t Message() {
+balance_torque_t SampleMessage() {
   balance_torque_t message;
   MessageTraits<balance_torque_t>::Resize(message, std::array<int32_t, 2>{3, 2});
   message.tick = 7;
@@ -27,7 +27,7 @@ balance_torque_t Message() {
   return message;
 }
 
-std::vector<Scalar> Scalars() { return ReadScalars(Balance(), Encode(Message())).value(); }
+std::vector<Scalar> Scalars() { return ReadScalars(Balance(), Encode(SampleMessage())).value(); }
 
 std::vector<std::string> Paths(const std::vector<Scalar>& scalars) {
   std::vector<std::string> paths;
@@ -90,7 +90,7 @@ TEST(FieldSelectionTest, SaysWhatAFieldMayHaveBeen) {
 
 TEST(FieldSelectionTest, JointsAndFeetHaveTheirNames) {
   const logging::ElementNames names = logging::ElementNames::OfSpec(logging::MakeTestSpec());
-  const std::vector<Scalar> scalars = ReadScalars(Balance(), Encode(Message()), names).value();
+  const std::vector<Scalar> scalars = ReadScalars(Balance(), Encode(SampleMessage()), names).value();
   const auto picked = [&](const std::string& field) {
     FieldSelection selection({field});
     selection.UseNames(Balance(), names);
@@ -139,20 +139,20 @@ TEST(FieldSelectionTest, AZeroMessageHasTheFieldsOfARealOne) {
 }
 
 TEST(FieldSelectionTest, DamagedMessagesAreNone) {
-  std::vector<uint8_t> bytes = Encode(Message());
+  std::vector<uint8_t> bytes = Encode(SampleMessage());
   bytes.pop_back();
   EXPECT_FALSE(ReadScalars(Balance(), bytes).has_value());
-  bytes = Encode(Message());
+  bytes = Encode(SampleMessage());
   bytes.push_back(0);
   EXPECT_FALSE(ReadScalars(Balance(), bytes).has_value());
-  bytes = Encode(Message());
+  bytes = Encode(SampleMessage());
   bytes[8] = 0x7f;  // 2 billion joints
   EXPECT_FALSE(ReadScalars(Balance(), bytes).has_value());
-  bytes = Encode(Message());
+  bytes = Encode(SampleMessage());
   bytes[0] ^= 1;  // fingerprint
   EXPECT_FALSE(ReadScalars(Balance(), bytes).has_value());
   EXPECT_FALSE(ReadScalars(Balance(), {}).has_value());
-  EXPECT_FALSE(ReadScalars(*FindMessageType("health_t"), Encode(Message())).has_value());
+  EXPECT_FALSE(ReadScalars(*FindMessageType("health_t"), Encode(SampleMessage())).has_value());
 }
 
 }  // namespace

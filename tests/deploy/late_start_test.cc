@@ -7,12 +7,12 @@
 #include <string>
 
 #include "components/framework/inline_runner.h"
-#include "deploy/poise/registry.h"
-#include "deploy/poise/run_setup.h"
-#include "deploy/poise/scenario_loading.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "poise/joint_command_t.hpp"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+#include "tools/scenario/scenario_loading.h"
 
 namespace poise {
 namespace {

@@ -1,5 +1,5 @@
 // The search for limits on functions whose boundaries are known.
-#include "deploy/poise/limit_search.h"
+#include "tools/sweep/limit_search.h"
 
 #include <gtest/gtest.h>
 

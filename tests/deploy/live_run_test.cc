@@ -1,5 +1,5 @@
 // Listening to a run in progress, which here is a locked folder and a sender on its public URL.
-#include "deploy/poise/live_run.h"
+#include "tools/run/live_run.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -13,10 +13,10 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "deploy/poise/field_selection.h"
-#include "deploy/poise/run_setup.h"
 #include "poise/health_t.hpp"
 #include "tests/logging/log_test_support.h"
+#include "tools/live/field_selection.h"
+#include "tools/scenario/run_setup.h"
 
 namespace poise {
 namespace {

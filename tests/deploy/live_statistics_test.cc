@@ -1,5 +1,5 @@
 // Rates and ages of a run whose messages come at known times.
-#include "deploy/poise/live_statistics.h"
+#include "tools/live/live_statistics.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "deploy/poise/message_text.h"
+#include "tools/live/message_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

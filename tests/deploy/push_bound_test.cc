@@ -1,5 +1,5 @@
 // The pendulum's bound of a push, against an integrated pendulum.
-#include "deploy/poise/push_bound.h"
+#include "tools/scenario/push_bound.h"
 
 #include <gtest/gtest.h>
 

@@ -9,12 +9,12 @@
 #include "components/framework/configuration.h"
 #include "components/framework/graph.pb.h"
 #include "components/robot/robot.pb.h"
-#include "deploy/poise/reference/field_reference.h"
-#include "deploy/poise/reference/message_reference.h"
-#include "deploy/poise/reference/reference_text.h"
-#include "deploy/poise/scenario.pb.h"
-#include "deploy/poise/sweep.pb.h"
 #include "poise/message_traits.hpp"
+#include "tools/reference/field_reference.h"
+#include "tools/reference/message_reference.h"
+#include "tools/reference/reference_text.h"
+#include "tools/scenario/scenario.pb.h"
+#include "tools/sweep/sweep.pb.h"
 
 namespace poise {
 namespace {

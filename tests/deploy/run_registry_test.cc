@@ -1,4 +1,4 @@
-#include "deploy/poise/run_registry.h"
+#include "tools/run/run_registry.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // What the page of a run in progress is told of its log.
-#include "deploy/poise/run_status.h"
+#include "tools/live/run_status.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // The maps of sweeps that exist in memory only.
-#include "deploy/poise/sweep_maps.h"
+#include "tools/maps/sweep_maps.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <regex>
 #include <set>
 
-#include "deploy/poise/svg_frame.h"
-#include "deploy/poise/sweep_edge.h"
-#include "deploy/poise/sweep_points.h"
+#include "tools/maps/svg_frame.h"
+#include "tools/maps/sweep_edge.h"
+#include "tools/sweep/sweep_points.h"
 
 namespace poise {
 namespace {

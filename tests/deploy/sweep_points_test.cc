@@ -1,5 +1,5 @@
 // Expressions, grids and random draws of sweeps.
-#include "deploy/poise/sweep_points.h"
+#include "tools/sweep/sweep_points.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 
 #include "components/framework/configuration.h"
-#include "deploy/poise/sweep_expression.h"
+#include "tools/sweep/sweep_expression.h"
 
 namespace poise {
 namespace {

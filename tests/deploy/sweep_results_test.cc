@@ -1,5 +1,5 @@
 // The file that keeps finished runs: what it survives and what it refuses.
-#include "deploy/poise/sweep_results.h"
+#include "tools/sweep/sweep_results.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -8,8 +8,8 @@
 #include <iterator>
 
 #include "components/framework/configuration.h"
-#include "deploy/poise/sweep_session.h"
-#include "deploy/poise/sweep_table.h"
+#include "tools/sweep/sweep_session.h"
+#include "tools/sweep/sweep_table.h"
 
 namespace poise {
 namespace {

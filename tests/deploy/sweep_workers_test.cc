@@ -1,5 +1,5 @@
 // Tasks in processes of their own: answers, exceptions, crashes, ends.
-#include "deploy/poise/sweep_workers.h"
+#include "tools/sweep/sweep_workers.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>

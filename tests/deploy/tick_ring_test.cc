@@ -1,5 +1,5 @@
 // The ticks of a run in progress, from messages that come late, not at all, or with hostile ticks.
-#include "deploy/poise/tick_ring.h"
+#include "tools/live/tick_ring.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <cstring>
 
 #include "components/framework/run.h"
-#include "deploy/poise/field_selection.h"
 #include "poise/external_push_t.hpp"
 #include "tests/logging/log_test_support.h"
+#include "tools/live/field_selection.h"
 
 namespace poise {
 namespace {

@@ -1,4 +1,4 @@
-#include "deploy/poise/top_view.h"
+#include "tools/live/top_view.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -62,7 +62,7 @@ function untrueLines(page, output) {
 /** A folder like a built checkout, but for the sources: deploy/run does without deploy/setup. */
 function sandbox() {
   const folder = mkdtempSync(join(tmpdir(), 'poise-examples-'));
-  cpSync(join(root, 'deploy'), join(folder, 'deploy'), {recursive: true, filter: (f) => !f.endsWith('deploy/poise')});
+  cpSync(join(root, 'deploy'), join(folder, 'deploy'), {recursive: true});
   writeFileSync(join(folder, 'deploy/run'), '#!/bin/sh\nexec "$(dirname "$0")/../build/release/bin/poise" run "$@"\n');
   chmodSync(join(folder, 'deploy/run'), 0o755);
   mkdirSync(join(folder, 'build/release'), {recursive: true});

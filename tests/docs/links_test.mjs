@@ -23,7 +23,7 @@ const tests = new Set(sources.filter((f) => f.startsWith('tests/')).flatMap((f) 
     [...text(f).matchAll(/\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)\s*\)/g)].map((m) => `${m[1]}.${m[2]}`)));
 const scripts = files.filter((f) => /^deploy\/(\w+|cluster\/\w+)$/.test(f) || f.endsWith('.sh')).map(text).join('\n');
 
-/** What a run's folder holds: `logging/` and `deploy/poise/` write it. */
+/** What a run's folder holds: `logging/` and `tools/` write it. */
 const OF_A_RUN = new Set(['run_spec.pbtxt', 'scenario.pbtxt']);
 /** Pages that deploy/docs writes. */
 const GENERATED = new Set([...text('deploy/docs').matchAll(/^page (\w+\.md)/gm)].map((m) => m[1]));

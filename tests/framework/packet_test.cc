@@ -13,9 +13,9 @@
 namespace poise {
 namespace {
 
-constexpr int64_t kRun = 77;
+constexpr int64_t kPacketRun = 77;
 
-std::vector<uint8_t> Packet(int64_t tick, double value = 1, int64_t run_id = kRun,
+std::vector<uint8_t> Packet(int64_t tick, double value = 1, int64_t run_id = kPacketRun,
                             int32_t joints = 3) {
   robot_sensors_t message;
   MessageTraits<robot_sensors_t>::Resize(message, std::vector<int32_t>{joints, 2});
@@ -33,7 +33,7 @@ class PacketFilterTest : public ::testing::Test {
     return filter_.Check(bytes.data(), bytes.size(), 10, 20);
   }
   PacketFilter filter_{robot_sensors_t::getHash(), static_cast<int>(Packet(0).size()),
-                       std::vector<int32_t>{3, 2}, kRun};
+                       std::vector<int32_t>{3, 2}, kPacketRun};
 };
 
 TEST_F(PacketFilterTest, AcceptsTheWindowOnly) {
@@ -71,8 +71,8 @@ TEST_F(PacketFilterTest, RefusesEveryDamagedByteOfTheHeader) {
       EXPECT_EQ(Check(bytes), expected(byte)) << byte;
     }
   }
-  EXPECT_EQ(Check(Packet(15, 1, kRun + 1)), PacketVerdict::kWrongRun);
-  EXPECT_EQ(Check(Packet(15, 1, kRun, 4)), PacketVerdict::kWrongSize);
+  EXPECT_EQ(Check(Packet(15, 1, kPacketRun + 1)), PacketVerdict::kWrongRun);
+  EXPECT_EQ(Check(Packet(15, 1, kPacketRun, 4)), PacketVerdict::kWrongSize);
 }
 
 TEST(PacketFilterNames, EveryVerdictHasAName) {
@@ -85,7 +85,7 @@ class InboxTest : public ::testing::Test {
  protected:
   InboxTest() {
     wiring_.AddInput(&input_, "in", {3, 2});
-    inbox_ = std::make_unique<Inbox>(&input_, kRun);
+    inbox_ = std::make_unique<Inbox>(&input_, kPacketRun);
   }
   void Offer(const std::vector<uint8_t>& bytes) { inbox_->Offer(bytes.data(), bytes.size()); }
   int64_t Count(PacketVerdict verdict) const { return inbox_->counters().count(verdict); }
@@ -138,7 +138,7 @@ TEST(CollectedChannelTest, AMessageThatIsNotFiniteDoesNotTakeThePlaceOfTheRightO
   channel.set_type("robot_sensors_t");
   channel.add_count(3);
   channel.add_count(2);
-  CollectedChannel collected(channel, kRun);
+  CollectedChannel collected(channel, kPacketRun);
   const std::vector<uint8_t> bad = Packet(0, NAN);
   const std::vector<uint8_t> good = Packet(0, 5);
   EXPECT_EQ(collected.Offer(bad.data(), bad.size()), PacketVerdict::kNotFinite);
@@ -197,7 +197,7 @@ TEST(LatestInbox, ShowsTheLastMessageAndWaitsForNone) {
   Input<robot_sensors_t> input;
   Wiring wiring;
   wiring.AddInput(&input, "in", {3, 2}, InputKind::kLatest);
-  Inbox inbox(&input, kRun);
+  Inbox inbox(&input, kPacketRun);
   EXPECT_TRUE(inbox.ready());
   inbox.Show(false);
   EXPECT_FALSE(input.present());

@@ -55,8 +55,7 @@ TEST(Estimators, BothAreInTheTableWhicheverRan) {
     for (const auto& [name, prefix] :
          {std::pair("ANCHORED_FEET", "anchored_feet"), {"INVARIANT_EKF", "invariant_ekf"}}) {
       const double rms = checks.at(fmt::format("{}_velocity_rms", prefix)).get<double>();
-      EXPECT_NE(LineOf(name, again.output).find(fmt::format("{:.4g} mm/s", rms)),
-                std::string::npos)
+      EXPECT_NE(LineOf(name, again.output).find(fmt::format("{:.4g} mm/s", rms)), std::string::npos)
           << rms << "\n"
           << again.output;
     }

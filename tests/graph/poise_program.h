@@ -85,6 +85,8 @@ nlohmann::json ReadSummary(const std::string& run);
 using CsvRow = std::map<std::string, std::string>;
 /// RFC 4180; expects that all rows have the heading's columns.
 std::vector<CsvRow> ReadCsv(const std::string& file);
+/// The lines of `text`, without their ends.
+std::vector<std::string> Lines(const std::string& text);
 /// A whole file's bytes; empty when there is none.
 std::string ReadAll(const std::filesystem::path& path);
 
@@ -103,6 +105,8 @@ bool WaitUntil(Condition condition) {
   }
   return true;
 }
+
+inline constexpr uintmax_t kUnderWay = 200'000;  // bytes of log: some tens of ticks
 
 /// True once the run's log has grown to `size` bytes: it is under way.
 bool WaitForLog(const std::string& run, uintmax_t size);

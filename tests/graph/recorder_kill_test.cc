@@ -18,7 +18,6 @@
 namespace poise {
 namespace {
 
-constexpr uintmax_t kUnderWay = 200'000;  // bytes of log: some tens of ticks
 constexpr double kPromised = 100;         // ms that may be lost
 
 /// What the recorder has mirrored, a message after it was handed to the log.

@@ -19,8 +19,6 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr uintmax_t kUnderWay = 200'000;  // bytes of log
-
 /// Runs of this test alone are known to the programs that this process starts.
 class OwnRegistry {
  public:

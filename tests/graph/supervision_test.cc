@@ -12,8 +12,6 @@
 namespace poise {
 namespace {
 
-constexpr uintmax_t kUnderWay = 200'000;  // bytes of log: some tens of ticks
-
 const std::vector<std::string> kComponents = {
     "sim_ode",       "hw_bridge", "state_estimator", "task_controller", "contact_wrench_monitor",
     "redistributor", "recorder"};

@@ -21,15 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr uintmax_t kUnderWay = 200'000;  // bytes of log
-
-std::vector<std::string> Lines(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
-}
-
 std::vector<std::string> Words(const std::string& line, char separator) {
   std::vector<std::string> words;
   std::istringstream in(line);
@@ -40,7 +31,7 @@ std::vector<std::string> Words(const std::string& line, char separator) {
 }
 
 /// The words of the line that begins with `name`.
-std::vector<std::string> Row(const std::string& view, const std::string& name) {
+std::vector<std::string> RowOf(const std::string& view, const std::string& name) {
   for (const std::string& line : Lines(view)) {
     if (line.starts_with(name + " ")) return Words(line, ' ');
   }
@@ -79,7 +70,7 @@ TEST_F(WatchTest, TopShowsEveryProcessAndChannel) {
   EXPECT_EQ(top.output.find('\x1b'), std::string::npos);
   const logging::RunRecord record = End();
   for (const auto& [name, health] : record.health) {
-    const std::vector<std::string> row = Row(top.output, name);
+    const std::vector<std::string> row = RowOf(top.output, name);
     ASSERT_EQ(row.size(), 14u) << name << " in\n" << top.output;
     EXPECT_EQ(row[1], "running");
     // A moment of this run, which its last report may still be.
@@ -89,7 +80,7 @@ TEST_F(WatchTest, TopShowsEveryProcessAndChannel) {
     EXPECT_EQ(row[10], "0");  // refused
   }
   for (const Channel& channel : record.spec.graph().channel()) {
-    const std::vector<std::string> row = Row(top.output, channel.name());
+    const std::vector<std::string> row = RowOf(top.output, channel.name());
     ASSERT_GE(row.size(), 8u) << channel.name() << " in\n" << top.output;
     EXPECT_EQ(row[1], channel.type());
     if (channel.external()) {

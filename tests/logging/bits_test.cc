@@ -15,14 +15,14 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 40;
+constexpr int64_t kBitsTicks = 40;
 
 class BitsTest : public testing::Test {
  protected:
   /// The bits of a log of ROBOT_STATE, after `change` of its messages.
   std::vector<ChannelBits> Bits(const std::function<void(std::vector<robot_state_t>*)>& change) {
-    std::vector<robot_state_t> states(kTicks);
-    for (int64_t t = 0; t < kTicks; ++t) {
+    std::vector<robot_state_t> states(kBitsTicks);
+    for (int64_t t = 0; t < kBitsTicks; ++t) {
       robot_state_t& state = states[static_cast<size_t>(t)];
       MessageTraits<robot_state_t>::Resize(state, std::vector<int32_t>{12, 2});
       SetHeader(t, &state);
@@ -50,10 +50,10 @@ const ChannelBits& RobotState(const std::vector<ChannelBits>& bits) {
 
 TEST_F(BitsTest, ALastBitIsNamedByItsTick) {
   const std::vector<ChannelBits> recorded = Bits();
-  EXPECT_EQ(RobotState(recorded).by_tick.size(), static_cast<size_t>(kTicks));
+  EXPECT_EQ(RobotState(recorded).by_tick.size(), static_cast<size_t>(kBitsTicks));
   // The check sum's byte hides one change in 256: of all ticks a few at most are named late.
   int late = 0;
-  for (int64_t tick = 0; tick < kTicks; ++tick) {
+  for (int64_t tick = 0; tick < kBitsTicks; ++tick) {
     const auto difference =
         FirstDifference(recorded, Bits([&](auto* states) {
                           double& z = (*states)[static_cast<size_t>(tick)].base_position[2];
@@ -75,7 +75,7 @@ TEST_F(BitsTest, RunIdAloneIsNoDifference) {
 TEST_F(BitsTest, AShorterRunLacksATick) {
   const auto difference = FirstDifference(Bits(), Bits([](auto* states) { states->pop_back(); }));
   ASSERT_TRUE(difference);
-  EXPECT_EQ(difference->tick, kTicks - 1);
+  EXPECT_EQ(difference->tick, kBitsTicks - 1);
   EXPECT_EQ(difference->what, "the run lacks it");
 }
 

@@ -13,12 +13,12 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 10;
+constexpr int64_t kCompareTicks = 10;
 
 class CompareTest : public testing::Test {
  protected:
   CompareTest() : spec_(MakeTestSpec()) {
-    for (int64_t t = 0; t < kTicks; ++t) {
+    for (int64_t t = 0; t < kCompareTicks; ++t) {
       robot_state_t state{};
       MessageTraits<robot_state_t>::Resize(state, std::vector<int32_t>{12, 2});
       SetHeader(t, &state);
@@ -55,8 +55,8 @@ TEST_F(CompareTest, RunIdAloneIsNoDifference) {
   for (robot_state_t& state : states_) state.run_id = 77;
   const LogComparison result = CompareLogs(first, Write("b", states_, tasks_));
   EXPECT_TRUE(result.equal());
-  EXPECT_EQ(result.ticks, kTicks);
-  EXPECT_EQ(result.messages, 2 * kTicks);
+  EXPECT_EQ(result.ticks, kCompareTicks);
+  EXPECT_EQ(result.messages, 2 * kCompareTicks);
   EXPECT_FALSE(result.earliest.has_value());
 }
 

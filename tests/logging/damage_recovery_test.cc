@@ -8,18 +8,18 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 2000;
+constexpr int64_t kDamageRecoveryTicks = 2000;
 constexpr int kTrials = 8;  // log_damage_report does more
 
 class DamageRecoveryTest : public testing::Test {
  protected:
   DamageRecoveryTest() {
-    WriteRawLog(path_, SmallLog(kTicks));
+    WriteRawLog(path_, SmallLog(kDamageRecoveryTicks));
     whole_ = ReadBytes(path_);
   }
   void Expect(const std::string& damaged) {
     const DamageTrial trial = TryDamage(whole_, damaged, path_);
-    EXPECT_EQ(trial.records, 2 * kTicks + 2);
+    EXPECT_EQ(trial.records, 2 * kDamageRecoveryTicks + 2);
     EXPECT_EQ(trial.by_poise, trial.undamaged);
     EXPECT_LE(trial.by_liblcm, trial.undamaged);
     lost_ += trial.records - trial.undamaged;
@@ -44,7 +44,7 @@ TEST_F(DamageRecoveryTest, OverwrittenAtAThousandPlaces) {
 }
 
 TEST_F(DamageRecoveryTest, LengthAndNumberOfARecordDamagedTogether) {
-  const std::vector<RawEvent> events = SmallLog(kTicks);
+  const std::vector<RawEvent> events = SmallLog(kDamageRecoveryTicks);
   for (size_t index = 5; index < 25; ++index) {
     std::string damaged = whole_;
     const size_t at = RecordOffset(events, index);

@@ -16,16 +16,16 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 5;
+constexpr int64_t kDamageTicks = 5;
 
 class DamageTest : public testing::Test {
  protected:
-  DamageTest() : spec_(MakeTestSpec()) { spec_.set_num_ticks(kTicks); }
+  DamageTest() : spec_(MakeTestSpec()) { spec_.set_num_ticks(kDamageTicks); }
 
-  /// Log with `info` first and kTicks messages of three channels and of HEALTH.
+  /// Log with `info` first and kDamageTicks messages of three channels and of HEALTH.
   std::string Write(const RawEvent& info) {
     std::vector<RawEvent> events = {info};
-    for (int64_t t = 0; t < kTicks; ++t) {
+    for (int64_t t = 0; t < kDamageTicks; ++t) {
       events.push_back(Zeros<robot_state_t>("ROBOT_STATE", t));
       events.push_back(Zeros<task_torque_t>("TASK_TORQUE", t));
       events.push_back(Zeros<joint_command_t>("JOINT_COMMAND", t));

@@ -19,7 +19,7 @@
 namespace poise::logging {
 namespace {
 
-constexpr size_t kHeader = 28;  // bytes of a record before its channel
+constexpr size_t kRecordHeader = 28;  // bytes of a record before its channel
 
 const uint8_t* Data(const std::string& bytes) {
   return reinterpret_cast<const uint8_t*>(bytes.data());
@@ -30,7 +30,7 @@ std::vector<std::string_view> UndamagedRecords(const std::string& whole,
                                                const std::string& damaged) {
   std::vector<std::string_view> records;
   for (size_t at = 0; at < whole.size();) {
-    const size_t size = kHeader + static_cast<size_t>(ReadInt32(Data(whole) + at + 20)) +
+    const size_t size = kRecordHeader + static_cast<size_t>(ReadInt32(Data(whole) + at + 20)) +
                         static_cast<size_t>(ReadInt32(Data(whole) + at + 24));
     const std::string_view record = std::string_view(whole).substr(at, size);
     const bool same = at + size <= damaged.size() && damaged.compare(at, size, record) == 0;
@@ -45,10 +45,10 @@ bool IsUndamaged(const std::vector<std::string_view>& records, int64_t number, i
                  std::string_view channel, std::string_view data) {
   if (number < 0 || static_cast<size_t>(number) >= records.size()) return false;
   const std::string_view record = records[static_cast<size_t>(number)];
-  return record.size() == kHeader + channel.size() + data.size() &&
+  return record.size() == kRecordHeader + channel.size() + data.size() &&
          ReadInt64(reinterpret_cast<const uint8_t*>(record.data()) + 12) == utime &&
-         record.substr(kHeader, channel.size()) == channel &&
-         record.substr(kHeader + channel.size()) == data;
+         record.substr(kRecordHeader, channel.size()) == channel &&
+         record.substr(kRecordHeader + channel.size()) == data;
 }
 
 int64_t CountWithPoise(const std::vector<std::string_view>& records, const std::string& path) {

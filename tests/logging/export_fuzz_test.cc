@@ -21,8 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrials = 150;
-constexpr int64_t kTicks = 30;
+constexpr int kDamagedLogs = 150;
+constexpr int64_t kExportFuzzTicks = 30;
 
 /// Reads PUSH and the operator's STOP, and answers with COMMAND.
 class Answer final : public Component {
@@ -61,7 +61,7 @@ class ExportFuzzTest : public testing::Test {
  protected:
   ExportFuzzTest() {
     registry_.Add("answer", "", [] { return std::make_unique<Answer>(); });
-    std::vector<RawEvent> events = SmallLog(kTicks);
+    std::vector<RawEvent> events = SmallLog(kExportFuzzTicks);
     events[0] = RunInfoEvent(SpecWithComponent());
     emergency_stop_t stop{};
     stop.run_id = 42;
@@ -123,43 +123,43 @@ TEST_F(ExportFuzzTest, AWholeLogReplaysToItsBits) {
   const LogReplay replay(folder_.path("whole.lcm"));
   const ReplayedComponent answer = replay.Replay(replay.spec(), 0, registry_);
   EXPECT_TRUE(answer.equal());
-  EXPECT_EQ(answer.ticks, kTicks);
+  EXPECT_EQ(answer.ticks, kExportFuzzTicks);
   EXPECT_EQ(answer.external_messages, 1);
 }
 
 TEST_F(ExportFuzzTest, DamageAnywhere) {
   std::mt19937 random(11);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, i % 3 == 0 ? CutAnywhere(whole_, &random)
                                 : Overwrite(whole_, 1 + random() % 40, &random));
     TryAll();
   }
-  EXPECT_GT(done_, kTrials);
-  EXPECT_GT(refused_, kTrials / 10);
+  EXPECT_GT(done_, kDamagedLogs);
+  EXPECT_GT(refused_, kDamagedLogs / 10);
 }
 
 TEST_F(ExportFuzzTest, DamageInTheMessagesAlone) {
   std::mt19937 random(12);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, whole_.substr(0, info_end_) +
                          Overwrite(whole_.substr(info_end_), 1 + random() % 40, &random));
     TryAll();
   }
-  EXPECT_GT(done_, kTrials);
+  EXPECT_GT(done_, kDamagedLogs);
 }
 
 TEST_F(ExportFuzzTest, DamageInRunInfoAlone) {
   std::mt19937 random(13);
-  for (int i = 0; i < kTrials; ++i) {
+  for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, Overwrite(whole_.substr(0, info_end_), 1 + random() % 8, &random) +
                          whole_.substr(info_end_));
     TryAll();
   }
-  EXPECT_GT(done_, kTrials);
-  EXPECT_GT(refused_, kTrials / 10);
+  EXPECT_GT(done_, kDamagedLogs);
+  EXPECT_GT(refused_, kDamagedLogs / 10);
 }
 
 }  // namespace

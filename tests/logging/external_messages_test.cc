@@ -10,20 +10,20 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 2000;
+constexpr int64_t kExternalMessagesTicks = 2000;
 
 class PlaceEmergencyStopsTest : public testing::Test {
  protected:
   /// The bridge's state from `tick` on.
   void SetState(int64_t tick, int8_t state, int8_t reason = bridge_status_t::REASON_OPERATOR) {
-    for (; tick < kTicks; ++tick) {
+    for (; tick < kExternalMessagesTicks; ++tick) {
       statuses_[static_cast<size_t>(tick)].state = state;
       statuses_[static_cast<size_t>(tick)].reason = reason;
     }
   }
   void ResetAt(int64_t tick) {
     SetState(tick, bridge_status_t::STATE_RUNNING, bridge_status_t::REASON_NONE);
-    for (; tick < kTicks; ++tick) ++statuses_[static_cast<size_t>(tick)].resets;
+    for (; tick < kExternalMessagesTicks; ++tick) ++statuses_[static_cast<size_t>(tick)].resets;
   }
   void Send(int64_t recorded, bool stop, bool reset = false) {
     emergency_stop_t message{};
@@ -35,11 +35,11 @@ class PlaceEmergencyStopsTest : public testing::Test {
   std::vector<ExternalMessage> Place() {
     Series<std::span<const uint8_t>> series;
     std::vector<std::vector<uint8_t>> encoded;
-    for (int64_t tick = 0; tick < kTicks; ++tick) {
+    for (int64_t tick = 0; tick < kExternalMessagesTicks; ++tick) {
       SetHeader(tick, &statuses_[static_cast<size_t>(tick)]);
       encoded.push_back(Encode(statuses_[static_cast<size_t>(tick)]));
     }
-    for (int64_t tick = 0; tick < kTicks; ++tick) {
+    for (int64_t tick = 0; tick < kExternalMessagesTicks; ++tick) {
       if (tick != lost_) series.Set(tick, encoded[static_cast<size_t>(tick)]);
     }
     std::vector<ExternalMessage> messages;
@@ -48,7 +48,7 @@ class PlaceEmergencyStopsTest : public testing::Test {
     return messages;
   }
 
-  std::vector<bridge_status_t> statuses_ = std::vector<bridge_status_t>(kTicks);
+  std::vector<bridge_status_t> statuses_ = std::vector<bridge_status_t>(kExternalMessagesTicks);
   std::vector<std::vector<uint8_t>> bytes_;
   std::vector<int64_t> recorded_;
   int64_t lost_ = -1;  // tick without a status

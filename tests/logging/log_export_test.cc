@@ -18,7 +18,7 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 10;
+constexpr int64_t kLogExportTicks = 10;
 using Row = std::vector<std::string>;
 
 /// Rows of a CSV file, by RFC 4180.
@@ -59,9 +59,9 @@ class LogExportTest : public testing::Test {
 };
 
 TEST_F(LogExportTest, CsvHoldsEveryMessageOfEveryChannel) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogExportTicks);
   external_push_t push{};
-  SetHeader(kTicks, &push);
+  SetHeader(kLogExportTicks, &push);
   push.point[2] = 0.1 + 0.2;
   push.force[1] = -4e-320;
   events.push_back({"PUSH", push.utime, Encode(push)});
@@ -76,7 +76,7 @@ TEST_F(LogExportTest, CsvHoldsEveryMessageOfEveryChannel) {
   const std::vector<Row> rows = ReadCsv(out_ + "/PUSH.csv");
   EXPECT_EQ(rows[0], (Row{"time", "tick", "force[0]", "force[1]", "force[2]", "point[0]",
                           "point[1]", "point[2]"}));
-  ASSERT_EQ(rows.size(), static_cast<size_t>(kTicks) + 2);
+  ASSERT_EQ(rows.size(), static_cast<size_t>(kLogExportTicks) + 2);
   EXPECT_EQ(rows[4], (Row{"0.006000", "3", "3.25", "0", "0", "0", "0", "0"}));
   EXPECT_EQ(std::stod(rows.back()[7]), 0.1 + 0.2);  // every digit
   EXPECT_EQ(std::strtod(rows.back()[3].c_str(), nullptr), -4e-320);
@@ -125,20 +125,20 @@ TEST_F(LogExportTest, CsvCallsJointsAndFeetByNameAndTellsUnits) {
 }
 
 TEST_F(LogExportTest, MergedHasARowATick) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogExportTicks);
   events.erase(events.begin() + 1 + 2 * 4);  // PUSH 4
   events.pop_back();
   std::swap(events[5], events[8]);  // any order: joined by tick
   WriteRawLog(log_, events);
   const std::vector<ExportedChannel> channels = ExportMergedCsv(log_, folder_.path("merged.csv"));
   ASSERT_EQ(channels.size(), 2u);
-  EXPECT_EQ(channels[0].messages, kTicks - 1);
-  EXPECT_EQ(channels[1].messages, kTicks);
+  EXPECT_EQ(channels[0].messages, kLogExportTicks - 1);
+  EXPECT_EQ(channels[1].messages, kLogExportTicks);
   const std::vector<Row> rows = ReadCsv(folder_.path("merged.csv"));
-  ASSERT_EQ(rows.size(), static_cast<size_t>(kTicks) + 1);
+  ASSERT_EQ(rows.size(), static_cast<size_t>(kLogExportTicks) + 1);
   const size_t push = Column(rows[0], "PUSH.force[0]");
   const size_t command = Column(rows[0], "COMMAND.current[3]");
-  for (size_t t = 0; t < static_cast<size_t>(kTicks); ++t) {
+  for (size_t t = 0; t < static_cast<size_t>(kLogExportTicks); ++t) {
     const Row& row = rows[t + 1];
     ASSERT_EQ(row.size(), rows[0].size());
     EXPECT_EQ(row[1], std::to_string(t));
@@ -149,7 +149,7 @@ TEST_F(LogExportTest, MergedHasARowATick) {
 }
 
 TEST_F(LogExportTest, LeavesOutAndCountsWhatIsNoMessageOfItsChannel) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogExportTicks);
   events[3].data.resize(30);                     // PUSH 1
   events.push_back({"PUSH", 0, Command(3)});     // of another type
   events.push_back({"../outside", 0, Push(3)});  // a path
@@ -159,7 +159,7 @@ TEST_F(LogExportTest, LeavesOutAndCountsWhatIsNoMessageOfItsChannel) {
   for (const ExportedChannel& channel : ExportCsv(log_, out_)) refused += channel.refused;
   EXPECT_EQ(refused, 4);
   EXPECT_FALSE(std::filesystem::exists(folder_.path("outside.csv")));
-  EXPECT_EQ(ReadCsv(out_ + "/PUSH.csv").size(), static_cast<size_t>(kTicks));
+  EXPECT_EQ(ReadCsv(out_ + "/PUSH.csv").size(), static_cast<size_t>(kLogExportTicks));
   int64_t messages = 0;
   refused = 0;
   for (const ExportedChannel& channel : ExportMcap(log_, folder_.path("log.mcap"))) {
@@ -171,7 +171,7 @@ TEST_F(LogExportTest, LeavesOutAndCountsWhatIsNoMessageOfItsChannel) {
 }
 
 TEST_F(LogExportTest, McapRefusesNamesThatAreNoUtf8AndMoreThanItHolds) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogExportTicks);
   events.push_back({"PU\xffH", 0, Push(3)});
   events.push_back({"PU\x1bH", 0, Push(3)});
   events.push_back({"M\xc3\x84RZ", 0, Push(3)});
@@ -195,7 +195,7 @@ TEST_F(LogExportTest, McapRefusesNamesThatAreNoUtf8AndMoreThanItHolds) {
 }
 
 TEST_F(LogExportTest, ReplacesNoLogAndLeavesNoPart) {
-  WriteRawLog(log_, SmallLog(kTicks));
+  WriteRawLog(log_, SmallLog(kLogExportTicks));
   const std::string bytes = ReadBytes(log_);
   EXPECT_THROW(ExportMcap(log_, log_), LogError);
   EXPECT_THROW(ExportMergedCsv(log_, log_), LogError);
@@ -209,13 +209,13 @@ TEST_F(LogExportTest, ReplacesNoLogAndLeavesNoPart) {
 }
 
 TEST_F(LogExportTest, TablesOfAnotherLogDoNotStandAmongThese) {
-  WriteRawLog(log_, SmallLog(kTicks));
+  WriteRawLog(log_, SmallLog(kLogExportTicks));
   ExportCsv(log_, out_);
   const std::string push = ReadBytes(out_ + "/PUSH.csv");
   WriteBytes(out_ + "/notes.txt", "mine");
   ExportCsv(log_, out_);  // the same again
   EXPECT_EQ(ReadBytes(out_ + "/PUSH.csv"), push);
-  std::vector<RawEvent> fewer = SmallLog(kTicks + 1);
+  std::vector<RawEvent> fewer = SmallLog(kLogExportTicks + 1);
   std::erase_if(fewer, [](const RawEvent& event) { return event.channel == "COMMAND"; });
   WriteRawLog(log_, fewer);
   try {
@@ -228,7 +228,7 @@ TEST_F(LogExportTest, TablesOfAnotherLogDoNotStandAmongThese) {
 }
 
 TEST_F(LogExportTest, RefusesWhatCannotBeWritten) {
-  WriteRawLog(log_, SmallLog(kTicks));
+  WriteRawLog(log_, SmallLog(kLogExportTicks));
   EXPECT_THROW(ExportCsv(log_, log_ + "/x"), LogError);
   EXPECT_THROW(ExportMergedCsv(log_, folder_.path("no/such")), LogError);
   EXPECT_THROW(ExportMcap(log_, folder_.path("no/such")), LogError);

@@ -15,7 +15,7 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kTicks = 10;
+constexpr int64_t kLogSurveyTicks = 10;
 
 class LogSurveyTest : public testing::Test {
  protected:
@@ -39,18 +39,18 @@ class LogSurveyTest : public testing::Test {
 };
 
 TEST_F(LogSurveyTest, WholeLog) {
-  EXPECT_TRUE(Problems(SmallLog(kTicks)).empty());
-  EXPECT_EQ(survey_.end_tick, kTicks);
-  EXPECT_EQ(survey_.events, 2 * kTicks + 2);
+  EXPECT_TRUE(Problems(SmallLog(kLogSurveyTicks)).empty());
+  EXPECT_EQ(survey_.end_tick, kLogSurveyTicks);
+  EXPECT_EQ(survey_.events, 2 * kLogSurveyTicks + 2);
   ASSERT_EQ(survey_.channels.size(), 3u);
-  EXPECT_EQ(survey_.channels[0].ticks.messages, kTicks);
-  EXPECT_EQ(survey_.channels[0].bytes, kTicks * static_cast<int64_t>(Push(0).size()));
+  EXPECT_EQ(survey_.channels[0].ticks.messages, kLogSurveyTicks);
+  EXPECT_EQ(survey_.channels[0].bytes, kLogSurveyTicks * static_cast<int64_t>(Push(0).size()));
   ASSERT_EQ(survey_.others.size(), 2u);
   EXPECT_EQ(survey_.others[0].type, "health_t");
 }
 
 TEST_F(LogSurveyTest, NamesTheTicksThatAreMissing) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   events.erase(events.begin() + 1 + 2 * 7);  // PUSH 7, 4, 3
   events.erase(events.begin() + 1 + 2 * 4);
   events.erase(events.begin() + 1 + 2 * 3);
@@ -58,15 +58,15 @@ TEST_F(LogSurveyTest, NamesTheTicksThatAreMissing) {
 }
 
 TEST_F(LogSurveyTest, CountsDoubleDisorderedAndRefused) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   std::swap(events[PushOf(2)], events[PushOf(3)]);
   EXPECT_EQ(Problem(events), "PUSH: 1 messages out of order");
 
-  events = SmallLog(kTicks);
+  events = SmallLog(kLogSurveyTicks);
   events.insert(events.begin() + 5, events[PushOf(1)]);
   EXPECT_EQ(Problem(events), "PUSH: 1 messages of a tick that was there already");
 
-  events = SmallLog(kTicks);
+  events = SmallLog(kLogSurveyTicks);
   external_push_t push{};
   SetHeader(2, &push);
   push.point[1] = std::numeric_limits<double>::infinity();
@@ -83,7 +83,7 @@ TEST_F(LogSurveyTest, CountsDoubleDisorderedAndRefused) {
 }
 
 TEST_F(LogSurveyTest, SaysWhatDamageTookAndWhere) {
-  const std::vector<RawEvent> events = SmallLog(kTicks);
+  const std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   WriteRawLog(path_, events);
   std::string bytes = ReadBytes(path_);
   const size_t at = RecordOffset(events, PushOf(5));
@@ -101,7 +101,7 @@ TEST_F(LogSurveyTest, SaysWhatDamageTookAndWhere) {
 }
 
 TEST_F(LogSurveyTest, DamagedRunInfoLeavesTheEvents) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   events[0].data[0] ^= 0xFF;  // of its fingerprint
   const std::vector<std::string> problems = Problems(events);
   ASSERT_EQ(problems.size(), 2u) << testing::PrintToString(problems);
@@ -109,20 +109,20 @@ TEST_F(LogSurveyTest, DamagedRunInfoLeavesTheEvents) {
   EXPECT_TRUE(survey_.channels.empty());
   ASSERT_EQ(survey_.others.size(), 4u);
   EXPECT_EQ(survey_.others[2].ticks.name, "PUSH");
-  EXPECT_EQ(survey_.others[2].ticks.messages, kTicks);
+  EXPECT_EQ(survey_.others[2].ticks.messages, kLogSurveyTicks);
 }
 
 TEST_F(LogSurveyTest, StrangersAndAMissingEndAreProblems) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   events.push_back({"PU\x01H", 0, Push(0)});
   EXPECT_EQ(Problem(events), "'PU\\x01H' is no channel of the run: 1 messages");
-  events = SmallLog(kTicks);
+  events = SmallLog(kLogSurveyTicks);
   events.pop_back();
   EXPECT_NE(Problem(events).find("ended at tick 10"), std::string::npos);
 }
 
 TEST_F(LogSurveyTest, CutLogIsARunsLog) {
-  WriteRawLog(path_, SmallLog(kTicks));
+  WriteRawLog(path_, SmallLog(kLogSurveyTicks));
   const std::string cut = folder_.path("cut");
   const CutResult result = CutLog(path_, {3, 6, {}}, cut);
   EXPECT_EQ(result.events, 1 + 2 * 4);
@@ -139,7 +139,7 @@ TEST_F(LogSurveyTest, CutLogIsARunsLog) {
   ASSERT_TRUE(reader.Next(&event));
   for (size_t i = PushOf(3); i < PushOf(7); ++i) {
     ASSERT_TRUE(reader.Next(&event));
-    const RawEvent raw = SmallLog(kTicks)[i];
+    const RawEvent raw = SmallLog(kLogSurveyTicks)[i];
     EXPECT_EQ(event.channel, raw.channel);
     EXPECT_EQ(event.utime, raw.utime);
     EXPECT_TRUE(std::equal(event.data.begin(), event.data.end(), raw.data.begin(), raw.data.end()));
@@ -160,7 +160,7 @@ TEST_F(LogSurveyTest, CutLogIsARunsLog) {
 }
 
 TEST_F(LogSurveyTest, CutKeepsWhatCameBeforeTheFirstTickAndAfterTheLast) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   health_t health{};
   SetHeader(0, &health);
   health.component = "robot";
@@ -168,7 +168,7 @@ TEST_F(LogSurveyTest, CutKeepsWhatCameBeforeTheFirstTickAndAfterTheLast) {
   events.insert(events.begin() + 1, {"HEALTH_ROBOT", 0, Encode(health)});
   emergency_stop_t stop{};
   stop.run_id = 42;
-  events.push_back({"STOP", kTicks * 2000, Encode(stop)});
+  events.push_back({"STOP", kLogSurveyTicks * 2000, Encode(stop)});
   WriteRawLog(path_, events);
   const auto count = [&](const CutRange& range) {
     static int number = 0;
@@ -181,7 +181,7 @@ TEST_F(LogSurveyTest, CutKeepsWhatCameBeforeTheFirstTickAndAfterTheLast) {
 }
 
 TEST_F(LogSurveyTest, CutCountsAsUnreadableOnlyWhatIsInItsRange) {
-  std::vector<RawEvent> events = SmallLog(kTicks);
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   events[PushOf(2)].data.resize(30);
   events[PushOf(6)].data.resize(30);
   events[PushOf(7)].data.resize(30);
@@ -192,7 +192,7 @@ TEST_F(LogSurveyTest, CutCountsAsUnreadableOnlyWhatIsInItsRange) {
 }
 
 TEST_F(LogSurveyTest, CutRefusesWhatCannotBe) {
-  WriteRawLog(path_, SmallLog(kTicks));
+  WriteRawLog(path_, SmallLog(kLogSurveyTicks));
   const auto refusal = [&](const CutRange& range, const std::string& to) -> std::string {
     try {
       CutLog(path_, range, to);

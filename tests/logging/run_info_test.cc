@@ -19,11 +19,11 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr int64_t kTicks = 10;
+constexpr int64_t kRunInfoTicks = 10;
 
 class RunInfoTest : public testing::Test {
  protected:
-  RunInfoTest() : events_(SmallLog(kTicks)) {}
+  RunInfoTest() : events_(SmallLog(kRunInfoTicks)) {}
 
   void WriteSpec(const RunSpec& spec) {
     std::string text;
@@ -86,7 +86,7 @@ TEST_F(RunInfoTest, TheRunsFolderStandsInAndAllMessagesAreRead) {
     EXPECT_THAT(run.warning, HasSubstr("run_spec.pbtxt"));
 
     const LogSurvey survey = SurveyLog(log_);
-    EXPECT_EQ(survey.end_tick, kTicks);
+    EXPECT_EQ(survey.end_tick, kRunInfoTicks);
     for (const ChannelSurvey& channel : survey.channels) EXPECT_EQ(channel.ticks.missing, 0);
     EXPECT_FALSE(survey.Problems(0).empty());  // the log is not whole all the same
 
@@ -97,7 +97,7 @@ TEST_F(RunInfoTest, TheRunsFolderStandsInAndAllMessagesAreRead) {
     EXPECT_TRUE(SurveyLog(cut).Problems(0).empty());
     std::filesystem::remove(cut);
     for (const ExportedChannel& channel : ExportMergedCsv(log_, folder_.path("merged.csv"))) {
-      EXPECT_EQ(channel.messages, kTicks);
+      EXPECT_EQ(channel.messages, kRunInfoTicks);
     }
   }
 }
@@ -130,7 +130,7 @@ TEST_F(RunInfoTest, WithoutTheFolderMessagesAreExportedAndTheRestRefusesSayingWh
       int found = 0;
       for (const ExportedChannel& channel : channels) {
         if (channel.channel != "PUSH" && channel.channel != "COMMAND") continue;
-        EXPECT_EQ(channel.messages, kTicks) << channel.channel;
+        EXPECT_EQ(channel.messages, kRunInfoTicks) << channel.channel;
         EXPECT_EQ(channel.refused, 0) << channel.channel;
         ++found;
       }
@@ -138,7 +138,7 @@ TEST_F(RunInfoTest, WithoutTheFolderMessagesAreExportedAndTheRestRefusesSayingWh
     }
     std::filesystem::remove_all(folder_.path("csv"));
     const std::string merged = ReadBytes(folder_.path("merged.csv"));
-    EXPECT_EQ(std::count(merged.begin(), merged.end(), '\n'), kTicks + 1);
+    EXPECT_EQ(std::count(merged.begin(), merged.end(), '\n'), kRunInfoTicks + 1);
     EXPECT_THAT(merged, HasSubstr("time,tick,PUSH.force[0]"));
     EXPECT_THAT(merged, HasSubstr("COMMAND.current[11]"));
   }

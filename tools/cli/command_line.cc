@@ -1,0 +1,120 @@
+#include "tools/cli/command_line.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "tools/cli/output_style.h"
+#include "tools/cli/text_table.h"
+
+namespace poise {
+namespace {
+
+constexpr int kDescription = 30;  // column of the descriptions, as CLI11 lays them out
+
+/// The command that the line names, as far as it could be read.
+const CLI::App& Named(const CLI::App& app) {
+  const std::vector<CLI::App*> parsed = app.get_subcommands();
+  return parsed.empty() ? app : Named(*parsed.back());
+}
+
+/// "poise log info".
+std::string FullName(const CLI::App& app) {
+  const CLI::App* const parent = app.get_parent();
+  return parent == nullptr ? app.get_name()
+                           : fmt::format("{} {}", FullName(*parent), app.get_name());
+}
+
+std::vector<const CLI::App*> Subcommands(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
+std::vector<std::string> Flags(const CLI::App& app) {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) flags.push_back(fmt::format("--{}", name));
+  }
+  return flags;
+}
+
+/// The commands below `app` that know `flag`.
+void FindFlag(const CLI::App& app, const std::string& flag, std::vector<std::string>* found) {
+  for (const CLI::App* command : Subcommands(app)) {
+    const std::vector<std::string> flags = Flags(*command);
+    if (std::find(flags.begin(), flags.end(), flag) != flags.end()) {
+      found->push_back(FullName(*command));
+    }
+    FindFlag(*command, flag, found);
+  }
+}
+
+std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
+                        const std::string& argument) {
+  const std::string flag = argument.substr(0, argument.find('='));
+  std::string text = fmt::format("has no flag {}", flag);
+  const std::vector<std::string> near = Nearest(flag, Flags(command));
+  std::vector<std::string> others;
+  FindFlag(root, flag, &others);
+  if (!near.empty()) {
+    text += fmt::format("; did you mean {}?", Joined(near, " or "));
+  } else if (!others.empty()) {
+    text += fmt::format("; it is one of {}", Joined(others, ", "));
+  }
+  return text;
+}
+
+std::string UnknownCommand(const CLI::App& command, const std::string& name) {
+  std::vector<std::string> names;
+  for (const CLI::App* each : Subcommands(command)) names.push_back(each->get_name());
+  return fmt::format("has no command '{}'; {}", name, Suggest(name, names));
+}
+
+}  // namespace
+
+std::string HelpText(const CLI::App& app) {
+  const int width = ScreenStyle().columns;
+  std::string text;
+  const std::string help = Named(app).help();
+  for (size_t begin = 0; begin < help.size();) {
+    const size_t end = std::min(help.find('\n', begin), help.size());
+    const std::string line = help.substr(begin, end - begin);
+    const bool described = line.starts_with("  ");
+    text += Wrapped(line, width, described ? std::min(kDescription, width / 2) : 0) + "\n";
+    begin = end + 1;
+  }
+  return text;
+}
+
+bool WantsSubcommand(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = Named(app);
+  return dynamic_cast<const CLI::RequiredError*>(&error) != nullptr &&
+         command.remaining().empty() && command.get_require_subcommand_min() > 0;
+}
+
+std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = Named(app);
+  const std::string name = FullName(command);
+  const std::vector<std::string> extra = command.remaining();
+  const std::string see = fmt::format("see {} --help", name);
+  if (extra.empty()) {
+    std::string what = error.what();
+    const size_t colon = what.find(':');
+    // CLI11 says "--out: 1 required TEXT missing".
+    if (colon != std::string::npos && dynamic_cast<const CLI::ArgumentMismatch*>(&error)) {
+      what = fmt::format("{} needs a value", what.substr(0, colon));
+    }
+    return fmt::format("{}: {}; {}", name, what, see);
+  }
+  std::string problem;
+  if (extra.front().starts_with("-") && extra.front().size() > 1) {
+    problem = UnknownFlag(app, command, extra.front());
+  } else if (!Subcommands(command).empty()) {
+    problem = UnknownCommand(command, extra.front());
+  } else {
+    problem = fmt::format("does not know what to do with '{}'", extra.front());
+  }
+  return fmt::format("{} {}{} {}", name, problem, problem.ends_with('?') ? " or" : ";", see);
+}
+
+}  // namespace poise

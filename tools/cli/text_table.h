@@ -1,0 +1,37 @@
+// Tables in plain text.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/cli/output_style.h"
+
+namespace poise {
+
+/// "12.35", "3": at most four digits, or all before the point.
+std::string FormatNumber(double value);
+std::string FormatNumber(double value, const std::string& unit);
+
+/// "a, b, c" of {"a", "b", "c"} and ", ".
+std::string Joined(const std::vector<std::string>& parts, std::string_view separator);
+
+struct TableCell {
+  TableCell(const char* t) : text(t) {}               // NOLINT: a text is a cell
+  TableCell(std::string t, Tone tone = Tone::kPlain)  // NOLINT
+      : text(std::move(t)), tone(tone) {}
+  std::string text;
+  Tone tone = Tone::kPlain;
+};
+using TableRow = std::vector<TableCell>;
+
+/// The rows in aligned columns, a line below the first one, the heading. All rows have as many
+/// cells as it; UTF-8. Where they do not fit `width`, long cells are wrapped between words, and
+/// what still does not fit comes in further blocks below, the first column again in each. What is
+/// no printable text is escaped.
+std::string FormatColumns(std::vector<TableRow> rows, int width = ScreenStyle().columns);
+
+/// `text` as a cell of a CSV file (RFC 4180): in quotes where it must be.
+std::string CsvCell(const std::string& text);
+
+}  // namespace poise

@@ -1,0 +1,52 @@
+#include <memory>
+
+#include "fmt/format.h"
+#include "logging/compare.h"
+#include "logging/log_messages.h"
+#include "logging/printable.h"
+#include "tools/commands/commands.h"
+#include "tools/run/run_dir.h"
+
+namespace poise {
+namespace {
+
+using logging::ForTerminal;
+
+int CompareRuns(const std::string& first, const std::string& second) {
+  const std::string first_log = FindLog(first).string();
+  const std::string second_log = FindLog(second).string();
+  WarnOfRunInfo(first_log);
+  WarnOfRunInfo(second_log);
+  const logging::LogComparison result = logging::CompareLogs(first_log, second_log);
+  fmt::print(
+      "{} ticks, {} messages compared; {} differ, {} only in the first, {} only in the "
+      "second\n",
+      result.ticks, result.messages, result.differing, result.only_first, result.only_second);
+  if (result.earliest) {
+    const logging::LogDifference& d = *result.earliest;
+    fmt::print("first: tick {}, {}{}{}: {} and {}\n", d.tick, ForTerminal(d.channel),
+               d.field.empty() ? "" : ".",
+               ForTerminal(logging::LogMessages(first_log).Label(d.channel, d.field)),
+               ForTerminal(d.first), ForTerminal(d.second));
+  }
+  // Nothing to compare is not equality.
+  return result.equal() && result.messages > 0 ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddCompareCommand(CLI::App* app, Command* command) {
+  struct Runs {
+    std::string first;
+    std::string second;
+  };
+  auto runs = std::make_shared<Runs>();
+  CLI::App* compare = app->add_subcommand(
+      "compare", "compare two runs' messages bit for bit (exit code 1 when they differ)");
+  compare->add_option("first", runs->first, "folder of a run or a log")->required();
+  compare->add_option("second", runs->second, "folder of a run or a log")->required();
+  compare->callback(
+      [runs, command] { *command = [runs] { return CompareRuns(runs->first, runs->second); }; });
+}
+
+}  // namespace poise

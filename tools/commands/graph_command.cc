@@ -1,0 +1,101 @@
+#include <filesystem>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "tools/commands/commands.h"
+#include "tools/scenario/catalog.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Files are told apart by what they hold, whatever folder they lie in.
+bool IsScenario(const std::string& file) {
+  Scenario scenario;
+  try {
+    ReadTextProto(file, &scenario);
+  } catch (const ConfigError&) {
+    Graph graph;
+    try {
+      ReadTextProto(file, &graph);
+      return false;
+    } catch (const ConfigError&) {
+      // Neither parses: the file's folder decides which error is shown.
+      return fs::path(file).parent_path().filename() != "graphs";
+    }
+  }
+  return true;
+}
+
+void ShowRun(const RunSpec& spec) {
+  BoundGraph bound(spec, Components());
+  const GraphPlan& plan = bound.plan();
+  const auto name_of = [&](const GraphPlan::Endpoint& end) {
+    return spec.graph().component(end.component).name();
+  };
+  for (const GraphPlan::ChannelPlan& channel : plan.channels) {
+    std::string readers;
+    for (const GraphPlan::Endpoint& reader : channel.readers) {
+      readers += (readers.empty() ? "" : ", ") + name_of(reader);
+    }
+    fmt::print("  {:<16} {:<18} {:>5} bytes  {} -> {}\n", channel.name, channel.type,
+               channel.encoded_size, channel.external ? "(operator)" : name_of(channel.writer),
+               readers.empty() ? "(log)" : readers);
+  }
+  fmt::print("one tick:");
+  for (const GraphPlan::StageRef& ref : plan.order) {
+    const ConfiguredComponent& component = bound.component(ref.component);
+    fmt::print(" {}.{}", component.name,
+               component.wiring.stages()[static_cast<size_t>(ref.stage)].name);
+  }
+  fmt::print("\n");
+}
+
+int CheckByName(const std::string& name) {
+  const std::string file =
+      FindFileOfKinds({"scenarios", "graphs"}, name, fs::current_path()).string();
+  if (!IsScenario(file)) {
+    CheckGraphFile(file);
+    fmt::print(
+        "{}: names, types and connections are good; check a scenario to have the "
+        "configurations checked too\n",
+        file);
+    return kExitOk;
+  }
+  const LoadedScenario loaded = LoadScenario(file, {});
+  RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
+  CheckRun(loaded, &spec);
+  std::string variants;
+  for (const Variant& variant : loaded.scenario.variant()) {
+    RunChanges changes;
+    changes.variant = variant.name();
+    const LoadedScenario changed = LoadScenario(file, changes);
+    RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
+    CheckRun(changed, &changed_spec);
+    variants += ", " + variant.name();
+  }
+  fmt::print("{} with {}: {} components, {} channels, all good{}\n", loaded.files.file(),
+             loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(),
+             variants.empty() ? "" : "; variants too: " + variants.substr(2));
+  ShowRun(spec);
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddGraphCommand(CLI::App* app, Command* command) {
+  auto name = std::make_shared<std::string>("push_double_support");
+  CLI::App* graph = app->add_subcommand("graph", "look at process graphs");
+  graph->require_subcommand(1);
+  CLI::App* check = graph->add_subcommand(
+      "check", "check a graph, or a scenario with its graph, robot and configurations");
+  check->add_option("name", *name, "graph or scenario: a name or a .pbtxt file")
+      ->capture_default_str();
+  check->callback([name, command] { *command = [name] { return CheckByName(*name); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,138 @@
+// `poise limit`: the largest survivable value of a field, for each point of a grid.
+#include <deque>
+#include <memory>
+
+#include "fmt/format.h"
+#include "tools/commands/commands.h"
+#include "tools/maps/sweep_output.h"
+#include "tools/sweep/limit_search.h"
+#include "tools/sweep/sweep_session.h"
+
+namespace poise {
+namespace {
+
+/// The search at one point, and what of it is going on.
+struct PointSearch {
+  int64_t run;
+  LimitSearch search;
+  std::vector<double> asked;  // not answered yet
+
+  /// The next value that is wanted and not asked for.
+  std::optional<double> Next() {
+    for (const double value : search.Wanted()) {
+      if (std::find(asked.begin(), asked.end(), value) != asked.end()) continue;
+      asked.push_back(value);
+      return value;
+    }
+    return {};
+  }
+};
+
+int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
+  const SweepDefinition definition(arguments, /*limit=*/true);
+  const Limit& limit = definition.sweep().limit();
+  const auto [first, end] = SelectedRuns(options, definition.points().size());
+  SweepSession session(definition, kKindLimit, options);
+  std::vector<PointSearch> searches;
+  for (int64_t run = first; run < end; ++run) searches.push_back({run, LimitSearch(limit), {}});
+  const auto add = [&, first = first, end = end](const SweepRow& row) {
+    if (row.run < first || row.run >= end) return;
+    searches[static_cast<size_t>(row.run - first)].search.Add(*row.limit, row.stands());
+  };
+  for (const auto& [key, row] : session.rows()) add(row);
+  fmt::print("{}: the largest {} of {} to {} at {} points{}, {} runs at a time; {}\n",
+             definition.name(), NameOf(limit), limit.min(), limit.max(), end - first,
+             session.found() > 0 ? fmt::format(", {} runs done before", session.found()) : "",
+             options.jobs, session.folder().string());
+  size_t open = 0;  // first search that is not finished
+  const bool complete = session.Run(
+      [&]() -> std::optional<SweepSession::Request> {
+        while (open < searches.size() && searches[open].search.Wanted().empty()) ++open;
+        for (size_t i = open; i < searches.size(); ++i) {
+          if (const std::optional<double> value = searches[i].Next()) {
+            return SweepSession::Request{searches[i].run, value};
+          }
+        }
+        return {};
+      },
+      add,
+      [&, per_point = LimitSearch::ExpectedRuns(limit)] {
+        SweepSession::Progress progress{0, 0, ""};
+        size_t finished = 0;
+        for (const PointSearch& point : searches) {
+          const bool is_finished = point.search.Wanted().empty();
+          finished += is_finished ? 1 : 0;
+          progress.done += point.search.tried();
+          progress.total +=
+              is_finished ? point.search.tried() : std::max(per_point, point.search.tried() + 1);
+        }
+        progress.text = fmt::format("{} of {} points known, {} runs done", finished,
+                                    searches.size(), static_cast<int64_t>(progress.done));
+        return progress;
+      });
+  if (!complete) {
+    fmt::print(stderr, "poise: interrupted after {} runs; --resume --out {} goes on\n",
+               session.rows().size(), session.folder().string());
+    return kExitFailed;
+  }
+  WriteOutput(session.folder(), session.header(), session.rows());
+  PrintOutput(session.folder(), session.header(), session.rows());
+  return AllRan(session.rows()) ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddLimitCommand(CLI::App* app, Command* command) {
+  auto arguments = std::make_shared<SweepArguments>();
+  auto session = std::make_shared<SessionOptions>();
+  auto given = std::make_shared<Limit>();
+  CLI::App* limit = app->add_subcommand(
+      "limit", "find the largest survivable value of a field, for each point of a grid");
+  AddSweepOptions(limit, arguments.get(), session.get());
+  const auto number = [&](const char* flag, void (Limit::*set)(double), const char* text) {
+    limit->add_option_function<double>(
+        flag, [given, set](double v) { ((*given).*set)(v); }, text);
+  };
+  const auto word = [&](const char* flag, const char* text, auto set) {
+    limit->add_option_function<std::string>(
+        flag, [given, set](const std::string& v) { set(given.get(), v); }, text);
+  };
+  word("--field", "the scenario's field whose limit is sought; replaces the file's",
+       [](Limit* l, const std::string& v) { l->set_field(v); });
+  word("--name", "its name, for --expression",
+       [](Limit* l, const std::string& v) { l->set_name(v); });
+  word("--unit", "its unit, for tables", [](Limit* l, const std::string& v) { l->set_unit(v); });
+  number("--min", &Limit::set_min, "smallest value tried");
+  number("--max", &Limit::set_max, "largest value tried");
+  number("--tolerance", &Limit::set_tolerance,
+         "at which a boundary is known well enough; default: 1/200 of max - min");
+  limit->add_option_function<int>(
+      "--samples", [given](int v) { given->set_samples(v); },
+      "values from min to max that are tried before bisection; default: 9");
+  limit->footer(
+      "Survival need not be monotone: first --samples values are tried, then the lowest boundary "
+      "at which survival ends is bisected,\nand the highest one if something above it survived. "
+      "limits.csv has for each point: the limit (the largest value below\nwhich all that was tried "
+      "survived), fails_at, largest_survived, monotone; for a scenario with one push, also\n"
+      "  impulse                  N·s, horizontal: 2/pi F T of a half sine, F T of a rectangle\n"
+      "  distance_to_edge         d in m, from the capture point (COM + velocity/w, on the ground) "
+      "to the edge of the convex\n"
+      "                           hull of the bearing soles, along the push, at its start\n"
+      "  lip_impulse              m w d, w = sqrt(g/h): what a linear inverted pendulum (COM at "
+      "height h, no rotation, CoP at\n"
+      "                           the edge at once) stands of an instantaneous push\n"
+      "  lip_impulse_of_duration  the same for the push's shape and duration T, integral of "
+      "f(t) e^(-wt) dt <= m w d; of a half\n"
+      "                           sine F T 2/pi with F = m w d (w^2 + (pi/T)^2) T / (pi (1 + "
+      "e^(-wT)))\n"
+      "  share_of_...             impulse over each\n"
+      "poise sweep merge joins the folders of --range or --part. Exit code: as poise sweep.");
+  limit->callback([arguments, session, given, command] {
+    *command = [arguments, session, given] {
+      arguments->limit = *given;
+      return RunLimit(*arguments, *session);
+    };
+  });
+}
+
+}  // namespace poise

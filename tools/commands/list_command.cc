@@ -1,0 +1,239 @@
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "components/robot/robot.pb.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+#include "logging/printable.h"
+#include "tools/cli/output_style.h"
+#include "tools/cli/plain_streams.h"
+#include "tools/commands/commands.h"
+#include "tools/reference/reference_text.h"
+#include "tools/run/run_registry.h"
+#include "tools/scenario/catalog.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/scenario_files.h"
+#include "tools/sweep/sweep.pb.h"
+
+namespace poise {
+namespace {
+
+template <class Message>
+Message ReadMessage(const std::string& file) {
+  Message message;
+  ReadTextProto(file, &message);
+  return message;
+}
+
+/// One line a file: its name and what `describe` says of it; a ConfigError is shown instead.
+void ListFiles(const std::string& kind,
+               const std::function<std::string(const std::string& file)>& describe) {
+  const std::vector<std::string> names = ListNames(kind);
+  size_t width = 0;
+  for (const std::string& name : names) width = std::max(width, name.size());
+  for (const std::string& name : names) {
+    std::string text;
+    try {
+      text = describe(InstalledFile(kind, name).string());
+    } catch (const ConfigError& error) {
+      text = error.what();
+    }
+    fmt::print("{}\n",
+               Wrapped(fmt::format("  {:<{}}  {}", name, width, text), ScreenStyle().columns, 6));
+  }
+}
+
+/// What the command line asks of the list.
+struct ListRequest {
+  std::string what;
+  std::string name;
+  std::string schema = "scenario";
+  bool markdown = false;
+  bool folders = false;
+};
+
+size_t TextWidth() { return static_cast<size_t>(std::min(ScreenStyle().columns, 100)); }
+
+ChannelsByType GraphChannels() {
+  ChannelsByType channels;
+  for (const std::string& name : ListNames("graphs")) {
+    const auto graph = ReadMessage<Graph>(InstalledFile("graphs", name).string());
+    for (const Channel& channel : graph.channel()) {
+      std::vector<std::string>& names = channels[channel.type()];
+      if (std::find(names.begin(), names.end(), channel.name()) == names.end()) {
+        names.push_back(channel.name());
+      }
+    }
+  }
+  return channels;
+}
+
+int ListFields(const ListRequest& request) {
+  static const std::map<std::string, Schema> kSchemas = {{"scenario", Schema::kScenario},
+                                                         {"robot", Schema::kRobot},
+                                                         {"sweep", Schema::kSweep},
+                                                         {"graph", Schema::kGraph}};
+  const auto fields = SelectFields(FieldReference(kSchemas.at(request.schema)), request.name);
+  fmt::print("{}", request.markdown ? FieldsAsMarkdown(fields) : FieldsAsText(fields, TextWidth()));
+  return kExitOk;
+}
+
+int ListMessages(const ListRequest& request) {
+  const std::vector<MessageEntry> messages = MessageReference();
+  const ChannelsByType channels = GraphChannels();
+  if (request.name.empty()) {
+    fmt::print("{}", request.markdown ? MessagesAsMarkdown(messages, channels)
+                                      : MessagesAsText(messages, channels, TextWidth()));
+    return kExitOk;
+  }
+  std::string type = request.name;
+  for (const auto& [carried, names] : channels) {
+    if (std::find(names.begin(), names.end(), request.name) != names.end()) type = carried;
+  }
+  const MessageEntry& message = FindMessage(messages, type);
+  fmt::print("{}", request.markdown ? MessagesAsMarkdown({message}, channels)
+                                    : MessageAsText(messages, message, channels, TextWidth()));
+  return kExitOk;
+}
+
+int ListMetricsAsMarkdown() {
+  fmt::print("| metric | unit | meaning |\n|---|---|---|\n");
+  for (const logging::Metric& metric : logging::Metrics()) {
+    fmt::print("| `{}` | {} | {} |\n", metric.name, metric.unit, metric.description);
+  }
+  return kExitOk;
+}
+
+/// Folders alone, of runs that can be listened to: for scripts.
+void ListRunFolders() {
+  for (const RunningRun& run : RunningRuns()) {
+    if (run.own && run.networked) fmt::print("{}\n", run.dir.string());
+  }
+}
+
+void ListRuns() {
+  const std::vector<RunningRun> runs = RunningRuns();
+  fmt::print("{}", runs.empty() ? "  none is going on\n" : FormatRuns(runs));
+  const std::string ended = LatestEndedRun().string();
+  if (!ended.empty()) fmt::print("  the latest that ended: {}\n", logging::ForTerminal(ended));
+}
+
+/// Name, unit and meaning in columns; where these leave little room, the meaning below.
+void PrintMetrics() {
+  constexpr int kLeastRoom = 26;
+  int name = 0;
+  int unit = 0;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    name = std::max(name, DisplayWidth(metric.name));
+    unit = std::max(unit, DisplayWidth(metric.unit));
+  }
+  const int indent = 2 + name + 2 + unit + 2;
+  const int columns = ScreenStyle().columns;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    const std::string line =
+        columns - indent >= kLeastRoom
+            ? Wrapped(fmt::format("  {:<{}}  {:<{}}  {}", metric.name, name, metric.unit, unit,
+                                  metric.description),
+                      columns, indent)
+            : fmt::format("  {}  {}\n{}", metric.name, metric.unit,
+                          Wrapped(fmt::format("      {}", metric.description), columns, 6));
+    fmt::print("{}\n", line);
+  }
+}
+
+int List(const ListRequest& request) {
+  const std::string& what = request.what;
+  if (request.folders) {
+    if (what != "runs") throw ConfigError("--folders goes with `poise list runs`");
+    ListRunFolders();
+    return kExitOk;
+  }
+  if (request.markdown) KeepUnicode();
+  if (what == "fields") return ListFields(request);
+  if (what == "messages") return ListMessages(request);
+  if (!request.name.empty()) {
+    throw ConfigError("NAME goes with `poise list fields` and `poise list messages`");
+  }
+  if (request.markdown) {
+    if (what == "metrics") return ListMetricsAsMarkdown();
+    throw ConfigError("--markdown goes with fields, messages and metrics");
+  }
+  const auto wanted = [&](const char* kind) {
+    const bool all = what.empty();
+    if (all) fmt::print("{}\n", kind);
+    return all || what == kind;
+  };
+  if (wanted("scenarios")) {
+    ListFiles("scenarios", [](const std::string& file) {
+      const Scenario s = ScenarioFiles(file).Merged();
+      std::string text =
+          fmt::format("{} ({} s{})", s.description(), s.duration(),
+                      s.has_paper_section() ? ", paper section " + s.paper_section() : "");
+      for (const Variant& variant : s.variant()) {
+        text += fmt::format("\n      --variant {}: {}{}", variant.name(), variant.description(),
+                            variant.name() == s.reference() ? " (the reference)" : "");
+      }
+      return text;
+    });
+  }
+  if (wanted("sweeps")) {
+    ListFiles("sweeps", [](const std::string& file) {
+      const auto sweep = ReadMessage<Sweep>(file);
+      return fmt::format("{} (poise {}, scenario {})", sweep.description(),
+                         sweep.has_limit() ? "limit" : "sweep", sweep.scenario());
+    });
+  }
+  if (wanted("robots")) {
+    ListFiles("robots",
+              [](const std::string& file) { return "URDF " + ReadMessage<Robot>(file).urdf(); });
+  }
+  if (wanted("graphs")) {
+    ListFiles("graphs", [](const std::string& file) {
+      const Graph g = ReadMessage<Graph>(file);
+      return fmt::format("{} ({} components, {} channels)", g.description(), g.component_size(),
+                         g.channel_size());
+    });
+  }
+  if (wanted("components")) {
+    for (const auto& [type, entry] : Components().entries()) {
+      fmt::print("  {:<24}{}\n", type, entry.summary);
+    }
+  }
+  if (wanted("runs")) ListRuns();
+  if (wanted("metrics")) {
+    PrintMetrics();
+  }
+  if (what.empty()) {
+    fmt::print(
+        "\npoise list fields: every field of a scenario with type, default, unit and meaning\n"
+        "poise list messages: every message of the bus\n");
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddListCommand(CLI::App* app, Command* command) {
+  auto request = std::make_shared<ListRequest>();
+  CLI::App* list = app->add_subcommand("list", "what there is to use, and what each field means");
+  list->add_option(
+          "what", request->what,
+          "scenarios, sweeps, robots, graphs, components, runs (that go on), metrics, fields or "
+          "messages; default: all but the last two")
+      ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "runs",
+                             "metrics", "fields", "messages"}));
+  list->add_option("name", request->name,
+                   "of fields: a path or its beginning (sim_ode.push), or a part of a field's "
+                   "name (stiffness); of messages: a type or a channel (ROBOT_STATE)");
+  list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
+      ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));
+  list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");
+  list->add_flag("--folders", request->folders,
+                 "of runs: only the folders of those that can be listened to, for scripts");
+  list->callback([request, command] { *command = [request] { return List(*request); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,298 @@
+#include <cmath>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "logging/log_cut.h"
+#include "logging/log_export.h"
+#include "logging/log_survey.h"
+#include "logging/printable.h"
+#include "logging/run_info.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/output_place.h"
+#include "tools/commands/commands.h"
+#include "tools/run/run_dir.h"
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using logging::ForTerminal;
+
+constexpr size_t kPlaces = 20;  // named of each kind of problem, without --all
+
+void PrintRow(const logging::ChannelSurvey& channel, double duration) {
+  const logging::ChannelCompleteness& ticks = channel.ticks;
+  const std::string rate =
+      duration > 0 && ticks.messages > 1
+          ? fmt::format("{:.1f}", static_cast<double>(ticks.messages) / duration)
+          : "";
+  fmt::print("{:<30} {:<18} {:>9} {:>9} {:>10}\n", ForTerminal(ticks.name),
+             channel.type.empty() ? "(not known)" : channel.type, ticks.messages, rate,
+             FormatBytes(channel.bytes));
+}
+
+/// "field: value" lines of the run.
+void PrintRun(const logging::LogSurvey& survey) {
+  const RunSpec& spec = survey.spec;
+  std::string versions = "poise " + spec.poise_version();
+  if (!spec.poise_commit().empty()) versions += " (commit " + spec.poise_commit() + ")";
+  for (const std::string& version : spec.library_version()) versions += ", " + version;
+  if (!spec.instruction_set().empty()) versions += "; built for " + spec.instruction_set();
+  const int64_t ticks = survey.end_tick - survey.first_tick;
+  fmt::print("scenario  {}\nrun       {}\nseed      {}\nstarted   {}\nversions  {}\n",
+             ForTerminal(spec.scenario()), spec.run_id(), spec.seed(),
+             ForTerminal(survey.info.started_at), ForTerminal(versions));
+  fmt::print("duration  {:.3f} s in the log, {} ticks of {:g} s from tick {}; {} planned\n",
+             static_cast<double>(ticks) * spec.tick_period(), ticks, spec.tick_period(),
+             survey.first_tick, spec.num_ticks());
+  try {
+    Scenario scenario;
+    ParseTextProto(survey.info.scenario, "RUN_INFO.scenario", &scenario);
+    const std::string changes = FormatChanges(scenario);
+    if (!changes.empty()) fmt::print("changed   {}\n", logging::LinesForTerminal(changes));
+  } catch (const ConfigError& error) {
+    fmt::print("changed   not known: {}\n", ForTerminal(error.what()));
+  }
+  if (spec.drop_rate() > 0)
+    fmt::print("dropped   {} of the messages, on purpose\n", spec.drop_rate());
+  if (spec.realtime()) fmt::print("paced     with the wall clock\n");
+  if (spec.lead_ticks() > 0) {
+    fmt::print("lead      the scenario's time 0 is tick {}\n", spec.lead_ticks());
+  }
+  if (spec.has_cut()) {
+    fmt::print("cut       from a longer log: ticks {} to {}{}\n", spec.cut().first_tick(),
+               spec.cut().last_tick(), spec.cut().channel().empty() ? "" : ", not all channels");
+  }
+}
+
+int Info(const std::string& run) {
+  const std::string log = FindLog(run).string();
+  const logging::LogSurvey survey = logging::SurveyLog(log);
+  if (survey.events == 0) {
+    throw ConfigError(fmt::format("{}: is no event log: it holds no event", log));
+  }
+  fmt::print("log       {}, {}, {} events\n", log,
+             FormatBytes(static_cast<int64_t>(survey.file_size)), survey.events);
+  if (survey.info_problem.empty()) {
+    PrintRun(survey);
+  } else {
+    fmt::print("run       not known: {}\n", ForTerminal(survey.info_problem));
+  }
+  fmt::print("\n{:<30} {:<18} {:>9} {:>9} {:>10}\n", "channel", "type", "messages", "per s",
+             "data");
+  const double duration = survey.duration(survey.end_tick - survey.first_tick);
+  for (const logging::ChannelSurvey& channel : survey.channels) PrintRow(channel, duration);
+  for (const logging::ChannelSurvey& channel : survey.others) PrintRow(channel, duration);
+  const size_t problems = survey.Problems(1).size();
+  if (problems > 0) fmt::print("\nnot whole: see poise log check\n");
+  return kExitOk;
+}
+
+int Check(const std::string& run, bool all) {
+  const std::string log = FindLog(run).string();
+  const logging::LogSurvey survey = logging::SurveyLog(log);
+  const std::vector<std::string> problems = survey.Problems(all ? 0 : kPlaces);
+  for (const std::string& problem : problems) fmt::print("{}\n", problem);
+  int64_t messages = 0;
+  for (const logging::ChannelSurvey& channel : survey.channels) messages += channel.ticks.messages;
+  fmt::print("{}: {} events; {} messages of {} channels, ticks {} to {}: {}\n", log, survey.events,
+             messages, survey.channels.size(), survey.first_tick, survey.end_tick - 1,
+             problems.empty() ? "whole" : "NOT WHOLE");
+  return problems.empty() ? kExitOk : kExitFailed;
+}
+
+struct CutOptions {
+  std::string run;
+  std::string out;
+  bool force = false;
+  std::optional<double> from;
+  std::optional<double> to;
+  std::optional<int64_t> first_tick;
+  std::optional<int64_t> last_tick;
+  std::vector<std::string> channels;
+};
+
+int Cut(const CutOptions& options) {
+  if (options.from && options.to && *options.from > *options.to) {
+    throw ConfigError(
+        fmt::format("log cut: --from {} is after --to {}", *options.from, *options.to));
+  }
+  if (options.first_tick && options.last_tick && *options.first_tick > *options.last_tick) {
+    throw ConfigError(fmt::format("log cut: --first-tick {} is after --last-tick {}",
+                                  *options.first_tick, *options.last_tick));
+  }
+  const std::string log = FindLog(options.run).string();
+  WarnOfRunInfo(log);
+  logging::CutRange range;
+  if (options.from || options.to) {
+    logging::LogReader reader(log);
+    range = logging::TicksOfTimes(options.from.value_or(-1e9), options.to.value_or(1e9),
+                                  logging::FindRunInfo(&reader, log).spec);
+  }
+  if (options.first_tick) range.first_tick = *options.first_tick;
+  if (options.last_tick) range.last_tick = *options.last_tick;
+  range.channels = options.channels;
+  CheckFileFree("--out", options.out, options.force);
+  if (std::error_code error; options.force && fs::is_regular_file(options.out, error)) {
+    if (fs::equivalent(options.out, log, error)) {
+      throw ConfigError(fmt::format("{}: is the log itself; choose another file", options.out));
+    }
+    fs::remove(options.out);
+  }
+  const logging::CutResult result = logging::CutLog(log, range, options.out);
+  if (result.refused > 0) {
+    fmt::print(stderr,
+               "poise: {}: {} events could not be read and are left out; see poise log "
+               "check\n",
+               log, result.refused);
+  }
+  fmt::print("{}: ticks {} to {}, {} events\n", options.out, result.first_tick, result.last_tick,
+             result.events);
+  return result.refused > 0 ? kExitFailed : kExitOk;
+}
+
+struct ExportOptions {
+  std::string run;
+  bool force = false;
+  std::string csv;
+  std::string merged;
+  std::string mcap;
+};
+
+/// Says what was written; true when nothing was left out.
+bool PrintExport(const std::string& to, const std::vector<logging::ExportedChannel>& channels) {
+  int64_t messages = 0;
+  int64_t refused = 0;
+  for (const logging::ExportedChannel& channel : channels) {
+    messages += channel.messages;
+    refused += channel.refused;
+    if (channel.refused == 0) continue;
+    fmt::print(stderr, "poise: {}: {} messages could not be read and are left out\n",
+               ForTerminal(channel.channel), channel.refused);
+  }
+  fmt::print("{}: {} messages of {} channels\n", to, messages, channels.size());
+  return refused == 0;
+}
+
+/// Throws ConfigError where one of the files would take another's place.
+void CheckExportFiles(const ExportOptions& options, const std::string& log) {
+  std::error_code error;
+  for (const std::string& file : {options.merged, options.mcap}) {
+    if (fs::equivalent(file, log, error)) {
+      throw ConfigError(fmt::format("{}: is the log itself; choose another file", file));
+    }
+  }
+  const auto whole = [](const std::string& file) {
+    return fs::weakly_canonical(fs::absolute(file));
+  };
+  if (options.merged.empty()) return;
+  if (!options.mcap.empty() && whole(options.merged) == whole(options.mcap)) {
+    throw ConfigError(
+        fmt::format("log export: --merged and --mcap name the same file {}", options.mcap));
+  }
+  if (!options.csv.empty() && whole(options.merged).parent_path() == whole(options.csv + "/.")) {
+    throw ConfigError(fmt::format(
+        "log export: --merged {} lies in the folder of --csv, where each file is a channel",
+        options.merged));
+  }
+}
+
+int Export(const ExportOptions& options) {
+  if (options.csv.empty() && options.merged.empty() && options.mcap.empty()) {
+    throw ConfigError("log export: nothing to write; give --csv, --merged or --mcap");
+  }
+  const std::string log = FindLog(options.run).string();
+  CheckExportFiles(options, log);
+  if (!options.csv.empty()) CheckFolderFree("--csv", options.csv, options.force);
+  if (!options.merged.empty()) CheckFileFree("--merged", options.merged, options.force);
+  if (!options.mcap.empty()) CheckFileFree("--mcap", options.mcap, options.force);
+  WarnOfRunInfo(log);
+  bool whole = true;
+  if (!options.csv.empty()) {
+    whole = PrintExport(options.csv, logging::ExportCsv(log, options.csv)) && whole;
+  }
+  if (!options.merged.empty()) {
+    whole = PrintExport(options.merged, logging::ExportMergedCsv(log, options.merged)) && whole;
+  }
+  if (!options.mcap.empty()) {
+    whole = PrintExport(options.mcap, logging::ExportMcap(log, options.mcap)) && whole;
+  }
+  return whole ? kExitOk : kExitFailed;
+}
+
+CLI::Option* AddRun(CLI::App* app, std::string* run) {
+  return app->add_option("run", *run, "folder of a run or a log; default: the latest run");
+}
+
+void AddInfo(CLI::App* log, Command* command) {
+  auto run = std::make_shared<std::string>();
+  CLI::App* info = log->add_subcommand("info", "what run it is of, and its channels");
+  AddRun(info, run.get());
+  info->callback([run, command] { *command = [run] { return Info(*run); }; });
+}
+
+void AddCheck(CLI::App* log, Command* command) {
+  struct Options {
+    std::string run;
+    bool all = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* check = log->add_subcommand(
+      "check",
+      "whether it is whole: damage by byte, missing, double, disordered and refused messages by "
+      "channel and tick (exit code 1 when anything is wrong)");
+  AddRun(check, &options->run);
+  check->add_flag("--all", options->all,
+                  fmt::format("name every place, not only the first {} of a kind", kPlaces));
+  check->callback(
+      [options, command] { *command = [options] { return Check(options->run, options->all); }; });
+}
+
+void AddCut(CLI::App* log, Command* command) {
+  auto options = std::make_shared<CutOptions>();
+  CLI::App* cut = log->add_subcommand(
+      "cut", "copy a part into a new log, which keeps RUN_INFO and is a run's log like the whole");
+  AddRun(cut, &options->run);
+  const auto time = Within("a time of -1e9 to 1e9 s", [](double s) { return std::abs(s) <= 1e9; });
+  cut->add_option("--out", options->out, "log to write")->required();
+  cut->add_flag("--force", options->force, "replace a file of that name");
+  CLI::Option* from =
+      cut->add_option("--from", options->from, "first time, s of the scenario")->check(time);
+  CLI::Option* to = cut->add_option("--to", options->to, "last time, s")->check(time);
+  const CLI::Range ticks(int64_t{0}, INT64_MAX - 1);
+  cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);
+  cut->add_option("--last-tick", options->last_tick, "last tick")->check(ticks)->excludes(to);
+  cut->add_option("--channel", options->channels,
+                  "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM_ODE; default: "
+                  "all")
+      ->allow_extra_args(false)
+      ->take_all();
+  cut->callback([options, command] { *command = [options] { return Cut(*options); }; });
+}
+
+void AddExport(CLI::App* log, Command* command) {
+  auto options = std::make_shared<ExportOptions>();
+  CLI::App* app = log->add_subcommand(
+      "export", "write it as CSV (PlotJuggler, spreadsheets) or MCAP (Foxglove, PlotJuggler)");
+  AddRun(app, &options->run);
+  app->add_option("--csv", options->csv, "folder for one CSV file a channel, a row a message");
+  app->add_option("--merged", options->merged, "one wide CSV file, a row a tick");
+  app->add_option("--mcap", options->mcap, "MCAP file, the messages as Protobuf");
+  app->add_flag("--force", options->force, "replace files of these names");
+  app->callback([options, command] { *command = [options] { return Export(*options); }; });
+}
+
+}  // namespace
+
+void AddLogCommand(CLI::App* app, Command* command) {
+  CLI::App* log = app->add_subcommand("log", "inspect, check, cut and export a run's log");
+  log->require_subcommand(1);
+  AddInfo(log, command);
+  AddCheck(log, command);
+  AddCut(log, command);
+  AddExport(log, command);
+}
+
+}  // namespace poise

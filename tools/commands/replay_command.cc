@@ -1,0 +1,184 @@
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <regex>
+
+#include "components/framework/configuration.h"
+#include "components/framework/run.h"
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "logging/component_replay.h"
+#include "logging/log_messages.h"
+#include "logging/log_player.h"
+#include "logging/printable.h"
+#include "tools/cli/signals.h"
+#include "tools/commands/commands.h"
+#include "tools/run/run_dir.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+using logging::ForTerminal;
+
+// liblcm's default, where its tools listen without options.
+constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0";
+
+struct ReplayOptions {
+  std::string run;
+  std::vector<std::string> components;
+  std::vector<std::string> set;
+  bool to_bus = false;
+  double speed = 1;
+  std::string url;
+};
+
+/// Indexes in the graph of the components asked for; all when none is.
+std::vector<int> Wanted(const RunSpec& spec, const std::vector<std::string>& names) {
+  std::vector<std::string> known;
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    known.push_back(instance.name());
+  }
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw ConfigError(fmt::format("--component {}: the log's graph has none of that name; {}",
+                                    name, Suggest(name, known)));
+    }
+  }
+  std::vector<int> wanted;
+  for (size_t i = 0; i < known.size(); ++i) {
+    if (names.empty() || std::find(names.begin(), names.end(), known[i]) != names.end()) {
+      wanted.push_back(static_cast<int>(i));
+    }
+  }
+  return wanted;
+}
+
+void Print(const logging::ReplayedComponent& component, const logging::LogMessages& messages) {
+  const double simulated = static_cast<double>(component.ticks) * messages.spec().tick_period();
+  fmt::print("{}: {} ticks in {:.3f} s, {:.0f} x real time: {}\n", ForTerminal(component.name),
+             component.ticks, component.wall_time, simulated / std::max(component.wall_time, 1e-9),
+             component.equal() ? "equal" : "DIFFERENT");
+  if (component.unplaced_messages > 0) {
+    fmt::print(
+        "  {} of {} external messages: the log does not tell the tick that they were read in, "
+        "only between which they came; differences after them may come of that\n",
+        component.unplaced_messages, component.external_messages);
+  }
+  for (const logging::ReplayedChannel& output : component.outputs) {
+    if (output.differing == 0) {
+      fmt::print("  {}: {} messages, the same bits\n", ForTerminal(output.channel), output.ticks);
+      continue;
+    }
+    fmt::print("  {}: {} of {} messages differ, first {} at tick {}\n", ForTerminal(output.channel),
+               output.differing, output.ticks,
+               ForTerminal(messages.Label(output.channel, output.first_field)),
+               output.first_differing_tick);
+    for (const logging::FieldDifference& field : output.fields) {
+      fmt::print(
+          "    {}: {} ticks, from {} on; largest {:.3g}: {} at tick {}, logged {}, "
+          "replayed {}\n",
+          field.field, field.ticks, field.first_tick, field.largest,
+          ForTerminal(messages.Label(output.channel, field.largest_path)), field.largest_tick,
+          ForTerminal(field.logged), ForTerminal(field.replayed));
+    }
+  }
+}
+
+int CompareReplay(const ReplayOptions& options, const std::string& log) {
+  const logging::LogReplay replay(log);
+  RunSpec spec = replay.spec();
+  for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
+  const logging::LogMessages messages(log);
+  bool equal = true;
+  for (const int index : Wanted(spec, options.components)) {
+    if (SpeaksEthercat(spec, index)) {
+      fmt::print("{}: left out: the log does not hold its EtherCAT frames\n",
+                 spec.graph().component(index).name());
+      continue;
+    }
+    const logging::ReplayedComponent component = replay.Replay(spec, index, Components());
+    Print(component, messages);
+    equal = equal && component.equal();
+  }
+  return equal ? kExitOk : kExitFailed;
+}
+
+int Play(const ReplayOptions& options, const std::string& log) {
+  std::string url = options.url;
+  if (url.empty()) {
+    const RunSpec spec = logging::LogMessages(log).spec();
+    url = spec.has_first_port() ? MirrorUrl(spec) : kDefaultUrl;  // the run had no network
+  }
+  fmt::print("playing {} at {}, {} x real time\n", log, url, options.speed);
+  std::fflush(stdout);
+  CatchStopSignals();
+  const logging::PlayResult result =
+      logging::PlayLog(log, url, options.speed, [] { return StopSignal() != 0; });
+  fmt::print("{} messages, {:.3f} s of the run{}\n", result.messages, result.time,
+             StopSignal() != 0 ? "; interrupted" : "");
+  if (result.failed > 0) {
+    fmt::print(stderr, "poise: {} messages could not be sent; see poise doctor\n", result.failed);
+  }
+  return result.failed > 0 || StopSignal() != 0 ? kExitFailed : kExitOk;
+}
+
+}  // namespace
+
+void AddReplayCommand(CLI::App* app, Command* command) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App* replay = app->add_subcommand(
+      "replay",
+      "feed a log's messages to the components again and compare what they give with what was "
+      "logged, bit for bit (exit code 1 when it differs)");
+  replay->footer(
+      "Configurations, robot and seed are those of the log. The components are those of this "
+      "program, so that a changed build shows where it differs.");
+  replay->add_option("run", options->run, "folder of a run or a log; default: the latest run");
+  CLI::Option* component =
+      replay
+          ->add_option("--component", options->components,
+                       "component to replay, more than once for several; default: all")
+          ->allow_extra_args(false)
+          ->take_all();
+  CLI::Option* set =
+      replay
+          ->add_option("--set", options->set,
+                       "change a field of a configuration, e.g. --set task_controller.com.kp=200")
+          ->type_name("FIELD=VALUE")
+          ->allow_extra_args(false)
+          ->take_all();
+  CLI::Option* to_bus = replay->add_flag(
+      "--to-bus", options->to_bus,
+      "send the messages to the run's public URL instead, for lcm-spy and the like");
+  to_bus->excludes(component)->excludes(set);
+  replay->add_option("--speed", options->speed, "of --to-bus: times real time")
+      ->check(CLI::Range(1e-3, 1e6))
+      ->needs(to_bus)
+      ->capture_default_str();
+  replay
+      ->add_option("--url", options->url,
+                   fmt::format("of --to-bus: LCM URL instead of the run's public one; default of a "
+                               "run inside one process: LCM's own, {}",
+                               kDefaultUrl))
+      ->needs(to_bus)
+      ->check(CLI::Validator(
+          [](const std::string& url) {
+            static const std::regex form(R"(udpm://\d+\.\d+\.\d+\.\d+:\d+(\?ttl=\d+)?)");
+            return std::regex_match(url, form) ? "" : url + ": must be udpm://GROUP:PORT?ttl=TTL";
+          },
+          ""));
+  replay->callback([options, command] {
+    *command = [options] {
+      const std::string log = FindLog(options->run).string();
+      WarnOfRunInfo(log);
+      return options->to_bus ? Play(*options, log) : CompareReplay(*options, log);
+    };
+  });
+}
+
+}  // namespace poise

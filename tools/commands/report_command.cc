@@ -1,0 +1,109 @@
+#include <filesystem>
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/cli/output_place.h"
+#include "tools/commands/commands.h"
+#include "tools/report/html_report.h"
+#include "tools/report/report.h"
+#include "tools/report/run_screen.h"
+#include "tools/run/run_dir.h"
+#include "tools/run/scenario_run.h"
+
+namespace poise {
+namespace {
+
+struct ReportOptions {
+  std::string run;
+  std::string overlay;
+  std::string html;
+  bool no_html = false;
+  bool full = false;
+  bool force = false;
+};
+
+ReportedRun ReadReportedRun(const std::string& run) {
+  ReportedRun result;
+  result.log = FindLog(run).string();
+  WarnOfRunInfo(result.log);
+  result.record = logging::ReadRun(result.log);
+  if (result.record.info.scenario.empty()) {
+    throw logging::LogError(
+        fmt::format("{}: RUN_INFO is damaged and scenario.pbtxt is not beside it: put the "
+                    "scenario's text there",
+                    result.log));
+  }
+  ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  PrepareRecord(result.log, result.scenario, &result.record);
+  if (result.scenario.has_reference() && result.record.reference == nullptr) {
+    fmt::print(
+        stderr, "warning: {}: is missing; what compares with it has no value\n",
+        (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
+  }
+  result.checks = EvaluateChecks(result.scenario, result.record);
+  return result;
+}
+
+/// report.html in a run's folder; beside any other log, under the log's name.
+std::filesystem::path DefaultHtml(const std::string& log) {
+  const std::filesystem::path path = log;
+  if (path.filename() == "run.lcm") return path.parent_path() / "report.html";
+  return std::filesystem::path(path).replace_extension(".html");
+}
+
+int Report(const ReportOptions& options) {
+  if (!options.html.empty()) CheckFileFree("--html", options.html, options.force);
+  std::vector<ReportedRun> runs;
+  runs.push_back(ReadReportedRun(options.run));
+  if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
+  const ReportedRun& run = runs.front();
+  const std::string commit = run.record.spec.poise_commit().empty()
+                                 ? ""
+                                 : fmt::format(" ({})", run.record.spec.poise_commit());
+  std::string text = Wrapped(
+      logging::LinesForTerminal(fmt::format(
+          "{} of {}, poise {}{}\n{}", run.record.spec.scenario(), run.record.info.started_at,
+          run.record.spec.poise_version(), commit, FormatChanges(run.scenario))),
+      ScreenStyle().columns, 2);
+  const std::vector<logging::Event> events = logging::Events(run.record);
+  const ShownRun shown{run.scenario, run.record, run.checks, events, "", {}};
+  text += fmt::format("\n{}\n", options.full ? FormatFullScreen(shown) : FormatScreen(shown));
+  fmt::print("{}", text);
+  if (run.record.spec.has_cut()) {
+    fmt::print("{}\n", Wrapped("part of a run: the scenario's checks are of the whole one and are "
+                               "not judged here",
+                               ScreenStyle().columns));
+  } else {
+    fmt::print("{}", FormatVerdictLines(run.checks, ""));
+  }
+  if (!options.no_html) {
+    const std::filesystem::path html =
+        options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
+    WriteHtmlReport(html, runs);
+    fmt::print("\nThe run, step by step: {}\n", FileAddress(html));
+  }
+  for (const CheckResult& check : run.checks) {
+    if (!check.passed) return kExitFailed;
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddReportCommand(CLI::App* app, Command* command) {
+  auto options = std::make_shared<ReportOptions>();
+  CLI::App* report = app->add_subcommand(
+      "report", "the table of a run from its log, and the run as a page to look at");
+  report->add_option("run", options->run, "folder of a run or a log; default: the latest run");
+  report->add_option("overlay", options->overlay, "a second run, drawn over the first in the page");
+  CLI::Option* html = report->add_option(
+      "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
+  report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report->add_flag("--force", options->force, "replace the file of --html");
+  report->add_flag("--full", options->full, "every figure, the events and the assumptions");
+  report->callback([options, command] { *command = [options] { return Report(*options); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,139 @@
+#include <cstdio>
+#include <memory>
+
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/commands/commands.h"
+#include "tools/run/scenario_run.h"
+#include "tools/run/several_runs.h"
+#include "tools/scenario/ablations.h"
+
+namespace poise {
+namespace {
+
+struct RunArguments {
+  std::vector<std::string> scenarios = {"push_double_support"};
+  std::string out;
+  RunOptions options;
+  bool no_reference = false;
+};
+
+int Run(RunArguments arguments) {
+  arguments.options.changes.reference = !arguments.no_reference;
+  const std::string& capture = arguments.options.changes.capture;
+  if (!capture.empty()) CheckFileFree("--capture", capture, arguments.options.force);
+  const std::vector<std::string>& names = arguments.scenarios;
+  if (names.size() == 1 && names.front() != kAllScenarios) {
+    const RunResult result = ScenarioRun(names.front(), arguments.options)
+                                 .Run(arguments.out, /*latest=*/arguments.out.empty());
+    if (result.summary.failed_by_machine) return kExitMachine;
+    return result.summary.passed ? kExitOk : kExitFailed;
+  }
+  return RunSeveral(names, arguments.options, arguments.out) ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App* app, Command* command) {
+  auto arguments = std::make_shared<RunArguments>();
+  RunOptions* const options = &arguments->options;
+  CLI::App* run = app->add_subcommand("run", "run scenarios and check them");
+  run->footer(
+      "Exit codes: 0 all checks hold; 1 a check or the run failed; 2 wrong usage or "
+      "configuration; 3 (real time) nothing failed but what the machine was too late for, or an "
+      "injected fault took.");
+  run->add_option("scenario", arguments->scenarios,
+                  "names (poise list scenarios) or .pbtxt files; all: every experiment of the "
+                  "paper, by section, with an overview")
+      ->capture_default_str();
+  run->add_option("--out", arguments->out,
+                  "folder of the run (of several: holds a folder each), new or empty; default: a "
+                  "dated one under runs/");
+  CLI::Option* in_process = run->add_flag("--inline", options->in_process,
+                                          "the same graph inside one process, without the network");
+  CLI::Option* const realtime = run->add_flag(
+      "--realtime", options->changes.realtime,
+      "the bridge owns the clock and holds the last command; processes that die are replaced. "
+      "With --inline: pace the ticks with the wall clock");
+  run->add_option(
+         "--kill", options->launch.kills.count,
+         "faults to inject: as often a controller process is killed, or stopped for 100 ms")
+      ->check(Within("in [1, 10000]", [](double n) { return n >= 1 && n <= 10000; }))
+      ->needs(realtime)
+      ->excludes(in_process);
+  run->add_option("--priority", options->changes.priority,
+                  "of the bridge under SCHED_FIFO, where the system grants it (default 40); 0: the "
+                  "ordinary scheduler")
+      ->check(CLI::Range(0, 98))
+      ->needs(realtime);
+  run->add_option("--cpu", options->changes.cpu,
+                  "that the controller is pinned to under SCHED_FIFO; default: the last one")
+      ->check(CLI::Range(0, 1023))
+      ->needs(realtime);
+  KillOptions* const kills = &options->launch.kills;
+  run->add_option("--kill-seed", kills->seed, "of the moments and processes of --kill")
+      ->capture_default_str();
+  run->add_option("--kill-from", kills->from,
+                  "first time of a fault, s of the scenario; negative: while the robot starts")
+      ->capture_default_str()
+      ->needs(realtime);
+  run->add_option("--kill-until", kills->until,
+                  "last time of a fault, s of the scenario (default: its end)")
+      ->needs(realtime);
+  CLI::Option* drives =
+      run->add_option("--drives", options->changes.drives,
+                      "what moves the simulated robot's motors; ethercat: an emulated chain of "
+                      "servo drives, through real EtherCAT frames")
+          ->check(CLI::IsMember({"ethercat"}))
+          ->excludes(in_process);
+  run->add_option("--link", options->changes.link,
+                  "of EtherCAT: udp (default), or raw:MASTER,DRIVES, two network interfaces; see "
+                  "deploy/veth")
+      ->needs(drives);
+  run->add_option("--capture", options->changes.capture,
+                  "write every EtherCAT frame to this file, for Wireshark")
+      ->needs(drives);
+  run->add_option("--variant", options->changes.variant,
+                  "run this variant of the scenario (poise list scenarios)");
+  run->add_option("--without", options->changes.without, "leave out a part of the controller")
+      ->check(CLI::IsMember(RemovableParts()))
+      ->allow_extra_args(false)
+      ->take_all();
+  run->add_flag("--ideal", options->changes.ideal,
+                "a robot without joint friction, sensor noise, drive train and model error");
+  run->add_flag("--no-reference", arguments->no_reference,
+                "do not run the scenario's reference variant beside it");
+  run->add_option("--set", options->changes.set,
+                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120 or "
+                  "--set 'check[push_peak].at_most=200' (poise list fields); "
+                  "no value: empties a list or group, unsets a number without default")
+      ->type_name("FIELD=VALUE")
+      ->allow_extra_args(false)
+      ->take_all();
+  run->add_option("--duration", options->changes.duration, "simulated time, s")
+      ->check(Within("a number of seconds in (0, 36000]",
+                     [](double s) { return s > 0 && s <= 36000; }));
+  run->add_option("--seed", options->changes.seed, "of all noise")
+      ->check([](const std::string& text) -> std::string {
+        const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+        return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
+      });
+  run->add_option("--drop", options->changes.drop_rate,
+                  "share of the messages that each process drops, to test the recovery")
+      ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
+      ->excludes(in_process);
+  run->add_flag(
+         "!--no-log", options->launch.log,
+         "write no log, for a run of hours: nothing is checked but that it stands to the end")
+      ->excludes(in_process);
+  run->add_flag("--force", options->force,
+                "replace the run that --out holds, or the file of --capture; start though the log "
+                "may not fit the disk");
+  CLI::Option* const quiet =
+      run->add_flag("--quiet", options->quiet, "only errors and the verdict, in one line");
+  run->add_flag("--full", options->full, "every figure, the events and the assumptions")
+      ->excludes(quiet);
+  run->callback([arguments, command] { *command = [arguments] { return Run(*arguments); }; });
+}
+
+}  // namespace poise

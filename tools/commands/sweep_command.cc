@@ -1,0 +1,150 @@
+// `poise sweep`: many runs of a scenario with varied fields.
+#include <memory>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "tools/cli/output_place.h"
+#include "tools/commands/commands.h"
+#include "tools/maps/sweep_output.h"
+#include "tools/run/run_dir.h"
+#include "tools/sweep/sweep_session.h"
+#include "tools/sweep/sweep_table.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct MergeOptions {
+  std::vector<std::string> folders;
+  std::string out;
+  bool force = false;
+  bool partial = false;
+};
+
+int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
+  const SweepDefinition definition(arguments, /*limit=*/false);
+  const auto [first, end] = SelectedRuns(options, definition.points().size());
+  SweepSession session(definition, kKindSweep, options);
+  const auto is_selected = [first = first, end = end](const SweepRow& row) {
+    return row.run >= first && row.run < end;
+  };
+  int64_t done = 0;
+  for (const auto& [key, row] : session.rows()) done += is_selected(row) ? 1 : 0;
+  fmt::print("{}: {} runs{}{}, {} at a time; {}\n", definition.name(), end - first,
+             end - first < definition.points().size()
+                 ? fmt::format(" of {}", definition.points().size())
+                 : "",
+             done > 0 ? fmt::format(", {} done before", done) : "", options.jobs,
+             session.folder().string());
+  int64_t next = first;
+  const bool complete = session.Run(
+      [&]() -> std::optional<SweepSession::Request> {
+        while (next < end && session.rows().contains({next, 0})) ++next;
+        if (next >= end) return {};
+        return SweepSession::Request{next++, {}};
+      },
+      [&](const SweepRow&) { ++done; },
+      [&] {
+        return SweepSession::Progress{static_cast<double>(done), static_cast<double>(end - first),
+                                      fmt::format("{} of {} runs done", done, end - first)};
+      });
+  if (!complete) {
+    fmt::print(stderr, "poise: interrupted; {} of {} runs are done; --resume --out {} goes on\n",
+               done, end - first, session.folder().string());
+    return kExitFailed;
+  }
+  WriteOutput(session.folder(), session.header(), session.rows());
+  PrintOutput(session.folder(), session.header(), session.rows());
+  return AllRan(session.rows()) ? kExitOk : kExitFailed;
+}
+
+/// Throws ConfigError when points are missing or not searched to the end.
+void CheckComplete(const SweepHeader& header, const SweepRows& rows) {
+  const int64_t size = SweepPoints(header.sweep).size();
+  int64_t done = 0;
+  if (header.kind == kKindLimit) {
+    for (const LimitPoint& point : LimitPoints(header, rows)) done += point.search.Wanted().empty();
+  } else {
+    done = static_cast<int64_t>(rows.size());
+  }
+  if (done == size) return;
+  std::vector<bool> seen(static_cast<size_t>(size));
+  for (const auto& [key, row] : rows) seen[static_cast<size_t>(row.run)] = true;
+  const auto missing = std::find(seen.begin(), seen.end(), false);
+  const std::string which = missing == seen.end() ? "some are not searched to their end"
+                                                  : fmt::format("point {} is the first that lacks",
+                                                                missing - seen.begin());
+  throw ConfigError(
+      fmt::format("{} of {} points are there, {}; give their folders too, or "
+                  "--partial",
+                  done, size, which));
+}
+
+int Merge(const MergeOptions& options) {
+  std::optional<SweepResults> merged;
+  std::string first;
+  for (const std::string& folder : options.folders) {
+    const std::string source = (fs::path(folder) / kResultsFile).string();
+    const std::optional<SweepResults> results = ReadResults(folder);
+    if (!results) throw ConfigError(fmt::format("{}: there are no results", source));
+    if (!merged) {
+      merged.emplace();
+      merged->header = results->header;
+      first = source;
+    } else if (const std::string problem = HeaderProblem(merged->header, results->header);
+               !problem.empty()) {
+      throw ConfigError(fmt::format("{}: beside {}, {}", source, first, problem));
+    }
+    for (const auto& [key, row] : results->rows) AddRow(row, source, &merged->rows);
+  }
+  if (!options.partial) CheckComplete(merged->header, merged->rows);
+  const fs::path out = fs::absolute(options.out);
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error || !fs::is_directory(out)) {
+    throw ConfigError(fmt::format("--out {}: cannot be made", options.out));
+  }
+  const RunDir dir(out);
+  CheckFolderFree("--out", options.out, options.force);
+  {
+    SweepResultsWriter writer(out, merged->header, {});
+    for (const auto& [key, row] : merged->rows) writer.Append(row);
+  }
+  WriteOutput(out, merged->header, merged->rows);
+  PrintOutput(out, merged->header, merged->rows);
+  return AllRan(merged->rows) ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddSweepCommand(CLI::App* app, Command* command) {
+  auto arguments = std::make_shared<SweepArguments>();
+  auto session = std::make_shared<SessionOptions>();
+  auto merge_options = std::make_shared<MergeOptions>();
+  CLI::App* sweep =
+      app->add_subcommand("sweep", "run a scenario over a grid of values, or over random ones");
+  AddSweepOptions(sweep, arguments.get(), session.get());
+  sweep->footer(
+      "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
+      "table.csv (a row a run, the same\nbytes whether resumed, split or in parallel) and "
+      "maps.html, and each map as map_N.svg and map_N.png.\nA sweep's file: "
+      "tools/sweep/sweep.proto; docs/sweeps.md.\n"
+      "Exit code: 0 when every run was made, fallen or not; 1 when interrupted or a run could not "
+      "be made; 2 wrong usage\nor configuration.");
+  CLI::App* merge = sweep->add_subcommand(
+      "merge", "one table from the folders of a sweep's, or a limit's, parts");
+  sweep->require_subcommand(0, 1);
+  merge->add_option("folder", merge_options->folders, "folders with results")->required();
+  merge->add_option("--out", merge_options->out, "folder for the whole")->required();
+  merge->add_flag("--force", merge_options->force, "replace what --out holds");
+  merge->add_flag("--partial", merge_options->partial, "though points are missing");
+  merge->callback(
+      [merge_options, command] { *command = [merge_options] { return Merge(*merge_options); }; });
+  sweep->callback([arguments, session, command, merge] {
+    if (merge->parsed()) return;
+    *command = [arguments, session] { return RunSweep(*arguments, *session); };
+  });
+}
+
+}  // namespace poise

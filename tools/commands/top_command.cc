@@ -1,0 +1,152 @@
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "components/framework/clock.h"
+#include "components/framework/configuration.h"
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/signals.h"
+#include "tools/cli/terminal.h"
+#include "tools/commands/commands.h"
+#include "tools/live/live_statistics.h"
+#include "tools/live/top_view.h"
+#include "tools/run/live_run.h"
+
+namespace poise {
+namespace {
+
+constexpr size_t kHintLine = 2;                    // of the view
+constexpr int64_t kMillisecond = 1'000'000;        // ns
+constexpr int64_t kLongestWait = 50;               // ms, until keys are looked at
+constexpr int64_t kTopSilence = 1000 * kMillisecond;  // then it is asked whether the run goes on
+
+struct TopOptions {
+  std::string run;
+  double interval = 0.5;  // s
+  bool once = false;
+};
+
+/// Listens to a run and sums up.
+class Watch {
+ public:
+  explicit Watch(const std::string& run)
+      : live_(run, "poise log info"),
+        control_(live_.spec(), {kRecorderName}),
+        names_(logging::ElementNames::OfSpec(live_.spec())),
+        statistics_(live_.spec(), NowNanoseconds()),
+        last_arrival_(NowNanoseconds()) {}
+
+  const LiveRun& live() const { return live_; }
+
+  /// Until `deadline`, ns, but not for longer than kLongestWait.
+  void Spin(int64_t deadline) {
+    const int64_t wait = std::max<int64_t>(0, deadline - NowNanoseconds()) / kMillisecond;
+    live_.Spin(static_cast<int>(std::min(wait, kLongestWait)), [&](const LiveMessage& message) {
+      last_arrival_ = NowNanoseconds();
+      if (message.index < 0) return;  // health comes from the processes themselves
+      bridge_status_t bridge;
+      if (message.type->fingerprint == bridge_status_t::getHash() &&
+          DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bridge)) {
+        statistics_.SetBridge(bridge);
+      }
+      statistics_.AddMessage(message.index, message.tick, message.data.size(), last_arrival_);
+    });
+    control_.Spin(0);
+    for (const auto& [name, status] : control_.statuses()) statistics_.SetProcess(name, status);
+  }
+
+  std::vector<ViewLine> View() {
+    return TopView(live_.spec(), names_, live_.dir().string(), statistics_.Take(NowNanoseconds()),
+                   live_.refused() + control_.refused());
+  }
+  bool HeardNothing() const {
+    return std::none_of(control_.statuses().begin(), control_.statuses().end(),
+                        [](const auto& entry) { return entry.second.seen; });
+  }
+  bool Ended() const { return NowNanoseconds() > last_arrival_ + kTopSilence && !live_.InProgress(); }
+
+ private:
+  LiveRun live_;
+  ControlClient control_;
+  logging::ElementNames names_;
+  LiveStatistics statistics_;
+  int64_t last_arrival_;
+};
+
+int Once(const TopOptions& options) {
+  Watch watch(options.run);
+  const int64_t end =
+      NowNanoseconds() + static_cast<int64_t>(options.interval * 1e3) * kMillisecond;
+  while (NowNanoseconds() < end && StopSignal() == 0) watch.Spin(end);
+  if (StopSignal() != 0) return kExitFailed;
+  fmt::print("{}", PlainText(watch.View()));
+  if (!watch.HeardNothing()) return kExitOk;
+  fmt::print(stderr,
+             "poise: run {}: no process was heard of in {} s; try a longer --interval, or look at "
+             "the network with poise doctor\n",
+             watch.live().spec().run_id(), options.interval);
+  return kExitFailed;
+}
+
+int Top(const TopOptions& options) {
+  CatchStopSignals();
+  if (options.once) return Once(options);
+  signal(SIGPIPE, SIG_IGN);  // a terminal that goes away shows as an error of the write
+  Watch watch(options.run);
+  if (isatty(STDOUT_FILENO) == 0) {
+    throw ConfigError("top: stdout is no terminal; take one snapshot with --once");
+  }
+  const auto interval = static_cast<int64_t>(options.interval * 1e3) * kMillisecond;
+  std::vector<ViewLine> view = watch.View();
+  bool ended = false;
+  {
+    FullScreen screen;
+    int64_t next = 0;
+    bool quit = false;
+    while (!quit && !ended && StopSignal() == 0) {
+      if (NowNanoseconds() >= next) {
+        next = NowNanoseconds() + interval;
+        view = watch.View();
+        std::vector<ViewLine> lines = view;
+        lines[kHintLine].text += "  q: quit";
+        const FullScreen::Size size = screen.size();
+        quit = !screen.Show(Frame(lines, size.columns, size.rows));
+      }
+      watch.Spin(next);
+      const char key = screen.Key();
+      quit = quit || key == 'q' || key == 'Q';
+      ended = watch.Ended();
+    }
+  }
+  if (!ended) return kExitOk;
+  fmt::print("{}\nThe run has ended; its table: poise report {}\n", PlainText(view),
+             watch.live().dir().string());
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddTopCommand(CLI::App* app, Command* command) {
+  auto options = std::make_shared<TopOptions>();
+  CLI::App* top = app->add_subcommand(
+      "top", "live view of a run in progress: its processes and channels; q or Ctrl-C ends it");
+  top->add_option("run", options->run, "folder of the run; default: the only one that goes on");
+  top->add_option("--interval", options->interval, "s between views, over which rates are measured")
+      ->capture_default_str()
+      ->check(Within("in [0.1, 60]", [](double s) { return s >= 0.1 && s <= 60; }));
+  top->add_flag("--once", options->once, "measure for one interval, print the view and end");
+  top->footer(
+      "Latencies: of one tick's work, from a process's last input to its outputs sent, since the "
+      "start. LATE: cycles of the clock's owner that missed their deadline, in real time. GAPS: "
+      "messages asked for again; RESENT: answered again; DROPPED: on purpose "
+      "(--drop); "
+      "UNSENT: refused by the system; MISSED: messages that this view did not get in time (the run "
+      "is not affected and the log has them).");
+  top->callback([options, command] { *command = [options] { return Top(*options); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,204 @@
+#include <sched.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <thread>
+
+#include "components/framework/configuration.h"
+#include "components/robot/robot_files.h"
+#include "fmt/format.h"
+#include "logging/log_reader.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/signals.h"
+#include "tools/commands/commands.h"
+#include "tools/live/run_status.h"
+#include "tools/live/tick_ring.h"
+#include "tools/live/view_server.h"
+#include "tools/report/html_report.h"
+#include "tools/run/live_run.h"
+
+namespace poise {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+using std::chrono::milliseconds;
+
+constexpr const char* kLogCommand = "poise report";
+constexpr milliseconds kPicture{33};
+// Between looks at the bus: far from filling its buffer, and few wake-ups beside the run.
+constexpr milliseconds kPause{4};
+constexpr milliseconds kViewSilence{500};  // then it is asked whether the run goes on
+constexpr milliseconds kViewPatience{5'000};
+constexpr int kNice = 10;
+
+struct ViewOptions {
+  std::string run;
+  int port = 0;
+  double keep = 60;  // s
+};
+
+/// A process that wakes up then takes no core from one of the run; where all cores are busy this
+/// one waits.
+void StandBack() {
+  const sched_param none{};
+  if (sched_setscheduler(0, SCHED_BATCH, &none) != 0 || setpriority(PRIO_PROCESS, 0, kNice) != 0) {
+    fmt::print(stderr, "warning: this process runs at the run's own priority\n");
+  }
+}
+
+/// RUN_INFO, as soon as the recorder has written it. Throws LogError when it does not.
+logging::RunRecord ReadStart(const LiveRun& live) {
+  const std::string log = (live.dir() / "run.lcm").string();
+  const auto deadline = Clock::now() + kViewPatience;
+  while (true) {
+    try {
+      logging::LogReader reader(log);
+      logging::RunRecord record;
+      record.info = logging::ReadRunInfo(&reader, log, &record.spec);
+      record.robot = robot::LoadRobotTexts(record.info.robot, record.info.urdf);
+      return record;
+    } catch (const logging::LogError&) {
+      if (Clock::now() > deadline || !live.InProgress() || StopSignal() != 0) throw;
+    }
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
+Json ChannelsJson(const TickRing& ring) {
+  Json json = Json::array();
+  for (const TickRing::Lane& lane : ring.lanes()) {
+    Json item = {{"name", lane.name}, {"type", lane.type->name}, {"count", 0}};
+    if (lane.external) item["ticks"] = {{"value", nullptr}};
+    item["signals"] = Json::array();
+    for (const TickRing::Signal& signal : lane.signals) {
+      item["signals"].push_back({{"field", signal.field}, {"integer", signal.integer}});
+    }
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
+class Viewer {
+ public:
+  Viewer(const ViewOptions& options, LiveRun* live, const logging::RunRecord& record,
+         const Scenario& scenario)
+      : live_(live),
+        keep_(options.keep),
+        run_id_(std::to_string(live->spec().run_id())),
+        ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
+        server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
+                &ring_),
+        status_((live->dir() / "run.lcm").string(), scenario) {}
+
+  int Run() {
+    fmt::print(
+        "{}: http://127.0.0.1:{}/  (the last {} s, {:.0f} MB; Ctrl-C ends)\n",
+        live_->dir().string(), server_.port(), keep_,
+        1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity()));
+    std::fflush(stdout);
+    server_.SetState(State());
+    auto next_picture = Clock::now();
+    last_message_ = next_picture;
+    while (StopSignal() == 0) {
+      server_.RunFor(live_ != nullptr ? kPause : kPicture);
+      const auto now = Clock::now();
+      if (live_ != nullptr) Listen(now);
+      if (now < next_picture) continue;
+      SendStatus();
+      server_.SendTicks();
+      if (server_.dropped() != dropped_) {
+        dropped_ = server_.dropped();
+        fmt::print(stderr, "a browser that took no ticks was dropped; its page connects again\n");
+      }
+      next_picture = std::max(next_picture + kPicture, now);
+    }
+    return kExitOk;
+  }
+
+ private:
+  static int64_t Ticks(double seconds, double period) {
+    return std::max<int64_t>(1, std::llround(seconds / period));
+  }
+
+  void Listen(Clock::time_point now) {
+    const int64_t lost = ring_.lost();
+    live_->Spin(0, [&](const LiveMessage& message) {
+      ring_.Add(message);
+      last_message_ = now;
+    });
+    if (now > last_message_ + kViewSilence) {
+      last_message_ = now;
+      if (!live_->InProgress()) {
+        ring_.Finish();
+        status_.Finish();
+        fmt::print("the run has ended; its page stays until Ctrl-C; {} {} checks it\n", kLogCommand,
+                   live_->dir().string());
+        std::fflush(stdout);
+        live_ = nullptr;
+      }
+    }
+    if (ring_.lost() != lost || live_ == nullptr) server_.SetState(State());
+  }
+
+  void SendStatus() {
+    std::optional<Json> status = status_.Take();
+    if (!status) return;
+    // Texts of a log may hold any bytes.
+    server_.SetStatus(Json({{"run_id", run_id_}, {"status", std::move(*status)}})
+                          .dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+
+  std::string State() const {
+    return Json({{"run_id", run_id_},
+                 {"state", live_ != nullptr ? "live" : "ended"},
+                 {"lost", ring_.lost()},
+                 {"end_tick", ring_.end_tick()}})
+        .dump();
+  }
+
+  LiveRun* live_;  // nullptr: the run has ended
+  double keep_;    // s
+  std::string run_id_;
+  int64_t dropped_ = 0;
+  TickRing ring_;
+  ViewServer server_;
+  RunStatus status_;
+  Clock::time_point last_message_;
+};
+
+int View(const ViewOptions& options) {
+  CatchStopSignals();
+  LiveRun live(options.run, kLogCommand);
+  const logging::RunRecord record = ReadStart(live);
+  if (record.spec.run_id() != live.spec().run_id()) {
+    throw ConfigError(
+        fmt::format("{}: a new run is starting in this folder; try again", live.dir().string()));
+  }
+  Scenario scenario;
+  ParseTextProto(record.info.scenario, (live.dir() / "run.lcm").string() + ": RUN_INFO.scenario",
+                 &scenario);
+  StandBack();
+  return Viewer(options, &live, record, scenario).Run();
+}
+
+}  // namespace
+
+void AddViewCommand(CLI::App* app, Command* command) {
+  auto options = std::make_shared<ViewOptions>();
+  CLI::App* view = app->add_subcommand(
+      "view", "the page of a run in progress, live in a browser on this machine");
+  view->add_option("run", options->run, "folder of the run; default: the only one that goes on");
+  view->add_option("--port", options->port, "on 127.0.0.1; default: a free one")
+      ->check(CLI::Range(1, 65535));
+  view->add_option("--keep", options->keep, "s of the run that the page can look back")
+      ->check(Within("in [1, 600]", [](double s) { return s >= 1 && s <= 600; }))
+      ->capture_default_str();
+  view->callback([options, command] { *command = [options] { return View(*options); }; });
+}
+
+}  // namespace poise

@@ -1,0 +1,103 @@
+#include "tools/live/run_status.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "fmt/format.h"
+#include "logging/events.h"
+#include "logging/run_record.h"
+#include "tools/report/html_report.h"
+#include "tools/report/report.h"
+#include "tools/run/scenario_run.h"
+
+namespace poise {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kPause{1};
+constexpr int kShare = 9;  // times what a reading took: the pause after it
+constexpr uintmax_t kMostBytes = uintmax_t{256} << 20;  // of log; as much again in memory
+
+bool OnlyAtTheEnd(const CheckResult& check) {
+  return check.name.starts_with("duration_reached") || check.name == "log_defects";
+}
+
+}  // namespace
+
+nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario, bool ended) {
+  logging::RunRecord record = logging::ReadRun(log);
+  PrepareRecord(log, scenario, &record);
+  std::vector<CheckResult> checks = EvaluateChecks(scenario, record);
+  if (!ended) std::erase_if(checks, OnlyAtTheEnd);
+  nlohmann::ordered_json json = {{"ended", ended},
+                                 {"checks", ChecksJson(checks)},
+                                 {"events", EventsJson(logging::Events(record, ended))},
+                                 {"components", ComponentsJson(record.health)},
+                                 {"checked_ticks", record.num_ticks}};
+  if (ended) {
+    json["run"] = PageRunJson(record, scenario, checks);
+  } else {
+    for (nlohmann::ordered_json& check : json["checks"]) check["passed"] = nullptr;
+  }
+  return json;
+}
+
+RunStatus::RunStatus(std::string log, Scenario scenario)
+    : log_(std::move(log)), scenario_(std::move(scenario)), thread_([this] { Run(); }) {}
+
+RunStatus::~RunStatus() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  stop_.notify_one();
+  thread_.join();
+}
+
+void RunStatus::Finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  stop_.notify_one();
+}
+
+std::optional<nlohmann::ordered_json> RunStatus::Take() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(newest_, std::nullopt);
+}
+
+void RunStatus::Run() {
+  bool ended = false;
+  while (true) {
+    const auto start = Clock::now();
+    std::error_code error;
+    const bool readable = std::filesystem::file_size(log_, error) <= kMostBytes;
+    if (readable || ended) {
+      nlohmann::ordered_json status;
+      try {
+        if (!readable) {
+          throw std::runtime_error(
+              fmt::format("{}: has more than {} MB, or cannot be read", log_, kMostBytes >> 20));
+        }
+        status = StatusJson(log_, scenario_, ended);
+      } catch (const std::exception& problem) {
+        status = {{"ended", ended}, {"problem", problem.what()}};  // the page tells
+      }
+      const std::lock_guard lock(mutex_);
+      newest_ = std::move(status);
+    }
+    if (ended) return;
+    const auto pause = std::max<Clock::duration>(kPause, kShare * (Clock::now() - start));
+    std::unique_lock lock(mutex_);
+    stop_.wait_for(lock, pause, [this] { return stopped_ || ended_; });
+    if (stopped_) return;
+    ended = ended_;
+  }
+}
+
+}  // namespace poise

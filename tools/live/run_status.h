@@ -1,0 +1,47 @@
+// What the log of a run in progress says so far, for its page.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "tools/scenario/scenario.pb.h"
+
+namespace poise {
+
+/// {"ended", "checks", "events", "components", "checked_ticks"} of the log as it is, as in
+/// summary.json. Before the run has ended no check has a verdict (passed: null), and what only its
+/// end decides (its duration, its log being whole) is left out; after it "run" is what a page says
+/// of the run itself. Throws LogError or RobotError.
+nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario, bool ended);
+
+/// Reads the log again and again on a thread of its own, which takes a tenth of one core at most; a
+/// log that has become too large is left as it was read last.
+class RunStatus {
+ public:
+  RunStatus(std::string log, Scenario scenario);
+  /// Waits for a reading under way.
+  ~RunStatus();
+
+  /// The run has ended: the log is read once more, for its final status.
+  void Finish();
+  /// The newest that has not been taken.
+  std::optional<nlohmann::ordered_json> Take();
+
+ private:
+  void Run();
+
+  const std::string log_;
+  const Scenario scenario_;
+  std::mutex mutex_;
+  std::condition_variable stop_;
+  bool stopped_ = false;
+  bool ended_ = false;
+  std::optional<nlohmann::ordered_json> newest_;
+  std::thread thread_;
+};
+
+}  // namespace poise

@@ -1,0 +1,197 @@
+#include "tools/live/tick_ring.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "components/framework/run.h"
+#include "logging/signal_table.h"
+#include "tools/live/field_selection.h"
+
+namespace poise {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "a batch is little-endian");
+
+constexpr uint32_t kBatchFormat = 1;
+constexpr int64_t kMaxTick = int64_t{1} << 52;  // what a batch can tell
+
+struct BatchHeader {
+  uint32_t format = kBatchFormat;
+  uint32_t count = 0;
+  double first_tick = 0;
+};
+
+/// NaN for what a page takes for no number.
+float ToFloat(double value) {
+  return std::abs(value) <= std::numeric_limits<float>::max()
+             ? static_cast<float>(value)
+             : std::numeric_limits<float>::quiet_NaN();
+}
+
+}  // namespace
+
+/// Writes a message's scalars to their places in a tick.
+class TickRing::Filler : public ScalarVisitor {
+ public:
+  Filler(const Place& place, double* integers, float* reals)
+      : kinds_(place.kinds),
+        integers_(integers + place.first_integer),
+        reals_(reals + place.first_real) {}
+
+  void Integer(std::string_view, int64_t value) override { Put(static_cast<double>(value)); }
+  void Real(std::string_view, double value) override { Put(value); }
+  void Text(std::string_view, std::string_view) override { ++next_; }
+
+ private:
+  void Put(double value) {
+    if (next_ == kinds_.size()) return;
+    switch (kinds_[next_++]) {
+      case Kind::kNone:
+        break;
+      case Kind::kInteger:
+        *integers_++ = value;
+        break;
+      case Kind::kReal:
+        *reals_++ = ToFloat(value);
+        break;
+    }
+  }
+
+  const std::vector<Kind>& kinds_;
+  size_t next_ = 0;
+  double* integers_;
+  float* reals_;
+};
+
+TickRing::TickRing(const RunSpec& spec, int64_t capacity)
+    : capacity_(capacity), slots_(capacity + kReceiveWindow), planned_(spec.num_ticks()) {
+  for (const Channel& channel : spec.graph().channel()) {
+    const MessageType* type = FindMessageType(channel.type());
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    Lane lane{channel.name(), type, channel.external(), {}};
+    Place place{{}, integers_, reals_};
+    const auto scalars = ReadScalars(*type, ZeroMessage(*type, counts));
+    for (const Scalar& scalar : scalars.value()) {
+      const bool integer = std::holds_alternative<int64_t>(scalar.value);
+      if (!logging::IsSignal(*type, scalar.path)) {
+        place.kinds.push_back(Kind::kNone);
+        continue;
+      }
+      place.kinds.push_back(integer ? Kind::kInteger : Kind::kReal);
+      ++(integer ? integers_ : reals_);
+      lane.signals.push_back({scalar.path, integer});
+    }
+    dense_ += channel.external() ? 0 : 1;
+    lanes_.push_back(std::move(lane));
+    places_.push_back(std::move(place));
+  }
+  const auto slots = static_cast<size_t>(slots_);
+  integer_values_.resize(slots * integers_);
+  real_values_.resize(slots * reals_);
+  arrived_.resize(slots);
+  last_tick_.assign(lanes_.size(), -1);
+}
+
+void TickRing::Clear(int64_t tick) {
+  const size_t slot = Slot(tick);
+  std::fill_n(integer_values_.begin() + static_cast<std::ptrdiff_t>(slot * integers_), integers_,
+              std::numeric_limits<double>::quiet_NaN());
+  std::fill_n(real_values_.begin() + static_cast<std::ptrdiff_t>(slot * reals_), reals_,
+              std::numeric_limits<float>::quiet_NaN());
+  arrived_[slot] = 0;
+}
+
+void TickRing::Start(int64_t tick) {
+  start_ = first_ = end_ = tick;
+  for (int64_t t = tick; t < tick + kReceiveWindow; ++t) Clear(t);
+}
+
+void TickRing::Take() {
+  const int missing = dense_ - arrived_[Slot(end_)];
+  // Who comes late has missed parts of the first ticks.
+  const bool beginning = first_ == end_ && end_ < start_ + kMaxLead;
+  ++end_;
+  if (beginning && missing > 0) {
+    first_ = end_;
+  } else {
+    lost_ += missing;
+    first_ = std::max(first_, end_ - capacity_);
+  }
+  Clear(end_ + kReceiveWindow - 1);
+}
+
+void TickRing::TakeUntil(int64_t tick) {
+  if (tick - end_ > capacity_) {
+    lost_ += dense_ * (tick - end_);
+    Start(tick);
+  }
+  while (end_ < tick) Take();
+}
+
+void TickRing::TakeComplete() {
+  while (end_ <= newest_ && (arrived_[Slot(end_)] == dense_ || newest_ >= end_ + kMaxLead)) Take();
+}
+
+void TickRing::Fill(const LiveMessage& message, int64_t tick) {
+  const size_t slot = Slot(tick);
+  Filler filler(places_[static_cast<size_t>(message.index)],
+                integer_values_.data() + slot * integers_, real_values_.data() + slot * reals_);
+  message.type->visit(message.data.data(), static_cast<int64_t>(message.data.size()), &filler);
+}
+
+void TickRing::Add(const LiveMessage& message) {
+  if (message.index < 0) return;
+  const auto channel = static_cast<size_t>(message.index);
+  if (lanes_[channel].external) {
+    if (newest_ >= 0) Fill(message, std::max(newest_, end_));
+    return;
+  }
+  const int64_t tick = message.tick;
+  if (tick < 0 || tick > kMaxTick || (planned_ > 0 && tick >= planned_)) return;
+  if (newest_ < 0) Start(tick);
+  if (tick >= end_ + kReceiveWindow) {
+    // After a long pause of this process; one stray packet moves nothing.
+    const bool confirmed = jump_ >= 0 && std::abs(tick - jump_) <= kMaxLead;
+    jump_ = confirmed ? -1 : tick;
+    if (!confirmed) return;
+    TakeUntil(tick - kMaxLead);
+  } else {
+    jump_ = -1;
+  }
+  newest_ = std::max(newest_, tick);
+  if (tick < end_ || tick <= last_tick_[channel]) return;
+  last_tick_[channel] = tick;
+  Fill(message, tick);
+  ++arrived_[Slot(tick)];
+  TakeComplete();
+}
+
+void TickRing::Finish() {
+  if (newest_ >= 0) TakeUntil(newest_ + 1);
+}
+
+std::string TickRing::Encode(int64_t from, int64_t to) const {
+  const auto count = static_cast<size_t>(to - from);
+  const BatchHeader header{kBatchFormat, static_cast<uint32_t>(count), static_cast<double>(from)};
+  std::string batch(sizeof(header) + count * tick_size(), '\0');
+  std::memcpy(batch.data(), &header, sizeof(header));
+  char* const integers = batch.data() + sizeof(header);
+  char* const reals = integers + count * integers_ * sizeof(double);
+  for (size_t row = 0; row < count; ++row) {
+    const size_t slot = Slot(from + static_cast<int64_t>(row));
+    for (size_t k = 0; k < integers_; ++k) {
+      std::memcpy(integers + (k * count + row) * sizeof(double),
+                  &integer_values_[slot * integers_ + k], sizeof(double));
+    }
+    for (size_t k = 0; k < reals_; ++k) {
+      std::memcpy(reals + (k * count + row) * sizeof(float), &real_values_[slot * reals_ + k],
+                  sizeof(float));
+    }
+  }
+  return batch;
+}
+
+}  // namespace poise

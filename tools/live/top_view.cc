@@ -1,0 +1,203 @@
+#include "tools/live/top_view.h"
+
+#include <algorithm>
+
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "logging/events.h"
+#include "logging/printable.h"
+#include "tools/cli/text_table.h"
+#include "tools/report/report.h"
+
+namespace poise {
+namespace {
+
+using Style = ViewLine::Style;
+
+constexpr double kStale = 1;  // s without a report of health, of which there are some a second
+constexpr char kNothing[] = "-";
+
+/// "-" for what is not known (negative).
+std::string Number(double value, int digits) {
+  return value < 0 ? kNothing : fmt::format("{:.{}f}", value, digits);
+}
+
+std::string Count(int64_t value) { return value < 0 ? kNothing : fmt::format("{}", value); }
+
+std::string Rate(double bytes_per_second) {
+  return bytes_per_second < 1e6 ? fmt::format("{:.1f} kB/s", bytes_per_second * 1e-3)
+                                : fmt::format("{:.2f} MB/s", bytes_per_second * 1e-6);
+}
+
+std::string StateName(int8_t state) {
+  switch (state) {
+    case health_t::STATE_STARTING:
+      return "starting";
+    case health_t::STATE_READY:
+      return "ready";
+    case health_t::STATE_RUNNING:
+      return "running";
+    case health_t::STATE_FINISHED:
+      return "finished";
+    case health_t::STATE_FAILED:
+      return "FAILED";
+    default:
+      return fmt::format("state {}", state);
+  }
+}
+
+void AddHeader(const RunSpec& spec, const logging::ElementNames& names, const std::string& dir,
+               const LiveSnapshot& snapshot, int64_t refused, std::vector<ViewLine>* lines) {
+  const double period = spec.tick_period();
+  lines->push_back({fmt::format("{}  run {}  {}", spec.scenario(), spec.run_id(), dir)});
+  std::string progress = fmt::format("tick {}", Count(snapshot.tick));
+  if (spec.num_ticks() > 0) progress += fmt::format(" of {}", spec.num_ticks());
+  if (snapshot.tick >= 0) {
+    progress +=
+        fmt::format("  {:.3f} s", static_cast<double>(snapshot.tick - spec.lead_ticks()) * period);
+  }
+  if (snapshot.tick_rate >= 0) {
+    progress += fmt::format("  {:.1f} ticks/s  {:.2f} x real time", snapshot.tick_rate,
+                            snapshot.tick_rate * period);
+  }
+  progress += spec.realtime() ? "  paced by the wall clock" : "  as fast as it goes";
+  const bool stopped = snapshot.bridge && snapshot.bridge->state >= bridge_status_t::STATE_STOPPING;
+  const bool failing = snapshot.bridge && snapshot.bridge->state > bridge_status_t::STATE_RUNNING;
+  if (snapshot.bridge) {
+    progress += "  bridge: " + logging::BridgeStateName(snapshot.bridge->state);
+    const std::string reason = logging::BridgeReasonText(*snapshot.bridge, names);
+    if (!reason.empty()) progress += ", " + reason;
+  }
+  lines->push_back({progress, stopped   ? Style::kFailure
+                              : failing ? Style::kWarning
+                                        : Style::kPlain});
+  lines->push_back({fmt::format("{}  refused here: {} packets", MirrorUrl(spec), refused),
+                    refused > 0 ? Style::kWarning : Style::kPlain});
+}
+
+/// What only real time brings about, where there is any of it.
+void AddRealTime(const health_t& h, std::vector<ViewLine>* lines) {
+  std::vector<std::string> parts;
+  if (h.lateness_max > 0) parts.push_back(fmt::format("at most {:.1f} us late", h.lateness_max));
+  if (h.ticks_skipped > 0) parts.push_back(fmt::format("{} ticks skipped", h.ticks_skipped));
+  if (h.restarts > 0) parts.push_back(fmt::format("restarted {} times", h.restarts));
+  const std::vector<std::string> granted = SchedulingNames(h.scheduling);
+  if (!granted.empty()) parts.push_back("scheduling: " + Joined(granted, ", "));
+  if (parts.empty()) return;
+  const bool odd = h.ticks_skipped > 0 || h.restarts > 0;
+  lines->push_back({"  " + Joined(parts, "; "), odd ? Style::kWarning : Style::kPlain});
+}
+
+void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
+  size_t width = 8;
+  for (const auto& process : snapshot.processes) width = std::max(width, process.name.size());
+  lines->push_back(
+      {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
+                   "PROCESS", width, "STATE", "TICK", "TICKS/S", "MEDIAN us", "P99 us", "MAX us",
+                   "LATE", "GAPS", "RESENT", "REFUSED", "DROPPED", "UNSENT", "AGE s"),
+       Style::kTitle});
+  for (const auto& process : snapshot.processes) {
+    if (!process.seen) {
+      lines->push_back(
+          {fmt::format("{:<{}} {}", process.name, width, "not heard of"), Style::kWarning});
+      continue;
+    }
+    const health_t& h = process.health;
+    const bool timed = h.latency_max > 0;  // the recorder answers no one
+    const bool failed = h.state == health_t::STATE_FAILED;
+    const bool stale = process.age > kStale && h.state <= health_t::STATE_RUNNING;
+    lines->push_back(
+        {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
+                     process.name, width, StateName(h.state), Count(h.tick),
+                     Number(process.tick_rate, 1), Number(timed ? h.latency_median : -1, 1),
+                     Number(timed ? h.latency_p99 : -1, 1), Number(timed ? h.latency_max : -1, 1),
+                     h.deadline_misses, h.gaps, h.resends, h.messages_refused, h.messages_dropped,
+                     h.publish_errors, Number(process.age, 1)),
+         failed                           ? Style::kFailure
+         : stale || h.deadline_misses > 0 ? Style::kWarning
+                                          : Style::kPlain});
+    AddRealTime(h, lines);
+    if (!h.detail.empty()) {
+      lines->push_back({fmt::format("  {}", logging::Printable(h.detail)),
+                        failed ? Style::kFailure : Style::kPlain});
+    }
+  }
+}
+
+void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
+  size_t name = 7;
+  size_t type = 4;
+  for (const auto& channel : snapshot.channels) {
+    name = std::max(name, channel.name.size());
+    type = std::max(type, channel.type.size());
+  }
+  lines->push_back({fmt::format("{:<{}} {:<{}}{:>9}{:>9}{:>12}{:>8}{:>8}{:>8}", "CHANNEL", name,
+                                "TYPE", type, "TICK", "MSG/S", "DATA", "B/MSG", "AGE s", "MISSED"),
+                    Style::kTitle});
+  double bytes = 0;
+  double rate = 0;
+  for (const auto& channel : snapshot.channels) {
+    bytes += channel.bytes_per_second;
+    rate += channel.rate;
+    lines->push_back({fmt::format(
+        "{:<{}} {:<{}}{:>9}{:>9.1f}{:>12}{:>8}{:>8}{:>8}", channel.name, name, channel.type, type,
+        Count(channel.tick), channel.rate, Rate(channel.bytes_per_second),
+        channel.bytes_per_message > 0 ? fmt::format("{}", channel.bytes_per_message) : kNothing,
+        Number(channel.age, 2), channel.missed)});
+  }
+  lines->push_back({fmt::format("{:<{}} {:<{}}{:>9}{:>9.1f}{:>12}", "all", name, "", type, "", rate,
+                                Rate(bytes))});
+}
+
+/// SGR sequence of a style.
+const char* Color(Style style) {
+  switch (style) {
+    case Style::kTitle:
+      return "\x1b[7m";
+    case Style::kWarning:
+      return "\x1b[33m";
+    case Style::kFailure:
+      return "\x1b[1;31m";
+    case Style::kPlain:
+      break;
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& names,
+                              const std::string& dir, const LiveSnapshot& snapshot,
+                              int64_t refused) {
+  std::vector<ViewLine> lines;
+  AddHeader(spec, names, dir, snapshot, refused, &lines);
+  lines.emplace_back();
+  AddProcesses(snapshot, &lines);
+  lines.emplace_back();
+  AddChannels(snapshot, &lines);
+  return lines;
+}
+
+std::string PlainText(const std::vector<ViewLine>& lines) {
+  std::string text;
+  for (const ViewLine& line : lines) text += line.text + '\n';
+  return text;
+}
+
+std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows) {
+  const auto width = static_cast<size_t>(std::max(columns, 1));
+  const auto height = static_cast<size_t>(std::max(rows, 1));
+  std::string frame = "\x1b[H";
+  size_t shown = 0;
+  for (const ViewLine& line : lines) {
+    if (shown == height) break;
+    if (line.text.empty() && lines.size() > height) continue;
+    // A line feed after the last would scroll.
+    frame += fmt::format("{}{}{}\x1b[0m\x1b[K", shown == 0 ? "" : "\r\n", Color(line.style),
+                         line.text.substr(0, width));
+    ++shown;
+  }
+  return frame + "\x1b[J";
+}
+
+}  // namespace poise

@@ -1,0 +1,366 @@
+#include "tools/live/view_server.h"
+
+#include <algorithm>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <charconv>
+#include <optional>
+#include <set>
+#include <string_view>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using tcp = asio::ip::tcp;
+using Clock = std::chrono::steady_clock;
+using ErrorCode = boost::system::error_code;
+
+constexpr size_t kMaxConnections = 32;
+constexpr uint32_t kMaxHeader = 16 << 10;      // bytes; browsers send about 1 KB
+constexpr size_t kMaxReceived = 1 << 10;       // bytes a WebSocket message; pages send none
+constexpr size_t kMaxBatch = size_t{1} << 20;  // bytes
+constexpr int kSendBuffer = 256 << 10;         // bytes, in the system
+constexpr std::chrono::seconds kRequestPatience{5};
+constexpr std::chrono::seconds kSendPatience{5};
+constexpr std::chrono::milliseconds kAcceptPause{100};  // when the system has no more sockets
+
+std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
+beast::string_view BeastView(std::string_view text) { return {text.data(), text.size()}; }
+
+/// "127.0.0.1:PORT" or "localhost:PORT": a page of another site that has its name resolve to this
+/// machine sends its own.
+bool IsHere(std::string_view host, int port) {
+  for (const char* name : {"127.0.0.1", "localhost"}) {
+    if (beast::iequals(BeastView(host), fmt::format("{}:{}", name, port))) return true;
+    if (port == 80 && beast::iequals(BeastView(host), name)) return true;
+  }
+  return false;
+}
+
+bool IsOriginHere(std::string_view origin, int port) {
+  constexpr std::string_view kScheme = "http://";
+  return origin.starts_with(kScheme) && IsHere(origin.substr(kScheme.size()), port);
+}
+
+/// "/stream?from=TICK": the tick that a client wants first; 0 without.
+std::optional<int64_t> StreamTarget(std::string_view target) {
+  constexpr std::string_view kPath = "/stream";
+  constexpr std::string_view kFrom = "?from=";
+  if (!target.starts_with(kPath)) return {};
+  target.remove_prefix(kPath.size());
+  if (target.empty()) return 0;
+  if (!target.starts_with(kFrom)) return {};
+  target.remove_prefix(kFrom.size());
+  int64_t tick = 0;
+  const char* const end = target.data() + target.size();
+  const auto [parsed, error] = std::from_chars(target.data(), end, tick);
+  if (error != std::errc() || parsed != end || tick < 0) return {};
+  return tick;
+}
+
+}  // namespace
+
+class ViewServer::Impl {
+ public:
+  Impl(int port, std::string page, const TickRing* ring);
+  ~Impl();
+
+  int port() const { return port_; }
+  int64_t dropped() const { return dropped_; }
+  void RunFor(std::chrono::milliseconds duration) { io_.run_for(duration); }
+  void SendTicks();
+  void SetState(std::string json);
+  void SetStatus(std::string json);
+
+ private:
+  class Client;
+
+  void Accept();
+  std::shared_ptr<const std::string> Batch(int64_t from, int64_t to);
+
+  asio::io_context io_{1};
+  tcp::acceptor acceptor_{io_};
+  asio::steady_timer accept_timer_{io_};
+  int port_ = 0;
+  const std::string page_;
+  const TickRing* ring_;
+  std::shared_ptr<const std::string> state_ = std::make_shared<std::string>();
+  std::shared_ptr<const std::string> status_;
+  // The batch made last: clients that keep up want the same.
+  std::shared_ptr<const std::string> batch_;
+  int64_t batch_from_ = -1;
+  int64_t batch_to_ = -1;
+  int64_t dropped_ = 0;
+  std::set<std::shared_ptr<Client>> clients_;
+};
+
+/// A connection: one HTTP request, which may become the stream. Removes itself when it ends.
+class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
+ public:
+  Client(tcp::socket socket, Impl* server) : stream_(std::move(socket)), server_(server) {}
+
+  void Start() {
+    ErrorCode ignored;  // the default sizes do as well
+    Socket().socket().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+    parser_.header_limit(kMaxHeader);
+    Socket().expires_after(kRequestPatience);
+    http::async_read(Socket(), buffer_, parser_,
+                     [self = shared_from_this()](ErrorCode error, size_t) {
+                       if (error) {
+                         self->Refuse(error);
+                       } else {
+                         self->Answer();
+                       }
+                     });
+  }
+
+  void SendTicks() {
+    if (!streaming_) return;
+    if (sending_ && Clock::now() > send_start_ + kSendPatience) {
+      ++server_->dropped_;
+      Close();
+    } else {
+      Send();
+    }
+  }
+
+  /// Ends it at once.
+  void Close() {
+    ErrorCode ignored;
+    Socket().socket().close(ignored);
+    streaming_ = false;
+    server_->clients_.erase(shared_from_this());
+  }
+
+ private:
+  beast::tcp_stream& Socket() { return stream_.next_layer(); }
+
+  void Refuse(ErrorCode error) {
+    if (error.category() == http::make_error_code(http::error::end_of_stream).category() &&
+        error != http::error::end_of_stream && error != http::error::partial_message) {
+      Respond(http::status::bad_request, "no request that is understood here\n");
+    } else {
+      Close();
+    }
+  }
+
+  void Answer() {
+    const auto& request = parser_.get();
+    const std::string_view target = View(request.target());
+    const auto origin = request.find(http::field::origin);
+    const bool foreign =
+        origin != request.end() && !IsOriginHere(View(origin->value()), server_->port_);
+    if (!IsHere(View(request[http::field::host]), server_->port_) || foreign) {
+      Respond(http::status::forbidden,
+              fmt::format("only for http://127.0.0.1:{}/\n", server_->port_));
+    } else if (websocket::is_upgrade(request)) {
+      const std::optional<int64_t> from = StreamTarget(target);
+      if (from) {
+        Upgrade(*from);
+      } else {
+        Respond(http::status::not_found, "the stream is /stream or /stream?from=TICK\n");
+      }
+    } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
+      Respond(http::status::method_not_allowed, "only GET\n");
+    } else if (target == "/" || target.starts_with("/?")) {
+      Respond(http::status::ok, server_->page_, "text/html; charset=utf-8");
+    } else {
+      Respond(http::status::not_found, "there is only /\n");
+    }
+  }
+
+  /// Sends it and closes. The page is not copied: `body` of other texts is.
+  void Respond(http::status status, std::string_view body,
+               std::string_view type = "text/plain; charset=utf-8") {
+    if (body.data() != server_->page_.data()) {
+      text_ = body;
+      body = text_;
+    }
+    response_.result(status);
+    response_.version(11);
+    response_.keep_alive(false);
+    response_.set(http::field::content_type, BeastView(type));
+    response_.set(http::field::cache_control, "no-store");
+    response_.set(http::field::x_frame_options, "DENY");
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    if (status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, HEAD");
+    response_.body() = beast::span<const char>(body.data(), body.size());
+    response_.content_length(body.size());
+    Socket().expires_after(kRequestPatience);
+    const auto done = [self = shared_from_this()](ErrorCode, size_t) {
+      ErrorCode ignored;
+      self->Socket().socket().shutdown(tcp::socket::shutdown_send, ignored);
+      self->Close();
+    };
+    if (parser_.get().method() == http::verb::head) {
+      http::async_write_header(Socket(), serializer_, done);
+    } else {
+      http::async_write(Socket(), serializer_, done);
+    }
+  }
+
+  void Upgrade(int64_t from) {
+    next_ = from;
+    Socket().expires_never();  // the stream has times of its own
+    websocket::stream_base::timeout times{};
+    times.handshake_timeout = kRequestPatience;
+    times.idle_timeout = 4 * kRequestPatience;  // pings in between: half-open ones end
+    times.keep_alive_pings = true;
+    stream_.set_option(times);
+    stream_.read_message_max(kMaxReceived);
+    stream_.write_buffer_bytes(64 << 10);
+    stream_.auto_fragment(false);
+    stream_.async_accept(parser_.get(), [self = shared_from_this()](ErrorCode error) {
+      if (error) {
+        self->Close();
+        return;
+      }
+      self->streaming_ = true;
+      self->buffer_.clear();
+      self->Receive();
+      self->Send();
+    });
+  }
+
+  /// Pings and the end; a message is none of a page of ours.
+  void Receive() {
+    stream_.async_read(buffer_, [self = shared_from_this()](ErrorCode, size_t) { self->Close(); });
+  }
+
+  void Send() {
+    if (sending_ || !streaming_) return;
+    const TickRing& ring = *server_->ring_;
+    if (sent_state_ != server_->state_) {
+      sent_state_ = outgoing_ = server_->state_;
+      stream_.text(true);
+    } else if (sent_status_ != server_->status_) {
+      sent_status_ = outgoing_ = server_->status_;
+      stream_.text(true);
+    } else if (next_ < ring.end_tick()) {
+      next_ = std::max(next_, ring.first_tick());
+      const int64_t to = std::min(ring.end_tick(), next_ + static_cast<int64_t>(BatchTicks()));
+      outgoing_ = server_->Batch(next_, to);
+      next_ = to;
+      stream_.binary(true);
+    } else {
+      return;
+    }
+    sending_ = true;
+    send_start_ = Clock::now();
+    stream_.async_write(asio::buffer(*outgoing_),
+                        [self = shared_from_this()](ErrorCode error, size_t) {
+                          self->sending_ = false;
+                          if (error) {
+                            self->Close();
+                          } else if (self->Behind()) {
+                            self->Send();
+                          }
+                        });
+  }
+
+  /// By a whole batch: then it does not wait for the next picture.
+  bool Behind() const {
+    const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
+    return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
+           ticks >= static_cast<int64_t>(BatchTicks());
+  }
+  size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
+
+  websocket::stream<beast::tcp_stream> stream_;
+  Impl* server_;
+  beast::flat_buffer buffer_{kMaxHeader + kMaxReceived};
+  http::request_parser<http::empty_body> parser_;
+  http::response<http::span_body<const char>> response_;
+  http::response_serializer<http::span_body<const char>> serializer_{response_};
+  std::string text_;
+  bool streaming_ = false;
+  bool sending_ = false;
+  Clock::time_point send_start_;
+  int64_t next_ = 0;  // tick
+  std::shared_ptr<const std::string> outgoing_;
+  std::shared_ptr<const std::string> sent_state_;
+  std::shared_ptr<const std::string> sent_status_;
+};
+
+ViewServer::Impl::Impl(int port, std::string page, const TickRing* ring)
+    : page_(std::move(page)), ring_(ring) {
+  try {
+    const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), static_cast<uint16_t>(port));
+    acceptor_.open(endpoint.protocol());
+    acceptor_.set_option(tcp::acceptor::reuse_address(true));
+    acceptor_.bind(endpoint);
+    acceptor_.listen();
+    port_ = acceptor_.local_endpoint().port();
+  } catch (const boost::system::system_error& error) {
+    throw ConfigError(
+        fmt::format("--port {}: cannot be had on 127.0.0.1: {}; choose another, or leave it out",
+                    port, error.code().message()));
+  }
+  Accept();
+}
+
+ViewServer::Impl::~Impl() {
+  const auto clients = clients_;
+  for (const auto& client : clients) client->Close();
+}
+
+void ViewServer::Impl::Accept() {
+  acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
+    if (error) {
+      accept_timer_.expires_after(kAcceptPause);
+      accept_timer_.async_wait([this](ErrorCode) { Accept(); });
+      return;
+    }
+    if (clients_.size() < kMaxConnections) {  // else the socket closes
+      const auto client = std::make_shared<Client>(std::move(socket), this);
+      clients_.insert(client);
+      client->Start();
+    }
+    Accept();
+  });
+}
+
+void ViewServer::Impl::SendTicks() {
+  const auto clients = clients_;  // one may end meanwhile
+  for (const auto& client : clients) client->SendTicks();
+}
+
+void ViewServer::Impl::SetState(std::string json) {
+  state_ = std::make_shared<const std::string>(std::move(json));
+}
+
+void ViewServer::Impl::SetStatus(std::string json) {
+  status_ = std::make_shared<const std::string>(std::move(json));
+}
+
+std::shared_ptr<const std::string> ViewServer::Impl::Batch(int64_t from, int64_t to) {
+  if (from != batch_from_ || to != batch_to_) {
+    batch_ = std::make_shared<const std::string>(ring_->Encode(from, to));
+    batch_from_ = from;
+    batch_to_ = to;
+  }
+  return batch_;
+}
+
+ViewServer::ViewServer(int port, std::string page, const TickRing* ring)
+    : impl_(std::make_unique<Impl>(port, std::move(page), ring)) {}
+ViewServer::~ViewServer() = default;
+int ViewServer::port() const { return impl_->port(); }
+void ViewServer::RunFor(std::chrono::milliseconds duration) { impl_->RunFor(duration); }
+int64_t ViewServer::dropped() const { return impl_->dropped(); }
+void ViewServer::SendTicks() { impl_->SendTicks(); }
+void ViewServer::SetState(std::string json) { impl_->SetState(std::move(json)); }
+void ViewServer::SetStatus(std::string json) { impl_->SetStatus(std::move(json)); }
+
+}  // namespace poise

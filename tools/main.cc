@@ -1,0 +1,107 @@
+// The program `poise`: runs, checks and inspects process graphs.
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "components/framework/build_info.h"
+#include "components/framework/configuration.h"
+#include "components/framework/say_error.h"
+#include "components/robot/robot_model.h"
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/cli/command_line.h"
+#include "tools/cli/output_style.h"
+#include "tools/commands/commands.h"
+
+namespace {
+
+void Fail(std::string_view problem) {
+  std::fflush(stdout);
+  poise::SayError(fmt::format("poise: {}", poise::logging::LinesForTerminal(problem)));
+}
+
+/// `code`, or failure where what was printed has not come out: a full disk behind a redirection.
+int Flushed(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  struct stat out {};
+  const bool pipe =
+      fstat(STDOUT_FILENO, &out) == 0 && (S_ISFIFO(out.st_mode) || S_ISSOCK(out.st_mode));
+  if (pipe) return code;  // its reader has what it wanted
+  Fail(fmt::format("standard output: cannot be written: {}", std::strerror(errno)));
+  return code == poise::kExitOk ? poise::kExitFailed : code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
+  poise::UsePlainStreams();
+  CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
+               "poise"};
+  app.set_version_flag("--version", poise::VersionText("poise"));
+  app.require_subcommand(1);
+  app.footer(
+      "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "
+      "wrong usage or configuration.");
+  poise::Command command;
+  poise::AddRunCommand(&app, &command);
+  poise::AddMatrixCommand(&app, &command);
+  poise::AddSweepCommand(&app, &command);
+  poise::AddLimitCommand(&app, &command);
+  poise::AddReportCommand(&app, &command);
+  poise::AddBitsCommand(&app, &command);
+  poise::AddCompareCommand(&app, &command);
+  poise::AddReplayCommand(&app, &command);
+  poise::AddEstimatorsCommand(&app, &command);
+  poise::AddLogCommand(&app, &command);
+  poise::AddNewCommand(&app, &command);
+  poise::AddGraphCommand(&app, &command);
+  poise::AddListCommand(&app, &command);
+  poise::AddDoctorCommand(&app, &command);
+  poise::AddEstopCommand(&app, &command);
+  poise::AddEchoCommand(&app, &command);
+  poise::AddTopCommand(&app, &command);
+  poise::AddViewCommand(&app, &command);
+  try {
+    std::vector<std::string> arguments(argv + 1, argv + argc);
+    if (!arguments.empty() && arguments.front() == "help") {
+      arguments.erase(arguments.begin());
+      arguments.emplace_back("--help");
+    }
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    app.parse(arguments);
+  } catch (const CLI::CallForHelp&) {
+    fmt::print("{}", poise::HelpText(app));
+    return Flushed(poise::kExitOk);
+  } catch (const CLI::CallForVersion& version) {
+    fmt::print("{}\n", version.what());
+    return Flushed(poise::kExitOk);
+  } catch (const CLI::ParseError& error) {
+    if (poise::WantsSubcommand(app, error)) {
+      fmt::print("{}", poise::HelpText(app));
+    } else {
+      Fail(poise::UsageProblem(app, error));
+    }
+    return poise::kExitUsage;
+  }
+  try {
+    return Flushed(command());
+  } catch (const poise::ConfigError& error) {
+    Fail(error.what());
+    return poise::kExitUsage;
+  } catch (const poise::robot::RobotError& error) {
+    Fail(error.what());
+    return poise::kExitUsage;
+  } catch (const std::exception& error) {
+    Fail(error.what());
+    return poise::kExitFailed;
+  }
+}

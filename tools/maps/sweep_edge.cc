@@ -1,0 +1,248 @@
+#include "tools/maps/sweep_edge.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "fmt/format.h"
+#include "tools/cli/text_table.h"
+#include "tools/maps/sweep_labels.h"
+#include "tools/sweep/sweep_points.h"
+#include "tools/sweep/sweep_table.h"
+
+namespace poise {
+namespace {
+
+constexpr double kTelling = 0.7;  // of a variable's range: failures spread wider tell nothing
+constexpr size_t kMostStretches = 6;
+
+/// Runs at one value of the variable, of which some may stand.
+struct Level {
+  int runs = 0, standing = 0;
+  bool stands() const { return standing == runs; }
+};
+using Levels = std::map<double, Level>;
+
+class Sentences {
+ public:
+  Sentences(const SweepHeader& header, const SweepRows& rows)
+      : header_(header), rows_(rows), points_(header.sweep) {
+    for (const auto& [key, row] : rows) standing_ += row.stands() ? 1 : 0;
+  }
+
+  std::vector<std::string> OfSweep() const;
+  std::vector<std::string> OfLimits() const;
+
+ private:
+  const Variable& variable(size_t i) const { return header_.sweep.vary(static_cast<int>(i)); }
+  size_t count() const { return static_cast<size_t>(header_.sweep.vary_size()); }
+  bool IsNumber(size_t i) const { return variable(i).choice_size() == 0; }
+  static std::string Quantity(double value, const std::string& unit) {
+    // What a unit says beside itself ("m, from the expected") stands at the axis.
+    const std::string short_unit = unit.substr(0, unit.find(','));
+    return short_unit == "°" ? FormatNumber(value) + "°" : FormatNumber(value, short_unit);
+  }
+  std::string Place(const std::vector<SweepValue>& point, std::optional<size_t> without) const;
+  std::string Stretches(const Levels& levels, bool standing, const std::string& unit) const;
+  std::string Along(size_t i) const;
+  std::string AlongInGroups(size_t i, const std::map<std::string, Levels>& groups) const;
+  std::optional<size_t> Graded() const;
+  std::string Failures(size_t i) const;
+
+  const SweepHeader& header_;
+  const SweepRows& rows_;
+  SweepPoints points_;
+  size_t standing_ = 0;
+};
+
+/// "direction 90°, law paper".
+std::string Sentences::Place(const std::vector<SweepValue>& point,
+                             std::optional<size_t> without) const {
+  std::string place;
+  for (size_t i = 0; i < point.size(); ++i) {
+    if (i == without) continue;
+    const std::string value =
+        IsNumber(i) ? Quantity(point[i].number, UnitOf(variable(i))) : points_.Text(i, point[i]);
+    place += fmt::format("{}{} {}", place.empty() ? "" : ", ", PlainName(variable(i)), value);
+  }
+  return place;
+}
+
+/// "50 to 190 N, 230 N": neighbouring levels at which all runs stand, or not all.
+std::string Sentences::Stretches(const Levels& levels, bool standing,
+                                 const std::string& unit) const {
+  std::vector<std::pair<double, double>> stretches;
+  bool on = false;
+  for (const auto& [value, level] : levels) {
+    if (level.stands() != standing) {
+      on = false;
+      continue;
+    }
+    if (!on) stretches.emplace_back(value, value);
+    stretches.back().second = value;
+    on = true;
+  }
+  std::string text;
+  for (size_t i = 0; i < stretches.size(); ++i) {
+    if (i == kMostStretches) return text + fmt::format(" and {} more", stretches.size() - i);
+    const auto& [from, to] = stretches[i];
+    text += i == 0 ? "" : ", ";
+    text += from == to ? Quantity(from, unit)
+                       : fmt::format("{} to {}", FormatNumber(from), Quantity(to, unit));
+  }
+  return text;
+}
+
+/// The variable along which survival is told: the last number that is no angle.
+std::optional<size_t> Sentences::Graded() const {
+  std::optional<size_t> graded;
+  for (size_t i = 0; i < count(); ++i) {
+    if (IsNumber(i) && (!variable(i).angle() || count() == 1)) graded = i;
+  }
+  return graded;
+}
+
+std::string Sentences::AlongInGroups(size_t i, const std::map<std::string, Levels>& groups) const {
+  const std::string name = PlainName(variable(i)), unit = UnitOf(variable(i));
+  std::optional<std::pair<double, std::string>> least, most;  // up to which value it stands, where
+  size_t all = 0, none = 0, broken = 0;
+  for (const auto& [place, levels] : groups) {
+    const auto edge =
+        std::ranges::find_if(levels, [](const auto& l) { return !l.second.stands(); });
+    if (edge == levels.end()) {
+      ++all;
+    } else if (edge == levels.begin()) {
+      ++none;
+    } else {
+      const double value = std::prev(edge)->first;
+      if (!least || value < least->first) least = {value, place};
+      if (!most || value > most->first) most = {value, place};
+    }
+    broken +=
+        std::any_of(edge, levels.end(), [](const auto& l) { return l.second.stands(); }) ? 1 : 0;
+  }
+  std::string text;
+  if (least) {
+    text = least->first == most->first
+               ? fmt::format("It stands up to a {} of {}, wherever it falls at all", name,
+                             Quantity(least->first, unit))
+               : fmt::format("It stands up to a {} of {} at the least ({}), of {} at the most ({})",
+                             name, Quantity(least->first, unit), least->second,
+                             Quantity(most->first, unit), most->second);
+  }
+  const auto add = [&](size_t number, const std::string& what) {
+    if (number == 0) return;
+    text += fmt::format("{}{} of {} places {}", text.empty() ? "In " : "; in ", number,
+                        groups.size(), what);
+  };
+  add(all, "it stands at every value");
+  add(none, fmt::format("not even at {}", Quantity(groups.begin()->second.begin()->first, unit)));
+  add(broken, "it stands again beyond a value at which it does not");
+  return text + ".";
+}
+
+std::string Sentences::Along(size_t i) const {
+  std::map<std::string, Levels> groups;  // by the other variables
+  for (const auto& [key, row] : rows_) {
+    const std::vector<SweepValue> point = points_.At(row.run);
+    Level& level = groups[Place(point, i)][point[i].number];
+    ++level.runs;
+    level.standing += row.stands() ? 1 : 0;
+  }
+  if (groups.size() > 1) return AlongInGroups(i, groups);
+  const Levels& levels = groups.begin()->second;
+  const std::string unit = UnitOf(variable(i));
+  return fmt::format("{}: stands at {}; does not at {}.", PlainName(variable(i)),
+                     Stretches(levels, true, unit), Stretches(levels, false, unit));
+}
+
+/// Where the runs that do not stand lie, if that is a part of the range; else empty.
+std::string Sentences::Failures(size_t i) const {
+  double low = INFINITY, high = -INFINITY, from = INFINITY, to = -INFINITY;
+  for (const auto& [key, row] : rows_) {
+    const double value = points_.At(row.run)[i].number;
+    low = std::min(low, value);
+    high = std::max(high, value);
+    if (row.stands()) continue;
+    from = std::min(from, value);
+    to = std::max(to, value);
+  }
+  if (!(to - from < kTelling * (high - low))) return "";
+  const std::string unit = UnitOf(variable(i));
+  return fmt::format("{} {} to {} (drawn from {} to {})", PlainName(variable(i)),
+                     FormatNumber(from), Quantity(to, unit), FormatNumber(low),
+                     Quantity(high, unit));
+}
+
+std::vector<std::string> Sentences::OfSweep() const {
+  const size_t runs = rows_.size();
+  if (runs == 0) return {"No run is there yet."};
+  if (standing_ == runs) return {fmt::format("All {} runs stand.", runs)};
+  if (standing_ == 0) return {fmt::format("None of {} runs stands.", runs)};
+  std::vector<std::string> sentences = {
+      fmt::format("{} of {} runs stand, {} do not.", standing_, runs, runs - standing_)};
+  if (!header_.sweep.has_random()) {
+    if (const auto graded = Graded()) sentences.push_back(Along(*graded));
+    return sentences;
+  }
+  std::string where;
+  for (size_t i = 0; i < count(); ++i) {
+    const std::string text = IsNumber(i) ? Failures(i) : "";
+    if (!text.empty()) where += (where.empty() ? "" : "; ") + text;
+  }
+  if (!where.empty()) sentences.push_back("Those that do not have " + where + ".");
+  return sentences;
+}
+
+std::vector<std::string> Sentences::OfLimits() const {
+  const Limit& limit = header_.sweep.limit();
+  const std::string name = PlainName(limit), unit = UnitOf(limit);
+  std::optional<std::pair<double, std::string>> least, most;
+  size_t none = 0, open = 0, broken = 0;
+  const std::vector<LimitPoint> found = LimitPoints(header_, rows_);
+  if (found.empty()) return {"No run is there yet."};
+  for (const LimitPoint& point : found) {
+    const std::optional<double> value = point.search.limit();
+    open += value && !point.search.fails_at() ? 1 : 0;
+    broken += point.search.monotone() ? 0 : 1;
+    if (!value) {
+      ++none;
+      continue;
+    }
+    const std::string place = Place(points_.At(point.run), {});
+    if (!least || *value < least->first) least = {*value, place};
+    if (!most || *value > most->first) most = {*value, place};
+  }
+  const auto at = [](const std::string& place) {
+    return place.empty() ? "" : fmt::format(" ({})", place);
+  };
+  std::vector<std::string> sentences;
+  if (least && least->first == most->first) {
+    sentences.push_back(fmt::format("The largest {} survived is {}{}.", name,
+                                    Quantity(least->first, unit),
+                                    found.size() == 1 ? at(least->second) : ""));
+  } else if (least) {
+    sentences.push_back(fmt::format("The largest {} survived is between {}{} and {}{}.", name,
+                                    Quantity(least->first, unit), at(least->second),
+                                    Quantity(most->first, unit), at(most->second)));
+  }
+  const auto add = [&](size_t number, const std::string& what) {
+    if (number > 0) {
+      sentences.push_back(fmt::format("At {} of {} points {}.", number, found.size(), what));
+    }
+  };
+  add(none, fmt::format("not even {} is survived", Quantity(limit.min(), unit)));
+  add(open, fmt::format("{} is survived, the most that was tried", Quantity(limit.max(), unit)));
+  add(broken, "something beyond the limit is survived again");
+  return sentences;
+}
+
+}  // namespace
+
+std::vector<std::string> SurvivalSentences(const SweepHeader& header, const SweepRows& rows) {
+  const Sentences sentences(header, rows);
+  return header.sweep.has_limit() ? sentences.OfLimits() : sentences.OfSweep();
+}
+
+}  // namespace poise

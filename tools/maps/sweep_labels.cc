@@ -1,0 +1,73 @@
+#include "tools/maps/sweep_labels.h"
+
+#include <algorithm>
+#include <regex>
+#include <vector>
+
+#include "fmt/format.h"
+#include "logging/metrics.h"
+#include "tools/reference/field_reference.h"
+#include "tools/sweep/sweep_points.h"
+
+namespace poise {
+namespace {
+
+std::string Words(std::string text) {
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
+}
+
+/// "peak of push[0]" of "sim_ode.push[0].peak".
+std::string WordsOfField(const std::string& field) {
+  const size_t last = field.rfind('.');
+  if (last == std::string::npos) return Words(field);
+  const size_t before = field.rfind('.', last - 1);
+  const size_t begin = before == std::string::npos ? 0 : before + 1;
+  return fmt::format("{} of {}", Words(field.substr(last + 1)),
+                     Words(field.substr(begin, last - begin)));
+}
+
+/// Of a field of the scenario, "sim_ode.push[0].peak"; empty when its schema says none.
+std::string UnitOfField(const std::string& field) {
+  static const std::vector<FieldEntry> fields = FieldReference(Schema::kScenario);
+  static const std::regex index("\\[[0-9]+\\]");
+  const std::string path = std::regex_replace(field, index, "[i]");
+  const auto known =
+      std::ranges::find_if(fields, [&](const FieldEntry& entry) { return entry.path == path; });
+  return known == fields.end() ? "" : known->unit;
+}
+
+template <class Quantity>
+std::string PlainNameOf(const Quantity& quantity) {
+  return quantity.has_name() ? Words(quantity.name()) : WordsOfField(quantity.field());
+}
+
+}  // namespace
+
+std::string PlainName(const Variable& variable) { return PlainNameOf(variable); }
+std::string PlainName(const Limit& limit) { return PlainNameOf(limit); }
+
+std::string UnitOf(const Variable& variable) {
+  if (variable.has_unit()) return variable.unit();
+  return variable.angle() ? "°" : UnitOfField(variable.field());
+}
+
+std::string UnitOf(const Limit& limit) {
+  return limit.has_unit() ? limit.unit() : UnitOfField(limit.field());
+}
+
+std::string WithUnit(const std::string& name, const std::string& unit) {
+  return unit.empty() ? name : fmt::format("{} [{}]", name, unit);
+}
+
+std::string MetricLabel(const std::string& metric) {
+  const logging::Metric* const known = logging::FindMetric(metric);
+  return known == nullptr ? metric : known->description;
+}
+
+std::string MetricUnit(const std::string& metric) {
+  const logging::Metric* const known = logging::FindMetric(metric);
+  return known == nullptr ? "" : known->unit;
+}
+
+}  // namespace poise

@@ -1,0 +1,26 @@
+// What a sweep's variables and metrics are called in maps: words and units instead of paths.
+#pragma once
+
+#include <string>
+
+#include "tools/sweep/sweep.pb.h"
+
+namespace poise {
+
+/// "direction", or "peak of push[0]" for the field sim_ode.push[0].peak.
+std::string PlainName(const Variable& variable);
+std::string PlainName(const Limit& limit);
+
+/// Of the variable itself, else of the scenario's field that it sets; "°" of an angle; may be
+/// empty.
+std::string UnitOf(const Variable& variable);
+std::string UnitOf(const Limit& limit);
+
+/// "direction [°]"; "seed" without a unit.
+std::string WithUnit(const std::string& name, const std::string& unit);
+
+/// A metric's name and unit: in words; a name that this version does not know stays.
+std::string MetricLabel(const std::string& metric);
+std::string MetricUnit(const std::string& metric);
+
+}  // namespace poise

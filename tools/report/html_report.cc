@@ -1,0 +1,249 @@
+#include "tools/report/html_report.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <sstream>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "logging/column_codec.h"
+#include "logging/events.h"
+#include "logging/partial_file.h"
+#include "logging/signal_table.h"
+#include "tools/robot/robot_json.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view kDataMark = "<!--POISE-RUN-DATA-->";
+
+/// build/web/report.html, beside build/PRESET/bin/poise.
+fs::path TemplatePath() {
+  return fs::read_symlink("/proc/self/exe").parent_path() / ".." / ".." / "web" / "report.html";
+}
+
+std::string ReadTemplate() {
+  const fs::path path = TemplatePath();
+  std::ifstream in(path, std::ios::binary);
+  std::stringstream text;
+  if (!in || !(text << in.rdbuf())) {
+    throw ConfigError(
+        fmt::format("{}: the page of reports is not built; run deploy/setup, or give --no-html",
+                    path.lexically_normal().string()));
+  }
+  if (text.view().find(kDataMark) == std::string_view::npos) {
+    throw ConfigError(fmt::format("{}: is no template of a report; run deploy/setup",
+                                  path.lexically_normal().string()));
+  }
+  return text.str();
+}
+
+/// JSON that can stand in a <script>: any bytes that logs hold, and no tag.
+std::string ScriptText(const Json& json) {
+  std::string text;
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
+Json ScenarioJson(const Scenario& scenario) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;  // with the defaults of what is not set
+  options.preserve_proto_field_names = true;
+  std::string text;
+  const auto status = google::protobuf::util::MessageToJsonString(scenario, &text, options);
+  if (!status.ok()) {
+    throw ConfigError(fmt::format("scenario: cannot be written as JSON: {}", status.ToString()));
+  }
+  return Json::parse(text);
+}
+
+/// A file that remembers why the first of its writes failed.
+class PageFile final : public std::filebuf {
+ public:
+  int problem() const { return problem_; }
+
+ protected:
+  int_type overflow(int_type c) override {
+    const int_type result = std::filebuf::overflow(c);
+    if (result == traits_type::eof()) Note();
+    return result;
+  }
+  std::streamsize xsputn(const char* data, std::streamsize size) override {
+    const std::streamsize written = std::filebuf::xsputn(data, size);
+    if (written != size) Note();
+    return written;
+  }
+  int sync() override {
+    const int result = std::filebuf::sync();
+    if (result != 0) Note();
+    return result;
+  }
+
+ private:
+  void Note() {
+    if (problem_ == 0) problem_ = errno;
+  }
+  int problem_ = 0;  // errno
+};
+
+/// Packs columns and writes each distinct one once, as an element of the page.
+class BlobWriter {
+ public:
+  BlobWriter(std::ostream* out, size_t run) : out_(out), run_(run) {}
+
+  /// {"value"} of a column of one value, else {"blob", "step", "order"}.
+  Json Add(std::span<const double> values, bool integer) {
+    const double first = values.front();
+    if (std::ranges::all_of(values, [first](double x) { return x == first; })) {
+      return {{"value", first}};
+    }
+    if (std::ranges::none_of(values, [](double x) { return std::isfinite(x); })) {
+      return {{"value", nullptr}};
+    }
+    logging::PackedColumn column = logging::PackColumn(values, integer);
+    const auto [blob, added] =
+        blobs_.try_emplace(std::move(column.data), fmt::format("run{}-{}", run_, blobs_.size()));
+    if (added) {
+      *out_ << "<script type=\"application/octet-stream\" id=\"" << blob->second << "\">"
+            << blob->first << "</script>\n";
+    }
+    return {{"blob", blob->second}, {"step", column.step}, {"order", column.order}};
+  }
+
+ private:
+  std::ostream* out_;
+  size_t run_;
+  std::map<std::string, std::string> blobs_;  // id by content
+};
+
+Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t num_ticks,
+                  BlobWriter* blobs) {
+  Json json = Json::array();
+  for (const logging::ChannelColumns& channel : channels) {
+    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.ticks.size()}};
+    if (static_cast<int64_t>(channel.ticks.size()) != num_ticks) {
+      const std::vector<double> ticks(channel.ticks.begin(), channel.ticks.end());
+      item["ticks"] = blobs->Add(ticks, true);
+    }
+    item["signals"] = Json::array();
+    for (const logging::SignalColumn& column : channel.columns) {
+      Json signal = {{"field", column.field}, {"integer", column.integer}};
+      signal.update(blobs->Add(column.values, column.integer));
+      item["signals"].push_back(std::move(signal));
+    }
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
+/// The log's name in its folder: a page says nothing of the rest of the machine.
+std::string LogName(const std::string& log) {
+  const fs::path path = fs::weakly_canonical(fs::absolute(log));
+  return (path.parent_path().filename() / path.filename()).string();
+}
+
+/// What a page knows of a run beside its ticks.
+Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
+              const std::vector<CheckResult>& checks) {
+  Json json;
+  json["format"] = 1;
+  json["run"] = PageRunJson(record, scenario, checks);
+  json["scenario"] = ScenarioJson(scenario);
+  json["scenario_text"] = record.info.scenario;
+  json["robot"] = RobotJson(record);
+  json["events"] = Json::array();
+  return json;
+}
+
+void WriteMetadata(const Json& json, std::ostream* out) {
+  *out << "<script type=\"application/json\" class=\"poise-run\">" << ScriptText(json)
+       << "</script>\n";
+}
+
+void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
+  Json json = Metadata(run.record, run.scenario, run.checks);
+  json["run"]["log"] = LogName(run.log);
+  json["events"] = EventsJson(logging::Events(run.record));
+  BlobWriter blobs(out, index);
+  json["channels"] =
+      ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
+  WriteMetadata(json, out);
+}
+
+/// The template with what `write` says of its runs.
+void WritePage(std::ostream* out, const std::function<void()>& write) {
+  const std::string page = ReadTemplate();
+  const size_t mark = page.find(kDataMark);
+  *out << std::string_view(page).substr(0, mark);
+  write();
+  *out << std::string_view(page).substr(mark + kDataMark.size());
+}
+
+}  // namespace
+
+Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
+                 const std::vector<CheckResult>& checks) {
+  Json json = RunJson(scenario, record, checks);
+  json["run_id"] = std::to_string(record.spec.run_id());  // beyond a double's integers
+  json["damages"] = record.damages;
+  return json;
+}
+
+void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
+  for (const ReportedRun& run : runs) {
+    std::error_code other;
+    if (!fs::equivalent(file, run.log, other)) continue;
+    throw ConfigError(
+        fmt::format("{}: is the log itself; name another file with --html", file.string()));
+  }
+  std::optional<logging::PartialFile> partial;
+  try {
+    partial.emplace(file.string());
+  } catch (const logging::LogError& error) {
+    throw ConfigError(fmt::format("{}; name another file with --html", error.what()));
+  }
+  PageFile page;
+  page.open(partial->part(), std::ios::out | std::ios::binary);
+  std::ostream out(&page);
+  WritePage(&out, [&] {
+    for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
+  });
+  out.flush();
+  if (!out || page.close() == nullptr) {
+    const int problem = page.problem() != 0 ? page.problem() : errno;
+    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with --html",
+                                  file.string(), std::strerror(problem)));
+  }
+  partial->Keep();
+}
+
+std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario, Json channels,
+                     int64_t keep) {
+  Json json = Metadata(record, scenario, {});
+  json["channels"] = std::move(channels);
+  json["live"] = {{"keep", keep}};
+  std::ostringstream out;
+  WritePage(&out, [&] { WriteMetadata(json, &out); });
+  return std::move(out).str();
+}
+
+}  // namespace poise

@@ -1,0 +1,39 @@
+// A run as one page that opens from disk: docs/report-format.md.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "logging/run_record.h"
+#include "tools/report/report.h"
+#include "tools/scenario/scenario.pb.h"
+
+namespace poise {
+
+/// One run of a page: its log, what was read from it, and its scenario as it was run.
+struct ReportedRun {
+  std::string log;
+  logging::RunRecord record;
+  Scenario scenario;
+  std::vector<CheckResult> checks;
+};
+
+/// What a page says of a run beside its messages: RunJson, and of its log.
+nlohmann::ordered_json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
+                                   const std::vector<CheckResult>& checks);
+
+/// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
+/// template is not built, `file` cannot be written or is a log; LogError for a log that is gone. A
+/// page that is not finished leaves `file` as it was.
+void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
+
+/// The page of a run in progress: no ticks, which come from its stream. `channels` as in
+/// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not
+/// built.
+std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario,
+                     nlohmann::ordered_json channels, int64_t keep);
+
+}  // namespace poise

@@ -1,0 +1,138 @@
+#include "tools/report/realtime_verdict.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "components/framework/timing.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+constexpr char kFollowMetric[] = "bridge_not_running_ticks";
+
+bool WantOfCommand(int8_t reason) {
+  return reason == bridge_status_t::REASON_NO_COMMAND ||
+         reason == bridge_status_t::REASON_COMMAND_STALE ||
+         reason == bridge_status_t::REASON_CYCLE_OVERRUN;
+}
+
+std::string Grouped(int64_t number) {
+  std::string text = std::to_string(number);
+  for (int i = static_cast<int>(text.size()) - 3; i > 0; i -= 3) {
+    text.insert(static_cast<size_t>(i), 1, ',');
+  }
+  return text;
+}
+
+std::string MachineLine(const MachineVerdict& machine) {
+  if (!machine.known) return "machine: not known, its report is missing\n";
+  std::string text =
+      fmt::format("machine: {} of {} cycles late", Grouped(machine.late), Grouped(machine.cycles));
+  if (machine.latest > 0) text += fmt::format(", worst {:.1f} ms", machine.latest * 1e3);
+  const MachineLoad& load = machine.load;
+  text += fmt::format("\n  {:.1f} processes (at most {}) wanted one of its {} CPUs, load {:.1f}",
+                      load.runnable, load.runnable_max, load.cpus, load.load);
+  if (load.pressure)
+    text += fmt::format(",\n  one had to wait in {:.0f} % of the time", 100 * *load.pressure);
+  return text + "\n";
+}
+
+}  // namespace
+
+MachineVerdict JudgeMachine(const RunSpec& spec, const RunOutcome& outcome) {
+  MachineVerdict verdict;
+  if (!spec.realtime() || !outcome.machine) return verdict;
+  verdict.load = *outcome.machine;
+  for (int i = 0; i < static_cast<int>(outcome.processes.size()); ++i) {
+    const health_t& health = outcome.processes[static_cast<size_t>(i)].health;
+    verdict.skipped = std::max(verdict.skipped, health.ticks_skipped);
+    if (TimingOf(spec, i) != Timing::kOwner) continue;
+    verdict.known = health.ticks_completed > 0;
+    verdict.cycles = health.ticks_completed;
+    verdict.late = health.deadline_misses;
+    const double overlong = health.latency_max * 1e-6 - spec.tick_period();
+    verdict.latest = std::max({0.0, health.lateness_max * 1e-6, overlong});
+  }
+  return verdict;
+}
+
+LostTicks CountLostTicks(const logging::RunRecord& run) {
+  LostTicks lost;
+  if (!run.spec.realtime()) return lost;
+  bool wrong = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const joint_command_t* command = run.command.at(tick);
+    wrong =
+        wrong || (command != nullptr && command->status == joint_command_t::STATUS_INVALID_INPUT);
+    const bridge_status_t* bridge = run.bridge.at(tick);
+    if (bridge == nullptr || bridge->state == bridge_status_t::STATE_RUNNING) continue;
+    ++lost.ticks;
+    lost.late += WantOfCommand(bridge->reason) ? 1 : 0;
+  }
+  if (wrong) lost.late = 0;
+  return lost;
+}
+
+bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lost) {
+  const auto failed = [](const CheckResult& check) { return !check.passed; };
+  const auto by_machine = [&](const CheckResult& check) {
+    return check.passed || check.name == kFollowMetric;
+  };
+  return std::ranges::any_of(checks, failed) && std::ranges::all_of(checks, by_machine) &&
+         lost.ticks > 0 && lost.late == lost.ticks;
+}
+
+std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
+                           const std::vector<CheckResult>& checks, const LostTicks& lost) {
+  if (!spec.realtime() || outcome.processes.empty()) return "";
+  std::string text;
+  if (outcome.crane_let_go) {
+    text += fmt::format("crane: let go at {:.3f} s\n", *outcome.crane_let_go);
+  }
+  text += MachineLine(JudgeMachine(spec, outcome));
+  const auto limited = [](const CheckResult& check) { return check.limited(); };
+  const auto holds = [](const CheckResult& check) { return check.limited() && check.passed; };
+  const auto number = std::ranges::count_if(checks, limited);
+  const auto good = std::ranges::count_if(checks, holds);
+  if (number == 0) {
+    return text + fmt::format("controller: {}\n",
+                              outcome.completed ? "the robot stood to the end" : outcome.message);
+  }
+  text += fmt::format("controller: {} of {} checks hold\n", good, number);
+  if (lost.ticks > 0 && lost.late == lost.ticks) {
+    text += fmt::format(
+        "  the bridge did not follow in {} ticks for want of a command in time, not for a wrong "
+        "one:\n  {}\n",
+        lost.ticks,
+        outcome.faults.empty() ? "the machine was late"
+                               : fmt::format("{} faults were injected, or the machine was late",
+                                             outcome.faults.size()));
+  }
+  return text;
+}
+
+nlohmann::ordered_json RealtimeJson(const RunSpec& spec, const RunOutcome& outcome,
+                                    const LostTicks& lost) {
+  const MachineVerdict machine = JudgeMachine(spec, outcome);
+  if (!machine.known) return nullptr;
+  const MachineLoad& load = machine.load;
+  nlohmann::ordered_json json;
+  json["cycles"] = machine.cycles;
+  json["late_cycles"] = machine.late;
+  json["latest"] = machine.latest;
+  json["skipped_ticks"] = machine.skipped;
+  json["cpus"] = load.cpus;
+  json["load"] = load.load;
+  json["runnable"] = load.runnable;
+  json["runnable_max"] = load.runnable_max;
+  json["cpu_pressure"] =
+      load.pressure ? nlohmann::ordered_json(*load.pressure) : nlohmann::ordered_json(nullptr);
+  json["crane_let_go"] = outcome.crane_let_go ? nlohmann::ordered_json(*outcome.crane_let_go)
+                                              : nlohmann::ordered_json(nullptr);
+  json["ticks_not_followed"] = lost.ticks;
+  json["for_want_of_a_command_in_time"] = lost.late;
+  return json;
+}
+
+}  // namespace poise

@@ -1,0 +1,42 @@
+// What a run in real time owes to the machine, and what to the controller.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+#include "logging/run_record.h"
+#include "tools/report/report.h"
+#include "tools/report/run_outcome.h"
+
+namespace poise {
+
+/// The clock's owner and what the machine let it do, over the whole run, its lead included.
+struct MachineVerdict {
+  bool known = false;  ///< false: not in real time, or nobody reported
+  int64_t cycles = 0;
+  int64_t late = 0;     ///< that ended after the next one was to begin
+  double latest = 0;    ///< s, after its time, of the latest begin or end
+  int64_t skipped = 0;  ///< ticks that a component was too late to work on, the worst component's
+  MachineLoad load;
+};
+
+MachineVerdict JudgeMachine(const RunSpec& spec, const RunOutcome& outcome);
+
+LostTicks CountLostTicks(const logging::RunRecord& run);
+
+/// True when checks failed, and only those that a command that is late fails by itself: the bridge
+/// did not follow for want of one.
+bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lost);
+
+/// Lines "crane:", "machine:" and "controller:" of a run in real time; empty of another.
+/// `checks`: none without a log.
+std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
+                           const std::vector<CheckResult>& checks, const LostTicks& lost);
+
+/// The same for summary.json; null of a run that was not in real time.
+nlohmann::ordered_json RealtimeJson(const RunSpec& spec, const RunOutcome& outcome,
+                                    const LostTicks& lost);
+
+}  // namespace poise

@@ -1,0 +1,44 @@
+// How a run ended.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "poise/health_t.hpp"
+#include "tools/report/machine_load.h"
+
+namespace poise {
+
+/// A fault that the launcher caused on purpose.
+struct InjectedFault {
+  std::string component;
+  bool killed = false;   ///< SIGKILL; else SIGSTOP for 100 ms
+  double time = 0;       ///< s of wall time, in the scenario's time
+  double regained = -1;  ///< s until control was regained; 0: no command was late; -1: not in time
+  int32_t cycles = 0;    ///< longest age of a command meanwhile
+};
+
+/// What a process of a run says of itself at the end, and its memory.
+struct ProcessReport {
+  health_t health;
+  int64_t resident_first = 0;  ///< bytes, 10 s after the start; 0: the run was shorter
+  int64_t resident_last = 0;   ///< bytes
+};
+
+struct RunOutcome {
+  bool completed = false;    ///< the planned end was reached, or a component ended the run well
+  bool interrupted = false;  ///< by a signal
+  std::string message;       ///< why the run ended; empty after the planned end
+  std::vector<std::string> details;  ///< last lines of the output of the process at fault
+  int64_t refused = 0;               ///< packets that the launcher refused on the service port
+  std::vector<InjectedFault> faults;
+  std::vector<ProcessReport> processes;  ///< in the graph's order; none of a run in one process
+  int32_t takeovers = 0;                 ///< processes that took the place of one that died
+  std::optional<MachineLoad> machine;    ///< in real time
+  std::optional<double> crane_let_go;    ///< s of the scenario's time; empty: no crane, or not yet
+  double wall_time = 0;                  ///< s, from the start command to the last tick
+};
+
+}  // namespace poise

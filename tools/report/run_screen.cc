@@ -1,0 +1,192 @@
+#include "tools/report/run_screen.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <string_view>
+
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/cli/text_table.h"
+#include "tools/report/run_story.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kFailures = 5;         // named in lines of their own
+constexpr size_t kFailuresInALine = 3;  // named in one line
+
+std::string Paragraph(const std::string& text) {
+  return text.empty() ? "" : Wrapped(logging::LinesForTerminal(text), ScreenStyle().columns) + "\n";
+}
+
+std::string Sentences(const ShownRun& run) {
+  std::string text = Paragraph(TellRun(run.record, run.checks, run.events, run.end));
+  for (const std::string& note : run.notes) text += Paragraph(note);
+  return text;
+}
+
+struct Count {
+  size_t limited = 0;
+  std::vector<const CheckResult*> failed;
+};
+
+Count CountChecks(const std::vector<CheckResult>& checks) {
+  Count count;
+  for (const CheckResult& check : checks) {
+    if (!check.limited()) continue;
+    ++count.limited;
+    if (!check.passed) count.failed.push_back(&check);
+  }
+  return count;
+}
+
+std::string Failure(const CheckResult& check) {
+  return logging::ForTerminal(fmt::format("{} ({}) measured {}, limit {}", check.label, check.name,
+                                          FormatMeasured(check), FormatLimit(check)));
+}
+
+std::string Hold(const Count& count) {
+  return fmt::format("{} of {} checks hold", count.limited - count.failed.size(), count.limited);
+}
+
+/// What this run has of the paper, or of its scenario.
+std::string ShortTable(const std::vector<CheckResult>& checks) {
+  const bool paper = std::any_of(checks.begin(), checks.end(),
+                                 [](const CheckResult& check) { return !check.paper.empty(); });
+  std::vector<TableRow> rows = {{"what", "measured", paper ? "paper" : "limit", ""}};
+  for (const CheckResult& check : checks) {
+    const bool shown = paper ? !check.paper.empty() : check.limited() && !check.of_every_run;
+    if (!shown) continue;
+    rows.push_back({check.label, FormatMeasured(check), paper ? check.paper : FormatLimit(check),
+                    VerdictCell(check)});
+  }
+  return rows.size() == 1 ? "" : FormatColumns(rows);
+}
+
+bool SameFile(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) && !error;
+}
+
+}  // namespace
+
+std::string FormatScreen(const ShownRun& run) {
+  const std::string table = ShortTable(run.checks);
+  return Sentences(run) + (table.empty() ? table : fmt::format("\n{}", table));
+}
+
+std::string FormatFullScreen(const ShownRun& run) {
+  return fmt::format("{}\n{}\n{}{}", Sentences(run), FormatTable(run.checks),
+                     logging::LinesForTerminal(FormatEvents(run.events)),
+                     logging::LinesForTerminal(FormatAssumptions(run.scenario)));
+}
+
+std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem) {
+  const Count count = CountChecks(checks);
+  if (problem.empty() && count.failed.empty()) {
+    return count.limited == 0 ? "passed" : fmt::format("passed: {}", Hold(count));
+  }
+  std::vector<std::string> parts;
+  if (!problem.empty()) parts.push_back(problem);
+  if (count.failed.empty() && count.limited > 0) parts.push_back(Hold(count));
+  for (size_t i = 0; i < std::min(count.failed.size(), kFailuresInALine); ++i) {
+    const std::string of =
+        i == 0 ? fmt::format("{} of {}: ", count.failed.size(), count.limited) : "";
+    parts.push_back(of + Failure(*count.failed[i]));
+  }
+  if (count.failed.size() > kFailuresInALine) {
+    parts.push_back(fmt::format("and {} more", count.failed.size() - kFailuresInALine));
+  }
+  return fmt::format("FAILED: {}", Joined(parts, "; "));
+}
+
+std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem) {
+  const Count count = CountChecks(checks);
+  const int width = ScreenStyle().columns;
+  if (problem.empty() && count.failed.empty()) {
+    return Toned(FormatVerdict(checks, problem), Tone::kGood) + "\n";
+  }
+  std::string text;
+  if (!problem.empty()) {
+    text += Toned(Wrapped(fmt::format("FAILED: {}", problem), width, 2), Tone::kBad) + "\n";
+  }
+  if (count.failed.empty()) {
+    if (count.limited > 0) text += Hold(count) + "\n";
+    return text;
+  }
+  const std::string failed =
+      fmt::format("FAILED: {} of {} checks", count.failed.size(), count.limited);
+  text += (problem.empty()
+               ? Toned(failed, Tone::kBad)
+               : fmt::format("{} of {} checks failed", count.failed.size(), count.limited)) +
+          "\n";
+  for (size_t i = 0; i < std::min(count.failed.size(), kFailures); ++i) {
+    text += Wrapped(fmt::format("  {}", Failure(*count.failed[i])), width, 4) + "\n";
+  }
+  if (count.failed.size() > kFailures) {
+    text +=
+        fmt::format("  and {} more, in the full table (--full)\n", count.failed.size() - kFailures);
+  }
+  return text;
+}
+
+std::string FormatNext(const Scenario& scenario, const fs::path& dir, bool latest) {
+  const std::string program = ProgramName();
+  const std::string whole = fs::absolute(dir).lexically_normal().string();
+  const std::string near = fs::proximate(dir).string();
+  const std::string run =
+      latest ? "" : fmt::format(" {}", near.size() < whole.size() ? near : whole);
+  std::string text = "\nLook further:\n";
+  const auto add = [&](const std::string& command, const std::string& what) {
+    text += fmt::format("  {} {}\n", program, Toned(command, Tone::kStrong));
+    text += Wrapped(fmt::format("      {}", what), ScreenStyle().columns, 6) + "\n";
+  };
+  add(fmt::format("report{}", run),
+      fmt::format("draws the run, step by step: {}", FileAddress(dir / "report.html")));
+  const int assumptions = scenario.assumption_size();
+  add(fmt::format("report{} --full", run),
+      fmt::format("every figure and event{}",
+                  assumptions == 0 ? ""
+                                   : fmt::format(", and the {} values that the paper does not give",
+                                                 assumptions)));
+  const std::vector<std::string> known = ListNames("scenarios");
+  if (std::find(known.begin(), known.end(), scenario.name()) != known.end()) {
+    add(fmt::format("matrix {}", scenario.name()), "the same without each part of the controller");
+  }
+  return text;
+}
+
+std::string ProgramName() {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  if (error) return "poise";
+  const char* const path = std::getenv("PATH");
+  const std::string_view folders = path == nullptr ? "" : path;
+  for (size_t begin = 0; begin < folders.size();) {
+    const size_t end = std::min(folders.find(':', begin), folders.size());
+    const fs::path candidate = fs::path(folders.substr(begin, end - begin)) / "poise";
+    begin = end + 1;
+    if (!fs::exists(candidate, error)) continue;
+    if (SameFile(candidate, self)) return "poise";
+    break;  // another one is called by that name
+  }
+  const std::string near = fs::proximate(self, error).string();
+  return error || near.starts_with("..") ? self.string() : near;
+}
+
+std::string FileAddress(const fs::path& file) {
+  std::string address = "file://";
+  for (const char c : fs::absolute(file).lexically_normal().string()) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain =
+        std::isalnum(byte) != 0 || std::string_view("/-_.~+,=@").find(c) != std::string_view::npos;
+    address += plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
+  }
+  return address;
+}
+
+}  // namespace poise

@@ -1,0 +1,49 @@
+// What the terminal shows of a run that has ended.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "logging/events.h"
+#include "logging/run_record.h"
+#include "tools/report/report.h"
+#include "tools/scenario/scenario.pb.h"
+
+namespace poise {
+
+/// A run to be shown. The references outlive it.
+struct ShownRun {
+  const Scenario& scenario;
+  const logging::RunRecord& record;
+  const std::vector<CheckResult>& checks;
+  const std::vector<logging::Event>& events;
+  std::string end;  ///< why it ended, where its starter knows more than the log
+  /// Paragraphs after the two sentences: what the machine did, as opposed to the controller.
+  std::vector<std::string> notes = {};
+};
+
+/// Two sentences, the notes, and the rows that the paper has a figure for (of a scenario without
+/// such: its own checks).
+std::string FormatScreen(const ShownRun& run);
+
+/// The same with every row, the events and the assumptions.
+std::string FormatFullScreen(const ShownRun& run);
+
+/// "passed: 22 of 22 checks hold", or "FAILED: 1 of 22: NAME measured X, limit Y", one line.
+/// `problem`: what else made the run fail; empty when nothing did.
+std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem);
+
+/// The same for a person: what failed by name in lines of its own, in colour.
+std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem);
+
+/// Where to look next, for a run in `dir`; `latest`: the commands find it without a name.
+std::string FormatNext(const Scenario& scenario, const std::filesystem::path& dir, bool latest);
+
+/// How this program is called from here: "poise" when $PATH has it, else its shortest path.
+std::string ProgramName();
+
+/// The address of a file, for a browser: "file:///home/me/report.html".
+std::string FileAddress(const std::filesystem::path& file);
+
+}  // namespace poise

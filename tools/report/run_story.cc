@@ -1,0 +1,273 @@
+#include "tools/report/run_story.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/contact_history.h"
+#include "logging/metrics.h"
+#include "tools/cli/text_table.h"
+
+namespace poise {
+namespace {
+
+using logging::Event;
+using logging::RunRecord;
+
+constexpr size_t kFigures = 3;   // in the second sentence
+constexpr size_t kTroubles = 4;  // likewise
+constexpr size_t kSupports = 5;  // named one by one
+
+struct Words {
+  std::string_view name;
+  std::string_view words;  // {} stands for the figure, or for the event's detail
+};
+
+constexpr Words kTrouble[] = {
+    {"contact_early", "contact came early ({})"},
+    {"contact_late", "contact came late ({})"},
+    {"searching", "a foot searched for the ground ({})"},
+    {"no_surface", "a foot found no ground ({})"},
+    {"contact_lost", "contact was lost ({})"},
+    {"eta_infeasible_begins", "no distribution between the feet met all conditions"},
+    {"cop_not_achieved_begins", "the centre of pressure could not be kept in its limits"},
+    {"step_needed", "the capture point left the soles, which only a step can answer"},
+    {"bridge_state", "the bridge went from {}"},
+};
+
+constexpr Words kFigure[] = {
+    {"com_error_max_x", "its centre of mass strayed up to {} to the front or back"},
+    {"com_error_max_y", "its centre of mass strayed up to {} to the side"},
+    {"com_error_true_max_y", "its centre of mass strayed up to {} to the side"},
+    {"com_motion_max", "its centre of mass moved by up to {}"},
+    {"left_foot_error_max_y", "the left foot strayed up to {} to the side"},
+    {"right_foot_error_max_y", "the right foot strayed up to {} to the side"},
+    {"balancing_first", "balancing set in at {}"},
+    {"balancing_last", "balancing was last on at {}"},
+    {"balancing_active", "balancing was on for {}"},
+    {"joint_torque_share", "its joints used at most {} of their torque"},
+    {"foot_tangential_force_computed_max", "a foot pulled sideways with at most {}"},
+    {"foot_yaw_moment_computed_max", "a foot twisted with at most {}"},
+    {"torque_step_at_switch", "the torques jumped by at most {} as the support changed"},
+    {"torque_step_at_switch_reference", "without the ramp by {}"},
+    {"foot_lift_motion_z", "the unloaded foot moved by {}"},
+};
+
+template <size_t N>
+const Words* Find(const Words (&list)[N], std::string_view name) {
+  const auto found =
+      std::find_if(list, list + N, [&](const Words& words) { return words.name == name; });
+  return found == list + N ? nullptr : found;
+}
+
+std::string Seconds(double time) { return fmt::format("{:.3f} s", time); }
+
+/// "from the right", "from behind and the left", of a force in the robot's frame.
+std::string Direction(const Eigen::Vector3d& force) {
+  constexpr double kAside = 0.38;  // of the force: within 22 degrees of the other axis
+  const double size = force.norm();
+  std::vector<std::string> sides;
+  if (std::abs(force.x()) > kAside * size) {
+    sides.emplace_back(force.x() > 0 ? "behind" : "the front");
+  }
+  if (std::abs(force.y()) > kAside * size) {
+    sides.emplace_back(force.y() > 0 ? "the right" : "the left");
+  }
+  if (sides.empty()) sides.emplace_back(force.z() > 0 ? "below" : "above");
+  return fmt::format("from {}", Joined(sides, " and "));
+}
+
+/// "pushed from the right with 188.9 N at 0.404 s"; empty without a push.
+std::string Pushes(const RunRecord& run, const std::vector<Event>& events) {
+  int count = 0;
+  int64_t at = 0;
+  double largest = -1;
+  for (const Event& event : events) {
+    if (event.name != "push_peak") continue;
+    ++count;
+    const int64_t tick = std::llround(event.time / run.spec.tick_period());
+    const external_push_t* push = run.push.at(tick);
+    if (push == nullptr) continue;
+    const double size = GetVector3(push->force).norm();
+    if (size > largest) largest = size, at = tick;
+  }
+  if (largest < 0) return "";
+  Eigen::Vector3d force = GetVector3(run.push.at(at)->force);
+  if (const robot_state_t* state = run.state.at(at)) {
+    const Eigen::Quaterniond body(state->base_orientation[0], state->base_orientation[1],
+                                  state->base_orientation[2], state->base_orientation[3]);
+    const Eigen::Vector3d ahead = body * Eigen::Vector3d::UnitX();
+    const double heading = std::atan2(ahead.y(), ahead.x());
+    force = Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()) * force;
+  }
+  const std::string push = fmt::format("{} with {} at {}", Direction(force),
+                                       fmt::format("{:.1f} N", largest), Seconds(run.time(at)));
+  return count == 1 ? fmt::format("pushed {}", push)
+                    : fmt::format("pushed {} times, hardest {}", count, push);
+}
+
+/// "on both feet", "went from both feet to the left foot and".
+struct SupportStory {
+  std::string moves;  ///< empty: it never changed
+  std::string last;   ///< empty: not known
+};
+
+SupportStory Supports(const RunRecord& run) {
+  const auto name = [&](const std::array<bool, 2>& contacts) {
+    const std::string support = logging::SupportName(run, contacts);
+    return support == "both feet" || support == "no foot" ? support
+                                                          : fmt::format("the {}", support);
+  };
+  const std::vector<logging::SupportChange> changes = logging::SupportChanges(run);
+  if (changes.empty()) {
+    for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+      const joint_command_t* command = run.command.at(tick);
+      if (command == nullptr || command->num_feet < 2) continue;
+      return {"", name({command->in_contact[0] != 0, command->in_contact[1] != 0})};
+    }
+    return {};
+  }
+  std::string moves;
+  if (changes.size() < kSupports) {
+    moves = fmt::format("went from {}", name(changes.front().before));
+    for (const logging::SupportChange& change : changes)
+      moves += fmt::format(" to {}", name(change.after));
+  } else {
+    moves = fmt::format("changed its support {} times", changes.size());
+  }
+  return {moves, name(changes.back().after)};
+}
+
+/// What the simulator says of a fall in brackets: "(body tilt 0.71 rad)".
+std::string HowItFell(const RunRecord& run) {
+  const std::string reason = EndReason(run);
+  const size_t begin = reason.find('(');
+  if (reason.find("fell") == std::string::npos || begin == std::string::npos) return "";
+  return fmt::format(" {}", reason.substr(begin));
+}
+
+std::string Capital(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] += 'A' - 'a';
+  return text;
+}
+
+std::string Fill(std::string_view words, const std::string& text) {
+  std::string filled(words);
+  const size_t place = filled.find("{}");
+  if (place != std::string::npos) filled.replace(place, 2, text);
+  return filled;
+}
+
+/// The first of each kind of trouble before the fall; empty when there was none.
+std::string TroubleBefore(double fall, const std::vector<Event>& events) {
+  std::vector<std::string_view> seen;
+  std::vector<std::string> parts;
+  for (const Event& event : events) {
+    if (event.time > fall || parts.size() == kTroubles) break;
+    const Words* const words = Find(kTrouble, event.name);
+    if (words == nullptr || std::find(seen.begin(), seen.end(), event.name) != seen.end()) continue;
+    // At its start the bridge comes to follow: no trouble.
+    if (event.name == "bridge_state" && !event.detail.starts_with("running")) continue;
+    seen.emplace_back(words->name);
+    parts.push_back(fmt::format("at {} {}", Seconds(event.time), Fill(words->words, event.detail)));
+  }
+  if (parts.empty()) return "Nothing else went wrong before it fell.";
+  return fmt::format("Before it fell: {}.", Joined(parts, "; "));
+}
+
+std::string Figure(const CheckResult& check) {
+  const Words* const words = Find(kFigure, check.name);
+  const std::string measured = FormatMeasured(check);
+  const std::string paper = check.paper.empty() ? "" : fmt::format("paper: {}", check.paper);
+  std::string text = words != nullptr ? Fill(words->words, measured)
+                                      : fmt::format("{}: {}", check.label, measured);
+  return paper.empty() ? text : fmt::format("{} ({})", text, paper);
+}
+
+/// Where the bridge no longer followed though the robot did not fall, an emergency stop for one.
+std::string BridgeTrouble(const std::vector<Event>& events) {
+  for (const Event& event : events) {
+    if (event.name != "bridge_state" || !event.detail.starts_with("running")) continue;
+    return fmt::format("; at {} the bridge went from {}", Seconds(event.time), event.detail);
+  }
+  return "";
+}
+
+/// Figures beside the paper's; those of any run where the scenario has none.
+std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks) {
+  std::vector<std::string> parts;
+  for (const CheckResult& check : checks) {
+    const bool beside = !check.paper.empty() && check.measured && !check.unit.empty();
+    // What was done to the robot is in the first sentence.
+    if (!beside || check.name.starts_with("push_") || parts.size() == kFigures) continue;
+    parts.push_back(Figure(check));
+  }
+  if (!parts.empty()) return Capital(Joined(parts, "; ")) + ".";
+  for (const char* name :
+       {"com_error_max_x", "com_error_max_y", "balancing_active", "joint_torque_share"}) {
+    const logging::Metric* const metric = logging::FindMetric(name);
+    CheckResult figure;
+    figure.name = name;
+    figure.unit = metric->unit;
+    figure.measured = metric->compute(run);
+    if (figure.measured && parts.size() < kFigures) parts.push_back(Figure(figure));
+  }
+  return parts.empty() ? "" : Capital(Joined(parts, "; ")) + ".";
+}
+
+}  // namespace
+
+bool IsTrouble(std::string_view event) { return Find(kTrouble, event) != nullptr; }
+
+std::string EndReason(const RunRecord& run) {
+  std::string reason;
+  for (const auto& [component, health] : run.health) {
+    if (health.detail.empty() || health.state < health_t::STATE_FINISHED) continue;
+    if (reason.empty() || health.state == health_t::STATE_FAILED) {
+      reason = fmt::format("{}: {}", component, health.detail);
+    }
+  }
+  return reason;
+}
+
+std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks,
+                    const std::vector<Event>& events, const std::string& end) {
+  const auto fall = std::find_if(events.begin(), events.end(),
+                                 [](const Event& event) { return event.name == "fall"; });
+  const double planned = run.time(run.spec.num_ticks());
+  const double reached = run.time(run.num_ticks);
+  const bool early = run.spec.num_ticks() > run.num_ticks;
+  const std::string pushes = Pushes(run, events);
+  const SupportStory support = Supports(run);
+  std::string first = pushes.empty() ? "the robot" : pushes + ", the robot";
+  if (!support.moves.empty()) first += fmt::format(" {},", support.moves);
+  const std::string and_ = support.moves.empty() ? "" : " and";
+  const char* const stood = run.truth.empty() ? "ran" : "stood";  // else nobody saw whether it fell
+  if (run.spec.has_cut()) {
+    const double begin = run.time(run.spec.cut().first_tick());
+    return Capital(fmt::format("{} {}. The log is a part of a run: {} to {} of {}.", first,
+                               fall != events.end() ? "fell" : stood, Seconds(begin),
+                               Seconds(reached), Seconds(planned)));
+  }
+  if (fall != events.end()) {
+    first += fmt::format("{} fell at {} of {}{}", and_, Seconds(fall->time),
+                         FormatNumber(planned, "s"), HowItFell(run));
+    return fmt::format("{}. {}", Capital(first), TroubleBefore(fall->time, events));
+  }
+  const std::string reason = end.empty() ? EndReason(run) : end;
+  const std::string on =
+      support.moves.empty() && !support.last.empty() ? fmt::format(" on {}", support.last) : "";
+  if (early) {
+    first +=
+        fmt::format("{} {}{} until the run ended at {} of {}{}", and_, stood, on, Seconds(reached),
+                    FormatNumber(planned, "s"), reason.empty() ? "" : fmt::format(": {}", reason));
+  } else {
+    first += fmt::format("{} {}{} to the end, {}", and_, stood, on, FormatNumber(reached, "s"));
+  }
+  first += BridgeTrouble(events);
+  const std::string figures = Figures(run, checks);
+  return fmt::format("{}.{}{}", Capital(first), figures.empty() ? "" : " ", figures);
+}
+
+}  // namespace poise

@@ -1,0 +1,27 @@
+// What happened in a run, in two sentences.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "logging/events.h"
+#include "logging/run_record.h"
+#include "tools/report/report.h"
+#include "tools/scenario/scenario.pb.h"
+
+namespace poise {
+
+/// True for an event (logging::Events) that tells of something wrong before a run's end.
+bool IsTrouble(std::string_view event);
+
+/// Where the run's end was not the planned one: why, as its components say; empty when none does.
+std::string EndReason(const logging::RunRecord& run);
+
+/// What happened to the robot; then what went wrong first, where it fell, or else its figures,
+/// beside the paper's where the scenario gives them. Everything comes from the run itself. `end`:
+/// why the run ended, where its starter knows more than the log; empty otherwise.
+std::string TellRun(const logging::RunRecord& run, const std::vector<CheckResult>& checks,
+                    const std::vector<logging::Event>& events, const std::string& end);
+
+}  // namespace poise

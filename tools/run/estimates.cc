@@ -1,0 +1,87 @@
+#include "tools/run/estimates.h"
+
+#include <algorithm>
+#include <string_view>
+
+#include "components/framework/clock.h"
+#include "components/framework/graph.h"
+#include "components/framework/run.h"
+#include "components/state_estimator/state_estimator.pb.h"
+#include "fmt/format.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+template <class Message, class Port>
+Port* FindPort(const std::vector<Port*>& ports) {
+  const auto found = std::find_if(ports.begin(), ports.end(), [](const Port* port) {
+    return std::string_view(port->type_name()) == Message::getTypeName();
+  });
+  return *found;  // state_estimator has one of each type
+}
+
+// The message counts the methods as the configuration does.
+static_assert(int{estimator_status_t::METHOD_ANCHORED_FEET} == StateEstimatorConfig::ANCHORED_FEET);
+static_assert(int{estimator_status_t::METHOD_INVARIANT_EKF} == StateEstimatorConfig::INVARIANT_EKF);
+
+}  // namespace
+
+std::optional<int> EstimatorOf(const RunSpec& spec) {
+  for (int i = 0; i < spec.graph().component_size(); ++i) {
+    if (TypeOf(spec.graph().component(i)) == "state_estimator") return i;
+  }
+  return {};
+}
+
+Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) {
+  const int index = EstimatorOf(spec).value();
+  const std::string& name = spec.graph().component(index).name();
+  ChangeConfiguration(fmt::format("{}.method={}", name,
+                                  StateEstimatorConfig::Method_Name(
+                                      static_cast<StateEstimatorConfig::Method>(method))),
+                      &spec);
+  SharedObjects shared;
+  const ConfiguredComponent estimator =
+      ConfigureComponent(spec, index, *Components().Find("state_estimator"), &shared);
+  InputPort* sensors = FindPort<robot_sensors_t>(estimator.wiring.inputs());
+  const OutputPort* state = FindPort<robot_state_t>(estimator.wiring.outputs());
+  const OutputPort* status = FindPort<estimator_status_t>(estimator.wiring.outputs());
+  auto estimates = std::make_shared<logging::Estimates>();
+  int64_t ticks = 0, time = 0;
+  for (int64_t t = 0; t < run.num_ticks; ++t) {
+    const robot_sensors_t* readings = run.sensors.at(t);
+    if (readings == nullptr) continue;  // as in a run that skips ticks
+    sensors->Bind(readings);
+    const Tick tick = MakeTick(t, spec.tick_period(), spec.lead_ticks());
+    for (OutputPort* output : estimator.wiring.outputs()) {
+      output->Stamp(spec.run_id(), tick.index, tick.utime);
+    }
+    const int64_t start = NowNanoseconds();
+    for (const Stage& stage : estimator.wiring.stages()) stage.run(tick);
+    time += NowNanoseconds() - start;
+    ++ticks;
+    estimates->state.Set(t, *static_cast<const robot_state_t*>(state->message()));
+    estimates->status.Set(t, *static_cast<const estimator_status_t*>(status->message()));
+  }
+  sensors->Bind(nullptr);
+  const double tick_time =
+      ticks > 0 ? 1e-3 * static_cast<double>(time) / static_cast<double>(ticks) : 0;
+  return {std::move(estimates), tick_time};
+}
+
+void AddOtherEstimates(std::span<const logging::Metric* const> metrics, logging::RunRecord* run) {
+  const bool needed = std::ranges::any_of(
+      metrics, [](const logging::Metric* metric) { return metric->needs_other_estimates; });
+  if (!needed || run->sensors.empty() || run->truth.empty() || !EstimatorOf(run->spec)) return;
+  const estimator_status_t* ran = nullptr;
+  for (int64_t t = 0; t < run->num_ticks && ran == nullptr; ++t) ran = run->estimator.at(t);
+  for (size_t method = 0; method < run->other_estimates.size(); ++method) {
+    const int m = static_cast<int>(method);
+    if (ran != nullptr && ran->method == m) continue;
+    run->other_estimates[method] = Reestimate(run->spec, m, *run).estimates;
+  }
+}
+
+}  // namespace poise

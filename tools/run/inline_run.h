@@ -1,0 +1,17 @@
+// Runs a graph inside this process.
+#pragma once
+
+#include <string>
+
+#include "components/framework/graph.pb.h"
+#include "tools/cli/progress.h"
+#include "tools/report/run_outcome.h"
+
+namespace poise {
+
+/// Runs to the end or until a stop signal, with the log in `log_path`; a run in real time is paced
+/// with the wall clock. Throws ConfigError or LogError.
+RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
+                     const std::string& log_path, Progress* progress);
+
+}  // namespace poise

@@ -1,0 +1,143 @@
+#include "tools/run/run_dir.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+
+#include "components/framework/configuration.h"
+#include "fmt/chrono.h"
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "logging/run_info.h"
+#include "tools/cli/output_place.h"
+#include "tools/run/run_registry.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kFiles[] = {"run.lcm",        "summary.json",   "recorder.json",
+                                  "run_spec.pbtxt", "scenario.pbtxt", "report.html"};
+
+/// The folder or log that `run` means. Throws ConfigError.
+fs::path FindRun(const std::string& run) {
+  const fs::path path = run.empty() ? RunsDir() / "latest" : fs::path(run);
+  if (!fs::exists(path)) {
+    if (!run.empty()) throw ConfigError(fmt::format("{}: no such log or run folder", run));
+    const fs::path ended = LatestEndedRun();  // elsewhere, or with --out
+    throw ConfigError(fmt::format("there is no run in {} yet; {}", RunsDir().string(),
+                                  ended.empty()
+                                      ? "start one with poise run"
+                                      : fmt::format("name the folder of one; the last was in {}",
+                                                    logging::ForTerminal(ended.string()))));
+  }
+  return path;
+}
+
+}  // namespace
+
+fs::path RunsDir() {
+  if (const char* const dir = std::getenv("POISE_RUNS_DIR"); dir != nullptr && *dir != '\0') {
+    return fs::absolute(dir);
+  }
+  std::error_code error;
+  const fs::path here = fs::current_path();
+  const fs::path home = fs::canonical(DeployDir(), error).parent_path();
+  if (error) return here / "runs";
+  const fs::path within = here.lexically_relative(home);
+  return (within.empty() || *within.begin() == ".." ? here : home) / "runs";
+}
+
+RunDir::RunDir(fs::path path)
+    : path_(std::move(path)), fd_(open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (fd_ >= 0 && flock(fd_, LOCK_EX | LOCK_NB) == 0) return;
+  const int problem = errno;
+  if (fd_ >= 0) close(fd_);
+  throw ConfigError(fmt::format(
+      "{}: {}", path_.string(),
+      problem == EWOULDBLOCK
+          ? "a run is going on in this folder; choose another with --out, or wait for its end"
+          : fmt::format("cannot be locked: {}", std::strerror(problem))));
+}
+
+RunDir::~RunDir() {
+  if (fd_ >= 0) close(fd_);
+}
+
+RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {
+  std::error_code error;
+  if (!out.empty()) {
+    const fs::path path = fs::absolute(out);
+    fs::create_directories(path, error);
+    if (error || !fs::is_directory(path)) {
+      throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
+                                    error ? error.message() : "there is a file of that name"));
+    }
+    RunDir dir(path);
+    CheckFolderFree("--out", out, force);
+    for (const char* file : kFiles) {
+      fs::remove(path / file, error);
+      fs::remove(ReferenceDir(path) / file, error);
+    }
+    fs::remove(ReferenceDir(path), error);  // if it is empty
+    return dir;
+  }
+  const std::string dated =
+      fmt::format("{:%Y-%m-%d-%H%M%S}-{}", fmt::localtime(std::time(nullptr)), name);
+  fs::create_directories(RunsDir(), error);
+  for (int i = 1; i < 1000 && !error; ++i) {
+    const fs::path path = RunsDir() / (i == 1 ? dated : fmt::format("{}-{}", dated, i));
+    if (fs::create_directory(path, error)) return RunDir(path);
+  }
+  throw ConfigError(
+      fmt::format("{}: cannot be made: {}; go to a folder of your own, or name one with --out",
+                  (RunsDir() / dated).string(), error.message()));
+}
+
+fs::path ReferenceDir(const fs::path& dir) { return dir / "reference"; }
+
+void PointLatestTo(const fs::path& dir) {
+  const fs::path target = dir.lexically_relative(RunsDir());
+  if (target.empty() || *target.begin() == "..") return;
+  std::error_code error;  // a convenience: a run is good without it
+  // Replaced in one step: another program always finds one.
+  const fs::path next = RunsDir() / fmt::format(".latest-{}", getpid());
+  fs::create_directory_symlink(target, next, error);
+  fs::rename(next, RunsDir() / "latest", error);
+  if (error) fs::remove(next, error);
+}
+
+fs::path FindLog(const std::string& run) {
+  fs::path path = FindRun(run);
+  if (!fs::is_directory(path)) return path;
+  path /= "run.lcm";
+  if (!fs::exists(path)) {
+    throw ConfigError(fmt::format("{}: is missing: that run has not begun, or never came to start",
+                                  path.string()));
+  }
+  return path;
+}
+
+void WarnOfRunInfo(const fs::path& log) {
+  const std::string warning = logging::RunInfoWarning(log.string());
+  if (!warning.empty()) fmt::print(stderr, "warning: {}\n", logging::ForTerminal(warning));
+}
+
+RunSpec ReadRunSpec(const std::string& run) {
+  fs::path path = FindRun(run);
+  if (!fs::is_directory(path)) path = path.parent_path();
+  path /= "run_spec.pbtxt";
+  RunSpec spec;
+  ReadTextProto(path.string(), &spec);
+  return spec;
+}
+
+}  // namespace poise

@@ -1,0 +1,301 @@
+#include "tools/run/run_registry.h"
+
+#include <fcntl.h>
+#include <pwd.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+
+#include "components/framework/configuration.h"
+#include "components/framework/graph.pb.h"
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/run/live_run.h"
+#include "tools/run/run_dir.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kDirPrefix[] = "poise-";  // then the user's number
+constexpr char kRunPrefix[] = "run-";    // then the process's number and a random text
+constexpr char kNewPrefix[] = ".new-";   // until it is locked and whole
+constexpr char kEnded[] = "ended";
+constexpr double kMinute = 60;  // s
+constexpr size_t kLongestPath = 1 << 16;
+
+/// A file that is closed with this.
+class Fd {
+ public:
+  explicit Fd(int fd) : fd_(fd) {}
+  ~Fd() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Fd(const Fd&) = delete;
+  Fd& operator=(const Fd&) = delete;
+  int get() const { return fd_; }
+  int release() { return std::exchange(fd_, -1); }
+
+ private:
+  int fd_;
+};
+
+fs::path SharedDir(uid_t user) { return fmt::format("/tmp/{}{}", kDirPrefix, user); }
+
+/// True for a folder, not a link, that belongs to `user`: nobody else has put it there.
+bool BelongsTo(const fs::path& dir, uid_t user) {
+  struct stat status {};
+  return lstat(dir.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == user;
+}
+
+bool WriteAll(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = write(fd, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    text.remove_prefix(static_cast<size_t>(written));
+  }
+  return true;
+}
+
+std::string ReadAll(int fd) {
+  std::string text(kLongestPath, '\0');
+  const ssize_t size = pread(fd, text.data(), text.size(), 0);
+  text.resize(size > 0 ? static_cast<size_t>(size) : 0);
+  return text;
+}
+
+/// True while another process holds the entry's lock.
+bool Held(int fd) { return flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK; }
+
+std::string UserName(uid_t user) {
+  const passwd* const entry = getpwuid(user);
+  return entry != nullptr ? entry->pw_name : fmt::format("{}", user);
+}
+
+/// What the run's folder says of it.
+void Describe(RunningRun* run) {
+  try {
+    const RunSpec spec = ReadRunSpec(run->dir.string());
+    run->scenario = spec.scenario();
+    run->run_id = spec.run_id();
+    run->networked = spec.first_port() != 0;
+  } catch (const ConfigError&) {
+    run->readable = false;
+  }
+}
+
+double AgeOf(const struct stat& status) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count() - static_cast<double>(status.st_mtim.tv_sec) -
+         1e-9 * static_cast<double>(status.st_mtim.tv_nsec);
+}
+
+/// The entry of a run that has died becomes that of the latest that ended, or goes.
+void Retire(const fs::path& file, const struct stat& status) {
+  const fs::path ended = file.parent_path() / kEnded;
+  struct stat before {};
+  const bool newer =
+      lstat(ended.c_str(), &before) != 0 || before.st_mtim.tv_sec <= status.st_mtim.tv_sec;
+  if (!newer || rename(file.c_str(), ended.c_str()) != 0) unlink(file.c_str());
+}
+
+/// Adds the runs that are registered in a folder of `user`'s.
+void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
+  if (!BelongsTo(dir, user)) return;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(dir, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kRunPrefix) && !name.starts_with(kNewPrefix)) continue;
+    const Fd fd(open(entry.path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    struct stat status {};
+    if (fd.get() < 0 || fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode) ||
+        status.st_uid != user) {
+      continue;
+    }
+    if (name.starts_with(kNewPrefix)) {
+      // A run was killed as it registered.
+      if (user == geteuid() && AgeOf(status) > kMinute) unlink(entry.path().c_str());
+      continue;
+    }
+    if (!Held(fd.get())) {
+      if (user == geteuid()) Retire(entry.path(), status);
+      continue;
+    }
+    RunningRun run;
+    run.dir = ReadAll(fd.get());
+    run.user = UserName(user);
+    run.own = user == geteuid() || geteuid() == 0;
+    run.age = AgeOf(status);
+    const bool known = std::any_of(runs->begin(), runs->end(),
+                                   [&](const RunningRun& other) { return other.dir == run.dir; });
+    if (run.dir.empty() || known) continue;
+    Describe(&run);
+    runs->push_back(std::move(run));
+  }
+}
+
+/// Folders of /tmp in which other users' runs may be registered, with the users.
+std::vector<std::pair<fs::path, uid_t>> OtherUsersDirs() {
+  std::vector<std::pair<fs::path, uid_t>> dirs;
+  if (std::getenv("POISE_RUNTIME_DIR") != nullptr) return dirs;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/tmp", error)) {
+    if (!entry.path().filename().string().starts_with(kDirPrefix)) continue;
+    struct stat status {};
+    if (lstat(entry.path().c_str(), &status) != 0 || status.st_uid == geteuid()) continue;
+    if (entry.path() == SharedDir(status.st_uid)) dirs.emplace_back(entry.path(), status.st_uid);
+  }
+  return dirs;
+}
+
+}  // namespace
+
+std::vector<fs::path> RegistryDirs() {
+  if (const char* const dir = std::getenv("POISE_RUNTIME_DIR"); dir != nullptr && *dir != '\0') {
+    return {dir};
+  }
+  std::vector<fs::path> dirs;
+  // That of another user stays in the environment of `sudo -E` and `su`.
+  const auto add = [&](const fs::path& own) {
+    if (!own.is_absolute() || !BelongsTo(own, geteuid())) return;
+    const fs::path dir = own / "poise";
+    if (std::find(dirs.begin(), dirs.end(), dir) == dirs.end()) dirs.push_back(dir);
+  };
+  if (const char* const xdg = std::getenv("XDG_RUNTIME_DIR"); xdg != nullptr) add(xdg);
+  // Also when the environment does not tell, as under cron.
+  add(fmt::format("/run/user/{}", geteuid()));
+  dirs.push_back(SharedDir(geteuid()));
+  return dirs;
+}
+
+RunRegistration::RunRegistration(const fs::path& run_dir) {
+  std::error_code error;
+  fs::path dir = fs::canonical(run_dir, error);
+  if (error) dir = fs::absolute(run_dir);
+  for (const fs::path& registry : RegistryDirs()) {
+    // Others may look, to find a run that another user started.
+    if (mkdir(registry.c_str(), 0755) != 0 && errno != EEXIST) continue;
+    if (!BelongsTo(registry, geteuid())) continue;
+    // Locked before it has its name, so that nobody takes it for a run that has died.
+    std::string file = (registry / kNewPrefix).string() + "XXXXXX";
+    Fd fd(mkostemp(file.data(), O_CLOEXEC));
+    if (fd.get() < 0) continue;
+    const fs::path name =
+        registry / fmt::format("{}{}-{}", kRunPrefix, getpid(), file.substr(file.size() - 6));
+    if (flock(fd.get(), LOCK_EX | LOCK_NB) != 0 || fchmod(fd.get(), 0644) != 0 ||
+        !WriteAll(fd.get(), dir.native()) || rename(file.c_str(), name.c_str()) != 0) {
+      unlink(file.c_str());
+      continue;
+    }
+    entries_.push_back({name, fd.release()});
+  }
+  if (entries_.empty()) {
+    fmt::print(stderr,
+               "warning: this run cannot be registered in {}; poise estop, top, echo and view need "
+               "its folder: {}\n",
+               RegistryDirs().back().string(), logging::ForTerminal(dir.string()));
+  }
+}
+
+RunRegistration::~RunRegistration() {
+  for (const Entry& entry : entries_) {
+    futimens(entry.fd, nullptr);  // when it ended
+    const fs::path ended = entry.file.parent_path() / kEnded;
+    if (rename(entry.file.c_str(), ended.c_str()) != 0) unlink(entry.file.c_str());
+    close(entry.fd);
+  }
+}
+
+std::vector<RunningRun> RunningRuns() {
+  std::vector<RunningRun> runs;
+  for (const fs::path& dir : RegistryDirs()) AddRuns(dir, geteuid(), &runs);
+  for (const auto& [dir, user] : OtherUsersDirs()) AddRuns(dir, user, &runs);
+  std::error_code error;
+  const fs::path latest = fs::canonical(RunsDir() / "latest", error);
+  const bool known = std::any_of(runs.begin(), runs.end(),
+                                 [&](const RunningRun& run) { return run.dir == latest; });
+  struct stat status {};
+  if (!error && !known && RunInProgress(latest) && stat(latest.c_str(), &status) == 0) {
+    RunningRun run;
+    run.dir = latest;
+    run.user = UserName(status.st_uid);
+    run.age = AgeOf(status);
+    Describe(&run);
+    runs.push_back(std::move(run));
+  }
+  std::sort(runs.begin(), runs.end(),
+            [](const RunningRun& a, const RunningRun& b) { return a.age < b.age; });
+  return runs;
+}
+
+fs::path LatestEndedRun() {
+  fs::path newest;
+  double least = 0;
+  std::error_code error;
+  const auto take = [&](const fs::path& dir, double age) {
+    if (!fs::is_regular_file(dir / "run_spec.pbtxt", error)) return;
+    if (!newest.empty() && age >= least) return;
+    newest = dir;
+    least = age;
+  };
+  for (const fs::path& dir : RegistryDirs()) {
+    const Fd fd(open((dir / kEnded).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+    struct stat status {};
+    if (fd.get() < 0 || fstat(fd.get(), &status) != 0 || status.st_uid != geteuid()) continue;
+    take(ReadAll(fd.get()), AgeOf(status));
+  }
+  if (!newest.empty()) return newest;
+  const fs::path latest = fs::canonical(RunsDir() / "latest", error);
+  if (!error) take(latest, 0);
+  return newest;
+}
+
+std::string FormatRuns(const std::vector<RunningRun>& runs) {
+  std::string text;
+  for (const RunningRun& run : runs) {
+    std::string what = !run.readable    ? "its folder cannot be read from here"
+                       : !run.networked ? run.scenario + ", inside one process"
+                                        : run.scenario;
+    if (run.user != UserName(geteuid())) what += ", of user " + run.user;
+    text += fmt::format("  {}  ({}, for {:.0f} s)\n", logging::ForTerminal(run.dir.string()),
+                        logging::ForTerminal(what), std::max(run.age, 0.0));
+  }
+  return text;
+}
+
+fs::path OnlyRunningRun(std::string_view log_command) {
+  const std::vector<RunningRun> runs = RunningRuns();
+  std::vector<RunningRun> own;
+  std::copy_if(runs.begin(), runs.end(), std::back_inserter(own),
+               [](const RunningRun& run) { return run.own; });
+  std::vector<RunningRun> heard;
+  std::copy_if(own.begin(), own.end(), std::back_inserter(heard),
+               [](const RunningRun& run) { return run.networked; });
+  if (heard.size() == 1) return heard.front().dir;
+  if (heard.empty() && own.size() == 1) return own.front().dir;  // the caller tells what it lacks
+  if (!own.empty()) {
+    std::string list = FormatRuns(heard.empty() ? own : heard);
+    list.pop_back();  // the last line's end
+    throw ConfigError(fmt::format("several runs are going on; name one:\n{}", list));
+  }
+  if (!runs.empty()) {
+    std::string list = FormatRuns(runs);
+    list.pop_back();
+    throw ConfigError(fmt::format("no run of yours is going on; name another user's:\n{}", list));
+  }
+  const fs::path ended = LatestEndedRun();
+  throw ConfigError(ended.empty() ? "no run is going on; start one with poise run"
+                                  : fmt::format("no run is going on; the latest has ended: {} {}",
+                                                log_command, logging::ForTerminal(ended.string())));
+}
+
+}  // namespace poise

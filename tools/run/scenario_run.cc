@@ -1,0 +1,249 @@
+#include "tools/run/scenario_run.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "components/framework/build_info.h"
+#include "components/framework/configuration.h"
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "tools/cli/signals.h"
+#include "tools/report/realtime_verdict.h"
+#include "tools/report/run_screen.h"
+#include "tools/run/estimates.h"
+#include "tools/run/inline_run.h"
+#include "tools/run/launcher.h"
+#include "tools/run/run_dir.h"
+#include "tools/run/run_registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kSpecFile[] = "run_spec.pbtxt";
+constexpr char kScenarioFile[] = "scenario.pbtxt";
+
+void PrintOutcome(const std::string& what, const RunOutcome& outcome) {
+  if (outcome.message.empty()) return;
+  fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
+             outcome.message);
+  for (const std::string& line : outcome.details) fmt::print(stderr, "  {}\n", line);
+}
+
+}  // namespace
+
+ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
+    : options_(options), main_(Prepare(scenario, options.changes, options.in_process, true)) {
+  if (options.launch.kills.count > 0) KillSchedule::Check(main_.spec, options.launch.kills);
+  if (!main_.loaded.scenario.has_reference()) return;
+  reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
+                       /*in_process=*/true, false);
+}
+
+ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunChanges& changes,
+                                       bool in_process, bool warn) const {
+  Part part{LoadScenario(scenario, changes), {}};
+  std::vector<std::string> warnings;
+  part.spec = MakeRunSpec(part.loaded, changes, &warnings);
+  part.spec.set_recorded(!in_process && options_.launch.log);
+  if (warn) {
+    for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  }
+  CheckRun(part.loaded, &part.spec);
+  return part;
+}
+
+void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(part.spec, &text);
+  WriteFile(dir / kSpecFile, text);
+  WriteFile(dir / kScenarioFile, ScenarioText(part.loaded.scenario));
+}
+
+RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
+                                const LaunchOptions& launch) {
+  const RunSpec& spec = part.spec;
+  Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
+                    quiet);
+  if (in_process) {
+    return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
+  }
+  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
+                          (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
+  return Launcher(spec, files, launch, &progress).Run();
+}
+
+void ScenarioRun::PrintHeading() const {
+  const Scenario& scenario = main_.loaded.scenario;
+  const RunSpec& spec = main_.spec;
+  std::string text = fmt::format("{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong),
+                                 scenario.has_paper_section()
+                                     ? fmt::format(" (the paper's {})", scenario.paper_section())
+                                     : "",
+                                 scenario.description());
+  if (main_.loaded.variant && main_.loaded.variant->has_description()) {
+    text += fmt::format("variant {}: {}\n", main_.loaded.variant->name(),
+                        main_.loaded.variant->description());
+  }
+  text += FormatChanges(scenario);
+  if (reference_) {
+    text += fmt::format("compared with variant {}, which runs first, in one process\n",
+                        scenario.reference());
+  }
+  text += fmt::format(
+      "{} s at {} Hz, {}; seed {}; poise {}{}\n", scenario.duration(), scenario.tick_rate(),
+      options_.in_process ? "in one process"
+                          : fmt::format("{} processes{}", spec.graph().component_size(),
+                                        options_.launch.log ? " and the recorder" : ", no log"),
+      spec.seed(), PoiseVersion(),
+      *PoiseCommit() == '\0' ? "" : fmt::format(" ({})", PoiseCommit()));
+  if (!options_.in_process) {
+    text += fmt::format("run {}; listen at {}\n", spec.run_id(), MirrorUrl(spec));
+  }
+  fmt::print("{}", Wrapped(text, ScreenStyle().columns, 2));
+  std::fflush(stdout);
+}
+
+void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& result,
+                           bool latest) const {
+  const RunSummary& summary = result.summary;
+  const RunOutcome& outcome = summary.outcome;
+  const std::string realtime = FormatRealtime(main_.spec, outcome, summary.checks, summary.lost);
+  std::string problem;
+  if (!outcome.completed) {
+    problem = outcome.message.empty() ? "the run did not reach its end" : outcome.message;
+  } else if (summary.reference && !summary.reference->completed) {
+    problem = fmt::format("the reference run: {}", summary.reference->message);
+  } else if (!summary.passed && summary.checks.empty()) {
+    problem = "there is no log";
+  }
+  const char* const by = summary.failed_by_machine ? ", by the machine alone" : "";
+  if (options_.quiet || summary.checks.empty()) {
+    if (!options_.quiet) fmt::print("{}", realtime);
+    fmt::print("{}{}\n", FormatVerdict(summary.checks, problem), by);
+    return;
+  }
+  // Whoever stops a run does not ask for its figures.
+  if (outcome.interrupted) {
+    fmt::print("{}\nIts log up to {:.3f} s: {}\n", FormatVerdict({}, problem),
+               record.time(record.num_ticks), (result.dir / "run.lcm").string());
+    return;
+  }
+  const ShownRun shown{main_.loaded.scenario, record,          summary.checks,
+                       summary.events,        outcome.message, {}};
+  fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
+             Wrapped(realtime, ScreenStyle().columns, 2),
+             FormatVerdictLines(summary.checks, problem));
+  if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
+  fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
+             record.duration(record.num_ticks), outcome.wall_time,
+             record.real_time_factor.value_or(0));
+  fmt::print("{}", FormatNext(main_.loaded.scenario, result.dir, latest));
+}
+
+LogSizes ScenarioRun::log_sizes() const {
+  LogSizes sizes;
+  if (options_.in_process || options_.launch.log) sizes.Add(ExpectedLogSize(main_.spec));
+  if (reference_) sizes.Add(ExpectedLogSize(reference_->spec));
+  return sizes;
+}
+
+RunResult ScenarioRun::Run(const std::string& out, bool latest) {
+  const Scenario& scenario = main_.loaded.scenario;
+  if (!options_.in_process) ChoosePorts(&main_.spec);
+  RunResult result;
+  const std::string space =
+      CheckSpace(out.empty() ? RunsDir() : fs::path(out), log_sizes(), options_.force);
+  const RunDir dir = MakeRunDir(out, name(), options_.force);
+  result.dir = dir.path();
+  // Also what runs after its reference can be found and watched from here on.
+  WriteFiles(main_, result.dir);
+  if (latest) PointLatestTo(result.dir);
+  const RunRegistration registration(result.dir);
+  if (!options_.quiet) PrintHeading();
+  if (!options_.quiet && !space.empty()) {
+    fmt::print("{}\n", Wrapped(space, ScreenStyle().columns, 2));
+    std::fflush(stdout);
+  }
+  CatchStopSignals();
+  RunSummary& summary = result.summary;
+  summary.mode = options_.in_process ? "inline" : "processes";
+  if (reference_) {
+    const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name(), true);
+    WriteFiles(*reference_, reference.path());
+    summary.reference =
+        RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true, {});
+    PrintOutcome(fmt::format("reference run (variant {})", scenario.reference()),
+                 *summary.reference);
+  }
+  if (StopSignal() == 0) {
+    summary.outcome =
+        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch);
+    PrintOutcome("run", summary.outcome);
+    if (!options_.quiet && !summary.outcome.interrupted) {
+      fmt::print("{}", FormatFaults(summary.outcome));
+      if (main_.spec.realtime()) fmt::print("{}", FormatProcesses(summary.outcome));
+    }
+  } else {
+    summary.outcome = *summary.reference;  // interrupted
+  }
+  const RunOutcome& outcome = summary.outcome;
+  const fs::path log = result.dir / "run.lcm";
+  const bool recorded = fs::exists(log);  // else the recorder never came to start
+  logging::RunRecord record;
+  if (recorded) {
+    record = logging::ReadRun(log);
+    PrepareRecord(log, scenario, &record);
+    if (outcome.wall_time > 0) {
+      record.real_time_factor = record.duration(record.num_ticks) / outcome.wall_time;
+    }
+    summary.checks = EvaluateChecks(scenario, record);
+    summary.events = logging::Events(record);
+    summary.lost = CountLostTicks(record);
+  } else {
+    record.spec = main_.spec;
+  }
+  summary.passed = (recorded || !options_.launch.log) && outcome.completed &&
+                   (!summary.reference || summary.reference->completed);
+  for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
+  summary.failed_by_machine =
+      !summary.passed && outcome.completed && FailedByMachine(summary.checks, summary.lost);
+  // What is known is said first: a full disk takes the summary along with the log.
+  std::string unwritten;
+  try {
+    WriteFile(result.dir / "summary.json", SummaryJson(scenario, record, summary));
+  } catch (const ConfigError& error) {
+    unwritten = error.what();
+    summary.passed = false;
+  }
+  PrintEnd(record, result, latest);
+  if (!unwritten.empty()) fmt::print(stderr, "poise: {}\n", unwritten);
+  std::fflush(stdout);
+  return result;
+}
+
+RunOutcome ScenarioRun::RunOnly(const std::string& out) {
+  if (!options_.in_process) ChoosePorts(&main_.spec);
+  const RunDir dir = MakeRunDir(out, name(), options_.force);
+  WriteFiles(main_, dir.path());
+  CatchStopSignals();
+  return RunPart(main_, dir.path(), options_.in_process, /*quiet=*/true, options_.launch);
+}
+
+void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {
+  record->first_tick = FirstCheckedTick(scenario, *record);
+  const fs::path reference = ReferenceDir(log.parent_path()) / "run.lcm";
+  if (scenario.has_reference() && fs::exists(reference)) {
+    record->reference = std::make_shared<logging::RunRecord>(logging::ReadRun(reference));
+    record->reference->first_tick = FirstCheckedTick(scenario, *record->reference);
+  }
+  std::vector<const logging::Metric*> metrics;
+  for (int i = 0; i < scenario.check_size(); ++i) metrics.push_back(MetricOfCheck(scenario, i));
+  AddOtherEstimates(metrics, record);
+}
+
+}  // namespace poise

@@ -1,0 +1,80 @@
+// One scenario run from its name to its summary.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.pb.h"
+#include "tools/cli/output_place.h"
+#include "tools/report/report.h"
+#include "tools/run/launcher.h"
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise {
+
+struct RunOptions {
+  RunChanges changes;
+  bool in_process = false;
+  bool quiet = false;  ///< only the verdict
+  bool full = false;   ///< every figure, events, assumptions, processes
+  bool force = false;  ///< replace what the folder holds; start where the log may not fit
+  LaunchOptions launch;
+};
+
+/// What `poise report` and the overview of several runs say of a run's scenario.
+struct RunResult {
+  RunSummary summary;
+  std::filesystem::path dir;
+  std::string problem;  ///< why nothing could be run or read; empty: it could
+};
+
+/// A checked scenario, ready to run, with its reference variant.
+class ScenarioRun {
+ public:
+  /// Throws ConfigError or RobotError; what is odd about the robot goes to stderr.
+  ScenarioRun(const std::string& scenario, const RunOptions& options);
+
+  /// Runs, writes the run's files into a folder (MakeRunDir's rules for `out`) and prints what
+  /// happens, the table and the verdict. With `latest`, runs/latest points there before the run
+  /// starts. Throws ConfigError for the folder, LogError for the log.
+  RunResult Run(const std::string& out, bool latest);
+
+  /// Runs without a word, without its reference and without checks: the log and what describes it
+  /// go into `out`. Throws as Run does.
+  RunOutcome RunOnly(const std::string& out);
+
+  const RunSpec& spec() const { return main_.spec; }
+  const std::string& name() const { return main_.spec.scenario(); }
+  const Scenario& scenario() const { return main_.loaded.scenario; }
+  /// Its log's, and its reference's.
+  LogSizes log_sizes() const;
+
+ private:
+  /// One run of a graph.
+  struct Part {
+    LoadedScenario loaded;
+    RunSpec spec;
+  };
+  Part Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
+               bool warn) const;
+  static void WriteFiles(const Part& part, const std::filesystem::path& dir);
+  static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
+                            bool quiet, const LaunchOptions& launch);
+  void PrintHeading() const;
+  /// What happened, the table, the verdict, where to look next.
+  void PrintEnd(const logging::RunRecord& record, const RunResult& result, bool latest) const;
+
+  RunOptions options_;
+  Part main_;
+  std::optional<Part> reference_;
+};
+
+/// Makes a record, read from `log`, ready for the scenario's checks: its first_tick, its reference
+/// if the scenario has one and its log is there, and the estimates of the methods that did not run
+/// if a check is of them. Throws LogError, RobotError or ConfigError.
+void PrepareRecord(const std::filesystem::path& log, const Scenario& scenario,
+                   logging::RunRecord* record);
+
+}  // namespace poise

@@ -1,0 +1,135 @@
+#include "tools/scenario/catalog.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+
+#include "components/framework/configuration.h"
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "tools/cli/text_table.h"
+
+namespace poise {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr char kEnding[] = ".pbtxt";
+
+/// True for "base/NAME".
+bool IsBase(const fs::path& name) {
+  const fs::path folder = name.parent_path();
+  return std::find(folder.begin(), folder.end(), "base") != folder.end();
+}
+
+/// The files that `name` may mean, the first that exists is meant.
+std::vector<fs::path> Candidates(const std::string& kind, const std::string& name,
+                                 const fs::path& beside) {
+  const fs::path file = name.ends_with(kEnding) ? name : name + kEnding;
+  if (file.is_absolute()) return {file.lexically_normal()};
+  return {(beside / file).lexically_normal(), (DeployDir() / kind / file).lexically_normal()};
+}
+
+/// Names of the files in the folders of `candidates`, as `name` could have been written.
+std::set<std::string> NamesThere(const std::vector<fs::path>& candidates, const std::string& name) {
+  const bool with_ending = name.ends_with(kEnding);
+  std::set<std::string> names;
+  for (const fs::path& candidate : candidates) {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(candidate.parent_path(), error)) {
+      if (entry.path().extension() != kEnding) continue;
+      const fs::path file = with_ending ? entry.path().filename() : entry.path().stem();
+      names.insert((fs::path(name).parent_path() / file).string());
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+fs::path DeployDir() {
+  const char* const dir = std::getenv("POISE_DEPLOY_DIR");
+  return dir != nullptr && *dir != '\0' ? fs::path(dir) : fs::path(POISE_SOURCE_DIR) / "deploy";
+}
+
+std::optional<fs::path> LookForFile(const std::string& kind, const std::string& name,
+                                    const fs::path& beside, BaseFiles bases) {
+  // A path with its ending says that this very file is meant.
+  const bool refused = bases == BaseFiles::kRefused && !name.ends_with(kEnding) && IsBase(name);
+  if (name.empty() || refused) return {};
+  std::error_code error;
+  for (const fs::path& file : Candidates(kind, name, beside)) {
+    if (fs::is_regular_file(file, error)) return file;
+  }
+  return {};
+}
+
+namespace {
+
+/// "scenario or sweep"
+std::string KindNames(const std::vector<std::string>& kinds) {
+  std::vector<std::string> names;
+  for (const std::string& kind : kinds) {
+    names.push_back(kind == "drives" ? kind : kind.substr(0, kind.size() - 1));
+  }
+  return Joined(names, " or ");
+}
+
+[[noreturn]] void FailToFind(const std::vector<std::string>& kinds, const std::string& name,
+                             const fs::path& beside, BaseFiles bases) {
+  if (name.empty()) throw ConfigError(fmt::format("no {} is named", KindNames(kinds)));
+  std::vector<std::string> searched;
+  std::set<std::string> names;
+  for (const std::string& kind : kinds) {
+    const std::vector<fs::path> candidates = Candidates(kind, name, beside);
+    for (const fs::path& file : candidates) {
+      if (std::find(searched.begin(), searched.end(), file.string()) == searched.end()) {
+        searched.push_back(file.string());
+      }
+    }
+    names.merge(NamesThere(candidates, name));
+    std::error_code error;
+    if (name.ends_with(kEnding) || !fs::is_directory(DeployDir() / kind, error)) continue;
+    for (const std::string& listed : ListNames(kind)) names.insert(listed);
+  }
+  if (bases == BaseFiles::kRefused) std::erase_if(names, IsBase);
+  const std::string near = names.empty() ? "" : Suggest(name, {names.begin(), names.end()}) + "; ";
+  throw ConfigError(fmt::format("no {} named '{}'; {}searched: {}", KindNames(kinds), name, near,
+                                Joined(searched, ", ")));
+}
+
+}  // namespace
+
+fs::path FindFile(const std::string& kind, const std::string& name, const fs::path& beside,
+                  BaseFiles bases) {
+  if (auto file = LookForFile(kind, name, beside, bases)) return *file;
+  FailToFind({kind}, name, beside, bases);
+}
+
+fs::path FindFileOfKinds(const std::vector<std::string>& kinds, const std::string& name,
+                         const fs::path& beside) {
+  for (const std::string& kind : kinds) {
+    if (auto file = LookForFile(kind, name, beside)) return *file;
+  }
+  FailToFind(kinds, name, beside, BaseFiles::kRefused);
+}
+
+std::vector<std::string> ListNames(const std::string& kind) {
+  std::vector<std::string> names;
+  const fs::path dir = DeployDir() / kind;
+  std::error_code error;
+  for (const auto& entry : fs::recursive_directory_iterator(dir, error)) {
+    if (entry.path().extension() != kEnding) continue;
+    const std::string name = fs::relative(entry.path(), dir).replace_extension().string();
+    if (!IsBase(name)) names.push_back(name);
+  }
+  if (error) throw ConfigError(fmt::format("{}: {}", dir.string(), error.message()));
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path InstalledFile(const std::string& kind, const std::string& name) {
+  return DeployDir() / kind / (name + kEnding);
+}
+
+}  // namespace poise

@@ -1,0 +1,99 @@
+#include "tools/scenario/push_bound.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "components/messages/conversions.h"
+#include "sim_ode/simulated_robot.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Vector2d;
+using std::numbers::pi;
+
+double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+/// How far `from` is inside the convex hull of `points` along the unit vector `along`; empty when
+/// the ray misses it. The hull's edges are among the segments between points, and no segment
+/// reaches beyond it.
+std::optional<double> DistanceToEdge(const std::vector<Vector2d>& points, const Vector2d& from,
+                                     const Vector2d& along) {
+  std::optional<double> furthest;
+  for (const Vector2d& a : points) {
+    for (const Vector2d& b : points) {
+      const Vector2d segment = b - a;
+      const double sine = Cross(along, segment);
+      if (std::abs(sine) < 1e-12) continue;
+      const double distance = Cross(a - from, segment) / sine;
+      const double share = Cross(a - from, along) / sine;
+      if (share < 0 || share > 1) continue;
+      furthest = std::max(furthest.value_or(distance), distance);
+    }
+  }
+  return furthest;
+}
+
+}  // namespace
+
+double HorizontalImpulse(const Push& push) {
+  const double horizontal = std::hypot(push.direction_x(), push.direction_y());
+  const double all = std::hypot(horizontal, push.direction_z());
+  const double mean = push.profile() == Push::HALF_SINE ? 2 / pi : 1;
+  return all > 0 ? std::abs(push.peak()) * mean * push.duration() * horizontal / all : 0;
+}
+
+double PendulumShare(Push::Profile profile, double duration, double frequency) {
+  const double wt = frequency * duration;
+  if (wt < 1e-9) return 1;
+  if (profile == Push::RECTANGLE) return -std::expm1(-wt) / wt;
+  return pi * pi * (1 + std::exp(-wt)) / (2 * (wt * wt + pi * pi));
+}
+
+std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run) {
+  const SimOdeConfig& sim = scenario.sim_ode();
+  if (sim.push_size() != 1 || sim.hand_size() > 0) return {};
+  const Push& push = sim.push(0);
+  Vector2d along(push.direction_x(), push.direction_y());
+  if (!(along.norm() > 1e-12)) return {};
+  along *= (push.peak() < 0 ? -1 : 1) / along.norm();
+  const auto tick = static_cast<int64_t>(std::floor(push.start() / run.spec.tick_period())) +
+                    run.spec.lead_ticks();
+  const ground_truth_t* truth = run.truth.at(std::min(tick, run.num_ticks - 1));
+  if (truth == nullptr) return {};
+  std::vector<Vector2d> corners;
+  double ground = 0;
+  for (size_t f = 0; f < run.robot.feet().size(); ++f) {
+    if (truth->foot_contact_points[f] == 0) continue;
+    const robot::FootModel& foot = run.robot.feet()[f];
+    const Eigen::Isometry3d sole = GetPose(truth->foot_pose[f]);
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) {
+        const Eigen::Vector3d corner = sole * Eigen::Vector3d(x * foot.length, y * foot.width, 0);
+        corners.emplace_back(corner.x(), corner.y());
+        ground += corner.z();
+      }
+    }
+  }
+  if (corners.empty()) return {};
+  PushBound bound;
+  const Eigen::Vector3d com = GetVector3(truth->com_position);
+  bound.height = com.z() - ground / static_cast<double>(corners.size());
+  if (!(bound.height > 0)) return {};
+  const double frequency = std::sqrt(robot::kGravity / bound.height);
+  const Vector2d capture_point =
+      com.head<2>() + GetVector3(truth->com_velocity).head<2>() / frequency;
+  bound.distance = DistanceToEdge(corners, capture_point, along).value_or(0);
+  if (!(bound.distance > 0)) return {};
+  bound.impulse = HorizontalImpulse(push);
+  bound.mass = WithModelErrors(run.robot, sim).total_mass();
+  bound.lip_impulse = bound.mass * frequency * bound.distance;
+  bound.lip_impulse_of_duration =
+      bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);
+  return bound;
+}
+
+}  // namespace poise

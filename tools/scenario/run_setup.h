@@ -1,0 +1,36 @@
+// From a scenario to a checked run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "components/framework/graph.h"
+#include "components/framework/graph.pb.h"
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise {
+
+/// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
+/// No ports yet. Throws ConfigError, or RobotError when the robot's files cannot work; what is odd
+/// about them goes to `warnings`.
+RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
+                    std::vector<std::string>* warnings);
+
+/// Makes and configures every component, checks the graph and fills in the channels' counts.
+/// Throws ConfigError with one line per problem, each with file, line and field.
+void CheckRun(const LoadedScenario& loaded, RunSpec* spec);
+
+/// The lines that CheckRun would throw for a graph on its own, without a scenario.
+void CheckGraphFile(const std::string& path);
+
+/// Changes one field of the components' configurations in a run, "task_controller.com.kp=200".
+/// Throws ConfigError.
+void ChangeConfiguration(const std::string& change, RunSpec* spec);
+
+/// Whether a component is at one of the ends of EtherCAT frames, which no log holds.
+bool SpeaksEthercat(const RunSpec& spec, int component);
+
+/// A block of free UDP ports for the run's channels. Throws ConfigError when none is found.
+void ChoosePorts(RunSpec* spec);
+
+}  // namespace poise

@@ -1,0 +1,140 @@
+#include "tools/scenario/scenario_files.h"
+
+#include <google/protobuf/message.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+
+/// Elements that `message` has at `field`: of a list, or 1 and 0 for a single field that is set and
+/// not. `field` may hold indexes.
+int Count(const Message& message, std::string_view field) {
+  const Message* level = &message;
+  while (true) {
+    const size_t dot = field.find('.');
+    const std::string_view step = field.substr(0, dot);
+    const size_t bracket = step.find('[');
+    const FieldDescriptor* descriptor =
+        level->GetDescriptor()->FindFieldByName(std::string(step.substr(0, bracket)));
+    if (descriptor == nullptr) return 0;
+    const google::protobuf::Reflection& reflection = *level->GetReflection();
+    const bool last = dot == std::string_view::npos;
+    const bool is_message = descriptor->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
+    if (!last && !is_message) return 0;
+    if (descriptor->is_repeated()) {
+      const int size = reflection.FieldSize(*level, descriptor);
+      int index = 0;  // without an index a list means its first element
+      if (bracket != std::string_view::npos) {
+        const char* const begin = step.data() + bracket + 1;
+        if (std::from_chars(begin, step.data() + step.size(), index).ec != std::errc()) return 0;
+        if (last) return index >= 0 && index < size ? 1 : 0;
+      } else if (last) {
+        return size;
+      }
+      if (index < 0 || index >= size) return 0;
+      level = &reflection.GetRepeatedMessage(*level, descriptor, index);
+    } else {
+      if (!reflection.HasField(*level, descriptor)) return 0;
+      if (last) return 1;
+      level = &reflection.GetMessage(*level, descriptor);
+    }
+    field.remove_prefix(dot + 1);
+  }
+}
+
+/// `field` with its first index less `shift`; nullopt when that is below 0. Elements of the lists
+/// further down are all of one file.
+std::optional<std::string> ShiftFirstIndex(std::string_view field, int shift) {
+  const size_t bracket = field.find('[');
+  if (bracket == std::string_view::npos) return std::string(field);
+  int index = 0;
+  const auto [end, error] =
+      std::from_chars(field.data() + bracket + 1, field.data() + field.size(), index);
+  if (error != std::errc() || index < shift) return std::nullopt;
+  return fmt::format("{}[{}{}", field.substr(0, bracket), index - shift,
+                     std::string_view(end, field.data() + field.size()));
+}
+
+}  // namespace
+
+bool HasField(const Message& message, std::string_view field) { return Count(message, field) > 0; }
+
+ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
+  fs::path next = file;
+  while (true) {
+    File read;
+    read.name = next.string();
+    read.text = ReadFile(read.name);
+    ParseTextProto(read.text, read.name, &read.fields);
+    const bool has_base = read.fields.has_base();
+    const std::string base = read.fields.base();
+    files_.insert(files_.begin(), std::move(read));
+    if (!has_base) break;
+    const auto fail = [&](const std::string& problem) {
+      throw ConfigError(fmt::format("{}:{}: base: {}", files_.front().name,
+                                    LocateField(files_.front().text, "base", Scenario()), problem));
+    };
+    try {
+      next = FindFile("scenarios", base, next.parent_path(), BaseFiles::kTaken);
+    } catch (const ConfigError& error) {
+      fail(error.what());
+    }
+    std::error_code error;
+    for (const File& earlier : files_) {
+      if (!fs::equivalent(earlier.name, next, error)) continue;
+      fail(fmt::format("{} is based on this file itself; bases may not form a loop", base));
+    }
+  }
+  own_ = files_.size() - 1;
+  if (overlay.empty()) return;
+  File read;
+  read.name = overlay.string();
+  read.text = ReadFile(read.name);
+  ParseTextProto(read.text, read.name, &read.fields);
+  files_.push_back(std::move(read));
+}
+
+Scenario ScenarioFiles::Merged() const {
+  Scenario merged;
+  for (const File& file : files_) merged.MergeFrom(file.fields);
+  merged.clear_base();
+  return merged;
+}
+
+FieldPlace ScenarioFiles::Locate(std::string_view field) const {
+  const std::string_view list = field.substr(0, field.find('['));
+  for (std::string_view path = field; !path.empty();) {
+    const bool indexed = path.size() > list.size();
+    FieldPlace place;
+    int before = 0;  // elements of the list in earlier files
+    for (const File& file : files_) {
+      const auto own = indexed ? ShiftFirstIndex(path, before) : std::string(path);
+      if (own && HasField(file.fields, *own)) {
+        place = {file.name, LocateField(file.text, *own, file.fields),
+                 *own + std::string(field.substr(path.size()))};
+      }
+      before += Count(file.fields, list);
+    }
+    if (place.line > 0) return place;
+    const size_t dot = path.rfind('.');
+    path = path.substr(0, dot == std::string_view::npos ? 0 : dot);
+  }
+  return {file(), 0, std::string(field)};
+}
+
+fs::path ScenarioFiles::FolderOf(std::string_view field) const {
+  return fs::path(Locate(field).file).parent_path();
+}
+
+}  // namespace poise

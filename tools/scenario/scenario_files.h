@@ -1,0 +1,54 @@
+// A scenario's file and the files it is based on.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/scenario/scenario.pb.h"
+
+namespace poise {
+
+/// Where a field of the merged scenario was written.
+struct FieldPlace {
+  std::string file;
+  int line = 0;       ///< from 1
+  std::string field;  ///< its path in that file: list indexes count that file's own elements
+};
+
+/// Scenario.base followed to its end. Immutable.
+class ScenarioFiles {
+ public:
+  /// Reads `file`, its base (FindFile), and so on. Throws ConfigError "file:line: base: problem":
+  /// no such file, bases that form a loop; and ParseTextProto's. `overlay`: a file of the same kind
+  /// without a base, whose fields come last; empty: none.
+  explicit ScenarioFiles(const std::filesystem::path& file,
+                         const std::filesystem::path& overlay = {});
+
+  /// All fields: the furthest base's first, single values replaced, lists appended. `base` is gone.
+  Scenario Merged() const;
+  /// File of the scenario itself.
+  const std::string& file() const { return files_[own_].name; }
+  /// The place of `field`, a path in the merged scenario, or of the nearest enclosing field that
+  /// any file sets; of several files, of the one that counts. `line` 0 and the scenario's own file
+  /// when there is none.
+  FieldPlace Locate(std::string_view field) const;
+  /// Folder to which a file name in `field`, a path in the merged scenario, is relative.
+  std::filesystem::path FolderOf(std::string_view field) const;
+
+ private:
+  struct File {
+    std::string name;
+    std::string text;
+    Scenario fields;  ///< its own alone
+  };
+  std::vector<File> files_;  // the furthest base first, the overlay last
+  size_t own_ = 0;           // the scenario's
+};
+
+/// True when `message` sets the field with dotted path `field` ("push[0].peak"; a list without
+/// index has elements).
+bool HasField(const google::protobuf::Message& message, std::string_view field);
+
+}  // namespace poise

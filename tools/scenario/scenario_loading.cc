@@ -1,0 +1,445 @@
+#include "tools/scenario/scenario_loading.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "components/framework/configuration.h"
+#include "components/framework/field_path.h"
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+#include "tools/reference/field_reference.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMaxLead = 60;     // s
+constexpr double kMinRate = 50;     // Hz
+constexpr double kMaxRate = 10000;  // Hz
+constexpr char kSetFlag[] = "--set";
+
+bool InName(unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; }
+
+/// What is wrong with the name of a scenario or variant, which becomes a part of a path; empty when
+/// nothing is.
+std::string NameProblem(const std::string& name) {
+  if (!name.empty() && std::all_of(name.begin(), name.end(), InName)) return "";
+  return fmt::format("is '{}'; use letters, digits, _ and -", name);
+}
+
+std::string VariantLabel(const Variant& variant) { return "variant " + variant.name(); }
+
+/// The path as it was written.
+std::string WrittenPath(const FieldChange& change) {
+  return change.set.substr(0, change.set.find('='));
+}
+
+/// With indexes for elements' names, as the checks below name fields.
+std::string PathOf(const LoadedScenario& loaded, const FieldChange& change) {
+  try {
+    return ResolvePath(loaded.scenario, WrittenPath(change));
+  } catch (const ConfigError&) {
+    return WrittenPath(change);  // what it named is gone by a later change
+  }
+}
+
+/// The unit of a field, and how its value is written; empty when it has none.
+std::string UnitHint(std::string_view path, std::string_view value) {
+  std::string pattern;  // as the reference has it: [i] for every index
+  for (size_t i = 0; i < path.size(); ++i) {
+    pattern += path[i];
+    if (path[i] != '[') continue;
+    pattern += "i]";
+    i = std::min(path.find(']', i), path.size() - 1);
+  }
+  for (const FieldEntry& entry : FieldReference(Schema::kScenario)) {
+    if (entry.path != pattern || entry.unit.empty()) continue;
+    const std::string text(value);
+    char* end = nullptr;
+    std::strtod(text.c_str(), &end);
+    const auto digits = static_cast<size_t>(end - text.c_str());
+    if (digits == 0) return fmt::format("; its unit is {}", entry.unit);
+    return fmt::format("; its unit is {}, which is not written: {}={}", entry.unit, path,
+                       text.substr(0, digits));
+  }
+  return "";
+}
+
+std::string NoVariant(const std::string& name, const std::vector<std::string>& names) {
+  return names.empty() ? "the scenario has no variants"
+                       : fmt::format("no variant named '{}'; {}", name, Suggest(name, names));
+}
+
+/// at_most is below at_least: says so at the one that was changed, and what to do with the other.
+[[noreturn]] void FailLimits(const LoadedScenario& loaded, int index) {
+  const Check& check = loaded.scenario.check(index);
+  const std::string path = fmt::format("check[{}]", index);
+  const auto changed = [&](const char* field) {
+    return std::any_of(
+        loaded.changes.begin(), loaded.changes.end(),
+        [&](const FieldChange& change) { return PathOf(loaded, change) == path + "." + field; });
+  };
+  const bool least = changed("at_least") && !changed("at_most");
+  const char* const other = least ? "at_most" : "at_least";
+  FailField(loaded, fmt::format("{}.{}", path, least ? "at_least" : "at_most"),
+            fmt::format("is {}, {} the check's {}, {}; change that too, or leave it out with --set "
+                        "'check[{}].{}='",
+                        least ? check.at_least() : check.at_most(), least ? "above" : "below",
+                        other, least ? check.at_most() : check.at_least(), check.metric(), other));
+}
+
+void CheckScenario(const LoadedScenario& loaded) {
+  const Scenario& s = loaded.scenario;
+  const auto fail = [&](const std::string& field, const std::string& problem) {
+    FailField(loaded, field, problem);
+  };
+  if (const std::string problem = NameProblem(s.name()); s.has_name() && !problem.empty()) {
+    fail("name", problem);
+  }
+  if (!s.has_robot()) fail("robot", "is missing; name one of deploy/robots");
+  if (!(s.duration() > 0) || s.duration() > 36000) {
+    fail("duration", fmt::format("is {} s; must be in (0, 36000]", s.duration()));
+  }
+  if (!(s.tick_rate() >= kMinRate && s.tick_rate() <= kMaxRate)) {
+    fail("tick_rate",
+         fmt::format("is {} Hz; must be in [{}, {}]", s.tick_rate(), kMinRate, kMaxRate));
+  }
+  if (!(s.lead() >= 0 && s.lead() <= kMaxLead)) {
+    fail("lead", fmt::format("is {} s; must be in [0, {}]", s.lead(), kMaxLead));
+  }
+  if (!(s.check_from() >= 0)) fail("check_from", "must be in [0, duration)");
+  if (!(s.check_from() < s.duration())) {
+    const auto changed = [&](const char* field) {
+      return std::any_of(
+          loaded.changes.begin(), loaded.changes.end(),
+          [&](const FieldChange& change) { return PathOf(loaded, change) == field; });
+    };
+    if (changed("duration") && !changed("check_from")) {
+      fail("duration", fmt::format("is {} s; must be more than check_from, {} s, from which on the "
+                                   "scenario is checked",
+                                   s.duration(), s.check_from()));
+    }
+    fail("check_from", "must be in [0, duration)");
+  }
+  std::vector<std::string> names;
+  for (const logging::Metric& metric : logging::Metrics()) names.push_back(metric.name);
+  for (int i = 0; i < s.check_size(); ++i) {
+    if (logging::FindMetric(s.check(i).metric()) == nullptr) {
+      fail(fmt::format("check[{}].metric", i),
+           fmt::format("no metric named '{}'; {}; see `poise list metrics`", s.check(i).metric(),
+                       Suggest(s.check(i).metric(), names)));
+    }
+    const auto check_finite = [&](const char* field, double value) {
+      if (std::isfinite(value)) return;
+      fail(fmt::format("check[{}].{}", i, field), fmt::format("is {}; must be finite", value));
+    };
+    check_finite("at_most", s.check(i).at_most());
+    check_finite("at_least", s.check(i).at_least());
+    check_finite("paper_value", s.check(i).paper_value());
+    if (s.check(i).has_at_most() && s.check(i).has_at_least() &&
+        s.check(i).at_most() < s.check(i).at_least()) {
+      FailLimits(loaded, i);
+    }
+  }
+  for (int i = 0; i < s.assumption_size(); ++i) {
+    const Assumption& assumption = s.assumption(i);
+    // As the files have it: an ablation may have cleared what the assumption is about.
+    if (!HasField(s, assumption.field()) && !HasField(loaded.files.Merged(), assumption.field())) {
+      fail(fmt::format("assumption[{}].field", i),
+           fmt::format("the scenario sets no field '{}'", assumption.field()));
+    }
+    if (assumption.kind() != "fitted" && assumption.kind() != "assumed") {
+      fail(fmt::format("assumption[{}].kind", i), "must be \"fitted\" or \"assumed\"");
+    }
+  }
+}
+
+bool HasOwnChecks(const LoadedScenario& loaded) {
+  return loaded.variant && loaded.variant->check_size() > 0;
+}
+
+/// The line of an error in `field`, to which `change` gave its value.
+std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
+                     std::string_view field, std::string_view problem) {
+  if (change.by == kSetFlag) {
+    // As the user wrote it: with the element's name.
+    const std::string path = PathOf(loaded, change);
+    const bool inside = field.starts_with(path);
+    const std::string rest(inside ? field.substr(path.size()) : "");
+    return fmt::format("{} {}: {}", change.by,
+                       inside ? WrittenPath(change) + rest : std::string(field), problem);
+  }
+  if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) {
+    return fmt::format("{}: {}: {}", change.by, field, problem);
+  }
+  int i = loaded.variant->set_size() - 1;
+  while (i > 0 && loaded.variant->set(i) != change.set) --i;
+  const FieldPlace place =
+      loaded.files.Locate(fmt::format("variant[{}].set[{}]", loaded.variant_index, i));
+  return fmt::format("{}:{}: {}: {}: {}", place.file, place.line, place.field, field, problem);
+}
+
+void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
+  const size_t equals = change.set.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw ConfigError(Describe(*loaded, change, change.set, "must be field.path=value"));
+  }
+  const std::string path = change.set.substr(0, equals);
+  const std::string first = path.substr(0, path.find_first_of(".["));
+  // A change of what is read before any change, or is written alone, would do nothing.
+  if (first == "base" || first == "variant" || first == "applied") {
+    throw ConfigError(Describe(*loaded, change, path,
+                               first == "applied" ? "cannot be set; poise run writes it"
+                                                  : "cannot be set here; write it in the "
+                                                    "scenario's file"));
+  }
+  const std::string value = change.set.substr(equals + 1);
+  try {
+    SetField(&loaded->scenario, path, value);
+  } catch (const ConfigError& error) {
+    const bool wrong_value = error.problem().starts_with(fmt::format("'{}' is not ", value));
+    const std::string hint = wrong_value ? UnitHint(path, value) : "";
+    throw ConfigError(
+        Describe(*loaded, change, error.field(), fmt::format("{}{}", error.problem(), hint)));
+  }
+  loaded->changes.push_back(change);
+}
+
+std::vector<std::string> VariantNames(const Scenario& scenario) {
+  std::vector<std::string> names;
+  for (const Variant& variant : scenario.variant()) names.push_back(variant.name());
+  return names;
+}
+
+void CheckReference(const LoadedScenario& loaded) {
+  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  const std::string& reference = loaded.scenario.reference();
+  if (loaded.scenario.has_reference() &&
+      std::find(names.begin(), names.end(), reference) == names.end()) {
+    FailField(loaded, "reference", NoVariant(reference, names));
+  }
+}
+
+/// Their names, and that of the reference.
+void CheckVariants(const LoadedScenario& loaded) {
+  const std::vector<std::string> names = VariantNames(loaded.scenario);
+  for (size_t i = 0; i < names.size(); ++i) {
+    const auto fail = [&](const std::string& problem) {
+      FailField(loaded, fmt::format("variant[{}].name", i), problem);
+    };
+    if (const std::string problem = NameProblem(names[i]); !problem.empty()) fail(problem);
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
+        names.begin() + static_cast<std::ptrdiff_t>(i)) {
+      fail(fmt::format("there are two variants named '{}'", names[i]));
+    }
+  }
+  CheckReference(loaded);
+}
+
+/// What the scenario's `ideal` gives and asks of the ideal robot.
+void ApplyIdeal(LoadedScenario* loaded) {
+  const Ideal ideal = loaded->scenario.ideal();
+  for (const std::string& set : ideal.set()) ApplyChange({set, "--ideal"}, loaded);
+  for (int i = 0; i < ideal.check_size(); ++i) {
+    bool known = false;
+    for (Check& check : *loaded->scenario.mutable_check()) {
+      if (check.metric() != ideal.check(i).metric()) continue;
+      known = true;
+      const std::string label = check.label();
+      check = ideal.check(i);
+      if (!check.has_label()) check.set_label(label);
+    }
+    if (!known) {
+      FailField(*loaded, fmt::format("ideal.check[{}].metric", i),
+                fmt::format("the scenario has no check of '{}'", ideal.check(i).metric()));
+    }
+  }
+}
+
+void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
+  const std::vector<std::string> names = VariantNames(loaded->scenario);
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw ConfigError(
+        fmt::format("--variant {}: {}: {}", name, loaded->files.file(), NoVariant(name, names)));
+  }
+  loaded->variant_index = static_cast<int>(found - names.begin());
+  loaded->variant = loaded->scenario.variant(loaded->variant_index);
+  const Variant& variant = *loaded->variant;
+  for (const std::string& set : variant.set()) ApplyChange({set, VariantLabel(variant)}, loaded);
+  if (variant.check_size() > 0) *loaded->scenario.mutable_check() = variant.check();
+}
+
+/// File of deploy/`kind` that the scenario's `field` names.
+std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const std::string& field,
+                    const std::string& name) {
+  try {
+    return FindFile(kind, name, loaded.files.FolderOf(field)).string();
+  } catch (const ConfigError& error) {
+    FailField(loaded, field, error.what());
+  }
+}
+
+/// What a robot is given that commands may reach late.
+void ApplyRealtime(LoadedScenario* loaded) {
+  const auto apply = [&](bool given, const char* set) {
+    if (!given) ApplyChange({set, "--realtime"}, loaded);
+  };
+  const Scenario& scenario = loaded->scenario;
+  // A process that dies is replaced: worth waiting for.
+  apply(scenario.hw_bridge().has_on_lost_command(), "hw_bridge.on_lost_command=HOLD");
+  // Until the controller follows, the robot hangs with its joints held.
+  apply(scenario.hw_bridge().has_hold_before_command(), "hw_bridge.hold_before_command=true");
+  apply(scenario.sim_ode().has_crane(), "sim_ode.crane.release_time=1");
+  apply(scenario.has_lead(), "lead=3");
+}
+
+/// The drives' type, their link, and whose time they follow.
+void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
+  Scenario* const scenario = &loaded->scenario;
+  const auto apply = [&](const std::string& set, const char* by) {
+    ApplyChange({set, by}, loaded);
+  };
+  if (scenario->has_drive_profile()) {
+    const std::string file = Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile());
+    ReadTextProto(
+        file,
+        scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_master()->mutable_profile());
+  }
+  if (!changes.realtime) {
+    apply("hw_bridge.ethercat.simulated_time=true", "--drives");
+    apply("drive_emulator.simulated_time=true", "--drives");
+  }
+  constexpr std::string_view kRaw = "raw:";
+  if (changes.link.empty() || changes.link == "udp") {
+    scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_link()->mutable_udp();
+    scenario->mutable_drive_emulator()->mutable_link()->mutable_udp();
+  } else {
+    const size_t comma = changes.link.find(',');
+    if (!changes.link.starts_with(kRaw) || comma == std::string::npos) {
+      throw ConfigError(fmt::format(
+          "--link {}: must be udp, or raw:MASTER,DRIVES with the names of two interfaces",
+          changes.link));
+    }
+    apply("hw_bridge.ethercat.link.interface=" +
+              changes.link.substr(kRaw.size(), comma - kRaw.size()),
+          "--link");
+    apply("drive_emulator.link.interface=" + changes.link.substr(comma + 1), "--link");
+  }
+  if (!changes.capture.empty()) {
+    scenario->mutable_hw_bridge()->mutable_ethercat()->set_capture(changes.capture);
+  }
+}
+
+}  // namespace
+
+void FailField(const LoadedScenario& loaded, std::string_view field, std::string_view problem) {
+  const auto concerns = [&](const std::string& path) {
+    return field == path || field.starts_with(path + ".") || field.starts_with(path + "[") ||
+           path.starts_with(std::string(field));
+  };
+  // The last one counts.
+  for (auto change = loaded.changes.rbegin(); change != loaded.changes.rend(); ++change) {
+    if (concerns(PathOf(loaded, *change)))
+      throw ConfigError(Describe(loaded, *change, field, problem));
+  }
+  std::string written(field);
+  if (HasOwnChecks(loaded) && field.starts_with("check[")) {
+    written = fmt::format("variant[{}].{}", loaded.variant_index, field);
+  }
+  const FieldPlace place = loaded.files.Locate(written);
+  if (place.line == 0) throw ConfigError(fmt::format("{}: {}: {}", place.file, field, problem));
+  throw ConfigError(fmt::format("{}:{}: {}: {}", place.file, place.line, place.field, problem));
+}
+
+LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
+  const fs::path overlay =
+      changes.drives.empty() ? fs::path() : FindFile("drives", changes.drives, fs::current_path());
+  LoadedScenario loaded(FindFile("scenarios", name, fs::current_path()), overlay);
+  Scenario* const scenario = &loaded.scenario;
+  CheckVariants(loaded);
+  if (!changes.drives.empty()) ApplyDrives(changes, &loaded);
+  if (changes.realtime) ApplyRealtime(&loaded);
+  for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
+    ApplyChange(change, &loaded);
+  }
+  if (changes.ideal) ApplyIdeal(&loaded);
+  if (!changes.variant.empty()) ApplyVariant(changes.variant, &loaded);
+  for (const std::string& set : changes.set) ApplyChange({set, kSetFlag}, &loaded);
+  if (changes.duration) {
+    ApplyChange({fmt::format("duration={}", *changes.duration), "--duration"}, &loaded);
+  }
+  if (changes.seed) ApplyChange({fmt::format("seed={}", *changes.seed), "--seed"}, &loaded);
+  CheckReference(loaded);  // which a change may have named
+  if (!changes.reference || HasOwnChecks(loaded) || changes.variant == scenario->reference()) {
+    scenario->clear_reference();
+  }
+  CheckScenario(loaded);
+  loaded.graph_file = Resolve(loaded, "graphs", "graph", scenario->graph());
+  loaded.robot_file = Resolve(loaded, "robots", "robot", scenario->robot());
+  Applied* const applied = scenario->mutable_applied();
+  applied->Clear();
+  if (!changes.variant.empty()) applied->set_variant(changes.variant);
+  for (const std::string& part : changes.without) applied->add_ablation("--without " + part);
+  if (changes.ideal) applied->add_ablation("--ideal");
+  for (const FieldChange& change : loaded.changes) {
+    Applied::Change* const entry = applied->add_change();
+    entry->set_by(change.by);
+    entry->set_set(change.set);
+  }
+  return loaded;
+}
+
+std::string NameOf(const LoadedScenario& loaded) {
+  if (loaded.scenario.has_name()) return loaded.scenario.name();
+  std::string name = fs::path(loaded.files.file()).stem().string();
+  std::replace_if(
+      name.begin(), name.end(), [](unsigned char c) { return !InName(c); }, '_');
+  return name;
+}
+
+RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes) {
+  RunChanges reference = changes;
+  reference.variant = loaded.scenario.reference();
+  if (changes.realtime) {
+    // In lockstep no command is late: what was set of the crane is for the other run.
+    reference.realtime = false;
+    reference.set.insert(reference.set.end(), {"sim_ode.crane=", "lead=0"});
+  }
+  reference.drives.clear();
+  reference.drop_rate = 0;
+  return reference;
+}
+
+std::string FormatChanges(const Scenario& scenario) {
+  std::string text;
+  std::string by;
+  for (const Applied::Change& change : scenario.applied().change()) {
+    const bool same = !text.empty() && change.by() == by;
+    text += same ? ", " : fmt::format("{}{}: ", text.empty() ? "" : "\n", change.by());
+    text += change.set();
+    by = change.by();
+  }
+  const auto& ablations = scenario.applied().ablation();
+  if (scenario.ideal().has_reason() &&
+      std::find(ablations.begin(), ablations.end(), "--ideal") != ablations.end()) {
+    text += fmt::format("\n--ideal: {}", scenario.ideal().reason());
+  }
+  return text.empty() ? "" : text + "\n";
+}
+
+std::string ScenarioText(const Scenario& scenario) {
+  std::string text;
+  google::protobuf::TextFormat::PrintToString(scenario, &text);
+  return text;
+}
+
+}  // namespace poise

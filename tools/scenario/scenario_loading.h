@@ -1,0 +1,74 @@
+// From a scenario's name and the command line to a checked scenario.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tools/scenario/ablations.h"
+#include "tools/scenario/scenario.pb.h"
+#include "tools/scenario/scenario_files.h"
+
+namespace poise {
+
+/// What the command line changes, in this order: ablations, the variant, single fields.
+struct RunChanges {
+  std::vector<std::string> without;  ///< of RemovableParts()
+  bool ideal = false;
+  std::string variant;             ///< of the scenario; empty: none
+  bool reference = true;           ///< false: the scenario's reference variant is not run
+  std::vector<std::string> set;    ///< "field.path=value", as SetField takes them, in order
+  std::optional<double> duration;  ///< s
+  std::optional<uint64_t> seed;
+  double drop_rate = 0;
+  bool realtime = false;
+  std::optional<int> priority;  ///< SCHED_FIFO, in real time; 0: the ordinary scheduler
+  std::optional<int> cpu;       ///< that the controller is pinned to in real time
+  std::string drives;           ///< "ethercat"; empty: the simulated robot's own
+  std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
+  std::string capture;  ///< file for all EtherCAT frames; empty: none
+};
+
+/// A scenario read and resolved to files.
+struct LoadedScenario {
+  explicit LoadedScenario(const std::filesystem::path& file,
+                          const std::filesystem::path& overlay = {})
+      : files(file, overlay), scenario(files.Merged()) {}
+
+  ScenarioFiles files;
+  /// Merged, with the changes. `reference` is empty when none is to be run.
+  Scenario scenario;
+  std::vector<FieldChange> changes;  ///< in order
+  std::optional<Variant> variant;    ///< the one that was chosen, as the file has it
+  int variant_index = -1;            ///< its place in the file's list
+  std::string graph_file;
+  std::string robot_file;
+};
+
+/// Reads and checks the scenario itself: bases, variants' names, duration, rate, metrics and limits
+/// of its checks, assumptions that name fields. Throws ConfigError, "file:line: field: problem;
+/// what to do".
+LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes);
+
+/// The scenario's name, or its file's without ending and with _ for what a name cannot have: a part
+/// of a path.
+std::string NameOf(const LoadedScenario& loaded);
+
+/// The same changes for the scenario's reference variant. Precondition: the scenario has one.
+RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& changes);
+
+/// A line for each flag and the variant: what they changed.
+std::string FormatChanges(const Scenario& scenario);
+
+/// Throws the ConfigError of a value of the scenario: with file and line of `field`, a path in the
+/// merged scenario, or with the flag that changed it.
+[[noreturn]] void FailField(const LoadedScenario& loaded, std::string_view field,
+                            std::string_view problem);
+
+/// The scenario with its changes as protobuf text.
+std::string ScenarioText(const Scenario& scenario);
+
+}  // namespace poise

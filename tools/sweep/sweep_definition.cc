@@ -1,0 +1,382 @@
+#include "tools/sweep/sweep_definition.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <boost/uuid/name_generator_sha1.hpp>
+#include <boost/uuid/uuid_io.hpp>
+#include <charconv>
+#include <filesystem>
+
+#include "components/framework/build_info.h"
+#include "components/framework/configuration.h"
+#include "components/framework/suggest.h"
+#include "fmt/format.h"
+#include "logging/metrics.h"
+#include "tools/cli/text_table.h"
+#include "tools/scenario/catalog.h"
+#include "tools/scenario/library_versions.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kAllMetrics[] = "all";
+// Tells of how a run went on this machine, not of what it did.
+constexpr char kMachineMetric[] = "real_time_factor";
+
+std::string Digest(const std::string& text) {
+  const boost::uuids::name_generator_sha1 generator(boost::uuids::ns::oid());
+  return boost::uuids::to_string(generator(text));
+}
+
+std::optional<double> Number(std::string_view text) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return {};
+  return number;
+}
+
+std::vector<std::string> Split(std::string_view text, char at) {
+  std::vector<std::string> parts;
+  while (true) {
+    const size_t end = text.find(at);
+    parts.emplace_back(text.substr(0, end));
+    if (end == std::string_view::npos) return parts;
+    text.remove_prefix(end + 1);
+  }
+}
+
+/// True for what starts like a field of a scenario, not a name of one's own.
+bool IsField(const std::string& name) {
+  return name.find_first_of(".[") != std::string::npos ||
+         Scenario::descriptor()->FindFieldByName(name) != nullptr;
+}
+
+/// FROM:TO[:STEPS][:FLAG...]. False when it is none.
+bool ParseRange(const std::string& text, Variable* variable) {
+  const std::vector<std::string> parts = Split(text, ':');
+  if (parts.size() < 2) return false;
+  const std::optional<double> from = Number(parts[0]);
+  const std::optional<double> to = Number(parts[1]);
+  if (!from || !to) return false;
+  variable->set_from(*from);
+  variable->set_to(*to);
+  for (size_t i = 2; i < parts.size(); ++i) {
+    int steps = 0;
+    const char* const end = parts[i].data() + parts[i].size();
+    const auto parsed = std::from_chars(parts[i].data(), end, steps);
+    if (i == 2 && parsed.ec == std::errc() && parsed.ptr == end) {
+      variable->set_steps(steps);
+    } else if (parts[i] == "log") {
+      variable->set_scale(Variable::LOGARITHMIC);
+    } else if (parts[i] == "angle") {
+      variable->set_angle(true);
+    } else if (parts[i] == "whole") {
+      variable->set_whole(true);
+    } else {
+      return false;
+    }
+  }
+  return true;
+}
+
+Variable ParseVary(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    throw ConfigError(
+        fmt::format("--vary {}: must be NAME=FROM:TO:STEPS or NAME=VALUE,VALUE,...; "
+                    "NAME is a field, or a name for --expression",
+                    text));
+  }
+  const std::string name = text.substr(0, equals);
+  const std::string rest = text.substr(equals + 1);
+  Variable variable;
+  const bool field = IsField(name);
+  if (rest.find(':') != std::string::npos) {
+    if (!ParseRange(rest, &variable)) {
+      throw ConfigError(
+          fmt::format("--vary {}: '{}' must be FROM:TO, FROM:TO:STEPS, and then any "
+                      "of :log, :angle, :whole",
+                      text, rest));
+    }
+  } else {
+    const std::vector<std::string> values = Split(rest, ',');
+    const bool numbers = std::all_of(values.begin(), values.end(),
+                                     [](const std::string& v) { return Number(v).has_value(); });
+    if (!numbers && !field) {
+      throw ConfigError(
+          fmt::format("--vary {}: '{}' is no field of a scenario, so its values must "
+                      "be numbers",
+                      text, name));
+    }
+    for (const std::string& value : values) {
+      if (numbers) {
+        variable.add_value(*Number(value));
+      } else {
+        Choice* const choice = variable.add_choice();
+        choice->set_name(value);
+        choice->add_set(fmt::format("{}={}", name, value));
+      }
+    }
+  }
+  if (!field) {
+    variable.set_name(name);
+  } else if (variable.choice_size() == 0) {
+    variable.set_field(name);
+  } else {
+    // A choice needs a name of its own: that of the field's last part.
+    std::string last = name.substr(name.rfind('.') + 1);
+    last.erase(
+        std::remove_if(last.begin(), last.end(), [](char c) { return c == '[' || c == ']'; }),
+        last.end());
+    variable.set_name(last);
+  }
+  return variable;
+}
+
+Assignment ParseExpression(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw ConfigError(fmt::format("--expression {}: must be FIELD=EXPRESSION", text));
+  }
+  Assignment assign;
+  assign.set_field(text.substr(0, equals));
+  assign.set_value(text.substr(equals + 1));
+  return assign;
+}
+
+bool ParsesAsScenario(const std::string& file) {
+  try {
+    ScenarioFiles files{fs::path(file)};
+    return true;
+  } catch (const ConfigError&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+/// Where each part of a sweep was written.
+struct SweepDefinition::Source {
+  std::string file;  // empty: there is none
+  std::string text;
+  Sweep written;  // by the file alone
+  Sweep sweep;
+  SweepArguments arguments;
+
+  Source(SweepArguments given, bool limit);
+
+  [[noreturn]] void Fail(const SweepProblem& problem) const;
+  /// The flag that gave an element of a list, or the file's place.
+  std::string Where(const std::string& field) const;
+
+ private:
+  void Read(const std::string& what);
+};
+
+SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(std::move(given)) {
+  Read(arguments.what);
+  sweep = written;
+  for (const std::string& flag : arguments.vary) *sweep.add_vary() = ParseVary(flag);
+  for (const std::string& flag : arguments.expression) {
+    *sweep.add_assign() = ParseExpression(flag);
+  }
+  for (const std::string& name : arguments.column) sweep.add_column(name);
+  if (arguments.random) sweep.set_random(*arguments.random);
+  if (arguments.seed) sweep.set_seed(*arguments.seed);
+  const RunChanges& changes = arguments.changes;
+  if (!changes.variant.empty()) sweep.set_variant(changes.variant);
+  for (const std::string& part : changes.without) sweep.add_without(part);
+  if (changes.ideal) sweep.set_ideal(true);
+  for (const std::string& set : changes.set) sweep.add_set(set);
+  if (changes.duration) sweep.add_set(fmt::format("duration={}", *changes.duration));
+  if (arguments.limit) sweep.mutable_limit()->MergeFrom(*arguments.limit);
+  if (!limit) sweep.clear_limit();
+}
+
+void SweepDefinition::Source::Read(const std::string& what) {
+  if (what.empty()) throw ConfigError("no sweep or scenario is named; see --help");
+  const fs::path place = FindFileOfKinds({"sweeps", "scenarios"}, what, fs::current_path());
+  const std::string found = place.string();
+  text = ReadFile(found);
+  try {
+    ParseTextProto(text, found, &written);
+  } catch (const ConfigError&) {
+    if (!ParsesAsScenario(found)) throw;
+    written.Clear();
+    written.set_scenario(found);
+    written.set_name(fs::path(found).stem().string());
+    return;
+  }
+  file = found;
+  if (!written.has_name()) written.set_name(fs::path(found).stem().string());
+  if (!written.has_scenario()) Fail({"scenario", "is missing; name one of deploy/scenarios"});
+  try {
+    const fs::path scenario = FindFile("scenarios", written.scenario(), place.parent_path());
+    written.set_scenario(scenario.string());
+  } catch (const ConfigError& error) {
+    Fail({"scenario", error.what()});
+  }
+}
+
+std::string SweepDefinition::Source::Where(const std::string& field) const {
+  const std::string last = field.substr(field.rfind('.') + 1);
+  for (const auto& [list, flag, flags, before] :
+       {std::tuple{"vary[", "--vary", &arguments.vary, written.vary_size()},
+        std::tuple{"assign[", "--expression", &arguments.expression, written.assign_size()},
+        std::tuple{"column[", "--column", &arguments.column, written.column_size()}}) {
+    if (!field.starts_with(list)) continue;
+    const int index = std::stoi(field.substr(std::string_view(list).size()));
+    if (index < before) continue;
+    return fmt::format("{} {}", flag, (*flags)[static_cast<size_t>(index - before)]);
+  }
+  const bool of_limit =
+      field.starts_with("limit.") && arguments.limit && HasField(*arguments.limit, last);
+  if (file.empty() || of_limit || (field == "random" && arguments.random)) return "--" + last;
+  const int line = LocateField(text, field, Sweep());
+  return line > 0 ? fmt::format("{}:{}: {}", file, line, field)
+                  : fmt::format("{}: {}", file, field);
+}
+
+void SweepDefinition::Source::Fail(const SweepProblem& problem) const {
+  throw ConfigError(fmt::format("{}: {}", Where(problem.field), problem.text));
+}
+
+SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
+    : points_(Sweep()), changes_(arguments.changes) {
+  const Source source(arguments, limit);
+  Sweep sweep = source.sweep;
+  if (auto problem = CheckVariables(sweep, limit)) source.Fail(*problem);
+  points_ = SweepPoints(sweep);
+  scenario_ = sweep.scenario();
+  changes_.reference = false;
+  changes_.variant = sweep.variant();
+  changes_.ideal = sweep.ideal();
+  changes_.without.assign(sweep.without().begin(), sweep.without().end());
+  changes_.set.assign(sweep.set().begin(), sweep.set().end());
+  changes_.duration.reset();  // is among `set`
+
+  std::optional<double> first_limit;
+  if (limit) first_limit = sweep.limit().min();
+  CheckFields(source, LoadScenario(scenario_, changes_).scenario, first_limit);
+  const RunChanges first = ChangesOf(0, first_limit);
+  const LoadedScenario loaded = LoadScenario(scenario_, first);
+  RunSpec spec = MakeRunSpec(loaded, first, nullptr);
+  CheckRun(loaded, &spec);
+
+  SetColumns(source, loaded.scenario);
+  CheckMaps(source);
+
+  Sweep definition = sweep;
+  definition.clear_scenario();  // its text stands below
+  std::string all;
+  google::protobuf::TextFormat::PrintToString(definition, &all);
+  Scenario base = LoadScenario(scenario_, changes_).scenario;
+  base.clear_applied();
+  all += ScenarioText(base);
+  google::protobuf::TextFormat::Printer printer;
+  std::string graph;
+  printer.PrintToString(spec.graph(), &graph);
+  all += graph;
+  for (const Resource& resource : spec.resource()) all += resource.text();
+  digest_ = Digest(all + PoiseVersion());
+}
+
+void SweepDefinition::CheckFields(const Source& source, Scenario scenario,
+                                  const std::optional<double>& limit) const {
+  const auto set = [&](Scenario* to, const std::string& field, std::string_view assignment) {
+    const size_t equals = assignment.find('=');
+    const auto fail = [&](const std::string& problem) { source.Fail({field, problem}); };
+    if (equals == std::string::npos || equals == 0) {
+      fail(fmt::format("'{}' must be field.path=value", assignment));
+    }
+    try {
+      SetField(to, assignment.substr(0, equals), assignment.substr(equals + 1));
+    } catch (const ConfigError& error) {
+      fail(error.what());
+    }
+  };
+  const std::vector<std::string> first = points_.Changes(0, limit);
+  size_t next = 0;
+  for (int i = 0; i < sweep().vary_size(); ++i) {
+    const Variable& variable = sweep().vary(i);
+    for (int k = 0; k < variable.choice_size(); ++k) {
+      Scenario copy = scenario;
+      for (int n = 0; n < variable.choice(k).set_size(); ++n) {
+        set(&copy, fmt::format("vary[{}].choice[{}].set[{}]", i, k, n), variable.choice(k).set(n));
+      }
+    }
+    const int choice = points_.At(0)[static_cast<size_t>(i)].choice;
+    const int sets = choice >= 0 ? variable.choice(choice).set_size() : variable.has_field();
+    for (int n = 0; n < sets; ++n) set(&scenario, fmt::format("vary[{}].field", i), first[next++]);
+  }
+  if (limit && sweep().limit().has_field()) set(&scenario, "limit.field", first[next++]);
+  for (int i = 0; i < sweep().assign_size(); ++i) {
+    set(&scenario, fmt::format("assign[{}].field", i), first[next++]);
+  }
+}
+
+void SweepDefinition::SetColumns(const Source& source, const Scenario& scenario) {
+  std::vector<std::string> metrics;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    if (metric.name != kMachineMetric) metrics.push_back(metric.name);
+  }
+  const auto add = [&](const std::string& name) {
+    if (std::find(columns_.begin(), columns_.end(), name) == columns_.end() &&
+        name != kMachineMetric) {
+      columns_.push_back(name);
+    }
+  };
+  for (int i = 0; i < sweep().column_size(); ++i) {
+    if (sweep().column(i) == kAllMetrics) {
+      for (const std::string& name : metrics) add(name);
+    } else if (std::find(metrics.begin(), metrics.end(), sweep().column(i)) != metrics.end()) {
+      add(sweep().column(i));
+    } else {
+      source.Fail({fmt::format("column[{}]", i),
+                   fmt::format("no metric named '{}'; {}; see `poise list metrics`",
+                               sweep().column(i), Suggest(sweep().column(i), metrics))});
+    }
+  }
+  if (sweep().column_size() == 0) {
+    for (const Check& check : scenario.check()) add(check.metric());
+  }
+}
+
+void SweepDefinition::CheckMaps(const Source& source) const {
+  std::vector<std::string> names;
+  for (const Variable& variable : sweep().vary()) names.push_back(NameOf(variable));
+  for (int i = 0; i < sweep().map_size(); ++i) {
+    const SweepMap& map = sweep().map(i);
+    for (const auto& [field, name] : {std::pair{"x", map.x()}, std::pair{"y", map.y()}}) {
+      if (name.empty() && field[0] == 'y') continue;
+      if (std::find(names.begin(), names.end(), name) == names.end()) {
+        source.Fail({fmt::format("map[{}].{}", i, field),
+                     fmt::format("no variable named '{}'; {}", name, Suggest(name, names))});
+      }
+    }
+    if (map.value() != "stands" &&
+        std::find(columns_.begin(), columns_.end(), map.value()) == columns_.end()) {
+      source.Fail({fmt::format("map[{}].value", i),
+                   fmt::format("is '{}', which is no column of the table; it is \"stands\" or one "
+                               "of {}",
+                               map.value(), Joined(columns_, ", "))});
+    }
+  }
+}
+
+RunChanges SweepDefinition::ChangesOf(int64_t run, const std::optional<double>& limit) const {
+  RunChanges changes = changes_;
+  for (std::string& set : points_.Changes(run, limit)) changes.set.push_back(std::move(set));
+  return changes;
+}
+
+std::string ProgramDigest() {
+  return Digest(
+      fmt::format("{} {}", ReadFile("/proc/self/exe"), fmt::join(LibraryVersions(), " ")));
+}
+
+}  // namespace poise

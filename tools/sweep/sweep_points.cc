@@ -1,0 +1,268 @@
+#include "tools/sweep/sweep_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "sim_ode/random.h"
+#include "tools/sweep/sweep_expression.h"
+
+namespace poise {
+namespace {
+
+constexpr double kFullTurn = 360;
+// What a table has beside the variables.
+constexpr const char* kReserved[] = {"run",   "outcome", "fell_at", "ended_at",
+                                     "phase", "trouble", "reason",  "stands"};
+
+bool IsFullTurn(const Variable& v) { return v.angle() && std::abs(v.to() - v.from()) == kFullTurn; }
+
+/// The value at `share` (0 to 1) of the way.
+double Between(const Variable& v, double share) {
+  double number = v.from() + share * (v.to() - v.from());
+  if (v.scale() == Variable::LOGARITHMIC) number = v.from() * std::pow(v.to() / v.from(), share);
+  if (share == 1) number = v.to();
+  return v.whole() ? std::round(number) : number;
+}
+
+std::vector<SweepValue> GridValues(const Variable& v) {
+  std::vector<SweepValue> values;
+  for (int i = 0; i < v.choice_size(); ++i) values.push_back({static_cast<double>(i), i});
+  for (const double number : v.value()) values.push_back({number, -1});
+  const double last = IsFullTurn(v) ? v.steps() : std::max(1, v.steps() - 1);
+  for (int i = 0; i < v.steps(); ++i) values.push_back({Between(v, i / last), -1});
+  return values;
+}
+
+std::optional<SweepProblem> CheckName(const std::string& path, bool has_name,
+                                      const std::string& name, const std::string& field) {
+  if (!has_name && field.empty()) {
+    return SweepProblem{path + ".field", "is missing; give a field, a name, or both"};
+  }
+  if (has_name && !IsExpressionName(name)) {
+    return SweepProblem{path + ".name",
+                        fmt::format("is '{}'; use letters, digits and _, and not the name of a "
+                                    "function or constant",
+                                    name)};
+  }
+  if (std::find(std::begin(kReserved), std::end(kReserved), name) != std::end(kReserved)) {
+    return SweepProblem{path + ".name", fmt::format("is '{}', a column of every table", name)};
+  }
+  return {};
+}
+
+std::optional<SweepProblem> CheckVariable(const Variable& v, const std::string& path, bool random) {
+  const bool range = v.has_from() || v.has_to();
+  const int kinds = (range ? 1 : 0) + (v.value_size() > 0 ? 1 : 0) + (v.choice_size() > 0 ? 1 : 0);
+  if (kinds != 1) return SweepProblem{path, "needs either from and to, or value, or choice"};
+  for (const double number : v.value()) {
+    if (!std::isfinite(number)) return SweepProblem{path + ".value", "must be finite"};
+  }
+  std::set<std::string> names;
+  for (int i = 0; i < v.choice_size(); ++i) {
+    const std::string field = fmt::format("{}.choice[{}]", path, i);
+    if (v.choice(i).name().empty()) return SweepProblem{field, "has no name"};
+    if (!names.insert(v.choice(i).name()).second) {
+      return SweepProblem{field + ".name",
+                          fmt::format("there are two choices named '{}'", v.choice(i).name())};
+    }
+  }
+  if (v.choice_size() > 0 && v.has_field()) {
+    return SweepProblem{path + ".field", "has no number to take; let the choices set it"};
+  }
+  if (!range) {
+    if (v.has_steps()) return SweepProblem{path + ".steps", "goes with from and to"};
+    return {};
+  }
+  if (!std::isfinite(v.from()) || !v.has_from()) {
+    return SweepProblem{path + ".from", "must be a finite number"};
+  }
+  if (!std::isfinite(v.to()) || !v.has_to()) {
+    return SweepProblem{path + ".to", "must be a finite number"};
+  }
+  if (v.scale() == Variable::LOGARITHMIC && !(v.from() > 0 && v.to() > 0)) {
+    return SweepProblem{path + ".scale", "is logarithmic: from and to must be more than 0"};
+  }
+  if (random) {
+    if (v.has_steps()) return SweepProblem{path + ".steps", "is of a grid; this sweep is random"};
+    return {};
+  }
+  if (!v.has_steps()) return SweepProblem{path + ".steps", "is missing: how many values"};
+  if (v.steps() < 1 || v.steps() > kMaxSweepRuns) {
+    return SweepProblem{path + ".steps",
+                        fmt::format("is {}; must be 1 to {}", v.steps(), kMaxSweepRuns)};
+  }
+  return {};
+}
+
+std::optional<SweepProblem> CheckLimit(const Limit& limit) {
+  if (auto problem = CheckName("limit", limit.has_name(), limit.name(), limit.field())) {
+    return problem;
+  }
+  if (!limit.has_min() || !std::isfinite(limit.min())) {
+    return SweepProblem{"limit.min", "must be a finite number"};
+  }
+  if (!limit.has_max() || !std::isfinite(limit.max())) {
+    return SweepProblem{"limit.max", "must be a finite number"};
+  }
+  if (!(limit.max() > limit.min())) return SweepProblem{"limit.max", "must be more than min"};
+  if (limit.samples() < 2 || limit.samples() > 10000) {
+    return SweepProblem{"limit.samples", fmt::format("is {}; must be 2 to 10000", limit.samples())};
+  }
+  const double range = limit.max() - limit.min();
+  if (limit.has_tolerance() && !(limit.tolerance() >= 1e-9 * range && limit.tolerance() <= range)) {
+    return SweepProblem{"limit.tolerance", fmt::format("is {}; must be {} to {}", limit.tolerance(),
+                                                       1e-9 * range, range)};
+  }
+  return {};
+}
+
+}  // namespace
+
+const std::string& NameOf(const Variable& variable) {
+  return variable.has_name() ? variable.name() : variable.field();
+}
+
+const std::string& NameOf(const Limit& limit) {
+  return limit.has_name() ? limit.name() : limit.field();
+}
+
+SweepPoints::SweepPoints(const Sweep& sweep) : sweep_(sweep) {
+  for (const Variable& v : sweep_.vary()) {
+    values_.push_back(sweep_.has_random() ? std::vector<SweepValue>{} : GridValues(v));
+    if (!sweep_.has_random()) size_ *= static_cast<int64_t>(values_.back().size());
+  }
+  if (sweep_.has_random()) size_ = sweep_.random();
+}
+
+SweepValue SweepPoints::Draw(const Variable& v, double share) const {
+  const auto pick = [&](int count) {
+    return std::min(count - 1, static_cast<int>(share * static_cast<double>(count)));
+  };
+  if (v.choice_size() > 0) {
+    const int choice = pick(v.choice_size());
+    return {static_cast<double>(choice), choice};
+  }
+  if (v.value_size() > 0) return {v.value(pick(v.value_size())), -1};
+  if (!v.whole()) return {Between(v, share), -1};
+  // Every whole number of the range as often as any other.
+  const double low = std::ceil(std::min(v.from(), v.to()));
+  const double high = std::floor(std::max(v.from(), v.to()));
+  if (v.scale() == Variable::LOGARITHMIC || high < low) return {Between(v, share), -1};
+  return {std::min(high, low + std::floor(share * (high - low + 1))), -1};
+}
+
+std::vector<SweepValue> SweepPoints::At(int64_t run) const {
+  std::vector<SweepValue> point(values_.size());
+  if (sweep_.has_random()) {
+    RandomStream random(sweep_.seed(), static_cast<uint64_t>(run));
+    for (size_t i = 0; i < point.size(); ++i) {
+      point[i] = Draw(sweep_.vary(static_cast<int>(i)), random.Uniform());
+    }
+    return point;
+  }
+  for (size_t i = point.size(); i-- > 0;) {
+    const auto count = static_cast<int64_t>(values_[i].size());
+    point[i] = values_[i][static_cast<size_t>(run % count)];
+    run /= count;
+  }
+  return point;
+}
+
+std::vector<SweepValue> SweepPoints::Values(size_t variable) const { return values_[variable]; }
+
+std::string SweepPoints::Text(size_t variable, const SweepValue& value) const {
+  const Variable& v = sweep_.vary(static_cast<int>(variable));
+  return value.choice >= 0 ? v.choice(value.choice).name() : fmt::format("{}", value.number);
+}
+
+std::vector<std::string> SweepPoints::Changes(int64_t run,
+                                              const std::optional<double>& limit) const {
+  std::vector<std::string> changes;
+  std::map<std::string, double> numbers;
+  std::string where = fmt::format("run {}", run);
+  const auto add_number = [&](const std::string& name, const std::string& field, double number) {
+    if (IsExpressionName(name)) numbers[name] = number;
+    if (!field.empty()) changes.push_back(fmt::format("{}={}", field, number));
+    where += fmt::format(", {} {}", name, number);
+  };
+  const std::vector<SweepValue> point = At(run);
+  for (size_t i = 0; i < point.size(); ++i) {
+    const Variable& v = sweep_.vary(static_cast<int>(i));
+    if (point[i].choice < 0) {
+      add_number(NameOf(v), v.field(), point[i].number);
+    } else {
+      const auto& set = v.choice(point[i].choice).set();
+      changes.insert(changes.end(), set.begin(), set.end());
+    }
+  }
+  if (limit) add_number(NameOf(sweep_.limit()), sweep_.limit().field(), *limit);
+  for (const Assignment& assign : sweep_.assign()) {
+    try {
+      changes.push_back(fmt::format("{}={}", assign.field(), Evaluate(assign.value(), numbers)));
+    } catch (const ExpressionError& error) {
+      throw ConfigError(
+          fmt::format("{} = {}: {} ({})", assign.field(), assign.value(), error.what(), where));
+    }
+  }
+  return changes;
+}
+
+std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
+  if (sweep.has_random() && (sweep.random() < 1 || sweep.random() > kMaxSweepRuns)) {
+    return SweepProblem{"random",
+                        fmt::format("is {}; must be 1 to {}", sweep.random(), kMaxSweepRuns)};
+  }
+  std::map<std::string, double> numbers;
+  std::set<std::string> names;
+  double runs = 1;
+  for (int i = 0; i < sweep.vary_size(); ++i) {
+    const Variable& v = sweep.vary(i);
+    const std::string path = fmt::format("vary[{}]", i);
+    if (auto problem = CheckName(path, v.has_name(), v.name(), v.field())) return problem;
+    if (auto problem = CheckVariable(v, path, sweep.has_random())) return problem;
+    if (!names.insert(NameOf(v)).second) {
+      return SweepProblem{path, fmt::format("there are two variables named '{}'", NameOf(v))};
+    }
+    const SweepPoints one([&] {
+      Sweep alone;
+      *alone.add_vary() = v;
+      if (sweep.has_random()) alone.set_random(1);
+      return alone;
+    }());
+    runs *= static_cast<double>(one.size());
+    if (v.choice_size() == 0 && IsExpressionName(NameOf(v))) {
+      numbers[NameOf(v)] = one.At(0)[0].number;
+    }
+  }
+  if (runs > static_cast<double>(kMaxSweepRuns)) {
+    return SweepProblem{"vary", fmt::format("makes {:g} runs; at most {}", runs, kMaxSweepRuns)};
+  }
+  if (limit) {
+    if (auto problem = CheckLimit(sweep.limit())) return problem;
+    if (!names.insert(NameOf(sweep.limit())).second) {
+      return SweepProblem{"limit", fmt::format("is '{}', a variable of `vary`; leave it out there",
+                                               NameOf(sweep.limit()))};
+    }
+    if (IsExpressionName(NameOf(sweep.limit()))) {
+      numbers[NameOf(sweep.limit())] = sweep.limit().min();
+    }
+  } else if (sweep.vary_size() == 0) {
+    return SweepProblem{"vary", "is missing: nothing differs from run to run"};
+  }
+  for (int i = 0; i < sweep.assign_size(); ++i) {
+    const std::string path = fmt::format("assign[{}]", i);
+    if (sweep.assign(i).field().empty()) return SweepProblem{path, "has no field"};
+    try {
+      Evaluate(sweep.assign(i).value(), numbers);
+    } catch (const ExpressionError& error) {
+      return SweepProblem{path + ".value",
+                          fmt::format("'{}' {}", sweep.assign(i).value(), error.what())};
+    }
+  }
+  return {};
+}
+
+}  // namespace poise

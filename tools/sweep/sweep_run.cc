@@ -1,0 +1,171 @@
+#include "tools/sweep/sweep_run.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "components/framework/configuration.h"
+#include "components/framework/inline_runner.h"
+#include "components/robot/robot_model.h"
+#include "logging/events.h"
+#include "logging/inline_record.h"
+#include "logging/inline_recorder.h"
+#include "logging/metrics.h"
+#include "logging/schedule_plan.h"
+#include "tools/cli/output_place.h"
+#include "tools/report/report.h"
+#include "tools/report/run_story.h"
+#include "tools/run/estimates.h"
+#include "tools/run/run_dir.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct Prepared {
+  LoadedScenario loaded;
+  RunSpec spec;
+};
+
+/// Runs to the end and takes the record, from memory or from the log in `log_dir`.
+logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
+                          std::string* end_detail) {
+  const std::string text = ScenarioText(prepared.loaded.scenario);
+  InlineRunner runner(prepared.spec, Components());
+  const auto run = [&] {
+    while (runner.Step()) {
+    }
+    *end_detail = runner.end_detail();
+  };
+  if (log_dir.empty()) {
+    logging::InlineRecord record(prepared.spec, text, &runner);
+    run();
+    return record.Take();
+  }
+  const RunDir dir = MakeRunDir(log_dir, prepared.spec.scenario(), /*force=*/true);
+  std::string spec;
+  google::protobuf::TextFormat::PrintToString(prepared.spec, &spec);
+  WriteFile(dir.path() / "run_spec.pbtxt", spec);
+  WriteFile(dir.path() / "scenario.pbtxt", text);
+  const fs::path log = dir.path() / "run.lcm";
+  logging::InlineRecorder recorder(log, prepared.spec, text, &runner);
+  run();
+  recorder.Close(prepared.spec);
+  return logging::ReadRun(log);
+}
+
+std::string PhaseAtEnd(const logging::RunRecord& run) {
+  const task_torque_t* task = run.task.at(run.num_ticks - 1);
+  if (task == nullptr) return "";
+  const auto phase = static_cast<size_t>(task->phase);
+  const std::optional<logging::SchedulePlan> plan = logging::ReadSchedulePlan(run);
+  const bool named = plan && phase < plan->phases.size() && !plan->phases[phase].name.empty();
+  return named ? plan->phases[phase].name : std::to_string(task->phase);
+}
+
+void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
+  std::vector<std::string> troubles;
+  for (const logging::Event& event : logging::Events(run)) {
+    if (event.name == "fall") {
+      row->fell_at = event.time;
+      break;
+    }
+    if (IsTrouble(event.name) &&
+        std::find(troubles.begin(), troubles.end(), event.name) == troubles.end()) {
+      troubles.push_back(event.name);
+    }
+  }
+  for (const std::string& name : troubles) row->trouble += (row->trouble.empty() ? "" : "+") + name;
+}
+
+}  // namespace
+
+SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
+                  const std::vector<std::string>& metrics, const std::string& log_dir,
+                  SweepRow row) {
+  std::optional<Prepared> prepared;
+  try {
+    LoadedScenario loaded = LoadScenario(scenario, changes);
+    RunSpec spec = MakeRunSpec(loaded, changes, nullptr);
+    CheckRun(loaded, &spec);
+    prepared.emplace(Prepared{std::move(loaded), std::move(spec)});
+  } catch (const ConfigError& error) {
+    row.outcome = kInvalid;
+    row.reason = error.what();
+    return row;
+  } catch (const robot::RobotError& error) {
+    row.outcome = kInvalid;
+    row.reason = error.what();
+    return row;
+  }
+  const Scenario& merged = prepared->loaded.scenario;
+  logging::RunRecord run = Record(*prepared, log_dir, &row.reason);
+  run.first_tick = FirstCheckedTick(merged, run);
+  ReadEvents(run, &row);
+  const bool whole = run.num_ticks >= run.spec.num_ticks() && row.reason.empty();
+  row.outcome = row.fell_at ? kFell : whole ? kStands : kStopped;
+  row.ended_at = run.time(run.num_ticks);
+  row.phase = PhaseAtEnd(run);
+  std::vector<const logging::Metric*> measured;
+  for (const std::string& name : metrics) measured.push_back(logging::FindMetric(name));
+  AddOtherEstimates(measured, &run);
+  for (const logging::Metric* metric : measured) {
+    const logging::Answer value = metric->compute(run);
+    if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
+  }
+  row.push = FindPushBound(merged, run);
+  return row;
+}
+
+std::string SweepRow::RowText(const SweepRow& row) {
+  ordered_json json = {{"run", row.run}};
+  if (row.limit) json["limit"] = *row.limit;
+  json["outcome"] = row.outcome;
+  if (row.fell_at) json["fell_at"] = *row.fell_at;
+  json["ended_at"] = row.ended_at;
+  json["phase"] = row.phase;
+  json["trouble"] = row.trouble;
+  json["reason"] = row.reason;
+  json["metrics"] = row.metrics;
+  if (row.push) {
+    json["push"] = {{"impulse", row.push->impulse},
+                    {"mass", row.push->mass},
+                    {"height", row.push->height},
+                    {"distance", row.push->distance},
+                    {"lip_impulse", row.push->lip_impulse},
+                    {"lip_impulse_of_duration", row.push->lip_impulse_of_duration}};
+  }
+  // A scenario's words may be any bytes.
+  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+SweepRow SweepRow::Parse(const std::string& text) {
+  const nlohmann::json json = nlohmann::json::parse(text);
+  SweepRow row;
+  row.run = json.at("run").get<int64_t>();
+  if (json.contains("limit")) row.limit = json["limit"].get<double>();
+  row.outcome = json.at("outcome").get<std::string>();
+  if (json.contains("fell_at")) row.fell_at = json["fell_at"].get<double>();
+  row.ended_at = json.at("ended_at").get<double>();
+  row.phase = json.at("phase").get<std::string>();
+  row.trouble = json.at("trouble").get<std::string>();
+  row.reason = json.at("reason").get<std::string>();
+  row.metrics = json.at("metrics").get<std::map<std::string, double>>();
+  if (json.contains("push")) {
+    const nlohmann::json& push = json["push"];
+    row.push = PushBound{
+        push.at("impulse").get<double>(),     push.at("mass").get<double>(),
+        push.at("height").get<double>(),      push.at("distance").get<double>(),
+        push.at("lip_impulse").get<double>(), push.at("lip_impulse_of_duration").get<double>()};
+  }
+  return row;
+}
+
+}  // namespace poise

@@ -1,0 +1,51 @@
+// One run of a sweep.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/scenario/push_bound.h"
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise {
+
+/// How a run of a sweep ended, by name in tables.
+inline constexpr char kStands[] = "stands";
+inline constexpr char kFell[] = "fell";
+inline constexpr char kStopped[] = "stopped";  ///< ended early, but not by a fall
+inline constexpr char kInvalid[] = "invalid";  ///< its configuration cannot be run
+inline constexpr char kCrashed[] = "crashed";  ///< the program did
+
+/// A finished run: a row of the table without its variables.
+struct SweepRow {
+  int64_t run = 0;
+  std::optional<double> limit;  ///< value of the quantity whose limit is sought
+  std::string outcome;
+  std::optional<double> fell_at;  ///< s
+  double ended_at = 0;            ///< s, simulated
+  std::string phase;              ///< the schedule's at the end
+  /// Names of what went wrong until the end (logging::Events), in order, each once, joined by +.
+  std::string trouble;
+  std::string reason;  ///< why it ended early
+  std::map<std::string, double> metrics;
+  std::optional<PushBound> push;
+
+  bool stands() const { return outcome == kStands; }
+  bool operator==(const SweepRow& other) const { return RowText(*this) == RowText(other); }
+
+  /// The row as a line of JSON, without its end.
+  static std::string RowText(const SweepRow& row);
+  /// Throws std::exception for what is none.
+  static SweepRow Parse(const std::string& text);
+};
+
+/// Runs `scenario` with `changes` in this process, without a log, or with a run's folder in
+/// `log_dir`. What cannot be run is kInvalid. `row`: its run and limit are taken from it. Throws
+/// what only the machine can be blamed for: memory, disk.
+SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
+                  const std::vector<std::string>& metrics, const std::string& log_dir,
+                  SweepRow row);
+
+}  // namespace poise

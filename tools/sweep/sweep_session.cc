@@ -1,0 +1,254 @@
+#include "tools/sweep/sweep_session.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <thread>
+
+#include "components/framework/clock.h"
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/output_place.h"
+#include "tools/cli/progress.h"
+#include "tools/cli/signals.h"
+#include "tools/scenario/ablations.h"
+#include "tools/sweep/sweep_workers.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPoll = 50;  // ms
+
+std::optional<int64_t> WholeNumber(std::string_view text) {
+  int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return {};
+  return number;
+}
+
+/// The two numbers around `at`.
+std::optional<std::pair<int64_t, int64_t>> Pair(std::string_view text, char at) {
+  const size_t middle = text.find(at);
+  if (middle == std::string_view::npos) return {};
+  const auto first = WholeNumber(text.substr(0, middle));
+  const auto second = WholeNumber(text.substr(middle + 1));
+  if (!first || !second) return {};
+  return std::pair{*first, *second};
+}
+
+/// `out`, made if need be, or a dated one.
+RunDir MakeSweepDir(const SessionOptions& options, const std::string& kind,
+                    const std::string& name) {
+  const std::string& out = options.out;
+  if (out.empty()) return MakeRunDir("", kind + "-" + name, false);
+  const fs::path path = fs::absolute(out);
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path)) {
+    throw ConfigError(fmt::format("--out {}: cannot be made: {}", out,
+                                  error ? error.message() : "there is a file of that name"));
+  }
+  // Results are refused with a word of --resume.
+  if (!options.resume && !fs::exists(path / kResultsFile)) {
+    CheckFolderFree("--out", out, options.force);
+  }
+  return RunDir(path);
+}
+
+std::string Duration(double seconds) {
+  const auto s = static_cast<int64_t>(seconds + 0.5);
+  if (s < 100) return fmt::format("{} s", s);
+  if (s < 6000) return fmt::format("{} min {} s", s / 60, s % 60);
+  return fmt::format("{} h {} min", s / 3600, s / 60 % 60);
+}
+
+}  // namespace
+
+void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* session) {
+  RunChanges* const changes = &arguments->changes;
+  session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const auto list = [&](const char* flag, std::vector<std::string>* to, const char* text,
+                        const char* type) {
+    return app->add_option(flag, *to, text)->type_name(type)->allow_extra_args(false)->take_all();
+  };
+  // Not required: CLI11 would take a subcommand's name for it.
+  app->add_option("sweep", arguments->what,
+                  "name of deploy/sweeps, or a .pbtxt file; or a scenario with --vary");
+  list("--vary", &arguments->vary,
+       "a field of the scenario, or a name for --expression, and its values: FROM:TO:STEPS, then "
+       ":log, :angle (degrees), :whole; or VALUE,VALUE,...; with --random FROM:TO",
+       "NAME=VALUES");
+  list("--expression", &arguments->expression,
+       "a field that follows from the variables, e.g. "
+       "'sim_ode.push[0].direction_x=cos(direction*deg)'",
+       "FIELD=EXPRESSION");
+  app->add_option("--random", arguments->random,
+                  "this many runs with every variable drawn at random, in place of the grid")
+      ->check(CLI::Range(int64_t{1}, kMaxSweepRuns));
+  app->add_option("--seed", arguments->seed, "of what is drawn at random");
+  list("--column", &arguments->column,
+       "metric of the table (poise list metrics), repeatable, or all; default: those of the "
+       "scenario's checks",
+       "METRIC");
+  app->add_option("--variant", changes->variant, "of the scenario");
+  list("--without", &changes->without, "leave out a part of the controller", "PART")
+      ->check(CLI::IsMember(RemovableParts()));
+  app->add_flag("--ideal", changes->ideal,
+                "a robot without joint friction, sensor noise, drive train and model error");
+  list("--set", &changes->set, "change a field of the scenario in every run", "FIELD=VALUE");
+  app->add_option("--duration", changes->duration, "simulated time of a run, s")
+      ->check(Within("in (0, 36000]", [](double s) { return s > 0 && s <= 36000; }));
+  app->add_option("--out", session->out, "folder of the results; default: a dated one under runs/");
+  app->add_option("--jobs", session->jobs, "runs at a time; default: the processor's cores")
+      ->check(CLI::Range(1, 1024));
+  CLI::Option* const resume = app->add_flag(
+      "--resume", session->resume, "go on with the sweep in --out; an empty folder begins one");
+  resume->needs(app->get_option("--out"));
+  app->add_flag("--force", session->force, "replace what --out holds")->excludes(resume);
+  CLI::Option* const range =
+      app->add_option("--range", session->range, "only points A to B - 1")->type_name("A:B");
+  app->add_option("--part", session->part, "only the K-th of N shares, K from 1")
+      ->type_name("K/N")
+      ->excludes(range);
+  app->add_flag("--logs", session->logs, "keep each run's log and files in OUT/logs/POINT");
+  app->add_flag("--quiet", session->quiet, "no progress");
+}
+
+std::pair<int64_t, int64_t> SelectedRuns(const SessionOptions& options, int64_t size) {
+  if (!options.range.empty()) {
+    const auto range = Pair(options.range, ':');
+    if (!range || range->first < 0 || range->second <= range->first || range->second > size) {
+      throw ConfigError(
+          fmt::format("--range {}: must be A:B with 0 <= A < B <= {}, the number of "
+                      "points",
+                      options.range, size));
+    }
+    return *range;
+  }
+  if (!options.part.empty()) {
+    const auto part = Pair(options.part, '/');
+    if (!part || part->first < 1 || part->second < part->first || part->second > kMaxSweepRuns) {
+      throw ConfigError(fmt::format("--part {}: must be K/N with 1 <= K <= N", options.part));
+    }
+    const auto [k, n] = *part;
+    return {size * (k - 1) / n, size * k / n};
+  }
+  return {0, size};
+}
+
+std::string HeaderProblem(const SweepHeader& header, const SweepHeader& found) {
+  if (header.kind != found.kind) return fmt::format("is of poise {}", found.kind);
+  if (header.digest != found.digest) {
+    return "is of another sweep: its definition, scenario, robot or graph differs";
+  }
+  if (header.program != found.program) {
+    return "was made by another build of poise, whose figures may differ";
+  }
+  return "";
+}
+
+SweepSession::SweepSession(const SweepDefinition& definition, const std::string& kind,
+                           const SessionOptions& options)
+    : definition_(definition),
+      options_(options),
+      header_{kind, definition.sweep(), definition.columns(), definition.digest(), ProgramDigest()},
+      dir_(MakeSweepDir(options, kind, definition.name())) {
+  if (options_.force && !options_.resume) fs::remove(folder() / kResultsFile);
+  std::optional<SweepResults> results = ReadResults(folder());
+  if (results) {
+    const std::string where = (folder() / kResultsFile).string();
+    if (!options_.resume) {
+      throw ConfigError(
+          fmt::format("{}: is there already; --resume goes on with it, --force "
+                      "replaces it; or choose another folder with --out",
+                      where));
+    }
+    const std::string problem = HeaderProblem(header_, results->header);
+    if (!problem.empty()) {
+      throw ConfigError(fmt::format("{}: {}; choose another folder with --out", where, problem));
+    }
+    rows_ = results->rows;
+    found_ = rows_.size();
+  }
+  writer_.emplace(folder(), header_, results);
+}
+
+SweepRow SweepSession::RowOf(const Request& request, const std::string& answer,
+                             const std::string& crash) {
+  if (crash.empty()) return SweepRow::Parse(answer);
+  SweepRow row;
+  row.run = request.run;
+  row.limit = request.limit;
+  row.outcome = kCrashed;
+  row.reason = crash;
+  return row;
+}
+
+bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
+                       const std::function<void(const SweepRow&)>& done,
+                       const std::function<Progress()>& progress) {
+  CatchStopSignals();
+  StatusLine status(options_.quiet);
+  ForkedTasks tasks(options_.jobs);
+  std::map<int64_t, Request> requests;
+  int64_t id = 0;
+  bool exhausted = false;
+  std::string failure;
+  const int64_t start = NowNanoseconds();
+  const double before = progress().done;
+  while (StopSignal() == 0) {
+    while (!tasks.full() && failure.empty()) {
+      const std::optional<Request> request = next();
+      exhausted = !request;
+      if (!request) break;
+      requests[id] = *request;
+      tasks.Start(id++, [this, request] {
+        std::string logs;
+        if (options_.logs) {
+          logs = (folder() / "logs" / std::to_string(request->run)).string();
+          if (request->limit) logs += fmt::format("/{}", *request->limit);
+        }
+        SweepRow row;
+        row.run = request->run;
+        row.limit = request->limit;
+        row = RunPoint(definition_.scenario(), definition_.ChangesOf(request->run, request->limit),
+                       definition_.columns(), logs, std::move(row));
+        return SweepRow::RowText(row);
+      });
+    }
+    if (tasks.running() == 0 && (exhausted || !failure.empty())) break;
+    for (const ForkedTasks::Result& result : tasks.Wait(kPoll)) {
+      const Request& request = requests.at(result.id);
+      if (!result.answer && !result.crashed) {
+        failure = fmt::format("run {}: {}", request.run, result.problem);
+        continue;
+      }
+      const SweepRow row = RowOf(request, result.answer.value_or(""), result.problem);
+      writer_->Append(row);
+      AddRow(row, kResultsFile, &rows_);
+      done(row);
+      requests.erase(result.id);
+    }
+    const double wall = static_cast<double>(NowNanoseconds() - start) * 1e-9;
+    if (status.Due(wall)) {
+      const Progress now = progress();
+      const double gained = now.done - before;
+      const std::string left =
+          gained > 0 ? ", about " + Duration(wall * (now.total - now.done) / gained) + " left" : "";
+      status.Show(now.text + left, wall);
+    }
+  }
+  status.Clear();
+  if (!failure.empty()) {
+    throw std::runtime_error(fmt::format("{}; --resume --out {} goes on after the {} runs done",
+                                         failure, folder().string(), rows_.size()));
+  }
+  return StopSignal() == 0;
+}
+
+}  // namespace poise

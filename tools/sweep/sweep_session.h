@@ -1,0 +1,87 @@
+// The runs of a sweep or of a limit's search, kept in a folder.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/run/run_dir.h"
+#include "tools/sweep/sweep_definition.h"
+#include "tools/sweep/sweep_results.h"
+
+namespace CLI {
+class App;
+}
+
+namespace poise {
+
+inline constexpr char kKindSweep[] = "sweep";
+inline constexpr char kKindLimit[] = "limit";
+
+/// How the runs are made; the results do not depend on it.
+struct SessionOptions {
+  std::string out;    ///< empty: a dated folder under runs/
+  std::string range;  ///< "A:B": runs A to B - 1
+  std::string part;   ///< "K/N": the K-th of N shares, K from 1
+  int jobs = 1;       ///< at a time
+  bool resume = false;
+  bool force = false;  ///< replace what `out` holds
+  bool logs = false;
+  bool quiet = false;
+};
+
+/// Adds the options that `poise sweep` and `poise limit` share. Both structs must outlive the
+/// parsing.
+void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* session);
+
+/// First run and the one after the last. Throws ConfigError for a range or part that is none.
+std::pair<int64_t, int64_t> SelectedRuns(const SessionOptions& options, int64_t size);
+
+class SweepSession {
+ public:
+  struct Request {
+    int64_t run = 0;
+    std::optional<double> limit;
+  };
+  struct Progress {
+    double done = 0, total = 1;  ///< runs
+    std::string text;
+  };
+
+  /// Locks and reads the folder. Throws ConfigError: it holds results and is not to be resumed, or
+  /// those of another sweep or of another build of poise.
+  SweepSession(const SweepDefinition& definition, const std::string& kind,
+               const SessionOptions& options);
+
+  /// Runs what `next` gives until it gives nothing and nothing runs; `done` gets each row when it
+  /// is on the disk. False when a signal ended it. Throws std::runtime_error when a run could not
+  /// be made for want of memory or disk.
+  bool Run(const std::function<std::optional<Request>()>& next,
+           const std::function<void(const SweepRow&)>& done,
+           const std::function<Progress()>& progress);
+
+  const std::filesystem::path& folder() const { return dir_.path(); }
+  const SweepHeader& header() const { return header_; }
+  const SweepRows& rows() const { return rows_; }
+  /// Rows that were there before.
+  size_t found() const { return found_; }
+
+ private:
+  SweepRow RowOf(const Request& request, const std::string& answer, const std::string& crash);
+
+  const SweepDefinition& definition_;
+  SessionOptions options_;
+  SweepHeader header_;
+  RunDir dir_;
+  SweepRows rows_;
+  size_t found_ = 0;
+  std::optional<SweepResultsWriter> writer_;
+};
+
+/// Empty: `found` is of the same sweep and program as `header`; else what differs and what to do.
+std::string HeaderProblem(const SweepHeader& header, const SweepHeader& found);
+
+}  // namespace poise

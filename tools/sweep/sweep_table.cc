@@ -1,0 +1,234 @@
+#include "tools/sweep/sweep_table.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <vector>
+
+#include "fmt/format.h"
+#include "tools/cli/text_table.h"
+
+namespace poise {
+namespace {
+
+template <class Number>
+std::string Cell(const std::optional<Number>& value) {
+  return value ? fmt::format("{}", *value) : "";
+}
+
+std::string Line(const std::vector<std::string>& cells) {
+  std::string line;
+  for (const std::string& cell : cells) {
+    if (!line.empty()) line += ',';
+    line += CsvCell(cell);
+  }
+  return line += '\n';
+}
+
+/// The run's number and its variables.
+std::vector<std::string> Place(const SweepPoints& points, int64_t run) {
+  std::vector<std::string> cells = {fmt::format("{}", run)};
+  const std::vector<SweepValue> values = points.At(run);
+  for (size_t i = 0; i < values.size(); ++i) cells.push_back(points.Text(i, values[i]));
+  return cells;
+}
+
+std::vector<std::string> PlaceNames(const Sweep& sweep) {
+  std::vector<std::string> names = {"run"};
+  for (const Variable& variable : sweep.vary()) names.push_back(NameOf(variable));
+  return names;
+}
+
+std::string Share(double part, double whole) { return fmt::format("{}", part / whole); }
+
+}  // namespace
+
+std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
+  const SweepPoints points(header.sweep);
+  const bool limit = header.sweep.has_limit();
+  std::vector<std::string> names = PlaceNames(header.sweep);
+  if (limit) names.push_back(NameOf(header.sweep.limit()));
+  for (const char* name : {"outcome", "fell_at", "ended_at", "phase", "trouble", "reason"}) {
+    names.emplace_back(name);
+  }
+  names.insert(names.end(), header.columns.begin(), header.columns.end());
+  std::string csv = Line(names);
+  for (const auto& [key, row] : rows) {
+    std::vector<std::string> cells = Place(points, row.run);
+    if (limit) cells.push_back(Cell(row.limit));
+    cells.insert(cells.end(), {row.outcome, Cell(row.fell_at), fmt::format("{}", row.ended_at),
+                               row.phase, row.trouble, row.reason});
+    for (const std::string& name : header.columns) {
+      const auto metric = row.metrics.find(name);
+      cells.push_back(metric == row.metrics.end() ? "" : fmt::format("{}", metric->second));
+    }
+    csv += Line(cells);
+  }
+  return csv;
+}
+
+std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& rows) {
+  std::vector<LimitPoint> points;
+  for (const auto& [key, row] : rows) {
+    if (points.empty() || points.back().run != row.run) {
+      points.push_back({row.run, LimitSearch(header.sweep.limit())});
+    }
+    points.back().search.Add(*row.limit, row.stands());
+  }
+  for (LimitPoint& point : points) {
+    const auto row_at = [&](const std::optional<double>& value) {
+      return value ? &rows.at({point.run, *value}) : nullptr;
+    };
+    point.at_limit = row_at(point.search.limit());
+    point.at_fall = row_at(point.search.fails_at());
+    point.at_largest = row_at(point.search.largest_survived());
+    point.any = point.at_limit != nullptr ? point.at_limit : point.at_fall;
+  }
+  return points;
+}
+
+std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
+  const SweepPoints points(header.sweep);
+  std::vector<std::string> names = PlaceNames(header.sweep);
+  names.push_back(NameOf(header.sweep.limit()));
+  for (const char* name :
+       {"fails_at", "largest_survived", "monotone", "runs", "impulse", "largest_survived_impulse",
+        "mass", "com_height", "distance_to_edge", "lip_impulse", "share_of_lip",
+        "lip_impulse_of_duration", "share_of_lip_of_duration", "phase", "trouble", "reason"}) {
+    names.emplace_back(name);
+  }
+  std::string csv = Line(names);
+  for (const LimitPoint& point : LimitPoints(header, rows)) {
+    std::vector<std::string> cells = Place(points, point.run);
+    cells.insert(cells.end(),
+                 {Cell(point.search.limit()), Cell(point.search.fails_at()),
+                  Cell(point.search.largest_survived()), point.search.monotone() ? "true" : "false",
+                  Cell(std::optional(point.search.tried()))});
+    const std::optional<PushBound> bound = point.any->push;
+    const auto impulse = [](const SweepRow* row) {
+      return row != nullptr && row->push ? std::optional(row->push->impulse) : std::nullopt;
+    };
+    const std::optional<double> at_limit = impulse(point.at_limit);
+    cells.push_back(Cell(at_limit));
+    cells.push_back(Cell(impulse(point.at_largest)));
+    const auto of_bound = [&](double PushBound::*field) {
+      cells.push_back(bound ? fmt::format("{}", (*bound).*field) : "");
+    };
+    const auto share = [&](double PushBound::*field) {
+      of_bound(field);
+      cells.push_back(bound && at_limit ? Share(*at_limit, (*bound).*field) : "");
+    };
+    of_bound(&PushBound::mass);
+    of_bound(&PushBound::height);
+    of_bound(&PushBound::distance);
+    share(&PushBound::lip_impulse);
+    share(&PushBound::lip_impulse_of_duration);
+    const SweepRow* const fall = point.at_fall;
+    for (const auto field : {&SweepRow::phase, &SweepRow::trouble, &SweepRow::reason}) {
+      cells.push_back(fall != nullptr ? fall->*field : "");
+    }
+    csv += Line(cells);
+  }
+  return csv;
+}
+
+namespace {
+
+/// What the capture point's warnings were worth, of runs with step_needed_time; else empty.
+std::string FormatWarnings(const SweepRows& rows) {
+  int falls = 0, standing = 0, false_alarms = 0;
+  std::vector<double> warnings;  // s
+  for (const auto& [key, row] : rows) {
+    const auto needed = row.metrics.find("step_needed_time");
+    if (needed == row.metrics.end()) continue;
+    const auto warning = row.metrics.find("step_warning_time");
+    if (row.outcome == kFell) {
+      ++falls;
+      if (warning != row.metrics.end() && warning->second > 0) warnings.push_back(warning->second);
+    } else if (row.outcome == kStands) {
+      ++standing;
+      false_alarms += needed->second > 0 ? 1 : 0;
+    }
+  }
+  if (falls + standing == 0) return "";
+  std::string text =
+      fmt::format("step_needed: {} of {} falls announced, false alarms in {} of {} that stand",
+                  warnings.size(), falls, false_alarms, standing);
+  if (!warnings.empty()) {
+    const auto middle = warnings.begin() + static_cast<std::ptrdiff_t>(warnings.size() / 2);
+    std::nth_element(warnings.begin(), middle, warnings.end());
+    text += fmt::format(", median warning {:.2f} s", *middle);
+  }
+  text += "\n";
+  return text;
+}
+
+}  // namespace
+
+std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
+  std::map<std::string, int> outcomes;
+  std::map<std::pair<std::string, std::string>, int> ways;
+  for (const auto& [key, row] : rows) {
+    ++outcomes[row.outcome];
+    if (row.outcome == kFell) ++ways[{row.phase, row.trouble}];
+  }
+  std::string text = fmt::format("{} runs", rows.size());
+  for (const char* outcome : {kStands, kFell, kStopped, kInvalid, kCrashed}) {
+    if (outcomes[outcome] == 0) continue;
+    text += fmt::format(", {} {} ({:.1f} %)", outcome, outcomes[outcome],
+                        100.0 * outcomes[outcome] / static_cast<double>(rows.size()));
+  }
+  text += "\n";
+  const auto has = [&](const char* column) {
+    return std::ranges::find(header.columns, column) != header.columns.end();
+  };
+  if (has("step_needed_time") && has("step_warning_time")) text += FormatWarnings(rows);
+  if (ways.empty()) return text;
+  std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::vector<TableRow> table = {{"fell", "in phase", "after"}};
+  for (const auto& [way, count] : sorted) {
+    table.push_back({fmt::format("{}", count), way.first, way.second.empty() ? "-" : way.second});
+  }
+  return text + "\n" + FormatColumns(table);
+}
+
+std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
+  const SweepPoints points(header.sweep);
+  const Limit& limit = header.sweep.limit();
+  std::vector<std::string> heading = PlaceNames(header.sweep);
+  const std::string unit = limit.has_unit() ? fmt::format(" [{}]", limit.unit()) : "";
+  heading.push_back(NameOf(limit) + unit);
+  heading.insert(heading.end(), {"largest survived", ""});
+  const std::vector<LimitPoint> found = LimitPoints(header, rows);
+  const bool push = std::any_of(found.begin(), found.end(),
+                                [](const LimitPoint& p) { return p.any->push.has_value(); });
+  if (push) heading.insert(heading.end(), {"N·s", "of pendulum", "for the duration"});
+  std::vector<TableRow> table = {TableRow(heading.begin(), heading.end())};
+  for (const LimitPoint& point : found) {
+    std::vector<std::string> cells = Place(points, point.run);
+    const LimitSearch& search = point.search;
+    const auto number = [](const std::optional<double>& value) {
+      return value ? FormatNumber(*value) : "none";
+    };
+    cells.push_back(
+        fmt::format("{}{}", search.fails_at() ? "" : "at least ", number(search.limit())));
+    cells.push_back(search.monotone() ? "" : number(search.largest_survived()));
+    cells.emplace_back(search.monotone() ? "" : "not monotone");
+    if (push) {
+      const bool known = point.at_limit != nullptr && point.at_limit->push;
+      const PushBound bound = known ? *point.at_limit->push : PushBound();
+      const auto percent = [&](double of) {
+        return known ? fmt::format("{:.1f} %", 100 * bound.impulse / of) : "";
+      };
+      cells.push_back(known ? FormatNumber(bound.impulse) : "");
+      cells.push_back(percent(bound.lip_impulse));
+      cells.push_back(percent(bound.lip_impulse_of_duration));
+    }
+    table.emplace_back(cells.begin(), cells.end());
+  }
+  return FormatColumns(table);
+}
+
+}  // namespace poise
