@@ -106,7 +106,7 @@ void AddEstimatorsCommand(CLI::App* app, Command* command) {
   estimators->add_option("run", options->runs, "folders of runs or logs; default: the latest run");
   estimators
       ->add_option("--set", options->set,
-                   "change a field of a configuration, e.g. --set "
+                   "change a field of a configuration (poise list fields), e.g. --set "
                    "state_estimator.invariant_ekf.contact_walk=1e-3")
       ->type_name("FIELD=VALUE")
       ->allow_extra_args(false)

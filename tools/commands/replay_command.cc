@@ -148,7 +148,8 @@ void AddReplayCommand(CLI::App* app, Command* command) {
   CLI::Option* set =
       replay
           ->add_option("--set", options->set,
-                       "change a field of a configuration, e.g. --set task_controller.com.kp=200")
+                       "change a field of a configuration (poise list fields), e.g. --set "
+                       "task_controller.com.kp=200")
           ->type_name("FIELD=VALUE")
           ->allow_extra_args(false)
           ->take_all();

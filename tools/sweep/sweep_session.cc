@@ -5,6 +5,7 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
+#include <stdexcept>
 #include <thread>
 
 #include "components/framework/clock.h"
@@ -15,6 +16,8 @@
 #include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
 #include "tools/scenario/ablations.h"
+#include "tools/scenario/run_setup.h"
+#include "tools/scenario/scenario_loading.h"
 #include "tools/sweep/sweep_workers.h"
 
 namespace poise {
@@ -100,7 +103,8 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
       ->check(CLI::IsMember(RemovableParts()));
   app->add_flag("--ideal", changes->ideal,
                 "a robot without joint friction, sensor noise, drive train and model error");
-  list("--set", &changes->set, "change a field of the scenario in every run", "FIELD=VALUE");
+  list("--set", &changes->set, "change a field of the scenario in every run (poise list fields)",
+       "FIELD=VALUE");
   app->add_option("--duration", changes->duration, "simulated time of a run, s")
       ->check(Within("in (0, 36000]", [](double s) { return s > 0 && s <= 36000; }));
   app->add_option("--out", session->out, "folder of the results; default: a dated one under runs/");
@@ -178,6 +182,21 @@ SweepSession::SweepSession(const SweepDefinition& definition, const std::string&
   writer_.emplace(folder(), header_, results);
 }
 
+std::string SweepSession::RoomForLogs(double runs) const {
+  const RunChanges changes = definition_.ChangesOf(0, std::nullopt);
+  RunSpec spec;
+  try {
+    const LoadedScenario loaded = LoadScenario(definition_.scenario(), changes);
+    spec = MakeRunSpec(loaded, changes, nullptr);
+    CheckRun(loaded, &spec);
+  } catch (const std::runtime_error&) {
+    return "";  // the point's own row says what is wrong with it
+  }
+  const int64_t one = ExpectedLogSize(spec);
+  const LogSizes sizes{static_cast<int64_t>(runs * static_cast<double>(one)), one};
+  return CheckSpace(folder(), sizes, options_.force);
+}
+
 SweepRow SweepSession::RowOf(const Request& request, const std::string& answer,
                              const std::string& crash) {
   if (crash.empty()) return SweepRow::Parse(answer);
@@ -200,7 +219,12 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
   bool exhausted = false;
   std::string failure;
   const int64_t start = NowNanoseconds();
-  const double before = progress().done;
+  const Progress first = progress();
+  const double before = first.done;
+  if (options_.logs) {
+    const std::string room = RoomForLogs(first.total - first.done);
+    if (!room.empty() && !options_.quiet) fmt::print("{}\n", room);
+  }
   while (StopSignal() == 0) {
     while (!tasks.full() && failure.empty()) {
       const std::optional<Request> request = next();

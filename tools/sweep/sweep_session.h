@@ -70,6 +70,9 @@ class SweepSession {
   size_t found() const { return found_; }
 
  private:
+  /// What to say of the room that `runs` logs take, from the first point's; empty: little. Throws
+  /// ConfigError where the disk cannot hold them, unless --force.
+  std::string RoomForLogs(double runs) const;
   SweepRow RowOf(const Request& request, const std::string& answer, const std::string& crash);
 
   const SweepDefinition& definition_;

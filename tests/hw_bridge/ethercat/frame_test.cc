@@ -21,7 +21,7 @@ Bytes Frame(const FrameBuilder& builder) {
   return {builder.bytes().begin(), builder.bytes().end()};
 }
 
-FrameError ErrorOf(const Bytes& bytes) { return FrameReader(bytes).error(); }
+FrameError ErrorOfFrame(const Bytes& bytes) { return FrameReader(bytes).error(); }
 
 TEST(EthercatFrame, IsLaidOutAsTheStandardSays) {
   FrameBuilder builder;
@@ -75,26 +75,26 @@ TEST(EthercatFrame, RefusesWhatIsNone) {
   builder.AddZero(Command::kBrd, 0, 0, 0x0130, 2);
   builder.AddZero(Command::kLrd, 0, 0, 0, 4);
   const Bytes right = Frame(builder);
-  EXPECT_EQ(ErrorOf({}), FrameError::kTooShort);
-  EXPECT_EQ(ErrorOf({0x0E}), FrameError::kTooShort);
-  EXPECT_EQ(ErrorOf(Bytes(1501, 0)), FrameError::kTooLong);
-  EXPECT_EQ(ErrorOf({0x00, 0x10}), FrameError::kLength);
-  EXPECT_EQ(ErrorOf(Bytes(right.begin(), right.end() - 1)), FrameError::kLength);
+  EXPECT_EQ(ErrorOfFrame({}), FrameError::kTooShort);
+  EXPECT_EQ(ErrorOfFrame({0x0E}), FrameError::kTooShort);
+  EXPECT_EQ(ErrorOfFrame(Bytes(1501, 0)), FrameError::kTooLong);
+  EXPECT_EQ(ErrorOfFrame({0x00, 0x10}), FrameError::kLength);
+  EXPECT_EQ(ErrorOfFrame(Bytes(right.begin(), right.end() - 1)), FrameError::kLength);
   Bytes bytes = right;
   bytes[1] = 0x40 | (bytes[1] & 0x07);  // type 4: network variables
-  EXPECT_EQ(ErrorOf(bytes), FrameError::kType);
+  EXPECT_EQ(ErrorOfFrame(bytes), FrameError::kType);
   bytes = right;
   bytes[2] = 15;
-  EXPECT_EQ(ErrorOf(bytes), FrameError::kUnknownCommand);
+  EXPECT_EQ(ErrorOfFrame(bytes), FrameError::kUnknownCommand);
   bytes = right;
   bytes[9] &= 0x7F;  // the first datagram says that it is the last
-  EXPECT_EQ(ErrorOf(bytes), FrameError::kChain);
+  EXPECT_EQ(ErrorOfFrame(bytes), FrameError::kChain);
   bytes = right;
   bytes[16 + 7] |= 0x80;  // the last says that more follow
-  EXPECT_EQ(ErrorOf(bytes), FrameError::kChain);
+  EXPECT_EQ(ErrorOfFrame(bytes), FrameError::kChain);
   bytes = right;
   bytes[16 + 6] = 0xFF;  // its data goes beyond the frame
-  EXPECT_EQ(ErrorOf(bytes), FrameError::kDatagram);
+  EXPECT_EQ(ErrorOfFrame(bytes), FrameError::kDatagram);
 }
 
 // A mailbox exchange that a user of another master captured (etherlab-dev, 2021-04-07, "Ethercat

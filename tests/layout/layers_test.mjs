@@ -1,0 +1,81 @@
+// The house keeps its order: every folder includes only what stands below it, and none grows past what one looks
+// through. docs/architecture.md has the folders' table. Usage: node --test layers_test.mjs
+import assert from 'node:assert/strict';
+import {readFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {test} from 'node:test';
+import {repositoryFiles, root} from '../docs/markdown.mjs';
+
+const files = repositoryFiles().filter((f) => !f.startsWith('tests/'));
+const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
+
+const BUS = ['lcmtypes', 'components/framework', 'components/robot', 'components/balance', 'components/messages'];
+/** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
+const BELOW = {
+  'lcmtypes': [],
+  'components/framework': ['lcmtypes'],
+  'components/robot': [],
+  'components/balance': ['components/robot'],
+  'components/messages': ['lcmtypes', 'components/framework', 'components/robot', 'components/balance'],
+  'components': BUS,
+  'sim_ode': BUS,
+  'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/drive_emulator'],
+  'hw_bridge/ethercat': [...BUS, 'hw_bridge'],
+  'hw_bridge/drive_emulator': [...BUS, 'hw_bridge', 'hw_bridge/ethercat'],
+  'logging': BUS,
+};
+/** The libraries of `poise`, each of which uses only those before it. */
+const TOOLS = ['cli', 'reference', 'scenario', 'robot', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
+/** Folders that one file may name although it is not below them: where all processes are listed. */
+const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
+
+const folderOf = (path) => path.slice(0, path.lastIndexOf('/'));
+const within = (path, folder) => path.startsWith(folder + '/');
+const isPart = (folder) => /^components\/\w+$/.test(folder) && !BUS.includes(folder);
+
+/** Why `file` may not include `path`; null when it may. */
+function problemOf(file, path) {
+  const own = folderOf(file), other = folderOf(path);
+  if (own === other) return null;
+  const tool = /^tools\/(\w+)/.exec(own);
+  if (own === 'tools' || tool) {
+    const at = /^tools\/(\w+)/.exec(other);
+    if (!at || !tool) return null;
+    return TOOLS.indexOf(at[1]) < TOOLS.indexOf(tool[1]) ? null : `tools/${at[1]} stands above tools/${tool[1]}`;
+  }
+  const rule = Object.keys(BELOW).filter((f) => own === f || within(own, f)).sort((a, b) => b.length - a.length)[0];
+  if (!rule) return `no rule for ${own}`;
+  if (isPart(own) && within(other + '/', own)) return null;
+  return BELOW[rule].some((f) => other === f) ? null : `${own} does not stand on ${other}`;
+}
+
+test('every include points down', () => {
+  const tops = new Set(files.map((f) => f.split('/')[0]));
+  const problems = [];
+  let includes = 0;
+  for (const file of sources) {
+    if (REGISTRY.includes(file)) continue;
+    const text = readFileSync(join(root, file), 'utf8');
+    for (const [, path] of text.matchAll(/^(?:#include|import) "([^"]+)"/gm)) {
+      if (!tops.has(path.split('/')[0])) continue;  // a library's
+      ++includes;
+      const problem = problemOf(file, path);
+      if (problem) problems.push(`${file} includes ${path}: ${problem}`);
+    }
+  }
+  assert.ok(includes > 500, `${includes} includes found`);
+  assert.deepEqual(problems, []);
+});
+
+test('an include that points up or sideways is seen', () => {
+  assert.match(problemOf('components/robot/a.cc', 'components/balance/b.h'), /does not stand on/);
+  assert.match(problemOf('components/redistributor/a.cc', 'components/task_controller/b.h'), /does not stand on/);
+  assert.match(problemOf('logging/a.cc', 'sim_ode/b.h'), /does not stand on/);
+  assert.match(problemOf('tools/run/a.cc', 'tools/live/b.h'), /stands above/);
+  assert.equal(problemOf('tools/live/a.cc', 'tools/run/b.h'), null);
+});
+
+test('every folder of tools/ has its place in the order', () => {
+  const folders = new Set(files.map((f) => /^tools\/(\w+)\//.exec(f)?.[1]).filter(Boolean));
+  assert.deepEqual([...folders].sort(), [...TOOLS].sort());
+});
