@@ -8,6 +8,7 @@
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/ethercat/socket_link.h"
+#include "hw_bridge/hw_bridge_type.h"
 #include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/units.h"
 
@@ -394,6 +395,11 @@ void HwBridge::Actuate(const Tick& tick) {
   if (!bus_) return;
   bus_->Send(command_);
   if (supervisor_->TakeReset()) bus_->RequestFaultReset();
+}
+
+ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
+  return {"hw_bridge", "drives and sensors: units, limits, safety states, e-stop",
+          [stop_signal] { return std::make_unique<HwBridge>(stop_signal); }};
 }
 
 }  // namespace poise

@@ -1,8 +1,7 @@
 #include <csignal>
-#include <memory>
 
 #include "components/framework/component_main.h"
-#include "hw_bridge/hw_bridge.h"
+#include "hw_bridge/hw_bridge_type.h"
 
 namespace {
 
@@ -16,6 +15,5 @@ int main(int argc, char** argv) {
   action.sa_handler = OnEmergencyStop;
   action.sa_flags = SA_RESTART;
   sigaction(SIGUSR1, &action, nullptr);
-  return poise::ComponentMain(argc, argv, "hw_bridge",
-                              [] { return std::make_unique<poise::HwBridge>(&emergency_stop); });
+  return poise::ComponentMain(argc, argv, poise::HwBridgeType(&emergency_stop));
 }

@@ -17,6 +17,12 @@ constexpr double kShortestLoss = 0.01;  // s; shorter is the foot's rattle, and 
 // A push that comes back sooner is the same push, s.
 constexpr double kPushGap = 0.05;
 
+/// Rounded to what one decimal shows, and never "-0.0".
+double Tenths(double value) {
+  const double tenths = std::round(10 * value) / 10;
+  return tenths == 0 ? 0 : tenths;
+}
+
 class EventList {
  public:
   explicit EventList(const RunRecord& run) : run_(run) {}
@@ -189,7 +195,8 @@ void AddBalancing(const RunRecord& run, EventList* events) {
                        "cop_not_achieved_ends", [&](int64_t tick) {
                          const balance_torque_t& balance = *run.balance.at(tick);
                          return fmt::format("CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
-                                            kMilli * balance.cop[0], kMilli * balance.cop[1],
+                                            Tenths(kMilli * balance.cop[0]),
+                                            Tenths(kMilli * balance.cop[1]),
                                             kMilli * balance.cop_limit[0],
                                             kMilli * balance.cop_limit[1]);
                        });
@@ -281,8 +288,8 @@ void AddPush(const RunRecord& run, bool ended, EventList* events) {
     events->Add(interval.begin, "push_begins", fmt::format("above {:.2g} N", threshold));
     if (!interval.end && !ended) continue;
     events->Add(peak, "push_peak",
-                fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), force.x(),
-                            force.y(), force.z()));
+                fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), Tenths(force.x()),
+                            Tenths(force.y()), Tenths(force.z())));
     events->AddEndOf(interval, "push_ends", fmt::format("peak {:.1f} N", force.norm()));
   }
 }

@@ -4,6 +4,7 @@
 
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
+#include "sim_ode/sim_ode_type.h"
 
 namespace poise {
 
@@ -97,6 +98,11 @@ void SimOde::PublishTruth() {
   SetVector3(truth.crane_point, message.crane_point);
   SetVector3(truth.crane_force, message.crane_force);
   message.crane_share = truth.crane_share;
+}
+
+ComponentType SimOdeType() {
+  return {"sim_ode", "the robot, the ground and the pushes, simulated in ODE",
+          [] { return std::make_unique<SimOde>(); }};
 }
 
 }  // namespace poise

@@ -7,6 +7,7 @@
 
 #include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
+#include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
@@ -303,6 +304,11 @@ void ContactWrenchMonitor::ReportCapturePoint(const Eigen::Isometry3d& frame_o, 
     SetVector3(Eigen::Vector3d::Zero(), out.step_position);
   }
   out.step_time = step.time;
+}
+
+ComponentType ContactWrenchMonitorType() {
+  return {"contact_wrench_monitor", "expected wrenches and CoP control in the null space (39)",
+          [] { return std::make_unique<ContactWrenchMonitor>(); }};
 }
 
 }  // namespace poise

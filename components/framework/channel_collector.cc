@@ -128,7 +128,8 @@ void ChannelCollector::Impl::Fail(std::string_view reason) {
   for (int64_t now = 0; !stopped_ && now < end; now = NowNanoseconds()) {
     service_.SendHealth();  // again and again: one may be lost
     pollfd service{service_.fd(), POLLIN, 0};
-    if (poll(&service, 1, static_cast<int>(kCollectorHealthInterval / kMillisecond)) > 0) ReceiveService();
+    if (poll(&service, 1, static_cast<int>(kCollectorHealthInterval / kMillisecond)) > 0)
+      ReceiveService();
   }
 }
 

@@ -36,7 +36,8 @@ void CatchSignals() {
 
 }  // namespace
 
-int ComponentMain(int argc, char** argv, const std::string& type, const ComponentFactory& factory) {
+int ComponentMain(int argc, char** argv, const ComponentType& of) {
+  const std::string& type = of.name;
   CatchSignals();
   std::string run_file;
   std::string name = type;
@@ -74,7 +75,7 @@ int ComponentMain(int argc, char** argv, const std::string& type, const Componen
     options.stop = &stop_asked;
     options.state_path = state;
     if (standby) options.take_over = &take_over_asked;
-    ProcessRunner runner(spec, name, factory, options);
+    ProcessRunner runner(spec, name, of.make, options);
     if (runner.Run()) return 0;
     SayError(fmt::format("{}: {}", name, runner.error()));
     return 1;

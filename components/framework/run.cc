@@ -81,5 +81,4 @@ bool MustReportProgress(const Graph& graph, int component) {
   return false;
 }
 
-
 }  // namespace poise

@@ -1,7 +1,6 @@
 #include "components/framework/component_main.h"
-#include "components/redistributor/redistributor.h"
+#include "components/redistributor/redistributor_type.h"
 
 int main(int argc, char** argv) {
-  return poise::ComponentMain(argc, argv, "redistributor",
-                              [] { return std::make_unique<poise::Redistributor>(); });
+  return poise::ComponentMain(argc, argv, poise::RedistributorType());
 }

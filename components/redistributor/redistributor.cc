@@ -9,6 +9,7 @@
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/redistributor/redistributor.pb.h"
+#include "components/redistributor/redistributor_type.h"
 
 namespace poise {
 namespace {
@@ -265,6 +266,11 @@ void Redistributor::Report(const Wrenches& wrench, const balance::ContactLimits&
     SetMargins(margins, &out.margins[i]);
     out.conditions_met[i] = !in_contact[i] || margins.Met() ? 1 : 0;
   }
+}
+
+ComponentType RedistributorType() {
+  return {"redistributor", "ratio eta, contact transitions and the joint torque (53)",
+          [] { return std::make_unique<Redistributor>(); }};
 }
 
 }  // namespace poise

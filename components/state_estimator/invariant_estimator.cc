@@ -12,9 +12,9 @@ using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kLongestPrediction = 1;     // s: what lies further back is not extrapolated
-constexpr double kMaxJointRate = 100;  // rad/s: no joint is faster
-constexpr double kMaxTorque = 1e4;     // N·m: no motor gives more
+constexpr double kLongestPrediction = 1;  // s: what lies further back is not extrapolated
+constexpr double kMaxJointRate = 100;     // rad/s: no joint is faster
+constexpr double kMaxTorque = 1e4;        // N·m: no motor gives more
 // Beyond the ranges of the IMUs that robots carry (2000 deg/s, 16 g) a reading is a fault; the last
 // good one then stands in for it with this uncertainty.
 constexpr double kGyroRange = 35, kGyroFault = 10;                     // rad/s

@@ -1,9 +1,6 @@
-#include <memory>
-
 #include "components/framework/component_main.h"
-#include "components/state_estimator/state_estimator.h"
+#include "components/state_estimator/state_estimator_type.h"
 
 int main(int argc, char** argv) {
-  return poise::ComponentMain(argc, argv, "state_estimator",
-                              [] { return std::make_unique<poise::StateEstimator>(); });
+  return poise::ComponentMain(argc, argv, poise::StateEstimatorType());
 }

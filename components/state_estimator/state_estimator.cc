@@ -7,6 +7,7 @@
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
+#include "components/state_estimator/state_estimator_type.h"
 
 namespace poise {
 namespace {
@@ -212,6 +213,11 @@ void StateEstimator::PublishInvariant() {
     status.foot_innovation[f] = invariant_->innovation(i);
     SetPose(invariant_->foot_pose(i), &status.foot_pose[f]);
   }
+}
+
+ComponentType StateEstimatorType() {
+  return {"state_estimator", "floating base and joint velocities from IMU, encoders and feet",
+          [] { return std::make_unique<StateEstimator>(); }};
 }
 
 }  // namespace poise

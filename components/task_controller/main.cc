@@ -1,7 +1,6 @@
 #include "components/framework/component_main.h"
-#include "components/task_controller/task_controller.h"
+#include "components/task_controller/task_controller_type.h"
 
 int main(int argc, char** argv) {
-  return poise::ComponentMain(argc, argv, "task_controller",
-                              [] { return std::make_unique<poise::TaskController>(); });
+  return poise::ComponentMain(argc, argv, poise::TaskControllerType());
 }

@@ -10,6 +10,7 @@
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
+#include "components/task_controller/task_controller_type.h"
 
 namespace poise {
 namespace {
@@ -356,6 +357,11 @@ void TaskController::Report(const References& references, const std::array<bool,
       SetPose(desired, &out.foot_desired[i]);
     }
   }
+}
+
+ComponentType TaskControllerType() {
+  return {"task_controller", "phases, references and the task torque (24)",
+          [] { return std::make_unique<TaskController>(); }};
 }
 
 }  // namespace poise

@@ -8,6 +8,7 @@
 
 #include "components/framework/suggest.h"
 #include "components/messages/robot_resource.h"
+#include "hw_bridge/drive_emulator/drive_emulator_type.h"
 
 namespace poise {
 namespace {
@@ -323,6 +324,11 @@ void DriveEmulator::Act(const Tick& tick) {
     drive_command_->enabled[joint_[i]] = enabled ? 1 : 0;
     drive_command_->current[joint_[i]] = enabled ? shafts_[i]->current() : 0.0;
   }
+}
+
+ComponentType DriveEmulatorType() {
+  return {"drive_emulator", "EtherCAT drives on the simulated robot's motors, with faults",
+          [] { return std::make_unique<DriveEmulator>(); }};
 }
 
 }  // namespace poise

@@ -1,9 +1,6 @@
-#include <memory>
-
 #include "components/framework/component_main.h"
-#include "hw_bridge/drive_emulator/drive_emulator.h"
+#include "hw_bridge/drive_emulator/drive_emulator_type.h"
 
 int main(int argc, char** argv) {
-  return poise::ComponentMain(argc, argv, "drive_emulator",
-                              [] { return std::make_unique<poise::DriveEmulator>(); });
+  return poise::ComponentMain(argc, argv, poise::DriveEmulatorType());
 }

@@ -1,6 +1,7 @@
 #include "tests/balance/balance_test_support.h"
 
 #include "components/robot/robot_files.h"
+#include "tests/test_seed.h"
 
 namespace poise::balance {
 
@@ -17,7 +18,7 @@ std::shared_ptr<const robot::RobotModel> Humanoid() {
 }
 
 StateSampler::StateSampler(std::shared_ptr<const robot::RobotModel> model, unsigned seed)
-    : model_(std::move(model)), random_(seed) {}
+    : model_(std::move(model)), random_(TestSeed(seed)) {}
 
 double StateSampler::Uniform(double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random_);

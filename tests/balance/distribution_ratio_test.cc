@@ -6,6 +6,7 @@
 #include <random>
 
 #include "components/balance/contact_transition.h"
+#include "tests/test_seed.h"
 
 namespace poise::balance {
 namespace {
@@ -16,7 +17,7 @@ const ContactLimits kSole{0.9, 0.9, 0.12, 0.05};
 
 class Random {
  public:
-  explicit Random(unsigned seed) : engine_(seed) {}
+  explicit Random(unsigned seed) : engine_(TestSeed(seed)) {}
   double operator()(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(engine_);
   }

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "components/balance/distribution_ratio.h"
+#include "tests/test_seed.h"
 
 namespace poise::balance {
 namespace {
@@ -75,7 +76,7 @@ TEST(SupportPolygon, ATurnedSoleReachesAsFarAsItsCorners) {
 // soles can be shared so that each foot's own centre of pressure is in its smaller sole, and one
 // outside cannot, by any share.
 TEST(SupportPolygon, IsWhatTheFeetCanDo) {
-  std::mt19937 random(11);
+  std::mt19937 random(TestSeed(11));
   std::uniform_real_distribution<double> uniform(-1, 1);
   int inside = 0, outside = 0;
   for (int trial = 0; trial < 3000; ++trial) {

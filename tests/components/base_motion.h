@@ -9,6 +9,7 @@
 
 #include "components/robot/dynamics.h"
 #include "components/state_estimator/base_estimator.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 
@@ -73,7 +74,7 @@ class BaseMotion {
   std::array<std::vector<int>, 2> leg_;  // joints of each leg
   MotionScript script_;
   SensorErrors errors_;
-  std::mt19937_64 random_{1};
+  std::mt19937_64 random_{TestSeed(1)};
   Sample before_, at_, after_;  // one grid step apart
   int64_t sample_ = -1;
   Eigen::VectorXd reading_;

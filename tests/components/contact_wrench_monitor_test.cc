@@ -11,6 +11,7 @@
 #include "components/balance/contact_conditions.h"
 #include "components/messages/conversions.h"
 #include "tests/components/control_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -80,7 +81,7 @@ class MonitorCase : public testing::TestWithParam<Case> {
   robot_state_t state_;
   task_torque_t task_{};
   int64_t tick_ = 0;
-  std::mt19937 random_{21};
+  std::mt19937 random_{TestSeed(21)};
 };
 
 // Whatever the task torque: wrenches, resultant and centre of pressure are what the equations of
@@ -325,7 +326,7 @@ TEST(ContactWrenchMonitor, HalfWidthBeyondTheSolesFollowsTheirDistance) {
 
 TEST(ContactWrenchMonitor, AChangeOfSupportGivesWhatAFreshMonitorGives) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
-  std::mt19937 random(22);
+  std::mt19937 random(TestSeed(22));
   const robot::RobotState standing = StandingState(model);
   robot_state_t state = StateMessage(model, Disturbed(standing, 0.05, 0.3, &random));
   task_torque_t task{};

@@ -7,6 +7,7 @@
 
 #include "components/messages/conversions.h"
 #include "tests/components/control_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -34,7 +35,7 @@ class TaskControllerCase : public testing::TestWithParam<Case> {
   robot::RobotModel model_;
   ControlContext context_;
   robot::RobotState standing_;
-  std::mt19937 random_{20};
+  std::mt19937 random_{TestSeed(20)};
 };
 
 // Rotation vector by the quaternion's logarithm.

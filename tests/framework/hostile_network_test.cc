@@ -10,6 +10,7 @@
 
 #include "tests/framework/process_harness.h"
 #include "tests/framework/toy_components.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -103,7 +104,7 @@ class Attacker {
 
   const RunSpec& spec_;
   int socket_;
-  std::mt19937_64 random_{99};
+  std::mt19937_64 random_{TestSeed(99)};
   int64_t sent_ = 0;
   std::vector<std::vector<Bytes>> forged_;
 };

@@ -1,4 +1,5 @@
 #include "components/framework/latency_histogram.h"
+#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,7 @@ namespace poise {
 namespace {
 
 TEST(LatencyHistogram, AgreesWithSortedSamples) {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(TestSeed(1));
   std::lognormal_distribution<double> distribution(9, 2);  // ns, from tens of ns to ms
   LatencyHistogram histogram;
   std::vector<int64_t> samples;

@@ -9,5 +9,5 @@ int main(int argc, char** argv) {
   const std::string type = argv[1];
   const poise::ComponentFactory* factory = registry.Find(type);
   if (factory == nullptr) return 2;
-  return poise::ComponentMain(argc - 1, argv + 1, type, *factory);
+  return poise::ComponentMain(argc - 1, argv + 1, {type, "", *factory});
 }

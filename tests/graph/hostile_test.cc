@@ -11,6 +11,7 @@
 #include "poise/health_t.hpp"
 #include "poise/message_traits.hpp"
 #include "tests/graph/poise_program.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -65,7 +66,7 @@ int64_t Attack(const RunSpec& spec, pid_t program) {
   targets.push_back(
       {BusSender(ServiceUrl(spec)), "HEALTH_REDISTRIBUTOR", StrangeHealth(spec.run_id())});
 
-  std::mt19937 random(1);
+  std::mt19937 random(TestSeed(1));
   int64_t sent = 0;
   const std::string alive = "/proc/" + std::to_string(program) + "/cmdline";
   const auto running = [&] {

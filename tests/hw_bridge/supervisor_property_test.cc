@@ -5,13 +5,14 @@
 #include <random>
 
 #include "tests/hw_bridge/supervisor_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
 
 class Hostile {
  public:
-  explicit Hostile(uint64_t seed) : random_(seed) {}
+  explicit Hostile(uint32_t seed) : random_(TestSeed(seed)) {}
 
   int Choose(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
   bool Rarely(int n) { return Choose(n) == 0; }

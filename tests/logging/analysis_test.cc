@@ -10,6 +10,7 @@
 
 #include "logging/metrics.h"
 #include "tests/logging/record_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise::logging {
 namespace {
@@ -201,7 +202,7 @@ TEST(Analysis, NeesIsTheSquaredErrorInStandardDeviations) {
 
 // Chi-squared with 9 and 5 degrees of freedom, by simulation.
 TEST(Analysis, TheNeesBoundsHoldNinetyFivePercent) {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(TestSeed(1));
   std::normal_distribution<double> normal;
   constexpr int kDraws = 100000;
   for (const auto& [part, freedom] : {std::pair(NeesPart::kAll, 9), {NeesPart::kObservable, 5}}) {

@@ -4,6 +4,7 @@
 #include "logging/log_survey.h"
 #include "tests/logging/damage_trial.h"
 #include "tests/logging/small_log.h"
+#include "tests/test_seed.h"
 
 namespace poise::logging {
 namespace {
@@ -29,7 +30,7 @@ class DamageRecoveryTest : public testing::Test {
   TemporaryFolder folder_;
   std::string path_ = folder_.path("log");
   std::string whole_;
-  std::mt19937 random_{11};
+  std::mt19937 random_{TestSeed(11)};
   int64_t lost_ = 0;
 };
 

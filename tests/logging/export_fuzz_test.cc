@@ -15,6 +15,7 @@
 #include "logging/signal_table.h"
 #include "tests/logging/damage_trial.h"
 #include "tests/logging/small_log.h"
+#include "tests/test_seed.h"
 
 namespace poise::logging {
 namespace {
@@ -128,7 +129,7 @@ TEST_F(ExportFuzzTest, AWholeLogReplaysToItsBits) {
 }
 
 TEST_F(ExportFuzzTest, DamageAnywhere) {
-  std::mt19937 random(11);
+  std::mt19937 random(TestSeed(11));
   for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, i % 3 == 0 ? CutAnywhere(whole_, &random)
@@ -140,7 +141,7 @@ TEST_F(ExportFuzzTest, DamageAnywhere) {
 }
 
 TEST_F(ExportFuzzTest, DamageInTheMessagesAlone) {
-  std::mt19937 random(12);
+  std::mt19937 random(TestSeed(12));
   for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, whole_.substr(0, info_end_) +
@@ -151,7 +152,7 @@ TEST_F(ExportFuzzTest, DamageInTheMessagesAlone) {
 }
 
 TEST_F(ExportFuzzTest, DamageInRunInfoAlone) {
-  std::mt19937 random(13);
+  std::mt19937 random(TestSeed(13));
   for (int i = 0; i < kDamagedLogs; ++i) {
     SCOPED_TRACE(i);
     WriteBytes(log_, Overwrite(whole_.substr(0, info_end_), 1 + random() % 8, &random) +

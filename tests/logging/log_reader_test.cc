@@ -6,6 +6,7 @@
 
 #include "fmt/format.h"
 #include "tests/logging/log_test_support.h"
+#include "tests/test_seed.h"
 
 namespace poise::logging {
 namespace {
@@ -113,7 +114,7 @@ TEST_F(LogReaderTest, GarbageBetweenEventsIsSkipped) {
 }
 
 TEST_F(LogReaderTest, RandomDamageNeverCrashes) {
-  std::mt19937 random(1);
+  std::mt19937 random(TestSeed(1));
   const auto below = [&](size_t n) {
     return std::uniform_int_distribution<size_t>(0, n - 1)(random);
   };

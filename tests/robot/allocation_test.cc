@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "tests/robot/robot_test_support.h"
+#include "tests/test_seed.h"
 
 extern "C" void* __libc_malloc(size_t size);
 namespace {
@@ -21,7 +22,7 @@ namespace {
 TEST(Allocation, DynamicsAllocateNothing) {
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     const RobotModel model = LoadTestRobot(robot);
-    std::mt19937 random(1);
+    std::mt19937 random(TestSeed(1));
     const RobotState state = RandomState(model, &random);
     RobotData data(model);
     Eigen::VectorXd acceleration = Eigen::VectorXd::Ones(model.num_velocities());

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "tests/robot/robot_test_support.h"
+#include "tests/test_seed.h"
 
 namespace poise::robot {
 namespace {
@@ -31,7 +32,7 @@ class DynamicsTest : public testing::TestWithParam<TestRobot> {
   }
 
   RobotModel model_;
-  std::mt19937 random_{3};
+  std::mt19937 random_{TestSeed(3)};
 };
 
 void ExpectClose(const VectorXd& actual, const VectorXd& expected, double tolerance,

@@ -7,6 +7,7 @@
 #include "components/framework/configuration.h"
 #include "components/robot/robot_files.h"
 #include "tests/robot/robot_test_support.h"
+#include "tests/test_seed.h"
 
 namespace poise::robot {
 namespace {
@@ -94,7 +95,7 @@ TEST(Loading, OrderOfLegsInTheTextChangesIndicesOnly) {
   const RobotModel a = LoadRobotTexts(robot, urdf);
   const RobotModel b = LoadRobotTexts(robot, swapped);
   EXPECT_EQ(b.joints()[0].name, "left_hip_yaw");
-  std::mt19937 random(5);
+  std::mt19937 random(TestSeed(5));
   const RobotState state = RandomState(a, &random);
   RobotState other = state;
   for (int j = 0; j < 12; ++j) {

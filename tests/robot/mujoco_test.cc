@@ -11,6 +11,7 @@
 #include <regex>
 
 #include "tests/robot/robot_test_support.h"
+#include "tests/test_seed.h"
 
 namespace poise::robot {
 namespace {
@@ -110,7 +111,7 @@ class MujocoTest : public testing::TestWithParam<TestRobot> {
   mjData* data_ = nullptr;
   int root_ = -1;
   std::vector<int> qpos_, dof_;
-  std::mt19937 random_{17};
+  std::mt19937 random_{TestSeed(17)};
 };
 
 TEST_P(MujocoTest, SameDegreesOfFreedomAndMass) {

@@ -9,6 +9,7 @@
 #include "components/robot/robot_files.h"
 #include "sim_ode/ode_world.h"
 #include "tests/sim_ode/simulation_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -92,7 +93,7 @@ TEST_P(FromRest, AccelerationsFollowTheEquationsOfMotion) {
   const robot::RobotModel model = rotor_inertia ? PaperRobot() : EditedRobot([](Robot* r) {
     for (auto& motor : *r->mutable_motor()) motor.set_rotor_inertia(0);
   });
-  std::mt19937 random(2);
+  std::mt19937 random(TestSeed(2));
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int trial = 0; trial < 50; ++trial) {
     robot::RobotState state = Lifted(simulation, 5 - simulation.truth().state.base_position.z());
@@ -287,7 +288,7 @@ TEST(Posture, JointsReadWhatTheyWereSetToWhateverTheFramesOfTheLinks) {
   const robot::RobotModel model =
       robot::LoadRobotFiles(POISE_SOURCE_DIR "/tests/robot/data/mantis.pbtxt");
   OdeWorld world(model, 8);
-  std::mt19937 random(3);
+  std::mt19937 random(TestSeed(3));
   std::uniform_real_distribution<double> angle(-1, 1);
   robot::RobotState state(model.num_joints());
   robot::RobotState read(model.num_joints());

@@ -15,6 +15,7 @@
 #include "components/framework/run.h"
 #include "poise/health_t.hpp"
 #include "tests/logging/log_test_support.h"
+#include "tests/test_seed.h"
 #include "tools/live/field_selection.h"
 #include "tools/scenario/run_setup.h"
 
@@ -154,7 +155,7 @@ TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
   attack("HEALTH_SIM_ODE", logging::Encode(health));
   attack("HEALTH_SIM_ODE", {});
   attack("HEALTH_NOBODY", logging::Encode(health));
-  std::mt19937 random(3);
+  std::mt19937 random(TestSeed(3));
   for (int i = 0; i < 100; ++i) {
     Bytes noise(random() % 600);
     for (uint8_t& byte : noise) byte = static_cast<uint8_t>(random());

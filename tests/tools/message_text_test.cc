@@ -1,4 +1,5 @@
 #include "tools/live/message_text.h"
+#include "tests/test_seed.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,7 +66,7 @@ TEST(MessageTextTest, CsvHasAColumnForEachField) {
 }
 
 TEST(MessageTextTest, CsvGivesTheSameNumbersBack) {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(TestSeed(1));
   std::normal_distribution<double> exponent(0, 60);
   for (int i = 0; i < 1000; ++i) {
     const double value =

@@ -172,7 +172,9 @@ class Means {
 
 std::string Maps::Curve(size_t x, const std::string& value) const {
   const ChartLabels labels = Labels(value, Label(x), "");
-  if (Drawn(x)) {
+  // A run stands or falls: a line between the two would tell of runs that are neither.
+  const bool either = value == kStandsValue && !variable(x).angle();
+  if (Drawn(x) || (either && variable(x).choice_size() == 0)) {
     std::vector<ChartPoint> points;
     for (const auto& [key, row] : rows_) {
       points.push_back({points_.At(row.run)[x].number, Value(row, value), Tip(row, value),

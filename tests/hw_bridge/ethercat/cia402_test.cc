@@ -9,6 +9,7 @@
 
 #include "hw_bridge/ethercat/drive_scale.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise::ethercat {
 namespace {
@@ -292,7 +293,7 @@ TEST(DriveScale, ConvertsAsEquation54) {
 }
 
 TEST(CounterUnwrap, FollowsTheTrueCountThroughWrapArounds) {
-  std::mt19937_64 random(1);
+  std::mt19937_64 random(TestSeed(1));
   std::uniform_int_distribution<int64_t> step(-2147483647, 2147483647);
   int64_t truth = 12345;
   CounterUnwrap unwrap;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise::ethercat {
 namespace {
@@ -28,7 +29,7 @@ TEST(DistributedClocks, DifferenceRegisterIsSignAndMagnitude) {
 
 TEST(DistributedClocks, AllSlavesShowOneTimeAndKeepIt) {
   Bench bench(4);
-  std::mt19937_64 random(3);
+  std::mt19937_64 random(TestSeed(3));
   for (EmulatedDriveConfig& drive : *bench.chain_config.mutable_drive()) {
     drive.set_clock_error(std::uniform_real_distribution<double>(-50, 50)(random));
     drive.set_clock_start(static_cast<int64_t>(random() % (1LL << 40)));
@@ -105,7 +106,7 @@ TEST(CycleSteering, HoldsThePhaseAgainstAnotherOscillator) {
   constexpr int64_t kCycle = 2'000'000;
   for (const double error : {80e-6, -80e-6}) {
     CycleSteering steering(kCycle);
-    std::mt19937_64 random(5);
+    std::mt19937_64 random(TestSeed(5));
     std::uniform_real_distribution<double> jitter(-20'000, 20'000);
     double reference = 777'000;  // ns, the slaves' time of this cycle's frame
     double sum = 0;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
+#include "tests/test_seed.h"
 
 namespace poise::ethercat {
 namespace {
@@ -101,7 +102,7 @@ TEST(EthercatFuzz, SlavesSurviveHostileFrames) {
   bench.Drive(DriveGoal::kEnabled, 20);
   const std::vector<Bytes> right = recording.frames();
 
-  Random random(11);
+  Random random(TestSeed(11));
   int64_t accepted = 0;
   const int64_t count = NumFrames();
   for (int64_t i = 0; i < count; ++i) {
@@ -166,7 +167,7 @@ TEST(EthercatFuzz, MasterSurvivesHostileAnswersInCycles) {
   Bench bench(3);
   bench.master_config.set_drift_frames(5);
   bench.Build();
-  Random random(12);
+  Random random(TestSeed(12));
   HostileLink hostile(bench.link.get(), &random);
   bench.master = std::make_unique<Master>(&hostile, bench.master_config);
   bench.master->Start();
@@ -188,7 +189,7 @@ TEST(EthercatFuzz, MasterSurvivesHostileAnswersInCycles) {
 }
 
 TEST(EthercatFuzz, StartUpEndsWithAnErrorOrWithDrives) {
-  Random random(13);
+  Random random(TestSeed(13));
   int64_t hostile_frames = 0;
   int started = 0, refused = 0;
   // Start-up asks for much fewer frames than cycles do; an eighth of the count is enough of them.
