@@ -43,7 +43,7 @@ double LeastEigenvalue(const Eigen::MatrixXd& m) {
 
 class Random {
  public:
-  explicit Random(uint32_t seed) : engine_(TestSeed(seed)) {}
+  explicit Random(uint64_t seed) : engine_(TestSeed(static_cast<uint32_t>(seed))) {}
   double Normal() { return normal_(engine_); }
   Vector3d Normal3() { return {Normal(), Normal(), Normal()}; }
   Matrix3d Rotation() {
@@ -284,7 +284,7 @@ class Swaying {
   static constexpr double kWindup = 2e-3;  // m and rad, by the compliance
   static constexpr double kWalk = 3e-4, kTurnWalk = 3e-4, kGyroWalk = 1e-5, kForceWalk = 1e-3;
 
-  explicit Swaying(uint32_t seed) : random_(seed) {
+  explicit Swaying(uint64_t seed) : random_(seed) {
     state.position = Vector3d(0.1, 0.05, 0.9);
     state.foot = {Vector3d(0, -0.1, 0), Vector3d(0, 0.1, 0)};
     state.velocity = Vector3d(0.1, -0.05, 0);

@@ -12,7 +12,7 @@ namespace {
 
 class Hostile {
  public:
-  explicit Hostile(uint32_t seed) : random_(TestSeed(seed)) {}
+  explicit Hostile(uint64_t seed) : random_(TestSeed(static_cast<uint32_t>(seed))) {}
 
   int Choose(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
   bool Rarely(int n) { return Choose(n) == 0; }
