@@ -194,11 +194,10 @@ void AddBalancing(const RunRecord& run, EventList* events) {
   events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
                        "cop_not_achieved_ends", [&](int64_t tick) {
                          const balance_torque_t& balance = *run.balance.at(tick);
-                         return fmt::format("CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
-                                            Tenths(kMilli * balance.cop[0]),
-                                            Tenths(kMilli * balance.cop[1]),
-                                            kMilli * balance.cop_limit[0],
-                                            kMilli * balance.cop_limit[1]);
+                         return fmt::format(
+                             "CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
+                             Tenths(kMilli * balance.cop[0]), Tenths(kMilli * balance.cop[1]),
+                             kMilli * balance.cop_limit[0], kMilli * balance.cop_limit[1]);
                        });
   const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
     const joint_command_t* command = run.command.at(tick);

@@ -93,12 +93,12 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
     lanes.try_emplace(
         channel.name(),
         ColumnLane{type,
-             PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)), counts,
-                          run.spec.run_id()),
-             channel.external(),
-             ColumnAppender(type),
-             {},
-             {}});
+                   PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)),
+                                counts, run.spec.run_id()),
+                   channel.external(),
+                   ColumnAppender(type),
+                   {},
+                   {}});
     order.push_back(channel.name());
   }
   const MessageType* const health = FindMessageType("health_t");
@@ -108,9 +108,10 @@ std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord
     if (found == lanes.end()) {
       if (!event.channel.starts_with("HEALTH_")) continue;
       order.emplace_back(event.channel);
-      found =
-          lanes.try_emplace(order.back(), ColumnLane{health, {}, false, ColumnAppender(health), {}, {}})
-              .first;
+      found = lanes
+                  .try_emplace(order.back(),
+                               ColumnLane{health, {}, false, ColumnAppender(health), {}, {}})
+                  .first;
     }
     ColumnLane& lane = found->second;
     int64_t tick = 0;

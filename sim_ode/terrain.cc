@@ -17,7 +17,7 @@ using std::numbers::pi;
 namespace {
 
 constexpr double kMaxTilt = 0.8;  // rad
-constexpr int kSoleCorners = 4;       // that share a sole's stiffness
+constexpr int kSoleCorners = 4;   // that share a sole's stiffness
 constexpr uint64_t kTerrainStream = 1;
 
 // A spring k and damper d under implicit Euler with step h: ODE's manual, "ERP and CFM".
@@ -67,8 +67,8 @@ Terrain::Terrain(const SimOdeConfig& config, double step, uint64_t seed) {
                         -std::sin(block.tilt_roll()),
                         std::cos(block.tilt_pitch()) * std::cos(block.tilt_roll()));
   slope_ = -normal.head<2>() / normal.z();
-  block_material_ = SpringDamper(block.stiffness() / kSoleCorners, block.damping() / kSoleCorners, step,
-                                 block.friction());
+  block_material_ = SpringDamper(block.stiffness() / kSoleCorners, block.damping() / kSoleCorners,
+                                 step, block.friction());
 
   RandomStream random(seed, kTerrainStream);
   wave_amplitude_ = block.irregularity() / kWaves;

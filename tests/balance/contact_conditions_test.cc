@@ -1,9 +1,10 @@
 #include "components/balance/contact_conditions.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
+
+#include "tests/test_seed.h"
 
 namespace poise::balance {
 namespace {

@@ -1,6 +1,5 @@
 // Polygons of the plane against closed forms and against brute force.
 #include "components/balance/convex_polygon.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,8 @@
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "tests/test_seed.h"
 
 namespace poise::balance {
 namespace {

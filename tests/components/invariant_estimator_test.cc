@@ -24,7 +24,9 @@ std::string DyrosPath() {
   return std::string(POISE_SOURCE_DIR) + "/deploy/robots/dyros/dyros_legs.pbtxt";
 }
 // Rotated joint frames, tilted soles, arms, and the IMU above a waist joint.
-std::string MantisPath() { return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt"; }
+std::string MantisPath() {
+  return std::string(POISE_SOURCE_DIR) + "/tests/robot/data/mantis.pbtxt";
+}
 
 constexpr double kChiSquared9 = 16.919;  // exceeded with 5 % by 9 degrees of freedom
 
@@ -68,8 +70,8 @@ INSTANTIATE_TEST_SUITE_P(Robots, AnyInvariantRobot, testing::Values(DyrosPath(),
                            return test.param == DyrosPath() ? "Dyros" : "Mantis";
                          });
 
-// Readings without errors: what remains is the second order of integration and, on MantisPath, whose
-// IMU turns with the waist, the lag of the joint velocities.
+// Readings without errors: what remains is the second order of integration and, on mantis,
+// whose IMU turns with the waist, the lag of the joint velocities.
 TEST_P(AnyInvariantRobot, FollowsExactReadings) {
   BaseMotion motion(GetParam());
   Sway(&motion, 0.02);

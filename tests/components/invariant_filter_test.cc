@@ -1,7 +1,6 @@
 // The filter against independent truth: matrix exponentials, numerical integration, finite
 // differences and Monte Carlo with the filter's own noise.
 #include "components/state_estimator/invariant_filter.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
@@ -12,6 +11,8 @@
 #include <numbers>
 #include <random>
 #include <vector>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

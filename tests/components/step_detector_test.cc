@@ -1,10 +1,11 @@
 // When a step is said to be needed: neither noise nor the number of ticks decides.
 #include "components/contact_wrench_monitor/step_detector.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

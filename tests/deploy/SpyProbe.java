@@ -235,13 +235,21 @@ public final class SpyProbe {
     return null;
   }
 
+  /** lcm-spy sorts its table on another thread than Swing's: between two rows an index may lead nowhere, so look again. */
   private static <T> T onSwing(Callable<T> call) throws Exception {
-    FutureTask<T> task = new FutureTask<>(call);
-    SwingUtilities.invokeLater(task);
-    try {
-      return task.get(PATIENCE, TimeUnit.MILLISECONDS);
-    } catch (java.util.concurrent.ExecutionException problem) {
-      throw problem.getCause() instanceof Exception ? (Exception) problem.getCause() : problem;
+    for (int attempt = 1; ; ++attempt) {
+      FutureTask<T> task = new FutureTask<>(call);
+      SwingUtilities.invokeLater(task);
+      try {
+        return task.get(PATIENCE, TimeUnit.MILLISECONDS);
+      } catch (java.util.concurrent.ExecutionException problem) {
+        Throwable cause = problem.getCause();
+        if (cause instanceof IndexOutOfBoundsException && attempt < 50) {
+          Thread.sleep(20);
+          continue;
+        }
+        throw cause instanceof Exception ? (Exception) cause : problem;
+      }
     }
   }
 }

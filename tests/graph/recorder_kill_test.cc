@@ -18,7 +18,7 @@
 namespace poise {
 namespace {
 
-constexpr double kPromised = 100;         // ms that may be lost
+constexpr double kPromised = 100;  // ms that may be lost
 
 /// What the recorder has mirrored, a message after it was handed to the log.
 class Mirror {

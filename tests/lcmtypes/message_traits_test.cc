@@ -1,6 +1,5 @@
 // What the generator says of every message, against what liblcm's own code does with it.
 #include "poise/message_traits.hpp"
-#include "tests/test_seed.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +11,8 @@
 #include <set>
 #include <string>
 #include <vector>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

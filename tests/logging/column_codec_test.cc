@@ -1,6 +1,5 @@
 // What a page's reader does is written out here once more, from docs/report-format.md.
 #include "logging/column_codec.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -9,6 +8,8 @@
 #include <limits>
 #include <random>
 #include <vector>
+
+#include "tests/test_seed.h"
 
 namespace poise::logging {
 namespace {

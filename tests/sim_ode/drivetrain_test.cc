@@ -1,6 +1,5 @@
 // The drivetrain's row on one inertia, integrated here without ODE.
 #include "sim_ode/drivetrain.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

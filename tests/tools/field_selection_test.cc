@@ -90,7 +90,8 @@ TEST(FieldSelectionTest, SaysWhatAFieldMayHaveBeen) {
 
 TEST(FieldSelectionTest, JointsAndFeetHaveTheirNames) {
   const logging::ElementNames names = logging::ElementNames::OfSpec(logging::MakeTestSpec());
-  const std::vector<Scalar> scalars = ReadScalars(Balance(), Encode(SampleMessage()), names).value();
+  const std::vector<Scalar> scalars =
+      ReadScalars(Balance(), Encode(SampleMessage()), names).value();
   const auto picked = [&](const std::string& field) {
     FieldSelection selection({field});
     selection.UseNames(Balance(), names);

@@ -1,12 +1,13 @@
 // The search for limits on functions whose boundaries are known.
 #include "tools/sweep/limit_search.h"
-#include "tests/test_seed.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 #include <random>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

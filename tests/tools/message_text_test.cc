@@ -1,5 +1,4 @@
 #include "tools/live/message_text.h"
-#include "tests/test_seed.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +7,8 @@
 #include <cstdlib>
 #include <limits>
 #include <random>
+
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {

@@ -24,7 +24,7 @@ namespace poise {
 namespace {
 
 constexpr int kSpin = 100;                      // ms
-constexpr int64_t kEchoSilence = 500'000'000;       // ns; then it is asked whether the run goes on
+constexpr int64_t kEchoSilence = 500'000'000;   // ns; then it is asked whether the run goes on
 constexpr size_t kLogBuffer = size_t{1} << 20;  // bytes of text
 
 struct EchoOptions {

@@ -114,7 +114,8 @@ void AddEstimatorsCommand(CLI::App* app, Command* command) {
   estimators->add_option("--from", options->from, "s: errors from here on")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  estimators->callback([options, command] { *command = [options] { return CompareEstimators(*options); }; });
+  estimators->callback(
+      [options, command] { *command = [options] { return CompareEstimators(*options); }; });
 }
 
 }  // namespace poise

@@ -139,7 +139,8 @@ bool Stops(const Line& line) {
 }
 
 int Stop(std::vector<Line>& lines) {
-  SendUntil(lines, true, false, kStopPatience, [](size_t, const Line& line) { return Stops(line); });
+  SendUntil(lines, true, false, kStopPatience,
+            [](size_t, const Line& line) { return Stops(line); });
   int exit_code = kExitOk;
   for (const Line& line : lines) {
     if (Stops(line)) {

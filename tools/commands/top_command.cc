@@ -19,9 +19,9 @@
 namespace poise {
 namespace {
 
-constexpr size_t kHintLine = 2;                    // of the view
-constexpr int64_t kMillisecond = 1'000'000;        // ns
-constexpr int64_t kLongestWait = 50;               // ms, until keys are looked at
+constexpr size_t kHintLine = 2;                       // of the view
+constexpr int64_t kMillisecond = 1'000'000;           // ns
+constexpr int64_t kLongestWait = 50;                  // ms, until keys are looked at
 constexpr int64_t kTopSilence = 1000 * kMillisecond;  // then it is asked whether the run goes on
 
 struct TopOptions {
@@ -67,7 +67,9 @@ class Watch {
     return std::none_of(control_.statuses().begin(), control_.statuses().end(),
                         [](const auto& entry) { return entry.second.seen; });
   }
-  bool Ended() const { return NowNanoseconds() > last_arrival_ + kTopSilence && !live_.InProgress(); }
+  bool Ended() const {
+    return NowNanoseconds() > last_arrival_ + kTopSilence && !live_.InProgress();
+  }
 
  private:
   LiveRun live_;

@@ -12,7 +12,7 @@ namespace poise {
 namespace {
 
 constexpr int64_t kSecondNs = 1'000'000'000;  // ns
-constexpr size_t kMostDeaths = 5;           // within kDeathWindow
+constexpr size_t kMostDeaths = 5;             // within kDeathWindow
 constexpr int64_t kDeathWindow = 2 * kSecondNs;
 constexpr int64_t kSuccessorPatience = 5 * kSecondNs;  // for a successor
 
