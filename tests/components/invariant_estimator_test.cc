@@ -95,7 +95,7 @@ TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
   Sway(&motion, 0.02);
   SensorErrors& errors = motion.errors();
   errors = TypicalErrors(*motion.model());
-  // MantisPath has no noise of its own.
+  // mantis has no noise of its own.
   errors.gyro_noise = 2e-4;
   errors.gyro_bias = Vector3d(2e-4, -1e-4, 3e-4);
   errors.accelerometer_noise = 1.7e-2;
