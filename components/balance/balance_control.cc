@@ -14,7 +14,7 @@ using Eigen::Index;
 using Rows2X6 = Eigen::Matrix<double, 2, 6>;
 
 // The moments' two rows of (42) must be independent this well, relative to their size.
-constexpr double kParallelNormals = 1e-12;
+constexpr double kMomentDependence = 1e-12;
 
 /// Moments about the axes of O_d, a point of frame O's plane, from a wrench in O: rows 4 and 5 of
 /// ᴼᵈK.
@@ -163,7 +163,7 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
     Eigen::Matrix2d gram;
     gram.noalias() = d.transpose().lazyProduct(d);
     const double determinant = gram.determinant();
-    if (!(determinant > kParallelNormals * raw(0, 0) * raw(1, 1) && determinant < HUGE_VAL)) {
+    if (!(determinant > kMomentDependence * raw(0, 0) * raw(1, 1) && determinant < HUGE_VAL)) {
       return BalanceStatus::kSingular;
     }
     // (41), (42): the increment of y that makes the moments about O_d vanish.
