@@ -385,7 +385,10 @@ bool ProcessRunner::Impl::RunOwner() {
     time += period_ns_ + configured_.component->cycle_correction();
     // Whole cycles that are lost stay lost: a burst of them would not help the robot.
     const int64_t behind = NowNanoseconds() - time;
-    if (behind >= period_ns_) time += behind / period_ns_ * period_ns_;
+    if (behind >= period_ns_) {
+      health.ticks_skipped += behind / period_ns_;
+      time += behind / period_ns_ * period_ns_;
+    }
   }
 }
 

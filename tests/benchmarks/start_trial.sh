@@ -25,10 +25,10 @@ start_load "$out"
 falls=0 others=0 seed=1
 while [ "$seed" -le "$starts" ]; do
   rm -rf "$out/run"
-  # The scenario begins 3 s after the run: faults between -3 s and -1 s fall into the first second, in the first half of
+  # The scenario begins 5 s after the run: faults between -5 s and -3 s fall into the first second, in the first half of
   # their slot.
   "$poise" run push_double_support --realtime --no-reference --no-log --duration 1 --out "$out/run" \
-    ${kill:+--kill 1 --kill-from -3 --kill-until -1 --kill-seed "$seed"} >"$out/text" 2>&1 || true
+    ${kill:+--kill 1 --kill-from -5 --kill-until -3 --kill-seed "$seed"} >"$out/text" 2>&1 || true
   grep -E '^(killed|stopped)' "$out/text" >>"$out/faults" || true
   sed -n 's/^crane: let go at \(.*\) s$/\1/p' "$out/text" >>"$out/cranes"
   sed -n 's/^machine: \(.*\) of \(.*\) cycles late\(, worst \(.*\) ms\)*$/\1 \2 \4/p' "$out/text" | tr -d , >>"$out/machines"

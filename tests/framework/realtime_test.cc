@@ -3,7 +3,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
+#include <optional>
 
 #include "components/framework/inbox.h"
 #include "components/framework/state_store.h"
@@ -209,6 +211,29 @@ TEST(Realtime, TheRobotGetsEveryCycleWhileAProcessIsStopped) {
   EXPECT_GT(after, 0) << "it came back";
   EXPECT_GE(run.health.at("filter").ticks_skipped, 50);
   EXPECT_EQ(run.health.at("controller").ticks_completed, kTicks);
+}
+
+TEST(Realtime, CyclesThatNeverBeganAreCounted) {
+  constexpr size_t kPush = 4;
+  constexpr int64_t kTicks = 600;
+  using Clock = std::chrono::steady_clock;
+  std::optional<Clock::time_point> stopped;
+  bool continued = false;
+  HarnessOptions options;
+  options.disturb = [&](const std::map<std::string, pid_t>& pids, const Messages& messages) {
+    if (!stopped && messages[kPush].size() >= 50) {
+      kill(pids.at("controller"), SIGSTOP);
+      stopped = Clock::now();
+    } else if (stopped && !continued && Clock::now() - *stopped >= std::chrono::milliseconds(200)) {
+      kill(pids.at("controller"), SIGCONT);
+      continued = true;
+    }
+  };
+  const ProcessRun run = RunAsProcesses(RealtimeToys(kTicks), options);
+  ASSERT_FALSE(run.timed_out);
+  ASSERT_TRUE(continued);
+  EXPECT_EQ(run.final_tick, kTicks - 1);
+  EXPECT_GE(run.health.at("controller").ticks_skipped, 98) << "200 ms of 2 ms each";
 }
 
 }  // namespace

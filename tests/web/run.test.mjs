@@ -6,7 +6,7 @@ import {addDerivedSignals, findPhases, lightLoad, noisyLoad} from '../../web/src
 import {figuresFor, panelOf, pitchJoints} from '../../web/src/figures.js';
 import {addBatch, decodeBatch} from '../../web/src/live.js';
 import {searchSignals} from '../../web/src/search.js';
-import {formatNumber, leastSpan, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
+import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
 
 const near = (actual, expected, message) => assert.ok(Math.abs(actual - expected) < 1e-6, message ?? `${actual} is not ${expected}`);
@@ -259,6 +259,12 @@ test('a plot\'s range holds its data and no noise fills it', () => {
   assert.deepEqual(paddedRange(null, null, 0), [0, 1]);
   const exact = paddedRange(1e-9, 2e-9, 0);
   assert.ok(exact[1] - exact[0] < 2e-9);
+});
+
+test('a ratio beyond any sense does not flatten what led to it', () => {
+  assert.equal(limitedEnd(3000, [0.05, 0.05, NaN]), 0.25);
+  assert.equal(limitedEnd(0.1, [0.05]), 0.1, 'nothing is added');
+  assert.equal(limitedEnd(3000, []), 3000, 'without a limit all is shown');
 });
 
 test('signals of joints and feet have their names', () => {

@@ -46,11 +46,14 @@ MachineVerdict JudgeMachine(const RunSpec& spec, const RunOutcome& outcome) {
   verdict.load = *outcome.machine;
   for (int i = 0; i < static_cast<int>(outcome.processes.size()); ++i) {
     const health_t& health = outcome.processes[static_cast<size_t>(i)].health;
-    verdict.skipped = std::max(verdict.skipped, health.ticks_skipped);
-    if (TimingOf(spec, i) != Timing::kOwner) continue;
+    if (TimingOf(spec, i) != Timing::kOwner) {
+      verdict.skipped = std::max(verdict.skipped, health.ticks_skipped);
+      continue;
+    }
     verdict.known = health.ticks_completed > 0;
-    verdict.cycles = health.ticks_completed;
-    verdict.late = health.deadline_misses;
+    // A cycle that never began is late, too.
+    verdict.cycles = health.ticks_completed + health.ticks_skipped;
+    verdict.late = health.deadline_misses + health.ticks_skipped;
     const double overlong = health.latency_max * 1e-6 - spec.tick_period();
     verdict.latest = std::max({0.0, health.lateness_max * 1e-6, overlong});
   }

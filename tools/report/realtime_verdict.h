@@ -16,7 +16,7 @@ namespace poise {
 struct MachineVerdict {
   bool known = false;  ///< false: not in real time, or nobody reported
   int64_t cycles = 0;
-  int64_t late = 0;     ///< that ended after the next one was to begin
+  int64_t late = 0;     ///< that ended after the next was to begin, or never began
   double latest = 0;    ///< s, after its time, of the latest begin or end
   int64_t skipped = 0;  ///< ticks that a component was too late to work on, the worst component's
   MachineLoad load;

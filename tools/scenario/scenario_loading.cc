@@ -299,7 +299,7 @@ void ApplyRealtime(LoadedScenario* loaded) {
   // Until the controller follows, the robot hangs with its joints held.
   apply(scenario.hw_bridge().has_hold_before_command(), "hw_bridge.hold_before_command=true");
   apply(scenario.sim_ode().has_crane(), "sim_ode.crane.release_time=1");
-  apply(scenario.has_lead(), "lead=3");
+  apply(scenario.has_lead(), "lead=5");
 }
 
 /// The drives' type, their link, and whose time they follow.

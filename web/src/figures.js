@@ -1,5 +1,6 @@
 // Which plots a run gets: the paper's figures of its section, then what every run is looked at for.
 import {CONDITIONS} from './derived.js';
+import {LIMITS_SHOWN} from './units.js';
 
 const series = (label, role, type, field) => ({label, role, type, field});
 const derived = (label, role, name) => ({label, role, type: 'derived', field: name});
@@ -20,10 +21,12 @@ function comMotion(run, figure, title, axes, note = '') {
 const push = (figure) => ({figure, title: 'External push, magnitude', unit: 'N',
   series: [derived('measured', 'measured', 'push_magnitude')]});
 
+const UP_TO_LIMITS = {upToLimits: true, note: `Drawn up to ${LIMITS_SHOWN} times the limit.`};
+
 function resultantConditions(figure) {
   return [['a', 'y', 1, 'l_y/2 > |M_x| / |F_z|, resultant in frame O (37)'],
     ['b', 'x', 0, 'l_x/2 > |M_y| / |F_z|, resultant in frame O (38)']].map(([letter, axis, i, title]) => ({
-    figure: figure && `${figure}${letter}`, title, unit: 'm', series: [
+    figure: figure && `${figure}${letter}`, title, unit: 'm', ...UP_TO_LIMITS, series: [
       derived('measured', 'measured', `cop_measured_abs_${axis}`),
       derived('computed', 'computed', `cop_computed_abs_${axis}`),
       series('limit', 'limit', 'balance_torque_t', `cop_limit[${i}]`)]}));
@@ -33,7 +36,7 @@ function footConditions(run, figure, foot) {
   const {name} = run.robot.feet[foot];
   const limits = {friction: 'μ_s', yaw: 'μ_z', roll: 'l_y/2', pitch: 'l_x/2'};
   return CONDITIONS.map(({key, number, unit, text}, i) => ({
-    figure: figure && `${figure}${'abcd'[i]}`, unit,
+    figure: figure && `${figure}${'abcd'[i]}`, unit, ...UP_TO_LIMITS,
     title: `${limits[key]} > ${text}, ${name} foot (${number})`, series: [
       derived('measured', 'measured', `${name}_${key}_ratio_measured`),
       derived('computed', 'computed', `${name}_${key}_ratio_computed`),

@@ -4,7 +4,7 @@ import {element} from './dom.js';
 import {csvOf, pngOf, savePanel} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
-import {formatNumber, leastSpan, paddedRange, quantity, scaled} from './units.js';
+import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from './units.js';
 
 const HEIGHT = 200;       // px
 const CLICK_SLACK = 4;    // px that a click may move
@@ -180,10 +180,12 @@ export class Panel {
     const {unit} = this.definition;
     const least = this.definition.added ? 0 : leastSpan(unit);
     const shown = (u) => scaled(Math.max(Math.abs(u.scales.y.min), Math.abs(u.scales.y.max)), unit);
+    const limit = this.definition.upToLimits ? this.lines.findIndex((line) => line.role === 'limit') : -1;
+    const end = (high) => limit < 0 || high === null ? high ?? NaN : limitedEnd(high, this.data[limit + 1]);
     this.#readAll();
     this.plot = new uPlot({
       width: Math.max(120, this.host.clientWidth), height: HEIGHT, legend: {show: false},
-      scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: (_, low, high) => paddedRange(low, high, least)}},
+      scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: (_, low, high) => paddedRange(Math.min(low, end(high)), end(high), least)}},
       axes: [axis({label: 'time (s)', labelSize: 16, size: 26}),
         axis({label: (u) => shown(u).unit || '1', labelSize: 16, size: 62,
           values: (u, splits) => splits.map((v) => formatNumber(Number((v * shown(u).factor).toPrecision(8)), 6))})],

@@ -26,6 +26,15 @@ export function paddedRange(low, high, least) {
   return [bottom - pad, Math.max(high, bottom + span) + pad];
 }
 
+/** What a plot of ratios with a limit is drawn up to: a robot that has fallen has ratios beyond any sense. */
+export const LIMITS_SHOWN = 5;
+
+/** The end of an axis whose data end at `high` and whose limits are `limits` (empty: none). */
+export function limitedEnd(high, limits) {
+  const most = limits.reduce((largest, value) => Number.isFinite(value) ? Math.max(largest, Math.abs(value)) : largest, 0);
+  return most > 0 ? Math.min(high, LIMITS_SHOWN * most) : high;
+}
+
 /** Prefixed units of messages and metrics, as those that PREFIXES knows; every other one stays. */
 const PREFIXED = {µs: ['s', 1e-6], ms: ['s', 1e-3], mm: ['m', 1e-3], 'mm/s': ['m/s', 1e-3], mrad: ['rad', 1e-3]};
 
