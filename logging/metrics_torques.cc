@@ -29,30 +29,41 @@ Answer TorqueStepAtSwitch(const RunRecord& run) {
   return largest;
 }
 
+/// None while the bridge does not follow: what a controller asks of a robot that has stopped moves
+/// nobody.
+const joint_command_t* FollowedCommand(const RunRecord& run, int64_t tick) {
+  const bridge_status_t* bridge = run.bridge.at(tick);
+  const bool stopped = bridge != nullptr && bridge->state > bridge_status_t::STATE_RUNNING;
+  return stopped ? nullptr : run.command.at(tick);
+}
+
 }  // namespace
 
 void AddTorques(MetricList* list) {
-  list->push_back(
-      {"joint_torque_max", "N·m", "largest commanded joint torque", [](const RunRecord& run) {
-         return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-           const joint_command_t* command = run.command.at(t);
-           if (command == nullptr) return {};
-           return std::abs(command->torque[joint]);
-         });
-       }});
-  list->push_back({"joint_torque_share", "%", "largest commanded joint torque, of its limit",
+  list->push_back({"joint_torque_max", "N·m",
+                   "largest joint torque commanded while the bridge follows",
                    [](const RunRecord& run) {
                      return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-                       const joint_command_t* command = run.command.at(t);
+                       const joint_command_t* command = FollowedCommand(run, t);
+                       if (command == nullptr) return {};
+                       return std::abs(command->torque[joint]);
+                     });
+                   }});
+  list->push_back({"joint_torque_share", "%",
+                   "largest joint torque commanded while the bridge follows, of its limit",
+                   [](const RunRecord& run) {
+                     return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
+                       const joint_command_t* command = FollowedCommand(run, t);
                        if (command == nullptr) return {};
                        return 100 * std::abs(command->torque[joint]) / JointTorqueLimit(run, joint);
                      });
                    }});
-  list->push_back({"torque_step_max", "N·m", "largest change of a joint's command in one tick",
+  list->push_back({"torque_step_max", "N·m",
+                   "largest change of a joint's command in one tick while the bridge follows",
                    [](const RunRecord& run) {
                      return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-                       const joint_command_t* now = run.command.at(t);
-                       const joint_command_t* before = run.command.at(t - 1);
+                       const joint_command_t* now = FollowedCommand(run, t);
+                       const joint_command_t* before = FollowedCommand(run, t - 1);
                        if (now == nullptr || before == nullptr) return {};
                        return std::abs(now->torque[joint] - before->torque[joint]);
                      });

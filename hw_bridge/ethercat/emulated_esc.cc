@@ -86,6 +86,7 @@ void EmulatedEsc::SetSyncManagerDisabled(int index, bool disabled) {
 
 EmulatedEsc::Rule EmulatedEsc::SyncManagerRule(size_t address, size_t size, bool write,
                                                int* manager) const {
+  if (address < kRegisters) return Rule::kFree;  // they guard the process data RAM alone
   for (int i = 0; i < kNumSyncManagers; ++i) {
     const SyncManagerSettings sync = sync_manager(i);
     if (!sync.active || sync.length == 0 || !Overlap(address, size, sync.start, sync.length)) {

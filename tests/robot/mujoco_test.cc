@@ -92,7 +92,7 @@ class MujocoTest : public testing::TestWithParam<TestRobot> {
 
   template <typename Actual, typename Expected>
   static void ExpectNear(const Actual& actual, const Expected& expected, const char* what,
-                         double tolerance = kTolerance) {
+                         double tolerance = kTolerance, double slack = 0) {
     ASSERT_EQ(actual.rows(), expected.rows());
     ASSERT_EQ(actual.cols(), expected.cols());
     double largest = 1, difference = 0;
@@ -103,7 +103,7 @@ class MujocoTest : public testing::TestWithParam<TestRobot> {
         difference = std::max(difference, std::abs(actual(i, j) - expected(i, j)));
       }
     }
-    EXPECT_LE(difference, tolerance * largest) << what;
+    EXPECT_LE(difference, tolerance * largest + slack) << what;
   }
 
   RobotModel model_;
@@ -138,7 +138,11 @@ TEST_P(MujocoTest, MassMatrixBiasAndGravity) {
     Forward(state);
     const VectorXd bias = t.transpose() * VectorXd::Map(data_->qfrc_bias, mujoco_->nv);
     mujoco_->opt.gravity[2] = -kGravity;
-    ExpectNear(data.bias, bias, "bias", inertia_tolerance);
+    // An error of the inertia turns with the link: ω × δI ω, and δI times what ω accelerates.
+    const double rate = state.base_angular_velocity.norm() + state.joint_velocity.lpNorm<1>();
+    const double slack =
+        GetParam() == TestRobot::kDyros ? 0 : 2 * kFullInertiaTolerance * rate * rate;
+    ExpectNear(data.bias, bias, "bias", kTolerance, slack);
     ExpectNear(data.gravity, with_gravity - bias, "gravity");
   }
 }

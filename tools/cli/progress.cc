@@ -37,7 +37,7 @@ void Progress::Show(double time, double wall) {
     return;
   }
   line_.Show(fmt::format("{:.2f} of {:.2f} s simulated, {:.1f} x real time", time, duration_,
-                         wall > 0 ? time / wall : 0.0),
+                         wall > 0 ? (time + lead_) / wall : 0.0),
              wall);
 }
 

@@ -26,15 +26,16 @@ class StatusLine {
 /// A run's progress.
 class Progress {
  public:
-  /// `duration`: s of the scenario. Quiet: shows nothing.
-  Progress(double duration, bool quiet) : duration_(duration), line_(quiet) {}
+  /// `duration`: s of the scenario; `lead`: s before it. Quiet: shows nothing.
+  Progress(double duration, bool quiet, double lead = 0)
+      : duration_(duration), lead_(lead), line_(quiet) {}
   /// The scenario's time (negative: the run's lead) and wall time since the start, s. Cheap: shows
   /// only when it is time to.
   void Show(double time, double wall);
   void Clear() { line_.Clear(); }
 
  private:
-  double duration_;
+  double duration_, lead_;
   StatusLine line_;
 };
 

@@ -235,9 +235,10 @@ void AddEchoCommand(CLI::App* app, Command* command) {
   CLI::App* echo = app->add_subcommand(
       "echo", "decoded messages of a channel, of a run in progress or from a log");
   echo->add_option("channel", options->channel, "e.g. ROBOT_STATE, HEALTH_SIM_ODE")->required();
-  echo->add_option("field", options->fields,
-                   "by path: torque[right_knee_pitch] or torque[3], foot_wrench[left].force, "
-                   "com_position; one line a message. Default: the whole message");
+  echo->add_option(
+      "field", options->fields,
+      "by path, of JOINT_COMMAND torque[right_knee_pitch] or torque[3], of "
+      "ROBOT_SENSORS foot_wrench[left].force; one line a message. Default: the whole message");
   CLI::Option* run = echo->add_option("--run", options->run,
                                       "folder of the run; default: the only one that goes on");
   echo->add_option("--log", options->log, "from a log (any LCM log) or a run's folder instead")

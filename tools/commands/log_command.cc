@@ -100,6 +100,11 @@ int Check(const std::string& run, bool all) {
   fmt::print("{}: {} events; {} messages of {} channels, ticks {} to {}: {}\n", log, survey.events,
              messages, survey.channels.size(), survey.first_tick, survey.end_tick - 1,
              problems.empty() ? "whole" : "NOT WHOLE");
+  if (!problems.empty() && survey.spec.realtime()) {
+    fmt::print(
+        "The run was in real time: a component sends nothing for ticks that reach it too late. "
+        "Such ticks are missing above, and are no defect of the log.\n");
+  }
   return problems.empty() ? kExitOk : kExitFailed;
 }
 

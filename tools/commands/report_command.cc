@@ -76,7 +76,7 @@ int Report(const ReportOptions& options) {
                                "not judged here",
                                ScreenStyle().columns));
   } else {
-    fmt::print("{}", FormatVerdictLines(run.checks, ""));
+    fmt::print("{}", FormatVerdictLines(run.checks, "", options.full));
   }
   if (!options.no_html) {
     const std::filesystem::path html =

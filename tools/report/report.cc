@@ -215,7 +215,10 @@ TableCell VerdictCell(const CheckResult& check) {
 }
 
 std::string FormatMeasured(const CheckResult& check) {
-  return check.measured ? FormatNumber(*check.measured, check.unit) : "none";
+  // A count is always known of a run that was seen; a time, of what never happened, is not.
+  return check.measured       ? FormatNumber(*check.measured, check.unit)
+         : check.unit.empty() ? "not known"
+                              : "none";
 }
 
 std::string FormatFaults(const RunOutcome& outcome) {

@@ -54,9 +54,10 @@ std::string Hold(const Count& count) {
 }
 
 /// What this run has of the paper, or of its scenario.
-std::string ShortTable(const std::vector<CheckResult>& checks) {
-  const bool paper = std::any_of(checks.begin(), checks.end(),
-                                 [](const CheckResult& check) { return !check.paper.empty(); });
+std::string ShortTable(const Scenario& scenario, const std::vector<CheckResult>& checks) {
+  const bool paper =
+      scenario.has_paper_section() &&
+      std::ranges::any_of(checks, [](const CheckResult& check) { return !check.paper.empty(); });
   std::vector<TableRow> rows = {{"what", "measured", paper ? "paper" : "limit", ""}};
   for (const CheckResult& check : checks) {
     const bool shown = paper ? !check.paper.empty() : check.limited() && !check.of_every_run;
@@ -75,7 +76,7 @@ bool SameFile(const fs::path& a, const fs::path& b) {
 }  // namespace
 
 std::string FormatScreen(const ShownRun& run) {
-  const std::string table = ShortTable(run.checks);
+  const std::string table = ShortTable(run.scenario, run.checks);
   return Sentences(run) + (table.empty() ? table : fmt::format("\n{}", table));
 }
 
@@ -104,7 +105,8 @@ std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::str
   return fmt::format("FAILED: {}", Joined(parts, "; "));
 }
 
-std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem) {
+std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem,
+                               bool below_full_table) {
   const Count count = CountChecks(checks);
   const int width = ScreenStyle().columns;
   if (problem.empty() && count.failed.empty()) {
@@ -128,8 +130,8 @@ std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std
     text += Wrapped(fmt::format("  {}", Failure(*count.failed[i])), width, 4) + "\n";
   }
   if (count.failed.size() > kFailures) {
-    text +=
-        fmt::format("  and {} more, in the full table (--full)\n", count.failed.size() - kFailures);
+    text += fmt::format("  and {} more, in the {}\n", count.failed.size() - kFailures,
+                        below_full_table ? "table above" : "full table (--full)");
   }
   return text;
 }
@@ -149,10 +151,12 @@ std::string FormatNext(const Scenario& scenario, const fs::path& dir, bool lates
       fmt::format("draws the run, step by step: {}", FileAddress(dir / "report.html")));
   const int assumptions = scenario.assumption_size();
   add(fmt::format("report{} --full", run),
-      fmt::format("every figure and event{}",
-                  assumptions == 0 ? ""
-                                   : fmt::format(", and the {} values that the paper does not give",
-                                                 assumptions)));
+      fmt::format(
+          "every figure and event{}",
+          assumptions == 0 ? ""
+          : !scenario.has_paper_section()
+              ? fmt::format(", and {} assumed values", assumptions)
+              : fmt::format(", and the {} values that the paper does not give", assumptions)));
   const std::vector<std::string> known = ListNames("scenarios");
   if (std::find(known.begin(), known.end(), scenario.name()) != known.end()) {
     add(fmt::format("matrix {}", scenario.name()), "the same without each part of the controller");

@@ -35,7 +35,8 @@ std::string FormatFullScreen(const ShownRun& run);
 std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem);
 
 /// The same for a person: what failed by name in lines of its own, in colour.
-std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem);
+std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem,
+                               bool below_full_table = false);
 
 /// Where to look next, for a run in `dir`; `latest`: the commands find it without a name.
 std::string FormatNext(const Scenario& scenario, const std::filesystem::path& dir, bool latest);

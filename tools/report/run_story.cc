@@ -78,7 +78,7 @@ std::string Direction(const Eigen::Vector3d& force) {
   return fmt::format("from {}", Joined(sides, " and "));
 }
 
-/// "pushed from the right with 188.9 N at 0.404 s"; empty without a push.
+/// "pushed from the right with up to 188.9 N, at 0.404 s"; empty without a push.
 std::string Pushes(const RunRecord& run, const std::vector<Event>& events) {
   int count = 0;
   int64_t at = 0;
@@ -86,7 +86,7 @@ std::string Pushes(const RunRecord& run, const std::vector<Event>& events) {
   for (const Event& event : events) {
     if (event.name != "push_peak") continue;
     ++count;
-    const int64_t tick = std::llround(event.time / run.spec.tick_period());
+    const int64_t tick = std::llround(event.time / run.spec.tick_period()) + run.spec.lead_ticks();
     const external_push_t* push = run.push.at(tick);
     if (push == nullptr) continue;
     const double size = GetVector3(push->force).norm();
@@ -101,8 +101,8 @@ std::string Pushes(const RunRecord& run, const std::vector<Event>& events) {
     const double heading = std::atan2(ahead.y(), ahead.x());
     force = Eigen::AngleAxisd(-heading, Eigen::Vector3d::UnitZ()) * force;
   }
-  const std::string push = fmt::format("{} with {} at {}", Direction(force),
-                                       fmt::format("{:.1f} N", largest), Seconds(run.time(at)));
+  const std::string push = fmt::format("{} with up to {:.1f} N, at {}", Direction(force), largest,
+                                       Seconds(run.time(at)));
   return count == 1 ? fmt::format("pushed {}", push)
                     : fmt::format("pushed {} times, hardest {}", count, push);
 }

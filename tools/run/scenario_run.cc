@@ -68,7 +68,7 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
                                 const LaunchOptions& launch) {
   const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
-                    quiet);
+                    quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
   if (in_process) {
     return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
   }
@@ -137,7 +137,7 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
                        summary.events,        outcome.message, {}};
   fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
              Wrapped(realtime, ScreenStyle().columns, 2),
-             FormatVerdictLines(summary.checks, problem));
+             FormatVerdictLines(summary.checks, problem, options_.full));
   if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
   fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
              record.duration(record.num_ticks), outcome.wall_time,

@@ -40,6 +40,7 @@ function liveButton({player, feed}) {
   const update = () => {
     const missed = feed.lost > 0 ? `, ${feed.lost} messages missed` : '';
     button.textContent = LIVE_TEXTS[feed.state] + missed;
+    button.dataset.state = feed.state;
     button.setAttribute('aria-pressed', String(player.following));
   };
   feed.addEventListener('state', update);

@@ -47,7 +47,7 @@ function sceneToolbar(scene) {
     box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'));
 }
 
-function sceneKey(overlay) {
+function sceneKey(run, overlay) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
@@ -58,6 +58,7 @@ function sceneKey(overlay) {
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
     entry('capture', '●', 'capture point; ○ a step needed there'),
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
+    run.scenario.sim_ode?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
 }
 
@@ -92,7 +93,7 @@ async function start() {
   const player = new Player(run);
   const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
   const scene = new SceneView(document.getElementById('scene'), run, overlay);
-  scene.host.append(sceneToolbar(scene), sceneKey(overlay),
+  scene.host.append(sceneToolbar(scene), sceneKey(run, overlay),
     element('span', {class: 'inset'}, 'soles from above, forward is up'));
   const [phases] = await Promise.all([phasesFound, scene.load()]);
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
@@ -135,6 +136,7 @@ async function start() {
     scene.pace(player.playing || player.following);
     update(performance.now());
   });
+  scene.setRow(player.row);  // the cursor may have moved while this page was being made
   update(performance.now());
   followGrowth(shared, () => {
     bar.refresh();

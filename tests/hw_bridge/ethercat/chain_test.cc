@@ -62,6 +62,15 @@ TEST_F(EthercatChain, CountsSlavesByBroadcast) {
   EXPECT_EQ(answer.data[0], 0x01);
 }
 
+// ETG.1000.4: sync managers guard buffers of the process data RAM, whatever start is written.
+TEST_F(EthercatChain, NoSyncManagerGuardsRegisters) {
+  AddressAll();
+  const auto low = static_cast<uint8_t>(reg::kAlStatus & 0xFF);
+  const auto high = static_cast<uint8_t>(reg::kAlStatus >> 8);
+  Do(Command::kFpwr, 1001, 0x0800, {low, high, 0x80, 0x00, 0x26, 0x00, 0x01, 0x00});
+  EXPECT_EQ(Read(Command::kBrd, 0, reg::kAlStatus, 2).working_counter, 3);
+}
+
 TEST_F(EthercatChain, AddressesByPositionOneSlaveAndCountsUp) {
   const Answer written =
       Do(Command::kApwr, AutoIncrementAddress(1), reg::kStationAddress, {0x34, 0x12});
