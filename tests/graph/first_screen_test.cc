@@ -90,7 +90,7 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
     limited += check["limit"].is_null() ? 0 : 1;
   }
   char text[100];
-  std::snprintf(text, sizeof text, " with %.1f N at ", peak);
+  std::snprintf(text, sizeof text, " with up to %.1f N, at ", peak);
   EXPECT_THAT(run.output, HasSubstr("\nPushed from "));
   EXPECT_THAT(Flat(run.output), HasSubstr(text));
   EXPECT_THAT(Flat(run.output), HasSubstr("the robot stood"));

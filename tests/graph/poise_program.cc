@@ -9,12 +9,32 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
 namespace poise {
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Runs of tests beside this one are not this one's: each process has a registry of its own.
+class ProcessRegistry {
+ public:
+  ProcessRegistry()
+      : folder_(fs::temp_directory_path() / ("poise_registry_" + std::to_string(getpid()))) {
+    setenv("POISE_RUNTIME_DIR", folder_.c_str(), 0);
+  }
+  ~ProcessRegistry() {
+    std::error_code error;
+    fs::remove_all(folder_, error);
+  }
+
+ private:
+  fs::path folder_;
+};
+const ProcessRegistry process_registry;
+
+}  // namespace
 
 std::vector<std::string> Lines(const std::string& text) {
   std::vector<std::string> lines;
@@ -25,7 +45,9 @@ std::vector<std::string> Lines(const std::string& text) {
 
 std::string ReadAll(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+  std::ostringstream text;  // an iterator would throw where a process of /proc ends meanwhile
+  text << in.rdbuf();
+  return text.str();
 }
 
 PoiseProgram::PoiseProgram(const std::vector<std::string>& arguments) {
