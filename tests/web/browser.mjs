@@ -8,6 +8,9 @@ const CHROMIUM = '/usr/bin/chromium';
 const QUIET = ['--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
   '--disable-quic', '--enable-unsafe-swiftshader'];  // no look-ups at start; 3D without a graphics card
 
+/** ms: a busy machine without a graphics card draws slowly, which is no failure. */
+export const PATIENCE = 240000;
+
 /** `web`: build/web, where deploy/setup installs playwright-core. */
 export async function launchBrowser(web) {
   if (!existsSync(CHROMIUM)) throw new Error(`${CHROMIUM} is missing: run deploy/setup, which installs it`);
@@ -19,6 +22,7 @@ export async function launchBrowser(web) {
 export async function openPage(browser, file, options = {}) {
   const context = await browser.newContext({viewport: {width: 1100, height: 800}, deviceScaleFactor: 0.5,
     acceptDownloads: true, ...options});
+  context.setDefaultTimeout(PATIENCE);
   const page = await context.newPage();
   const problems = [];
   page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
@@ -29,6 +33,6 @@ export async function openPage(browser, file, options = {}) {
   });
   await page.goto(url);
   await page.waitForFunction(() => document.documentElement.dataset.ready
-    || document.querySelector('[role=alert]'), null, {timeout: 60000});
+    || document.querySelector('[role=alert]'), null, {timeout: PATIENCE});
   return {page, problems};
 }

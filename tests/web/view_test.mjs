@@ -7,7 +7,7 @@ import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {launchBrowser, openPage} from './browser.mjs';
+import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
 import {startRun, startView} from './live_run.mjs';
 import {ask, open, openStream, upgrade} from './raw_socket.mjs';
 
@@ -32,13 +32,13 @@ async function start(name, parameters, viewParameters = []) {
   return {run, view};
 }
 
-const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: 60000});
+const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: PATIENCE});
 const end = (page) => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numTicks);
 const more = async (page, ticks = 20) => until(page, (n) => window.poise.run.firstTick + window.poise.run.numTicks > n,
   await end(page) + ticks);
 
 test('a page follows a run in progress, looks back while it goes on, and has all of it in the end', async () => {
-  const {run, view} = await start('live', ['--realtime', '--duration', '60']);
+  const {run, view} = await start('live', ['--realtime', '--duration', '600']);
   const {page, problems} = await openPage(browser, view.url);
   assert.match(await page.locator('#live').innerText(), /live/);
   await more(page);
@@ -152,7 +152,7 @@ test('a page follows a run in progress, looks back while it goes on, and has all
 });
 
 test('a page keeps the last ticks only', async () => {
-  const {run, view} = await start('short', ['--realtime', '--duration', '60'], ['--keep', '1']);
+  const {run, view} = await start('short', ['--realtime', '--duration', '600'], ['--keep', '1']);
   const {page, problems} = await openPage(browser, view.url);
   // Full, however late the page came, and some have gone.
   const first = await page.evaluate(() => window.poise.run.firstTick);
@@ -172,7 +172,7 @@ test('a page keeps the last ticks only', async () => {
 });
 
 test('a page that loses its server goes on with the next one where it was', async () => {
-  const {run, view} = await start('again', ['--realtime', '--duration', '60']);
+  const {run, view} = await start('again', ['--realtime', '--duration', '600']);
   const {page} = await openPage(browser, view.url);
   await more(page);
   assert.equal(await view.stop(), 0);
