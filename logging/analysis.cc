@@ -18,8 +18,8 @@ Eigen::Quaterniond Rotation(const double (&q)[4]) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
 }
 
-bool InContact(const task_torque_t& task, int foot) {
-  return task.in_contact[static_cast<size_t>(foot)] != 0;
+bool InContact(const support_plan_t& plan, int foot) {
+  return plan.in_contact[static_cast<size_t>(foot)] != 0;
 }
 
 Answer Fold(const RunRecord& run, const std::function<Answer(int64_t)>& value,
@@ -86,15 +86,15 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
 
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
   const robot_sensors_t* sensors = run.sensors.at(tick);
-  const task_torque_t* task = run.task.at(tick - 1);
+  const support_plan_t* plan = run.plan.at(tick - 1);
   const balance_torque_t* balance = run.balance.at(tick - 1);
-  if (sensors == nullptr || task == nullptr || balance == nullptr) return {};
+  if (sensors == nullptr || plan == nullptr || balance == nullptr) return {};
   const Eigen::Isometry3d frame = GetPose(balance->frame_o);
   balance::Vector6d resultant = balance::Vector6d::Zero();
-  for (int foot = 0; foot < task->num_feet; ++foot) {
-    if (!InContact(*task, foot)) continue;
+  for (int foot = 0; foot < plan->num_feet; ++foot) {
+    if (!InContact(*plan, foot)) continue;
     const auto f = static_cast<size_t>(foot);
-    resultant += balance::WrenchTransform(frame, GetPose(task->foot_pose[f])) *
+    resultant += balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) *
                  GetWrench(sensors->foot_wrench[f]);
   }
   if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
@@ -104,10 +104,10 @@ std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
 std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
                                                        int64_t tick) {
   const robot_sensors_t* sensors = run.sensors.at(tick);
-  const task_torque_t* task = run.task.at(tick - 1);
+  const support_plan_t* plan = run.plan.at(tick - 1);
   const joint_command_t* command = run.command.at(tick - 1);
-  if (sensors == nullptr || task == nullptr || command == nullptr) return {};
-  if (!InContact(*task, foot)) return {};
+  if (sensors == nullptr || plan == nullptr || command == nullptr) return {};
+  if (!InContact(*plan, foot)) return {};
   const auto f = static_cast<size_t>(foot);
   return GetWrench(sensors->foot_wrench[f]) - GetWrench(command->foot_wrench[f]);
 }

@@ -41,6 +41,14 @@ void CheckLogSpec(const RunSpec& spec, const std::string& path) {
   }
   for (const Channel& channel : spec.graph().channel()) {
     const MessageType* type = FindMessageType(channel.type());
+    if (type != nullptr && channel.count_size() > 0 &&
+        static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
+      throw LogError(fmt::format(
+          "{}: RUN_INFO: channel {}: its {} has {} counts, this build's has {}: the log "
+          "is of another version{}, which can read it",
+          path, channel.name(), channel.type(), channel.count_size(), type->count_names.size(),
+          spec.has_poise_commit() ? fmt::format(" ({})", spec.poise_commit()) : ""));
+    }
     if (type == nullptr || type->has_strings || type->run_id_offset < 0 ||
         static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
       throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts", path,

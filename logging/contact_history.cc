@@ -14,42 +14,46 @@ std::array<bool, 2> Contacts(const std::vector<int8_t>& in_contact) {
   return {in_contact[0] != 0, in_contact[1] != 0};
 }
 
-double Height(const task_torque_t& task, size_t foot) { return task.foot_pose[foot].position[2]; }
+double Height(const support_plan_t& plan, size_t foot) { return plan.foot_pose[foot].position[2]; }
 
 /// Follows where each foot's reference is to end before both feet are to stand, phase by phase.
 class ReferenceEnds {
  public:
-  explicit ReferenceEnds(const RunRecord& run) : plan_(ReadSchedulePlan(run)) {}
+  explicit ReferenceEnds(const RunRecord& run) : schedule_(ReadSchedulePlan(run)) {}
 
-  void Update(const task_torque_t& task) {
-    if (task.phase == phase_) return;
-    phase_ = task.phase;
-    if (!plan_ || phase_ < 0 || static_cast<size_t>(phase_) >= plan_->phases.size()) return;
-    const auto now = static_cast<size_t>(phase_);
-    std::array<double, 2> level{task.foot_desired[0].position[2], task.foot_desired[1].position[2]};
-    for (size_t p = now; p < plan_->phases.size(); ++p) {
-      const PhasePlan& phase = plan_->phases[p];
-      if (p > now && phase.double_support) break;
+  void Update(const support_plan_t& plan) {
+    if (plan.phase == phase_) return;
+    phase_ = plan.phase;
+    if (!schedule_ || phase_ < 0 || static_cast<size_t>(phase_) >= schedule_->phases.size()) return;
+    std::array<double, 2> level{plan.foot_reference[0].position[2],
+                                plan.foot_reference[1].position[2]};
+    int at = phase_;
+    // As the phases follow each other when all goes well; a plan may go round in circles.
+    for (size_t steps = 0; at >= 0 && steps < schedule_->phases.size(); ++steps) {
+      const PhasePlan& phase = schedule_->phases[static_cast<size_t>(at)];
+      if (at != phase_ && phase.double_support) break;
+      const bool now = steps == 0;
+      at = phase.next;
       if (!phase.foot) continue;
       const auto f = static_cast<size_t>(phase.foot->foot);
       if (phase.foot->above_support) {
-        level[f] = Height(task, 1 - f) + phase.foot->z;
-      } else if (!(p == now && phase.foot->at_once)) {  // else it stands there already
+        level[f] = Height(plan, 1 - f) + phase.foot->z;
+      } else if (!(now && phase.foot->at_once)) {  // else it stands there already
         level[f] += phase.foot->z;
       }
       end_[f] = level[f];
     }
   }
-  void Place(const task_torque_t& task, TouchDown* touch) const {
+  void Place(const support_plan_t& plan, TouchDown* touch) const {
     if (!end_[touch->foot]) return;
-    touch->above_end = Height(task, touch->foot) - *end_[touch->foot];
-    touch->timing = *touch->above_end > plan_->expected_within    ? Timing::kEarly
-                    : *touch->above_end < -plan_->expected_within ? Timing::kLate
-                                                                  : Timing::kExpected;
+    touch->above_end = Height(plan, touch->foot) - *end_[touch->foot];
+    touch->timing = *touch->above_end > schedule_->expected_within    ? Timing::kEarly
+                    : *touch->above_end < -schedule_->expected_within ? Timing::kLate
+                                                                      : Timing::kExpected;
   }
 
  private:
-  std::optional<SchedulePlan> plan_;
+  std::optional<SchedulePlan> schedule_;
   int32_t phase_ = -1;
   std::array<std::optional<double>, 2> end_;
 };
@@ -89,27 +93,27 @@ std::vector<SupportChange> SupportChanges(const RunRecord& run) {
 std::vector<TouchDown> TouchDowns(const RunRecord& run) {
   std::vector<TouchDown> touches;
   ReferenceEnds ends(run);
-  const task_torque_t* before = nullptr;
+  const support_plan_t* before = nullptr;
   std::array<bool, 2> down{};  // a sole that bounces touches down once
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const task_torque_t* task = run.task.at(tick);
-    if (task == nullptr) continue;
-    ends.Update(*task);
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    ends.Update(*plan);
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
-      const int8_t was = before->foot_state[foot], is = task->foot_state[foot];
-      const bool off = was != task_torque_t::FOOT_SUPPORT && was != task_torque_t::FOOT_TOUCHING;
+      const int8_t was = before->foot_state[foot], is = plan->foot_state[foot];
+      const bool off = was != support_plan_t::FOOT_SUPPORT && was != support_plan_t::FOOT_TOUCHING;
       // From a swing straight to support the schedule alone decided.
       const bool confirmed =
-          is == task_torque_t::FOOT_TOUCHING ||
-          (is == task_torque_t::FOOT_SUPPORT && was == task_torque_t::FOOT_SEARCHING);
-      if (was == task_torque_t::FOOT_SUPPORT) down[foot] = false;
+          is == support_plan_t::FOOT_TOUCHING ||
+          (is == support_plan_t::FOOT_SUPPORT && was == support_plan_t::FOOT_SEARCHING);
+      if (was == support_plan_t::FOOT_SUPPORT) down[foot] = false;
       if (!off || !confirmed || down[foot]) continue;
       down[foot] = true;
-      TouchDown touch{tick, foot, Height(*task, foot) - Height(*task, 1 - foot), {}};
-      ends.Place(*task, &touch);
+      TouchDown touch{tick, foot, Height(*plan, foot) - Height(*plan, 1 - foot), {}};
+      ends.Place(*plan, &touch);
       touches.push_back(touch);
     }
-    before = task;
+    before = plan;
   }
   return touches;
 }

@@ -65,18 +65,38 @@ class EventList {
   std::vector<Entry> events_;
 };
 
+/// What the phase before came to, where that is not its planned end; else empty.
+std::string OutcomeText(int8_t outcome) {
+  switch (outcome) {
+    case support_plan_t::OUTCOME_NO_SURFACE:
+      return ": no surface was found";
+    case support_plan_t::OUTCOME_CONTACT_LOST:
+      return ": a contact was lost";
+    case support_plan_t::OUTCOME_TIMEOUT:
+      return ": the phase before had waited for too long";
+    default:
+      return "";
+  }
+}
+
 void AddPhases(const RunRecord& run, EventList* events) {
-  const std::optional<SchedulePlan> plan = ReadSchedulePlan(run);
+  const std::optional<SchedulePlan> schedule = ReadSchedulePlan(run);
   std::optional<int32_t> phase;
+  double last_time = 0;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const task_torque_t* task = run.task.at(tick);
-    if (task == nullptr || task->phase == phase) continue;
-    phase = task->phase;
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    // A phase may follow itself: then its time begins anew.
+    const bool began = plan->phase != phase || plan->phase_time < last_time;
+    last_time = plan->phase_time;
+    if (!began) continue;
+    phase = plan->phase;
     const auto i = static_cast<size_t>(*phase);
-    const bool named = plan && i < plan->phases.size() && !plan->phases[i].name.empty();
+    const bool named = schedule && i < schedule->phases.size() && !schedule->phases[i].name.empty();
     events->Add(tick, "phase_began",
-                named ? fmt::format("phase {}, {}", *phase, plan->phases[i].name)
-                      : fmt::format("phase {}", *phase));
+                (named ? fmt::format("phase {}, {}", *phase, schedule->phases[i].name)
+                       : fmt::format("phase {}", *phase)) +
+                    OutcomeText(plan->began_by));
   }
 }
 
@@ -91,13 +111,13 @@ void AddSupport(const RunRecord& run, EventList* events) {
 
 void AddTransitions(const RunRecord& run, EventList* events) {
   for (const auto& [kind, begin, end] :
-       {std::tuple{task_torque_t::TRANSITION_UNLOADING, "unloading_begins", "unloading_ends"},
-        std::tuple{task_torque_t::TRANSITION_LOADING, "loading_begins", "loading_ends"}}) {
+       {std::tuple{support_plan_t::TRANSITION_UNLOADING, "unloading_begins", "unloading_ends"},
+        std::tuple{support_plan_t::TRANSITION_LOADING, "loading_begins", "loading_ends"}}) {
     for (size_t foot = 0; foot < 2; ++foot) {
       const auto holds = [&, wanted = kind](int64_t tick) -> std::optional<bool> {
-        const task_torque_t* task = run.task.at(tick);
-        if (task == nullptr) return {};
-        return task->transition == wanted && task->transition_foot == static_cast<int>(foot);
+        const support_plan_t* plan = run.plan.at(tick);
+        if (plan == nullptr) return {};
+        return plan->transition == wanted && plan->transition_foot == static_cast<int>(foot);
       };
       events->AddIntervals(Intervals(run, holds), begin, end,
                            [&](int64_t) { return FootName(run, foot); });
@@ -107,13 +127,13 @@ void AddTransitions(const RunRecord& run, EventList* events) {
 
 void AddWaiting(const RunRecord& run, EventList* events) {
   for (const auto& [reason, text] :
-       {std::pair{task_torque_t::WAITING_COM, "for the COM to come above the stance sole"},
-        std::pair{task_torque_t::WAITING_CONTACT, "for the measured load to confirm the contact"},
-        std::pair{task_torque_t::WAITING_NO_SURFACE, "for good: no surface was found"}}) {
+       {std::pair{support_plan_t::WAITING_COM, "for the COM to come above the stance sole"},
+        std::pair{support_plan_t::WAITING_CONTACT, "for the measured load to confirm the contact"},
+        std::pair{support_plan_t::WAITING_NO_SURFACE, "no surface was found"}}) {
     const auto holds = [&, wanted = reason](int64_t tick) -> std::optional<bool> {
-      const task_torque_t* task = run.task.at(tick);
-      if (task == nullptr) return {};
-      return task->waiting_for == wanted;
+      const support_plan_t* plan = run.plan.at(tick);
+      if (plan == nullptr) return {};
+      return plan->waiting_for == wanted;
     };
     events->AddIntervals(Intervals(run, holds), "waiting_begins", "waiting_ends",
                          [&, why = text](int64_t) { return std::string(why); });
@@ -121,27 +141,27 @@ void AddWaiting(const RunRecord& run, EventList* events) {
 }
 
 void AddFeet(const RunRecord& run, bool ended, EventList* events) {
-  const task_torque_t* before = nullptr;
+  const support_plan_t* before = nullptr;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const task_torque_t* task = run.task.at(tick);
-    if (task == nullptr) continue;
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
     for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
-      const int8_t is = task->foot_state[foot];
+      const int8_t is = plan->foot_state[foot];
       if (is == before->foot_state[foot]) continue;
       const double height =
-          kMilli * (task->foot_pose[foot].position[2] - task->foot_pose[1 - foot].position[2]);
-      if (is == task_torque_t::FOOT_SEARCHING) {
+          kMilli * (plan->foot_pose[foot].position[2] - plan->foot_pose[1 - foot].position[2]);
+      if (is == support_plan_t::FOOT_SEARCHING) {
         events->Add(tick, "searching",
                     fmt::format("{} without contact {:.1f} mm above the other sole",
                                 FootName(run, foot), height));
-      } else if (is == task_torque_t::FOOT_RETRACTED) {
+      } else if (is == support_plan_t::FOOT_RETRACTED) {
         events->Add(tick, "no_surface",
                     fmt::format("{} found no surface down to {:.1f} mm above the other sole; "
                                 "retracted",
                                 FootName(run, foot), height));
       }
     }
-    before = task;
+    before = plan;
   }
   for (const TouchDown& touch : TouchDowns(run)) {
     const std::string foot = FootName(run, touch.foot);
@@ -213,18 +233,18 @@ void AddBalancing(const RunRecord& run, EventList* events) {
 
 void AddCapturePoint(const RunRecord& run, EventList* events) {
   const auto needed = [&](int64_t tick) -> std::optional<bool> {
-    const balance_torque_t* balance = run.balance.at(tick);
-    if (balance == nullptr) return {};
-    return balance->step_needed != 0;
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) return {};
+    return plan->step_needed != 0;
   };
   const std::vector<Interval> intervals = Intervals(run, needed);
   for (const Interval& interval : intervals) {
-    const balance_torque_t& balance = *run.balance.at(interval.begin);
+    const support_plan_t& plan = *run.plan.at(interval.begin);
     events->Add(interval.begin, "step_needed",
                 fmt::format("a foot at ({:.2f}, {:.2f}) m within {:.2f} s; capture point {:.1f} mm "
                             "beyond the soles",
-                            balance.step_position[0], balance.step_position[1], balance.step_time,
-                            -kMilli * balance.capture_margin));
+                            plan.step_position[0], plan.step_position[1], plan.step_time,
+                            -kMilli * plan.capture_margin));
     events->AddEndOf(interval, "step_needed_ends", "capture point inside the soles again");
   }
 }

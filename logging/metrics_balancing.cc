@@ -79,16 +79,16 @@ std::optional<int64_t> FallTick(const RunRecord& run) {
 
 std::vector<Interval> StepNeeded(const RunRecord& run) {
   return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
-    const balance_torque_t* balance = run.balance.at(tick);
-    if (balance == nullptr) return {};
-    return balance->step_needed != 0;
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) return {};
+    return plan->step_needed != 0;
   });
 }
 
 /// s from the last begin of "step needed" to the fall, 0 when a fall was not announced.
 Answer WarningTime(const RunRecord& run) {
   const std::optional<int64_t> fall = FallTick(run);
-  if (!fall || run.balance.empty()) return {};
+  if (!fall || run.plan.empty()) return {};
   double warning = 0;
   for (const Interval& interval : StepNeeded(run)) {
     const bool lasts = interval.begin < *fall && interval.end.value_or(*fall) >= *fall;
@@ -103,9 +103,9 @@ void AddCapturePoint(MetricList* list) {
                    [](const RunRecord& run) {
                      return Scaled(Minimum(run,
                                            [&](int64_t t) -> Answer {
-                                             const balance_torque_t* balance = run.balance.at(t);
-                                             if (balance == nullptr) return {};
-                                             return balance->capture_margin;
+                                             const support_plan_t* plan = run.plan.at(t);
+                                             if (plan == nullptr) return {};
+                                             return plan->capture_margin;
                                            }),
                                    kMilli);
                    }});
@@ -117,7 +117,7 @@ void AddCapturePoint(MetricList* list) {
                    }});
   list->push_back({"step_needed_time", "s", "time in which a step was said to be needed, in sum",
                    [](const RunRecord& run) -> Answer {
-                     if (run.balance.empty()) return {};
+                     if (run.plan.empty()) return {};
                      int64_t ticks = 0;
                      for (const Interval& interval : StepNeeded(run)) {
                        ticks += interval.end.value_or(run.num_ticks) - interval.begin;

@@ -39,9 +39,9 @@ Answer ComDifference(const RunRecord& run) {
 Answer BodyRotationOnBothFeet(const RunRecord& run, bool first) {
   const auto both = [&](int64_t t) -> std::optional<bool> {
     if (t < run.first_tick) return false;
-    const task_torque_t* task = run.task.at(t);
-    if (task == nullptr) return {};
-    return task->in_contact[0] != 0 && task->in_contact[1] != 0;
+    const support_plan_t* plan = run.plan.at(t);
+    if (plan == nullptr) return {};
+    return plan->in_contact[0] != 0 && plan->in_contact[1] != 0;
   };
   const std::vector<Interval> intervals = Intervals(run, both);
   if (intervals.empty() || (!first && intervals.size() < 2)) return {};
@@ -66,14 +66,14 @@ void AddMotion(MetricList* list) {
         {fmt::format("com_error_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the estimated COM from its reference, {}", kAxis[axis]),
          [axis](const RunRecord& run) {
-           return Scaled(
-               Maximum(run,
-                       [&](int64_t t) -> Answer {
-                         const task_torque_t* task = run.task.at(t);
-                         if (task == nullptr) return {};
-                         return std::abs(task->com_position[axis] - task->com_desired[axis]);
-                       }),
-               kMilli);
+           return Scaled(Maximum(run,
+                                 [&](int64_t t) -> Answer {
+                                   const support_plan_t* plan = run.plan.at(t);
+                                   if (plan == nullptr) return {};
+                                   return std::abs(plan->com_position[axis] -
+                                                   plan->com_reference.position[axis]);
+                                 }),
+                         kMilli);
          }});
   }
   for (int axis = 0; axis < 3; ++axis) {
@@ -81,24 +81,25 @@ void AddMotion(MetricList* list) {
         {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
          [axis](const RunRecord& run) {
-           return Scaled(
-               Maximum(run,
-                       [&](int64_t t) -> Answer {
-                         const task_torque_t* task = run.task.at(t);
-                         const ground_truth_t* truth = run.truth.at(t);
-                         if (task == nullptr || truth == nullptr) return {};
-                         return std::abs(truth->com_position[axis] - task->com_desired[axis]);
-                       }),
-               kMilli);
+           return Scaled(Maximum(run,
+                                 [&](int64_t t) -> Answer {
+                                   const support_plan_t* plan = run.plan.at(t);
+                                   const ground_truth_t* truth = run.truth.at(t);
+                                   if (plan == nullptr || truth == nullptr) return {};
+                                   return std::abs(truth->com_position[axis] -
+                                                   plan->com_reference.position[axis]);
+                                 }),
+                         kMilli);
          }});
   }
   list->push_back(
       {"com_error_end", "mm", "distance of the true COM from its reference at the end",
        [](const RunRecord& run) -> Answer {
-         const task_torque_t* task = run.task.at(run.num_ticks - 1);
+         const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
          const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
-         if (task == nullptr || truth == nullptr) return {};
-         return kMilli * (GetVector3(truth->com_position) - GetVector3(task->com_desired)).norm();
+         if (plan == nullptr || truth == nullptr) return {};
+         return kMilli *
+                (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
        }});
   list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
                    [](const RunRecord& run) {
@@ -137,10 +138,10 @@ void AddMotion(MetricList* list) {
              return Scaled(Maximum(run,
                                    [&](int64_t t) -> Answer {
                                      const auto f = static_cast<size_t>(foot);
-                                     const task_torque_t* task = run.task.at(t);
-                                     if (task == nullptr || task->in_contact[f] != 0) return {};
-                                     return std::abs(task->foot_pose[f].position[axis] -
-                                                     task->foot_desired[f].position[axis]);
+                                     const support_plan_t* plan = run.plan.at(t);
+                                     if (plan == nullptr || plan->in_contact[f] != 0) return {};
+                                     return std::abs(plan->foot_pose[f].position[axis] -
+                                                     plan->foot_reference[f].position[axis]);
                                    }),
                            kMilli);
            }});

@@ -29,16 +29,16 @@ void AddOutcome(MetricList* list) {
             [](const RunRecord& run, int64_t t) -> std::optional<bool> {
               const task_torque_t* task = run.task.at(t);
               if (task == nullptr) return {};
-              return task->status != task_torque_t::STATUS_OK &&
-                     task->status != task_torque_t::STATUS_WAITING;
+              return task->status != task_torque_t::STATUS_OK;
             });
   count_all("balance_not_ok_ticks",
-            "ticks of the whole run without balance torque for want of state",
+            "ticks of the whole run without balance torque for want of state or task torque",
             [](const RunRecord& run, int64_t t) -> std::optional<bool> {
               const balance_torque_t* balance = run.balance.at(t);
               if (balance == nullptr) return {};
               return balance->status == balance_torque_t::STATUS_SINGULAR ||
-                     balance->status == balance_torque_t::STATUS_INVALID_STATE;
+                     balance->status == balance_torque_t::STATUS_INVALID_STATE ||
+                     balance->status == balance_torque_t::STATUS_HELD;
             });
   count_all("command_not_ok_ticks", "ticks of the whole run with a command of invalid input",
             [](const RunRecord& run, int64_t t) -> std::optional<bool> {
@@ -48,9 +48,9 @@ void AddOutcome(MetricList* list) {
             });
   count_all("waiting_ticks", "ticks of the whole run in which the schedule was held back",
             [](const RunRecord& run, int64_t t) -> std::optional<bool> {
-              const task_torque_t* task = run.task.at(t);
-              if (task == nullptr) return {};
-              return task->status == task_torque_t::STATUS_WAITING;
+              const support_plan_t* plan = run.plan.at(t);
+              if (plan == nullptr) return {};
+              return plan->status == support_plan_t::STATUS_WAITING;
             });
   list->push_back({"waiting_time", "s", "time of the whole run in which the schedule was held back",
                    [](const RunRecord& run) {
@@ -59,9 +59,9 @@ void AddOutcome(MetricList* list) {
                    }});
   list->push_back({"last_phase", "", "index of the scenario's phase at the end, from 0",
                    [](const RunRecord& run) -> Answer {
-                     const task_torque_t* task = run.task.at(run.num_ticks - 1);
-                     if (task == nullptr) return {};
-                     return task->phase;
+                     const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+                     if (plan == nullptr) return {};
+                     return plan->phase;
                    }});
   list->push_back({"real_time_factor", "", "simulated time over wall time (informs only)",
                    [](const RunRecord& run) { return run.real_time_factor; }});

@@ -25,6 +25,7 @@
 #include "poise/joint_command_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
+#include "poise/support_plan_t.hpp"
 #include "poise/task_torque_t.hpp"
 
 namespace poise::logging {
@@ -46,6 +47,7 @@ struct RunRecord {
   Series<robot_sensors_t> sensors;
   Series<robot_state_t> state;
   Series<estimator_status_t> estimator;
+  Series<support_plan_t> plan;
   Series<task_torque_t> task;
   Series<balance_torque_t> balance;
   Series<joint_command_t> command;
@@ -81,6 +83,7 @@ struct RunRecord {
     visit(&sensors);
     visit(&state);
     visit(&estimator);
+    visit(&plan);
     visit(&task);
     visit(&balance);
     visit(&command);

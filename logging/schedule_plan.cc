@@ -13,7 +13,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-constexpr const char* kSchema = "poise.TaskControllerConfig";
+constexpr const char* kSchema = "poise.StepPlannerConfig";
 
 /// A field of a message by name; its schema is the only place that knows defaults.
 class Reader {
@@ -81,12 +81,31 @@ PhasePlan ReadPhase(const Reader& phase) {
   return plan;
 }
 
+/// Sets what follows each phase that is done: the one it names, else the one after it in the list.
+void LinkPhases(const Reader& config, SchedulePlan* plan) {
+  constexpr int kDone = 1;  // the schema's first outcome
+  const int count = config.Size("phase");
+  for (int i = 0; i < count; ++i) {
+    const Reader phase = config.Element("phase", i);
+    int& next = plan->phases[static_cast<size_t>(i)].next;
+    if (!phase.Has("duration")) continue;
+    if (i + 1 < count) next = i + 1;
+    for (int k = 0; k < phase.Size("next"); ++k) {
+      const Reader named = phase.Element("next", k);
+      if (named.Enum("on") != kDone) continue;
+      for (int j = 0; j < count; ++j) {
+        if (plan->phases[static_cast<size_t>(j)].name == named.Text("to")) next = j;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run) {
   const auto* schema =
       google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(kSchema);
-  const std::string component = WriterOf(run.spec.graph(), "task_torque_t");
+  const std::string component = WriterOf(run.spec.graph(), "support_plan_t");
   if (schema == nullptr || component.empty()) return {};
   for (const ComponentConfig& config : run.spec.config()) {
     if (config.component() != component) continue;
@@ -103,6 +122,7 @@ std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run) {
     for (int i = 0; i < reader.Size("phase"); ++i) {
       plan.phases.push_back(ReadPhase(reader.Element("phase", i)));
     }
+    LinkPhases(reader, &plan);
     return plan;
   }
   return {};

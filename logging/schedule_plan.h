@@ -21,6 +21,7 @@ struct PhasePlan {
   std::string name;
   bool double_support = false;
   std::optional<FootPlan> foot;
+  int next = -1;  ///< phase that follows when this one is done; -1: none
 };
 
 struct SchedulePlan {
@@ -28,7 +29,7 @@ struct SchedulePlan {
   double expected_within = 0;  ///< m, a contact further from its reference's end is early or late
 };
 
-/// Of the component that writes TASK_TORQUE. Empty when the run names no such configuration, when
+/// Of the component that writes SUPPORT_PLAN. Empty when the run names no such configuration, when
 /// it does not fit this version's schema, or when the program does not link that schema: logging
 /// knows it by name only, since it includes no component's folder.
 std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run);

@@ -13,6 +13,9 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 // A corner that turns by less than this, relative to its edges' lengths, is on a line.
 constexpr double kStraight = 1e-12;
+// m, within which points count as on one line along y: far above rounding, far below a sole's
+// margin.
+constexpr double kAligned = 1e-9;
 
 /// `next` goes on anticlockwise from the edge before.
 bool TurnsLeft(const Eigen::Vector2d& before, const Eigen::Vector2d& at,
@@ -69,8 +72,11 @@ ConvexPolygon ConvexHull(std::span<const Eigen::Vector2d> points) {
     sorted[i] = points[i];
   }
   const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(n);
+  // Points on one line along y must come in order along it, whatever rounding does to their x.
   std::sort(sorted.begin(), end, [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+    const double ax = std::round(a.x() / kAligned), bx = std::round(b.x() / kAligned);
+    if (ax != bx) return ax < bx;
+    return a.y() < b.y() || (a.y() == b.y() && a.x() < b.x());
   });
   const auto m = static_cast<size_t>(std::unique(sorted.begin(), end) - sorted.begin());
   if (m <= 2) {

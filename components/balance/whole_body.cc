@@ -35,12 +35,15 @@ void WholeBody::UpdateKinematics(const robot::RobotState& state) {
   robot::ComputeFeet(*model_, &data_);
 }
 
-bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact) {
+void WholeBody::UpdateDynamics(const robot::RobotState& state) {
   UpdateKinematics(state);
-  if (!have_dynamics_) {
-    robot::ComputeDynamics(*model_, state_, &data_);
-    have_dynamics_ = true;
-  }
+  if (have_dynamics_) return;
+  robot::ComputeDynamics(*model_, state_, &data_);
+  have_dynamics_ = true;
+}
+
+bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact) {
+  UpdateDynamics(state);
   if (!have_contacts_ || in_contact != in_contact_) {
     in_contact_ = in_contact;
     contacts_valid_ = UpdateContacts();

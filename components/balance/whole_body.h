@@ -21,6 +21,8 @@ class WholeBody {
   /// Kinematics and feet only (data().foot_*). Enough for redistribution. `state` sized for the
   /// model.
   void UpdateKinematics(const robot::RobotState& state);
+  /// Those, mass matrix and COM, whatever the contacts: enough for data(), contact() is not valid.
+  void UpdateDynamics(const robot::RobotState& state);
   /// Everything, for the given contacts (right first). False when the contact dynamics do not exist
   /// (non-finite state, feet in a singular posture, no contact).
   bool Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact);
@@ -28,7 +30,7 @@ class WholeBody {
   const robot::RobotModel& model() const { return *model_; }
   const robot::RobotData& data() const { return data_; }
   const ContactDynamics& contact() const { return contact_; }  ///< valid after Update returned true
-  /// About the COM, kg·m²/s, world axes, of the last Update's state.
+  /// About the COM, kg·m²/s, world axes, of the last Update's or UpdateDynamics' state.
   Eigen::Vector3d AngularMomentum() const;
   /// Sole frames and contacts of the last Update.
   ContactGeometry geometry() const;

@@ -63,12 +63,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
                                     sole_margin_, foot.name, foot.length, foot.width));
     }
   }
-  const StepWarning& step = config.step();
   const char* const must = "must be a number, 0 or more";
-  step_reach_ = ReadNotNegative(step.reach(), "step.reach", must);
-  step_ = StepDetector(ReadNotNegative(step.beyond(), "step.beyond", must),
-                       ReadNotNegative(step.persistence(), "step.persistence", must));
-  angular_momentum_ = step.angular_momentum();
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
       ReadNotNegative(config.cop_feedback().time_constant(), "cop_feedback.time_constant", must);
@@ -85,17 +80,17 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
 
   const MessageCounts counts = JointAndFootCounts(*model_);
   wiring->AddInput(&robot_state_, "robot_state", counts);
-  wiring->AddInput(&task_torque_, "task_torque", counts);
+  wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
+  wiring->AddInput(&task_torque_, "task_torque", JointCounts(*model_));
   wiring->AddOutput(&balance_torque_, "balance_torque", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
-  wiring->AddStage("balance", {&robot_state_, &task_torque_}, {&balance_torque_},
+  wiring->AddStage("balance", {&robot_state_, &support_plan_, &task_torque_}, {&balance_torque_},
                    [this](const Tick& tick) { Balance(tick); });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
 }
 
 bool ContactWrenchMonitor::Archive(StateArchive* archive) {
   archive->Show(in_contact_);
-  step_.Archive(archive);
   archive->Show(cop_error_, balanced_index_, balanced_time_);
   ArchiveMessage(&*balance_torque_, archive);
   return true;
@@ -110,12 +105,12 @@ void ContactWrenchMonitor::Prepare() {
 void ContactWrenchMonitor::Balance(const Tick& tick) {
   const task_torque_t& task = *task_torque_;
   balance_torque_t& out = *balance_torque_;
-  const std::array<bool, 2> in_contact{task.in_contact[0] != 0, task.in_contact[1] != 0};
+  const std::array<bool, 2> in_contact{support_plan_->in_contact[0] != 0,
+                                       support_plan_->in_contact[1] != 0};
   std::copy(task.torque.begin(), task.torque.end(), torque_.data());
-  if (task.status == task_torque_t::STATUS_SINGULAR) {
-    out.status = balance_torque_t::STATUS_SINGULAR;
-  } else if (task.status == task_torque_t::STATUS_INVALID_STATE || !state_valid_ ||
-             !torque_.allFinite() || !(in_contact[0] || in_contact[1])) {
+  if (task.status != task_torque_t::STATUS_OK) {
+    out.status = balance_torque_t::STATUS_HELD;
+  } else if (!state_valid_ || !torque_.allFinite() || !(in_contact[0] || in_contact[1])) {
     out.status = balance_torque_t::STATUS_INVALID_STATE;
   } else {
     in_contact_ = in_contact;
@@ -170,7 +165,6 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
     return balance_torque_t::STATUS_SINGULAR;
   }
   Report(result, limits, region, in_contact);
-  ReportCapturePoint(frame_o, tick.time);
   balanced_index_ = tick.index;
   balanced_time_ = tick.time;
   const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, region);
@@ -274,36 +268,6 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
         std::abs(result.resultant(2)) * balance::SignedDistance(region, result.cop);
   }
   SetMargins(margins, &out.resultant_margins);
-}
-
-void ContactWrenchMonitor::ReportCapturePoint(const Eigen::Isometry3d& frame_o, double time) {
-  balance_torque_t& out = *balance_torque_;
-  const robot::RobotData& data = whole_body_->data();
-  const balance::ConvexPolygon soles = Soles(frame_o, 0);
-  balance::CapturePoint pendulum, body;
-  const Eigen::Vector3d turning = whole_body_->AngularMomentum() / model_->total_mass();
-  if (soles.num_corners == 0 ||
-      !balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, Eigen::Vector3d::Zero(),
-                                    robot::kGravity, &pendulum) ||
-      !balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
-                                    &body)) {
-    return;
-  }
-  const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
-    return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
-  };
-  SetVector3(world(pendulum.position), out.capture_point);
-  const balance::CapturePoint& counts = angular_momentum_ ? body : pendulum;
-  out.capture_margin = balance::SignedDistance(soles, counts.position);
-  out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
-  balance::Step step;
-  if (out.step_needed != 0 && out.capture_margin < 0) {
-    step = balance::LatestStep(soles, counts, step_reach_);
-    SetVector3(world(step.position), out.step_position);
-  } else if (out.step_needed == 0) {
-    SetVector3(Eigen::Vector3d::Zero(), out.step_position);
-  }
-  out.step_time = step.time;
 }
 
 ComponentType ContactWrenchMonitorType() {

@@ -7,23 +7,22 @@
 #include <optional>
 
 #include "components/balance/balance_control.h"
-#include "components/balance/capture_point.h"
 #include "components/balance/convex_polygon.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
-#include "components/contact_wrench_monitor/step_detector.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/robot_state_t.hpp"
+#include "poise/support_plan_t.hpp"
 #include "poise/task_torque_t.hpp"
 
 namespace poise {
 
-/// ROBOT_STATE, TASK_TORQUE -> BALANCE_TORQUE. The protected task is the COM's height. When the
-/// task torque is held from an earlier tick, or the dynamics do not exist, it is passed on without
-/// a balancing part and the status says so; the contact quantities are then those of the last good
-/// tick.
+/// ROBOT_STATE, SUPPORT_PLAN, TASK_TORQUE -> BALANCE_TORQUE. The protected task is the COM's
+/// height. When the task torque is held from an earlier tick, or the dynamics do not exist, it is
+/// passed on without a balancing part and the status says so; the contact quantities are then those
+/// of the last good tick.
 class ContactWrenchMonitor : public Component {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
@@ -44,9 +43,9 @@ class ContactWrenchMonitor : public Component {
                       const Tick& tick);
   void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
               const balance::ConvexPolygon& region, const std::array<bool, 2>& in_contact);
-  void ReportCapturePoint(const Eigen::Isometry3d& frame_o, double time);
 
   Input<robot_state_t> robot_state_;
+  Input<support_plan_t> support_plan_;
   Input<task_torque_t> task_torque_;
   Output<balance_torque_t> balance_torque_;
 
@@ -56,12 +55,9 @@ class ContactWrenchMonitor : public Component {
   std::optional<balance::BalanceControl> balance_control_;
   bool balancing_ = true;
   balance::ContactLimits double_support_, single_support_;
-  std::optional<double> beyond_soles_;  // m
-  bool polygon_ = false;                // the region is the soles' hull
-  double sole_margin_ = 0;              // m
-  double step_reach_ = 0;               // m
-  bool angular_momentum_ = false;       // counts in the capture point that asks for a step
-  StepDetector step_;
+  std::optional<double> beyond_soles_;               // m
+  bool polygon_ = false;                             // the region is the soles' hull
+  double sole_margin_ = 0;                           // m
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none

@@ -23,4 +23,10 @@ MessageCounts JointAndFootCounts(const robot::RobotModel& model) {
   return {model.num_joints(), static_cast<int32_t>(model.feet().size())};
 }
 
+MessageCounts JointCounts(const robot::RobotModel& model) { return {model.num_joints()}; }
+
+MessageCounts FootCounts(const robot::RobotModel& model) {
+  return {static_cast<int32_t>(model.feet().size())};
+}
+
 }  // namespace poise

@@ -14,5 +14,8 @@ std::shared_ptr<const robot::RobotModel> LoadRobot(const ComponentContext& conte
 
 /// Counts of a message that begins with {num_joints, num_feet}.
 MessageCounts JointAndFootCounts(const robot::RobotModel& model);
+/// {num_joints} alone, {num_feet} alone.
+MessageCounts JointCounts(const robot::RobotModel& model);
+MessageCounts FootCounts(const robot::RobotModel& model);
 
 }  // namespace poise

@@ -66,11 +66,11 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
 
   const MessageCounts counts = JointAndFootCounts(*model_);
   wiring->AddInput(&robot_state_, "robot_state", counts);
-  wiring->AddInput(&task_torque_, "task_torque", counts);
+  wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
   wiring->AddInput(&balance_torque_, "balance_torque", counts);
   wiring->AddOutput(&joint_command_, "joint_command", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
-  wiring->AddStage("redistribute", {&robot_state_, &task_torque_, &balance_torque_},
+  wiring->AddStage("redistribute", {&robot_state_, &support_plan_, &balance_torque_},
                    {&joint_command_}, [this](const Tick& tick) { Redistribute(tick); });
 }
 
@@ -91,12 +91,10 @@ void Redistributor::Prepare() {
 void Redistributor::Redistribute(const Tick& tick) {
   const balance_torque_t& balance = *balance_torque_;
   joint_command_t& out = *joint_command_;
-  const int8_t task = task_torque_->status;
-  const bool held = task == task_torque_t::STATUS_SINGULAR ||
-                    task == task_torque_t::STATUS_INVALID_STATE ||
+  const bool held = balance.status == balance_torque_t::STATUS_HELD ||
                     balance.status == balance_torque_t::STATUS_INVALID_STATE;
-  const std::array<bool, 2> in_contact{task_torque_->in_contact[0] != 0,
-                                       task_torque_->in_contact[1] != 0};
+  const std::array<bool, 2> in_contact{support_plan_->in_contact[0] != 0,
+                                       support_plan_->in_contact[1] != 0};
   if (held || !state_valid_ || !AllFinite(balance.torque) || !(in_contact[0] || in_contact[1])) {
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
@@ -166,8 +164,8 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
 }
 
 balance::RatioInterval Redistributor::KeepLanded(balance::RatioInterval interval) {
-  const task_torque_t& task = *task_torque_;
-  if (task.transition == task_torque_t::TRANSITION_LOADING) landed_foot_ = task.transition_foot;
+  const support_plan_t& plan = *support_plan_;
+  if (plan.transition == support_plan_t::TRANSITION_LOADING) landed_foot_ = plan.transition_foot;
   if (landed_foot_ == robot::kRightFoot) {
     interval.min = std::clamp(landed_share_, interval.min, interval.max);
   } else if (landed_foot_ >= 0) {
@@ -178,13 +176,13 @@ balance::RatioInterval Redistributor::KeepLanded(balance::RatioInterval interval
 
 double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
                                   std::array<Eigen::Isometry3d, 2> sole_in_o) const {
-  const task_torque_t& task = *task_torque_;
-  if (!transition_ || task.transition == task_torque_t::TRANSITION_NONE) return free_ratio;
-  const bool unloading = task.transition == task_torque_t::TRANSITION_UNLOADING;
-  const double ramped = balance::TransitionRatio(free_ratio, task.transition_foot, unloading,
-                                                 task.transition_progress);
+  const support_plan_t& plan = *support_plan_;
+  if (!transition_ || plan.transition == support_plan_t::TRANSITION_NONE) return free_ratio;
+  const bool unloading = plan.transition == support_plan_t::TRANSITION_UNLOADING;
+  const double ramped = balance::TransitionRatio(free_ratio, plan.transition_foot, unloading,
+                                                 plan.transition_progress);
   // Only the loaded foot's conditions count: both soles turned like it, the other's are the same.
-  const size_t light = task.transition_foot == robot::kRightFoot ? 0 : 1;
+  const size_t light = plan.transition_foot == robot::kRightFoot ? 0 : 1;
   sole_in_o[light].linear() = sole_in_o[1 - light].linear();
   const balance::RatioInterval allowed =
       balance::FeasibleRatio(resultant, sole_in_o, double_support_, 0.0, 1.0);
@@ -192,12 +190,12 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
 }
 
 double Redistributor::FeedbackShare(double eta) const {
-  const task_torque_t& task = *task_torque_;
+  const support_plan_t& plan = *support_plan_;
   const double loaded = feedback_.LoadShare(eta);
-  if (task.transition == task_torque_t::TRANSITION_NONE) return loaded;
-  const double progress = balance::SmoothStep(task.transition_progress);
+  if (plan.transition == support_plan_t::TRANSITION_NONE) return loaded;
+  const double progress = balance::SmoothStep(plan.transition_progress);
   return loaded *
-         (task.transition == task_torque_t::TRANSITION_UNLOADING ? 1 - progress : progress);
+         (plan.transition == support_plan_t::TRANSITION_UNLOADING ? 1 - progress : progress);
 }
 
 bool Redistributor::AboutToTip(const Wrenches& desired) const {

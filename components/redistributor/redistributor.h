@@ -17,13 +17,13 @@
 #include "poise/balance_torque_t.hpp"
 #include "poise/joint_command_t.hpp"
 #include "poise/robot_state_t.hpp"
-#include "poise/task_torque_t.hpp"
+#include "poise/support_plan_t.hpp"
 
 namespace poise {
 
-/// ROBOT_STATE, TASK_TORQUE, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
-/// through. With STATUS_INVALID_INPUT (a neighbour's torque is held or not finite) the last good
-/// command is sent again; when the neighbours have a fresh torque but no resultant, that torque
+/// ROBOT_STATE, SUPPORT_PLAN, BALANCE_TORQUE -> JOINT_COMMAND. In single support the torque passes
+/// through. With STATUS_INVALID_INPUT (the balance torque is held or not finite) the last good
+/// command is sent again; when there is a fresh torque but no resultant, that torque
 /// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
 /// it holds its last accepted command for a few cycles, then damps the joints, then stops.
 class Redistributor : public Component {
@@ -58,7 +58,7 @@ class Redistributor : public Component {
               const std::array<bool, 2>& in_contact);
 
   Input<robot_state_t> robot_state_;
-  Input<task_torque_t> task_torque_;
+  Input<support_plan_t> support_plan_;
   Input<balance_torque_t> balance_torque_;
   Output<joint_command_t> joint_command_;
 

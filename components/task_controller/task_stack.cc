@@ -29,7 +29,7 @@ TaskStack::TaskStack(const robot::RobotModel& model, PdGains com, PdGains orient
 }
 
 void TaskStack::Update(const robot::RobotModel& model, const robot::RobotData& data,
-                       const References& references, const std::array<bool, 2>& in_contact) {
+                       const TaskReferences& references, const std::array<bool, 2>& in_contact) {
   jacobian_.topRows<3>() = data.com_jacobian;
   bias_acceleration_.head<3>() = data.com_bias_acceleration;
   acceleration_.head<3>() =
@@ -41,17 +41,18 @@ void TaskStack::Update(const robot::RobotModel& model, const robot::RobotData& d
   for (const int joint : model.supporting_joints(body)) {
     jacobian_.block<3, 1>(3, 6 + joint) = data.joint_axis[static_cast<size_t>(joint)];
   }
-  body_error_ = OrientationError(references.body_rotation, data.body_rotation[b]);
+  body_error_ = OrientationError(references.body.rotation, data.body_rotation[b]);
   bias_acceleration_.segment<3>(3) = data.body_angular_bias[b];
   acceleration_.segment<3>(3) =
-      references.body_angular_acceleration +
+      references.body.angular_acceleration +
       Pd(orientation_, body_error_,
-         references.body_angular_velocity - data.body_angular_velocity[b]);
+         references.body.angular_velocity - data.body_angular_velocity[b]);
 
   num_rows_ = 6;
   for (size_t i = 0; i < 2; ++i) {
     if (in_contact[i]) continue;
     const PointMotion& desired = references.foot[i];
+    const RotationMotion& turn = references.foot_rotation[i];
     const Eigen::Isometry3d& sole = data.foot_pose[i];
     jacobian_.middleRows<6>(num_rows_) = data.foot_jacobian[i];
     bias_acceleration_.segment<6>(num_rows_) = data.foot_bias_acceleration[i];
@@ -59,8 +60,8 @@ void TaskStack::Update(const robot::RobotModel& model, const robot::RobotData& d
         desired.acceleration + Pd(foot_, desired.position - sole.translation(),
                                   desired.velocity - data.foot_velocity[i].head<3>());
     acceleration_.segment<3>(num_rows_ + 3) =
-        Pd(foot_, OrientationError(references.foot_rotation[i], sole.linear()),
-           -data.foot_velocity[i].tail<3>());
+        turn.angular_acceleration + Pd(foot_, OrientationError(turn.rotation, sole.linear()),
+                                       turn.angular_velocity - data.foot_velocity[i].tail<3>());
     num_rows_ += 6;
   }
 }

@@ -5,9 +5,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "components/messages/motion.h"
 #include "components/robot/dynamics.h"
-#include "components/task_controller/reference_generator.h"
-#include "components/task_controller/task_controller.pb.h"
 
 namespace poise {
 
@@ -16,12 +15,20 @@ struct PdGains {
   double kd = 0;  ///< 1/s
 };
 
+/// Where the tasks are to lead, world.
+struct TaskReferences {
+  PointMotion com;
+  RotationMotion body;
+  std::array<PointMotion, 2> foot;              ///< sole centre, of a foot out of contact
+  std::array<RotationMotion, 2> foot_rotation;  ///< likewise
+};
+
 /// Smallest rotation vector from `actual` to `desired`, rad, in the axes both are given in (world).
 Eigen::Vector3d OrientationError(const Eigen::Matrix3d& desired, const Eigen::Matrix3d& actual);
 
 /// Rows: COM (3), body orientation (3), for each foot out of contact its sole's position and
 /// orientation (6); world axes. f* = k_p e + k_d ė + ẍ_d: (25) with the acceleration of the
-/// reference fed forward; for a resting reference it is (25).
+/// reference fed forward, turning ones too; for a resting reference it is (25).
 class TaskStack {
  public:
   TaskStack(const robot::RobotModel& model, PdGains com, PdGains orientation, PdGains foot);
@@ -34,7 +41,7 @@ class TaskStack {
   /// `data` must hold kinematics, feet and dynamics of one state; at least one foot in contact.
   /// Never allocates.
   void Update(const robot::RobotModel& model, const robot::RobotData& data,
-              const References& references, const std::array<bool, 2>& in_contact);
+              const TaskReferences& references, const std::array<bool, 2>& in_contact);
 
   int num_rows() const { return num_rows_; }
   auto jacobian() const { return jacobian_.topRows(num_rows_); }                 ///< J, t×n

@@ -37,6 +37,23 @@ TEST(ConvexHull, OfTwoLevelSolesSideBySideIsARectangle) {
   EXPECT_NEAR(Area(hull), 0.30 * 0.36, 1e-15);
 }
 
+// Soles level to rounding: their corners along y stand in any order by x.
+TEST(ConvexHull, OfSolesAlignedToRoundingIsTheirRectangle) {
+  std::mt19937 random(TestSeed(31));
+  std::uniform_real_distribution<double> rounding(-1e-15, 1e-15);
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::vector<Vector2d> corners;
+    for (const double y : {-0.1, 0.1}) {
+      for (const double dx : {-0.105, 0.105}) {
+        for (const double dy : {-0.05, 0.05}) {
+          corners.push_back({dx + rounding(random), y + dy + rounding(random)});
+        }
+      }
+    }
+    ASSERT_NEAR(Area(ConvexHull(corners)), 0.21 * 0.3, 1e-12) << trial;
+  }
+}
+
 TEST(ConvexHull, OfASoleAheadOfTheOtherHasSixCorners) {
   std::vector<Vector2d> corners;
   for (const Vector2d& at : {Vector2d(0, -0.1), Vector2d(0.2, 0.1)}) {

@@ -39,9 +39,9 @@ namespace {
 
 constexpr int64_t kSecond = 1'000'000'000;  // ns
 constexpr int64_t kPeriod = kSecond / 500;  // ns
-constexpr const char* kHops[] = {"ROBOT_SENSORS", "ROBOT_STATE", "TASK_TORQUE", "BALANCE_TORQUE",
-                                 "JOINT_COMMAND"};
-constexpr int kNumHops = 5;
+constexpr const char* kHops[] = {"ROBOT_SENSORS", "ROBOT_STATE",    "SUPPORT_PLAN",
+                                 "TASK_TORQUE",   "BALANCE_TORQUE", "JOINT_COMMAND"};
+constexpr int kNumHops = 6;
 
 /// Hears the datagrams of one channel with the time at which the kernel got them.
 class Ear {
@@ -132,7 +132,7 @@ void Listen(const std::string& group, int first_port, int last_port, size_t firs
 /// A ring of processes over liblcm: each answers the channel before its own.
 class BareRing {
  public:
-  /// `sizes` of the five messages; `readers[i]`: channels that process i reads beside the one it
+  /// `sizes` of the six messages; `readers[i]`: channels that process i reads beside the one it
   /// answers.
   BareRing(const RunSpec& spec, int first_port, const std::vector<size_t>& sizes)
       : spec_(spec), first_port_(first_port), sizes_(sizes) {
@@ -182,7 +182,7 @@ class BareRing {
     }
   }
   /// Publishes its own message for each one of the hop before. Like the components, the later ones
-  /// read the state and the task's torque as well.
+  /// read the state and the support plan as well.
   [[noreturn]] void Answer(int hop) {
     lcm::LCM in(Url(hop - 1)), out(Url(hop));
     std::vector<std::unique_ptr<lcm::LCM>> others;
@@ -199,7 +199,7 @@ class BareRing {
     Handler handler{&out, hop, std::vector<uint8_t>(sizes_[static_cast<size_t>(hop)])};
     Handler ignore{};
     in.subscribe(kHops[hop - 1], &Handler::Handle, &handler)->setQueueCapacity(0);
-    for (int other = 1; other < hop - 1; ++other) {
+    for (int other = 1; other < std::min(hop - 1, 3); ++other) {
       others.push_back(std::make_unique<lcm::LCM>(Url(other)));
       others.back()->subscribe(kHops[other], &Handler::Handle, &ignore)->setQueueCapacity(0);
     }
@@ -284,7 +284,7 @@ int Run(const std::string& program, double seconds, int rounds) {
   }
   fs::remove_all(folder);
   fs::remove(folder.string() + ".txt");
-  fmt::print("ROBOT_SENSORS to JOINT_COMMAND, four hops, 500 Hz, us\n");
+  fmt::print("ROBOT_SENSORS to JOINT_COMMAND, five hops, 500 Hz, us\n");
   fmt::print("{:<22}{:>9}{:>9}{:>9}{:>9}{:>9}\n", "", "ticks", "median", "p99", "p99.9", "worst");
   const auto row = [](const char* name, const Latencies& l) {
     fmt::print("{:<22}{:>9}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, l.us.size(), l.Quantile(0.5),

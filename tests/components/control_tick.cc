@@ -110,17 +110,21 @@ ControlTick::ControlTick(robot::TestRobot robot, const Contacts& in_contact,
                          const std::string& estimator)
     : context_(robot),
       estimator_(&context_, estimator),
-      task_(&context_, TaskConfig(std::string("phase { start: 0 support: ") +
-                                  (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }")),
+      planner_(&context_, std::string("phase { support: ") +
+                              (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }"),
+      task_(&context_, TaskConfig()),
       monitor_(&context_, MonitorConfig(true)),
       redistributor_(&context_, RedistributorText()),
       whole_body_(context_.shared()->Get<balance::WholeBody>(
           "estimated", [] { return std::shared_ptr<balance::WholeBody>(); })) {
+  planner_.Bind("robot_state", &state());
   task_.Bind("robot_state", &state());
+  task_.Bind("support_plan", &plan());
   monitor_.Bind("robot_state", &state());
+  monitor_.Bind("support_plan", &plan());
   monitor_.Bind("task_torque", &task());
   redistributor_.Bind("robot_state", &state());
-  redistributor_.Bind("task_torque", &task());
+  redistributor_.Bind("support_plan", &plan());
   redistributor_.Bind("balance_torque", &balance());
 }
 

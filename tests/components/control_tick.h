@@ -1,4 +1,4 @@
-// The controller's components in one process over a swaying motion: estimator, task
+// The controller's components in one process over a swaying motion: estimator, planner, task
 // controller, monitor, redistributor.
 #pragma once
 
@@ -10,6 +10,7 @@
 #include "components/contact_wrench_monitor/contact_wrench_monitor.h"
 #include "components/redistributor/redistributor.h"
 #include "components/state_estimator/state_estimator.h"
+#include "components/step_planner/step_planner.h"
 #include "components/task_controller/task_controller.h"
 #include "poise/robot_sensors_t.hpp"
 #include "tests/components/control_fixture.h"
@@ -22,7 +23,7 @@ namespace poise {
 std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
                                             const Contacts& in_contact, int num_ticks);
 
-/// The four components as the inline runner calls them, with one WholeBody between them.
+/// The five components as the inline runner calls them, with one WholeBody between them.
 class ControlTick {
  public:
   /// `estimator`: StateEstimatorConfig.
@@ -30,17 +31,20 @@ class ControlTick {
               const std::string& estimator = "");
 
   void Estimate(const robot_sensors_t& sensors, const Tick& tick);
+  void Plan(const Tick& tick) { planner_.Run(tick); }
   void Task(const Tick& tick) { task_.Run(tick); }
   void Monitor(const Tick& tick) { monitor_.Run(tick); }
   void Redistribute(const Tick& tick) { redistributor_.Run(tick); }
   void Run(const robot_sensors_t& sensors, const Tick& tick) {
     Estimate(sensors, tick);
+    Plan(tick);
     Task(tick);
     Monitor(tick);
     Redistribute(tick);
   }
 
   const robot_state_t& state() const { return estimator_.output<robot_state_t>(); }
+  const support_plan_t& plan() const { return planner_.output<support_plan_t>(); }
   const task_torque_t& task() const { return task_.output<task_torque_t>(); }
   const balance_torque_t& balance() const { return monitor_.output<balance_torque_t>(); }
   const joint_command_t& command() const { return redistributor_.output<joint_command_t>(); }
@@ -50,6 +54,7 @@ class ControlTick {
  private:
   ControlContext context_;
   Harness<StateEstimator> estimator_;
+  Harness<StepPlanner> planner_;
   Harness<TaskController> task_;
   Harness<ContactWrenchMonitor> monitor_;
   Harness<Redistributor> redistributor_;

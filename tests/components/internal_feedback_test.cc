@@ -123,10 +123,10 @@ class ClosedLoop : public testing::Test {
  protected:
   ClosedLoop() : random_(TestSeed(3)), now_(Disturbed(StandingState(model_), 0.03, 0, &random_)) {
     state_ = StateMessage(model_, now_);
-    MessageTraits<task_torque_t>::Resize(task_, std::array{model_.num_joints(), 2});
+    MessageTraits<support_plan_t>::Resize(plan_, std::array{2});
     MessageTraits<balance_torque_t>::Resize(balance_, std::array{model_.num_joints(), 2});
-    task_.in_contact = {1, 1};
-    task_.transition_foot = -1;
+    plan_.in_contact = {1, 1};
+    plan_.transition_foot = -1;
     const Dynamics dynamics(model_, now_, {true, true});
     // Any torque that keeps the feet pressed.
     const Eigen::MatrixXd& jacobian = dynamics.contact_jacobian;
@@ -153,7 +153,7 @@ class ClosedLoop : public testing::Test {
   }
   void Bind(Harness<Redistributor>* harness) {
     harness->Bind("robot_state", &state_);
-    harness->Bind("task_torque", &task_);
+    harness->Bind("support_plan", &plan_);
     harness->Bind("balance_torque", &balance_);
   }
   void Read(const joint_command_t& command) {
@@ -180,7 +180,7 @@ class ClosedLoop : public testing::Test {
   std::mt19937 random_;
   robot::RobotState now_;
   robot_state_t state_;
-  task_torque_t task_{};
+  support_plan_t plan_{};
   balance_torque_t balance_{};
   Eigen::Isometry3d frame_o_;
   std::array<Eigen::Isometry3d, 2> sole_;
@@ -236,9 +236,9 @@ TEST_F(ClosedLoop, AnUnloadedFootAndSingleSupportKnowNone) {
   Eigen::VectorXd before;
   for (int tick = 0; tick < 300; ++tick) {
     if (tick >= 100) {
-      task_.transition = task_torque_t::TRANSITION_UNLOADING;
-      task_.transition_foot = 1;
-      task_.transition_progress = std::min(1.0, (tick - 100) / 150.0);
+      plan_.transition = support_plan_t::TRANSITION_UNLOADING;
+      plan_.transition_foot = 1;
+      plan_.transition_progress = std::min(1.0, (tick - 100) / 150.0);
     }
     harness.Run(TickAt(tick));
     if (tick > 60)
@@ -251,12 +251,12 @@ TEST_F(ClosedLoop, AnUnloadedFootAndSingleSupportKnowNone) {
   }
   EXPECT_EQ(before.norm(), 0);
   EXPECT_LT(largest_step, 1);  // N·m in a tick
-  task_.transition = task_torque_t::TRANSITION_NONE;
-  task_.in_contact = {1, 0};
+  plan_.transition = support_plan_t::TRANSITION_NONE;
+  plan_.in_contact = {1, 0};
   harness.Run(TickAt(300));
   EXPECT_EQ(ToEigen(out.feedback_torque).norm(), 0);
   // Back on both feet the answer begins from nothing, without a reading of two feet to go by.
-  task_.in_contact = {1, 1};
+  plan_.in_contact = {1, 1};
   harness.Run(TickAt(301));
   EXPECT_EQ(ToEigen(out.feedback_torque).norm(), 0);
 }

@@ -1,4 +1,4 @@
-// The whole of task controller, monitor and redistributor against the independent route:
+// The whole of planner, task controller, monitor and redistributor against the independent route:
 // accelerations from tasks and contacts alone, the resultant from the base rows, the joint torques
 // from the joint rows.
 #include "components/redistributor/redistributor.h"
@@ -11,6 +11,7 @@
 
 #include "components/contact_wrench_monitor/contact_wrench_monitor.h"
 #include "components/messages/conversions.h"
+#include "components/step_planner/step_planner.h"
 #include "components/task_controller/task_controller.h"
 #include "tests/components/control_fixture.h"
 #include "tests/test_seed.h"
@@ -20,34 +21,40 @@ namespace {
 
 using robot::TestRobot;
 
-// The three components in one process with what they share, as the inline graph runs them.
+// The four components in one process with what they share, as the inline graph runs them.
 class Chain {
  public:
-  Chain(TestRobot robot, const std::string& task, const std::string& monitor,
+  Chain(TestRobot robot, const std::string& phases, const std::string& monitor,
         const std::string& redistributor)
       : model_(robot::LoadTestRobot(robot)),
         context_(robot),
-        task_(&context_, task),
+        planner_(&context_, phases),
+        task_(&context_, TaskConfig()),
         monitor_(&context_, monitor),
         redistributor_(&context_, redistributor) {
+    planner_.Bind("robot_state", &state_);
     task_.Bind("robot_state", &state_);
+    task_.Bind("support_plan", &plan());
     monitor_.Bind("robot_state", &state_);
-    monitor_.Bind("task_torque", &task_.output<task_torque_t>());
+    monitor_.Bind("support_plan", &plan());
+    monitor_.Bind("task_torque", &task());
     redistributor_.Bind("robot_state", &state_);
-    redistributor_.Bind("task_torque", &task_.output<task_torque_t>());
-    redistributor_.Bind("balance_torque", &monitor_.output<balance_torque_t>());
+    redistributor_.Bind("support_plan", &plan());
+    redistributor_.Bind("balance_torque", &balance());
   }
   const joint_command_t& Run(const robot::RobotState& state, int64_t tick) {
     state_ = StateMessage(model_, state);
     return RunMessage(tick);
   }
   const joint_command_t& RunMessage(int64_t tick) {
+    planner_.Run(TickAt(tick));
     task_.Run(TickAt(tick));
     monitor_.Run(TickAt(tick));
     redistributor_.Run(TickAt(tick));
     return redistributor_.output<joint_command_t>();
   }
   const robot::RobotModel& model() const { return model_; }
+  const support_plan_t& plan() const { return planner_.output<support_plan_t>(); }
   const task_torque_t& task() const { return task_.output<task_torque_t>(); }
   const balance_torque_t& balance() const { return monitor_.output<balance_torque_t>(); }
   robot_state_t& state() { return state_; }
@@ -56,6 +63,7 @@ class Chain {
   robot::RobotModel model_;
   ControlContext context_;
   robot_state_t state_;
+  Harness<StepPlanner> planner_;
   Harness<TaskController> task_;
   Harness<ContactWrenchMonitor> monitor_;
   Harness<Redistributor> redistributor_;
@@ -70,7 +78,7 @@ struct Case {
 class ChainCase : public testing::TestWithParam<Case> {
  protected:
   std::string Phases() const {
-    return TaskConfig(std::string("phase { start: 0 support: ") + GetParam().support + " }");
+    return std::string("phase { support: ") + GetParam().support + " }";
   }
   std::mt19937 random_{TestSeed(23)};
 };
@@ -244,8 +252,7 @@ INSTANTIATE_TEST_SUITE_P(All, ChainCase,
 // Level feet and an η between its bounds: neither foot carries a moment about x (figures 11, 12 of
 // the paper).
 TEST(Redistributor, FreesBothFeetOfRollMoment) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true), RedistributorText());
   const robot::RobotState standing = StandingState(chain.model());
   const joint_command_t& out = chain.Run(standing, 0);
   ASSERT_EQ(out.status, joint_command_t::STATUS_OK);
@@ -258,7 +265,7 @@ TEST(Redistributor, FreesBothFeetOfRollMoment) {
 
 TEST(Redistributor, PassesThroughWhenSwitchedOff) {
   std::mt19937 random(TestSeed(24));
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true),
               RedistributorText("redistribution: false"));
   int checked = 0;
   for (int tick = 0; tick < 20; ++tick) {
@@ -286,8 +293,8 @@ struct Switch {
 
 Switch LiftTheLeftFoot(const std::string& redistributor, double com_offset) {
   Chain chain(TestRobot::kDyros,
-              TaskConfig("phase { start: 0 transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.1 "
-                         "duration: 0.2 } } phase { start: 0.3 support: RIGHT }"),
+              "phase { duration: 0.3 transition { kind: UNLOAD foot: LEFT_FOOT delay: 0.1 "
+              "duration: 0.2 } } phase { support: RIGHT }",
               MonitorConfig(false), redistributor);
   robot::RobotState state = StandingState(chain.model());
   const robot::RobotData data = robot::Evaluate(chain.model(), state);
@@ -345,21 +352,20 @@ TEST(Redistributor, TheRampTakesTheTorqueJumpOutOfTheSwitch) {
 // The COM further from the stance sole's centre than the sole's reduced half width: the ramp stops
 // at the last ratio that the stance foot can bear.
 TEST(Redistributor, TheRampEndsWhereTheStanceFootWouldTip) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
   const robot::RobotState standing = StandingState(chain.model());
   chain.Run(standing, 0);
   ControlContext context(TestRobot::kDyros);
   Harness<Redistributor> alone(&context, RedistributorText());
-  task_torque_t task = chain.task();
-  task.transition = task_torque_t::TRANSITION_UNLOADING;
-  task.transition_foot = 1;
+  support_plan_t plan = chain.plan();
+  plan.transition = support_plan_t::TRANSITION_UNLOADING;
+  plan.transition_foot = 1;
   alone.Bind("robot_state", &chain.state());
-  alone.Bind("task_torque", &task);
+  alone.Bind("support_plan", &plan);
   alone.Bind("balance_torque", &chain.balance());
   double last = 0.5;
   for (double progress : {0.0, 0.3, 0.6, 1.0}) {
-    task.transition_progress = progress;
+    plan.transition_progress = progress;
     alone.Run(TickAt(0));
     const auto& out = alone.output<joint_command_t>();
     EXPECT_GE(out.eta, last - 1e-9);
@@ -377,7 +383,7 @@ TEST(Redistributor, TheRampEndsWhereTheStanceFootWouldTip) {
 // distance, so the interval is 1/2 ± half width / distance, and the ratio's way through it is known
 // in closed form.
 TEST(RatioMoves, LeadTheRatioFromEndToEnd) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false),
               RedistributorText("ratio_move { start: 0.1 duration: 0.2 position: 1 } "
                                 "ratio_move { start: 0.4 duration: 0.3 position: 0 }"));
   const robot::RobotState standing = StandingState(chain.model());
@@ -421,24 +427,23 @@ TEST(RatioMoves, LeadTheRatioFromEndToEnd) {
 
 // One tick of a redistributor alone, its neighbours' messages given.
 joint_command_t RunAlone(const std::string& extra, double time, const robot_state_t& state,
-                         const task_torque_t& task, const balance_torque_t& balance) {
+                         const support_plan_t& plan, const balance_torque_t& balance) {
   ControlContext context(TestRobot::kDyros);
   Harness<Redistributor> alone(&context, RedistributorText(extra));
   alone.Bind("robot_state", &state);
-  alone.Bind("task_torque", &task);
+  alone.Bind("support_plan", &plan);
   alone.Bind("balance_torque", &balance);
   alone.Run(TickAt(std::llround(time * 1e6) / kTickMicroseconds));
   return alone.output<joint_command_t>();
 }
 
 TEST(RatioMoves, LeaveAnInfeasibleTickAlone) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
   chain.Run(StandingState(chain.model()), 0);
   const std::string moves = "ratio_move { start: 0.1 duration: 0.2 position: 1 }";
   balance_torque_t balance = chain.balance();
   const auto run = [&](const std::string& extra) {
-    return RunAlone(extra, 0.2, chain.state(), chain.task(), balance);
+    return RunAlone(extra, 0.2, chain.state(), chain.plan(), balance);
   };
   EXPECT_GT(run(moves).eta, run("").eta + 0.05);
   EXPECT_EQ(run(moves + " redistribution: false").torque, balance.torque);
@@ -450,19 +455,18 @@ TEST(RatioMoves, LeaveAnInfeasibleTickAlone) {
 }
 
 TEST(RatioMoves, ATransitionRampsFromWhereTheyStand) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
   chain.Run(StandingState(chain.model()), 0);
-  task_torque_t task = chain.task();
+  support_plan_t plan = chain.plan();
   const auto run = [&] {
     return RunAlone("ratio_move { start: 0.1 duration: 0.2 position: 0.25 }", 0.5, chain.state(),
-                    task, chain.balance());
+                    plan, chain.balance());
   };
   const joint_command_t before = run();
   EXPECT_NEAR(before.eta, 0.75 * before.eta_min + 0.25 * before.eta_max, 1e-12);
-  task.transition = task_torque_t::TRANSITION_UNLOADING;
-  task.transition_foot = 1;
-  task.transition_progress = 0;
+  plan.transition = support_plan_t::TRANSITION_UNLOADING;
+  plan.transition_foot = 1;
+  plan.transition_progress = 0;
   EXPECT_NEAR(run().eta, before.eta, 1e-12);
 }
 
@@ -503,8 +507,7 @@ TEST(RatioMoves, RefuseAScheduleThatCannotBe) {
 }
 
 TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(true),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(true), RedistributorText());
   const robot::RobotState standing = StandingState(chain.model());
   const std::vector<double> good = chain.Run(standing, 0).torque;
   ASSERT_GT(ToEigen(chain.Run(standing, 1).redistribution_torque).norm(), 0);
@@ -518,18 +521,17 @@ TEST(Redistributor, HoldsTheLastCommandWhenItsNeighboursHaveNone) {
 
 // The COM above the right foot would leave the left one the 2 % of eta_max.
 TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
-  Chain chain(TestRobot::kDyros, TaskConfig("phase { start: 0 }"), MonitorConfig(false),
-              RedistributorText());
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
   chain.Run(StandingState(chain.model()), 0);
-  task_torque_t task = chain.task();
+  support_plan_t plan = chain.plan();
   balance_torque_t balance = chain.balance();
   const auto sole_y = [&](size_t i) {
-    return (GetPose(balance.frame_o).inverse() * GetPose(task.foot_pose[i])).translation().y();
+    return (GetPose(balance.frame_o).inverse() * GetPose(plan.foot_pose[i])).translation().y();
   };
   ControlContext context(TestRobot::kDyros);
   Harness<Redistributor> alone(&context, RedistributorText("landed_share: 0.1"));
   alone.Bind("robot_state", &chain.state());
-  alone.Bind("task_torque", &task);
+  alone.Bind("support_plan", &plan);
   alone.Bind("balance_torque", &balance);
   const auto ratio_with_cop_at = [&](double y) {
     balance.resultant.moment[0] = balance.resultant.force[2] * y;
@@ -537,16 +539,16 @@ TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
     return alone.output<joint_command_t>().eta;
   };
   const auto transition = [&](int8_t kind, int8_t foot, double progress) {
-    task.transition = kind;
-    task.transition_foot = foot;
-    task.transition_progress = progress;
+    plan.transition = kind;
+    plan.transition_foot = foot;
+    plan.transition_progress = progress;
   };
   const double right = sole_y(0), left = sole_y(1);
   EXPECT_NEAR(ratio_with_cop_at(right), 0.98, 1e-9);  // not landed
 
-  transition(task_torque_t::TRANSITION_LOADING, 1, 0);
+  transition(support_plan_t::TRANSITION_LOADING, 1, 0);
   EXPECT_NEAR(ratio_with_cop_at(right), 1, 1e-9);  // no load yet
-  transition(task_torque_t::TRANSITION_NONE, -1, 0);
+  transition(support_plan_t::TRANSITION_NONE, -1, 0);
   EXPECT_NEAR(ratio_with_cop_at(right), 0.9, 1e-9);
   EXPECT_NEAR(ratio_with_cop_at(0), 0.5, 1e-6);  // (71): no more than the least share
   EXPECT_NEAR(ratio_with_cop_at(left), 0.02, 1e-9);
@@ -554,14 +556,14 @@ TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
   // only eta_max remains.
   EXPECT_NEAR(ratio_with_cop_at(right - 0.048), 0.98, 0.01);
 
-  task.in_contact[1] = 0;  // lifted
+  plan.in_contact[1] = 0;  // lifted
   alone.Run(TickAt(1));
-  task.in_contact[1] = 1;
+  plan.in_contact[1] = 1;
   EXPECT_NEAR(ratio_with_cop_at(right), 0.98, 1e-9);
 
-  transition(task_torque_t::TRANSITION_LOADING, 0, 1);
+  transition(support_plan_t::TRANSITION_LOADING, 0, 1);
   ratio_with_cop_at(left);
-  transition(task_torque_t::TRANSITION_NONE, -1, 0);
+  transition(support_plan_t::TRANSITION_NONE, -1, 0);
   EXPECT_NEAR(ratio_with_cop_at(left), 0.1, 1e-9);
 }
 

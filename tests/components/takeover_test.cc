@@ -26,14 +26,14 @@ std::string Phases(robot::TestRobot robot) {
   return std::string(R"(
   contact { settle_duration: 0.03 }
   hip_strategy { enabled: true start: 0.02 tilt: 0.05 tilt_time: 0.1 hold_time: 0.05 return_time: 0.1 inside: 0.001 }
-  phase { start: 0 com { target: SHIFT x: 0.01 duration: 0.2 } )") +
+  phase { duration: 0.25 com { target: SHIFT x: 0.01 duration: 0.2 } )") +
          unload + R"( }
-  phase { start: 0.25 support: RIGHT foot { foot: LEFT_FOOT z: 0.04 duration: 0.1 } }
-  phase { start: 0.4 support: RIGHT foot { foot: LEFT_FOOT z: -0.04 duration: 0.1 } }
-  phase { start: 0.6 com { target: SHIFT x: -0.02 duration: 0.2 delay: 0.05 }
+  phase { duration: 0.15 support: RIGHT foot { foot: LEFT_FOOT z: 0.04 duration: 0.1 } }
+  phase { duration: 0.2 support: RIGHT foot { foot: LEFT_FOOT z: -0.04 duration: 0.1 } }
+  phase { duration: 0.25 com { target: SHIFT x: -0.02 duration: 0.2 delay: 0.05 }
           transition { kind: LOAD foot: LEFT_FOOT delay: 0.05 duration: 0.1 } }
-  phase { start: 0.85 gravity_compensation: true }
-  phase { start: 0.95 com { target: SHIFT y: 0.02 duration: 0.1 } }
+  phase { duration: 0.1 gravity_compensation: true }
+  phase { com { target: SHIFT y: 0.02 duration: 0.1 } }
 )";
 }
 
@@ -53,38 +53,46 @@ std::vector<robot_state_t> States(robot::TestRobot robot) {
   return states;
 }
 
-// The three components, with nothing that outlives them.
+// The four components, with nothing that outlives them.
 class Chain {
  public:
   explicit Chain(robot::TestRobot robot)
       : context_(robot),
-        task_(&context_, TaskConfig(Phases(robot))),
+        planner_(&context_, Phases(robot)),
+        task_(&context_, TaskConfig()),
         monitor_(&context_, MonitorConfig(true, 0.05, 0.05) + " cop_feedback { share: 0.5 }"),
         redistributor_(&context_,
                        RedistributorText("feedback { enabled: true integral: 200 pause: 0.002 }")) {
+    task_.Bind("support_plan", &plan());
+    monitor_.Bind("support_plan", &plan());
     monitor_.Bind("task_torque", &task());
-    redistributor_.Bind("task_torque", &task());
+    redistributor_.Bind("support_plan", &plan());
     redistributor_.Bind("balance_torque", &balance());
   }
   void Run(const robot_state_t& state, int64_t tick) {
+    planner_.Bind("robot_state", &state);
     task_.Bind("robot_state", &state);
     monitor_.Bind("robot_state", &state);
     redistributor_.Bind("robot_state", &state);
+    planner_.Run(TickAt(tick));
     task_.Run(TickAt(tick));
     monitor_.Run(TickAt(tick));
     redistributor_.Run(TickAt(tick));
   }
   void TakeOver(Chain* from) {
+    planner_.Restore(from->planner_.Save());
     task_.Restore(from->task_.Save());
     monitor_.Restore(from->monitor_.Save());
     redistributor_.Restore(from->redistributor_.Save());
   }
+  const support_plan_t& plan() const { return planner_.output<support_plan_t>(); }
   const task_torque_t& task() const { return task_.output<task_torque_t>(); }
   const balance_torque_t& balance() const { return monitor_.output<balance_torque_t>(); }
   const joint_command_t& command() const { return redistributor_.output<joint_command_t>(); }
 
  private:
   ControlContext context_;
+  Harness<StepPlanner> planner_;
   Harness<TaskController> task_;
   Harness<ContactWrenchMonitor> monitor_;
   Harness<Redistributor> redistributor_;
@@ -98,6 +106,7 @@ std::vector<uint8_t> Encoded(const T& message) {
 }
 
 void ExpectSame(const Chain& a, const Chain& b, int64_t tick) {
+  ASSERT_EQ(Encoded(a.plan()), Encoded(b.plan())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.task()), Encoded(b.task())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.balance()), Encoded(b.balance())) << "tick " << tick;
   ASSERT_EQ(Encoded(a.command()), Encoded(b.command())) << "tick " << tick;
@@ -122,9 +131,9 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
     whole.Run(states[static_cast<size_t>(tick)], tick);
     reborn->Run(states[static_cast<size_t>(tick)], tick);
     ASSERT_NO_FATAL_FAILURE(ExpectSame(whole, *reborn, tick));
-    phases.insert(whole.task().phase);
-    foot_states.insert(whole.task().foot_state[1]);
-    transitions.insert(whole.task().transition);
+    phases.insert(whole.plan().phase);
+    foot_states.insert(whole.plan().foot_state[1]);
+    transitions.insert(whole.plan().transition);
     balancing += whole.balance().active_x + whole.balance().active_y;
     // The body sways by less; its reference is turned by more.
     tilted += Eigen::Map<const Eigen::Vector3d>(whole.task().body_orientation_error).norm() > 0.04;
@@ -133,8 +142,8 @@ TEST_P(Takeover, AFreshObjectForEveryTickGivesTheSameBits) {
   }
   EXPECT_EQ(phases.size(), 6u);
   EXPECT_EQ(foot_states,
-            (std::set<int>{task_torque_t::FOOT_SUPPORT, task_torque_t::FOOT_SWING,
-                           task_torque_t::FOOT_SEARCHING, task_torque_t::FOOT_TOUCHING}));
+            (std::set<int>{support_plan_t::FOOT_SUPPORT, support_plan_t::FOOT_SWING,
+                           support_plan_t::FOOT_SEARCHING, support_plan_t::FOOT_TOUCHING}));
   EXPECT_EQ(transitions.size(), GetParam() == robot::TestRobot::kDyros ? 3u : 2u);
   EXPECT_GT(balancing, 50);
   EXPECT_EQ(held, 4);
@@ -167,21 +176,23 @@ TEST_P(Takeover, SkippedTicksChangeNoScheduleAndNoReference) {
   std::vector<int> phase_of;
   for (int tick = 0; tick < kNumTicks; ++tick) {
     whole.Run(states[static_cast<size_t>(tick)], tick);
-    phase_of.push_back(whole.task().phase);
+    phase_of.push_back(whole.plan().phase);
     if (tick % 3 != 0 || (tick > 180 && tick < 200)) continue;
     skipping.Run(states[static_cast<size_t>(tick)], tick);
     ASSERT_NE(skipping.command().status, joint_command_t::STATUS_INVALID_INPUT) << tick;
     // Measured contact, and with it double support, comes up to three ticks later.
     const int latest = phase_of.back(),
               earliest = phase_of[static_cast<size_t>(std::max(0, tick - 4))];
-    ASSERT_LE(skipping.task().phase, latest) << tick;
-    ASSERT_GE(skipping.task().phase, earliest) << tick;
+    ASSERT_LE(skipping.plan().phase, latest) << tick;
+    ASSERT_GE(skipping.plan().phase, earliest) << tick;
     for (int i = 0; i < 3; ++i) {
       // The reference moves by 0.4 m/s at the most, and is up to three ticks late.
-      ASSERT_NEAR(skipping.task().com_desired[i], whole.task().com_desired[i], 3e-3) << tick;
+      ASSERT_NEAR(skipping.plan().com_reference.position[i], whole.plan().com_reference.position[i],
+                  3e-3)
+          << tick;
     }
   }
-  EXPECT_EQ(skipping.task().phase, 5);
+  EXPECT_EQ(skipping.plan().phase, 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Takeover,

@@ -117,7 +117,7 @@ class ToyController final : public Toy {
     wiring->AddInput(&state_, "state", {joints(), 2});
     wiring->AddInput(&before_, "before", {joints(), 2}, InputKind::kPreviousTick);
     wiring->AddInput(&stop_, "stop", {}, InputKind::kLatest);
-    wiring->AddOutput(&torque_, "torque", {joints(), 2});
+    wiring->AddOutput(&torque_, "torque", {joints()});
     wiring->AddOutput(&command_, "command", {joints(), 2});
     wiring->AddStage("prepare", {&sensors_, &before_}, {&torque_}, [this](const Tick&) {
       if (!sensors_.present()) return torque_.Withhold();  // in real time

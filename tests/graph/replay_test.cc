@@ -59,8 +59,8 @@ TEST_F(ReplayTest, EveryComponentGivesTheLoggedBits) {
   Run();  // as processes
   const ProgramResult result = Replay();
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  for (const char* component : {"sim_ode", "hw_bridge", "state_estimator", "task_controller",
-                                "contact_wrench_monitor", "redistributor"}) {
+  for (const char* component : {"sim_ode", "hw_bridge", "state_estimator", "step_planner",
+                                "task_controller", "contact_wrench_monitor", "redistributor"}) {
     EXPECT_HAS(result, std::string(component) + ": 200 ticks");
   }
   EXPECT_HAS(result, "JOINT_COMMAND: 200 messages, the same bits");

@@ -109,10 +109,10 @@ TEST_F(ScenarioBaseTest, AnErrorNamesTheFileThatSetTheField) {
 TEST_F(ScenarioBaseTest, IndexesOfListsMapToTheFileOfTheElement) {
   // Phase 0 is the base's; of the lists inside sim_ode, the base has six joints and a push.
   Derived(
-      "task_controller {\n"
-      "  phase { name: \"later\" start: -1 }\n"
+      "step_planner {\n"
+      "  phase { name: \"later\" duration: -1 }\n"
       "}\n");
-  ExpectRefused(File("derived"), {File("derived") + ":3: task_controller.phase[0]"});
+  ExpectRefused(File("derived"), {File("derived") + ":3: step_planner.phase[0]"});
   Derived(
       "sim_ode {\n"
       "  start {\n"

@@ -12,9 +12,10 @@
 namespace poise {
 namespace {
 
-const std::vector<std::string> kComponents = {
-    "sim_ode",       "hw_bridge", "state_estimator", "task_controller", "contact_wrench_monitor",
-    "redistributor", "recorder"};
+const std::vector<std::string> kComponents = {"sim_ode",         "hw_bridge",
+                                              "state_estimator", "step_planner",
+                                              "task_controller", "contact_wrench_monitor",
+                                              "redistributor",   "recorder"};
 
 class SupervisionTest : public testing::Test {
  protected:

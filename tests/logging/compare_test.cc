@@ -25,7 +25,7 @@ class CompareTest : public testing::Test {
       state.base_position[2] = 0.1 * static_cast<double>(t);
       states_.push_back(state);
       task_torque_t task{};
-      MessageTraits<task_torque_t>::Resize(task, std::vector<int32_t>{12, 2});
+      MessageTraits<task_torque_t>::Resize(task, std::vector<int32_t>{12});
       SetHeader(t, &task);
       tasks_.push_back(task);
     }

@@ -40,7 +40,9 @@ class DamageTest : public testing::Test {
   template <class T>
   static RawEvent Zeros(const char* channel, int64_t tick) {
     T message{};
-    MessageTraits<T>::Resize(message, std::vector<int32_t>{12, 2});
+    std::vector<int32_t> counts{12, 2};
+    counts.resize(MessageTraits<T>::kCountNames.size());
+    MessageTraits<T>::Resize(message, counts);
     SetHeader(tick, &message);
     return {channel, message.utime, Encode(message)};
   }
@@ -128,7 +130,7 @@ TEST_F(DamageTest, SpecThatCannotBeIsRefusedByField) {
     EXPECT_NE(Refusal(WriteSpec()).find("num_joints"), std::string::npos) << joints;
   }
   spec_ = good;
-  spec_.mutable_graph()->mutable_channel(ChannelIndex(spec_, "TASK_TORQUE"))->set_count(1, 1);
+  spec_.mutable_graph()->mutable_channel(ChannelIndex(spec_, "SUPPORT_PLAN"))->set_count(0, 1);
   EXPECT_NE(Refusal(WriteSpec()).find("num_feet"), std::string::npos);
 }
 

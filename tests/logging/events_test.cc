@@ -6,7 +6,7 @@
 #include <numbers>
 #include <set>
 
-#include "components/task_controller/task_controller.pb.h"
+#include "components/step_planner/step_planner.pb.h"
 #include "google/protobuf/text_format.h"
 #include "tests/logging/record_fixture.h"
 
@@ -33,14 +33,16 @@ auto Is(double time, const std::string& name, const std::string& detail = "") {
 class EventsTest : public RecordTest {
  protected:
   /// The plan in the run's own configuration.
-  void Plan(const TaskControllerConfig& config) {
+  void Plan(const StepPlannerConfig& config) {
     ComponentConfig* part = spec_.add_config();
-    part->set_component("task_controller");
+    part->set_component("step_planner");
     google::protobuf::TextFormat::PrintToString(config, part->mutable_text());
   }
-  static TaskControllerConfig StepDown() {
-    TaskControllerConfig config;
-    config.add_phase()->set_name("stand");
+  static StepPlannerConfig StepDown() {
+    StepPlannerConfig config;
+    Phase* stand = config.add_phase();
+    stand->set_name("stand");
+    stand->set_duration(0.04);
     Phase* down = config.add_phase();
     down->set_name("set down");
     down->set_support(RIGHT);
@@ -52,10 +54,10 @@ class EventsTest : public RecordTest {
   /// The left foot off the ground from tick 20 on, in phase 1.
   void LiftLeft() {
     for (size_t t = 20; t < kTicks; ++t) {
-      task_[t].phase = 1;
-      task_[t].in_contact[1] = command_[t].in_contact[1] = 0;
-      task_[t].foot_state[1] = task_torque_t::FOOT_SWING;
-      task_[t].foot_pose[1].position[2] = task_[t].foot_desired[1].position[2] = 0.12;
+      plan_[t].phase = 1;
+      plan_[t].in_contact[1] = command_[t].in_contact[1] = 0;
+      plan_[t].foot_state[1] = support_plan_t::FOOT_SWING;
+      plan_[t].foot_pose[1].position[2] = plan_[t].foot_reference[1].position[2] = 0.12;
     }
   }
   std::vector<Event> Named(const std::string& name) {
@@ -92,9 +94,51 @@ TEST_F(EventsTest, PhasesCarryTheirNames) {
                                                 Is(0.04, "phase_began", "phase 1, set down")));
 }
 
+TEST_F(EventsTest, APhaseSaysWhatTheOneBeforeCameTo) {
+  Plan(StepDown());
+  for (size_t t = 20; t < kTicks; ++t) {
+    plan_[t].phase = t < 60 ? 1 : 0;
+    plan_[t].began_by = t < 60 ? support_plan_t::OUTCOME_DONE : support_plan_t::OUTCOME_NO_SURFACE;
+  }
+  EXPECT_THAT(Named("phase_began"),
+              ElementsAre(Field(&Event::detail, "phase 0, stand"),
+                          Field(&Event::detail, "phase 1, set down"),
+                          Field(&Event::detail, "phase 0, stand: no surface was found")));
+}
+
+// Its time begins anew.
+TEST_F(EventsTest, APhaseThatFollowsItselfBeginsAgain) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    plan_[t].phase_time = kPeriod * static_cast<double>(t % 50);
+    plan_[t].began_by = t < 50 ? support_plan_t::OUTCOME_NONE : support_plan_t::OUTCOME_TIMEOUT;
+  }
+  EXPECT_THAT(Named("phase_began"),
+              ElementsAre(Is(0, "phase_began"), Is(0.1, "phase_began", "waited for too long")));
+}
+
+// The phases that follow each other when all goes well count, in whatever order they are listed.
+TEST_F(EventsTest, TheReferencesEndIsThatOfThePhaseThatFollows) {
+  StepPlannerConfig config = StepDown();
+  *config.add_phase() = config.phase(1);
+  config.mutable_phase(1)->set_duration(0.04);
+  config.mutable_phase(1)->mutable_foot()->set_height_above_support(0.12);
+  Phase* elsewhere = config.add_phase();
+  *elsewhere = config.phase(2);
+  elsewhere->set_name("lower still");
+  elsewhere->mutable_foot()->set_height_above_support(0.05);
+  config.mutable_phase(1)->add_next()->set_to("lower still");
+  Plan(config);
+  LiftLeft();
+  for (size_t t = 50; t < kTicks; ++t) {
+    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+    plan_[t].foot_pose[1].position[2] = 0.125;
+  }
+  EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "75.0 mm above")));
+}
+
 TEST_F(EventsTest, APlanThatDoesNotFitLeavesThePhasesUnnamed) {
   ComponentConfig* part = spec_.add_config();
-  part->set_component("task_controller");
+  part->set_component("step_planner");
   part->set_text("phase { name: \"stand\" warp: 9 }");
   EXPECT_THAT(Named("phase_began"), ElementsAre(Field(&Event::detail, "phase 0")));
 }
@@ -114,18 +158,18 @@ TEST_F(EventsTest, SupportChangeNamesTheJointOfTheLargestStep) {
 
 TEST_F(EventsTest, TransitionsAndWaiting) {
   for (size_t t = 5; t < 10; ++t) {
-    task_[t].status = task_torque_t::STATUS_WAITING;
-    task_[t].waiting_for = task_torque_t::WAITING_COM;
+    plan_[t].status = support_plan_t::STATUS_WAITING;
+    plan_[t].waiting_for = support_plan_t::WAITING_COM;
   }
   for (size_t t = 10; t < 20; ++t) {
-    task_[t].transition = task_torque_t::TRANSITION_UNLOADING;
-    task_[t].transition_foot = 1;
+    plan_[t].transition = support_plan_t::TRANSITION_UNLOADING;
+    plan_[t].transition_foot = 1;
   }
   for (size_t t = 40; t < 50; ++t) {
-    task_[t].transition = task_torque_t::TRANSITION_LOADING;
-    task_[t].transition_foot = 0;
+    plan_[t].transition = support_plan_t::TRANSITION_LOADING;
+    plan_[t].transition_foot = 0;
   }
-  for (size_t t = 60; t < kTicks; ++t) task_[t].waiting_for = task_torque_t::WAITING_NO_SURFACE;
+  for (size_t t = 60; t < kTicks; ++t) plan_[t].waiting_for = support_plan_t::WAITING_NO_SURFACE;
   EXPECT_THAT(
       Events(Read()),
       ElementsAre(Is(0, "phase_began"), Is(0.01, "waiting_begins", "above the stance sole"),
@@ -140,8 +184,8 @@ TEST_F(EventsTest, AContactAboveTheReferencesEndIsEarly) {
   Plan(StepDown());
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
-    task_[t].foot_pose[1].position[2] = 0.115;
+    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+    plan_[t].foot_pose[1].position[2] = 0.115;
   }
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "left foot, 115.0 mm above")));
   EXPECT_THAT(Named("contact_early"),
@@ -154,21 +198,23 @@ TEST_F(EventsTest, ASoleThatBouncesTouchesDownOnce) {
   Plan(StepDown());
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = t % 20 < 10 ? task_torque_t::FOOT_TOUCHING : task_torque_t::FOOT_SWING;
+    plan_[t].foot_state[1] =
+        t % 20 < 10 ? support_plan_t::FOOT_TOUCHING : support_plan_t::FOOT_SWING;
   }
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.12, "touch_down", "left foot")));
   EXPECT_EQ(Named("contact_early").size(), 1u);
 }
 
 TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
-  TaskControllerConfig config = StepDown();
+  StepPlannerConfig config = StepDown();
   *config.add_phase() = config.phase(1);
+  config.mutable_phase(1)->set_duration(0.04);
   config.mutable_phase(1)->mutable_foot()->set_height_above_support(0.12);
   Plan(config);
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
-    task_[t].foot_pose[1].position[2] = 0.125;  // 5 mm above where it hovers
+    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+    plan_[t].foot_pose[1].position[2] = 0.125;  // 5 mm above where it hovers
   }
   EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "35.0 mm above")));
 }
@@ -176,10 +222,10 @@ TEST_F(EventsTest, AContactWhileTheFootHoversIsEarly) {
 TEST_F(EventsTest, AContactFoundBySearchingIsLate) {
   Plan(StepDown());
   LiftLeft();
-  for (size_t t = 30; t < 50; ++t) task_[t].foot_state[1] = task_torque_t::FOOT_SEARCHING;
+  for (size_t t = 30; t < 50; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_SEARCHING;
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = task_torque_t::FOOT_SUPPORT;
-    task_[t].foot_pose[1].position[2] = 0.06;
+    plan_[t].foot_state[1] = support_plan_t::FOOT_SUPPORT;
+    plan_[t].foot_pose[1].position[2] = 0.06;
   }
   EXPECT_THAT(Named("searching"), ElementsAre(Is(0.06, "searching", "left foot")));
   EXPECT_THAT(Named("touch_down"), ElementsAre(Is(0.1, "touch_down", "60.0 mm")));
@@ -187,12 +233,12 @@ TEST_F(EventsTest, AContactFoundBySearchingIsLate) {
 }
 
 TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
-  TaskControllerConfig config = StepDown();
+  StepPlannerConfig config = StepDown();
   Plan(config);
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
-    task_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
+    plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
+    plan_[t].foot_pose[1].position[2] = 0.095;  // 5 mm above its end
   }
   EXPECT_EQ(Named("touch_down").size(), 1u);
   EXPECT_TRUE(Named("contact_early").empty());
@@ -204,20 +250,20 @@ TEST_F(EventsTest, AContactNearTheReferencesEndIsAsExpected) {
 }
 
 TEST_F(EventsTest, AReferenceWithoutHeightEndsBelowWhereItBegan) {
-  TaskControllerConfig config = StepDown();
+  StepPlannerConfig config = StepDown();
   config.mutable_phase(1)->mutable_foot()->clear_height_above_support();
   config.mutable_phase(1)->mutable_foot()->set_z(-0.1);  // from 0.12 to 0.02
   Plan(config);
   LiftLeft();
-  for (size_t t = 50; t < kTicks; ++t) task_[t].foot_state[1] = task_torque_t::FOOT_TOUCHING;
+  for (size_t t = 50; t < kTicks; ++t) plan_[t].foot_state[1] = support_plan_t::FOOT_TOUCHING;
   EXPECT_THAT(Named("contact_early"), ElementsAre(Is(0.1, "contact_early", "100.0 mm above")));
 }
 
 TEST_F(EventsTest, NoSurface) {
   LiftLeft();
   for (size_t t = 50; t < kTicks; ++t) {
-    task_[t].foot_state[1] = task_torque_t::FOOT_RETRACTED;
-    task_[t].foot_pose[1].position[2] = -0.06;
+    plan_[t].foot_state[1] = support_plan_t::FOOT_RETRACTED;
+    plan_[t].foot_pose[1].position[2] = -0.06;
   }
   EXPECT_THAT(Named("no_surface"), ElementsAre(Is(0.1, "no_surface", "-60.0 mm")));
 }
@@ -254,11 +300,11 @@ TEST_F(EventsTest, BalancingOfEachAxis) {
 
 TEST_F(EventsTest, AStepThatIsNeededSaysWhereAndByWhen) {
   for (size_t t = 30; t < 60; ++t) {
-    balance_[t].step_needed = 1;
-    balance_[t].capture_margin = -0.0125;
-    balance_[t].step_position[0] = 0.1;
-    balance_[t].step_position[1] = -0.45;
-    balance_[t].step_time = 0.32;
+    plan_[t].step_needed = 1;
+    plan_[t].capture_margin = -0.0125;
+    plan_[t].step_position[0] = 0.1;
+    plan_[t].step_position[1] = -0.45;
+    plan_[t].step_time = 0.32;
   }
   EXPECT_THAT(Named("step_needed"),
               ElementsAre(Is(0.06, "step_needed",

@@ -1,6 +1,7 @@
 #include "tests/logging/record_fixture.h"
 
 #include <cmath>
+#include <string_view>
 
 #include "logging/metrics.h"
 
@@ -10,10 +11,11 @@ namespace {
 template <class T>
 T Sized(int64_t tick) {
   T message{};
-  MessageTraits<T>::Resize(message,
-                           MessageTraits<T>::kCountNames.size() == 2   ? std::vector<int32_t>{12, 2}
-                           : MessageTraits<T>::kCountNames.size() == 1 ? std::vector<int32_t>{12}
-                                                                       : std::vector<int32_t>{});
+  std::vector<int32_t> counts;
+  for (const char* name : MessageTraits<T>::kCountNames) {
+    counts.push_back(std::string_view(name) == "num_feet" ? 2 : 12);
+  }
+  MessageTraits<T>::Resize(message, counts);
   SetHeader(tick, &message);
   return message;
 }
@@ -26,6 +28,7 @@ RecordTest::RecordTest() {
   for (int64_t t = 0; t < kTicks; ++t) {
     sensors_.push_back(Sized<robot_sensors_t>(t));
     state_.push_back(Sized<robot_state_t>(t));
+    plan_.push_back(Sized<support_plan_t>(t));
     task_.push_back(Sized<task_torque_t>(t));
     balance_.push_back(Sized<balance_torque_t>(t));
     command_.push_back(Sized<joint_command_t>(t));
@@ -36,13 +39,12 @@ RecordTest::RecordTest() {
     SetIdentity(&balance_.back().frame_o);
     balance_.back().cop_limit[0] = 0.13;
     balance_.back().cop_limit[1] = 0.07;
-    task_.back().transition_foot = -1;
+    plan_.back().transition_foot = -1;
     command_.back().eta_feasible = 1;
     for (size_t foot = 0; foot < 2; ++foot) {
-      SetIdentity(&task_.back().foot_pose[foot]);
-      SetIdentity(&task_.back().foot_desired[foot]);
-      task_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
-      task_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
+      SetIdentity(&plan_.back().foot_pose[foot]);
+      plan_.back().foot_pose[foot].position[1] = foot == 0 ? -0.105 : 0.105;
+      plan_.back().in_contact[foot] = command_.back().in_contact[foot] = 1;
       command_.back().conditions_met[foot] = 1;
       command_.back().margins[foot] = {1, 1, 1, 1, 1};
     }
@@ -54,6 +56,7 @@ RunRecord RecordTest::Read() {
   for (size_t t = 0; t < kTicks; ++t) {
     Add("ROBOT_SENSORS", sensors_[t], &events);
     Add("ROBOT_STATE", state_[t], &events);
+    Add("SUPPORT_PLAN", plan_[t], &events);
     Add("TASK_TORQUE", task_[t], &events);
     Add("BALANCE_TORQUE", balance_[t], &events);
     Add("JOINT_COMMAND", command_[t], &events);

@@ -37,6 +37,7 @@ class RecordTest : public testing::Test {
   RunSpec spec_ = MakeTestSpec();
   std::vector<robot_sensors_t> sensors_;
   std::vector<robot_state_t> state_;
+  std::vector<support_plan_t> plan_;
   std::vector<task_torque_t> task_;
   std::vector<balance_torque_t> balance_;
   std::vector<joint_command_t> command_;

@@ -155,9 +155,9 @@ TEST(LateStart, AControllerThatIsLostWhileTheCraneLetsGoFindsTheRobotUp) {
 }
 
 TEST(LateStart, TheFirstPhasesMoveWaitsForTheScenario) {
-  const Outcome outcome = Start(
-      kNever, {"task_controller.phase[0].com.target=SHIFT", "task_controller.phase[0].com.x=0.02",
-               "task_controller.phase[0].com.duration=0.5"});
+  const Outcome outcome =
+      Start(kNever, {"step_planner.phase[0].com.target=SHIFT", "step_planner.phase[0].com.x=0.02",
+                     "step_planner.phase[0].com.duration=0.5"});
   EXPECT_EQ(outcome.end, "");
   EXPECT_LT(outcome.moved_before, 5e-3);
   EXPECT_NEAR(outcome.com_moved, 0.02, 4e-3);

@@ -59,8 +59,8 @@ const soles = (page, time) => page.evaluate((t) => {
 
 /** Standing, for a robot whose posture is not known. */
 const robotScenario = (robot) => `name: "robot_test" description: "" robot: "${robot}" duration: 0.1
-  task_controller { com { kp: 225 kd: 10 } orientation { kp: 225 kd: 10 } foot { kp: 225 kd: 10 } posture { kp: 100 kd: 20 }
-    phase { name: "stand" start: 0 support: DOUBLE } }
+  task_controller { com { kp: 225 kd: 10 } orientation { kp: 225 kd: 10 } foot { kp: 225 kd: 10 } posture { kp: 100 kd: 20 } }
+  step_planner { phase { name: "stand" support: DOUBLE } }
   contact_wrench_monitor {
     double_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 }
     single_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 } }

@@ -18,7 +18,7 @@ test('units, texts and names of values come from the .lcm files', () => {
   assert.equal(signal('JOINT_COMMAND.foot_wrench[0].moment[2]').unit, 'N·m');
   assert.equal(signal('GROUND_TRUTH.foot_pose[1].position[2]').unit, 'm');
   assert.equal(signal('ROBOT_SENSORS.imu_acceleration[0]').unit, 'm/s²');
-  assert.equal(signal('TASK_TORQUE.status').valueNames[3], 'waiting');
+  assert.equal(signal('SUPPORT_PLAN.status').valueNames[2], 'waiting');
   assert.match(signal('JOINT_COMMAND.eta').text, /share of the right foot/);
   assert.equal(messages.health_t.fields.latency_p99.unit, 'µs');
   assert.equal(messages.drive_feedback_t.fields.current.unit, 'A');
@@ -92,9 +92,9 @@ test('pitch joints are found by their axis', () => {
 
 test('measured centre of pressure of two soles, closed form', async () => {
   const load = {'robot_sensors_t.foot_wrench[0].force[2]': -300, 'robot_sensors_t.foot_wrench[1].force[2]': -100,
-    'task_torque_t.foot_pose[0].position[1]': -0.1, 'task_torque_t.foot_pose[1].position[1]': 0.1,
-    'task_torque_t.foot_pose[0].orientation[0]': 1, 'task_torque_t.foot_pose[1].orientation[0]': 1,
-    'balance_torque_t.frame_o.orientation[0]': 1, 'task_torque_t.in_contact[0]': 1, 'task_torque_t.in_contact[1]': 1};
+    'support_plan_t.foot_pose[0].position[1]': -0.1, 'support_plan_t.foot_pose[1].position[1]': 0.1,
+    'support_plan_t.foot_pose[0].orientation[0]': 1, 'support_plan_t.foot_pose[1].orientation[0]': 1,
+    'balance_torque_t.frame_o.orientation[0]': 1, 'support_plan_t.in_contact[0]': 1, 'support_plan_t.in_contact[1]': 1};
   const y = await valuesOf(makeRun('', load), 'derived.cop_measured_y');
   assert.ok(Number.isNaN(y[0]));  // no tick before
   near(y[1], (300 * -0.1 + 100 * 0.1) / 400);
@@ -144,7 +144,7 @@ test('a run grows by ticks, and what follows from its signals with it', async ()
   const push = await valuesOf(run, 'EXTERNAL_PUSH.force[1]');
   assert.equal(push.length, 3500);
   assert.deepEqual([push[699], push[700], push[3499]], [0, 4, 16]);
-  assert.ok(Number.isNaN((await valuesOf(run, 'TASK_TORQUE.phase'))[10]));
+  assert.ok(Number.isNaN((await valuesOf(run, 'SUPPORT_PLAN.phase'))[10]));
   const size = await valuesOf(run, 'derived.push_magnitude').then((v) => v.map((x) => Number.isNaN(x) ? x : Math.round(x)));
   assert.equal(size.length, 3500);
   run.appendTicks(1, {});
@@ -152,7 +152,7 @@ test('a run grows by ticks, and what follows from its signals with it', async ()
 });
 
 test('phases of a run, and of one that grows', async () => {
-  const run = makeRun('', {'task_torque_t.in_contact[0]': 1, 'balance_torque_t.active_y': 1});
+  const run = makeRun('', {'support_plan_t.in_contact[0]': 1, 'balance_torque_t.active_y': 1});
   const phases = await findPhases(run);
   assert.deepEqual(phases.support, [{from: 0, to: 4 * 0.002, value: 'right foot'}]);
   assert.deepEqual(phases.balancing, [{from: 0, to: 4 * 0.002, value: true}]);
@@ -164,7 +164,7 @@ test('a missed message changes no phase, a long gap is known as one', async () =
   const phases = await findPhases(run);
   const add = (n, right, left, active = 0) => {
     const fill = (x) => new Float64Array(n).fill(x);
-    run.appendTicks(n, right === undefined ? {} : {'TASK_TORQUE.in_contact[0]': fill(right), 'TASK_TORQUE.in_contact[1]': fill(left),
+    run.appendTicks(n, right === undefined ? {} : {'SUPPORT_PLAN.in_contact[0]': fill(right), 'SUPPORT_PLAN.in_contact[1]': fill(left),
       'BALANCE_TORQUE.active_x': fill(0), 'BALANCE_TORQUE.active_y': fill(active)});
     phases.update();
   };
@@ -188,7 +188,7 @@ test('phases of a live run begin with what it keeps', async () => {
   const run = makeRun('', {}, 0, {keep: 100});
   const phases = await findPhases(run);
   for (let k = 0; k < 4; ++k) {
-    run.appendTicks(50, {'TASK_TORQUE.in_contact[0]': new Float64Array(50).fill(1), 'TASK_TORQUE.in_contact[1]': new Float64Array(50).fill(k % 2)});
+    run.appendTicks(50, {'SUPPORT_PLAN.in_contact[0]': new Float64Array(50).fill(1), 'SUPPORT_PLAN.in_contact[1]': new Float64Array(50).fill(k % 2)});
     phases.update();
   }
   assert.deepEqual(phases.support.map(({from, to, value}) => [Math.round(from / 0.002), Math.round(to / 0.002), value]),
@@ -199,8 +199,8 @@ test('no ratio and no centre of pressure of a sole without load', async () => {
   const computed = (fz) => makeRun('7.5', {'joint_command_t.in_contact[1]': 1, 'joint_command_t.foot_wrench[1].force[2]': fz,
     'joint_command_t.foot_wrench[1].moment[0]': 0.01, 'joint_command_t.foot_wrench[1].force[0]': 0.1});
   const measured = (fz) => makeRun('7.5', {'robot_sensors_t.foot_wrench[1].force[2]': fz,
-    'robot_sensors_t.foot_wrench[1].moment[0]': 0.01, 'task_torque_t.in_contact[1]': 1,
-    'task_torque_t.foot_pose[1].orientation[0]': 1, 'balance_torque_t.frame_o.orientation[0]': 1});
+    'robot_sensors_t.foot_wrench[1].moment[0]': 0.01, 'support_plan_t.in_contact[1]': 1,
+    'support_plan_t.foot_pose[1].orientation[0]': 1, 'balance_torque_t.frame_o.orientation[0]': 1});
   const least = lightLoad(makeRun(''));
   near(least, 0.0980665 * 10);  // a hundredth of 10 kg
   for (const fz of [0, -6.4e-5, 6.4e-5, -0.99 * least]) {
@@ -220,7 +220,7 @@ test('no ratio and no centre of pressure of a sole without load', async () => {
 
 test('no derived signal is infinite, whatever the messages hold', async () => {
   const constants = {};
-  for (const type of ['robot_sensors_t', 'joint_command_t', 'robot_state_t', 'external_push_t', 'task_torque_t']) {
+  for (const type of ['robot_sensors_t', 'joint_command_t', 'robot_state_t', 'external_push_t', 'support_plan_t', 'task_torque_t']) {
     for (const signal of makeRun('').signals.values()) {
       if (signal.channel.type === type && !signal.integer) constants[`${type}.${signal.field}`] = 3e38;
     }
@@ -280,14 +280,14 @@ test('signals of joints and feet have their names', () => {
 });
 
 test('a part of a run begins where it was cut', async () => {
-  const whole = makeRun('7.2', {'task_torque_t.in_contact[0]': 1}, 10);
+  const whole = makeRun('7.2', {'support_plan_t.in_contact[0]': 1}, 10);
   const {meta} = whole;
   const ticks = {blob: 'ticks', step: 1, order: 0};
   const zigzag = deflateSync(Uint8Array.from([...[7, 8, 9].map((x) => 2 * x), ...new Array(9).fill(0)])).toString('base64');
   const part = new Run({...meta, run: {...meta.run, ticks: 10, cut: {first_tick: 7, last_tick: 9}},
     channels: meta.channels.map((c) => ({...c, count: 3, ticks}))}, messages, () => zigzag);
   assert.deepEqual([part.firstTick, part.numTicks, part.start, part.rowAt(0.016)], [7, 3, 0.014, 1]);
-  assert.deepEqual(await valuesOf(part, 'TASK_TORQUE.in_contact[0]'), [1, 1, 1]);
+  assert.deepEqual(await valuesOf(part, 'SUPPORT_PLAN.in_contact[0]'), [1, 1, 1]);
   assert.ok([...part.channels].every((c) => !c.sparse));
   addDerivedSignals(part);
   assert.deepEqual((await findPhases(part)).support, [{from: 0.014, to: 0.02, value: 'right foot'}]);
@@ -314,7 +314,7 @@ test('a live run keeps its last ticks, and what is derived goes on', async () =>
   const ramp = (first, n) => Float32Array.from({length: n}, (_, i) => first + i);
   for (const [first, n] of [[0, 700], [700, 700], [1400, 7], [1407, 2000], [3407, 33]]) {
     run.appendTicks(n, {...Object.fromEntries(['x', 'y', 'z'].map((_, i) => [`EXTERNAL_PUSH.force[${i}]`, new Float32Array(n)])),
-      'EXTERNAL_PUSH.force[0]': ramp(first, n), 'TASK_TORQUE.com_position[1]': ramp(first + 5, n)});
+      'EXTERNAL_PUSH.force[0]': ramp(first, n), 'SUPPORT_PLAN.com_position[1]': ramp(first + 5, n)});
   }
   assert.deepEqual([run.firstTick, run.numTicks], [1940, 1500]);
   near(run.start, 3.88);

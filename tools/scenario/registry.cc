@@ -3,6 +3,7 @@
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
 #include "components/redistributor/redistributor_type.h"
 #include "components/state_estimator/state_estimator_type.h"
+#include "components/step_planner/step_planner_type.h"
 #include "components/task_controller/task_controller_type.h"
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 #include "hw_bridge/hw_bridge_type.h"
@@ -13,9 +14,9 @@ namespace poise {
 const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
-    for (const ComponentType& type :
-         {SimOdeType(), HwBridgeType(), DriveEmulatorType(), StateEstimatorType(),
-          TaskControllerType(), ContactWrenchMonitorType(), RedistributorType()}) {
+    for (const ComponentType& type : {SimOdeType(), HwBridgeType(), DriveEmulatorType(),
+                                      StateEstimatorType(), StepPlannerType(), TaskControllerType(),
+                                      ContactWrenchMonitorType(), RedistributorType()}) {
       r.Add(type.name, type.summary, type.make);
     }
     return r;

@@ -62,12 +62,13 @@ logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
 }
 
 std::string PhaseAtEnd(const logging::RunRecord& run) {
-  const task_torque_t* task = run.task.at(run.num_ticks - 1);
-  if (task == nullptr) return "";
-  const auto phase = static_cast<size_t>(task->phase);
-  const std::optional<logging::SchedulePlan> plan = logging::ReadSchedulePlan(run);
-  const bool named = plan && phase < plan->phases.size() && !plan->phases[phase].name.empty();
-  return named ? plan->phases[phase].name : std::to_string(task->phase);
+  const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+  if (plan == nullptr) return "";
+  const auto phase = static_cast<size_t>(plan->phase);
+  const std::optional<logging::SchedulePlan> schedule = logging::ReadSchedulePlan(run);
+  const bool named =
+      schedule && phase < schedule->phases.size() && !schedule->phases[phase].name.empty();
+  return named ? schedule->phases[phase].name : std::to_string(plan->phase);
 }
 
 void ReadEvents(const logging::RunRecord& run, SweepRow* row) {

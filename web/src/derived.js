@@ -66,14 +66,14 @@ const relative = ([values], i, memory) => values[i] - firstNumber(memory, values
 function comSignals() {
   return AXES.flatMap((axis, i) => [
     {name: `com_motion_${axis}`, unit: 'm', text: 'estimated COM from where it was first',
-      deps: [['task_torque_t', `com_position[${i}]`]], compute: relative},
+      deps: [['support_plan_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_true_${axis}`, unit: 'm', text: 'true COM from where it was first',
       deps: [['ground_truth_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_desired_${axis}`, unit: 'm', text: 'desired COM from where the estimated one was first',
-      deps: [['task_torque_t', `com_desired[${i}]`], ['task_torque_t', `com_position[${i}]`]],
+      deps: [['support_plan_t', `com_reference.position[${i}]`], ['support_plan_t', `com_position[${i}]`]],
       compute: ([desired, estimated], k, memory) => desired[k] - firstNumber(memory, estimated[k])},
     {name: `com_error_${axis}`, unit: 'm', text: 'estimated COM less desired',
-      deps: [['task_torque_t', `com_position[${i}]`], ['task_torque_t', `com_desired[${i}]`]],
+      deps: [['support_plan_t', `com_position[${i}]`], ['support_plan_t', `com_reference.position[${i}]`]],
       compute: pointwise(([a, b]) => a - b)},
   ]);
 }
@@ -81,8 +81,8 @@ function comSignals() {
 function copSignals(run) {
   const least = lightLoad(run);
   const both = [...wrench('robot_sensors_t', 0), ...wrench('robot_sensors_t', 1),
-    ...pose('task_torque_t', 'foot_pose[0]'), ...pose('task_torque_t', 'foot_pose[1]'),
-    ['task_torque_t', 'in_contact[0]'], ['task_torque_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
+    ...pose('support_plan_t', 'foot_pose[0]'), ...pose('support_plan_t', 'foot_pose[1]'),
+    ['support_plan_t', 'in_contact[0]'], ['support_plan_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
   return [0, 1].flatMap((i) => [
     {name: `cop_measured_${AXES[i]}`, unit: 'm', text: 'measured centre of pressure, frame O',
       deps: both, compute: measuredCop(i, least)},
@@ -268,7 +268,7 @@ class Phases {
     this.run = run;
     const get = (type, field) => run.find(type, field);
     this.#active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
-    this.#contact = run.robot.feet.map((_, f) => get('task_torque_t', `in_contact[${f}]`)).filter(Boolean);
+    this.#contact = run.robot.feet.map((_, f) => get('support_plan_t', `in_contact[${f}]`)).filter(Boolean);
   }
 
   async load() {

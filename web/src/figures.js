@@ -59,9 +59,9 @@ function footWrenches(run, figure) {
 
 function footMotion(figure, run, foot, axis, note) {
   return {figure, title: `Position of the ${run.robot.feet[foot].name} sole, ${'xyz'[axis]}`, unit: 'm', note, series: [
-    series('estimated', 'computed', 'task_torque_t', `foot_pose[${foot}].position[${axis}]`),
+    series('estimated', 'computed', 'support_plan_t', `foot_pose[${foot}].position[${axis}]`),
     series('true', 'truth', 'ground_truth_t', `foot_pose[${foot}].position[${axis}]`),
-    series('desired', 'desired', 'task_torque_t', `foot_desired[${foot}].position[${axis}]`)]};
+    series('desired', 'desired', 'support_plan_t', `foot_reference[${foot}].position[${axis}]`)]};
 }
 
 /** Indices of the joints between base and foot that turn about the world's y axis in the zero posture, nearly. */

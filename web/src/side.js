@@ -26,12 +26,13 @@ export class Readout {
     const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
     const metres = (values) => quantity(values, 'm', DIGITS);
     const newton = (values) => quantity(values, 'N', DIGITS);
+    const plan = find('support_plan_t', 'status');
     const status = find('task_torque_t', 'status');
     const bridge = find('bridge_status_t', 'state');
-    const phase = find('task_torque_t', 'phase');
+    const phase = find('support_plan_t', 'phase');
     return [
-      ['phase', [phase], ([i]) => run.scenario.task_controller?.phase?.[i]?.name ?? formatNumber(i)],
-      ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
+      ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
+      ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
       ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
       ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
       ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],

@@ -1,4 +1,4 @@
-#include "components/task_controller/hip_strategy.h"
+#include "components/step_planner/hip_strategy.h"
 
 #include <cmath>
 #include <string>

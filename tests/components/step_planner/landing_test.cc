@@ -1,6 +1,6 @@
 // The landing of one foot against a mass that follows its reference, and a surface that pushes
 // back.
-#include "components/task_controller/landing.h"
+#include "components/step_planner/landing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "components/task_controller/landing.h"
+#include "components/step_planner/landing.h"
 
 #include <algorithm>
 
@@ -53,6 +53,13 @@ bool Landing::BeginMove(double from, double to, double end) {
   move_end_ = end;
   end_height_ = to;
   return true;
+}
+
+void Landing::Release() {
+  if (state_ != State::kSearching && state_ != State::kRetracted) return;
+  state_ = State::kSwing;
+  lowered_ = false;
+  left_ = true;
 }
 
 void Landing::Measure(double time, double load) {

@@ -1,8 +1,9 @@
-#include "components/task_controller/reference_generator.h"
+#include "components/step_planner/reference_generator.h"
 
 #include <algorithm>
+#include <cmath>
 
-#include "components/task_controller/phase_schedule.h"
+#include "components/step_planner/phase_graph.h"
 
 namespace poise {
 
@@ -88,17 +89,62 @@ void ReferencePoint::Archive(StateArchive* archive) {
   archive->Show(pending_, target_, start_, duration_);
 }
 
+void ReferenceTurn::Hold(const Eigen::Matrix3d& rotation) {
+  origin_ = rotation;
+  vector_.Hold(Eigen::Vector3d::Zero());
+}
+
+void ReferenceTurn::Schedule(const Eigen::Vector3d& target, double start, double duration) {
+  vector_.Schedule(target, start, duration);
+}
+
+RotationMotion ReferenceTurn::At(double time) {
+  const PointMotion motion = vector_.At(time);
+  const Eigen::Vector3d &r = motion.position, &v = motion.velocity;
+  const double angle = r.norm();
+  if (angle == 0 && v.isZero(0) && motion.acceleration.isZero(0)) return {.rotation = origin_};
+  // ω = J v with J = I + a [r]× + b [r]×², a = (1 − cos θ)/θ², b = (θ − sin θ)/θ³; below 1e-3 rad
+  // the first terms of their series, whose rest is below rounding. Slopes: by θ, over θ.
+  const double square = angle * angle;
+  double a = 0.5 - square / 24, b = 1.0 / 6 - square / 120;
+  double a_slope = -1.0 / 12 + square / 180, b_slope = -1.0 / 60 + square / 1260;
+  if (angle > 1e-3) {
+    const double sine = std::sin(angle), cosine = std::cos(angle);
+    a = (1 - cosine) / square;
+    b = (angle - sine) / (square * angle);
+    a_slope = (sine / angle - 2 * a) / square;
+    b_slope = ((1 - cosine) / square - 3 * b) / square;
+  }
+  const double rate = r.dot(v);  // θ θ'
+  const Eigen::Vector3d across = r.cross(v), twice = r.cross(across);
+  RotationMotion turn;
+  turn.rotation = angle > 0 ? Eigen::AngleAxisd(angle, r / angle) * origin_ : origin_;
+  turn.angular_velocity = v + a * across + b * twice;
+  // J' v + J v', where [r]× v' is the derivative of [r]× v as [v]× v vanishes.
+  const Eigen::Vector3d across_rate = r.cross(motion.acceleration);
+  turn.angular_acceleration = motion.acceleration + a_slope * rate * across + a * across_rate +
+                              b_slope * rate * twice + b * (v.cross(across) + r.cross(across_rate));
+  return turn;
+}
+
+void ReferenceTurn::Archive(StateArchive* archive) {
+  archive->Show(origin_);
+  vector_.Archive(archive);
+}
+
 void References::Archive(StateArchive* archive) {
   com.Archive(archive);
-  archive->Show(body_rotation, body_angular_velocity, body_angular_acceleration);
+  body.Archive(archive);
   for (PointMotion& motion : foot) motion.Archive(archive);
-  archive->Show(foot_rotation);
+  for (RotationMotion& motion : foot_rotation) motion.Archive(archive);
 }
 
 void ReferenceGenerator::Archive(StateArchive* archive) {
   archive->Show(time_, anchored_, foot_free_);
   com_.Archive(archive);
   for (ReferencePoint& foot : foot_) foot.Archive(archive);
+  body_turn_.Archive(archive);
+  for (ReferenceTurn& turn : foot_turn_) turn.Archive(archive);
   references_.Archive(archive);
 }
 
@@ -130,7 +176,7 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
                                     double time) {
   if (!anchored_) {
     com_.Hold(estimate.com);
-    references_.body_rotation = estimate.body_rotation;
+    body_turn_.Hold(estimate.body_rotation);
     foot_free_ = {false, false};
     anchored_ = true;
   }
@@ -143,11 +189,15 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
     com_.Schedule(ComTarget(com, estimate, com_.At(time).position), time + com.delay(),
                   com.duration());
   }
+  const auto schedule = [time](const Turn& turn, ReferenceTurn* reference) {
+    reference->Schedule({turn.x(), turn.y(), turn.z()}, time + turn.delay(), turn.duration());
+  };
+  if (phase.has_body()) schedule(phase.body(), &body_turn_);
   const std::array<bool, 2> in_contact = ContactsOf(phase.support());
   for (size_t i = 0; i < 2; ++i) {
     if (!in_contact[i] && !foot_free_[i]) {
       foot_[i].Hold(estimate.sole[i].translation());
-      references_.foot_rotation[i] = estimate.sole[i].linear();
+      foot_turn_[i].Hold(estimate.sole[i].linear());
     }
     foot_free_[i] = !in_contact[i];
   }
@@ -160,6 +210,7 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
       target.z() = estimate.sole[1 - swing].translation().z() + foot.height_above_support();
     }
     foot_[swing].Schedule(target, time + foot.delay(), foot.duration());
+    if (foot.has_turn()) schedule(foot.turn(), &foot_turn_[swing]);
   }
 }
 
@@ -171,15 +222,18 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
   references_.com = com_.Slow(time, std::clamp(time - time_, 0.0, kMaxPeriod), rate);
   time_ = time;
   for (size_t i = 0; i < 2; ++i) {
-    if (foot_free_[i]) references_.foot[i] = foot_[i].At(time);
+    if (!foot_free_[i]) continue;
+    references_.foot[i] = foot_[i].At(time);
+    references_.foot_rotation[i] = foot_turn_[i].At(time);
   }
+  references_.body = body_turn_.At(time);
   return references_;
 }
 
 void ReferenceGenerator::HoldFoot(size_t foot, const Eigen::Vector3d& position,
                                   const Eigen::Matrix3d& rotation) {
   foot_[foot].Hold(position);
-  references_.foot_rotation[foot] = rotation;
+  foot_turn_[foot].Hold(rotation);
 }
 
 }  // namespace poise

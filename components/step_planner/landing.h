@@ -5,8 +5,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "components/task_controller/reference_generator.h"
-#include "components/task_controller/task_controller.pb.h"
+#include "components/messages/motion.h"
+#include "components/step_planner/reference_generator.h"
+#include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 
@@ -51,10 +52,15 @@ class Landing {
   /// Its reference is to move from height `from` to `to`, m, until `end`, s. A foot that touches is
   /// not lowered any further, and a retracted one stays: false, the move is not to be made.
   bool BeginMove(double from, double to, double end);
+  /// The foot follows the references again, from where it stands, though it searched or found no
+  /// surface: the plan goes on otherwise.
+  void Release();
   /// Once a tick, before the schedule: `load` in N, measured along the sole's normal.
   void Measure(double time, double load);
   /// Measured contact that has settled: double support may begin.
   bool confirmed() const;
+  /// No surface was found, and the foot is up again.
+  bool found_none() const { return state_ == State::kRetracted && retreat_.Ended(time_); }
 
   /// Once a tick, after the schedule. `before_touch_down`: the next phase is double support; `due`:
   /// it should have begun. `reference`, `rotation`: of the scenario; replaced where the foot does

@@ -6,21 +6,13 @@
 #include <array>
 
 #include "components/framework/state_archive.h"
-#include "components/task_controller/task_controller.pb.h"
+#include "components/messages/motion.h"
+#include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 
 /// s, counted at most for a tick after a gap of the ticks.
 inline constexpr double kMaxPeriod = 0.02;
-
-/// Position, velocity and acceleration of a point, m and s.
-struct PointMotion {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();
-
-  void Archive(StateArchive* archive) { archive->Show(position, velocity, acceleration); }
-};
 
 /// Quintic in time from a given motion to rest at a target; from rest it is the minimum-jerk line.
 /// Holds before and after.
@@ -33,6 +25,7 @@ class QuinticMove {
   void Begin(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
   PointMotion At(double time) const;
   bool UnderWay(double time) const { return time > start_ && time < start_ + duration_; }
+  bool Ended(double time) const { return time >= start_ + duration_; }
   /// What is left of it comes later by `delay`, s.
   void Postpone(double delay) { start_ += delay; }
   void Archive(StateArchive* archive) { archive->Show(coefficient_, start_, duration_); }
@@ -66,6 +59,23 @@ class ReferencePoint {
   double start_ = 0, duration_ = 0;
 };
 
+/// A frame that turns by a rotation vector which a ReferencePoint leads; at rest until then.
+class ReferenceTurn {
+ public:
+  /// At rest at `rotation`, from where later turns count.
+  void Hold(const Eigen::Matrix3d& rotation);
+  /// To the rotation vector `target`, rad, world axes, counted from the last Hold. Replaces a turn
+  /// that has not begun yet.
+  void Schedule(const Eigen::Vector3d& target, double start, double duration);
+  /// `time` must not decrease from call to call.
+  RotationMotion At(double time);
+  void Archive(StateArchive* archive);
+
+ private:
+  Eigen::Matrix3d origin_ = Eigen::Matrix3d::Identity();
+  ReferencePoint vector_;  // rad
+};
+
 /// What the references are anchored to: the robot as it is estimated, world frame, m.
 struct EstimatedPose {
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
@@ -76,12 +86,9 @@ struct EstimatedPose {
 
 struct References {
   PointMotion com;
-  Eigen::Matrix3d body_rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d body_angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s, world
-  Eigen::Vector3d body_angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s², world
+  RotationMotion body;
   std::array<PointMotion, 2> foot;  ///< sole centre; meaningful for a foot out of contact
-  std::array<Eigen::Matrix3d, 2> foot_rotation{Eigen::Matrix3d::Identity(),
-                                               Eigen::Matrix3d::Identity()};
+  std::array<RotationMotion, 2> foot_rotation;  ///< likewise
 
   void Archive(StateArchive* archive);
 };
@@ -114,6 +121,8 @@ class ReferenceGenerator {
   std::array<bool, 2> foot_free_{false, false};
   ReferencePoint com_;
   std::array<ReferencePoint, 2> foot_;
+  ReferenceTurn body_turn_;
+  std::array<ReferenceTurn, 2> foot_turn_;
   References references_;
 };
 

@@ -1,6 +1,6 @@
 // The hip strategy against a linear inverted pendulum with a flywheel, whose capture point p + (ξ −
 // p) follows in closed form from the flywheel's acceleration.
-#include "components/task_controller/hip_strategy.h"
+#include "components/step_planner/hip_strategy.h"
 
 #include <gtest/gtest.h>
 

@@ -4,8 +4,9 @@
 #include <Eigen/Core>
 
 #include "components/framework/state_archive.h"
-#include "components/task_controller/reference_generator.h"
-#include "components/task_controller/task_controller.pb.h"
+#include "components/messages/motion.h"
+#include "components/step_planner/reference_generator.h"
+#include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 

@@ -1,0 +1,19 @@
+#include "components/step_planner/contact_loss.h"
+
+namespace poise {
+namespace {
+
+constexpr double kTimeTolerance = 1e-9;  // s, far below a tick, far above rounding
+
+}  // namespace
+
+void ContactLoss::Update(double time, double load, bool carries) {
+  if (!carries || !(load < release_load_)) return Reset();
+  if (!below_) {
+    below_ = true;
+    since_ = time;
+  }
+  lost_ = time - since_ >= duration_ - kTimeTolerance;
+}
+
+}  // namespace poise

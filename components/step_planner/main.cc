@@ -1,0 +1,6 @@
+#include "components/framework/component_main.h"
+#include "components/step_planner/step_planner_type.h"
+
+int main(int argc, char** argv) {
+  return poise::ComponentMain(argc, argv, poise::StepPlannerType());
+}

@@ -1,0 +1,133 @@
+#include "components/step_planner/phase_schedule.h"
+
+#include <algorithm>
+
+namespace poise {
+namespace {
+
+// Ticks are whole microseconds: far below any, far above rounding.
+constexpr double kTimeTolerance = 1e-9;
+
+int Other(int foot) { return 1 - foot; }
+
+}  // namespace
+
+const ScheduleState& PhaseSchedule::Advance(const ScheduleInput& input) {
+  const double time = input.time;
+  state_.phase_began = false;
+  WaitingFor hindrance = WaitingFor::kNothing;
+  if (!began_) {
+    began_ = true;
+    // The run's lead, at negative times, counts for nothing.
+    Begin(0, DONE, time, std::max(time, 0.0));
+    state_.first = true;
+  } else if (!BeginByOutcome(input) && Due(time)) {
+    hindrance = Hindrance(input);
+    if (hindrance == WaitingFor::kNothing) {
+      Begin(next(), DONE, time, origin_ + phase().duration());
+    } else {
+      Postpone(std::max(0.0, time - phase().duration() - origin_));
+    }
+  }
+  AdvanceTransition(input);
+  if (hindrance != WaitingFor::kNothing) state_.waiting_for = hindrance;
+  return state_;
+}
+
+void PhaseSchedule::Begin(int phase, Outcome outcome, double time, double origin) {
+  state_.phase = phase;
+  state_.phase_began = true;
+  state_.phase_start = time;
+  state_.first = false;
+  state_.began_by = outcome;
+  transition_began_ = false;
+  origin_ = origin;
+  held_ = 0;
+}
+
+bool PhaseSchedule::BeginByOutcome(const ScheduleInput& input) {
+  const auto begin = [&](Outcome outcome, int foot) {
+    const int follower = graph_.Follower(state_.phase, outcome, foot);
+    if (follower == PhaseGraph::kNone) return false;
+    Begin(follower, outcome, input.time, input.time);
+    return true;
+  };
+  for (const int foot : {RIGHT_FOOT, LEFT_FOOT}) {
+    if (input.contact_lost[static_cast<size_t>(foot)] && begin(CONTACT_LOST, foot)) return true;
+  }
+  if (input.no_surface && begin(NO_SURFACE, 0)) return true;
+  return phase().has_timeout() && held_ >= phase().timeout() - kTimeTolerance && begin(TIMEOUT, 0);
+}
+
+void PhaseSchedule::Postpone(double delay) {
+  origin_ += delay;
+  held_ += delay;
+}
+
+bool PhaseSchedule::Due(double time) const {
+  return next() != PhaseGraph::kNone && !(Unloads() && !transition_began_) &&
+         time >= origin_ + phase().duration() - kTimeTolerance;
+}
+
+bool PhaseSchedule::BeforeTouchDown() const {
+  return phase().support() != DOUBLE && next() != PhaseGraph::kNone &&
+         config_.phase(next()).support() == DOUBLE;
+}
+
+bool PhaseSchedule::Unloads() const {
+  return phase().has_transition() && phase().transition().kind() == ContactTransition::UNLOAD;
+}
+
+WaitingFor PhaseSchedule::Hindrance(const ScheduleInput& input) const {
+  // The ramp has ended by then: CheckStepPlannerConfig sees to that.
+  if (Unloads() && !input.com_over_foot[static_cast<size_t>(Other(phase().transition().foot()))]) {
+    return WaitingFor::kCom;
+  }
+  if (config_.contact().required() && BeforeTouchDown()) {
+    const int foot = phase().support() == RIGHT ? LEFT_FOOT : RIGHT_FOOT;
+    if (!input.foot_confirmed[static_cast<size_t>(foot)]) return WaitingFor::kContact;
+  }
+  return WaitingFor::kNothing;
+}
+
+void PhaseSchedule::AdvanceTransition(const ScheduleInput& input) {
+  state_.waiting_for = WaitingFor::kNothing;
+  state_.transition = TransitionKind::kNone;
+  state_.transition_foot = -1;
+  state_.progress = 0;
+  if (!phase().has_transition()) return;
+
+  const ContactTransition& transition = phase().transition();
+  const bool unloading = transition.kind() == ContactTransition::UNLOAD;
+  const double due = origin_ + transition.delay();
+  if (!transition_began_) {
+    const bool is_due = input.time >= due - kTimeTolerance;
+    if (is_due && unloading &&
+        !input.com_over_foot[static_cast<size_t>(Other(transition.foot()))]) {
+      state_.waiting_for = WaitingFor::kCom;
+      Postpone(input.time - due);
+      return;
+    }
+    if (is_due) {
+      transition_began_ = true;
+      transition_start_ = due;
+    } else if (unloading) {
+      return;
+    }
+  }
+  // A foot that is to be loaded carries nothing from the phase's start until the ramp begins.
+  if (transition_began_) {
+    const double elapsed = std::max(0.0, input.time - transition_start_);
+    state_.progress = transition.duration() > kTimeTolerance
+                          ? std::min(1.0, elapsed / transition.duration() + kTimeTolerance)
+                          : 1.0;
+  }
+  if (!unloading && state_.progress >= 1.0) {
+    state_.progress = 0;
+    return;
+  }
+  state_.transition = unloading ? TransitionKind::kUnloading : TransitionKind::kLoading;
+  state_.transition_foot = transition.foot();
+}
+
+}  // namespace poise

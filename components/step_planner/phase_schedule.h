@@ -1,0 +1,94 @@
+// The plan's phases in time: which one, how it ended, and how far its contact transition has come.
+#pragma once
+
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/step_planner/phase_graph.h"
+#include "components/step_planner/step_planner.pb.h"
+
+namespace poise {
+
+enum class TransitionKind { kNone, kUnloading, kLoading };
+
+/// What holds a phase back.
+enum class WaitingFor {
+  kNothing,
+  kCom,      ///< to stand above the stance sole, before unloading or lift-off
+  kContact,  ///< of the foot that comes down, before double support
+};
+
+/// What the robot says in one tick; feet right first.
+struct ScheduleInput {
+  double time = 0;                                   ///< s, not decreasing
+  std::array<bool, 2> com_over_foot{false, false};   ///< that foot alone can carry the robot
+  std::array<bool, 2> foot_confirmed{false, false};  ///< of the foot that comes down
+  std::array<bool, 2> contact_lost{false, false};    ///< a foot that is to carry does not
+  bool no_surface = false;  ///< the foot that came down found none and is up again
+};
+
+struct ScheduleState {
+  int phase = 0;
+  bool phase_began = false;  ///< the phase's first tick
+  double phase_start = 0;    ///< s, when it really began
+  bool first = true;         ///< no phase has ended yet
+  Outcome began_by = DONE;   ///< what the phase before came to; of no meaning in the first
+  WaitingFor waiting_for = WaitingFor::kNothing;
+  TransitionKind transition = TransitionKind::kNone;
+  int transition_foot = -1;
+  double progress = 0;  ///< 0..1
+
+  bool waiting() const { return waiting_for != WaitingFor::kNothing; }
+};
+
+/// Pure function of the calls made so far: no clock. At most one phase begins per call.
+///
+/// A phase's times count from its origin: where the phase before was to end. So a plan that nothing
+/// holds back does not drift by the ticks that it is made of, and one that waits goes on from
+/// there.
+class PhaseSchedule {
+ public:
+  /// `config` must have passed CheckStepPlannerConfig.
+  explicit PhaseSchedule(const StepPlannerConfig& config) : config_(config), graph_(config) {}
+
+  /// An unloading, or the lift-off after it, that is due while the other foot cannot carry waits,
+  /// and with it everything later in the phase; the references under way go on, so that the COM can
+  /// arrive. So waits double support, when contact.required, until the foot that comes down is
+  /// confirmed. Of several outcomes in a tick the first of CONTACT_LOST, NO_SURFACE, TIMEOUT and
+  /// DONE that leads somewhere counts.
+  const ScheduleState& Advance(const ScheduleInput& input);
+
+  const Phase& phase() const { return config_.phase(state_.phase); }
+  /// The phase that follows when this one is done; kNone: none.
+  int next() const { return graph_.Follower(state_.phase, DONE); }
+  const Phase& phase(int index) const { return config_.phase(index); }
+  /// The phase under way stands on one foot, the next on both.
+  bool BeforeTouchDown() const;
+  const ScheduleState& state() const { return state_; }
+  void Archive(StateArchive* archive) {
+    archive->Show(state_, began_, transition_began_, transition_start_, origin_, held_);
+  }
+
+ private:
+  void Begin(int phase, Outcome outcome, double time, double origin);
+  /// Begins what follows an outcome other than DONE; false: none has come that leads somewhere.
+  bool BeginByOutcome(const ScheduleInput& input);
+  bool Unloads() const;
+  bool Due(double time) const;
+  /// Why the next phase, which is due, may not begin.
+  WaitingFor Hindrance(const ScheduleInput& input) const;
+  void AdvanceTransition(const ScheduleInput& input);
+  /// All that is later in the phase comes later by `delay`, s.
+  void Postpone(double delay);
+
+  StepPlannerConfig config_;
+  PhaseGraph graph_;
+  ScheduleState state_;
+  bool began_ = false;
+  bool transition_began_ = false;
+  double transition_start_ = 0;
+  double origin_ = 0;  // s, from where the phase's times count
+  double held_ = 0;    // s, by which waiting has moved it
+};
+
+}  // namespace poise

@@ -1,0 +1,254 @@
+#include "components/step_planner/planner_config.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <string>
+
+#include "components/framework/configuration.h"
+#include "components/step_planner/hip_strategy.h"
+#include "components/step_planner/phase_graph.h"
+
+namespace poise {
+namespace {
+
+// Far below a tick, far above rounding.
+constexpr double kTimeTolerance = 1e-9;
+
+const char* Name(int foot) { return foot == RIGHT_FOOT ? "right" : "left"; }
+Support SupportOn(int foot) { return foot == RIGHT_FOOT ? RIGHT : LEFT; }
+int Other(int foot) { return 1 - foot; }
+std::string Field(int phase) { return fmt::format("phase[{}]", phase); }
+
+void CheckFinite(double value, const std::string& field) {
+  if (!std::isfinite(value)) throw ConfigError(field, "is not a finite number");
+}
+
+void CheckNotNegative(double value, const std::string& field) {
+  CheckFinite(value, field);
+  if (value < 0) throw ConfigError(field, "is negative; give seconds from 0 up");
+}
+
+void CheckPositive(double value, const std::string& field, const char* unit) {
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw ConfigError(field, fmt::format("is {}; must be a positive number of {}", value, unit));
+  }
+}
+
+void CheckCom(const ComReference& com, const std::string& field) {
+  CheckFinite(com.x(), field + ".x");
+  CheckFinite(com.y(), field + ".y");
+  CheckFinite(com.z(), field + ".z");
+  CheckNotNegative(com.duration(), field + ".duration");
+  CheckNotNegative(com.delay(), field + ".delay");
+}
+
+void CheckTurn(const Turn& turn, const std::string& field) {
+  CheckFinite(turn.x(), field + ".x");
+  CheckFinite(turn.y(), field + ".y");
+  CheckFinite(turn.z(), field + ".z");
+  CheckNotNegative(turn.duration(), field + ".duration");
+  CheckNotNegative(turn.delay(), field + ".delay");
+  const double angle = Eigen::Vector3d(turn.x(), turn.y(), turn.z()).norm();
+  if (angle >= EIGEN_PI) {
+    throw ConfigError(field,
+                      fmt::format("turns by {:.3f} rad; must be less than half a turn", angle));
+  }
+}
+
+void CheckFoot(const Phase& phase, const std::string& field) {
+  const FootReference& foot = phase.foot();
+  if (!foot.has_foot()) throw ConfigError(field + ".foot", "is missing; name the foot that moves");
+  if (phase.support() != SupportOn(Other(foot.foot()))) {
+    throw ConfigError(field + ".foot",
+                      fmt::format("moves the {0} foot, which is in contact; the phase's support "
+                                  "must be {1}",
+                                  Name(foot.foot()), Support_Name(SupportOn(Other(foot.foot())))));
+  }
+  CheckFinite(foot.x(), field + ".x");
+  CheckFinite(foot.y(), field + ".y");
+  CheckFinite(foot.z(), field + ".z");
+  CheckFinite(foot.height_above_support(), field + ".height_above_support");
+  CheckNotNegative(foot.duration(), field + ".duration");
+  CheckNotNegative(foot.delay(), field + ".delay");
+  if (foot.has_turn()) CheckTurn(foot.turn(), field + ".turn");
+}
+
+void CheckRamp(const Phase& phase, const std::string& field) {
+  const ContactTransition& transition = phase.transition();
+  if (!transition.has_kind()) throw ConfigError(field + ".kind", "is missing; UNLOAD or LOAD");
+  if (!transition.has_foot()) throw ConfigError(field + ".foot", "is missing; name the foot");
+  CheckNotNegative(transition.delay(), field + ".delay");
+  CheckNotNegative(transition.duration(), field + ".duration");
+  if (phase.support() != DOUBLE) {
+    throw ConfigError(field, "needs both feet in contact; the phase's support must be DOUBLE");
+  }
+  // A ramp that a phase cuts short would make a step of the load.
+  const double end = transition.delay() + transition.duration();
+  if (phase.has_duration() && end > phase.duration() + kTimeTolerance) {
+    throw ConfigError(field + ".duration",
+                      fmt::format("ends {} s after the phase's start, which lasts {} s; shorten it "
+                                  "or its delay",
+                                  end, phase.duration()));
+  }
+}
+
+/// What lies before and behind a phase's ramp.
+void CheckTransition(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
+  const std::string field = Field(index) + ".transition";
+  const ContactTransition& transition = config.phase(index).transition();
+  const int foot = transition.foot();
+  const Support single = SupportOn(Other(foot));
+  if (transition.kind() == ContactTransition::UNLOAD) {
+    const int next = graph.Follower(index, DONE);
+    if (next == PhaseGraph::kNone || config.phase(next).support() != single) {
+      throw ConfigError(field, fmt::format("unloads the {} foot; the next phase's support must be "
+                                           "{}",
+                                           Name(foot), Support_Name(single)));
+    }
+    return;
+  }
+  bool entered = index != 0;
+  for (const PhaseGraph::Arrow& arrow : graph.arrows()) {
+    if (arrow.to == index && config.phase(arrow.from).support() != single) entered = false;
+  }
+  if (!entered) {
+    throw ConfigError(field, fmt::format("loads the {} foot; the phase before must have support {}",
+                                         Name(foot), Support_Name(single)));
+  }
+}
+
+/// True when the phase may have to wait for something that does not come.
+bool Waits(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
+  const Phase& phase = config.phase(index);
+  const int next = graph.Follower(index, DONE);
+  const bool unloads =
+      phase.has_transition() && phase.transition().kind() == ContactTransition::UNLOAD;
+  const bool touches = config.contact().required() && phase.support() != DOUBLE &&
+                       next != PhaseGraph::kNone && config.phase(next).support() == DOUBLE;
+  return unloads || touches;
+}
+
+void CheckTimeout(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
+  const Phase& phase = config.phase(index);
+  const bool follows = graph.Follower(index, TIMEOUT) != PhaseGraph::kNone;
+  const std::string field = Field(index) + ".timeout";
+  if (!phase.has_timeout()) {
+    if (follows) throw ConfigError(field, "is missing; give the s that the phase may be held back");
+    return;
+  }
+  CheckPositive(phase.timeout(), field, "s");
+  if (!follows) throw ConfigError(field, "leads nowhere; give next { on: TIMEOUT to: ... }");
+  if (!Waits(config, graph, index)) {
+    throw ConfigError(field, "never comes: the phase waits for nothing");
+  }
+}
+
+/// An arrow may not do to the feet what no robot can.
+void CheckArrow(const StepPlannerConfig& config, const PhaseGraph& graph,
+                const PhaseGraph::Arrow& arrow) {
+  const Phase &from = config.phase(arrow.from), &to = config.phase(arrow.to);
+  const std::string next = fmt::format("{}.next[{}]", Field(arrow.from), arrow.next);
+  const bool listed = arrow.next == PhaseGraph::kNone;
+  if (from.support() != DOUBLE && to.support() != DOUBLE && from.support() != to.support()) {
+    throw ConfigError(listed ? Field(arrow.to) + ".support" : next + ".to",
+                      "exchanges the stance foot at once; put a DOUBLE phase between");
+  }
+  const bool confirms = config.contact().required();
+  if (from.support() != DOUBLE && to.support() == DOUBLE && confirms) {
+    if (from.gravity_compensation()) {
+      throw ConfigError(Field(arrow.from) + ".gravity_compensation",
+                        "lowers no foot, but the next phase waits for one to touch down; set "
+                        "contact.required: false, or a phase with tasks between");
+    }
+    if (arrow.outcome != DONE) {
+      throw ConfigError(next + ".to", fmt::format("stands on both feet, but after {} no contact "
+                                                  "is confirmed; only DONE waits for it",
+                                                  Outcome_Name(arrow.outcome)));
+    }
+  }
+  if (arrow.outcome == NO_SURFACE) {
+    const int done = graph.Follower(arrow.from, DONE);
+    const bool lowers = confirms && from.support() != DOUBLE && done != PhaseGraph::kNone &&
+                        config.phase(done).support() == DOUBLE;
+    if (!lowers) {
+      throw ConfigError(next + ".on",
+                        "NO_SURFACE never comes: the phase lowers no foot, as it is "
+                        "not followed by a DOUBLE one that waits for contact");
+    }
+  }
+  const bool lifts = from.support() == DOUBLE && to.support() != DOUBLE;
+  if (arrow.outcome == CONTACT_LOST && lifts && to.support() == SupportOn(arrow.foot)) {
+    throw ConfigError(next + ".foot",
+                      fmt::format("must be {}: the phase that follows stands on the other one",
+                                  FootName_Name(static_cast<FootName>(Other(arrow.foot)))));
+  }
+}
+
+void CheckContact(const ContactConfirmation& contact) {
+  const auto positive = [](double value, const char* name, const char* unit) {
+    CheckPositive(value, fmt::format("contact.{}", name), unit);
+  };
+  positive(contact.touch_load(), "touch_load", "N");
+  positive(contact.release_load(), "release_load", "N");
+  positive(contact.press_load(), "press_load", "N");
+  positive(contact.search_speed(), "search_speed", "m/s");
+  positive(contact.search_depth(), "search_depth", "m");
+  positive(contact.retract_height(), "retract_height", "m");
+  positive(contact.expected_within(), "expected_within", "m");
+  positive(contact.lost_duration(), "lost_duration", "s");
+  CheckNotNegative(contact.touch_duration(), "contact.touch_duration");
+  CheckNotNegative(contact.settle_duration(), "contact.settle_duration");
+  if (contact.release_load() >= contact.touch_load()) {
+    throw ConfigError("contact.release_load",
+                      fmt::format("is {} N; must be below touch_load, {} N, or contact flickers",
+                                  contact.release_load(), contact.touch_load()));
+  }
+  if (contact.press_load() <= contact.touch_load()) {
+    throw ConfigError("contact.press_load",
+                      fmt::format("is {} N; must be above touch_load, {} N, or the search comes to "
+                                  "a stand before contact counts",
+                                  contact.press_load(), contact.touch_load()));
+  }
+}
+
+void CheckStep(const StepWarning& step) {
+  const auto check = [](double value, const char* name) {
+    if (!(value >= 0) || !std::isfinite(value)) {
+      throw ConfigError(fmt::format("step.{}", name), "must be a number, 0 or more");
+    }
+  };
+  check(step.beyond(), "beyond");
+  check(step.persistence(), "persistence");
+  check(step.reach(), "reach");
+}
+
+}  // namespace
+
+void CheckStepPlannerConfig(const StepPlannerConfig& config) {
+  CheckPositive(config.com_lag(), "com_lag", "m");
+  CheckContact(config.contact());
+  CheckStep(config.step());
+  CheckHipStrategyConfig(config.hip_strategy());
+  for (int i = 0; i < config.phase_size(); ++i) {
+    const Phase& phase = config.phase(i);
+    if (phase.has_duration()) CheckNotNegative(phase.duration(), Field(i) + ".duration");
+    if (phase.gravity_compensation() && (phase.has_com() || phase.has_foot() || phase.has_body())) {
+      throw ConfigError(Field(i) + ".gravity_compensation",
+                        "has no task; remove the phase's com, foot and body references");
+    }
+    if (phase.has_com()) CheckCom(phase.com(), Field(i) + ".com");
+    if (phase.has_body()) CheckTurn(phase.body(), Field(i) + ".body");
+    if (phase.has_foot()) CheckFoot(phase, Field(i) + ".foot");
+    if (phase.has_transition()) CheckRamp(phase, Field(i) + ".transition");
+  }
+  const PhaseGraph graph(config);
+  for (const PhaseGraph::Arrow& arrow : graph.arrows()) CheckArrow(config, graph, arrow);
+  for (int i = 0; i < config.phase_size(); ++i) {
+    if (config.phase(i).has_transition()) CheckTransition(config, graph, i);
+    CheckTimeout(config, graph, i);
+  }
+}
+
+}  // namespace poise

@@ -1,0 +1,401 @@
+#include "components/step_planner/step_planner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/support_polygon.h"
+#include "components/messages/archive_message.h"
+#include "components/messages/conversions.h"
+#include "components/messages/motion.h"
+#include "components/messages/robot_resource.h"
+#include "components/step_planner/planner_config.h"
+#include "components/step_planner/step_planner_type.h"
+
+namespace poise {
+namespace {
+
+int8_t TransitionCode(TransitionKind kind) {
+  switch (kind) {
+    case TransitionKind::kUnloading:
+      return support_plan_t::TRANSITION_UNLOADING;
+    case TransitionKind::kLoading:
+      return support_plan_t::TRANSITION_LOADING;
+    case TransitionKind::kNone:
+      break;
+  }
+  return support_plan_t::TRANSITION_NONE;
+}
+
+int8_t OutcomeCode(Outcome outcome) {
+  switch (outcome) {
+    case DONE:
+      return support_plan_t::OUTCOME_DONE;
+    case NO_SURFACE:
+      return support_plan_t::OUTCOME_NO_SURFACE;
+    case CONTACT_LOST:
+      return support_plan_t::OUTCOME_CONTACT_LOST;
+    case TIMEOUT:
+      return support_plan_t::OUTCOME_TIMEOUT;
+  }
+  return support_plan_t::OUTCOME_NONE;
+}
+
+int8_t FootCode(Landing::State state) {
+  switch (state) {
+    case Landing::State::kSearching:
+      return support_plan_t::FOOT_SEARCHING;
+    case Landing::State::kTouching:
+      return support_plan_t::FOOT_TOUCHING;
+    case Landing::State::kRetracted:
+      return support_plan_t::FOOT_RETRACTED;
+    case Landing::State::kSwing:
+      break;
+  }
+  return support_plan_t::FOOT_SWING;
+}
+
+// The paper's distance of the limits from the edges of its sole, m.
+constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
+
+double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
+  if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
+  if (!(value > 0 && value <= 0.5 * sole)) {
+    throw ConfigError(field, fmt::format("is {}; must be above 0 and at most the sole's {} m",
+                                         value, 0.5 * sole));
+  }
+  return value;
+}
+
+}  // namespace
+
+void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
+  const auto config = context.config<StepPlannerConfig>();
+  CheckStepPlannerConfig(config);
+  model_ = LoadRobot(context);
+  whole_body_ = context.shared->Get<balance::WholeBody>(
+      "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
+  schedule_.emplace(config);
+  generator_.emplace(config.com_lag());
+  ConfigureLimits(config);
+  landing_.assign(2, Landing(config.contact()));
+  contact_loss_.assign(2, ContactLoss(config.contact()));
+  const StepWarning& step = config.step();
+  step_ = StepDetector(step.beyond(), step.persistence());
+  step_reach_ = step.reach();
+  angular_momentum_ = step.angular_momentum();
+  state_ = robot::RobotState(model_->num_joints());
+  in_contact_ = ContactsOf(config.phase(0).support());
+
+  wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
+  wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
+  wiring->AddStage("plan", {&robot_state_}, {&support_plan_},
+                   [this](const Tick& tick) { support_plan_->status = Plan(tick.time); });
+  support_plan_t& out = *support_plan_;
+  const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
+  out.transition_foot = -1;
+  SetMotion(RotationMotion(), &out.body_reference);
+  for (size_t i = 0; i < 2; ++i) {
+    out.in_contact[i] = out.next_in_contact[i] = in_contact_[i] ? 1 : 0;
+    SetPose(identity, &out.foot_pose[i]);
+    SetMotion(RotationMotion(), &out.foot_rotation_reference[i]);
+  }
+}
+
+void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
+  const HipStrategyConfig& hip = config.hip_strategy();
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    if (hip.start() >= 0.5 * std::min(foot.length, foot.width)) {
+      throw ConfigError("hip_strategy.start",
+                        fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
+                                    hip.start(), foot.name, foot.length, foot.width));
+    }
+    stance_half_[i] = {ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
+                                      foot.length, kLengthReserve, "stance_half_length"),
+                       ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(),
+                                      foot.width, kWidthReserve, "stance_half_width")};
+  }
+  hip_strategy_.emplace(hip);
+  joint_reserve_ = hip.joint_reserve();
+  brake_time_ = hip.brake_time();
+}
+
+bool StepPlanner::Archive(StateArchive* archive) {
+  schedule_->Archive(archive);
+  generator_->Archive(archive);
+  hip_strategy_->Archive(archive);
+  for (Landing& landing : landing_) landing.Archive(archive);
+  for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
+  step_.Archive(archive);
+  references_.Archive(archive);
+  archive->Show(in_contact_, last_controlled_);
+  ArchiveMessage(&*support_plan_, archive);
+  return true;
+}
+
+int8_t StepPlanner::Plan(double time) {
+  const std::array<double, 2> load{-robot_state_->foot_wrench[0].force[2],
+                                   -robot_state_->foot_wrench[1].force[2]};
+  if (!ReadState(*robot_state_, &state_) || !std::isfinite(load[0] + load[1])) {
+    return support_plan_t::STATUS_INVALID_STATE;
+  }
+  whole_body_->UpdateDynamics(state_);
+  const ScheduleState& schedule = schedule_->Advance(Observe(time, load));
+  if (schedule.phase_began) BeginPhase(time);
+  const Capture capture = ComputeCapture();
+  UpdateReferences(time, capture);
+  ReportPhase(time);
+  ReportFeet();
+  ReportReferences();
+  ReportCapture(time, capture);
+  return schedule.waiting() ? support_plan_t::STATUS_WAITING : support_plan_t::STATUS_OK;
+}
+
+ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& load) {
+  ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
+  const int ramped = schedule_->state().transition_foot;
+  for (size_t i = 0; i < 2; ++i) {
+    landing_[i].Measure(time, load[i]);
+    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i));
+    input.foot_confirmed[i] = landing_[i].confirmed();
+    input.contact_lost[i] = contact_loss_[i].lost();
+    input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
+  }
+  return input;
+}
+
+void StepPlanner::BeginPhase(double time) {
+  const Phase& phase = schedule_->phase();
+  const EstimatedPose estimate = Estimate();
+  const ScheduleState& schedule = schedule_->state();
+  // The first phase begins with the run; its moves wait for the scenario's time 0.
+  generator_->BeginPhase(phase, estimate, schedule.first ? std::max(time, 0.0) : time);
+  const std::array<bool, 2> last_contact = in_contact_;
+  in_contact_ = ContactsOf(phase.support());
+  for (size_t i = 0; i < 2; ++i) {
+    contact_loss_[i].Reset();
+    if (in_contact_[i]) continue;
+    if (last_contact[i] || !last_controlled_) {
+      references_.foot[i].position = estimate.sole[i].translation();
+      references_.foot_rotation[i].rotation = estimate.sole[i].linear();
+      landing_[i].LiftOff(references_.foot[i].position.z());
+    } else if (schedule.began_by != DONE) {
+      landing_[i].Release();
+    }
+    const bool moves = phase.has_foot() && static_cast<size_t>(phase.foot().foot()) == i;
+    const PointMotion& standing = references_.foot[i];
+    if (moves && !landing_[i].BeginMove(standing.position.z(), generator_->foot(i).target().z(),
+                                        generator_->foot(i).end())) {
+      generator_->HoldFoot(i, standing.position, references_.foot_rotation[i].rotation);
+    }
+  }
+  last_controlled_ = !phase.gravity_compensation();
+}
+
+StepPlanner::Capture StepPlanner::ComputeCapture() const {
+  const robot::RobotData& data = whole_body_->data();
+  const balance::ContactGeometry geometry = Geometry();
+  Capture capture;
+  capture.known =
+      balance::FrameO(geometry.sole, geometry.in_contact, &capture.frame_o) &&
+      balance::ComputeCapturePoint(capture.frame_o, data.com, data.com_velocity,
+                                   Eigen::Vector3d::Zero(), robot::kGravity, &capture.pendulum);
+  return capture;
+}
+
+void StepPlanner::UpdateReferences(double time, const Capture& capture) {
+  const robot::RobotData& data = whole_body_->data();
+  references_ = generator_->Update(time, data.com);
+  if (schedule_->phase().gravity_compensation()) return;
+  const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
+  for (size_t i = 0; i < 2; ++i) {
+    if (in_contact_[i]) continue;
+    PointMotion* foot = &references_.foot[i];
+    Eigen::Matrix3d* rotation = &references_.foot_rotation[i].rotation;
+    if (landing_[i].Update(schedule_->BeforeTouchDown(), due, data.foot_pose[i], foot, rotation)) {
+      // Where the landing ends, the plan goes on from here.
+      generator_->HoldFoot(i, foot->position, *rotation);
+      references_.foot_rotation[i] = {.rotation = *rotation};
+    }
+  }
+  if (hip_strategy_->enabled()) TiltBody(time, capture);
+}
+
+void StepPlanner::TiltBody(double time, const Capture& capture) {
+  HipInput input{.time = time, .near_joint_limit = NearJointLimit()};
+  if (capture.known) {
+    const balance::ConvexPolygon region = Soles(capture.frame_o, hip_strategy_->start());
+    if (region.num_corners > 0) {
+      const Eigen::Vector2d& point = capture.pendulum.position;
+      const Eigen::Vector2d out = point - balance::NearestPoint(region, point);
+      input.excess = capture.frame_o.linear().leftCols<2>() * out;
+      input.excess.z() = 0;
+      input.margin = balance::SignedDistance(region, point);
+    }
+  }
+  // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
+  // a turn that goes over into another, or comes upon the plan's own, only nearly.
+  const PointMotion tilt = hip_strategy_->Update(input);
+  const double angle = tilt.position.norm();
+  if (angle > 0) {
+    references_.body.rotation =
+        Eigen::AngleAxisd(angle, tilt.position / angle) * references_.body.rotation;
+  }
+  references_.body.angular_velocity += tilt.velocity;
+  references_.body.angular_acceleration += tilt.acceleration;
+}
+
+bool StepPlanner::NearJointLimit() const {
+  for (size_t i = 0; i < 2; ++i) {
+    if (!in_contact_[i]) continue;
+    for (const int joint : model_->supporting_joints(model_->feet()[i].body)) {
+      const robot::Joint& limits = model_->joints()[static_cast<size_t>(joint)];
+      const double position = state_.joint_position[joint], speed = state_.joint_velocity[joint];
+      const double room = speed > 0 ? limits.upper - position : position - limits.lower;
+      // At an even deceleration a joint goes on for half of brake_time.
+      if (0.5 * brake_time_ * std::abs(speed) > room - joint_reserve_) return true;
+    }
+  }
+  return false;
+}
+
+EstimatedPose StepPlanner::Estimate() const {
+  const robot::RobotData& data = whole_body_->data();
+  return {.com = data.com,
+          .body_rotation = data.body_rotation[static_cast<size_t>(model_->body_task_body())],
+          .sole = {data.foot_pose[0], data.foot_pose[1]}};
+}
+
+balance::ContactGeometry StepPlanner::Geometry() const {
+  const robot::RobotData& data = whole_body_->data();
+  return {{data.foot_pose[0], data.foot_pose[1]}, in_contact_};
+}
+
+balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o, double margin) const {
+  std::array<Eigen::Vector2d, 2> half;
+  for (size_t i = 0; i < 2; ++i) {
+    const robot::FootModel& foot = model_->feet()[i];
+    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+  }
+  return balance::SupportPolygon(frame_o, Geometry(), half);
+}
+
+std::array<bool, 2> StepPlanner::ComOverFoot() const {
+  const robot::RobotData& data = whole_body_->data();
+  std::array<bool, 2> over{};
+  for (size_t i = 0; i < 2; ++i) {
+    const Eigen::Isometry3d& sole = data.foot_pose[i];
+    // Along the vertical onto the sole's plane, then into its axes.
+    const Eigen::Vector3d normal = sole.linear().col(2);
+    Eigen::Vector3d offset = data.com - sole.translation();
+    if (!(offset.z() > 0)) continue;
+    offset += std::sqrt(offset.z() / robot::kGravity) * data.com_velocity;
+    offset.z() -= offset.dot(normal) / normal.z();
+    const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
+    over[i] = std::abs(at.x()) <= stance_half_[i].x() && std::abs(at.y()) <= stance_half_[i].y();
+  }
+  return over;
+}
+
+int8_t StepPlanner::WaitingCode() const {
+  switch (schedule_->state().waiting_for) {
+    case WaitingFor::kCom:
+      return support_plan_t::WAITING_COM;
+    case WaitingFor::kContact:
+      for (size_t i = 0; i < 2; ++i) {
+        if (!in_contact_[i] && landing_[i].state() == Landing::State::kRetracted) {
+          return support_plan_t::WAITING_NO_SURFACE;
+        }
+      }
+      return support_plan_t::WAITING_CONTACT;
+    case WaitingFor::kNothing:
+      break;
+  }
+  return support_plan_t::WAITING_NONE;
+}
+
+void StepPlanner::ReportPhase(double time) {
+  support_plan_t& out = *support_plan_;
+  const ScheduleState& schedule = schedule_->state();
+  out.phase = schedule.phase;
+  out.phase_time = time - schedule.phase_start;
+  out.began_by = schedule.first ? support_plan_t::OUTCOME_NONE : OutcomeCode(schedule.began_by);
+  out.waiting_for = WaitingCode();
+  out.gravity_compensation = schedule_->phase().gravity_compensation() ? 1 : 0;
+  out.transition = TransitionCode(schedule.transition);
+  out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
+  out.transition_progress = schedule.progress;
+}
+
+void StepPlanner::ReportFeet() {
+  support_plan_t& out = *support_plan_;
+  const int next = schedule_->next();
+  const std::array<bool, 2> then =
+      next == PhaseGraph::kNone ? in_contact_ : ContactsOf(schedule_->phase(next).support());
+  for (size_t i = 0; i < 2; ++i) {
+    out.in_contact[i] = in_contact_[i] ? 1 : 0;
+    out.next_in_contact[i] = then[i] ? 1 : 0;
+    out.foot_state[i] =
+        in_contact_[i] ? support_plan_t::FOOT_SUPPORT : FootCode(landing_[i].state());
+    SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
+  }
+}
+
+void StepPlanner::ReportReferences() {
+  support_plan_t& out = *support_plan_;
+  const robot::RobotData& data = whole_body_->data();
+  const EstimatedPose estimate = Estimate();
+  const bool controlled = !schedule_->phase().gravity_compensation();
+  SetVector3(data.com, out.com_position);
+  SetVector3(data.com_velocity, out.com_velocity);
+  SetMotion(controlled ? references_.com : PointMotion{.position = data.com}, &out.com_reference);
+  SetMotion(controlled ? references_.body : RotationMotion{.rotation = estimate.body_rotation},
+            &out.body_reference);
+  for (size_t i = 0; i < 2; ++i) {
+    const bool moves = controlled && !in_contact_[i];
+    const Eigen::Isometry3d& sole = estimate.sole[i];
+    SetMotion(moves ? references_.foot[i] : PointMotion{.position = sole.translation()},
+              &out.foot_reference[i]);
+    SetMotion(moves ? references_.foot_rotation[i] : RotationMotion{.rotation = sole.linear()},
+              &out.foot_rotation_reference[i]);
+  }
+}
+
+void StepPlanner::ReportCapture(double time, const Capture& capture) {
+  if (!capture.known) return;
+  support_plan_t& out = *support_plan_;
+  const robot::RobotData& data = whole_body_->data();
+  const Eigen::Isometry3d& frame_o = capture.frame_o;
+  const balance::ConvexPolygon soles = Soles(frame_o, 0);
+  if (soles.num_corners == 0) return;
+  balance::CapturePoint counts = capture.pendulum;
+  if (angular_momentum_) {
+    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / model_->total_mass();
+    balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
+                                 &counts);
+  }
+  const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
+    return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
+  };
+  SetVector3(world(capture.pendulum.position), out.capture_point);
+  out.capture_margin = balance::SignedDistance(soles, counts.position);
+  out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
+  balance::Step step;
+  if (out.step_needed != 0 && out.capture_margin < 0) {
+    step = balance::LatestStep(soles, counts, step_reach_);
+    SetVector3(world(step.position), out.step_position);
+  } else if (out.step_needed == 0) {
+    SetVector3(Eigen::Vector3d::Zero(), out.step_position);
+  }
+  out.step_time = step.time;
+}
+
+ComponentType StepPlannerType() {
+  return {"step_planner",
+          "which feet carry, and where COM, body and feet go: phases, capture point",
+          [] { return std::make_unique<StepPlanner>(); }};
+}
+
+}  // namespace poise

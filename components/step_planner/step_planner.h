@@ -1,0 +1,87 @@
+// The step planner: phases, references and capture point, the support plan of a tick.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "components/balance/capture_point.h"
+#include "components/balance/whole_body.h"
+#include "components/framework/component.h"
+#include "components/robot/robot_model.h"
+#include "components/step_planner/contact_loss.h"
+#include "components/step_planner/hip_strategy.h"
+#include "components/step_planner/landing.h"
+#include "components/step_planner/phase_schedule.h"
+#include "components/step_planner/reference_generator.h"
+#include "components/step_planner/step_detector.h"
+#include "poise/robot_state_t.hpp"
+#include "poise/support_plan_t.hpp"
+
+namespace poise {
+
+/// ROBOT_STATE -> SUPPORT_PLAN. When a state is invalid the plan of the last good tick is sent
+/// again with the status set.
+class StepPlanner : public Component {
+ public:
+  void Configure(const ComponentContext& context, Wiring* wiring) override;
+  bool Archive(StateArchive* archive) override;
+
+ private:
+  /// Where the COM can be brought to rest, seen from the soles in contact.
+  struct Capture {
+    bool known = false;  ///< else the COM is below the soles, or a number is not finite
+    Eigen::Isometry3d frame_o = Eigen::Isometry3d::Identity();
+    balance::CapturePoint pendulum;  ///< of the COM's own momentum
+  };
+
+  void ConfigureLimits(const StepPlannerConfig& config);
+  /// STATUS_* of the plan.
+  int8_t Plan(double time);
+  /// What the robot says to the schedule.
+  ScheduleInput Observe(double time, const std::array<double, 2>& load);
+  /// Contacts, references and landings of a phase's first tick.
+  void BeginPhase(double time);
+  Capture ComputeCapture() const;
+  /// The plan's references where the free foot follows them, else its landing's.
+  void UpdateReferences(double time, const Capture& capture);
+  /// Turns the body's reference by the hip strategy's tilt.
+  void TiltBody(double time, const Capture& capture);
+  /// A joint of a stance leg that would come too near to its limit before it could be braked.
+  bool NearJointLimit() const;
+  EstimatedPose Estimate() const;
+  balance::ContactGeometry Geometry() const;
+  /// Hull of the soles in contact, `margin` (m) off their edges.
+  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o, double margin) const;
+  /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
+  /// rest, lies inside its reduced rectangle. At rest that is the COM's projection, and the CoP.
+  std::array<bool, 2> ComOverFoot() const;
+  void ReportPhase(double time);
+  void ReportFeet();
+  void ReportReferences();
+  void ReportCapture(double time, const Capture& capture);
+  int8_t WaitingCode() const;
+
+  Input<robot_state_t> robot_state_;
+  Output<support_plan_t> support_plan_;
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  std::shared_ptr<balance::WholeBody> whole_body_;
+  std::optional<PhaseSchedule> schedule_;
+  std::optional<ReferenceGenerator> generator_;
+  std::optional<HipStrategy> hip_strategy_;
+  double joint_reserve_ = 0, brake_time_ = 0;  // rad, s, of the hip strategy
+  std::vector<Landing> landing_;               // by foot
+  std::vector<ContactLoss> contact_loss_;      // by foot
+  StepDetector step_;
+  double step_reach_ = 0;          // m
+  bool angular_momentum_ = false;  // counts in the capture point that asks for a step
+  References references_;
+  robot::RobotState state_;
+  std::array<bool, 2> in_contact_{true, true};
+  bool last_controlled_ = false;                // the phase before had tasks
+  std::array<Eigen::Vector2d, 2> stance_half_;  // m, of each sole's reduced rectangle
+};
+
+}  // namespace poise

@@ -1,0 +1,438 @@
+// The step planner with a faked estimator: phases, landings, references and capture point of a
+// robot.
+#include "components/step_planner/step_planner.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "components/messages/conversions.h"
+#include "components/messages/motion.h"
+#include "tests/components/control_fixture.h"
+#include "tests/test_seed.h"
+
+namespace poise {
+namespace {
+
+using robot::TestRobot;
+
+// Of a point in the hull of others, m, negative outside, by brute force: a pair of points with all
+// others on its left is an edge.
+double DistanceInside(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& point) {
+  double inside = std::numeric_limits<double>::infinity(), outside = inside;
+  for (const Eigen::Vector2d& a : points) {
+    for (const Eigen::Vector2d& b : points) {
+      const Eigen::Vector2d edge = b - a;
+      if (edge.norm() < 1e-9) continue;
+      const Eigen::Vector2d left = Eigen::Vector2d(-edge.y(), edge.x()).normalized();
+      const bool on_hull = std::all_of(points.begin(), points.end(), [&](const auto& other) {
+        return left.dot(other - a) > -1e-9;
+      });
+      if (!on_hull) continue;
+      const double along = std::clamp(edge.dot(point - a) / edge.squaredNorm(), 0.0, 1.0);
+      inside = std::min(inside, left.dot(point - a));
+      outside = std::min(outside, (a + along * edge - point).norm());
+    }
+  }
+  return inside >= 0 ? inside : -outside;
+}
+
+struct Case {
+  TestRobot robot;
+  const char* support;
+  Contacts in_contact;
+};
+
+class StepPlannerCase : public testing::TestWithParam<Case> {
+ protected:
+  std::string Phase(const std::string& more = "") const {
+    return std::string("phase { support: ") + GetParam().support + " " + more + " }";
+  }
+  robot::RobotModel model_ = robot::LoadTestRobot(GetParam().robot);
+  ControlContext context_{GetParam().robot};
+  robot::RobotState standing_ = StandingState(model_);
+  std::mt19937 random_{TestSeed(24)};
+};
+
+// The references hold where the robot was at the first tick, bit for bit; what it does later is
+// told beside them.
+TEST_P(StepPlannerCase, HoldsWhereTheRobotWasAtTheFirstTick) {
+  const auto body = static_cast<size_t>(model_.body_task_body());
+  for (int trial = 0; trial < 20; ++trial) {
+    Harness<StepPlanner> harness(&context_, Phase());
+    const robot::RobotState first = Disturbed(standing_, 0.05, 0.3, &random_);
+    const robot::RobotState now = Disturbed(first, 0.05, 0.5, &random_);
+    robot_state_t message = StateMessage(model_, first);
+    harness.Bind("robot_state", &message);
+    harness.Run(TickAt(0));
+    message = StateMessage(model_, now);
+    harness.Run(TickAt(1));
+    const auto& out = harness.output<support_plan_t>();
+    ASSERT_EQ(out.status, support_plan_t::STATUS_OK);
+    const robot::RobotData start = robot::Evaluate(model_, first), d = robot::Evaluate(model_, now);
+    EXPECT_LT((GetVector3(out.com_position) - d.com).norm(), 1e-12);
+    EXPECT_LT((GetVector3(out.com_velocity) - d.com_velocity).norm(), 1e-12);
+    const PointMotion com = GetMotion(out.com_reference);
+    const RotationMotion turn = GetMotion(out.body_reference);
+    EXPECT_LT((com.position - start.com).norm(), 1e-12);
+    EXPECT_EQ(com.velocity.norm() + com.acceleration.norm(), 0);
+    EXPECT_LT((turn.rotation - start.body_rotation[body]).norm(), 1e-12);
+    EXPECT_EQ(turn.angular_velocity.norm() + turn.angular_acceleration.norm(), 0);
+    EXPECT_EQ(out.phase, 0);
+    EXPECT_EQ(out.began_by, support_plan_t::OUTCOME_NONE);
+    EXPECT_NEAR(out.phase_time, 0.002, 1e-12);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(out.in_contact[i] != 0, GetParam().in_contact[i]);
+      EXPECT_EQ(out.next_in_contact[i], out.in_contact[i]);
+      EXPECT_EQ(out.foot_state[i], GetParam().in_contact[i] ? support_plan_t::FOOT_SUPPORT
+                                                            : support_plan_t::FOOT_SWING);
+      EXPECT_LT((GetPose(out.foot_pose[i]).matrix() - d.foot_pose[i].matrix()).norm(), 1e-12);
+      // A foot in contact goes nowhere.
+      const Eigen::Isometry3d& sole = (GetParam().in_contact[i] ? d : start).foot_pose[i];
+      EXPECT_LT((GetMotion(out.foot_reference[i]).position - sole.translation()).norm(), 1e-12);
+      EXPECT_LT((GetMotion(out.foot_rotation_reference[i]).rotation - sole.linear()).norm(), 1e-12);
+    }
+  }
+}
+
+TEST_P(StepPlannerCase, WithoutTasksTheReferencesAreWhereTheRobotIs) {
+  Harness<StepPlanner> harness(&context_, Phase("gravity_compensation: true"));
+  for (int tick = 0; tick < 10; ++tick) {
+    const robot::RobotState now = Disturbed(standing_, 0.05, 0.3, &random_);
+    const robot_state_t message = StateMessage(model_, now);
+    harness.Bind("robot_state", &message);
+    harness.Run(TickAt(tick));
+    const auto& out = harness.output<support_plan_t>();
+    EXPECT_EQ(out.gravity_compensation, 1);
+    const robot::RobotData d = robot::Evaluate(model_, now);
+    EXPECT_LT((GetMotion(out.com_reference).position - d.com).norm(), 1e-12);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_LT(
+          (GetMotion(out.foot_rotation_reference[i]).rotation - d.foot_pose[i].linear()).norm(),
+          1e-12);
+    }
+  }
+}
+
+// COM + velocity / ω, seen along the normal of the soles' plane, h above it along the vertical; on
+// level soles these are one.
+TEST_P(StepPlannerCase, TheCapturePointIsThePendulums) {
+  Harness<StepPlanner> harness(&context_, Phase());
+  for (int tick = 0; tick < 50; ++tick) {
+    robot::RobotState now = standing_;
+    std::uniform_real_distribution<double> speed(-0.5, 0.5);
+    now.base_linear_velocity = {speed(random_), speed(random_), 0};  // all of it alike
+    const robot_state_t message = StateMessage(model_, now);
+    harness.Bind("robot_state", &message);
+    harness.Run(TickAt(tick));
+    const auto& out = harness.output<support_plan_t>();
+    const robot::RobotData d = robot::Evaluate(model_, now);
+    const double ground = d.foot_pose[0].translation().z();
+    const double frequency = std::sqrt(robot::kGravity / (d.com.z() - ground));
+    const Eigen::Vector2d point = (d.com + now.base_linear_velocity / frequency).head<2>();
+    EXPECT_LT((GetVector3(out.capture_point).head<2>() - point).norm(), 1e-6);
+    EXPECT_NEAR(out.capture_point[2], ground, 1e-6);
+    std::vector<Eigen::Vector2d> corners;
+    for (size_t i = 0; i < 2; ++i) {
+      if (!GetParam().in_contact[i]) continue;
+      const robot::FootModel& foot = model_.feet()[i];
+      for (const int k : {0, 1, 2, 3}) {
+        const Eigen::Vector3d corner(k % 2 == 0 ? -0.5 * foot.length : 0.5 * foot.length,
+                                     k < 2 ? -0.5 * foot.width : 0.5 * foot.width, 0);
+        corners.push_back((d.foot_pose[i] * corner).head<2>());
+      }
+    }
+    const double margin = DistanceInside(corners, point);
+    EXPECT_NEAR(out.capture_margin, margin, 1e-6);
+  }
+}
+
+TEST_P(StepPlannerCase, SendsTheLastPlanAgainWhenTheStateIsUnusable) {
+  Harness<StepPlanner> harness(&context_, Phase());
+  robot_state_t message = StateMessage(model_, standing_);
+  harness.Bind("robot_state", &message);
+  harness.Run(TickAt(0));
+  const support_plan_t good = harness.output<support_plan_t>();
+  const robot_state_t sound = message;
+  message.base_position[2] = std::numeric_limits<double>::infinity();
+  harness.Run(TickAt(1));
+  const auto& out = harness.output<support_plan_t>();
+  EXPECT_EQ(out.status, support_plan_t::STATUS_INVALID_STATE);
+  EXPECT_EQ(GetVector3(out.com_reference.position), GetVector3(good.com_reference.position));
+  EXPECT_TRUE(MessageTraits<support_plan_t>::AllFinite(out));
+  message = sound;
+  harness.Run(TickAt(2));
+  EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, StepPlannerCase,
+                         testing::Values(Case{TestRobot::kDyros, "DOUBLE", {true, true}},
+                                         Case{TestRobot::kDyros, "RIGHT", {true, false}},
+                                         Case{TestRobot::kMantis, "DOUBLE", {true, true}},
+                                         Case{TestRobot::kMantis, "LEFT", {false, true}}));
+
+// A reference comes out of its message with the bits it had.
+TEST(Motion, GoesOverTheBusUnchanged) {
+  std::mt19937 random(TestSeed(25));
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 1000; ++trial) {
+    PointMotion point;
+    RotationMotion turn;
+    for (auto* vector : {&point.position, &point.velocity, &point.acceleration,
+                         &turn.angular_velocity, &turn.angular_acceleration}) {
+      *vector = Eigen::Vector3d::NullaryExpr([&] { return normal(random); });
+    }
+    turn.rotation =
+        Eigen::AngleAxisd(normal(random), point.velocity.normalized()).toRotationMatrix();
+    point_motion_t point_message;
+    rotation_motion_t turn_message;
+    SetMotion(point, &point_message);
+    SetMotion(turn, &turn_message);
+    EXPECT_EQ(GetMotion(point_message).position, point.position);
+    EXPECT_EQ(GetMotion(point_message).velocity, point.velocity);
+    EXPECT_EQ(GetMotion(point_message).acceleration, point.acceleration);
+    EXPECT_EQ(GetMotion(turn_message).rotation, turn.rotation);
+    EXPECT_EQ(GetMotion(turn_message).angular_velocity, turn.angular_velocity);
+    EXPECT_EQ(GetMotion(turn_message).angular_acceleration, turn.angular_acceleration);
+    EXPECT_EQ(turn_message.rotation[1], turn.rotation(0, 1));  // row by row
+  }
+}
+
+TEST(StepPlanner, RefusesWhatDoesNotFitTheRobot) {
+  ControlContext context(TestRobot::kDyros);
+  const auto field_of = [&](const std::string& config) -> std::string {
+    try {
+      Harness<StepPlanner> harness(&context, config + " phase { }");
+    } catch (const ConfigError& error) {
+      return error.field();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(field_of(""), "accepted");
+  EXPECT_EQ(field_of("stance_half_length: 0.16"), "stance_half_length");
+  EXPECT_EQ(field_of("stance_half_width: 0"), "stance_half_width");
+  EXPECT_EQ(field_of("hip_strategy { start: 0.075 }"), "hip_strategy.start");
+}
+
+TEST(StepPlanner, ReportsAWaitingUnloading) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  ControlContext context(TestRobot::kDyros);
+  Harness<StepPlanner> harness(
+      &context,
+      "phase { duration: 0.1 transition { kind: UNLOAD foot: LEFT_FOOT duration: 0.01 } } "
+      "phase { support: RIGHT }");
+  robot::RobotState state = StandingState(model);  // COM between the feet
+  robot_state_t message = StateMessage(model, state);
+  harness.Bind("robot_state", &message);
+  for (int tick = 0; tick < 100; ++tick) {
+    harness.Run(TickAt(tick));
+    const auto& out = harness.output<support_plan_t>();
+    ASSERT_EQ(out.status, support_plan_t::STATUS_WAITING);
+    ASSERT_EQ(out.phase, 0);
+    ASSERT_EQ(out.transition, support_plan_t::TRANSITION_NONE);
+    ASSERT_EQ(out.in_contact[1], 1);
+  }
+  // The whole robot leant about the soles' middle until the COM is over the right foot.
+  state.base_position.y() -= 0.1;
+  message = StateMessage(model, state);
+  // Soles moved with it: still between the feet.
+  harness.Run(TickAt(100));
+  EXPECT_EQ(harness.output<support_plan_t>().status, support_plan_t::STATUS_WAITING);
+  const Eigen::Quaterniond lean(Eigen::AngleAxisd(0.12, Eigen::Vector3d::UnitX()));
+  state.base_position = lean * state.base_position;
+  state.base_orientation = lean * state.base_orientation;
+  message = StateMessage(model, state);
+  const robot::RobotData data = robot::Evaluate(model, state);
+  // Inside the sole (75 mm) is not enough: 25 mm less are its reduced rectangle.
+  ASSERT_LT(std::abs(data.com.y() - data.foot_pose[0].translation().y()), 0.05);
+  // On its way out: the point where it can be brought to rest lies 80 mm further.
+  robot::RobotState moving = state;
+  moving.base_linear_velocity.y() = 0.3;
+  message = StateMessage(model, moving);
+  harness.Run(TickAt(101));
+  EXPECT_EQ(harness.output<support_plan_t>().status, support_plan_t::STATUS_WAITING);
+  message = StateMessage(model, state);
+  harness.Run(TickAt(102));
+  EXPECT_EQ(harness.output<support_plan_t>().status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(harness.output<support_plan_t>().transition, support_plan_t::TRANSITION_UNLOADING);
+  EXPECT_EQ(harness.output<support_plan_t>().transition_foot, 1);
+}
+
+// A robot on its right foot whose left one, lowered at 0.1 s, is to carry from 0.4 s on.
+class TouchDown : public testing::Test {
+ protected:
+  explicit TouchDown(const std::string& contact = "")
+      : harness_(&context_,
+                 contact +
+                     "phase { duration: 0.1 support: RIGHT } "
+                     "phase { duration: 0.3 support: RIGHT foot { foot: LEFT_FOOT z: -0.02 "
+                     "duration: 0.1 } } "
+                     "phase { transition { kind: LOAD foot: LEFT_FOOT duration: 0.1 } }") {
+    message_ = StateMessage(robot::LoadTestRobot(TestRobot::kDyros),
+                            StandingState(robot::LoadTestRobot(TestRobot::kDyros)));
+    message_.foot_wrench[0].force[2] = -500;
+    harness_.Bind("robot_state", &message_);
+  }
+  /// `load` on the left sole, N, until `time`, s.
+  const support_plan_t& Run(double time, double load) {
+    message_.foot_wrench[1].force[2] = -load;
+    while (TickAt(tick_).time < time - 1e-9) harness_.Run(TickAt(tick_++));
+    return harness_.output<support_plan_t>();
+  }
+
+  ControlContext context_{TestRobot::kDyros};
+  Harness<StepPlanner> harness_;
+  robot_state_t message_;
+  int64_t tick_ = 0;
+};
+
+TEST_F(TouchDown, InTimeDoesNotShiftTheSchedule) {
+  EXPECT_EQ(Run(0.07, 0).foot_state[1], support_plan_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.4, 12).foot_state[1], support_plan_t::FOOT_TOUCHING);
+  EXPECT_EQ(harness_.output<support_plan_t>().in_contact[1], 0);
+  const support_plan_t& out = Run(0.402, 12);
+  EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(out.phase, 2);
+  EXPECT_EQ(out.in_contact[1], 1);
+  EXPECT_EQ(out.foot_state[1], support_plan_t::FOOT_SUPPORT);
+  EXPECT_EQ(out.transition, support_plan_t::TRANSITION_LOADING);
+  EXPECT_NEAR(out.transition_progress, 0, 1e-8);
+}
+
+TEST_F(TouchDown, LateHoldsTheScheduleUntilTheLoadHasLasted) {
+  EXPECT_EQ(Run(0.2, 0).foot_state[1], support_plan_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.21, 0).foot_state[1], support_plan_t::FOOT_SEARCHING);
+  EXPECT_EQ(Run(0.4, 0).status, support_plan_t::STATUS_OK);
+  const support_plan_t& out = Run(0.5, 0);
+  EXPECT_EQ(out.status, support_plan_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_CONTACT);
+  EXPECT_EQ(out.phase, 1);
+  EXPECT_LT(out.foot_reference[1].position[2], out.foot_pose[1].position[2] - 0.02);
+  // 0.02 s of load, then 0.3 s in which it settles.
+  EXPECT_EQ(Run(0.52, 12).foot_state[1], support_plan_t::FOOT_SEARCHING);
+  EXPECT_EQ(Run(0.522, 12).foot_state[1], support_plan_t::FOOT_TOUCHING);
+  EXPECT_EQ(Run(0.82, 12).waiting_for, support_plan_t::WAITING_CONTACT);
+  EXPECT_EQ(Run(0.824, 12).phase, 2);
+  EXPECT_EQ(out.status, support_plan_t::STATUS_OK);
+  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_NONE);
+}
+
+// This foot does not move: its reference gives up at twice the depth.
+TEST_F(TouchDown, WithoutASurfaceItEndsInSingleSupport) {
+  const support_plan_t& out = Run(8, 0);
+  EXPECT_EQ(out.status, support_plan_t::STATUS_WAITING);
+  EXPECT_EQ(out.waiting_for, support_plan_t::WAITING_NO_SURFACE);
+  EXPECT_EQ(out.foot_state[1], support_plan_t::FOOT_RETRACTED);
+  EXPECT_EQ(out.phase, 1);
+  EXPECT_NEAR(out.foot_reference[1].position[2], -0.02 - 0.12 + 0.05, 1e-3);
+  EXPECT_EQ(Run(9, 100).phase, 1);  // for good
+}
+
+TEST_F(TouchDown, ALoadThatIsNoNumberIsAnInvalidState) {
+  Run(0.1, 0);
+  EXPECT_EQ(Run(0.11, std::numeric_limits<double>::quiet_NaN()).status,
+            support_plan_t::STATUS_INVALID_STATE);
+  EXPECT_EQ(Run(0.12, 0).status, support_plan_t::STATUS_OK);
+}
+
+class UnconfirmedTouchDown : public TouchDown {
+ protected:
+  UnconfirmedTouchDown() : TouchDown("contact { required: false } ") {}
+};
+
+TEST_F(UnconfirmedTouchDown, FollowsTheScheduleAlone) {
+  EXPECT_EQ(Run(0.4, 0).foot_state[1], support_plan_t::FOOT_SWING);
+  EXPECT_EQ(Run(0.402, 0).phase, 2);
+}
+
+// What follows when there is no surface, and when a foot that carries does not.
+class WayOut : public testing::Test {
+ protected:
+  WayOut() {
+    message_ = StateMessage(robot::LoadTestRobot(TestRobot::kDyros),
+                            StandingState(robot::LoadTestRobot(TestRobot::kDyros)));
+    message_.foot_wrench[0].force[2] = -500;
+    harness_.Bind("robot_state", &message_);
+  }
+  /// `load` on the left sole, N, until `phase` begins; its time, s; 20 s when it does not.
+  double RunUntil(int phase, double load) {
+    message_.foot_wrench[1].force[2] = -load;
+    do {
+      harness_.Run(TickAt(tick_++));
+    } while (plan().phase != phase && TickAt(tick_).time < 20);
+    return TickAt(tick_ - 1).time;
+  }
+  const support_plan_t& plan() const { return harness_.output<support_plan_t>(); }
+  double foot_height() const { return plan().foot_reference[1].position[2]; }
+
+  ControlContext context_{TestRobot::kDyros};
+  Harness<StepPlanner> harness_{&context_, R"(
+    phase { name: "up" duration: 0.1 support: RIGHT }
+    phase { name: "down" duration: 0.3 support: RIGHT
+            foot { foot: LEFT_FOOT z: -0.02 duration: 0.1 }
+            next { on: NO_SURFACE to: "higher" } }
+    phase { name: "stand" next { on: CONTACT_LOST foot: LEFT_FOOT to: "right" } }
+    phase { name: "higher" duration: 1 support: RIGHT
+            foot { foot: LEFT_FOOT z: 0.03 duration: 0.5 } next { to: "down" } }
+    phase { name: "right" support: RIGHT }
+  )"};
+  robot_state_t message_;
+  int64_t tick_ = 0;
+};
+
+TEST_F(WayOut, AFootWithoutASurfaceComesUpAndThePlanGoesOnFromThere) {
+  EXPECT_NEAR(RunUntil(1, 0), 0.1, 1e-9);
+  EXPECT_EQ(plan().next_in_contact[1], 1);
+  double lowest = 0, last = foot_height();
+  int retracted = 0, waiting = 0;
+  while (plan().phase == 1) {
+    harness_.Run(TickAt(tick_++));
+    lowest = std::min(lowest, foot_height());
+    EXPECT_LT(std::abs(foot_height() - last), 1e-3);  // no step
+    last = foot_height();
+    retracted += plan().foot_state[1] == support_plan_t::FOOT_RETRACTED;
+    waiting += plan().waiting_for == support_plan_t::WAITING_NO_SURFACE;
+  }
+  // This foot does not follow: its reference gives up at twice the depth, is brought to a stand
+  // within millimetres, and rises by 0.05 m from there.
+  EXPECT_NEAR(lowest, -0.02 - 0.12, 0.01);
+  EXPECT_NEAR(foot_height(), -0.02 - 0.12 + 0.05, 1e-3);
+  EXPECT_NEAR(retracted * 0.002, 0.05 / 0.03, 0.01);
+  EXPECT_GT(waiting, 0);
+  EXPECT_EQ(plan().phase, 3);
+  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_NO_SURFACE);
+  EXPECT_EQ(plan().waiting_for, support_plan_t::WAITING_NONE);
+  EXPECT_EQ(plan().foot_state[1], support_plan_t::FOOT_SWING);
+  EXPECT_EQ(plan().in_contact[1], 0);
+  // "higher", from where the foot is held, then down again, and there a load.
+  const double begun = TickAt(tick_ - 1).time, held = foot_height();
+  EXPECT_NEAR(RunUntil(1, 0), begun + 1, 1e-9);
+  EXPECT_NEAR(foot_height(), held + 0.03, 1e-6);
+  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_DONE);
+  RunUntil(2, 50);
+  EXPECT_EQ(plan().in_contact[1], 1);
+  EXPECT_EQ(plan().foot_state[1], support_plan_t::FOOT_SUPPORT);
+}
+
+TEST_F(WayOut, ALostContactIsGivenUp) {
+  RunUntil(1, 0);
+  const double stood = RunUntil(2, 50);
+  EXPECT_LT(stood, 1);
+  message_.foot_wrench[1].force[2] = -300;
+  for (int i = 0; i < 100; ++i) harness_.Run(TickAt(tick_++));
+  EXPECT_EQ(plan().phase, 2);
+  const double lost = TickAt(tick_).time;
+  EXPECT_NEAR(RunUntil(4, 0), lost + 0.1, 1e-9);
+  EXPECT_EQ(plan().began_by, support_plan_t::OUTCOME_CONTACT_LOST);
+  EXPECT_EQ(plan().in_contact[0], 1);
+  EXPECT_EQ(plan().in_contact[1], 0);
+  // It hangs where it was when it was given up.
+  const Eigen::Vector3d sole = GetVector3(plan().foot_pose[1].position);
+  EXPECT_LT((GetVector3(plan().foot_reference[1].position) - sole).norm(), 1e-12);
+}
+
+}  // namespace
+}  // namespace poise
