@@ -292,6 +292,80 @@ void ContactDynamics::Acceleration(const VectorRef& torque,
   });
 }
 
+void ContactDynamics::ReduceTorque(const VectorRef& torque,
+                                   Eigen::Ref<Eigen::VectorXd> reduced) const {
+  WithSizes(reduced_, [&]<int K, bool Loop>() {
+    constexpr int R = Rank<K, Loop>();
+    const Index k = reduced_.num_joints, r = reduced_.rank();
+    eigen_assert(torque.size() == k && reduced.size() == r);
+    const Eigen::Map<const StackVector<K>> command(torque.data(), k);
+    Eigen::Map<StackVector<R>> result(reduced.data(), r);
+    if constexpr (Loop) {
+      SetTransposedProduct(result, View<K, R>(reduced_.rotation, k, r, 6), command);
+    } else {
+      result = command;
+    }
+    SolveLower(View<R, R>(reduced_.factor, r, r), result);
+  });
+}
+
+void ContactDynamics::ExpandTorque(const VectorRef& reduced,
+                                   Eigen::Ref<Eigen::VectorXd> torque) const {
+  WithSizes(reduced_, [&]<int K, bool Loop>() {
+    constexpr int R = Rank<K, Loop>();
+    const Index k = reduced_.num_joints, r = reduced_.rank();
+    eigen_assert(torque.size() == k && reduced.size() == r);
+    const auto factor = View<R, R>(reduced_.factor, r, r);
+    StackVector<R> z = StackVector<R>::Zero(r);
+    for (Index j = 0; j < r; ++j) z += factor.col(j) * reduced(j);
+    Eigen::Map<StackVector<K>> result(torque.data(), k);
+    if constexpr (Loop) {
+      SetProduct(result, View<K, R>(reduced_.rotation, k, r, 6), z);
+    } else {
+      result = z;
+    }
+  });
+}
+
+void ContactDynamics::ReduceRows(const MatrixRef& jacobian, const VectorRef& bias_acceleration,
+                                 Eigen::Ref<Eigen::MatrixXd> rows_t,
+                                 Eigen::Ref<Eigen::VectorXd> load) const {
+  WithSizes(reduced_, [&]<int K, bool Loop>() {
+    constexpr int R = Rank<K, Loop>();
+    const Index k = reduced_.num_joints, r = reduced_.rank(), t = jacobian.rows();
+    eigen_assert(jacobian.cols() == k + 6 && rows_t.rows() == r && rows_t.cols() == t &&
+                 load.size() == t);
+    const auto phi_t = View<K, 6>(reduced_.phi_t, k, 6);
+    const auto factor = View<R, R>(reduced_.factor, r, r);
+    const Eigen::Map<const StackVector<K>> bias_torque(reduced_.bias.joint_torque.data(), k);
+    StackVector<R> bias(r);  // L⁻¹ Vᵀ h
+    StackVector<K> joints(k);
+    if constexpr (Loop) {
+      SetTransposedProduct(bias, View<K, R>(reduced_.rotation, k, r, 6), bias_torque);
+    } else {
+      bias = bias_torque;
+    }
+    SolveLower(factor, bias);
+    for (Index i = 0; i < t; ++i) {
+      const Vector6d base = jacobian.block<1, 6>(i, 0).transpose();
+      for (Index j = 0; j < k; ++j) joints(j) = jacobian(i, 6 + j);
+      AddProduct<1>(joints, phi_t, base);
+      Eigen::Map<StackVector<R>> row(&rows_t(0, i), r);
+      double drift = bias_acceleration(i) + base.dot(reduced_.bias.base_acceleration);
+      if constexpr (Loop) {
+        SetTransposedProduct(row, View<K, R>(reduced_.rotation, k, r, 6), joints);
+        drift += joints.dot(Eigen::Map<const StackVector<K>>(
+            reduced_.bias.joint_acceleration.data(), k));
+      } else {
+        row = joints;
+      }
+      if (!(row.squaredNorm() > kHeld * kHeld * jacobian.row(i).squaredNorm())) row.setZero();
+      SolveLower(factor, row);
+      load(i) = row.dot(bias) - drift;
+    }
+  });
+}
+
 // The equations of motion are linear in forces, contact bias and torque: the paper's matrices are
 // their unit responses.
 Eigen::VectorXd ContactDynamics::Wrench(const VectorRef& generalized_force,

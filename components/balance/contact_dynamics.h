@@ -12,6 +12,9 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using MatrixRef = Eigen::Ref<const Eigen::MatrixXd>;
 using VectorRef = Eigen::Ref<const Eigen::VectorXd>;
 
+/// A task row that the contacts leave less than this share of is rounding: the contacts hold it.
+inline constexpr double kHeld = 1e-10;
+
 /// Joints that the tick path has scratch for.
 inline constexpr int kMaxJoints = 128;
 
@@ -77,6 +80,19 @@ class ContactDynamics {
   void ExpectedWrench(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> wrench) const;
   /// Acceleration q̈ that joint torques (k×1) produce, (9), n×1 into `acceleration`.
   void Acceleration(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> acceleration) const;
+
+  // Reduced coordinates u = L⁻¹ Vᵀ Γ of a torque, r×1 with r = reduced().rank(): what of it moves
+  // the robot. In them ẍ = T u − load for a task's rows, and what is dynamically consistent is
+  // orthogonal.
+
+  /// Γ (k×1) to u (r×1).
+  void ReduceTorque(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> reduced) const;
+  /// u (r×1) to the least Γ (k×1) that has it, V L u.
+  void ExpandTorque(const VectorRef& reduced, Eigen::Ref<Eigen::VectorXd> torque) const;
+  /// J (t×n) and J̇ q̇ (t×1) of task rows to Tᵀ (r×t) and their load (t×1). Rows that the contacts
+  /// hold become zero.
+  void ReduceRows(const MatrixRef& jacobian, const VectorRef& bias_acceleration,
+                  Eigen::Ref<Eigen::MatrixXd> rows_t, Eigen::Ref<Eigen::VectorXd> load) const;
 
   // The matrices of the paper, formed on demand (they allocate; the tick path needs none of them).
   Eigen::MatrixXd lambda_c() const;          ///< Λ_c, m×m, (4)

@@ -14,8 +14,6 @@ using Eigen::Index;
 // Smallest share of a task's inverse inertia that the tasks before it may leave (sin² of the angle
 // between them).
 constexpr double kDependence = 1e-12;
-// A task row that the contacts leave less than this of is rounding: the contacts hold it.
-constexpr double kHeld = 1e-10;
 
 /// Calls `function` with joints, support and task rows as compile-time constants where they are
 /// common.

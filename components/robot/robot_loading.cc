@@ -208,6 +208,9 @@ RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
                "body_link")
           .body;
 
+  for (const auto& [link, place] : tree.links) {
+    model.frames_.push_back({link, place.body, place.pose});
+  }
   model.bodies_ = std::move(tree.bodies);
   model.joints_ = std::move(tree.joints);
   model.BuildTree();

@@ -37,6 +37,12 @@ void RobotModel::BuildTree() {
   }
 }
 
+const Frame* RobotModel::FindFrame(std::string_view name) const {
+  const auto frame = std::find_if(frames_.begin(), frames_.end(),
+                                  [&](const Frame& other) { return other.name == name; });
+  return frame == frames_.end() ? nullptr : &*frame;
+}
+
 int RobotModel::FindJoint(std::string_view name) const {
   const auto joint = std::find_if(joints_.begin(), joints_.end(),
                                   [&](const Joint& other) { return other.name == name; });

@@ -59,6 +59,13 @@ struct FootModel {
   double length = 0, width = 0;                            ///< m
 };
 
+/// A link of the URDF, one that is fixed to a body or the body's own.
+struct Frame {
+  std::string name;
+  int body = -1;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< in the body frame
+};
+
 struct ImuModel {
   int body = -1;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< IMU frame in the body frame
@@ -136,6 +143,10 @@ class RobotModel {
   std::span<const int> supporting_joints(int body) const {
     return tree_.supporting_joints[static_cast<size_t>(body)];
   }
+  /// Every link of the URDF, in order of the names.
+  const std::vector<Frame>& frames() const { return frames_; }
+  /// A link by its URDF name; null when there is none.
+  const Frame* FindFrame(std::string_view name) const;
   /// Index of a joint by name, -1 when there is none.
   int FindJoint(std::string_view name) const;
   /// A copy with one body's mass and inertia scaled and its COM shifted (m, body frame), for
@@ -151,6 +162,7 @@ class RobotModel {
   std::vector<Joint> joints_;
   std::vector<MotorModel> motors_;
   std::vector<FootModel> feet_;
+  std::vector<Frame> frames_;
   ImuModel imu_;
   int body_task_body_ = 0;
   KinematicTree tree_;

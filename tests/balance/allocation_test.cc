@@ -7,6 +7,8 @@
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/redistribution.h"
+#include "components/balance/task_hierarchy.h"
+#include "components/balance/tasks/task.h"
 #include "tests/balance/balance_test_support.h"
 
 extern "C" void* __libc_malloc(size_t size);
@@ -77,6 +79,49 @@ void CountOn(const std::shared_ptr<const robot::RobotModel>& model,
 TEST(Allocation, TheTickPathAllocatesNothing) {
   for (const auto& model : {Biped(), Humanoid()}) {
     for (const auto& in_contact : {kDouble, kRight, kLeft}) CountOn(model, in_contact);
+  }
+}
+
+TEST(Allocation, TasksAndTheirHierarchyAllocateNothing) {
+  for (const auto& model : {Biped(), Humanoid()}) {
+    const int k = model->num_joints();
+    StateSampler sampler(model, 42);
+    WholeBody body(model);
+    const robot::RobotState state = sampler.Draw();
+    ASSERT_TRUE(body.Update(state, kDouble));
+    const TaskState at{*model, state, body.data()};
+    std::vector<std::unique_ptr<Task>> tasks;
+    std::vector<int> level_rows;
+    TaskTarget target;
+    int rows = 0;
+    for (const char* type : {"com", "orientation", "frame", "angular_momentum", "joint_posture"}) {
+      TaskSpec spec;
+      spec.type = type;
+      tasks.push_back(CreateTask(spec, *model));
+      tasks.back()->Hold(at, &target);
+      level_rows.push_back(tasks.back()->num_rows());
+      rows += level_rows.back();
+    }
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, k + 6);
+    Eigen::VectorXd bias = Eigen::VectorXd::Zero(rows), wanted = bias;
+    Eigen::VectorXd torque = Eigen::VectorXd::Ones(k);
+    TaskHierarchy hierarchy(k, k, 5);
+
+    const long before = allocations;
+    int row = 0;
+    for (const auto& task : tasks) {
+      TaskRows view{jacobian.middleRows(row, task->num_rows()),
+                    bias.segment(row, task->num_rows()), wanted.segment(row, task->num_rows())};
+      task->Hold(at, &target);
+      task->Write(at, target, &view);
+      row += task->num_rows();
+    }
+    const bool computed = hierarchy.Compute(body.contact(), jacobian, bias, wanted, level_rows);
+    hierarchy.ProjectIntoNullSpace(torque);
+    EXPECT_EQ(allocations - before, 0);
+    EXPECT_TRUE(computed);
+    EXPECT_EQ(hierarchy.num_free(), 0);
+    EXPECT_LT(torque.norm(), 1e-9);  // nothing is left
   }
 }
 

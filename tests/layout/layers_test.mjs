@@ -8,13 +8,14 @@ import {repositoryFiles, root} from '../docs/markdown.mjs';
 const files = repositoryFiles().filter((f) => !f.startsWith('tests/'));
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
-const BUS = ['lcmtypes', 'components/framework', 'components/robot', 'components/balance', 'components/messages'];
+const BUS = ['lcmtypes', 'components/framework', 'components/robot', 'components/balance', 'components/balance/tasks', 'components/messages'];
 /** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
 const BELOW = {
   'lcmtypes': [],
   'components/framework': ['lcmtypes'],
   'components/robot': [],
   'components/balance': ['components/robot'],
+  'components/balance/tasks': ['components/robot', 'components/balance'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/robot', 'components/balance'],
   'components': BUS,
   'sim_ode': BUS,

@@ -1,0 +1,183 @@
+#include "components/balance/task_hierarchy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "components/balance/small_matrix.h"
+
+namespace poise::balance {
+namespace {
+
+using Eigen::Index;
+
+// A row of unit length of which this is left lies in the levels above, to rounding.
+constexpr double kNothingLeft = 1e-7;
+
+}  // namespace
+
+TaskHierarchy::TaskHierarchy(int num_joints, int max_rows, int max_levels)
+    : first_(num_joints, std::max(1, std::min(max_rows, num_joints))) {
+  if (max_rows < 1 || max_levels < 1) {
+    throw std::invalid_argument("TaskHierarchy: at least one row and one level");
+  }
+  const Index k = num_joints;
+  levels_.resize(static_cast<size_t>(max_levels));
+  basis_.setZero(k, k);
+  rows_.setZero(k, max_rows);
+  coefficients_.setZero(max_rows, k);
+  normal_.setZero(k, k);
+  for (auto* v : {&scale_, &load_, &wanted_}) v->setZero(max_rows);
+  for (auto* v : {&torque_, &fading_, &step_, &reduced_, &change_}) v->setZero(k);
+}
+
+int TaskHierarchy::num_free() const {
+  Index taken = 0;
+  for (const Level& level : levels()) taken += level.directions;
+  return static_cast<int>(rank_ - taken);
+}
+
+bool TaskHierarchy::Compute(const ContactDynamics& contact, const MatrixRef& jacobian,
+                            const VectorRef& bias_acceleration, const VectorRef& acceleration,
+                            std::span<const int> level_rows) {
+  contact_ = &contact;
+  num_levels_ = 0;
+  rank_ = contact.reduced().rank();
+  basis_size_ = 0;
+  num_fading_ = 0;
+  Index rows = 0, most = 0;
+  for (const int t : level_rows) {
+    if (t < 1) return false;
+    rows += t;
+    most = std::max<Index>(most, t);
+  }
+  if (level_rows.empty() || level_rows.size() > levels_.size() || most > rows_.cols() ||
+      jacobian.rows() != rows || bias_acceleration.size() != rows || acceleration.size() != rows ||
+      contact.num_joints() != torque_.size()) {
+    return false;
+  }
+  const Index first = level_rows[0];
+  if (!first_.Compute(contact, jacobian.topRows(first), bias_acceleration.head(first))) {
+    return false;
+  }
+  first_.TaskTorque(acceleration.head(first), torque_);
+  levels_[0] = {static_cast<int>(first), static_cast<int>(first), true};
+  num_levels_ = 1;
+  if (level_rows.size() == 1) return torque_.allFinite();
+
+  auto u = reduced_.head(rank_);
+  contact.ReduceTorque(torque_, u);
+  contact.ReduceRows(jacobian.topRows(first), bias_acceleration.head(first),
+                     rows_.topLeftCorner(rank_, first), load_.head(first));
+  bool complete = true;
+  ExtendBasis(first, &complete);
+  change_.head(rank_) = u;
+  Index row = first;
+  for (size_t i = 1; i < level_rows.size(); ++i) {
+    if (!AddLevel(row, level_rows[i], jacobian, bias_acceleration, acceleration)) return false;
+    row += level_rows[i];
+  }
+  // What the levels below have added.
+  u -= change_.head(rank_);
+  contact.ExpandTorque(u, change_);
+  torque_ += change_;
+  return torque_.allFinite();
+}
+
+bool TaskHierarchy::AddLevel(Index first_row, Index t, const MatrixRef& jacobian,
+                             const VectorRef& bias_acceleration, const VectorRef& acceleration) {
+  auto u = reduced_.head(rank_);
+  contact_->ReduceRows(jacobian.middleRows(first_row, t), bias_acceleration.segment(first_row, t),
+                       rows_.topLeftCorner(rank_, t), load_.head(t));
+  for (Index i = 0; i < t; ++i) {
+    wanted_(i) = acceleration(first_row + i) + load_(i) - rows_.col(i).head(rank_).dot(u);
+  }
+  if (!std::isfinite(wanted_.head(t).sum())) return false;
+  const Index before = basis_size_;
+  bool complete = true;
+  const Index taken = ExtendBasis(t, &complete);
+  levels_[num_levels_++] = {static_cast<int>(t), static_cast<int>(taken), complete};
+  if (taken == 0) return true;
+
+  // min |C z − e|² + Σ λ² z²: C, e scaled by row, λ only in directions that fade.
+  auto z = step_.head(taken);
+  for (Index i = 0; i < t; ++i) wanted_(i) *= scale_(i);
+  const auto c = coefficients_.topLeftCorner(t, taken);
+  auto normal = normal_.topLeftCorner(taken, taken);
+  for (Index j = 0; j < taken; ++j) {
+    for (Index i = 0; i < j; ++i) normal(i, j) = 0;
+    for (Index i = j; i < taken; ++i) normal(i, j) = c.col(i).dot(c.col(j));
+    normal(j, j) += fading_(j);
+    z(j) = c.col(j).dot(wanted_.head(t));
+  }
+  if (!Cholesky(normal, 0.0)) return false;
+  SolveLower(normal, z);
+  SolveLowerTransposed(normal, z);
+  for (Index j = 0; j < taken; ++j) u += basis_.col(before + j).head(rank_) * z(j);
+  return true;
+}
+
+Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
+  for (Index i = 0; i < t; ++i) {
+    auto row = rows_.col(i).head(rank_);
+    const double length = row.norm();
+    scale_(i) = length > 0 ? 1 / length : 0;
+    row *= scale_(i);
+    *complete &= length > 0;
+    RemoveBasis(basis_size_, row);
+  }
+  Index taken = 0;
+  for (; basis_size_ < rank_ && taken < t; ++taken) {
+    Index next = 0;
+    double most = -1;
+    for (Index i = 0; i < t; ++i) {
+      const double left = rows_.col(i).head(rank_).squaredNorm();
+      if (left > most) {
+        most = left;
+        next = i;
+      }
+    }
+    const double left = std::sqrt(most);
+    if (!(left > kNothingLeft)) break;
+    auto direction = basis_.col(basis_size_).head(rank_);
+    direction = rows_.col(next).head(rank_) / left;
+    // Taken out twice: what rounding left of the basis is so much longer now.
+    RemoveBasis(basis_size_, direction);
+    direction.normalize();
+    ++basis_size_;
+    for (Index i = 0; i < t; ++i) {
+      auto row = rows_.col(i).head(rank_);
+      const double share = direction.dot(row);
+      coefficients_(i, taken) = share;
+      row -= direction * share;
+    }
+    const double faded = std::min(1.0, left / kFading);
+    fading_(taken) = kFading * kFading * (1 - faded * faded);
+    *complete &= faded == 1;
+    num_fading_ += faded == 1 ? 0 : 1;
+  }
+  *complete &= taken == t;
+  return taken;
+}
+
+void TaskHierarchy::RemoveBasis(Index directions, Eigen::Ref<Eigen::VectorXd> vector) const {
+  for (int pass = 0; pass < 2; ++pass) {
+    for (Index j = 0; j < directions; ++j) {
+      const auto direction = basis_.col(j).head(rank_);
+      vector -= direction * direction.dot(vector);
+    }
+  }
+}
+
+void TaskHierarchy::ProjectIntoNullSpace(Eigen::Ref<Eigen::VectorXd> torque) const {
+  if (num_levels_ == 1) {
+    first_.ProjectIntoNullSpace(torque);
+    return;
+  }
+  StackVector<Eigen::Dynamic> u(rank_);
+  contact_->ReduceTorque(torque, u);
+  RemoveBasis(basis_size_, u);
+  contact_->ExpandTorque(u, torque);
+}
+
+}  // namespace poise::balance

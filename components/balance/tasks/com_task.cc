@@ -1,0 +1,42 @@
+// The COM's position.
+#include "components/balance/tasks/task.h"
+
+namespace poise::balance {
+namespace {
+
+class ComTask : public Task {
+ public:
+  ComTask(const TaskGains& gains, std::vector<int> rows) : gains_(gains), rows_(std::move(rows)) {}
+
+  int num_rows() const override { return static_cast<int>(rows_.size()); }
+
+  void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
+    const robot::RobotData& data = state.data;
+    for (int i = 0; i < num_rows(); ++i) {
+      const int axis = rows_[static_cast<size_t>(i)];
+      rows->jacobian.row(i) = data.com_jacobian.row(axis);
+      rows->bias_acceleration[i] = data.com_bias_acceleration[axis];
+      rows->acceleration[i] =
+          PdAcceleration(gains_, target.acceleration[axis], target.position[axis] - data.com[axis],
+                         target.velocity[axis] - data.com_velocity[axis]);
+    }
+  }
+
+  void Hold(const TaskState& state, TaskTarget* target) const override {
+    target->position = state.data.com;
+    target->velocity.setZero();
+    target->acceleration.setZero();
+  }
+
+ private:
+  TaskGains gains_;
+  std::vector<int> rows_;
+};
+
+}  // namespace
+
+std::unique_ptr<Task> MakeComTask(const TaskSpec& spec, const robot::RobotModel&) {
+  return std::make_unique<ComTask>(spec.gains, SelectedRows(spec.axes, kX, 3));
+}
+
+}  // namespace poise::balance

@@ -1,0 +1,108 @@
+// Tasks of the operational space (13): what a robot shall accelerate, and how.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "components/balance/contact_dynamics.h"
+#include "components/robot/dynamics.h"
+
+namespace poise::balance {
+
+struct TaskGains {
+  double kp = 0;  ///< 1/s²
+  double kd = 0;  ///< 1/s
+};
+
+/// Rows of a task that has six: translation, then rotation. A type of three has one half of them.
+enum Axis { kX, kY, kZ, kTurnX, kTurnY, kTurnZ };
+/// Axes that a task is to control, in the world's directions; all false: all that its type has.
+using AxisSelection = std::array<bool, 6>;
+
+/// Where a task is to be, world frame. A type reads what it is about and leaves the rest.
+struct TaskTarget {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();              ///< m
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();              ///< m/s
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< m/s²
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< frame to world
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s
+  Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s²
+  Eigen::VectorXd joint_position;  ///< rad, of all joints, in their order
+  Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();       ///< kg·m²/s, about the COM
+  Eigen::Vector3d angular_momentum_rate = Eigen::Vector3d::Zero();  ///< kg·m²/s²
+};
+
+/// One state; `data` must hold its kinematics, feet and dynamics.
+struct TaskState {
+  const robot::RobotModel& model;
+  const robot::RobotState& state;
+  const robot::RobotData& data;
+};
+
+/// Rows of ẍ = J q̈ + J̇ q̇ and the f* that ẍ shall be; a task fills its own.
+struct TaskRows {
+  Eigen::Ref<Eigen::MatrixXd> jacobian;           ///< J, t×n; zero when a task gets it
+  Eigen::Ref<Eigen::VectorXd> bias_acceleration;  ///< J̇ q̇, t×1
+  Eigen::Ref<Eigen::VectorXd> acceleration;       ///< f*, t×1: (25), the reference's fed forward
+};
+
+/// A kind of motion with its gains. Immutable after construction; no method allocates.
+class Task {
+ public:
+  virtual ~Task() = default;
+  virtual int num_rows() const = 0;
+  /// Fills `rows`, which has num_rows() rows.
+  virtual void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const = 0;
+  /// The target at which the task, at this state, has no error and is at rest.
+  virtual void Hold(const TaskState& state, TaskTarget* target) const = 0;
+};
+
+/// What a task is made of. Fields that its type has no use for must be left as they are.
+struct TaskSpec {
+  std::string type;  ///< as TaskTypes() names it
+  TaskGains gains;
+  AxisSelection axes{};
+  std::string link;  ///< URDF link; empty: the link of the body task
+  int foot = -1;     ///< the sole of this foot in place of a link; right: 0
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< m, in the frame of link or sole
+  std::vector<std::string> joints;                  ///< empty: all
+};
+
+/// Makes a task; throws std::invalid_argument, "field: what is wrong with it".
+using MakeTask = std::unique_ptr<Task> (*)(const TaskSpec& spec, const robot::RobotModel& model);
+
+struct TaskType {
+  std::string_view name;  ///< of the file without `_task.cc`
+  MakeTask make;
+};
+
+/// A file NAME_task.cc of this folder that defines MakeNameTask (MakeTask) is a type of its own.
+const std::vector<TaskType>& TaskTypes();
+
+/// By `spec.type` from `types`; throws std::invalid_argument for one that is not there.
+std::unique_ptr<Task> CreateTask(const TaskSpec& spec, const robot::RobotModel& model,
+                                 const std::vector<TaskType>& types = TaskTypes());
+
+// For types.
+
+/// Smallest rotation vector from `actual` to `desired`, rad, in the axes both are given in.
+Eigen::Vector3d OrientationError(const Eigen::Matrix3d& desired, const Eigen::Matrix3d& actual);
+
+/// Rows that `axes` selects of those from `first` to first + count; all when none is selected.
+/// Throws std::invalid_argument for an axis outside of them.
+std::vector<int> SelectedRows(const AxisSelection& axes, int first, int count);
+
+/// Frame that `spec` names by link or foot, moved to its point. Throws std::invalid_argument.
+robot::Frame TaskFrame(const TaskSpec& spec, const robot::RobotModel& model);
+
+/// f* of one axis: a_d + (k_p e + k_d ė).
+inline double PdAcceleration(const TaskGains& gains, double acceleration, double error,
+                             double velocity_error) {
+  return acceleration + (gains.kp * error + gains.kd * velocity_error);
+}
+
+}  // namespace poise::balance
