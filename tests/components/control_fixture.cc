@@ -2,6 +2,10 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <regex>
+#include <stdexcept>
 
 #include "components/robot/posture.h"
 
@@ -12,9 +16,15 @@ Tick TickAt(int64_t index) {
   return {.index = index, .utime = utime, .time = static_cast<double>(utime) * 1e-6};
 }
 
-ControlContext::ControlContext(robot::TestRobot robot)
-    : resources_{{"robot", robot::ReadWhole(robot::RobotPath(robot))},
-                 {"urdf", robot::ReadWhole(robot::UrdfPath(robot))}} {}
+ControlContext::ControlContext(const std::string& robot_path)
+    : resources_{{"robot", robot::ReadWhole(robot_path)}} {
+  std::smatch urdf;
+  if (!std::regex_search(resources_["robot"], urdf, std::regex("urdf: *\"([^\"]+)\""))) {
+    throw std::invalid_argument(robot_path + " names no URDF");
+  }
+  const auto folder = std::filesystem::path(robot_path).parent_path();
+  resources_["urdf"] = robot::ReadWhole((folder / urdf[1].str()).string());
+}
 
 void ControlContext::Configure(Component* component, const std::string& config, Wiring* wiring) {
   ComponentContext context;
@@ -29,10 +39,13 @@ void ControlContext::Configure(Component* component, const std::string& config, 
 robot::RobotState StandingState(const robot::RobotModel& model) {
   robot::RobotState bent(model.num_joints());
   for (int j = 0; j < model.num_joints(); ++j) {
-    const std::string& name = model.joints()[static_cast<size_t>(j)].name;
-    const bool hip = name.find("hip_pitch") != std::string::npos;
+    std::string name;  // of any maker's spelling: L_HipPitch_Joint, left_hip_pitch
+    for (const char c : model.joints()[static_cast<size_t>(j)].name) {
+      if (c != '_') name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    const bool hip = name.find("hippitch") != std::string::npos;
     const bool knee = name.find("knee") != std::string::npos;
-    const bool ankle = name.find("ankle_pitch") != std::string::npos;
+    const bool ankle = name.find("anklepitch") != std::string::npos;
     bent.joint_position[j] = knee ? 0.7 : hip || ankle ? -0.35 : 0.0;
   }
   const robot::RobotData data = robot::Evaluate(model, bent);

@@ -31,7 +31,9 @@ Tick TickAt(int64_t index);
 /// What a run gives to its components.
 class ControlContext {
  public:
-  explicit ControlContext(robot::TestRobot robot);
+  explicit ControlContext(robot::TestRobot robot) : ControlContext(robot::RobotPath(robot)) {}
+  /// `robot_path`: a Robot file; its URDF lies beside it.
+  explicit ControlContext(const std::string& robot_path);
   /// Configures `component`; throws what it throws.
   void Configure(Component* component, const std::string& config, Wiring* wiring);
   SharedObjects* shared() { return &shared_; }

@@ -106,9 +106,9 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
   throw std::logic_error("the robot cannot sway as these tests ask of it");
 }
 
-ControlTick::ControlTick(robot::TestRobot robot, const Contacts& in_contact,
+ControlTick::ControlTick(const std::string& robot_path, const Contacts& in_contact,
                          const std::string& estimator)
-    : context_(robot),
+    : context_(robot_path),
       estimator_(&context_, estimator),
       planner_(&context_, std::string("phase { support: ") +
                               (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }"),

@@ -27,7 +27,10 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
 class ControlTick {
  public:
   /// `estimator`: StateEstimatorConfig.
-  ControlTick(robot::TestRobot robot, const Contacts& in_contact,
+  ControlTick(robot::TestRobot robot, const Contacts& in_contact, const std::string& estimator = "")
+      : ControlTick(robot::RobotPath(robot), in_contact, estimator) {}
+  /// `robot_path`: a Robot file.
+  ControlTick(const std::string& robot_path, const Contacts& in_contact,
               const std::string& estimator = "");
 
   void Estimate(const robot_sensors_t& sensors, const Tick& tick);
