@@ -9,6 +9,7 @@
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/ethercat/socket_link.h"
 #include "hw_bridge/hw_bridge_type.h"
+#include "hw_bridge/robot_thresholds.h"
 #include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/units.h"
 
@@ -37,21 +38,25 @@ void Validate(const HwBridgeConfig& config) {
           "must be above 0 and at most 1");
   Require(config.damping_after_cycles() >= 0, "damping_after_cycles", "must not be negative");
   Require(config.stop_after_cycles() >= 0, "stop_after_cycles", "must not be negative");
-  RequireAmount(config.damping(), "damping", "N·m·s/rad");
+  if (config.has_damping()) RequireAmount(config.damping(), "damping", "N·m·s/rad");
   Require(config.stop_ramp() >= 0 && config.stop_ramp() <= 10, "stop_ramp",
           "must be between 0 and 10 s");
   RequirePositive(config.velocity_cutoff(), "velocity_cutoff", "Hz");
   Require(config.hold_time() >= 0 && config.hold_time() <= 60, "hold_time",
           "must be between 0 and 60 s");
-  RequireAmount(config.hold_stiffness(), "hold_stiffness", "N·m/rad");
-  RequireAmount(config.hold_damping(), "hold_damping", "N·m·s/rad");
+  if (config.has_hold_stiffness()) {
+    RequireAmount(config.hold_stiffness(), "hold_stiffness", "N·m/rad");
+  }
+  if (config.has_hold_damping()) {
+    RequireAmount(config.hold_damping(), "hold_damping", "N·m·s/rad");
+  }
   Require(config.resume_time() >= 0 && config.resume_time() <= 10, "resume_time",
           "must be between 0 and 10 s");
   Require(config.first_command_ramp() >= 0 && config.first_command_ramp() <= 60,
           "first_command_ramp", "must be between 0 and 60 s");
   RequirePositive(config.start_velocity(), "start_velocity", "rad/s");
   Require(config.enable_cycles() >= 1, "enable_cycles", "must be at least 1");
-  RequirePositive(config.slew_limit(), "slew_limit", "N·m/s");
+  if (config.has_slew_limit()) RequirePositive(config.slew_limit(), "slew_limit", "N·m/s");
   RequirePositive(config.overload_time(), "overload_time", "s");
   RequireAmount(config.soft_range(), "soft_range", "rad");
   RequireAmount(config.position_margin(), "position_margin", "rad");
@@ -60,9 +65,9 @@ void Validate(const HwBridgeConfig& config) {
           "must be above 0 and at most half a turn, in rad");
   RequirePositive(config.tilt_time(), "tilt_time", "s");
   RequirePositive(config.frozen_time(), "frozen_time", "s");
-  RequirePositive(config.frozen_torque(), "frozen_torque", "N·m");
+  if (config.has_frozen_torque()) RequirePositive(config.frozen_torque(), "frozen_torque", "N·m");
   Require(config.torque_error_cycles() >= 1, "torque_error_cycles", "must be at least 1");
-  RequirePositive(config.torque_error(), "torque_error", "N·m");
+  if (config.has_torque_error()) RequirePositive(config.torque_error(), "torque_error", "N·m");
   RequirePositive(config.overrun_lateness(), "overrun_lateness", "periods");
   Require(config.overruns_in_a_row() >= 1, "overruns_in_a_row", "must be at least 1");
   Require(config.overruns_in_100() >= 1, "overruns_in_100", "must be at least 1");
@@ -77,8 +82,14 @@ int Cycles(double seconds, double period) {
   return static_cast<int>(std::ceil(seconds / period - 1e-9));
 }
 
+/// `value` for every joint where it is given.
+std::vector<double> ByJoint(bool given, double value, const std::vector<double>& derived) {
+  return given ? std::vector<double>(derived.size(), value) : derived;
+}
+
 FeedbackMonitorConfig MakeMonitorConfig(const HwBridgeConfig& config,
-                                        const robot::RobotModel& model, double period) {
+                                        const robot::RobotModel& model,
+                                        const RobotThresholds& derived, double period) {
   FeedbackMonitorConfig result;
   for (const robot::Joint& joint : model.joints()) {
     result.velocity_limit.push_back(joint.velocity_limit);
@@ -87,9 +98,10 @@ FeedbackMonitorConfig MakeMonitorConfig(const HwBridgeConfig& config,
   result.num_feet = static_cast<int>(model.feet().size());
   result.period = period;
   result.frozen_cycles = std::max(1, Cycles(config.frozen_time(), period));
-  result.frozen_torque = config.frozen_torque();
+  result.frozen_torque =
+      config.has_frozen_torque() ? config.frozen_torque() : derived.frozen_torque;
   result.torque_error_cycles = config.torque_error_cycles();
-  result.torque_error = config.torque_error();
+  result.torque_error = config.has_torque_error() ? config.torque_error() : derived.torque_error;
   return result;
 }
 
@@ -118,7 +130,8 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
     result.lower.push_back(joint.lower);
     result.upper.push_back(joint.upper);
   }
-  result.monitor = MakeMonitorConfig(config, model, period);
+  const RobotThresholds derived = DeriveThresholds(model);
+  result.monitor = MakeMonitorConfig(config, model, derived, period);
   result.soft_range = config.soft_range();
   result.position_margin = config.position_margin();
   result.velocity_trip = config.velocity_trip();
@@ -130,16 +143,18 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
   result.first_command_ramp = Cycles(config.first_command_ramp(), period);
   result.damping_after_cycles = config.damping_after_cycles();
   result.stop_after_cycles = config.stop_after_cycles();
-  result.damping = config.damping();
+  result.damping = ByJoint(config.has_damping(), config.damping(), derived.damping);
   result.stop_ramp = config.stop_ramp();
   if (config.on_lost_command() == HwBridgeConfig::HOLD) {
     result.hold_cycles = Cycles(config.hold_time(), period);
   }
   result.hold_before_command = config.hold_before_command();
-  result.hold_stiffness = config.hold_stiffness();
-  result.hold_damping = config.hold_damping();
+  result.hold_stiffness =
+      ByJoint(config.has_hold_stiffness(), config.hold_stiffness(), derived.hold_stiffness);
+  result.hold_damping =
+      ByJoint(config.has_hold_damping(), config.hold_damping(), derived.hold_damping);
   result.resume_cycles = Cycles(config.resume_time(), period);
-  result.slew_limit = config.slew_limit();
+  result.slew_limit = config.has_slew_limit() ? config.slew_limit() : derived.slew_limit;
   result.overload_time = config.overload_time();
   result.overrun_lateness = config.overrun_lateness() * period;
   result.overruns_in_a_row = config.overruns_in_a_row();
@@ -398,8 +413,19 @@ void HwBridge::Actuate(const Tick& tick) {
 }
 
 ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
-  return {"hw_bridge", "drives and sensors: units, limits, safety states, e-stop",
-          [stop_signal] { return std::make_unique<HwBridge>(stop_signal); }};
+  return {"hw_bridge",
+          "drives and sensors: units, limits, safety states, e-stop",
+          [stop_signal] { return std::make_unique<HwBridge>(stop_signal); },
+          {.realtime =
+               {// A process that dies is replaced: worth waiting for.
+                {"hw_bridge.on_lost_command", "hw_bridge.on_lost_command=HOLD"},
+                // Until the controller follows, the robot's joints are held.
+                {"hw_bridge.hold_before_command", "hw_bridge.hold_before_command=true"}},
+           .drive_link = {.drives = false,
+                          .link = "hw_bridge.ethercat.link",
+                          .simulated_time = "hw_bridge.ethercat.simulated_time",
+                          .profile = "hw_bridge.ethercat.master.profile",
+                          .capture = "hw_bridge.ethercat.capture"}}};
 }
 
 }  // namespace poise

@@ -295,7 +295,7 @@ void Supervisor::UpdateLoss(int64_t age) {
 }
 
 double Supervisor::DampingTorque(size_t joint, double share) const {
-  return monitor_.updated() ? -share * config_.damping * joint_velocity()[joint] : 0.0;
+  return monitor_.updated() ? -share * config_.damping[joint] * joint_velocity()[joint] : 0.0;
 }
 
 double Supervisor::WantedTorque(size_t joint) const {
@@ -316,7 +316,8 @@ double Supervisor::WantedTorque(size_t joint) const {
                             static_cast<double>(monitor_.counts()[joint])) /
                            CountsPerRadian(config_.motors[joint]);
       const double rate = monitor_.updated() ? joint_velocity()[joint] : 0.0;
-      return hold_torque_[joint] + config_.hold_stiffness * error - config_.hold_damping * rate;
+      return hold_torque_[joint] + config_.hold_stiffness[joint] * error -
+             config_.hold_damping[joint] * rate;
     }
     case Status::STATE_DAMPING:
       return DampingTorque(joint, 1);

@@ -41,14 +41,14 @@ struct SupervisorConfig {
   int damping_after_cycles =
       3;                      ///< age of the last accepted command beyond which it is not followed
   int stop_after_cycles = 9;  ///< cycles of damping before the bridge stops
-  double damping = 20;        ///< N·m·s/rad at the joint
-  double stop_ramp = 0.1;     ///< s
+  std::vector<double> damping;  ///< N·m·s/rad, by joint
+  double stop_ramp = 0.1;       ///< s
   /// Cycles of holding between the last command's end and damping; 0: none.
   int hold_cycles = 0;
-  bool hold_before_command = false;  ///< hold from the start until the first command, without end
-  double hold_stiffness = 0;         ///< N·m/rad
-  double hold_damping = 0;           ///< N·m·s/rad
-  int resume_cycles = 0;             ///< cycles in which a command that is back is faded in
+  bool hold_before_command = false;    ///< hold from the start until the first command, without end
+  std::vector<double> hold_stiffness;  ///< N·m/rad, by joint
+  std::vector<double> hold_damping;    ///< N·m·s/rad, by joint
+  int resume_cycles = 0;               ///< cycles in which a command that is back is faded in
 
   double slew_limit = std::numeric_limits<double>::infinity();  ///< N·m/s, of a followed command
   double overload_time = 2;                                     ///< s at the peak current

@@ -4,12 +4,14 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
 
 #include "components/framework/configuration.h"
 #include "components/robot/dynamics.h"
+#include "sim/config_check.h"
 
 namespace poise {
 namespace {
@@ -52,7 +54,7 @@ void StartOde() {
     dSetMessageHandler(KeepMessage);
   });
   if (dCheckConfiguration("ODE_double_precision") == 0) {
-    throw ConfigError("sim_ode: the ODE library is built in single precision; install libode-dev");
+    throw ConfigError("ode: the ODE library is built in single precision; install libode-dev");
   }
 }
 
@@ -66,7 +68,23 @@ void Turn(dBodyID body, const Matrix3d& r) {
 
 }  // namespace
 
-OdeWorld::OdeWorld(const robot::RobotModel& model, int max_contacts) : model_(model) {
+Softness SpringDamper(double k, double d, double h) {
+  return {h * k / (h * k + d), 1 / (h * k + d)};
+}
+
+WorldFactory OdeWorlds(const OdeConfig& config) {
+  if (!(config.contact_erp() > 0 && config.contact_erp() <= 1)) {
+    throw ConfigError("contact_erp", "must be greater than 0 and at most 1");
+  }
+  RequirePositive(config.contact_cfm(), "contact_cfm");
+  return [config](const robot::RobotModel& model, int max_contacts, double step) {
+    return std::make_unique<OdeWorld>(config, model, max_contacts, step);
+  };
+}
+
+OdeWorld::OdeWorld(const OdeConfig& config, const robot::RobotModel& model, int max_contacts,
+                   double step)
+    : model_(model), step_(step), ground_{config.contact_erp(), config.contact_cfm()} {
   StartOde();
   world_ = dWorldCreate();
   contacts_ = dJointGroupCreate(0);
@@ -197,7 +215,7 @@ bool OdeWorld::Finite() const {
   return std::isfinite(sum);
 }
 
-void OdeWorld::SetDrivetrain(int joint, const Drivetrain::Row& row) {
+void OdeWorld::SetJoint(int joint, const JointRow& row) {
   const dJointID hinge = hinges_[static_cast<size_t>(joint)];
   dJointAddHingeTorque(hinge, row.torque);
   // ODE divides cfm by the step, so the row it solves is J v' + cfm lambda = velocity.
@@ -211,29 +229,31 @@ void OdeWorld::AddForce(int body, const Vector3d& force, const Vector3d& point) 
                      point.y(), point.z());
 }
 
-void OdeWorld::AddContact(int body, const Vector3d& position, const Vector3d& normal, double depth,
-                          double velocity, const Terrain::Material& material) {
+void OdeWorld::AddContact(const TerrainContact& at) {
   if (num_contacts_ == feedback_.size()) return;
+  const ContactMaterial& material = at.material;
+  const Softness softness =
+      material.stiffness > 0 ? SpringDamper(material.stiffness, material.damping, step_) : ground_;
   dContact contact{};
   contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM | dContactMotionN;
-  contact.surface.motionN = velocity;
+  contact.surface.motionN = at.velocity;
   contact.surface.mu = material.friction;
-  contact.surface.soft_erp = material.erp;
-  contact.surface.soft_cfm = material.cfm;
+  contact.surface.soft_erp = softness.erp;
+  contact.surface.soft_cfm = softness.cfm;
   for (int i = 0; i < 3; ++i) {
-    contact.geom.pos[i] = position[i];
-    contact.geom.normal[i] = normal[i];
+    contact.geom.pos[i] = at.position[i];
+    contact.geom.normal[i] = at.normal[i];
   }
-  contact.geom.depth = depth;
+  contact.geom.depth = at.depth;
   const dJointID joint = dJointCreateContact(world_, contacts_, &contact);
-  dJointAttach(joint, bodies_[static_cast<size_t>(body)], nullptr);
+  dJointAttach(joint, bodies_[static_cast<size_t>(at.body)], nullptr);
   dJointSetFeedback(joint, &feedback_[num_contacts_++]);
 }
 
-bool OdeWorld::Step(double h) {
+bool OdeWorld::Step() {
   ode_message[0] = '\0';
   try {
-    if (dWorldStep(world_, h) == 0) std::snprintf(message_, sizeof message_, "out of memory");
+    if (dWorldStep(world_, step_) == 0) std::snprintf(message_, sizeof message_, "out of memory");
   } catch (const OdeError& error) {
     std::snprintf(message_, sizeof message_, "%s", error.what());
     return false;

@@ -1,4 +1,4 @@
-// A RobotModel as bodies and hinges in an ODE world: the only file that talks to ODE.
+// The simulated robot's world in ODE: the only file that talks to ODE.
 #pragma once
 
 #include <ode/ode.h>
@@ -9,59 +9,54 @@
 #include <vector>
 
 #include "components/robot/robot_model.h"
-#include "sim_ode/drivetrain.h"
-#include "sim_ode/terrain.h"
+#include "sim/world.h"
+#include "sim_ode/sim_ode.pb.h"
 
 namespace poise {
 
-/// Owns a world without geometry: the caller finds the contacts. ODE's dWorldStep (direct solver)
-/// is used throughout; it is first order in the step and repeatable bit for bit. No method here
-/// allocates; dWorldStep itself does.
-class OdeWorld {
+/// How ODE softens a contact: its row is J v' + cfm lambda = -(erp / step) depth.
+struct Softness {
+  double erp;  ///< share of the penetration removed per step
+  double cfm;  ///< m/(N·s)
+};
+
+/// A spring `k` (N/m) and a damper `d` (N·s/m) under implicit Euler with step `h` (s): ODE's
+/// manual, "ERP and CFM".
+Softness SpringDamper(double k, double d, double h);
+
+/// ODE's dWorldStep (direct solver) is used throughout; it is first order in the step and
+/// repeatable bit for bit. It allocates.
+class OdeWorld : public World {
  public:
-  /// Room for `max_contacts` contacts in a step. Throws ConfigError when ODE was built in single
-  /// precision.
-  OdeWorld(const robot::RobotModel& model, int max_contacts);
-  ~OdeWorld();
+  /// See WorldFactory. Throws ConfigError when ODE was built in single precision.
+  OdeWorld(const OdeConfig& config, const robot::RobotModel& model, int max_contacts, double step);
+  ~OdeWorld() override;
   OdeWorld(const OdeWorld&) = delete;
   OdeWorld& operator=(const OdeWorld&) = delete;
 
-  void SetState(const robot::RobotState& state);
-  /// Joint positions are counted on over full turns. `state` must be sized.
-  void GetState(robot::RobotState* state) const;
+  void SetState(const robot::RobotState& state) override;
+  void GetState(robot::RobotState* state) const override;
+  double joint_position(int joint) const override;
+  double joint_velocity(int joint) const override;
+  Eigen::Vector3d com_position(int body) const override;
+  Eigen::Vector3d com_velocity(int body) const override;
+  Eigen::Matrix3d rotation(int body) const override;
+  Eigen::Vector3d angular_velocity(int body) const override;
+  Eigen::Isometry3d pose(int body) const override;
+  bool Finite() const override;
 
-  double joint_position(int joint) const;            ///< rad, multi-turn
-  double joint_velocity(int joint) const;            ///< rad/s
-  Eigen::Vector3d com_position(int body) const;      ///< m, world
-  Eigen::Vector3d com_velocity(int body) const;      ///< m/s
-  Eigen::Matrix3d rotation(int body) const;          ///< body to world
-  Eigen::Vector3d angular_velocity(int body) const;  ///< rad/s, world axes
-  /// Body frame (not COM) in the world.
-  Eigen::Isometry3d pose(int body) const;
-  /// False when any position or velocity is not finite.
-  bool Finite() const;
-
-  // Before each step:
-  void SetDrivetrain(int joint, const Drivetrain::Row& row);
-  void AddForce(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point);  ///< world
-  /// A contact at `position` (world) that pushes `body` along `normal`; `depth` in m,
-  /// `velocity` in m/s of the surface along the normal.
-  void AddContact(int body, const Eigen::Vector3d& position, const Eigen::Vector3d& normal,
-                  double depth, double velocity, const Terrain::Material& material);
-
-  /// Steps by `h` s; contacts, torques and forces are then used up. False when ODE had something to
-  /// say: see message().
-  bool Step(double h);
-  /// ODE's first complaint, empty when there was none.
-  std::string_view message() const { return message_; }
-
-  // After a step: force (N) and moment (N·m) about the body's COM at the step's start, world axes,
-  // of contact `index` in the order of the AddContact calls.
-  Eigen::Vector3d contact_force(int index) const;
-  Eigen::Vector3d contact_moment(int index) const;
+  void SetJoint(int joint, const JointRow& row) override;
+  void AddForce(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point) override;
+  void AddContact(const TerrainContact& contact) override;
+  bool Step() override;
+  std::string_view message() const override { return message_; }
+  Eigen::Vector3d contact_force(int index) const override;
+  Eigen::Vector3d contact_moment(int index) const override;
 
  private:
   const robot::RobotModel& model_;
+  double step_;
+  Softness ground_;  // of contacts that are rigid
   dWorldID world_;
   dJointGroupID contacts_;
   std::vector<dBodyID> bodies_;
@@ -72,5 +67,8 @@ class OdeWorld {
   size_t num_contacts_ = 0;
   char message_[160] = "";
 };
+
+/// Worlds in ODE. Throws ConfigError with the path inside OdeConfig: a value out of range.
+WorldFactory OdeWorlds(const OdeConfig& config);
 
 }  // namespace poise

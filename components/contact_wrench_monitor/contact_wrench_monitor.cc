@@ -271,8 +271,10 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
 }
 
 ComponentType ContactWrenchMonitorType() {
-  return {"contact_wrench_monitor", "expected wrenches and CoP control in the null space (39)",
-          [] { return std::make_unique<ContactWrenchMonitor>(); }};
+  return {"contact_wrench_monitor",
+          "expected wrenches and CoP control in the null space (39)",
+          [] { return std::make_unique<ContactWrenchMonitor>(); },
+          {.parts = {{"balancing", "contact_wrench_monitor.balancing"}}}};
 }
 
 }  // namespace poise

@@ -11,6 +11,7 @@
 #include <typeindex>
 #include <vector>
 
+#include "components/framework/component_traits.h"
 #include "components/framework/configuration.h"
 #include "components/framework/ports.h"
 #include "components/framework/state_archive.h"
@@ -64,7 +65,7 @@ struct ComponentContext {
   std::string config_text;  ///< protobuf text of the component's own configuration message
   double tick_period = 0;   ///< s
   int64_t lead_ticks = 0;   ///< before the scenario's time 0
-  uint64_t seed = 0;        ///< of this instance: the run's seed mixed with `name`
+  uint64_t seed = 0;  ///< of this instance: the run's seed mixed with `name`, or its seed_name
   const std::map<std::string, std::string>* resources = nullptr;  ///< "robot", "urdf": text by name
   SharedObjects* shared = nullptr;
 
@@ -164,12 +165,16 @@ using ComponentFactory = std::function<std::unique_ptr<Component>()>;
 
 class ComponentRegistry {
  public:
-  void Add(std::string type, std::string summary, ComponentFactory factory);
+  void Add(std::string type, std::string summary, ComponentFactory factory,
+           ComponentTraits traits = {});
   /// nullptr when there is no such type.
   const ComponentFactory* Find(const std::string& type) const;
+  /// Those of a type without any when there is no such type.
+  const ComponentTraits& TraitsOf(const std::string& type) const;
   struct Entry {
     std::string summary;
     ComponentFactory factory;
+    ComponentTraits traits;
   };
   const std::map<std::string, Entry>& entries() const { return entries_; }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "components/framework/component.h"
+#include "components/framework/component_traits.h"
 
 namespace poise {
 
@@ -13,6 +14,7 @@ struct ComponentType {
   std::string name;     ///< of the type and of its program
   std::string summary;  ///< a line for `poise list components`
   ComponentFactory make;
+  ComponentTraits traits = {};
 };
 
 }  // namespace poise

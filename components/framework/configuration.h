@@ -45,8 +45,8 @@ std::string ReadFile(const std::string& path);
 int LocateField(std::string_view text, std::string_view field,
                 const google::protobuf::Message& prototype);
 
-/// Sets one field by dotted path from text ("sim_ode.push[0].peak", "120"); an empty text clears a
-/// list or a group of fields ("sim_ode.push", ""). Throws ConfigError naming the path, the nearest
+/// Sets one field by dotted path from text ("sim.push[0].peak", "120"); an empty text clears a
+/// list or a group of fields ("sim.push", ""). Throws ConfigError naming the path, the nearest
 /// valid names and the expected type. An index may be that of an element or one past the end.
 void SetField(google::protobuf::Message* message, std::string_view path, std::string_view value);
 

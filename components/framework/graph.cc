@@ -351,7 +351,8 @@ void FillCounts(const GraphPlan& plan, Graph* graph) {
 ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
                                        const ComponentFactory& factory, SharedObjects* shared) {
   ConfiguredComponent result;
-  result.name = spec.graph().component(index).name();
+  const ComponentInstance& instance = spec.graph().component(index);
+  result.name = instance.name();
   result.component = factory();
   ComponentContext context;
   context.name = result.name;
@@ -360,7 +361,8 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
   }
   context.tick_period = spec.tick_period();
   context.lead_ticks = spec.lead_ticks();
-  context.seed = InstanceSeed(spec.seed(), result.name);
+  context.seed =
+      InstanceSeed(spec.seed(), instance.has_seed_name() ? instance.seed_name() : result.name);
   std::map<std::string, std::string> resources;
   for (const Resource& resource : spec.resource()) resources[resource.name()] = resource.text();
   context.resources = &resources;

@@ -81,6 +81,19 @@ Eigen::Vector3d GetVector3(const double (&array)[3]) {
   return Eigen::Map<const Eigen::Vector3d>(array);
 }
 
+ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
+                                double width_share) {
+  const robot::FootModel &right = model.feet()[0], &left = model.feet()[1];
+  constexpr double kLengthShare = 0.8;
+  if (!config.has_half_length()) {
+    config.set_half_length(kLengthShare * std::min(right.length, left.length) / 2);
+  }
+  if (!config.has_half_width()) {
+    config.set_half_width(width_share * std::min(right.width, left.width) / 2);
+  }
+  return config;
+}
+
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field) {
   balance::ContactLimits limits;
   limits.half_length =

@@ -31,6 +31,11 @@ void SetMargins(const balance::ContactMargins& margins, contact_margins_t* messa
 void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]);
 Eigen::Vector3d GetVector3(const double (&array)[3]);
 
+/// `config`, with four fifths of the smaller sole's half length and `width_share` of its half width
+/// where it gives none.
+ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
+                                double width_share);
+
 /// Limits of a contact patch. Throws ConfigError "<field>.half_length" ...: missing, not positive
 /// or not finite.
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field);

@@ -32,8 +32,12 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<RedistributorConfig>();
   redistribution_ = config.redistribution();
   transition_ = config.transition();
-  double_support_ = ReadLimits(config.double_support(), "double_support");
-  single_support_ = ReadLimits(config.single_support(), "single_support");
+  model_ = LoadRobot(context);
+  // A foot that shares the load is kept further from its inner edge, towards which it would tip.
+  double_support_ =
+      ReadLimits(WithinSoles(config.double_support(), *model_, 2.0 / 3), "double_support");
+  single_support_ =
+      ReadLimits(WithinSoles(config.single_support(), *model_, 0.8), "single_support");
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
   CheckRatio(eta_min_, "eta_min");
@@ -57,7 +61,6 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
     throw ConfigError("feedback.enabled", "needs redistribution: true");
   }
 
-  model_ = LoadRobot(context);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   state_ = robot::RobotState(model_->num_joints());
@@ -267,8 +270,11 @@ void Redistributor::Report(const Wrenches& wrench, const balance::ContactLimits&
 }
 
 ComponentType RedistributorType() {
-  return {"redistributor", "ratio eta, contact transitions and the joint torque (53)",
-          [] { return std::make_unique<Redistributor>(); }};
+  return {"redistributor",
+          "ratio eta, contact transitions and the joint torque (53)",
+          [] { return std::make_unique<Redistributor>(); },
+          {.parts = {{"redistribution", "redistributor.redistribution"},
+                     {"transition", "redistributor.transition"}}}};
 }
 
 }  // namespace poise

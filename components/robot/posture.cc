@@ -230,4 +230,15 @@ RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal) {
                    ": move the COM or the feet, or start from another nominal posture");
 }
 
+double StandingHeight(const RobotModel& model) {
+  if (model.stance().com_height) return *model.stance().com_height;
+  RobotState state(model.num_joints());
+  state.joint_position = model.stance().joint_position;
+  RobotData data(model);
+  ComputeKinematics(model, state, &data);
+  ComputeFeet(model, &data);
+  ComputeDynamics(model, state, &data);
+  return data.com.z() - data.foot_pose[kRightFoot].translation().z();
+}
+
 }  // namespace poise::robot

@@ -23,4 +23,7 @@ struct PostureGoal {
 /// how much (tolerance 1e-8).
 RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
 
+/// m, of the COM above the soles in the robot's stance (RobotModel::stance).
+double StandingHeight(const RobotModel& model);
+
 }  // namespace poise::robot

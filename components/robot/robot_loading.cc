@@ -182,6 +182,48 @@ std::vector<FootModel> LoadFeet(const Robot& description, const UrdfTree& tree) 
   return feet;
 }
 
+StanceModel LoadStance(const Stance& stance, const UrdfTree& tree) {
+  StanceModel result;
+  result.joint_position = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tree.joints.size()));
+  for (int i = 0; i < stance.joint_size(); ++i) {
+    const std::string field = fmt::format("stance.joint[{}]", i);
+    const std::string& name = stance.joint(i).joint();
+    size_t j = 0;
+    while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
+    if (j == tree.joints.size()) {
+      throw RobotError(
+          fmt::format("{}: the URDF has no joint '{}' that moves: correct the name", field, name));
+    }
+    const double position = stance.joint(i).position();
+    if (!std::isfinite(position)) {
+      throw RobotError(fmt::format("{}.position is {}: it must be finite", field, position));
+    }
+    result.joint_position[static_cast<Eigen::Index>(j)] = position;
+  }
+  if (stance.has_com_height()) {
+    result.com_height = Positive(stance.com_height(), "stance.com_height");
+  }
+  if (stance.has_foot_spacing()) {
+    result.foot_spacing = Positive(stance.foot_spacing(), "stance.foot_spacing");
+  }
+  return result;
+}
+
+DriveTrainModel LoadDriveTrain(const DriveTrain& drive) {
+  const auto amount = [](double value, const char* name) {
+    return NotNegative(value, fmt::format("drive_train.{}", name));
+  };
+  DriveTrainModel result;
+  result.torque_lag = amount(drive.torque_lag(), "torque_lag");
+  result.current_resolution = amount(drive.current_resolution(), "current_resolution");
+  result.backlash = amount(drive.backlash(), "backlash");
+  result.gear_stiffness = amount(drive.gear_stiffness(), "gear_stiffness");
+  result.gear_damping = amount(drive.gear_damping(), "gear_damping");
+  result.link_encoder = drive.link_encoder();
+  result.sensor_delay = amount(drive.sensor_delay(), "sensor_delay");
+  return result;
+}
+
 }  // namespace
 
 RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
@@ -207,6 +249,9 @@ RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
       FindLink(tree, description.has_body_link() ? description.body_link() : tree.root_link,
                "body_link")
           .body;
+
+  model.stance_ = LoadStance(description.stance(), tree);
+  model.drive_train_ = LoadDriveTrain(description.drive_train());
 
   for (const auto& [link, place] : tree.links) {
     model.frames_.push_back({link, place.body, place.pose});

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -72,6 +73,24 @@ struct ImuModel {
   double gyro_noise = 0, gyro_bias = 0, accelerometer_noise = 0, accelerometer_bias = 0;
 };
 
+/// How the robot stands when nothing else is said.
+struct StanceModel {
+  Eigen::VectorXd joint_position;      ///< rad, by joint; 0 where the file says nothing
+  std::optional<double> com_height;    ///< m above the soles
+  std::optional<double> foot_spacing;  ///< m between the soles' centres in y
+};
+
+/// DriveTrain of robot.proto.
+struct DriveTrainModel {
+  double torque_lag = 0;          ///< s
+  double current_resolution = 0;  ///< A
+  double backlash = 0;            ///< rad at the joint
+  double gear_stiffness = 0;      ///< N·m/rad at the joint; 0: rigid
+  double gear_damping = 0;        ///< N·m·s/rad at the joint
+  bool link_encoder = false;
+  double sensor_delay = 0;  ///< s
+};
+
 inline constexpr int kRightFoot = 0;
 inline constexpr int kLeftFoot = 1;
 inline constexpr double kGravity = 9.80665;  ///< m/s², standard gravity, along -z of the world
@@ -131,6 +150,8 @@ class RobotModel {
   const std::vector<MotorModel>& motors() const { return motors_; }  ///< by joint index
   const std::vector<FootModel>& feet() const { return feet_; }       ///< right first
   const ImuModel& imu() const { return imu_; }
+  const StanceModel& stance() const { return stance_; }
+  const DriveTrainModel& drive_train() const { return drive_train_; }
   int body_task_body() const {
     return body_task_body_;
   }  ///< body whose orientation the body task controls
@@ -164,6 +185,8 @@ class RobotModel {
   std::vector<FootModel> feet_;
   std::vector<Frame> frames_;
   ImuModel imu_;
+  StanceModel stance_;
+  DriveTrainModel drive_train_;
   int body_task_body_ = 0;
   KinematicTree tree_;
   double total_mass_ = 0, force_noise_ = 0, moment_noise_ = 0;

@@ -51,7 +51,8 @@ BaseEstimatorConfig ReadAnchoredConfig(const StateEstimatorConfig& config) {
   return result;
 }
 
-InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config) {
+InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config,
+                                             const robot::DriveTrainModel& drive) {
   const InvariantEkfConfig& in = config.invariant_ekf();
   InvariantEstimatorConfig out;
   const auto read = [](const char* name, double value, double* field, bool zero = false) {
@@ -66,13 +67,16 @@ InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config)
   out.joint_velocity_cutoff = config.joint_velocity_cutoff();
   out.light_load = config.light_load();
   out.full_load = config.full_load();
-  read("sensor_delay", in.sensor_delay(), &out.sensor_delay, true);
+  read("sensor_delay", in.has_sensor_delay() ? in.sensor_delay() : drive.sensor_delay,
+       &out.sensor_delay, true);
   if (out.sensor_delay > kLongestDelay) {
     throw ConfigError("invariant_ekf.sensor_delay",
                       "must be at most 0.05 s: the motion is not known further ahead");
   }
   read("timing", in.timing(), &out.timing, true);
-  read("gear_stiffness", in.gear_stiffness(), &out.gear_stiffness, true);
+  const double stiffness = drive.link_encoder ? 0 : drive.gear_stiffness;  // the encoders see it
+  read("gear_stiffness", in.has_gear_stiffness() ? in.gear_stiffness() : stiffness,
+       &out.gear_stiffness, true);
   read("gear_stiffness_error", in.gear_stiffness_error(), &out.gear_stiffness_error, true);
   read("gyro_noise", in.gyro_noise(), &out.gyro_noise);
   read("accelerometer_noise", in.accelerometer_noise(), &out.accelerometer_noise);
@@ -109,8 +113,8 @@ Eigen::Vector2d CenterOfPressure(const wrench_t& wrench) {
 void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<StateEstimatorConfig>();
   const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
-  const InvariantEstimatorConfig invariant = ReadInvariantConfig(config);
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
+  const InvariantEstimatorConfig invariant = ReadInvariantConfig(config, model->drive_train());
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
@@ -216,8 +220,19 @@ void StateEstimator::PublishInvariant() {
 }
 
 ComponentType StateEstimatorType() {
-  return {"state_estimator", "floating base and joint velocities from IMU, encoders and feet",
-          [] { return std::make_unique<StateEstimator>(); }};
+  // The message counts the methods as the configuration does.
+  static_assert(int{estimator_status_t::METHOD_ANCHORED_FEET} ==
+                StateEstimatorConfig::ANCHORED_FEET);
+  static_assert(int{estimator_status_t::METHOD_INVARIANT_EKF} ==
+                StateEstimatorConfig::INVARIANT_EKF);
+  return {"state_estimator",
+          "floating base and joint velocities from IMU, encoders and feet",
+          [] { return std::make_unique<StateEstimator>(); },
+          // What it knows of the drive train.
+          {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
+                     "state_estimator.invariant_ekf.gear_stiffness=0"},
+           .methods = {"state_estimator.method=ANCHORED_FEET",
+                       "state_estimator.method=INVARIANT_EKF"}}};
 }
 
 }  // namespace poise

@@ -327,8 +327,14 @@ void DriveEmulator::Act(const Tick& tick) {
 }
 
 ComponentType DriveEmulatorType() {
-  return {"drive_emulator", "EtherCAT drives on the simulated robot's motors, with faults",
-          [] { return std::make_unique<DriveEmulator>(); }};
+  return {"drive_emulator",
+          "EtherCAT drives on the simulated robot's motors, with faults",
+          [] { return std::make_unique<DriveEmulator>(); },
+          {.drive_link = {.drives = true,
+                          .link = "drive_emulator.link",
+                          .simulated_time = "drive_emulator.simulated_time",
+                          .profile = {},
+                          .capture = {}}}};
 }
 
 }  // namespace poise

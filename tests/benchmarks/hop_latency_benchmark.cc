@@ -248,7 +248,7 @@ int Run(const std::string& program, double seconds, int rounds) {
     {
       ChildProcess run("poise",
                        {program, "run", "push_double_support", "--set",
-                        "sim_ode.push=", "--realtime", "--no-log", "--no-reference", "--quiet",
+                        "sim.push=", "--realtime", "--no-log", "--no-reference", "--quiet",
                         "--duration", fmt::format("{}", seconds + 3), "--out", folder.string()},
                        folder.string() + ".txt");
       const fs::path file = folder / "run_spec.pbtxt";

@@ -38,7 +38,7 @@ standing=$((faults / 2))
 seed=1
 while [ "$standing" -gt 0 ]; do
   count=$((standing < 10 ? standing : 10))
-  trial "$seed" "$count" --set sim_ode.push= --duration $((2 * count))
+  trial "$seed" "$count" --set sim.push= --duration $((2 * count))
   standing=$((standing - count)) seed=$((seed + 1))
 done
 push=$((faults - faults / 2))

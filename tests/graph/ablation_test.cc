@@ -60,23 +60,23 @@ TEST_F(AblationTest, AVariantIsTheScenarioWithItsFieldsSet) {
   const std::string file = deploy_.Scenario(
       "mine", std::string(kBase) +
                   "variant { name: \"hard\" description: \"A harder push\"\n"
-                  "  set: \"sim_ode.push[0].peak=90\" set: \"seed=5\" }\n"
+                  "  set: \"sim.push[0].peak=90\" set: \"seed=5\" }\n"
                   "variant { name: \"own\" check { metric: \"push_peak\" at_least: 50 } }\n");
   const std::string hard = Run("hard", "mine", {"--variant", "hard"});
   ExpectOutput("A harder push");
-  ExpectOutput("variant hard: sim_ode.push[0].peak=90, seed=5");
-  EXPECT_TRUE(Equal(hard, Run("set", "mine", {"--set", "sim_ode.push[0].peak=90", "--seed", "5"})));
+  ExpectOutput("variant hard: sim.push[0].peak=90, seed=5");
+  EXPECT_TRUE(Equal(hard, Run("set", "mine", {"--set", "sim.push[0].peak=90", "--seed", "5"})));
   EXPECT_FALSE(Equal(hard, Run("plain", "mine")));
   // The command line has the last word.
   EXPECT_TRUE(
       Equal(Run("back", "mine",
-                {"--variant", "hard", "--set", "seed=1", "--set", "sim_ode.push[0].peak=60"}),
+                {"--variant", "hard", "--set", "seed=1", "--set", "sim.push[0].peak=60"}),
             Run("plain", "mine")));
   const nlohmann::json summary = ReadSummary(hard);
   EXPECT_EQ(summary["variant"], "hard");
   ASSERT_EQ(summary["changes"].size(), 2u);
   EXPECT_EQ(summary["changes"][0]["by"], "variant hard");
-  EXPECT_EQ(summary["changes"][0]["set"], "sim_ode.push[0].peak=90");
+  EXPECT_EQ(summary["changes"][0]["set"], "sim.push[0].peak=90");
   EXPECT_EQ(summary["checks"].size(), 8u);  // five of every run, three of base/stand
   const nlohmann::json own = ReadSummary(Run("own", "mine", {"--variant", "own"}));
   ASSERT_EQ(own["checks"].size(), 6u);
@@ -95,9 +95,9 @@ TEST_F(AblationTest, AWrongVariantHasFileAndLine) {
     all.push_back(file + ":3: ");
     ExpectUsageError({"graph", "check", "mine"}, all);
   };
-  expect_refused("variant { name: \"a\"\n set: \"sim_ode.push[0].peek=1\" }",
+  expect_refused("variant { name: \"a\"\n set: \"sim.push[0].peek=1\" }",
                  {"variant[0].set[0]", "peek", "peak"});
-  expect_refused("variant { name: \"a\"\n set: \"sim_ode.push[0].peak=much\" }",
+  expect_refused("variant { name: \"a\"\n set: \"sim.push[0].peak=much\" }",
                  {"variant[0].set[0]", "much"});
   expect_refused("variant { name: \"a\"\n set: \"duration\" }", {"variant[0].set[0]", "value"});
   expect_refused("variant { name: \"a\"\n set: \"duration=-1\" }",
@@ -182,11 +182,11 @@ TEST_F(AblationTest, AnIdealRobotIsTheModelWithoutNoise) {
   deploy_.Scenario(
       "imperfect",
       std::string(kBase) +
-          "sim_ode { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
+          "sim { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
           "  motor_change { joint: \"left_knee_pitch\" torque_constant: 0.9 }\n"
           "  model_error { link: \"upper_body\" mass_scale: 1.02 }\n"
           "  model_error { link: \"left_shank\" com_x: 0.005 } }\n"
-          "assumption { field: \"sim_ode.drive_train.torque_lag\" kind: \"assumed\" }\n");
+          "assumption { field: \"sim.drive_train.torque_lag\" kind: \"assumed\" }\n");
   const std::string ideal = Run("ideal", "mine", {"--ideal"});
   ExpectOutput("--ideal: ");
   // Nothing is left that depends on the seed, or on what the scenario says of imperfections.
@@ -205,7 +205,7 @@ TEST_F(AblationTest, AnIdealRobotIsTheModelWithoutNoise) {
 
 TEST_F(AblationTest, TheReferenceVariantRunsBeside) {
   deploy_.Scenario("mine", std::string(kBase) +
-                               "variant { name: \"free\" set: \"sim_ode.push=\" }\n"
+                               "variant { name: \"free\" set: \"sim.push=\" }\n"
                                "variant { name: \"own\" check { metric: \"fallen\" } }\n"
                                "variant { name: \"other\" set: \"seed=3\" }\n"
                                "reference: \"free\"\n");
@@ -241,8 +241,8 @@ TEST_F(AblationTest, TheReferenceVariantRunsBeside) {
 TEST_F(AblationTest, AReferenceThatFallsFailsTheRun) {
   // 382 N s on a robot of this size, ten times what it can stand (fall_test.cc).
   deploy_.Scenario("mine", std::string("base: \"base/stand\" duration: 1.5\n") +
-                               "variant { name: \"felled\" set: \"sim_ode.push[0].peak=2000\"\n"
-                               "  set: \"sim_ode.push[0].duration=0.3\" }\n"
+                               "variant { name: \"felled\" set: \"sim.push[0].peak=2000\"\n"
+                               "  set: \"sim.push[0].duration=0.3\" }\n"
                                "reference: \"felled\"\n");
   const std::string out = deploy_ / "run";
   const ProgramResult result = RunPoise({"run", "mine", "--inline", "--out", out});
@@ -392,7 +392,7 @@ TEST(IdealRobot, HoldsWhatTheExperimentsAskOfIt) {
 TEST(IdealRobot, FallsByThePapersPush) {
   const RunFolder folder;
   const ProgramResult result =
-      RunPoise({"run", "push_double_support", "--ideal", "--set", "sim_ode.push[0].peak=188.91",
+      RunPoise({"run", "push_double_support", "--ideal", "--set", "sim.push[0].peak=188.91",
                 "--inline", "--quiet", "--out", folder / "run"});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_NE(result.output.find("fell"), std::string::npos) << result.output;

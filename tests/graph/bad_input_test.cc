@@ -59,7 +59,7 @@ TEST_F(BadInputTest, WrongValueOfAComponentHasFileLineAndField) {
 
 TEST_F(BadInputTest, UnknownJointIsNamed) {
   const std::string file = Changed("joint: \"left_knee_pitch\"", "joint: \"left_knee\"");
-  ExpectRefused({"run", file}, {file, "sim_ode.start.nominal[4]", "left_knee"});
+  ExpectRefused({"run", file}, {file, "sim.start.nominal[4]", "left_knee"});
 }
 
 TEST_F(BadInputTest, UnknownMetricHasNearNames) {
@@ -78,11 +78,36 @@ TEST_F(BadInputTest, ImpossibleDuration) {
 }
 
 TEST_F(BadInputTest, SetNamesItsFlagAndField) {
-  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.push[0].peek=1"},
+  ExpectRefused({"run", StandScenario(), "--set", "sim.push[0].peek=1"},
                 {"--set", "peek", "peak"});
-  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.push[0].peak=much"},
-                {"--set", "sim_ode.push[0].peak"});
+  ExpectRefused({"run", StandScenario(), "--set", "sim.push[0].peak=much"},
+                {"--set", "sim.push[0].peak"});
   ExpectRefused({"run", StandScenario(), "--set", "duration"}, {"--set", "value"});
+}
+
+TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
+  std::string file = Changed("sim {", "sim_ode {");
+  ExpectRefused({"run", file}, {Line(), "write sim { ... }"});
+  file = Changed("sim {", "sim { ground { erp: 0.3 }");
+  ExpectRefused({"run", file}, {Line(), "write ode { contact_erp: ... } beside sim"});
+  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.push[0].peak=120"},
+                {"--set sim_ode.push[0].peak", "write sim.push[0].peak"});
+  ExpectRefused({"run", StandScenario(), "--set", "sim_ode.ground.cfm=1e-6"},
+                {"write ode.contact_cfm"});
+  ExpectRefused({"run", Changed("duration: 0.4", "duration: 0.4 assumption { field: "
+                                                 "\"sim_ode.push\" kind: \"assumed\" }")},
+                {"assumption[0].field", "write sim.push"});
+}
+
+TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
+  ExpectRefused({"run", StandScenario(), "--set", "engine=od"},
+                {"--set engine", "no engine 'od'", "ode"});
+  ExpectRefused({"run", StandScenario(), "--set", "ode.contact_cfm=0"},
+                {"--set ode.contact_cfm", "greater than 0"});
+  EXPECT_EQ(RunPoise({"run", StandScenario(), "--inline", "--set", "engine=ode", "--out",
+                      folder_ / "run"})
+                .exit_code,
+            0);
 }
 
 TEST_F(BadInputTest, ValueSetOnTheCommandLineIsNamedAsSuch) {

@@ -123,7 +123,7 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
 TEST_F(FirstScreenTest, TellsOfAFallWhenAndWhatWentWrongBefore) {
   const ProgramResult run =
       RunPoise({"run", "pushed", "--inline", "--out", run_, "--duration", "4", "--set",
-                "sim_ode.push[0].peak=1000", "--set", "sim_ode.push[0].duration=0.2"});
+                "sim.push[0].peak=1000", "--set", "sim.push[0].duration=0.2"});
   EXPECT_EQ(run.exit_code, 1) << run.output;
   const nlohmann::json summary = ReadSummary(run_);
   char text[100] = "";
@@ -135,7 +135,7 @@ TEST_F(FirstScreenTest, TellsOfAFallWhenAndWhatWentWrongBefore) {
   const std::string words = Flat(run.output);
   EXPECT_THAT(words, HasSubstr(std::string("the robot ") + text + " of 4 s"));
   EXPECT_THAT(words, HasSubstr("Before it fell: at "));
-  EXPECT_THAT(words, HasSubstr("FAILED: sim_ode: the robot fell"));
+  EXPECT_THAT(words, HasSubstr("FAILED: sim: the robot fell"));
 }
 
 TEST_F(FirstScreenTest, QuietSaysWhatFailed) {

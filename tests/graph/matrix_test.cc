@@ -25,8 +25,8 @@ class MatrixTest : public testing::Test {
                      "description: \"Two, \\\"quoted\\\"\"\n"
                      "check { metric: \"push_peak\" at_most: 70 label: \"push, largest\""
                      "        paper: \"60 N\" paper_value: 60 }\n"
-                     "variant { name: \"felled\" set: \"sim_ode.push[0].peak=2000\"\n"
-                     "  set: \"sim_ode.push[0].duration=0.3\" set: \"duration=1.5\" }\n");
+                     "variant { name: \"felled\" set: \"sim.push[0].peak=2000\"\n"
+                     "  set: \"sim.push[0].duration=0.3\" set: \"duration=1.5\" }\n");
     deploy_.Scenario("quiet",
                      "base: \"base/stand\" name: \"quiet\" paper_section: \"7.1\" duration: 0.2\n");
   }

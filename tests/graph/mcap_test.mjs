@@ -91,7 +91,7 @@ async function readMcap() {
 // Named elements, as the robot's file and its URDF have them: arrays that num_joints, num_motors and num_feet size.
 const robotFile = (name) => readFileSync(here(`../../deploy/robots/dyros/${name}`), 'utf8');
 const inOrder = (text, names) => [...names].sort((a, b) => text.indexOf(`<joint name="${a}"`) - text.indexOf(`<joint name="${b}"`));
-const joints = inOrder(robotFile('dyros_legs.urdf'), [...robotFile('dyros_legs.pbtxt').matchAll(/joint: "(\w+)"/g)].map((m) => m[1]));
+const joints = inOrder(robotFile('dyros_legs.urdf'), [...robotFile('dyros_legs.pbtxt').matchAll(/^  joint: "(\w+)"/gm)].map((m) => m[1]));
 const feet = [...robotFile('dyros_legs.pbtxt').matchAll(/foot \{\s+name: "(\w+)"/g)].map((m) => m[1]);
 const elements = {num_joints: joints, num_motors: joints, num_feet: feet};
 

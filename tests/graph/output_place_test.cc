@@ -144,10 +144,10 @@ TEST_F(OutputPlaceTest, FieldsAreNamedByWhatTheyLimit) {
                     "--set 'check[violated_ticks].at_most='"});
   ExpectUsageError({"run", StandScenario(), "--set", "check[violated].at_most=5"},
                    {"no check is called 'violated'", "violated_ticks"});
-  ExpectUsageError({"run", StandScenario(), "--set", "sim_ode.push[0].peak=100N"},
-                   {"'100N' is not a number; its unit is N", "sim_ode.push[0].peak=100"});
-  ExpectUsageError({"run", StandScenario(), "--set", "sim_ode.push.peak=100"},
-                   {"write sim_ode.push[0].peak"});
+  ExpectUsageError({"run", StandScenario(), "--set", "sim.push[0].peak=100N"},
+                   {"'100N' is not a number; its unit is N", "sim.push[0].peak=100"});
+  ExpectUsageError({"run", StandScenario(), "--set", "sim.push.peak=100"},
+                   {"write sim.push[0].peak"});
   EXPECT_EQ(RunPoise(Run({"--inline", "--set", check + ".at_most=7"})).exit_code, 0);
   for (const nlohmann::json& row : ReadSummary(run_)["checks"]) {
     if (row["name"] != "violated_ticks") continue;

@@ -59,7 +59,7 @@ TEST_F(ReplayTest, EveryComponentGivesTheLoggedBits) {
   Run();  // as processes
   const ProgramResult result = Replay();
   EXPECT_EQ(result.exit_code, 0) << result.output;
-  for (const char* component : {"sim_ode", "hw_bridge", "state_estimator", "step_planner",
+  for (const char* component : {"sim", "hw_bridge", "state_estimator", "step_planner",
                                 "task_controller", "contact_wrench_monitor", "redistributor"}) {
     EXPECT_HAS(result, std::string(component) + ": 200 ticks");
   }
@@ -68,7 +68,7 @@ TEST_F(ReplayTest, EveryComponentGivesTheLoggedBits) {
 
 TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
   Run({"--inline", "--set", "task_controller.com.kp=190", "--seed", "5"});
-  EXPECT_EQ(Replay({"--component", "task_controller", "--component", "sim_ode"}).exit_code, 0);
+  EXPECT_EQ(Replay({"--component", "task_controller", "--component", "sim"}).exit_code, 0);
   const ProgramResult result =
       Replay({"--component", "task_controller", "--set", "task_controller.com.kp=225"});
   EXPECT_EQ(result.exit_code, 1) << result.output;

@@ -107,31 +107,31 @@ TEST_F(ScenarioBaseTest, AnErrorNamesTheFileThatSetTheField) {
 }
 
 TEST_F(ScenarioBaseTest, IndexesOfListsMapToTheFileOfTheElement) {
-  // Phase 0 is the base's; of the lists inside sim_ode, the base has six joints and a push.
+  // Phase 0 is the base's; of the lists inside sim, the base has six joints and a push.
   Derived(
       "step_planner {\n"
       "  phase { name: \"later\" duration: -1 }\n"
       "}\n");
   ExpectRefused(File("derived"), {File("derived") + ":3: step_planner.phase[0]"});
   Derived(
-      "sim_ode {\n"
+      "sim {\n"
       "  start {\n"
       "    nominal { joint: \"left_hip_roll\" position: 0 }\n"
       "    nominal { joint: \"tail\" position: 0 }\n"
       "  }\n"
       "}\n");
-  ExpectRefused(File("derived"), {File("derived") + ":5: sim_ode.start.nominal[1]", "tail"});
+  ExpectRefused(File("derived"), {File("derived") + ":5: sim.start.nominal[1]", "tail"});
   Derived(
-      "sim_ode {\n"
+      "sim {\n"
       "  push { start: 0.2 duration: 0.1 peak: 10 direction_x: 1 link: \"tail\" }\n"
       "}\n");
-  ExpectRefused(File("derived"), {File("derived") + ":3: sim_ode.push[0].link", "tail"});
+  ExpectRefused(File("derived"), {File("derived") + ":3: sim.push[0].link", "tail"});
   Derived("");
   std::string base = ReadFile(File("base/robot"));
   base.replace(base.find("left_knee_pitch"), 15, "left_knee_patch");
   Write("base/robot", base);
   ExpectRefused(File("derived"),
-                {BaseLine("nominal { joint: \"left_knee_patch"), "sim_ode.start.nominal[4]"});
+                {BaseLine("nominal { joint: \"left_knee_patch"), "sim.start.nominal[4]"});
 }
 
 TEST_F(ScenarioBaseTest, BasesNestAndRelativeNamesAreThoseOfTheirFile) {
@@ -163,11 +163,11 @@ TEST_F(ScenarioBaseTest, ALoopOrAMissingBaseIsAnError) {
 
 TEST_F(ScenarioBaseTest, AnAssumptionMayNameAFieldOfEitherFile) {
   const std::string assumption = "assumption { kind: \"assumed\" field: ";
-  Derived(assumption + "\"sim_ode.push[0].peak\" }\n" + assumption + "\"duration\" }\n");
+  Derived(assumption + "\"sim.push[0].peak\" }\n" + assumption + "\"duration\" }\n");
   EXPECT_EQ(RunPoise({"graph", "check", File("derived")}).exit_code, 0);
-  Derived(assumption + "\"sim_ode.push[1].peak\" }\n");
+  Derived(assumption + "\"sim.push[1].peak\" }\n");
   ExpectRefused(File("derived"), {File("derived") + ":2: assumption[0].field", "push[1]"});
-  Derived(assumption + "\"sim_ode.drive_train.backlash\" }\n");
+  Derived(assumption + "\"sim.drive_train.backlash\" }\n");
   ExpectRefused(File("derived"), {File("derived") + ":2: assumption[0].field", "backlash"});
 }
 

@@ -90,12 +90,12 @@ TEST_F(ScenarioPlaceTest, AnErrorListsThePathsSearched) {
 TEST_F(ScenarioPlaceTest, ASweepFindsItsScenarioBesideIt) {
   fs::copy_file(StandScenario(), "own/standing.pbtxt");
   Write("own/pushes.pbtxt",
-        "scenario: \"standing\"\nvary { field: \"sim_ode.push[0].peak\" value: [10, 20] }\n");
+        "scenario: \"standing\"\nvary { field: \"sim.push[0].peak\" value: [10, 20] }\n");
   const ProgramResult sweep = RunPoise({"sweep", "own/pushes", "--quiet", "--out", "pushes"});
   EXPECT_EQ(sweep.exit_code, 0) << sweep.output;
   EXPECT_TRUE(fs::exists("pushes/table.csv"));
   Write("own/pushes.pbtxt",
-        "scenario: \"sitting\"\nvary { field: \"sim_ode.push[0].peak\" value: [10, 20] }\n");
+        "scenario: \"sitting\"\nvary { field: \"sim.push[0].peak\" value: [10, 20] }\n");
   ExpectUsageError({"sweep", "own/pushes.pbtxt"},
                    {Full("own/pushes.pbtxt") + ":1: scenario: no scenario named 'sitting'",
                     Full("own/sitting.pbtxt")});

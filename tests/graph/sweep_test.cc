@@ -29,9 +29,9 @@ class SweepTest : public testing::Test {
         "tiny",
         "scenario: \"pushed\"\n"
         "vary { name: \"direction\" from: 0 to: 360 steps: 4 angle: true }\n"
-        "vary { name: \"force\" field: \"sim_ode.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n"
-        "assign { field: \"sim_ode.push[0].direction_x\" value: \"cos(direction*deg)\" }\n"
-        "assign { field: \"sim_ode.push[0].direction_y\" value: \"sin(direction*deg)\" }\n");
+        "vary { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n"
+        "assign { field: \"sim.push[0].direction_x\" value: \"cos(direction*deg)\" }\n"
+        "assign { field: \"sim.push[0].direction_y\" value: \"sin(direction*deg)\" }\n");
   }
   std::string Sweep(const std::string& name, const std::string& text) const {
     const std::string file = deploy_ / ("deploy/sweeps/" + name + ".pbtxt");
@@ -70,9 +70,9 @@ TEST_F(SweepTest, ARowIsWhatTheRunByItselfGives) {
       "run",      "pushed",
       "--inline", "--quiet",
       "--out",    Out("run"),
-      "--set",    "sim_ode.push[0].peak=60",
-      "--set",    "sim_ode.push[0].direction_x=" + nlohmann::json(std::cos(angle)).dump(),
-      "--set",    "sim_ode.push[0].direction_y=" + nlohmann::json(std::sin(angle)).dump()};
+      "--set",    "sim.push[0].peak=60",
+      "--set",    "sim.push[0].direction_x=" + nlohmann::json(std::cos(angle)).dump(),
+      "--set",    "sim.push[0].direction_y=" + nlohmann::json(std::sin(angle)).dump()};
   for (const auto& [name, value] : row) {
     const bool metric =
         !std::set<std::string>{"run",      "direction", "force",   "outcome", "fell_at",
@@ -179,7 +179,7 @@ TEST_F(SweepTest, MapsAreThereAsPng) {
   const std::string sweep =
       Sweep("heat",
             "scenario: \"pushed\" column: \"push_peak\"\n"
-            "vary { name: \"force\" field: \"sim_ode.push[0].peak\" value: 20 value: 60 }\n"
+            "vary { name: \"force\" field: \"sim.push[0].peak\" value: 20 value: 60 }\n"
             "vary { field: \"seed\" value: 1 value: 2 }\n"
             "map { x: \"force\" y: \"seed\" value: \"push_peak\" }\n");
   Expect(0, {"sweep", sweep, "--out", Out("sweep")});
@@ -206,7 +206,7 @@ TEST_F(SweepTest, MapsAreThereAsPng) {
 }
 
 TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {
-  Expect(0, {"sweep", "pushed", "--set", "duration=1.5", "--vary", "sim_ode.push[0].peak=20,2000",
+  Expect(0, {"sweep", "pushed", "--set", "duration=1.5", "--vary", "sim.push[0].peak=20,2000",
              "--out", Out("sweep")});
   int falls = 0;
   for (const CsvRow& row : ReadCsv(Out("sweep") + "/table.csv")) {
@@ -221,7 +221,7 @@ TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {
 TEST_F(SweepTest, AreListedWithWhatTheySay) {
   Sweep("far",
         "description: \"As far as it goes\" scenario: \"pushed\"\n"
-        "limit { field: \"sim_ode.push[0].peak\" min: 1 max: 2 }\n");
+        "limit { field: \"sim.push[0].peak\" min: 1 max: 2 }\n");
   Sweep("wrong", "scenari: 1\n");
   const ProgramResult list = RunPoise({"list", "sweeps"});
   EXPECT_EQ(list.exit_code, 0) << list.output;
@@ -233,7 +233,7 @@ TEST_F(SweepTest, AreListedWithWhatTheySay) {
 
 TEST_F(SweepTest, RunsThatCannotBeMadeAreNamedAndTheOthersGoOn) {
   const ProgramResult result = RunPoise(
-      {"sweep", "pushed", "--vary", "sim_ode.ground.friction=0.9,-1", "--out", Out("sweep")});
+      {"sweep", "pushed", "--vary", "sim.ground.friction=0.9,-1", "--out", Out("sweep")});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_NE(result.output.find("run 1: invalid: "), std::string::npos) << result.output;
   const std::vector<CsvRow> rows = ReadCsv(Out("sweep") + "/table.csv");
@@ -251,7 +251,7 @@ TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   expect("scenario: \"pushed\"\nvary { name: \"a\" form: 1 }\n", {"wrong.pbtxt:2:", "form"});
   expect("vary { name: \"a\" value: 1 }\n", {"wrong.pbtxt: scenario"});
   expect("scenario: \"pusht\"\nvary { field: \"seed\" value: 1 }\n", {"pusht", "pushed"});
-  expect("scenario: \"pushed\"\nvary {\n field: \"sim_ode.pusch[0].peak\" value: 1 }\n",
+  expect("scenario: \"pushed\"\nvary {\n field: \"sim.pusch[0].peak\" value: 1 }\n",
          {"wrong.pbtxt:3: vary[0].field", "push"});
   expect(
       "scenario: \"pushed\"\nvary { name: \"a\" value: 1 }\nassign {\n field: \"seed\"\n value: "
@@ -291,9 +291,9 @@ TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
 TEST_F(SweepTest, ALimitIsTheLargestForceThatIsSurvived) {
   Sweep("limit",
         "scenario: \"pushed\" set: \"duration=1.6\"\n"
-        "vary { name: \"side\" choice { name: \"left\" set: \"sim_ode.push[0].direction_y=1\" }\n"
-        "  choice { name: \"right\" set: \"sim_ode.push[0].direction_y=-1\" } }\n"
-        "limit { name: \"force\" field: \"sim_ode.push[0].peak\" unit: \"N\" min: 50 max: 950\n"
+        "vary { name: \"side\" choice { name: \"left\" set: \"sim.push[0].direction_y=1\" }\n"
+        "  choice { name: \"right\" set: \"sim.push[0].direction_y=-1\" } }\n"
+        "limit { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" min: 50 max: 950\n"
         "  samples: 3 tolerance: 120 }\n");
   const std::string out = Out("limit");
   Expect(0, {"limit", "limit", "--out", out});

@@ -148,7 +148,7 @@ TEST_F(WatchTest, UnknownChannelsAndFieldsAreUsageErrors) {
                    {"torque has no element 'right_knee_pich'; did you mean right_knee_pitch"});
   ExpectUsageError({"echo", "JOINT_COMMAND", "foot_wrench[lef]", "--run", run},
                    {"foot_wrench has no element 'lef'; did you mean left?"});
-  ExpectUsageError({"echo", "HEALTH_SIM_ODE", "stat", "--run", run}, {"did you mean state"});
+  ExpectUsageError({"echo", "HEALTH_SIM", "stat", "--run", run}, {"did you mean state"});
   ExpectUsageError({"top", run}, {"stdout is no terminal", "--once"});
 }
 

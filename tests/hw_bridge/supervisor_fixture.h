@@ -33,7 +33,7 @@ inline SupervisorConfig ThreeJoints() {
   config.monitor.period = 0.002;
   config.damping_after_cycles = 3;
   config.stop_after_cycles = 13;
-  config.damping = 20;
+  config.damping.assign(config.motors.size(), 20);
   config.stop_ramp = 0.1;
   config.monitor.velocity_cutoff = 60;
   return config;

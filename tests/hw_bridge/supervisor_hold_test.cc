@@ -13,8 +13,8 @@ using Status = bridge_status_t;
 SupervisorConfig Holding() {
   SupervisorConfig config = ThreeJoints();
   config.hold_cycles = 100;
-  config.hold_stiffness = 600;
-  config.hold_damping = 10;
+  config.hold_stiffness.assign(config.motors.size(), 600);
+  config.hold_damping.assign(config.motors.size(), 10);
   config.resume_cycles = 10;
   return config;
 }

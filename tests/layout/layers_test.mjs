@@ -18,7 +18,8 @@ const BELOW = {
   'components/balance/tasks': ['components/robot', 'components/balance'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/robot', 'components/balance'],
   'components': BUS,
-  'sim_ode': BUS,
+  'sim': BUS,
+  'sim_ode': [...BUS, 'sim'],
   'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/drive_emulator'],
   'hw_bridge/ethercat': [...BUS, 'hw_bridge'],
   'hw_bridge/drive_emulator': [...BUS, 'hw_bridge', 'hw_bridge/ethercat'],
@@ -70,7 +71,8 @@ test('every include points down', () => {
 test('an include that points up or sideways is seen', () => {
   assert.match(problemOf('components/robot/a.cc', 'components/balance/b.h'), /does not stand on/);
   assert.match(problemOf('components/redistributor/a.cc', 'components/task_controller/b.h'), /does not stand on/);
-  assert.match(problemOf('logging/a.cc', 'sim_ode/b.h'), /does not stand on/);
+  assert.match(problemOf('logging/a.cc', 'sim/b.h'), /does not stand on/);
+  assert.match(problemOf('sim/a.cc', 'sim_ode/b.h'), /does not stand on/);
   assert.match(problemOf('tools/run/a.cc', 'tools/live/b.h'), /stands above/);
   assert.equal(problemOf('tools/live/a.cc', 'tools/run/b.h'), null);
 });

@@ -31,7 +31,7 @@ class DamageTest : public testing::Test {
       events.push_back(Zeros<task_torque_t>("TASK_TORQUE", t));
       events.push_back(Zeros<joint_command_t>("JOINT_COMMAND", t));
     }
-    events.push_back(Health("HEALTH_SIM_ODE", "sim_ode"));
+    events.push_back(Health("HEALTH_SIM", "sim"));
     WriteRawLog(folder_.path("log"), events);
     return folder_.path("log");
   }
@@ -162,11 +162,11 @@ TEST_F(DamageTest, MessagesThatAreNotFiniteAreUnreadable) {
 
 TEST_F(DamageTest, HealthCountsUnderItsOwnNameOnly) {
   WriteRawLog(folder_.path("log"),
-              {RunInfoEvent(spec_), Health("HEALTH_SIM_ODE", "sim_ode"),
-               Health("HEALTH_SIM_ODE", "\xFF\xFE"), Health("HEALTH_HW_BRIDGE", "sim_ode")});
+              {RunInfoEvent(spec_), Health("HEALTH_SIM", "sim"),
+               Health("HEALTH_SIM", "\xFF\xFE"), Health("HEALTH_HW_BRIDGE", "sim")});
   const RunRecord run = ReadRun(folder_.path("log"));
   EXPECT_EQ(run.health.size(), 1u);
-  EXPECT_EQ(run.health.count("sim_ode"), 1u);
+  EXPECT_EQ(run.health.count("sim"), 1u);
   EXPECT_EQ(run.refused_health, 2);
 }
 

@@ -118,9 +118,9 @@ TEST_F(SignalTableTest, TakesHealthOverTime) {
   for (const int64_t tick : {2, 7}) {
     health_t health{};
     SetHeader(tick, &health);
-    health.component = "sim_ode";
+    health.component = "sim";
     health.gaps = 10 * tick;
-    events.push_back(Event("HEALTH_SIM_ODE", health));
+    events.push_back(Event("HEALTH_SIM", health));
   }
   const auto channels = Read(events);
   ASSERT_EQ(channels.size(), 2u);

@@ -57,6 +57,20 @@ TEST(Loading, DyrosIsThePapersRobot) {
               1e-12);
 }
 
+TEST(Loading, StanceAndDriveTrainAreTheFiles) {
+  const RobotModel model = LoadTestRobot(TestRobot::kDyros);
+  EXPECT_EQ(model.stance().com_height, 0.75);
+  EXPECT_FALSE(model.stance().foot_spacing);
+  EXPECT_EQ(model.stance().joint_position[model.FindJoint("left_knee_pitch")], 0.6);
+  EXPECT_EQ(model.stance().joint_position[model.FindJoint("left_hip_yaw")], 0);
+  EXPECT_EQ(model.drive_train().gear_stiffness, 7e4);
+  EXPECT_EQ(model.drive_train().sensor_delay, 0.002);
+  const RobotModel without = LoadTestRobot(TestRobot::kMantis);
+  EXPECT_TRUE(without.stance().joint_position.isZero(0));
+  EXPECT_EQ(without.stance().joint_position.size(), without.num_joints());
+  EXPECT_EQ(without.drive_train().gear_stiffness, 0);
+}
+
 TEST(Loading, StaticFrictionIsCoulombsWhenNotGiven) {
   std::string text = ReadWhole(RobotPath(TestRobot::kDyros));
   text.erase(text.find("static_friction: 2.4"), std::string("static_friction: 2.4").size());

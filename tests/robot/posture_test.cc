@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "components/framework/configuration.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::robot {
@@ -133,6 +134,24 @@ TEST(Posture, RefusesGoalsThatAreNone) {
   EXPECT_THAT(Refusal(model, goal), testing::HasSubstr("nominal has 3 joints, the robot 12"));
   goal = Standing(model, 0.21, 0, std::numeric_limits<double>::quiet_NaN());
   EXPECT_THAT(Refusal(model, goal), testing::HasSubstr("not finite"));
+}
+
+TEST(StandingHeight, IsTheStancesOwnOrWhatItsJointsGive) {
+  Robot description;
+  ReadTextProto(RobotPath(TestRobot::kDyros), &description);
+  const std::string urdf = ReadWhole(UrdfPath(TestRobot::kDyros));
+  EXPECT_EQ(StandingHeight(RobotModel::Load(description, urdf)), 0.75);
+  description.mutable_stance()->clear_com_height();
+  const RobotModel model = RobotModel::Load(description, urdf);
+  // Both legs bent by 0.3, 0.6, 0.3 rad: thigh and shank of 0.36 m each lower the hips by this
+  // much.
+  const double lowered = 0.72 * (1 - std::cos(0.3));
+  description.mutable_stance()->clear_joint();
+  const double straight = StandingHeight(RobotModel::Load(description, urdf));
+  const double share = model.bodies()[0].mass / model.total_mass();
+  const double bent = StandingHeight(model);
+  EXPECT_LT(bent, straight - share * lowered) << "the body and parts of the legs are lower";
+  EXPECT_GT(bent, straight - lowered);
 }
 
 }  // namespace

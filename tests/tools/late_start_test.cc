@@ -68,7 +68,7 @@ Outcome Start(const Lost& lost, std::vector<std::string> set = {}, bool realtime
   changes.realtime = realtime;
   changes.duration = 1;
   changes.set = std::move(set);
-  changes.set.insert(changes.set.begin(), "sim_ode.push=");
+  changes.set.insert(changes.set.begin(), "sim.push=");
   const LoadedScenario loaded = LoadScenario("push_double_support", changes);
   std::vector<std::string> warnings;
   RunSpec spec = MakeRunSpec(loaded, changes, &warnings);
@@ -173,14 +173,14 @@ TEST(LateStart, AControllerThatNeverComesEndsTheRunWithoutAFall) {
 
 TEST(LateStart, ARunInLockstepHasNeitherCraneNorLead) {
   const LoadedScenario loaded = LoadScenario("push_double_support", {});
-  EXPECT_FALSE(loaded.scenario.sim_ode().has_crane());
+  EXPECT_FALSE(loaded.scenario.sim().has_crane());
   EXPECT_EQ(loaded.scenario.lead(), 0);
   EXPECT_FALSE(loaded.scenario.hw_bridge().hold_before_command());
   RunChanges realtime;
   realtime.realtime = true;
-  realtime.set = {"sim_ode.crane=", "lead=0", "hw_bridge.hold_before_command=false"};
+  realtime.set = {"sim.crane=", "lead=0", "hw_bridge.hold_before_command=false"};
   const LoadedScenario taken_away = LoadScenario("push_double_support", realtime);
-  EXPECT_FALSE(taken_away.scenario.sim_ode().has_crane());
+  EXPECT_FALSE(taken_away.scenario.sim().has_crane());
   EXPECT_EQ(taken_away.scenario.lead(), 0);
 }
 

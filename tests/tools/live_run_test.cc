@@ -123,7 +123,7 @@ TEST_F(LiveRunTest, NamesAllChannels) {
   StartOnTheBus();
   const LiveRun live(folder.path(""), "x");
   EXPECT_THAT(live.ChannelNames(), Contains("ROBOT_STATE"));
-  EXPECT_THAT(live.ChannelNames(), Contains("HEALTH_SIM_ODE"));
+  EXPECT_THAT(live.ChannelNames(), Contains("HEALTH_SIM"));
   EXPECT_THAT(live.ChannelNames(), Contains("HEALTH_RECORDER"));
 }
 
@@ -134,9 +134,9 @@ TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
   health_t health{};
   health.run_id = 42;
   health.tick = 8;
-  health.component = "sim_ode";
+  health.component = "sim";
   Send(&sender, "ROBOT_STATE", Message("ROBOT_STATE", 7));
-  Send(&sender, "HEALTH_SIM_ODE", logging::Encode(health));
+  Send(&sender, "HEALTH_SIM", logging::Encode(health));
   Send(&sender, "EMERGENCY_STOP", Message("EMERGENCY_STOP", 0));
   int64_t hostile = 0;
   const auto attack = [&](const std::string& channel, Bytes bytes) {
@@ -152,18 +152,18 @@ TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
   attack("ROBOT_STATE", Message("TASK_TORQUE", 7));
   attack("NOBODY", Message("TASK_TORQUE", 7));
   health.run_id = 41;
-  attack("HEALTH_SIM_ODE", logging::Encode(health));
-  attack("HEALTH_SIM_ODE", {});
+  attack("HEALTH_SIM", logging::Encode(health));
+  attack("HEALTH_SIM", {});
   attack("HEALTH_NOBODY", logging::Encode(health));
   std::mt19937 random(TestSeed(3));
   for (int i = 0; i < 100; ++i) {
     Bytes noise(random() % 600);
     for (uint8_t& byte : noise) byte = static_cast<uint8_t>(random());
-    attack(i % 2 == 0 ? "ROBOT_STATE" : "HEALTH_SIM_ODE", noise);
+    attack(i % 2 == 0 ? "ROBOT_STATE" : "HEALTH_SIM", noise);
   }
   Send(&sender, "ROBOT_STATE", Message("ROBOT_STATE", 9));
   EXPECT_THAT(HearUntil(&live, 9),
-              ElementsAre("ROBOT_STATE 7", "HEALTH_SIM_ODE 8", "EMERGENCY_STOP 0"));
+              ElementsAre("ROBOT_STATE 7", "HEALTH_SIM 8", "EMERGENCY_STOP 0"));
   EXPECT_EQ(live.refused(), hostile);
 }
 

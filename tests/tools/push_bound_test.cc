@@ -19,7 +19,7 @@ constexpr double kDuration = 0.107;  // s
 
 Scenario PushScenario(const std::string& push) {
   Scenario scenario;
-  ParseTextProto("sim_ode { push { start: 0.01 duration: 0.107 peak: 100 " + push + " } }", "test",
+  ParseTextProto("sim { push { start: 0.01 duration: 0.107 peak: 100 " + push + " } }", "test",
                  &scenario);
   return scenario;
 }
@@ -142,10 +142,10 @@ TEST(PushBound, ThereIsNoneForOtherPushes) {
   EXPECT_FALSE(FindPushBound(Scenario(), run));
   EXPECT_FALSE(FindPushBound(PushScenario("direction_z: 1"), run));
   Scenario two = PushScenario("direction_y: 1");
-  *two.mutable_sim_ode()->add_push() = two.sim_ode().push(0);
+  *two.mutable_sim()->add_push() = two.sim().push(0);
   EXPECT_FALSE(FindPushBound(two, run));
   Scenario hand = PushScenario("direction_y: 1");
-  hand.mutable_sim_ode()->add_hand();
+  hand.mutable_sim()->add_hand();
   EXPECT_FALSE(FindPushBound(hand, run));
   // Of an oblique one the horizontal part counts.
   const auto oblique = FindPushBound(PushScenario("direction_x: 3 direction_z: 4"), run);

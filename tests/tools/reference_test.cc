@@ -165,13 +165,13 @@ TEST(FieldReference, IsSelectedByPathByBeginningAndByPartOfAName) {
     return result;
   };
   EXPECT_EQ(paths("").size(), all.size());
-  EXPECT_THAT(paths("sim_ode.push[0].peak"), ElementsAre("sim_ode.push[i].peak"));
-  EXPECT_EQ(paths("sim_ode.push[0]"), paths("sim_ode.push"));
-  EXPECT_EQ(paths("sim_ode.push."), paths("sim_ode.push"));
-  // A beginning ends where a name does: sim_ode.push is not sim_ode.push_sensor_noise.
-  EXPECT_THAT(paths("sim_ode.push"), Not(Contains("sim_ode.push_sensor_noise")));
+  EXPECT_THAT(paths("sim.push[0].peak"), ElementsAre("sim.push[i].peak"));
+  EXPECT_EQ(paths("sim.push[0]"), paths("sim.push"));
+  EXPECT_EQ(paths("sim.push."), paths("sim.push"));
+  // A beginning ends where a name does: sim.push is not sim.push_sensor_noise.
+  EXPECT_THAT(paths("sim.push"), Not(Contains("sim.push_sensor_noise")));
   EXPECT_THAT(paths("hw_bridge.hold_st"), ElementsAre("hw_bridge.hold_stiffness"));
-  EXPECT_THAT(paths("stiffness"), Contains("sim_ode.drive_train.gear_stiffness"));
+  EXPECT_THAT(paths("stiffness"), Contains("sim.drive_train.gear_stiffness"));
   try {
     SelectFields(all, "stifness");
     FAIL() << "no such field";

@@ -73,7 +73,7 @@ class SweepMapsTest : public ::testing::Test {
 
 TEST_F(SweepMapsTest, AFallRuinsNoScale) {
   header.sweep.set_name("pushes");
-  Vary("", "", {50, 100, 150, 200, 250})->set_field("sim_ode.push[0].peak");
+  Vary("", "", {50, 100, 150, 200, 250})->set_field("sim.push[0].peak");
   for (const double error : {1.0, 2.0, 3.0}) Add(true, error);
   for (const double error : {4e5, 1.5e6}) Add(false, error);
   const SweepMaps maps = MapCharts(header, rows);

@@ -16,7 +16,7 @@ class TopViewTest : public ::testing::Test {
   TopViewTest() {
     spec.set_num_ticks(5000);
     LiveSnapshot::Process process;
-    process.name = "sim_ode";
+    process.name = "sim";
     process.seen = true;
     process.health.state = health_t::STATE_RUNNING;
     process.health.tick = 1520;
@@ -87,8 +87,8 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
 }
 
 TEST_F(TopViewTest, ShowsAProcess) {
-  EXPECT_THAT(Row("sim_ode"),
-              ::testing::ElementsAre("sim_ode", "running", "1520", "499.8", "256.5", "565.0",
+  EXPECT_THAT(Row("sim"),
+              ::testing::ElementsAre("sim", "running", "1520", "499.8", "256.5", "565.0",
                                      "1278.4", "7", "11", "44", "22", "33", "55", "0.1"));
 }
 
@@ -115,7 +115,7 @@ TEST_F(TopViewTest, MarksWhatIsWrong) {
   using Style = ViewLine::Style;
   const auto style = [&] {
     for (const ViewLine& line : TopView(spec, names, "", snapshot, 0)) {
-      if (line.text.starts_with("sim_ode")) return line.style;
+      if (line.text.starts_with("sim")) return line.style;
     }
     return Style::kTitle;
   };

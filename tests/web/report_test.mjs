@@ -24,7 +24,7 @@ function poise(...parameters) {
 /** 3 s of the push of 7.2; then `poise report` of it over the arguments' run. */
 before(async () => {
   const push = ['run', 'push_double_support', '--inline', '--duration', '2'];
-  for (const [out, more] of [['a', []], ['b', ['--set', 'sim_ode.push[0].duration=0.09']]]) {
+  for (const [out, more] of [['a', []], ['b', ['--set', 'sim.push[0].duration=0.09']]]) {
     const run = poise(...push, ...more, '--out', path(out));
     assert.ok(run.status === 0 || run.status === 1, run.stderr);  // a check of the shorter run may fail
   }
@@ -67,7 +67,7 @@ const robotScenario = (robot) => `name: "robot_test" description: "" robot: "${r
   redistributor {
     double_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 }
     single_support { half_length: 0.1 half_width: 0.05 friction: 0.9 yaw_friction: 0.9 } }
-  sim_ode { start { } ground { friction: 0.9 } }
+  sim { start { } ground { friction: 0.9 } }
 `;
 
 const state = (page) => page.evaluate(() => {

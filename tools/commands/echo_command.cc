@@ -234,7 +234,7 @@ void AddEchoCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<EchoOptions>();
   CLI::App* echo = app->add_subcommand(
       "echo", "decoded messages of a channel, of a run in progress or from a log");
-  echo->add_option("channel", options->channel, "e.g. ROBOT_STATE, HEALTH_SIM_ODE")->required();
+  echo->add_option("channel", options->channel, "e.g. ROBOT_STATE, HEALTH_SIM")->required();
   echo->add_option(
       "field", options->fields,
       "by path, of JOINT_COMMAND torque[right_knee_pitch] or torque[3], of "

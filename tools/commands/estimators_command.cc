@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "components/framework/configuration.h"
-#include "components/state_estimator/state_estimator.pb.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/metrics.h"
@@ -35,11 +34,12 @@ constexpr Column kColumns[] = {
 
 struct Method {
   int method;
+  const char* name;
   const char* prefix;  // of its metrics
 };
 constexpr Method kMethods[] = {
-    {estimator_status_t::METHOD_ANCHORED_FEET, "anchored_feet"},
-    {estimator_status_t::METHOD_INVARIANT_EKF, "invariant_ekf"},
+    {estimator_status_t::METHOD_ANCHORED_FEET, "ANCHORED_FEET", "anchored_feet"},
+    {estimator_status_t::METHOD_INVARIANT_EKF, "INVARIANT_EKF", "invariant_ekf"},
 };
 
 int CompareEstimators(const EstimatorsOptions& options) {
@@ -62,8 +62,7 @@ int CompareEstimators(const EstimatorsOptions& options) {
           fmt::format("--from {}: {} ends at {} s", options.from, log, run.time(run.num_ticks)));
     }
     if (!EstimatorOf(run.spec)) {
-      throw logging::LogError(
-          fmt::format("{}: its graph has no component of type state_estimator", log));
+      throw logging::LogError(fmt::format("{}: its graph has no state estimator", log));
     }
     if (run.sensors.empty()) {
       throw logging::LogError(fmt::format("{}: holds no ROBOT_SENSORS to estimate from", log));
@@ -72,12 +71,10 @@ int CompareEstimators(const EstimatorsOptions& options) {
     for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
     // Both methods again, also the one that ran: the configuration may be another.
     run.estimator = {};
-    for (const auto& [method, prefix] : kMethods) {
+    for (const auto& [method, name_of_method, prefix] : kMethods) {
       Reestimated result = Reestimate(spec, method, run);
       run.other_estimates[static_cast<size_t>(method)] = std::move(result.estimates);
-      rows.push_back(
-          {method == 0 ? run.spec.scenario() : "",
-           StateEstimatorConfig::Method_Name(static_cast<StateEstimatorConfig::Method>(method))});
+      rows.push_back({method == 0 ? run.spec.scenario() : "", name_of_method});
       for (const Column& column : kColumns) {
         const logging::Metric* metric =
             logging::FindMetric(fmt::format("{}_{}", prefix, column.metric));

@@ -199,7 +199,11 @@ int List(const ListRequest& request) {
   }
   if (wanted("components")) {
     for (const auto& [type, entry] : Components().entries()) {
-      fmt::print("  {:<24}{}\n", type, entry.summary);
+      const std::vector<std::string>& sections = entry.traits.sections;
+      fmt::print("  {:<24}{}{}\n", type, entry.summary,
+                 sections.empty()
+                     ? ""
+                     : fmt::format(" (the scenario's fields {})", fmt::join(sections, " and ")));
     }
   }
   if (wanted("runs")) ListRuns();
@@ -226,7 +230,7 @@ void AddListCommand(CLI::App* app, Command* command) {
       ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "runs",
                              "metrics", "fields", "messages"}));
   list->add_option("name", request->name,
-                   "of fields: a path or its beginning (sim_ode.push), or a part of a field's "
+                   "of fields: a path or its beginning (sim.push), or a part of a field's "
                    "name (stiffness); of messages: a type or a channel (ROBOT_STATE)");
   list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
       ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));

@@ -12,6 +12,7 @@
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
+#include "tools/scenario/former_fields.h"
 #include "tools/scenario/scenario_loading.h"
 
 namespace poise {
@@ -49,7 +50,7 @@ void PrintRun(const logging::LogSurvey& survey) {
              survey.first_tick, spec.num_ticks());
   try {
     Scenario scenario;
-    ParseTextProto(survey.info.scenario, "RUN_INFO.scenario", &scenario);
+    ParseScenario(survey.info.scenario, "RUN_INFO.scenario", &scenario);
     const std::string changes = FormatChanges(scenario);
     if (!changes.empty()) fmt::print("changed   {}\n", logging::LinesForTerminal(changes));
   } catch (const ConfigError& error) {
@@ -270,7 +271,7 @@ void AddCut(CLI::App* log, Command* command) {
   cut->add_option("--first-tick", options->first_tick, "first tick")->check(ticks)->excludes(from);
   cut->add_option("--last-tick", options->last_tick, "last tick")->check(ticks)->excludes(to);
   cut->add_option("--channel", options->channels,
-                  "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM_ODE; default: "
+                  "channel to keep, e.g. --channel ROBOT_STATE --channel HEALTH_SIM; default: "
                   "all")
       ->allow_extra_args(false)
       ->take_all();

@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <memory>
 
-#include "components/framework/configuration.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/output_place.h"
@@ -11,6 +10,7 @@
 #include "tools/report/run_screen.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
+#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
@@ -35,7 +35,7 @@ ReportedRun ReadReportedRun(const std::string& run) {
                     "scenario's text there",
                     result.log));
   }
-  ParseTextProto(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  ParseScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
   PrepareRecord(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {
     fmt::print(

@@ -104,7 +104,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
   run->add_option("--set", options->changes.set,
-                  "change a field of the scenario, e.g. --set sim_ode.push[0].peak=120 or "
+                  "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
                   "--set 'check[push_peak].at_most=200' (poise list fields); "
                   "no value: empties a list or group, unsets a number without default")
       ->type_name("FIELD=VALUE")

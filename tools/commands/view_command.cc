@@ -20,6 +20,7 @@
 #include "tools/live/view_server.h"
 #include "tools/report/html_report.h"
 #include "tools/run/live_run.h"
+#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
@@ -180,7 +181,7 @@ int View(const ViewOptions& options) {
         fmt::format("{}: a new run is starting in this folder; try again", live.dir().string()));
   }
   Scenario scenario;
-  ParseTextProto(record.info.scenario, (live.dir() / "run.lcm").string() + ": RUN_INFO.scenario",
+  ParseScenario(record.info.scenario, (live.dir() / "run.lcm").string() + ": RUN_INFO.scenario",
                  &scenario);
   StandBack();
   return Viewer(options, &live, record, scenario).Run();

@@ -17,7 +17,7 @@ std::string Words(std::string text) {
   return text;
 }
 
-/// "peak of push[0]" of "sim_ode.push[0].peak".
+/// "peak of push[0]" of "sim.push[0].peak".
 std::string WordsOfField(const std::string& field) {
   const size_t last = field.rfind('.');
   if (last == std::string::npos) return Words(field);
@@ -27,7 +27,7 @@ std::string WordsOfField(const std::string& field) {
                      Words(field.substr(begin, last - begin)));
 }
 
-/// Of a field of the scenario, "sim_ode.push[0].peak"; empty when its schema says none.
+/// Of a field of the scenario, "sim.push[0].peak"; empty when its schema says none.
 std::string UnitOfField(const std::string& field) {
   static const std::vector<FieldEntry> fields = FieldReference(Schema::kScenario);
   static const std::regex index("\\[[0-9]+\\]");

@@ -7,7 +7,7 @@
 
 namespace poise {
 
-/// "direction", or "peak of push[0]" for the field sim_ode.push[0].peak.
+/// "direction", or "peak of push[0]" for the field sim.push[0].peak.
 std::string PlainName(const Variable& variable);
 std::string PlainName(const Limit& limit);
 

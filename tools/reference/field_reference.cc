@@ -146,7 +146,7 @@ void Append(const Descriptor& type, const std::string& prefix, std::vector<Field
   }
 }
 
-/// "sim_ode.push[0]" as "sim_ode.push[i]", without a dot at its end.
+/// "sim.push[0]" as "sim.push[i]", without a dot at its end.
 std::string Normalized(std::string_view path) {
   std::string result;
   for (size_t i = 0; i < path.size(); ++i) {

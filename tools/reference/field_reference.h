@@ -13,7 +13,7 @@ namespace poise {
 enum class Schema { kScenario, kRobot, kSweep, kGraph };
 
 struct FieldEntry {
-  std::string path;           ///< as --set takes it, [i] for a list's index: "sim_ode.push[i].peak"
+  std::string path;           ///< as --set takes it, [i] for a list's index: "sim.push[i].peak"
   std::string type;           ///< "number", "text", "list of groups", ...
   std::string default_value;  ///< as a file has it; empty: none
   std::string unit;           ///< empty: none
@@ -26,7 +26,7 @@ struct FieldEntry {
 /// file (Scenario.applied) is left out.
 std::vector<FieldEntry> FieldReference(Schema schema);
 
-/// The fields at and below the path `beginning` ("sim_ode.push", "sim_ode.push[0]", "sim_ode."); if
+/// The fields at and below the path `beginning` ("sim.push", "sim.push[0]", "sim."); if
 /// there are none, those whose name holds it. Empty: all. Throws ConfigError with near names when
 /// nothing fits.
 std::vector<FieldEntry> SelectFields(const std::vector<FieldEntry>& fields,

@@ -6,7 +6,6 @@
 #include "components/framework/clock.h"
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
-#include "components/state_estimator/state_estimator.pb.h"
 #include "fmt/format.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
@@ -19,32 +18,25 @@ Port* FindPort(const std::vector<Port*>& ports) {
   const auto found = std::find_if(ports.begin(), ports.end(), [](const Port* port) {
     return std::string_view(port->type_name()) == Message::getTypeName();
   });
-  return *found;  // state_estimator has one of each type
+  return *found;  // an estimator has one of each type
 }
-
-// The message counts the methods as the configuration does.
-static_assert(int{estimator_status_t::METHOD_ANCHORED_FEET} == StateEstimatorConfig::ANCHORED_FEET);
-static_assert(int{estimator_status_t::METHOD_INVARIANT_EKF} == StateEstimatorConfig::INVARIANT_EKF);
 
 }  // namespace
 
 std::optional<int> EstimatorOf(const RunSpec& spec) {
   for (int i = 0; i < spec.graph().component_size(); ++i) {
-    if (TypeOf(spec.graph().component(i)) == "state_estimator") return i;
+    if (!Components().TraitsOf(TypeOf(spec.graph().component(i))).methods.empty()) return i;
   }
   return {};
 }
 
 Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) {
   const int index = EstimatorOf(spec).value();
-  const std::string& name = spec.graph().component(index).name();
-  ChangeConfiguration(fmt::format("{}.method={}", name,
-                                  StateEstimatorConfig::Method_Name(
-                                      static_cast<StateEstimatorConfig::Method>(method))),
-                      &spec);
+  const std::string& type = TypeOf(spec.graph().component(index));
+  ChangeConfiguration(Components().TraitsOf(type).methods.at(static_cast<size_t>(method)), &spec);
   SharedObjects shared;
   const ConfiguredComponent estimator =
-      ConfigureComponent(spec, index, *Components().Find("state_estimator"), &shared);
+      ConfigureComponent(spec, index, *Components().Find(type), &shared);
   InputPort* sensors = FindPort<robot_sensors_t>(estimator.wiring.inputs());
   const OutputPort* state = FindPort<robot_state_t>(estimator.wiring.outputs());
   const OutputPort* status = FindPort<estimator_status_t>(estimator.wiring.outputs());

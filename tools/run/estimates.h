@@ -11,7 +11,8 @@
 
 namespace poise {
 
-/// Index in the graph of the component of type state_estimator; empty without one.
+/// Index in the graph of the component that estimates the state (ComponentTraits::methods); empty
+/// without one.
 std::optional<int> EstimatorOf(const RunSpec& spec);
 
 /// What a method made of a run's readings.

@@ -1,49 +1,43 @@
 #include "tools/scenario/ablations.h"
 
-#include <utility>
+#include <algorithm>
+
+#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {
 
-const std::vector<std::pair<std::string, std::string>>& PartFields() {
-  static const std::vector<std::pair<std::string, std::string>> fields = {
-      {"balancing", "contact_wrench_monitor.balancing"},
-      {"redistribution", "redistributor.redistribution"},
-      {"transition", "redistributor.transition"},
-  };
-  return fields;
+std::vector<RemovablePart> Parts() {
+  std::vector<RemovablePart> parts;
+  for (const auto& [type, entry] : Components().entries()) {
+    parts.insert(parts.end(), entry.traits.parts.begin(), entry.traits.parts.end());
+  }
+  return parts;
 }
-
-constexpr const char* kIdeal[] = {
-    "sim_ode.joint_friction=false",
-    "sim_ode.sensor_noise=false",
-    "sim_ode.rotor_inertia=true",
-    "sim_ode.push_sensor_noise=0",
-    "sim_ode.drive_train=",
-    "sim_ode.model_error=",
-    "sim_ode.motor_change=",
-    // What the estimator knows of the drive train.
-    "state_estimator.invariant_ekf.sensor_delay=0",
-    "state_estimator.invariant_ekf.gear_stiffness=0",
-};
 
 }  // namespace
 
 std::vector<std::string> RemovableParts() {
-  std::vector<std::string> parts;
-  for (const auto& [part, field] : PartFields()) parts.push_back(part);
-  return parts;
+  std::vector<std::string> names;
+  for (const RemovablePart& part : Parts()) names.push_back(part.name);
+  return names;
 }
 
 std::vector<FieldChange> AblationChanges(const std::vector<std::string>& parts, bool ideal) {
   std::vector<FieldChange> changes;
-  for (const auto& [part, field] : PartFields()) {
-    for (const std::string& wanted : parts) {
-      if (wanted == part) changes.push_back({field + "=false", "--without " + part});
-    }
+  for (const RemovablePart& part : Parts()) {
+    if (std::find(parts.begin(), parts.end(), part.name) == parts.end()) continue;
+    changes.push_back({part.field + "=false", "--without " + part.name});
   }
-  if (ideal) {
-    for (const char* set : kIdeal) changes.push_back({set, "--ideal"});
+  if (!ideal) return changes;
+  for (const auto& [type, entry] : Components().entries()) {
+    for (const std::string& set : entry.traits.ideal) {
+      const bool known =
+          std::any_of(changes.begin(), changes.end(), [&](const FieldChange& change) {
+            return change.set == set;  // of another engine
+          });
+      if (!known) changes.push_back({set, "--ideal"});
+    }
   }
   return changes;
 }

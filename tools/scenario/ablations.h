@@ -25,10 +25,11 @@ std::vector<std::string> RemovableParts();
 
 /// The changes of --without PART, for each of `parts` (of RemovableParts()), and of --ideal.
 ///
-/// Ideal: no friction in the joints, no sensor noise, no drive train between command and torque,
-/// no difference between the robot and its model. The rotors' inertia is on: it is part of the
-/// model that the controller uses (mass_matrix of components/robot), and without it the robot would
-/// differ from it. Limits of the motors and the ground stay.
+/// Each component declares its own (ComponentTraits). Ideal: no friction in the joints, no sensor
+/// noise, no drive train between command and torque, no difference between the robot and its model.
+/// The rotors' inertia is on: it is part of the model that the controller uses (mass_matrix of
+/// components/robot), and without it the robot would differ from it. Limits of the motors and the
+/// ground stay.
 std::vector<FieldChange> AblationChanges(const std::vector<std::string>& parts, bool ideal);
 
 /// All of them, "full" first.

@@ -10,6 +10,7 @@
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/former_fields.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -78,7 +79,7 @@ std::string NewScenarioText(const std::string& name, const std::string& from,
                               : FindFile("scenarios", from, folder);
   const std::string text = ReadFile(source.string());
   Scenario fields;
-  ParseTextProto(text, source.string(), &fields);
+  ParseScenario(text, source.string(), &fields);
   Lines lines(text);
   const auto line_of = [&](const char* field) { return LocateField(text, field, fields); };
   for (const auto& [field, kind, has, value] :

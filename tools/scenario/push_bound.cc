@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "components/messages/conversions.h"
-#include "sim_ode/simulated_robot.h"
+#include "sim/push.h"
+#include "sim/simulated_robot.h"
+#include "sim/start_posture.h"
 
 namespace poise {
 namespace {
@@ -39,11 +41,14 @@ std::optional<double> DistanceToEdge(const std::vector<Vector2d>& points, const 
 
 }  // namespace
 
-double HorizontalImpulse(const Push& push) {
+double HorizontalImpulse(const Push& push, double impulse_scale) {
   const double horizontal = std::hypot(push.direction_x(), push.direction_y());
   const double all = std::hypot(horizontal, push.direction_z());
-  const double mean = push.profile() == Push::HALF_SINE ? 2 / pi : 1;
-  return all > 0 ? std::abs(push.peak()) * mean * push.duration() * horizontal / all : 0;
+  if (!(all > 0)) return 0;
+  const double impulse = push.has_scaled_impulse()
+                             ? std::abs(push.scaled_impulse()) * impulse_scale
+                             : std::abs(push.peak()) * MeanOfPeak(push.profile()) * push.duration();
+  return impulse * horizontal / all;
 }
 
 double PendulumShare(Push::Profile profile, double duration, double frequency) {
@@ -54,12 +59,13 @@ double PendulumShare(Push::Profile profile, double duration, double frequency) {
 }
 
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run) {
-  const SimOdeConfig& sim = scenario.sim_ode();
+  const SimConfig& sim = scenario.sim();
   if (sim.push_size() != 1 || sim.hand_size() > 0) return {};
   const Push& push = sim.push(0);
   Vector2d along(push.direction_x(), push.direction_y());
   if (!(along.norm() > 1e-12)) return {};
-  along *= (push.peak() < 0 ? -1 : 1) / along.norm();
+  const double sign = push.has_scaled_impulse() ? push.scaled_impulse() : push.peak();
+  along *= (sign < 0 ? -1 : 1) / along.norm();
   const auto tick = static_cast<int64_t>(std::floor(push.start() / run.spec.tick_period())) +
                     run.spec.lead_ticks();
   const ground_truth_t* truth = run.truth.at(std::min(tick, run.num_ticks - 1));
@@ -88,8 +94,12 @@ std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::
       com.head<2>() + GetVector3(truth->com_velocity).head<2>() / frequency;
   bound.distance = DistanceToEdge(corners, capture_point, along).value_or(0);
   if (!(bound.distance > 0)) return {};
-  bound.impulse = HorizontalImpulse(push);
-  bound.mass = WithModelErrors(run.robot, sim).total_mass();
+  const robot::RobotModel simulated = WithModelErrors(run.robot, sim);
+  bound.mass = simulated.total_mass();
+  // The start's posture is solved again only where the impulse is a share of what it gives.
+  const double scale =
+      push.has_scaled_impulse() ? ImpulseScale(simulated, SolveStart(simulated, sim.start())) : 0;
+  bound.impulse = HorizontalImpulse(push, scale);
   bound.lip_impulse = bound.mass * frequency * bound.distance;
   bound.lip_impulse_of_duration =
       bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);

@@ -28,8 +28,9 @@ struct PushBound {
 /// several, or a vertical one: then there is no such bound.
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run);
 
-/// N·s, horizontal impulse of a push.
-double HorizontalImpulse(const Push& push);
+/// N·s, horizontal impulse of a push; `impulse_scale`: ImpulseScale (N·s), of which scaled_impulse
+/// is a share.
+double HorizontalImpulse(const Push& push, double impulse_scale = 0);
 
 /// Share of a push's impulse that counts for an inverted pendulum: integral of f e^(-wt) dt over
 /// that of f, for its shape and duration (s), `frequency` w in 1/s.

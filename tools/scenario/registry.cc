@@ -17,7 +17,7 @@ const ComponentRegistry& Components() {
     for (const ComponentType& type : {SimOdeType(), HwBridgeType(), DriveEmulatorType(),
                                       StateEstimatorType(), StepPlannerType(), TaskControllerType(),
                                       ContactWrenchMonitorType(), RedistributorType()}) {
-      r.Add(type.name, type.summary, type.make);
+      r.Add(type.name, type.summary, type.make, type.traits);
     }
     return r;
   }();

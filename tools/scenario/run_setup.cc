@@ -18,8 +18,6 @@
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"
-#include "hw_bridge/drive_emulator/drive_emulator.pb.h"
-#include "hw_bridge/hw_bridge.pb.h"
 #include "tools/scenario/library_versions.h"
 #include "tools/scenario/registry.h"
 
@@ -32,23 +30,94 @@ namespace fs = std::filesystem;
 constexpr int kFirstPort = 12000;
 constexpr int kLastPort = 32000;
 
-/// The scenario's field with the configuration of a component; nullptr when it has none of that
-/// name.
-const google::protobuf::FieldDescriptor* ConfigField(const Scenario& scenario,
-                                                     const std::string& component) {
-  const auto* field = scenario.GetDescriptor()->FindFieldByName(component);
+using google::protobuf::FieldDescriptor;
+
+/// The scenario's field `section`, which holds a configuration; nullptr when there is none.
+const FieldDescriptor* ConfigField(const std::string& section) {
+  const auto* field = Scenario::descriptor()->FindFieldByName(section);
   const bool is_config = field != nullptr && !field->is_repeated() &&
-                         field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_MESSAGE;
+                         field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
   return is_config ? field : nullptr;
 }
 
-std::string ConfigText(const Scenario& scenario, const std::string& component) {
-  const auto* field = ConfigField(scenario, component);
-  if (field == nullptr || !scenario.GetReflection()->HasField(scenario, field)) return "";
+/// The scenario's fields that hold the configuration of a component of this type.
+std::vector<std::string> SectionsOf(const std::string& type) {
+  const std::vector<std::string>& sections = Components().TraitsOf(type).sections;
+  return sections.empty() ? std::vector<std::string>{type} : sections;
+}
+
+/// The configuration of a component of this type.
+std::string ConfigText(const Scenario& scenario, const std::string& type) {
+  const std::vector<std::string> sections = SectionsOf(type);
+  const google::protobuf::Reflection& reflection = *scenario.GetReflection();
+  Scenario own;  // its sections alone
+  for (const std::string& section : sections) {
+    const FieldDescriptor* field = ConfigField(section);
+    if (field == nullptr || !reflection.HasField(scenario, field)) continue;
+    reflection.MutableMessage(&own, field)->CopyFrom(reflection.GetMessage(scenario, field));
+  }
+  const FieldDescriptor* field = ConfigField(sections[0]);
   std::string text;
-  google::protobuf::TextFormat::PrintToString(scenario.GetReflection()->GetMessage(scenario, field),
-                                              &text);
+  if (sections.size() > 1) {
+    google::protobuf::TextFormat::PrintToString(own, &text);
+  } else if (field != nullptr) {
+    google::protobuf::TextFormat::PrintToString(reflection.GetMessage(own, field), &text);
+  }
   return text;
+}
+
+/// ConfigText's inverse: the sections alone.
+Scenario ParseConfig(const ComponentConfig& config, const std::string& type) {
+  const std::vector<std::string> sections = SectionsOf(type);
+  const std::string source = "configuration of " + config.component();
+  Scenario own;
+  const FieldDescriptor* field = ConfigField(sections[0]);
+  if (sections.size() > 1) {
+    ParseTextProto(config.text(), source, &own);
+  } else if (field != nullptr) {
+    ParseTextProto(config.text(), source, own.GetReflection()->MutableMessage(&own, field));
+  }
+  return own;
+}
+
+/// Where the run keeps a component's configuration; -1 when it has none.
+int ConfigIndex(const RunSpec& spec, const ComponentInstance& instance) {
+  int i = spec.config_size() - 1;
+  while (i >= 0 && spec.config(i).component() != instance.name()) --i;
+  return i;
+}
+
+/// The scenario's path of a field of a component's own configuration.
+std::string ScenarioPath(const std::string& type, const std::string& field) {
+  const std::vector<std::string> sections = SectionsOf(type);
+  if (sections.size() > 1) return field;
+  return field.empty() ? sections[0] : sections[0] + "." + field;
+}
+
+/// Puts the engine that the scenario names in the place of the graph's.
+void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
+  const std::string& engine = loaded.scenario.engine();
+  if (!loaded.scenario.has_engine()) return;
+  std::string chosen;
+  std::vector<std::string> engines;
+  for (const auto& [type, entry] : Components().entries()) {
+    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
+    if (entry.traits.engine == engine) chosen = type;
+  }
+  if (engine.empty() || chosen.empty()) {
+    FailField(loaded, "engine",
+              fmt::format("there is no engine '{}'; {}", engine, Suggest(engine, engines)));
+  }
+  bool found = false;
+  for (ComponentInstance& instance : *graph->mutable_component()) {
+    if (Components().TraitsOf(TypeOf(instance)).engine.empty()) continue;
+    instance.set_type(chosen);
+    found = true;
+  }
+  if (!found) {
+    FailField(loaded, "engine",
+              fmt::format("the graph {} simulates no robot; leave engine out", graph->name()));
+  }
 }
 
 void AddResource(RunSpec* spec, const std::string& name, const fs::path& file) {
@@ -102,6 +171,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
   spec.set_scenario(NameOf(loaded));
   ReadTextProto(loaded.graph_file, spec.mutable_graph());
+  ChooseEngine(loaded, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
   spec.set_lead_ticks(std::llround(scenario.lead() * scenario.tick_rate()));
@@ -146,8 +216,10 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
     if (error.field().empty()) throw;
     std::string field = error.field();
     for (const ComponentInstance& instance : spec->graph().component()) {
-      if (field == instance.name() || field.starts_with(instance.name() + ".")) {
-        field.replace(0, instance.name().size(), TypeOf(instance));
+      const std::string& name = instance.name();
+      if (field == name || field.starts_with(name + ".")) {
+        field =
+            ScenarioPath(TypeOf(instance), field.substr(std::min(name.size() + 1, field.size())));
         break;
       }
     }
@@ -166,39 +238,36 @@ void CheckGraphFile(const std::string& path) {
 }
 
 void ChangeConfiguration(const std::string& change, RunSpec* spec) {
-  const std::string type = change.substr(0, change.find_first_of(".[="));
-  std::vector<std::string> types;
+  const std::string section = change.substr(0, change.find_first_of(".[="));
+  std::vector<std::string> names;
   bool changed = false;
   const size_t equals = change.find('=');
   if (equals == std::string::npos || equals == 0) {
     throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
   }
   for (const ComponentInstance& instance : spec->graph().component()) {
-    types.push_back(TypeOf(instance));
-    Scenario scenario;
-    const auto* field = ConfigField(scenario, type);
-    if (types.back() != type || field == nullptr) continue;
-    auto& configs = *spec->mutable_config();
-    auto config = std::find_if(configs.begin(), configs.end(), [&](const ComponentConfig& c) {
-      return c.component() == instance.name();
-    });
-    if (config == configs.end()) {
+    const std::string& type = TypeOf(instance);
+    const std::vector<std::string> sections = SectionsOf(type);
+    names.insert(names.end(), sections.begin(), sections.end());
+    const bool takes = std::find(sections.begin(), sections.end(), section) != sections.end();
+    if (!takes || ConfigField(section) == nullptr) continue;
+    const int config = ConfigIndex(*spec, instance);
+    if (config < 0) {
       throw ConfigError(
           fmt::format("--set {}: the run has no configuration of {}", change, instance.name()));
     }
-    ParseTextProto(config->text(), "configuration of " + instance.name(),
-                   scenario.GetReflection()->MutableMessage(&scenario, field));
+    Scenario own = ParseConfig(spec->config(config), type);
     try {
-      SetField(&scenario, change.substr(0, equals), change.substr(equals + 1));
+      SetField(&own, change.substr(0, equals), change.substr(equals + 1));
     } catch (const ConfigError& error) {
       throw ConfigError(fmt::format("--set {}", error.what()));
     }
-    config->set_text(ConfigText(scenario, type));
+    spec->mutable_config(config)->set_text(ConfigText(own, type));
     changed = true;
   }
   if (!changed) {
-    throw ConfigError(fmt::format("--set {}: the run has no component '{}'; {}", change, type,
-                                  Suggest(type, types)));
+    throw ConfigError(fmt::format("--set {}: no component of the run has a configuration '{}'; {}",
+                                  change, section, Suggest(section, names)));
   }
 }
 
@@ -206,27 +275,15 @@ namespace {
 
 /// The port of EtherCAT over UDP, for the components at both of its ends.
 void SetEthercatPort(int port, RunSpec* spec) {
-  for (ComponentConfig& config : *spec->mutable_config()) {
-    const auto& components = spec->graph().component();
-    const auto instance = std::find_if(
-        components.begin(), components.end(),
-        [&](const ComponentInstance& each) { return each.name() == config.component(); });
-    if (instance == components.end()) continue;
-    const auto set = [&](auto message, auto link_of) {
-      ParseTextProto(config.text(), "configuration of " + config.component(), &message);
-      ethercat::LinkConfig* const link = link_of(&message);
-      if (link == nullptr || !link->has_udp() || link->udp().has_port()) return;
-      link->mutable_udp()->set_port(static_cast<uint32_t>(port));
-      google::protobuf::TextFormat::PrintToString(message, config.mutable_text());
-    };
-    if (TypeOf(*instance) == "hw_bridge") {
-      set(HwBridgeConfig(), [](HwBridgeConfig* message) {
-        return message->has_ethercat() ? message->mutable_ethercat()->mutable_link() : nullptr;
-      });
-    } else if (TypeOf(*instance) == "drive_emulator") {
-      set(DriveEmulatorConfig(),
-          [](DriveEmulatorConfig* message) { return message->mutable_link(); });
-    }
+  for (const ComponentInstance& instance : spec->graph().component()) {
+    const std::string& type = TypeOf(instance);
+    const std::string udp = Components().TraitsOf(type).drive_link.link + ".udp";
+    const int config = ConfigIndex(*spec, instance);
+    if (udp.starts_with('.') || config < 0) continue;
+    Scenario own = ParseConfig(spec->config(config), type);
+    if (!HasField(own, udp) || HasField(own, udp + ".port")) continue;
+    SetField(&own, udp + ".port", std::to_string(port));
+    spec->mutable_config(config)->set_text(ConfigText(own, type));
   }
 }
 
@@ -234,15 +291,10 @@ void SetEthercatPort(int port, RunSpec* spec) {
 
 bool SpeaksEthercat(const RunSpec& spec, int component) {
   const ComponentInstance& instance = spec.graph().component(component);
-  if (TypeOf(instance) == "drive_emulator") return true;
-  if (TypeOf(instance) != "hw_bridge") return false;
-  for (const ComponentConfig& config : spec.config()) {
-    if (config.component() != instance.name()) continue;
-    HwBridgeConfig bridge;
-    ParseTextProto(config.text(), "configuration of " + instance.name(), &bridge);
-    return bridge.has_ethercat();
-  }
-  return false;
+  const std::string& link = Components().TraitsOf(TypeOf(instance)).drive_link.link;
+  const int config = ConfigIndex(spec, instance);
+  if (link.empty() || config < 0) return false;
+  return HasField(ParseConfig(spec.config(config), TypeOf(instance)), link);
 }
 
 void ChoosePorts(RunSpec* spec) {

@@ -9,6 +9,7 @@
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
@@ -76,7 +77,7 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
     File read;
     read.name = next.string();
     read.text = ReadFile(read.name);
-    ParseTextProto(read.text, read.name, &read.fields);
+    ParseScenario(read.text, read.name, &read.fields);
     const bool has_base = read.fields.has_base();
     const std::string base = read.fields.base();
     files_.insert(files_.begin(), std::move(read));
@@ -101,7 +102,7 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
   File read;
   read.name = overlay.string();
   read.text = ReadFile(read.name);
-  ParseTextProto(read.text, read.name, &read.fields);
+  ParseScenario(read.text, read.name, &read.fields);
   files_.push_back(std::move(read));
 }
 

@@ -15,6 +15,8 @@
 #include "logging/metrics.h"
 #include "tools/reference/field_reference.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/former_fields.h"
+#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {
@@ -153,8 +155,10 @@ void CheckScenario(const LoadedScenario& loaded) {
     const Assumption& assumption = s.assumption(i);
     // As the files have it: an ablation may have cleared what the assumption is about.
     if (!HasField(s, assumption.field()) && !HasField(loaded.files.Merged(), assumption.field())) {
+      const std::string former = FormerField(assumption.field());
       fail(fmt::format("assumption[{}].field", i),
-           fmt::format("the scenario sets no field '{}'", assumption.field()));
+           fmt::format("the scenario sets no field '{}'{}", assumption.field(),
+                       former.empty() ? "" : "; " + former));
     }
     if (assumption.kind() != "fitted" && assumption.kind() != "assumed") {
       fail(fmt::format("assumption[{}].kind", i), "must be \"fitted\" or \"assumed\"");
@@ -205,6 +209,9 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
   try {
     SetField(&loaded->scenario, path, value);
   } catch (const ConfigError& error) {
+    if (const std::string former = FormerField(path); !former.empty()) {
+      throw ConfigError(Describe(*loaded, change, path, "has another name now; " + former));
+    }
     const bool wrong_value = error.problem().starts_with(fmt::format("'{}' is not ", value));
     const std::string hint = wrong_value ? UnitHint(path, value) : "";
     throw ConfigError(
@@ -278,11 +285,16 @@ void ApplyVariant(const std::string& name, LoadedScenario* loaded) {
   if (variant.check_size() > 0) *loaded->scenario.mutable_check() = variant.check();
 }
 
-/// File of deploy/`kind` that the scenario's `field` names.
+/// The file that the scenario's `field` names: beside the file that says so, or the current folder
+/// where --set does, then in deploy/`kind`.
 std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const std::string& field,
                     const std::string& name) {
+  const bool set =
+      std::any_of(loaded.changes.begin(), loaded.changes.end(), [&](const FieldChange& change) {
+        return change.by == kSetFlag && PathOf(loaded, change) == field;
+      });
   try {
-    return FindFile(kind, name, loaded.files.FolderOf(field)).string();
+    return FindFile(kind, name, set ? fs::current_path() : loaded.files.FolderOf(field)).string();
   } catch (const ConfigError& error) {
     FailField(loaded, field, error.what());
   }
@@ -290,52 +302,59 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
 
 /// What a robot is given that commands may reach late.
 void ApplyRealtime(LoadedScenario* loaded) {
-  const auto apply = [&](bool given, const char* set) {
-    if (!given) ApplyChange({set, "--realtime"}, loaded);
+  const auto apply = [&](const std::string& unless, const std::string& set) {
+    if (!HasField(loaded->scenario, unless)) ApplyChange({set, "--realtime"}, loaded);
   };
-  const Scenario& scenario = loaded->scenario;
-  // A process that dies is replaced: worth waiting for.
-  apply(scenario.hw_bridge().has_on_lost_command(), "hw_bridge.on_lost_command=HOLD");
-  // Until the controller follows, the robot hangs with its joints held.
-  apply(scenario.hw_bridge().has_hold_before_command(), "hw_bridge.hold_before_command=true");
-  apply(scenario.sim_ode().has_crane(), "sim_ode.crane.release_time=1");
-  apply(scenario.has_lead(), "lead=5");
+  for (const auto& [type, entry] : Components().entries()) {
+    for (const DefaultSetting& each : entry.traits.realtime) apply(each.unless, each.set);
+  }
+  apply("lead", "lead=5");
+}
+
+/// The group of fields at `path`, which holds no index; made where the scenario has none.
+google::protobuf::Message* Group(Scenario* scenario, std::string_view path) {
+  google::protobuf::Message* group = scenario;
+  for (size_t begin = 0; begin <= path.size();) {
+    const size_t end = std::min(path.find('.', begin), path.size());
+    const std::string name(path.substr(begin, end - begin));
+    const auto* const field = group->GetDescriptor()->FindFieldByName(name);
+    group = group->GetReflection()->MutableMessage(group, field);
+    begin = end + 1;
+  }
+  return group;
 }
 
 /// The drives' type, their link, and whose time they follow.
 void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   Scenario* const scenario = &loaded->scenario;
-  const auto apply = [&](const std::string& set, const char* by) {
-    ApplyChange({set, by}, loaded);
-  };
-  if (scenario->has_drive_profile()) {
-    const std::string file = Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile());
-    ReadTextProto(
-        file,
-        scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_master()->mutable_profile());
-  }
-  if (!changes.realtime) {
-    apply("hw_bridge.ethercat.simulated_time=true", "--drives");
-    apply("drive_emulator.simulated_time=true", "--drives");
-  }
   constexpr std::string_view kRaw = "raw:";
-  if (changes.link.empty() || changes.link == "udp") {
-    scenario->mutable_hw_bridge()->mutable_ethercat()->mutable_link()->mutable_udp();
-    scenario->mutable_drive_emulator()->mutable_link()->mutable_udp();
-  } else {
-    const size_t comma = changes.link.find(',');
-    if (!changes.link.starts_with(kRaw) || comma == std::string::npos) {
-      throw ConfigError(fmt::format(
-          "--link {}: must be udp, or raw:MASTER,DRIVES with the names of two interfaces",
-          changes.link));
-    }
-    apply("hw_bridge.ethercat.link.interface=" +
-              changes.link.substr(kRaw.size(), comma - kRaw.size()),
-          "--link");
-    apply("drive_emulator.link.interface=" + changes.link.substr(comma + 1), "--link");
+  const bool udp = changes.link.empty() || changes.link == "udp";
+  const size_t comma = changes.link.find(',');
+  if (!udp && (!changes.link.starts_with(kRaw) || comma == std::string::npos)) {
+    throw ConfigError(
+        fmt::format("--link {}: must be udp, or raw:MASTER,DRIVES with the names of two interfaces",
+                    changes.link));
   }
-  if (!changes.capture.empty()) {
-    scenario->mutable_hw_bridge()->mutable_ethercat()->set_capture(changes.capture);
+  for (const auto& [type, entry] : Components().entries()) {
+    const DriveLink& end = entry.traits.drive_link;
+    if (scenario->has_drive_profile() && !end.profile.empty()) {
+      ReadTextProto(Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile()),
+                    Group(scenario, end.profile));
+    }
+    if (!changes.realtime && !end.simulated_time.empty()) {
+      ApplyChange({end.simulated_time + "=true", "--drives"}, loaded);
+    }
+    if (!end.link.empty() && udp) {
+      Group(scenario, end.link + ".udp");
+    } else if (!end.link.empty()) {
+      const std::string interface = end.drives
+                                        ? changes.link.substr(comma + 1)
+                                        : changes.link.substr(kRaw.size(), comma - kRaw.size());
+      ApplyChange({end.link + ".interface=" + interface, "--link"}, loaded);
+    }
+    if (!changes.capture.empty() && !end.capture.empty()) {
+      SetField(scenario, end.capture, changes.capture);
+    }
   }
 }
 
@@ -410,9 +429,12 @@ RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& chan
   RunChanges reference = changes;
   reference.variant = loaded.scenario.reference();
   if (changes.realtime) {
-    // In lockstep no command is late: what was set of the crane is for the other run.
     reference.realtime = false;
-    reference.set.insert(reference.set.end(), {"sim_ode.crane=", "lead=0"});
+    for (const auto& [type, entry] : Components().entries()) {
+      const std::vector<std::string>& lockstep = entry.traits.lockstep;
+      reference.set.insert(reference.set.end(), lockstep.begin(), lockstep.end());
+    }
+    reference.set.push_back("lead=0");
   }
   reference.drives.clear();
   reference.drop_rate = 0;

@@ -6,7 +6,7 @@
 
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
-#include "sim_ode/random.h"
+#include "sim/random.h"
 #include "tools/sweep/sweep_expression.h"
 
 namespace poise {

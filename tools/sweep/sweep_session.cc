@@ -88,7 +88,7 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
        "NAME=VALUES");
   list("--expression", &arguments->expression,
        "a field that follows from the variables, e.g. "
-       "'sim_ode.push[0].direction_x=cos(direction*deg)'",
+       "'sim.push[0].direction_x=cos(direction*deg)'",
        "FIELD=EXPRESSION");
   app->add_option("--random", arguments->random,
                   "this many runs with every variable drawn at random, in place of the grid")

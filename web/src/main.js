@@ -58,7 +58,7 @@ function sceneKey(run, overlay) {
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
     entry('capture', '●', 'capture point; ○ a step needed there'),
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
-    run.scenario.sim_ode?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
+    run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
 }
 

@@ -171,7 +171,7 @@ export class SceneView {
       this.ghost = new RobotView(this.overlay.robot, {ghost: true});
       scene.add(this.ghost.object);
     }
-    const block = this.run.scenario.sim_ode?.block;
+    const block = this.run.scenario.sim?.block;
     if (block) {
       this.block = new Block(block);
       scene.add(this.block.object);
@@ -268,7 +268,7 @@ export class SceneView {
       this.ghost.setPose(this.overlaySamples.pose('base', other),
         this.overlaySamples.vector('joint', other, this.overlay.robot.joints.length));
     }
-    if (this.block) this.block.setRise(blockRise(this.run.scenario.sim_ode.block, this.run.timeAt(row)));
+    if (this.block) this.block.setRise(blockRise(this.run.scenario.sim.block, this.run.timeAt(row)));
 
     const com = samples.vector('com', row);
     this.com.visible = this.comMark.visible = show.com && com.every(Number.isFinite);

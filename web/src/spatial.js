@@ -41,7 +41,7 @@ export function convexHull(points) {
 
 /**
  * Share of its height, 0..1, that the top of the scenario's soft block has at a time, s: it rises with minimum jerk, as
- * in sim_ode/terrain.cc. undefined before it is there.
+ * in sim/terrain.cc. undefined before it is there.
  */
 export function blockRise(block, time) {
   const elapsed = time - (block.start ?? 0);
@@ -53,7 +53,7 @@ export function blockRise(block, time) {
 /** Of the block, from above, counterclockwise. */
 export const BLOCK_CORNERS = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
 
-/** Heights of the top's corners above the ground, m, as in sim_ode/terrain.cc. */
+/** Heights of the top's corners above the ground, m, as in sim/terrain.cc. */
 export function blockTop(block, rise) {
   const slope = [-Math.tan(block.tilt_pitch), Math.tan(block.tilt_roll) / Math.cos(block.tilt_pitch)];
   return BLOCK_CORNERS.map(([i, j]) => block.height * rise + slope[0] * i * block.length / 2 + slope[1] * j * block.width / 2);

@@ -1,0 +1,73 @@
+#include "sim/crane.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/robot/dynamics.h"
+#include "sim/config_check.h"
+#include "sim/minimum_jerk.h"
+
+namespace poise {
+
+using Eigen::Vector3d;
+
+namespace {
+
+// By what the robot's weight stretches the spring: little beside the robot, so that it starts where
+// it is to stand, and soft beside its legs.
+constexpr double kSag = 0.01;  // m
+constexpr double kDampingRatio = 0.7;
+// The force is explicit in the step; a point of a link feels as little as a quarter of its mass.
+constexpr double kFeltMass = 0.25;
+constexpr double kStable = 0.5;      // of the greatest damping that a step allows
+constexpr double kTakeUpTime = 0.1;  // s, in which the hold comes back
+
+}  // namespace
+
+CraneSpring::CraneSpring(const Crane& config, const robot::RobotModel& model,
+                         const Eigen::Isometry3d& base, const Vector3d& com, double step,
+                         double tick_period)
+    : release_time_(config.release_time()),
+      tick_period_(tick_period),
+      anchor_(com + config.height() * Vector3d::UnitZ()) {
+  RequireNotNegative(config.height(), "crane.height");
+  RequireNotNegative(config.follow_time(), "crane.follow_time");
+  const double ticks = std::ceil(config.follow_time() / tick_period - 1e-9);
+  follow_ticks_ = static_cast<int64_t>(std::min(ticks, 1e9));
+  RequirePositive(release_time_, "crane.release_time");
+  const double mass = model.total_mass();
+  stiffness_ = config.has_stiffness() ? config.stiffness() : mass * robot::kGravity / kSag;
+  RequirePositive(stiffness_, "crane.stiffness");
+  const double felt = kFeltMass * model.bodies()[0].mass;
+  damping_ = config.has_damping() ? config.damping()
+                                  : std::min(2 * kDampingRatio * std::sqrt(mass * stiffness_),
+                                             kStable * felt / step);
+  RequireNotNegative(damping_, "crane.damping");
+  if (step * (damping_ + step * stiffness_) > felt) {
+    throw ConfigError(
+        config.has_damping() ? "crane.damping" : "crane.stiffness",
+        fmt::format("spring and damper are too stiff for a root link of {} kg with steps of {} s; "
+                    "lower damping or stiffness",
+                    model.bodies()[0].mass, step));
+  }
+  point_ = base.inverse() * anchor_;
+}
+
+void CraneSpring::Follow(bool follows) {
+  if (let_go()) return;
+  followed_ = follows ? followed_ + 1 : 0;
+  if (!follows) {
+    released_ = std::max(0.0, released_ - tick_period_ / kTakeUpTime);
+  } else if (followed_ > follow_ticks_) {
+    released_ = std::min(1.0, released_ + tick_period_ / release_time_);
+  }
+  share_ = 1 - MinimumJerk(released_, 1).position;
+}
+
+Vector3d CraneSpring::Force(const Vector3d& position, const Vector3d& velocity) const {
+  return share_ * (stiffness_ * (anchor_ - position) - damping_ * velocity);
+}
+
+}  // namespace poise

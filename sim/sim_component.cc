@@ -1,0 +1,119 @@
+#include "sim/sim_component.h"
+
+#include <algorithm>
+
+#include "components/messages/conversions.h"
+#include "components/messages/robot_resource.h"
+
+namespace poise {
+
+ComponentTraits SimTraits(const std::string& engine) {
+  return {.sections = {"sim", engine},
+          .engine = engine,
+          .ideal = {"sim.joint_friction=false", "sim.sensor_noise=false", "sim.rotor_inertia=true",
+                    "sim.push_sensor_noise=0", "sim.robot_drive_train=false",
+                    "sim.drive_train=", "sim.model_error=", "sim.motor_change="},
+          // Until the controller follows, the robot hangs.
+          .realtime = {{"sim.crane", "sim.crane.release_time=1"}},
+          // No command is late.
+          .lockstep = {"sim.crane="}};
+}
+
+void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
+  const SimSetup setup = read_(context);
+  const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
+  try {
+    simulation_ = std::make_unique<Simulation>(*model, setup.sim, setup.worlds, context.tick_period,
+                                               context.seed, context.lead_ticks);
+    sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, setup.sim), context.seed);
+  } catch (const ConfigError& error) {
+    if (error.field().empty()) throw;
+    throw ConfigError("sim." + error.field(), error.problem());
+  }
+  readings_ = std::make_unique<SensorReadings>(model->num_joints());
+
+  const MessageCounts counts = JointAndFootCounts(*model);
+  wiring->AddInput(&drive_command_, "drive_command", {model->num_joints()},
+                   InputKind::kPreviousTick);
+  wiring->AddInput(&bridge_status_, "bridge_status", {model->num_joints()},
+                   InputKind::kPreviousTick);
+  wiring->AddOutput(&drive_feedback_, "drive_feedback", counts);
+  wiring->AddOutput(&external_push_, "external_push", {});
+  wiring->AddOutput(&ground_truth_, "ground_truth", counts);
+  wiring->AddStage("step", {&drive_command_, &bridge_status_},
+                   {&drive_feedback_, &external_push_, &ground_truth_},
+                   [this](const Tick& tick) { Step(tick); });
+}
+
+std::string_view SimComponent::finished() const {
+  return simulation_ ? simulation_->end_reason() : std::string_view{};
+}
+
+void SimComponent::Step(const Tick& tick) {
+  if (tick.index > 0) {
+    if (drive_command_.present()) {
+      simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);
+    } else {
+      simulation_->SetCurrents({}, {});
+    }
+    simulation_->Follow(bridge_status_.present() &&
+                        bridge_status_->state == bridge_status_t::STATE_RUNNING);
+    simulation_->Advance();
+  }
+  sensors_->Measure(simulation_->measured(), readings_.get());
+  PublishFeedback();
+  PublishPush();
+  PublishTruth();
+}
+
+void SimComponent::PublishFeedback() {
+  drive_feedback_t& message = *drive_feedback_;
+  for (size_t j = 0; j < message.current.size(); ++j) {
+    message.position_counts[j] = readings_->position_counts[j];
+    message.current[j] = simulation_->measured().motor_current[static_cast<Eigen::Index>(j)];
+    message.drive_status[j] = drive_feedback_t::DRIVE_ENABLED;  // simulated drives have no faults
+  }
+  SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);
+  SetVector3(readings_->imu_acceleration, message.imu_acceleration);
+  for (size_t f = 0; f < message.foot_wrench.size(); ++f) {
+    SetWrench(readings_->foot_wrench[f], &message.foot_wrench[f]);
+  }
+}
+
+void SimComponent::PublishPush() {
+  SetVector3(readings_->push_force, external_push_->force);
+  SetVector3(simulation_->truth().push_point, external_push_->point);
+}
+
+void SimComponent::PublishTruth() {
+  ground_truth_t& message = *ground_truth_;
+  const SimulationTruth& truth = simulation_->truth();
+  const robot::RobotState& state = truth.state;
+  SetVector3(state.base_position, message.base_position);
+  const Eigen::Quaterniond& q = state.base_orientation;
+  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
+  std::copy_n(orientation, 4, message.base_orientation);
+  SetVector3(state.base_linear_velocity, message.base_linear_velocity);
+  SetVector3(state.base_angular_velocity, message.base_angular_velocity);
+  for (size_t j = 0; j < message.joint_position.size(); ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    message.joint_position[j] = state.joint_position[i];
+    message.joint_velocity[j] = state.joint_velocity[i];
+    message.joint_torque[j] = truth.motor_torque[i];
+    message.friction_torque[j] = truth.friction_torque[i];
+  }
+  SetVector3(truth.com, message.com_position);
+  SetVector3(truth.com_velocity, message.com_velocity);
+  for (size_t f = 0; f < message.foot_pose.size(); ++f) {
+    SetPose(truth.foot_pose[f], &message.foot_pose[f]);
+    SetWrench(-truth.foot_wrench[f], &message.foot_wrench[f]);  // robot on environment
+    message.foot_contact_points[f] = truth.contact_points[f];
+  }
+  SetVector3(truth.push_force, message.push_force);
+  message.fallen = simulation_->fallen() ? 1 : 0;
+  SetVector3(truth.crane_point, message.crane_point);
+  SetVector3(truth.crane_force, message.crane_force);
+  message.crane_share = truth.crane_share;
+}
+
+}  // namespace poise

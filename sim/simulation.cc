@@ -1,0 +1,438 @@
+#include "sim/simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "sim/config_check.h"
+#include "sim/simulated_robot.h"
+#include "sim/start_posture.h"
+
+namespace poise {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using robot::kGravity;
+using robot::RobotModel;
+using robot::RobotState;
+
+namespace {
+
+constexpr int kCorners = 4;
+// A corner this far above the ground already rests on it: rounding of the start posture must not
+// let the robot drop.
+constexpr double kContactMargin = 1e-6;  // m
+constexpr double kMaxStartDepth = 5e-3;  // m, of a sole in the block
+
+int StepsPerTick(const SimConfig& config, double tick_period) {
+  RequirePositive(config.step(), "step");
+  const double steps = tick_period / config.step();
+  const double whole = std::round(steps);
+  if (whole < 1 || std::abs(steps - whole) > 1e-6 * whole) {
+    throw ConfigError("step", fmt::format("{} s does not divide the control period of {} s into "
+                                          "whole steps; use {} s divided by a whole number",
+                                          config.step(), tick_period, tick_period));
+  }
+  return static_cast<int>(whole);
+}
+
+Drivetrain::Options DrivetrainOptions(const RobotModel& model,
+                                      const std::vector<robot::MotorModel>& motors,
+                                      const DriveTrain& drive, const SimConfig& config) {
+  RequirePositive(config.friction_stiffness(), "friction_stiffness");
+  RequireNotNegative(drive.torque_lag(), "drive_train.torque_lag");
+  RequireNotNegative(drive.current_resolution(), "drive_train.current_resolution");
+  RequireNotNegative(drive.backlash(), "drive_train.backlash");
+  RequireNotNegative(drive.gear_stiffness(), "drive_train.gear_stiffness");
+  RequireNotNegative(drive.gear_damping(), "drive_train.gear_damping");
+  const Drivetrain::Options options{config.rotor_inertia(),      config.joint_friction(),
+                                    config.friction_stiffness(), drive.backlash(),
+                                    drive.gear_stiffness(),      drive.gear_damping()};
+  if (!options.elastic()) return options;
+  const std::string field =
+      drive.gear_stiffness() > 0 ? "drive_train.gear_stiffness" : "drive_train.backlash";
+  if (!options.inertia) {
+    throw ConfigError(field, "needs the rotor as a body; set rotor_inertia: true or this to 0");
+  }
+  for (size_t j = 0; j < model.joints().size(); ++j) {
+    if (motors[j].reflected_inertia > 0) continue;
+    throw ConfigError(field, "needs the rotor as a body, but joint '" + model.joints()[j].name +
+                                 "' has none; give its motor a rotor_inertia in the robot file");
+  }
+  return options;
+}
+
+size_t DelaySteps(const DriveTrain& drive, double step) {
+  const double delay = drive.sensor_delay();
+  RequireNotNegative(delay, "drive_train.sensor_delay");
+  const double whole = std::round(delay / step);
+  if (std::abs(delay / step - whole) > 1e-6 * std::max(whole, 1.0) || whole > 1e4) {
+    throw ConfigError(
+        "drive_train.sensor_delay",
+        fmt::format("{} s is not a whole number (at most 10000) of steps of {} s", delay, step));
+  }
+  return static_cast<size_t>(whole);
+}
+
+}  // namespace
+
+SimulationTruth::SimulationTruth(int num_joints)
+    : state(num_joints),
+      com(Vector3d::Zero()),
+      com_velocity(Vector3d::Zero()),
+      contact_points{0, 0},
+      encoder_position(Eigen::VectorXd::Zero(num_joints)),
+      motor_current(Eigen::VectorXd::Zero(num_joints)),
+      motor_torque(Eigen::VectorXd::Zero(num_joints)),
+      friction_torque(Eigen::VectorXd::Zero(num_joints)),
+      imu_angular_velocity(Vector3d::Zero()),
+      imu_specific_force(Vector3d::Zero()),
+      push_force(Vector3d::Zero()),
+      push_point(Vector3d::Zero()),
+      crane_point(Vector3d::Zero()),
+      crane_force(Vector3d::Zero()) {
+  foot_pose.fill(Isometry3d::Identity());
+  foot_wrench.fill(robot::Vector6d::Zero());
+}
+
+Simulation::Simulation(const RobotModel& model, const SimConfig& config, const WorldFactory& worlds,
+                       double tick_period, uint64_t seed, int64_t lead_ticks)
+    : model_(WithModelErrors(model, config)),
+      motors_(SimulatedMotors(model, config)),
+      steps_per_tick_(StepsPerTick(config, tick_period)),
+      step_(tick_period / steps_per_tick_),
+      torque_limits_(config.torque_limits()),
+      fall_height_(config.fall_height()),
+      fall_tilt_(config.fall_tilt()),
+      terrain_(config, seed),
+      world_(worlds(model_, kCorners * static_cast<int>(model_.feet().size()), step_)),
+      drive_train_(SimulatedDriveTrain(model_, config)),
+      drivetrain_options_(DrivetrainOptions(model_, motors_, drive_train_, config)),
+      current_loop_(drive_train_, step_),
+      steps_(-lead_ticks * steps_per_tick_),
+      command_(Eigen::VectorXd::Zero(model_.num_joints())),
+      current_(Eigen::VectorXd::Zero(model_.num_joints())),
+      mean_current_(Eigen::VectorXd::Zero(model_.num_joints())),
+      torque_(Eigen::VectorXd::Zero(model_.num_joints())),
+      truth_(model_.num_joints()),
+      measured_(truth_),
+      delayed_(DelaySteps(drive_train_, step_), truth_) {
+  RequireNotNegative(fall_height_, "fall_height");
+  RequirePositive(fall_tilt_, "fall_tilt");
+  const RobotState start = SolveStart(model_, config.start());
+  const double scale = ImpulseScale(model_, start);
+  for (int i = 0; i < config.push_size(); ++i) {
+    pushes_.emplace_back(config.push(i), model_, scale, "push[" + std::to_string(i) + "]");
+  }
+  for (int i = 0; i < config.hand_size(); ++i) {
+    hands_.emplace_back(config.hand(i), model_, step_, "hand[" + std::to_string(i) + "]");
+  }
+  for (const robot::FootModel& foot : model_.feet()) {
+    auto& corners = corners_.emplace_back();
+    for (int c = 0; c < kCorners; ++c) {
+      corners[static_cast<size_t>(c)] = foot.sole * Vector3d((c & 1 ? -0.5 : 0.5) * foot.length,
+                                                             (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+    }
+  }
+  SetState(start);
+  start_com_height_ = truth_.com.z();
+  CheckStart();
+  if (!config.has_crane()) return;
+  crane_.emplace(config.crane(), model_, world_->pose(0), truth_.com, step_, tick_period);
+  const double least = config.crane().follow_time() + config.crane().release_time();
+  if (static_cast<double>(lead_ticks) * tick_period < least) {
+    throw ConfigError(
+        "crane", fmt::format("takes {} s at least to let go, before the scenario's time 0; give "
+                             "the scenario a lead of more, or take the crane away",
+                             least));
+  }
+  ReadCrane();
+}
+
+void Simulation::CheckStart() const {
+  for (size_t f = 0; f < corners_.size(); ++f) {
+    const Isometry3d body = world_->pose(model_.feet()[f].body);
+    for (const Vector3d& corner : corners_[f]) {
+      const Vector3d p = body * corner;
+      const Terrain::Surface surface = terrain_.At(p.x(), p.y(), 0);
+      if (surface.block && surface.height - p.z() > kMaxStartDepth) {
+        throw ConfigError("block", fmt::format("the {} sole starts {:.3f} m inside it; move it or "
+                                               "set block.start to when it is put in place",
+                                               model_.feet()[f].name, surface.height - p.z()));
+      }
+    }
+  }
+}
+
+void Simulation::SetState(const RobotState& state) {
+  world_->SetState(state);
+  drivetrains_.clear();
+  for (size_t j = 0; j < model_.joints().size(); ++j) {
+    drivetrains_.emplace_back(model_.joints()[j], motors_[j], drivetrain_options_);
+  }
+  std::array<bool, 2> in_contact{};
+  for (size_t f = 0; f < 2; ++f) {
+    truth_.contact_points[f] = CollectContacts(f, false);
+    in_contact[f] = truth_.contact_points[f] > 0;
+  }
+  truth_.foot_wrench = RestWrenches(model_, state, in_contact);
+  imu_acceleration_.setZero();
+  if (current_loop_.lags() || drivetrain_options_.elastic()) {
+    Eigen::VectorXd torque = RestTorques(model_, state, truth_.foot_wrench);
+    if (!in_contact[0] && !in_contact[1]) torque.setZero();  // in flight nothing rests
+    for (int j = 0; j < model_.num_joints(); ++j) {
+      const auto i = static_cast<size_t>(j);
+      drivetrains_[i].Place(state.joint_position[j], state.joint_velocity[j], torque[j]);
+      if (!current_loop_.lags()) continue;
+      current_[j] = mean_current_[j] = torque[j] / motors_[i].torque_per_ampere();
+      torque_[j] = torque[j];
+    }
+  }
+  ReadTruth();
+  measured_ = truth_;
+  for (SimulationTruth& past : delayed_) past = truth_;
+}
+
+void Simulation::SetCurrents(std::span<const double> current, std::span<const int8_t> enabled) {
+  for (size_t j = 0; j < motors_.size(); ++j) {
+    const robot::MotorModel& motor = motors_[j];
+    const auto i = static_cast<Eigen::Index>(j);
+    double amperes = j < current.size() && j < enabled.size() && enabled[j] != 0 ? current[j] : 0;
+    if (!std::isfinite(amperes)) {
+      ++refused_currents_;
+      amperes = 0;
+    }
+    amperes = current_loop_.Quantise(amperes);
+    if (torque_limits_) {
+      const double effort = model_.joints()[j].effort / motor.torque_per_ampere();
+      const double limit = std::min(motor.peak_current, effort);
+      amperes = std::clamp(amperes, -limit, limit);
+    }
+    command_[i] = amperes;
+  }
+}
+
+void Simulation::Step() {
+  StepOnce();
+  if (broken_) return;
+  ReadTruth();
+  DetectFall();
+}
+
+void Simulation::Advance() {
+  for (int i = 0; i < steps_per_tick_; ++i) StepOnce();
+  if (broken_) return;
+  ReadTruth();
+  DetectFall();
+  CheckCrane();
+}
+
+void Simulation::Delay() {
+  ReadTruth();
+  std::swap(measured_, delayed_[oldest_]);
+  delayed_[oldest_] = truth_;
+  oldest_ = (oldest_ + 1) % delayed_.size();
+  measured_.push_force = truth_.push_force;
+  measured_.push_point = truth_.push_point;
+}
+
+void Simulation::StepOnce() {
+  if (broken_) return;
+  const double from = time();
+  const double to = static_cast<double>(steps_ + 1) * step_;
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
+    const double gain = motors_[static_cast<size_t>(j)].torque_per_ampere();
+    mean_current_[j] = current_loop_.Advance(command_[j], &current_[j]);
+    torque_[j] = mean_current_[j] * gain;
+    world_->SetJoint(j, drivetrain.Begin(step_, world_->joint_position(j),
+                                         world_->joint_velocity(j), torque_[j]));
+  }
+  for (const PushProfile& push : pushes_) {
+    const Vector3d force = push.MeanForce(from, to);
+    if (!force.isZero(0)) {
+      world_->AddForce(push.body(), force, world_->pose(push.body()) * push.point());
+    }
+  }
+  for (HandSpring& hand : hands_) {
+    const Vector3d point = world_->pose(hand.body()) * hand.point();
+    hand.Grip(from, point);
+    const Vector3d force = hand.Force(from, point, PointVelocity(hand.body(), point));
+    if (!force.isZero(0)) world_->AddForce(hand.body(), force, point);
+  }
+  if (crane_ && !crane_->let_go()) {
+    const Vector3d point = world_->pose(0) * crane_->point();
+    world_->AddForce(0, crane_->Force(point, PointVelocity(0, point)), point);
+  }
+  std::array<Isometry3d, 2> sole;
+  std::array<Vector3d, 2> com;
+  for (size_t f = 0; f < 2; ++f) {
+    const robot::FootModel& foot = model_.feet()[f];
+    sole[f] = world_->pose(foot.body) * foot.sole;
+    com[f] = world_->com_position(foot.body);
+    truth_.contact_points[f] = CollectContacts(f, true);
+  }
+  const Vector3d imu_velocity = ImuVelocity();
+
+  const bool quiet = world_->Step();
+  ++steps_;
+  if (!quiet) return Break(world_->message());
+  if (!world_->Finite()) return Break("the state is no longer finite");
+
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    drivetrains_[static_cast<size_t>(j)].End(step_, world_->joint_velocity(j));
+  }
+  ReadFootWrenches(sole, com);
+  imu_acceleration_ = (ImuVelocity() - imu_velocity) / step_;
+  if (!delayed_.empty()) Delay();
+}
+
+int Simulation::CollectContacts(size_t foot, bool add) {
+  const int body = model_.feet()[foot].body;
+  const Isometry3d pose = world_->pose(body);
+  int count = 0;
+  for (const Vector3d& corner : corners_[foot]) {
+    const Vector3d p = pose * corner;
+    const Terrain::Surface surface = terrain_.At(p.x(), p.y(), time());
+    const double depth = (surface.height - p.z()) * surface.normal.z();
+    if (depth < -kContactMargin) continue;
+    ++count;
+    if (add) {
+      world_->AddContact({body, p, surface.normal, std::max(depth, 0.0),
+                          surface.velocity * surface.normal.z(), terrain_.material(surface.block)});
+    }
+  }
+  return count;
+}
+
+// An ideal six-axis sensor between the foot and a sole without mass: it reads exactly the contact
+// forces. A plate on a fixed joint would measure its own weight too and cost six constraint rows
+// per foot.
+void Simulation::ReadFootWrenches(const std::array<Isometry3d, 2>& sole,
+                                  const std::array<Vector3d, 2>& com) {
+  int contact = 0;
+  for (size_t f = 0; f < 2; ++f) {
+    Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
+    for (int c = 0; c < truth_.contact_points[f]; ++c, ++contact) {
+      force += world_->contact_force(contact);
+      moment += world_->contact_moment(contact);
+    }
+    // The world's moments are about the COM where the step began; so are the sole frames used here.
+    const Matrix3d to_sole = sole[f].linear().transpose();
+    truth_.foot_wrench[f] << to_sole * force,
+        to_sole * (moment + (com[f] - sole[f].translation()).cross(force));
+  }
+}
+
+Vector3d Simulation::ImuVelocity() const {
+  const robot::ImuModel& imu = model_.imu();
+  return PointVelocity(imu.body, world_->pose(imu.body) * imu.pose.translation());
+}
+
+Vector3d Simulation::PointVelocity(int body, const Vector3d& point) const {
+  return world_->com_velocity(body) +
+         world_->angular_velocity(body).cross(point - world_->com_position(body));
+}
+
+void Simulation::ReadTruth() {
+  world_->GetState(&truth_.state);
+  truth_.com.setZero();
+  truth_.com_velocity.setZero();
+  for (int b = 0; b < static_cast<int>(model_.bodies().size()); ++b) {
+    const double share = model_.bodies()[static_cast<size_t>(b)].mass / model_.total_mass();
+    truth_.com += share * world_->com_position(b);
+    truth_.com_velocity += share * world_->com_velocity(b);
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    truth_.foot_pose[f] = world_->pose(model_.feet()[f].body) * model_.feet()[f].sole;
+  }
+  truth_.motor_current = mean_current_;
+  truth_.motor_torque = torque_;
+  for (int j = 0; j < model_.num_joints(); ++j) {
+    const Drivetrain& drivetrain = drivetrains_[static_cast<size_t>(j)];
+    const bool rotor = drivetrain.elastic() && !drive_train_.link_encoder();
+    truth_.encoder_position[j] =
+        rotor ? drivetrain.rotor_position() : truth_.state.joint_position[j];
+    truth_.friction_torque[j] = drivetrain.friction_torque();
+  }
+  const robot::ImuModel& imu = model_.imu();
+  const Matrix3d to_imu = (world_->rotation(imu.body) * imu.pose.linear()).transpose();
+  truth_.imu_angular_velocity = to_imu * world_->angular_velocity(imu.body);
+  truth_.imu_specific_force = to_imu * (imu_acceleration_ + kGravity * Vector3d::UnitZ());
+
+  ReadPush();
+  ReadCrane();
+}
+
+void Simulation::ReadCrane() {
+  if (!crane_) return;
+  const Vector3d point = world_->pose(0) * crane_->point();
+  truth_.crane_point = point;
+  truth_.crane_force = crane_->Force(point, PointVelocity(0, point));
+  truth_.crane_share = crane_->share();
+}
+
+void Simulation::ReadPush() {
+  truth_.push_force.setZero();
+  truth_.push_point = truth_.state.base_position;
+  double strongest = -1;
+  for (const PushProfile& push : pushes_) {
+    const Vector3d force = push.Force(time());
+    truth_.push_force += force;
+    if (force.norm() > strongest) {
+      strongest = force.norm();
+      truth_.push_point = world_->pose(push.body()) * push.point();
+    }
+  }
+  for (const HandSpring& hand : hands_) {
+    const Vector3d point = world_->pose(hand.body()) * hand.point();
+    const Vector3d force = hand.Force(time(), point, PointVelocity(hand.body(), point));
+    truth_.push_force += force;
+    if (force.norm() > strongest) {
+      strongest = force.norm();
+      truth_.push_point = point;
+    }
+  }
+}
+
+void Simulation::DetectFall() {
+  if (fallen_) return;
+  const double upright = world_->rotation(model_.body_task_body())(2, 2);
+  const double tilt = std::acos(std::clamp(upright, -1.0, 1.0));
+  const double share = truth_.com.z() / start_com_height_;
+  constexpr size_t kRoom = sizeof end_reason_ - 1;
+  if (tilt > fall_tilt_) {
+    fallen_ = true;
+    *fmt::format_to_n(end_reason_, kRoom, "the robot fell at {:.3f} s (body tilt {:.2f} rad)",
+                      time(), tilt)
+         .out = '\0';
+  } else if (share < fall_height_) {
+    fallen_ = true;
+    *fmt::format_to_n(end_reason_, kRoom,
+                      "the robot fell at {:.3f} s (centre of mass at {:.0f} % of its height)",
+                      time(), 100 * share)
+         .out = '\0';
+  }
+}
+
+void Simulation::CheckCrane() {
+  if (!crane_ || crane_->let_go() || steps_ < 0 || end_reason_[0] != '\0') return;
+  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
+                    "the crane still holds the robot at {:.3f} s: the bridge has followed commands "
+                    "for {:.3f} s without a break; give the scenario a longer lead",
+                    time(), crane_->followed())
+       .out = '\0';
+}
+
+void Simulation::Break(std::string_view reason) {
+  broken_ = true;
+  if (fallen_) return;  // why the run ends is already said
+  *fmt::format_to_n(end_reason_, sizeof end_reason_ - 1,
+                    "the simulation broke down at {:.3f} s: {}", time(), reason)
+       .out = '\0';
+}
+
+}  // namespace poise

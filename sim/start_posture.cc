@@ -1,0 +1,126 @@
+#include "sim/start_posture.h"
+
+#include <Eigen/QR>
+#include <cmath>
+#include <string>
+
+#include "components/robot/posture.h"
+#include "sim/config_check.h"
+
+namespace poise {
+
+using Eigen::Isometry3d;
+using Eigen::Matrix3d;
+using Eigen::Translation3d;
+using Eigen::Vector3d;
+using robot::kLeftFoot;
+using robot::kRightFoot;
+using robot::RobotData;
+using robot::RobotModel;
+using robot::RobotState;
+using robot::Vector6d;
+
+RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
+  robot::PostureGoal goal;
+  // Joints of the scenario's own are another posture than the robot's stance.
+  const bool stands = config.nominal_size() == 0;
+  goal.nominal = stands ? model.stance().joint_position : Eigen::VectorXd::Zero(model.num_joints());
+  for (int i = 0; i < config.nominal_size(); ++i) {
+    const auto& entry = config.nominal(i);
+    const std::string field = "start.nominal[" + std::to_string(i) + "]";
+    const int joint = model.FindJoint(entry.joint());
+    if (joint < 0) {
+      std::string names;
+      for (const auto& known : model.joints()) names += (names.empty() ? "" : ", ") + known.name;
+      throw ConfigError(field + ".joint", "no joint '" + entry.joint() + "'; use one of " + names);
+    }
+    RequireFinite(entry.position(), field + ".position");
+    goal.nominal[joint] = entry.position();
+  }
+
+  RobotData data(model);
+  const auto evaluate = [&](const Eigen::VectorXd& joints) {
+    RobotState state(model.num_joints());
+    state.joint_position = joints;
+    robot::ComputeKinematics(model, state, &data);
+    robot::ComputeFeet(model, &data);
+    robot::ComputeDynamics(model, state, &data);
+  };
+  double spacing = config.foot_spacing();
+  if (!config.has_foot_spacing() && model.stance().foot_spacing) {
+    spacing = *model.stance().foot_spacing;
+  } else if (!config.has_foot_spacing()) {
+    evaluate(Eigen::VectorXd::Zero(model.num_joints()));
+    spacing =
+        data.foot_pose[kLeftFoot].translation().y() - data.foot_pose[kRightFoot].translation().y();
+  }
+  double com_height = config.com_height();
+  if (!config.has_com_height() && stands && model.stance().com_height) {
+    com_height = *model.stance().com_height;
+  } else if (!config.has_com_height()) {
+    evaluate(goal.nominal);
+    com_height = data.com.z() - data.foot_pose[kRightFoot].translation().z();
+  }
+  RequirePositive(spacing, "start.foot_spacing");
+  RequireNotNegative(config.left_foot_height(), "start.left_foot_height");
+  RequireFinite(config.com_x(), "start.com_x");
+  RequireFinite(config.com_y(), "start.com_y");
+  RequirePositive(com_height, "start.com_height");
+
+  goal.foot[kRightFoot] = Isometry3d(Translation3d(0, -spacing / 2, 0));
+  goal.foot[kLeftFoot] = Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));
+  goal.com_xy = {config.com_x(), config.com_y()};
+  goal.com_height = com_height;
+  try {
+    return robot::SolvePosture(model, goal);
+  } catch (const robot::RobotError& error) {
+    throw ConfigError("start", error.what());
+  }
+}
+
+std::array<Vector6d, 2> RestWrenches(const RobotModel& model, const RobotState& state,
+                                     const std::array<bool, 2>& in_contact) {
+  RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  const double arm = model.feet()[kRightFoot].length / 2;
+  // Force and moment about the COM, world axes, of the wrenches [f; m / arm] in the sole frames.
+  Eigen::Matrix<double, 6, 12> balance = Eigen::Matrix<double, 6, 12>::Zero();
+  for (int f = 0; f < 2; ++f) {
+    if (!in_contact[static_cast<size_t>(f)]) continue;
+    const Isometry3d& sole = data.foot_pose[static_cast<size_t>(f)];
+    const Matrix3d r = sole.linear();
+    const Vector3d lever = sole.translation() - data.com;
+    balance.block<3, 3>(0, 6 * f) = r;
+    for (int i = 0; i < 3; ++i) balance.block<3, 1>(3, 6 * f + i) = lever.cross(r.col(i));
+    balance.block<3, 3>(3, 6 * f + 3) = arm * r;
+  }
+  Vector6d weight = Vector6d::Zero();
+  weight.z() = model.total_mass() * robot::kGravity;
+  Eigen::Matrix<double, 12, 1> wrenches = balance.completeOrthogonalDecomposition().solve(weight);
+  std::array<Vector6d, 2> result;
+  for (int f = 0; f < 2; ++f) {
+    result[static_cast<size_t>(f)] = wrenches.segment<6>(6 * f);
+    result[static_cast<size_t>(f)].tail<3>() *= arm;
+  }
+  return result;
+}
+
+Eigen::VectorXd RestTorques(const RobotModel& model, const RobotState& state,
+                            const std::array<Vector6d, 2>& wrenches) {
+  RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  Eigen::VectorXd force = data.gravity;
+  for (size_t f = 0; f < 2; ++f) {
+    const Matrix3d r = data.foot_pose[f].linear();
+    Vector6d wrench;
+    wrench << r * wrenches[f].head<3>(), r * wrenches[f].tail<3>();
+    force -= data.foot_jacobian[f].transpose() * wrench;
+  }
+  return force.tail(model.num_joints());
+}
+
+}  // namespace poise

@@ -1,0 +1,51 @@
+// What the soles stand on: level rigid ground and, where there is one, a soft block.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+#include "sim/sim.pb.h"
+#include "sim/world.h"
+
+namespace poise {
+
+/// A height field z(x, y). Only its top exists: a sole is met at its corners and from above.
+class Terrain {
+ public:
+  struct Surface {
+    double height;           ///< m, world
+    double velocity;         ///< m/s, upward, of a block that rises
+    Eigen::Vector3d normal;  ///< unit, upward
+    bool block;              ///< of the block rather than of the ground
+  };
+
+  /// The block's stiffness and damping are those of a whole sole, shared by its four corners.
+  /// Throws ConfigError: sizes, stiffness, friction or tilt out of range.
+  Terrain(const SimConfig& config, uint64_t seed);
+
+  /// The higher of ground and block at (x, y) at time `time` (s).
+  Surface At(double x, double y, double time) const;
+  /// Of one sole corner's contact.
+  const ContactMaterial& material(bool block) const {
+    return block ? block_material_ : ground_material_;
+  }
+
+ private:
+  struct Wave {
+    Eigen::Vector2d number;  // rad/m
+    double phase;
+  };
+  static constexpr int kWaves = 5;
+
+  ContactMaterial ground_material_, block_material_;
+  bool has_block_ = false;
+  Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d half_size_ = Eigen::Vector2d::Zero();
+  double height_ = 0, start_ = 0, rise_ = 0;
+  Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();  // dz/dx, dz/dy of the tilted top
+  double wave_amplitude_ = 0;
+  std::array<Wave, kWaves> waves_{};
+};
+
+}  // namespace poise

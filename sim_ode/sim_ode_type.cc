@@ -1,0 +1,26 @@
+#include "sim_ode/sim_ode_type.h"
+
+#include "sim/sim_component.h"
+#include "sim_ode/ode_world.h"
+#include "sim_ode/sim_ode.pb.h"
+
+namespace poise {
+namespace {
+
+SimSetup ReadSetup(const ComponentContext& context) {
+  const auto config = context.config<SimOdeConfig>();
+  try {
+    return {config.sim(), OdeWorlds(config.ode())};
+  } catch (const ConfigError& error) {
+    throw ConfigError("ode." + error.field(), error.problem());
+  }
+}
+
+}  // namespace
+
+ComponentType SimOdeType() {
+  return {"sim_ode", "the robot, the ground and the pushes, simulated in ODE",
+          [] { return std::make_unique<SimComponent>(ReadSetup); }, SimTraits("ode")};
+}
+
+}  // namespace poise

@@ -1,0 +1,183 @@
+// The component: what it publishes when, in which units, frames and signs.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+
+#include "tests/sim/engine.h"
+#include "tests/sim/simulation_fixture.h"
+
+namespace poise {
+namespace {
+
+// A component wired by hand: binds the command of the tick before and runs the stage, as a runner
+// would.
+class Bench {
+ public:
+  explicit Bench(const SimConfig& config, uint64_t seed = 1) {
+    resources_["robot"] = ReadFile(RobotFolder() + "dyros_legs.pbtxt");
+    resources_["urdf"] = ReadFile(RobotFolder() + "dyros_legs.urdf");
+    ComponentContext context;
+    context.name = "sim";
+    context.config_text = "sim { robot_drive_train: false " + config.DebugString() + " }";
+    context.tick_period = kTick;
+    context.seed = seed;
+    context.resources = &resources_;
+    context.shared = &shared_;
+    component_->Configure(context, &wiring_);
+  }
+
+  void Run(const drive_command_t* command) {
+    wiring_.inputs().at(0)->Bind(command);
+    wiring_.inputs().at(1)->Bind(nullptr);  // no bridge
+    const Stage& stage = wiring_.stages().at(0);
+    const double time = static_cast<double>(tick_) * kTick;
+    const Tick tick{tick_, std::llround(time * 1e6), time};
+    for (OutputPort* output : stage.outputs) output->Stamp(77, tick.index, tick.utime);
+    stage.run(tick);
+    for (const OutputPort* output : stage.outputs) EXPECT_TRUE(output->Finite());
+    ++tick_;
+  }
+
+  template <class T>
+  const T& Get(const std::string& name) const {
+    for (const OutputPort* output : wiring_.outputs()) {
+      if (output->name() == name) return *static_cast<const T*>(output->message());
+    }
+    throw std::out_of_range(name);
+  }
+  const drive_feedback_t& feedback() const { return Get<drive_feedback_t>("drive_feedback"); }
+  const ground_truth_t& truth() const { return Get<ground_truth_t>("ground_truth"); }
+  const external_push_t& push() const { return Get<external_push_t>("external_push"); }
+  const Wiring& wiring() const { return wiring_; }
+  const Component& component() const { return *component_; }
+
+ private:
+  std::map<std::string, std::string> resources_;
+  SharedObjects shared_;
+  std::unique_ptr<Component> component_ = EngineType().make();
+  Wiring wiring_;
+  int64_t tick_ = 0;
+};
+
+drive_command_t Command(double current) {
+  drive_command_t command;
+  command.num_motors = 12;
+  command.current.assign(12, current);
+  command.enabled.assign(12, 1);
+  return command;
+}
+
+TEST(SimComponent, DeclaresItsPorts) {
+  const Bench bench(StandingConfig());
+  const Wiring& wiring = bench.wiring();
+  ASSERT_EQ(wiring.inputs().size(), 2u);
+  EXPECT_EQ(wiring.inputs()[0]->name(), "drive_command");
+  EXPECT_EQ(wiring.inputs()[0]->kind(), InputKind::kPreviousTick);
+  EXPECT_THAT(wiring.inputs()[0]->counts(), ::testing::ElementsAre(12));
+  EXPECT_EQ(wiring.inputs()[1]->name(), "bridge_status");
+  EXPECT_EQ(wiring.inputs()[1]->kind(), InputKind::kPreviousTick);
+  ASSERT_EQ(wiring.stages().size(), 1u);
+  EXPECT_EQ(wiring.stages()[0].outputs.size(), 3u);
+  EXPECT_EQ(bench.feedback().position_counts.size(), 12u);
+  EXPECT_EQ(bench.truth().foot_wrench.size(), 2u);
+}
+
+TEST(SimComponent, TickZeroReportsTheStartAtRest) {
+  Bench bench(StandingConfig("sensor_noise: false"));
+  bench.Run(nullptr);
+  const ground_truth_t& truth = bench.truth();
+  const drive_feedback_t& feedback = bench.feedback();
+  EXPECT_EQ(truth.run_id, 77);
+  const double weight = PaperRobot().total_mass() * robot::kGravity;
+  EXPECT_NEAR(feedback.foot_wrench[0].force[2] + feedback.foot_wrench[1].force[2], weight, 1e-8);
+  EXPECT_NEAR(feedback.imu_acceleration[2], robot::kGravity, 1e-9);
+  for (int j = 0; j < 12; ++j) {
+    const auto i = static_cast<size_t>(j);
+    EXPECT_EQ(truth.joint_velocity[i], 0);
+    EXPECT_EQ(feedback.position_counts[i],
+              std::llround(truth.joint_position[i] * 50 * 8192 / (2 * std::numbers::pi)));
+    EXPECT_EQ(feedback.drive_status[i], drive_feedback_t::DRIVE_ENABLED);
+    EXPECT_EQ(feedback.current[i], 0);
+  }
+  EXPECT_EQ(truth.foot_contact_points[0], 4);
+  EXPECT_NEAR(truth.foot_pose[0].position[1] + truth.foot_pose[1].position[1], 0, 1e-9);
+  EXPECT_LT(truth.foot_pose[0].position[1], 0) << "right first";
+}
+
+TEST(SimComponent, AppliesTheCommandOfTheTickBefore) {
+  Bench bench(StandingConfig("sensor_noise: false"));
+  bench.Run(nullptr);
+  drive_command_t command = Command(1.5);
+  command.enabled[4] = 0;
+  bench.Run(&command);
+  EXPECT_EQ(bench.feedback().current[3], 1.5);
+  EXPECT_EQ(bench.feedback().current[4], 0);
+  EXPECT_NEAR(bench.truth().joint_torque[3], 1.5 * 50 * 0.10, 1e-12) << "(54)";
+  EXPECT_NE(bench.truth().joint_velocity[3], 0);
+  bench.Run(nullptr);
+  EXPECT_EQ(bench.feedback().current[3], 0) << "no command: motors free";
+}
+
+TEST(SimComponent, SensorReportsTheReactionOfTheTrueWrench) {
+  Bench bench(StandingConfig("sensor_noise: false"));
+  for (int i = 0; i < 5; ++i) {
+    const drive_command_t command = Command(0);
+    bench.Run(i == 0 ? nullptr : &command);
+    for (size_t f = 0; f < 2; ++f) {
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_EQ(bench.feedback().foot_wrench[f].force[k], -bench.truth().foot_wrench[f].force[k]);
+        EXPECT_EQ(bench.feedback().foot_wrench[f].moment[k],
+                  -bench.truth().foot_wrench[f].moment[k]);
+      }
+      EXPECT_LT(bench.truth().foot_wrench[f].force[2], 0) << "robot on environment presses down";
+    }
+  }
+}
+
+TEST(SimComponent, PushIsMeasuredWithNoise) {
+  Bench bench(StandingConfig(
+      "push { start: 0.01 duration: 0.1 peak: 100 direction_y: 1 point { z: 0.25 } }"));
+  double worst = 0;
+  for (int i = 0; i < 40; ++i) {
+    const drive_command_t command = Command(0);
+    bench.Run(i == 0 ? nullptr : &command);
+    const double time = i * kTick;
+    const double expected =
+        time < 0.01 ? 0 : 100 * std::sin(std::numbers::pi * (time - 0.01) / 0.1);
+    EXPECT_NEAR(bench.truth().push_force[1], expected, 1e-9);
+    worst = std::max(worst, std::abs(bench.push().force[1] - expected));
+  }
+  EXPECT_GT(worst, 0.1);
+  EXPECT_LT(worst, 1.0) << "five times 0.2 N";
+  EXPECT_NEAR(bench.push().point[2] - bench.truth().base_position[2], 0.25, 0.02);
+}
+
+TEST(SimComponent, AFallFailsTheRun) {
+  Bench bench(StandingConfig());
+  const drive_command_t command = Command(0);
+  EXPECT_TRUE(bench.component().finished().empty());
+  for (int i = 0; i < 1500; ++i) bench.Run(i == 0 ? nullptr : &command);
+  EXPECT_TRUE(bench.component().failed());
+  EXPECT_THAT(std::string(bench.component().finished()),
+              ::testing::StartsWith("the robot fell at "));
+  EXPECT_EQ(bench.truth().fallen, 1);
+}
+
+TEST(SimComponent, RefusesBadConfigurations) {
+  for (const char* const problem : {"step: 0.003", "push_sensor_noise: -1"}) {
+    try {
+      Bench bench(StandingConfig(problem));
+      FAIL() << problem;
+    } catch (const ConfigError& error) {
+      EXPECT_EQ(error.field(),
+                "sim." + std::string(problem).substr(0, std::string(problem).find(':')));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace poise
