@@ -1,6 +1,7 @@
 #include "components/balance/balance_control.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -27,38 +28,34 @@ Rows2X6 MomentRows(const Eigen::Vector2d& point) {
   return rows;
 }
 
-/// Joint acceleration's part that `torque` causes, and the base wrench of all.
-template <int K, bool Loop>
+/// Base wrench that joint torques produce, all in all.
+template <int S, bool Loop>
 Vector6d BaseWrench(const ReducedDynamics& reduced, const VectorRef& torque) {
-  constexpr int R = Rank<K, Loop>();
-  const Index k = reduced.num_joints, r = reduced.rank();
-  StackVector<K> net = Eigen::Map<const StackVector<K>>(torque.data(), k) -
-                       Eigen::Map<const StackVector<K>>(reduced.bias.joint_torque.data(), k);
+  constexpr int R = Rank<S, Loop>();
+  const Index s = reduced.num_legs, r = reduced.legs_rank();
+  SplitVector<S> net;
+  Gather(reduced, torque.data(), &net);
+  net.legs -= Eigen::Map<const StackVector<S>>(reduced.bias.joint_torque.data(), s);
+  net.others -= reduced.bias.others_torque;
   StackVector<R> z(r);
-  const auto basis = View<K, R>(reduced.rotation, k, r, Loop ? 6 : 0);
+  SplitVector<S> acceleration;
+  acceleration.others = net.others;
+  ToReduced<S, Loop>(reduced, net.legs, &z, &acceleration.others);
+  SolveReducedTransposed<S, Loop>(reduced, &z, &acceleration.others);
+  acceleration.legs =
+      Eigen::Map<const StackVector<S>>(reduced.bias.joint_acceleration.data(), s);
   if constexpr (Loop) {
-    SetTransposedProduct(z, basis, net);
+    AddProduct<1>(acceleration.legs, View<S, R>(reduced.rotation, s, r, 6), z);
   } else {
-    z = net;
+    acceleration.legs = z;
   }
-  const auto factor = View<R, R>(reduced.factor, r, r);
-  SolveLower(factor, z);
-  SolveLowerTransposed(factor, z);
-  StackVector<K> acceleration =
-      Eigen::Map<const StackVector<K>>(reduced.bias.joint_acceleration.data(), k);
-  if constexpr (Loop) {
-    AddProduct<1>(acceleration, basis, z);
-  } else {
-    acceleration = z;
-  }
-  Vector6d inertial;
-  SetTransposedProduct(inertial, View<K, 6>(reduced.psi_t, k, 6), acceleration);
-  return reduced.bias.base_wrench - inertial;
+  return reduced.bias.base_wrench - BaseInertia(reduced, acceleration);
 }
 
 }  // namespace
 
-BalanceControl::BalanceControl(int num_joints, int max_protected_rows) {
+BalanceControl::BalanceControl(int num_joints, int max_protected_rows)
+    : num_joints_(num_joints) {
   if (num_joints < 1 || num_joints > kMaxJoints || max_protected_rows < 1 ||
       max_protected_rows > num_joints) {
     throw std::invalid_argument("BalanceControl: 1 to 128 joints, 1 to that many protected rows");
@@ -104,19 +101,19 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
   *result = BalanceResult{};
   const int feet = geometry.in_contact[0] + geometry.in_contact[1];
   if (6 * feet != reduced.num_contact_rows || protected_task.num_rows() > projection_.rows() ||
-      reduced.num_joints != moment_.rows() || torque.size() != moment_.rows() ||
+      reduced.num_joints != num_joints_ || torque.size() != num_joints_ ||
       !FrameO(geometry.sole, geometry.in_contact, &result->frame_o)) {
     return BalanceStatus::kSingular;
   }
-  return WithSizes(reduced, [&]<int K, bool Loop>() {
-    constexpr int R = Rank<K, Loop>();
-    const Index k = reduced.num_joints, r = reduced.rank(), t = protected_task.num_rows();
+  return WithSizes(reduced, [&]<int S, bool Loop>() {
+    constexpr int R = Rank<S, Loop>();
+    const Index s = reduced.num_legs, r = reduced.legs_rank(), t = protected_task.num_rows();
 
     // (35): the base rows of the equations of motion are the resultant of all contacts, seen from
     // the base.
     const Eigen::Isometry3d& root = geometry.sole[geometry.in_contact[0] ? 0 : 1];
     const Matrix6d to_o = WrenchTransform(result->frame_o, root).lazyProduct(reduced.root_transfer);
-    result->resultant_task = to_o.lazyProduct(BaseWrench<K, Loop>(reduced, torque));
+    result->resultant_task = to_o.lazyProduct(BaseWrench<S, Loop>(reduced, torque));
     result->resultant = result->resultant_task;
     if (!result->resultant_task.allFinite()) return BalanceStatus::kSingular;
     if (!(result->resultant_task(2) < 0)) return BalanceStatus::kUnloaded;
@@ -132,36 +129,43 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
     // (42) with y = L⁻¹ Vᵀ Γ as variable: D = −S_c ᴼᵈK Ψ V L⁻ᵀ, then D (I − T_hᵀ Λ_h T_h).
     const Rows2X6 moment_rows = MomentRows(result->cop_desired);
     const Eigen::Matrix<double, 6, 2> rows_t = (moment_rows.lazyProduct(to_o)).transpose();
-    Eigen::Matrix<double, K, 2, 0, K == Dynamic ? kMaxJoints : K, 2> joints(k, 2);
+    Eigen::Matrix<double, S, 2, 0, S == Dynamic ? kMaxJoints : S, 2> joints(s, 2);
     joints.setZero();
-    AddProduct<-1>(joints, View<K, 6>(reduced.psi_t, k, 6), rows_t);
+    AddProduct<-1>(joints, View<S, 6>(reduced.psi_t, s, 6), rows_t);
     auto d = View<R, 2>(moment_, r, 2);
-    const auto basis = View<K, R>(reduced.rotation, k, r, Loop ? 6 : 0);
-    if constexpr (Loop) {
-      SetTransposedProduct(d.col(0), basis, joints.col(0));
-      SetTransposedProduct(d.col(1), basis, joints.col(1));
-    } else {
-      d = joints;
+    std::array<OthersVector, 2> d_others;
+    for (int i = 0; i < 2; ++i) {
+      auto column = d.col(i);
+      d_others[i].setZero(reduced.filled_others);
+      AddColumns(-1, OthersCoupling(reduced), 6, rows_t.col(i).data(), d_others[i].data());
+      ToReduced<S, Loop>(reduced, StackVector<S>(joints.col(i)), &column, &d_others[i]);
     }
-    const auto factor = View<R, R>(reduced.factor, r, r);
-    SolveLower(factor, d.col(0));
-    SolveLower(factor, d.col(1));
+    const auto products = [&](Eigen::Matrix2d* gram) {
+      gram->noalias() = d.transpose().lazyProduct(d);
+      if (reduced.filled_others == 0) return;
+      for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j < 2; ++j) (*gram)(i, j) += d_others[i].dot(d_others[j]);
+      }
+    };
     Eigen::Matrix2d raw;
-    raw.noalias() = d.transpose().lazyProduct(d);
+    products(&raw);
 
     const MatrixRef task = protected_task.reduced_jacobian();
     const MatrixRef task_factor = protected_task.factor();
+    const BlockMatrix task_others = protected_task.others_reduced();
     auto projection = View<Dynamic, 2>(projection_, t, 2);
     for (int i = 0; i < 2; ++i) {
       auto force = projection.col(i);
       force.setZero();
       for (Index j = 0; j < r; ++j) force += task.col(j) * d(j, i);
+      AddDots(1, task_others, t, d_others[i].data(), force.data());
       SolveLower(task_factor, force);
       SolveLowerTransposed(task_factor, force);
       for (Index j = 0; j < r; ++j) d(j, i) -= task.col(j).dot(force);
+      AddColumns(-1, task_others, t, force.data(), d_others[i].data());
     }
     Eigen::Matrix2d gram;
-    gram.noalias() = d.transpose().lazyProduct(d);
+    products(&gram);
     const double determinant = gram.determinant();
     if (!(determinant > kMomentDependence * raw(0, 0) * raw(1, 1) && determinant < HUGE_VAL)) {
       return BalanceStatus::kSingular;
@@ -172,23 +176,34 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
                                 -(gram(0, 0) * moment(1) - gram(1, 0) * moment(0)) / determinant);
     StackVector<R> y(r);
     y.noalias() = d.lazyProduct(share);
-    if (!std::isfinite(y.sum())) return BalanceStatus::kSingular;
+    OthersVector y_others = d_others[0] * share(0) + d_others[1] * share(1);
+    if (!std::isfinite(y.sum() + y_others.sum())) return BalanceStatus::kSingular;
 
     // Γ = V L y, q̈ = V L⁻ᵀ y
+    const auto factor = View<R, R>(reduced.factor, r, r);
     StackVector<R> z = StackVector<R>::Zero(r);
     for (Index j = 0; j < r; ++j) z += factor.col(j) * y(j);
-    Eigen::Map<StackVector<K>> command(torque.data(), k);
-    StackVector<K> acceleration(k);
-    SolveLowerTransposed(factor, y);
-    if constexpr (Loop) {
-      AddProduct<1>(command, basis, z);
-      SetProduct(acceleration, basis, y);
-    } else {
-      command += z;
-      acceleration = y;
+    SplitVector<S> command, acceleration;
+    Gather(reduced, torque.data(), &command);
+    if (reduced.filled_others > 0) {
+      const BlockMatrix others = OthersFactor(reduced);
+      AddColumns(1, others, r, y.data(), command.others.data());
+      AddColumns(1, {others.col(r), others.rows, others.stride}, others.rows, y_others.data(),
+                 command.others.data());
     }
-    Vector6d change;
-    SetTransposedProduct(change, View<K, 6>(reduced.psi_t, k, 6), acceleration);
+    acceleration.others = y_others;
+    SolveReducedTransposed<S, Loop>(reduced, &y, &acceleration.others);
+    acceleration.legs.resize(s);
+    if constexpr (Loop) {
+      const auto basis = View<S, R>(reduced.rotation, s, r, 6);
+      AddProduct<1>(command.legs, basis, z);
+      SetProduct(acceleration.legs, basis, y);
+    } else {
+      command.legs += z;
+      acceleration.legs = y;
+    }
+    Scatter(reduced, command, torque.data());
+    const Vector6d change = BaseInertia(reduced, acceleration);
     result->resultant.noalias() -= to_o.lazyProduct(change);
     result->cop = CenterOfPressure(result->resultant);
     return BalanceStatus::kOk;

@@ -65,7 +65,8 @@ class BalanceControl {
                             bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
                             BalanceResult* result);
 
-  Eigen::MatrixXd moment_;      // r×2, (42) in reduced coordinates, transposed
+  int num_joints_;
+  Eigen::MatrixXd moment_;      // r_s×2, (42) in reduced coordinates, transposed
   Eigen::MatrixXd projection_;  // t_h×2
 };
 

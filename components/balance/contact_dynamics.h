@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
+#include <vector>
 
 namespace poise::balance {
 
@@ -25,32 +27,50 @@ inline constexpr int kMaxJoints = 128;
 /// An orthonormal basis V of null(H) makes every matrix of the paper small: with Vᵀ M V = L Lᵀ,
 ///   A⁻¹ N_cᵀ = Z Zᵀ, Z = [Φ; I] V L⁻ᵀ,  W = (V L⁻ᵀ)(V L⁻ᵀ)ᵀ,  W⁺ = V Vᵀ M V Vᵀ.
 /// null(W) is the range of Hᵀ: known, not searched for. Without a second foot V = I.
-/// k×k buffers hold their matrix in the top left corner; r = k − (m − 6) is the rank of W.
+///
+/// Φ and H have columns for the joints between base and feet alone, the legs (s of them); all
+/// others (o: waist, arms, head) meet the legs only through the base, and V is the identity for
+/// them. So joints are kept in the order [legs; others]: what the contacts change is s×s, and of
+/// the others M is A itself. L = [L_ss 0; L_os L_oo].
+/// s×s buffers hold their matrix in the top left corner; r = k − (m − 6) is the rank of W. Rows of
+/// others are filled up to whole blocks, with zeros.
 struct ReducedDynamics {
   int num_joints = 0;        ///< k
   int num_contact_rows = 0;  ///< m
-  Eigen::MatrixXd phi_t;     ///< Φᵀ, k×6
-  Eigen::MatrixXd psi_t;  ///< ([A_bb A_bj] [Φ; I])ᵀ, k×6: base rows of A q̈ = A_bb a_b + Ψ q̈_j
-  Eigen::MatrixXd mass;        ///< M, k×k
-  Eigen::MatrixXd rotation;    ///< [Q₁ V], k×k, of Hᵀ = Q₁ R (two feet only)
-  Eigen::MatrixXd mass_basis;  ///< M V, k×r (two feet only)
-  Eigen::MatrixXd factor;      ///< L, r×r, lower
-  Eigen::MatrixXd loop;        ///< Hᵀ's Householder vectors and R, k×6 (two feet only)
-  Matrix6d base_mass;          ///< A_bb
-  Matrix6d root_transfer;      ///< G_1⁻ᵀ: base wrench → wrench of the root foot
-  Matrix6d second_transfer;    ///< G_2ᵀ: wrench of the second foot → base wrench
+  int num_legs = 0;          ///< s
+  int filled_others = 0;     ///< o, filled up
+  std::vector<int> order;    ///< joints: legs, then others, each ascending
+  Eigen::MatrixXd phi_t;     ///< Φᵀ of the legs, s×6
+  Eigen::MatrixXd psi_t;     ///< ([A_bb A_bj] [Φ; I])ᵀ of the legs, s×6: base rows of A q̈ = A_bb a_b
+                             ///< + Ψ q̈_j; of the others see others_coupling
+  Eigen::MatrixXd mass;      ///< M_ss
+  Eigen::MatrixXd rotation;  ///< [Q₁ V], s×s, of Hᵀ = Q₁ R (two feet only)
+  Eigen::MatrixXd mass_basis;       ///< M_ss V, s×(s−6) (two feet only)
+  Eigen::MatrixXd factor;           ///< L_ss, lower
+  Eigen::MatrixXd loop;             ///< Hᵀ's Householder vectors and R, s×6 (two feet only)
+  Eigen::MatrixXd others_coupling;  ///< A_ob, o×6
+  Eigen::MatrixXd others_carried;   ///< A_os, o×s; empty unless legs carry other joints
+  Eigen::MatrixXd others_factor;    ///< [L_os L_oo]
+  Eigen::VectorXd others_inverses;  ///< of L_oo's diagonal blocks
+  Matrix6d base_mass;               ///< A_bb
+  Matrix6d root_transfer;           ///< G_1⁻ᵀ: base wrench → wrench of the root foot
+  Matrix6d second_transfer;         ///< G_2ᵀ: wrench of the second foot → base wrench
 
   /// Terms that do not depend on the torque, linear in (b + g, J̇_c q̇).
   struct Bias {
-    Eigen::VectorXd joint_torque;  ///< h, k×1, the particular acceleration's inertia included
-    Eigen::VectorXd joint_acceleration;  ///< of the particular solution, k×1
+    Eigen::VectorXd joint_torque;   ///< h of the legs, the particular acceleration's inertia included
+    Eigen::VectorXd others_torque;  ///< h of the others
+    Eigen::VectorXd joint_acceleration;  ///< of the particular solution, legs; of the others it is 0
     Vector6d base_acceleration;          ///< a_b
     Vector6d base_wrench;                ///< −(A_bb a_b + base rows of b + g)
   };
   Bias bias;
-  Eigen::VectorXd gravity_torque;  ///< [Φ; I]ᵀ g, k×1
+  Eigen::VectorXd gravity_torque;  ///< [Φ; I]ᵀ g, k×1, in the robot's order
 
   bool closed_loop() const { return num_contact_rows == 12; }
+  bool legs_carry_others() const { return others_carried.size() > 0; }
+  int num_others() const { return num_joints - num_legs; }
+  int legs_rank() const { return num_legs - (num_contact_rows - 6); }
   int rank() const { return num_joints - (num_contact_rows - 6); }
 };
 
@@ -62,6 +82,9 @@ class ContactDynamics {
   /// `num_joints` k, 1 ≤ k ≤ kMaxJoints; two feet need k > 6 (std::invalid_argument otherwise).
   /// Room for two feet.
   explicit ContactDynamics(int num_joints);
+  /// The same for a J_c that is zero but for the base and `legs` (joints, ascending). Not
+  /// `legs_carry_others`: A has no entries between legs and other joints either.
+  ContactDynamics(int num_joints, std::span<const int> legs, bool legs_carry_others);
 
   /// (4)–(11) and (22). `mass_matrix` n×n symmetric, `bias` b and `gravity` g n×1,
   /// `contact_jacobian` J_c m×n whose base columns are rigid transforms [Rᵀ −Rᵀp̂; 0 Rᵀ],
@@ -73,6 +96,10 @@ class ContactDynamics {
 
   int num_joints() const { return reduced_.num_joints; }
   int num_contact_rows() const { return reduced_.num_contact_rows; }
+  /// Joints that contacts move, ascending.
+  std::span<const int> legs() const {
+    return {reduced_.order.data(), static_cast<size_t>(reduced_.num_legs)};
+  }
   /// J_c, m×n.
   MatrixRef contact_jacobian() const { return contact_jacobian_.topRows(num_contact_rows()); }
 
@@ -85,7 +112,7 @@ class ContactDynamics {
   // the robot. In them ẍ = T u − load for a task's rows, and what is dynamically consistent is
   // orthogonal.
 
-  /// Γ (k×1) to u (r×1).
+  /// Γ (k×1) to u (r×1: legs, then others).
   void ReduceTorque(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> reduced) const;
   /// u (r×1) to the least Γ (k×1) that has it, V L u.
   void ExpandTorque(const VectorRef& reduced, Eigen::Ref<Eigen::VectorXd> torque) const;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "components/balance/block_cholesky.h"
 #include "components/balance/contact_dynamics.h"
 
 namespace poise::balance {
@@ -159,21 +160,107 @@ void SolveFromRight(const Factor& factor, Matrix&& x) {
   }
 }
 
-/// Rank of W.
-template <int K, bool Loop>
+/// Rank of W over the legs.
+template <int S, bool Loop>
 constexpr int Rank() {
-  return K == Eigen::Dynamic ? Eigen::Dynamic : (Loop ? K - 6 : K);
+  return S == Eigen::Dynamic ? Eigen::Dynamic : (Loop ? S - 6 : S);
 }
 
-/// Calls `function` with joints and support as compile-time constants where they are common.
+/// Scratch over the joints beyond the legs, rows filled up to whole blocks.
+using OthersVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, WholeBlocks(kMaxJoints), 1>;
+
+/// A vector over the joints in the order of ReducedDynamics, or its reduced coordinates.
+template <int S>
+struct SplitVector {
+  StackVector<S> legs;
+  OthersVector others;  // zero in what fills up
+};
+
+/// Calls `function` with the legs' joints and the support as compile-time constants: two legs of
+/// six joints, however many others there are, or any other number.
 template <class Function>
 decltype(auto) WithSizes(const ReducedDynamics& reduced, Function&& function) {
-  if (reduced.num_joints == 12) {
+  if (reduced.num_legs == 12) {
     if (reduced.closed_loop()) return function.template operator()<12, true>();
     return function.template operator()<12, false>();
   }
   if (reduced.closed_loop()) return function.template operator()<Eigen::Dynamic, true>();
   return function.template operator()<Eigen::Dynamic, false>();
+}
+
+/// `joints` (in the robot's order) by legs and others.
+template <int S>
+void Gather(const ReducedDynamics& reduced, const double* joints, SplitVector<S>* split) {
+  const Eigen::Index s = reduced.num_legs, o = reduced.num_others();
+  const int* const order = reduced.order.data();
+  split->legs.resize(s);
+  split->others.resize(reduced.filled_others);
+  for (Eigen::Index i = 0; i < s; ++i) split->legs.coeffRef(i) = joints[order[i]];
+  for (Eigen::Index i = 0; i < o; ++i) split->others.coeffRef(i) = joints[order[s + i]];
+  for (Eigen::Index i = o; i < reduced.filled_others; ++i) split->others.coeffRef(i) = 0;
+}
+
+/// The way back.
+template <int S>
+void Scatter(const ReducedDynamics& reduced, const SplitVector<S>& split, double* joints) {
+  const Eigen::Index s = reduced.num_legs, o = reduced.num_others();
+  const int* const order = reduced.order.data();
+  for (Eigen::Index i = 0; i < s; ++i) joints[order[i]] = split.legs.coeff(i);
+  for (Eigen::Index i = 0; i < o; ++i) joints[order[s + i]] = split.others.coeff(i);
+}
+
+/// [L_os L_oo] of the others; L_os in the first columns, as many as the legs' rank.
+inline BlockMatrix OthersFactor(const ReducedDynamics& reduced) {
+  return {const_cast<double*>(reduced.others_factor.data()), reduced.filled_others,
+          reduced.others_factor.outerStride()};
+}
+inline BlockMatrix OthersCoupling(const ReducedDynamics& reduced) {
+  return {const_cast<double*>(reduced.others_coupling.data()), reduced.filled_others,
+          reduced.others_coupling.outerStride()};
+}
+inline BlockMatrix OthersCarried(const ReducedDynamics& reduced) {
+  return {const_cast<double*>(reduced.others_carried.data()), reduced.filled_others,
+          reduced.others_carried.outerStride()};
+}
+
+/// Base rows of A q̈ that joints make: Ψ q̈_j.
+template <int S>
+Vector6d BaseInertia(const ReducedDynamics& reduced, const SplitVector<S>& acceleration) {
+  Vector6d result;
+  SetTransposedProduct(result, View<S, 6>(reduced.psi_t, reduced.num_legs, 6), acceleration.legs);
+  AddDots(1, OthersCoupling(reduced), 6, acceleration.others.data(), result.data());
+  return result;
+}
+
+/// x ← L⁻¹ Vᵀ x: torque to reduced coordinates. `reduced_legs` gets the legs' part.
+template <int S, bool Loop, class Legs>
+void ToReduced(const ReducedDynamics& reduced, const StackVector<S>& legs, Legs* reduced_legs,
+               OthersVector* others) {
+  constexpr int R = Rank<S, Loop>();
+  const Eigen::Index s = reduced.num_legs, r = reduced.legs_rank();
+  if constexpr (Loop) {
+    SetTransposedProduct(*reduced_legs, View<S, R>(reduced.rotation, s, r, 6), legs);
+  } else {
+    *reduced_legs = legs;
+  }
+  SolveLower(View<R, R>(reduced.factor, r, r), *reduced_legs);
+  if (reduced.filled_others == 0) return;
+  const BlockMatrix factor = OthersFactor(reduced);
+  AddColumns(-1, factor, r, reduced_legs->data(), others->data());
+  SolveBlocks(factor, r, reduced.others_inverses.data(), others->data());
+}
+
+/// x ← L⁻ᵀ x, in place: reduced coordinates to V's.
+template <int S, bool Loop, class Legs>
+void SolveReducedTransposed(const ReducedDynamics& reduced, Legs* legs, OthersVector* others) {
+  constexpr int R = Rank<S, Loop>();
+  const Eigen::Index r = reduced.legs_rank();
+  if (reduced.filled_others > 0) {
+    const BlockMatrix factor = OthersFactor(reduced);
+    SolveBlocksTransposed(factor, r, reduced.others_inverses.data(), others->data());
+    AddDots(-1, factor, r, others->data(), legs->data());
+  }
+  SolveLowerTransposed(View<R, R>(reduced.factor, r, r), *legs);
 }
 
 }  // namespace poise::balance

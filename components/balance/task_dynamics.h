@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "components/balance/block_cholesky.h"
 #include "components/balance/contact_dynamics.h"
 
 namespace poise::balance {
@@ -37,16 +38,24 @@ class TaskDynamics {
 
   // What Compute kept, in the reduced coordinates y = Lᵀ Vᵀ q̈_j of ReducedDynamics, where ẍ = T y +
   // drift.
-  /// T = J A⁻¹ N_cᵀ Sᵀ (W⁺)^½, t×r: T Tᵀ = Λ⁻¹.
-  MatrixRef reduced_jacobian() const { return reduced_jacobian_.topLeftCorner(rows_, rank_); }
+  /// T = J A⁻¹ N_cᵀ Sᵀ (W⁺)^½ of the legs, t×r_s: T Tᵀ = Λ⁻¹ with the others'.
+  MatrixRef reduced_jacobian() const { return reduced_jacobian_.topLeftCorner(rows_, legs_rank_); }
+  /// Tᵀ of the others, o×t, rows filled up.
+  BlockMatrix others_reduced() const;
   /// Lower Cholesky factor of Λ⁻¹, t×t.
   MatrixRef factor() const { return factor_.topLeftCorner(rows_, rows_); }
 
  private:
+  /// T of all of y, t×r.
+  Eigen::MatrixXd WholeJacobian() const;
+  BlockMatrix others_jacobian() const;
+
   const ContactDynamics* contact_ = nullptr;
-  int rows_ = 0, rank_ = 0;
-  Eigen::MatrixXd joint_jacobian_;    // J [Φ; I], t×k
-  Eigen::MatrixXd reduced_jacobian_;  // T, t×r
+  int rows_ = 0, legs_rank_ = 0;
+  Eigen::MatrixXd joint_jacobian_;    // J [Φ; I] of the legs, t×s
+  Eigen::MatrixXd reduced_jacobian_;  // T of the legs, t×r_s
+  Eigen::MatrixXd others_jacobian_;   // Jᵀ of the others, o×t
+  Eigen::MatrixXd others_reduced_;    // Tᵀ of the others, o×t
   Eigen::MatrixXd factor_;            // of T Tᵀ
   Eigen::VectorXd drift_;             // ẍ at y = 0, t×1
   Eigen::VectorXd load_;              // Λ⁻¹ (μ + p), t×1

@@ -1,7 +1,10 @@
 #include "components/balance/whole_body.h"
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
+#include <vector>
 
 namespace poise::balance {
 namespace {
@@ -14,12 +17,37 @@ bool Same(const robot::RobotState& a, const robot::RobotState& b) {
          a.joint_position == b.joint_position && a.joint_velocity == b.joint_velocity;
 }
 
+/// Joints between the base and a foot, ascending.
+std::vector<int> LegJoints(const robot::RobotModel& model) {
+  std::set<int> legs;
+  for (const robot::FootModel& foot : model.feet()) {
+    const auto joints = model.supporting_joints(foot.body);
+    legs.insert(joints.begin(), joints.end());
+  }
+  return {legs.begin(), legs.end()};
+}
+
+/// Another joint hangs on a leg: toes, or arms above a waist that the feet stand below.
+bool LegsCarryOthers(const robot::RobotModel& model) {
+  const std::vector<int> legs = LegJoints(model);
+  const auto is_leg = [&](int joint) { return std::ranges::binary_search(legs, joint); };
+  for (const robot::Joint& joint : model.joints()) {
+    const auto below = model.supporting_joints(joint.body);
+    if (!is_leg(below.front()) && std::ranges::any_of(below, is_leg)) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+ContactDynamics MakeContactDynamics(const robot::RobotModel& model) {
+  return ContactDynamics(model.num_joints(), LegJoints(model), LegsCarryOthers(model));
+}
 
 WholeBody::WholeBody(std::shared_ptr<const robot::RobotModel> model)
     : model_(std::move(model)),
       data_(*model_),
-      contact_(model_->num_joints()),
+      contact_(MakeContactDynamics(*model_)),
       state_(model_->num_joints()) {
   contact_jacobian_[0].setZero(6, model_->num_velocities());
   contact_jacobian_[1].setZero(12, model_->num_velocities());
@@ -90,16 +118,20 @@ ContactGeometry WholeBody::geometry() const {
 void WholeBody::ContactJacobian(const std::array<bool, 2>& in_contact,
                                 Eigen::MatrixXd* jacobian) const {
   const Eigen::Index n = model_->num_velocities();
-  jacobian->resize(6 * (in_contact[0] + in_contact[1]), n);
+  const Eigen::Index rows = 6 * (in_contact[0] + in_contact[1]);
+  // Columns of joints that are no leg's stay zero.
+  if (jacobian->rows() != rows || jacobian->cols() != n) jacobian->setZero(rows, n);
   Eigen::Index row = 0;
   for (int i = 0; i < 2; ++i) {
     if (!in_contact[i]) continue;
     const Eigen::Matrix3d to_sole = data_.foot_pose[i].linear().transpose();
     const robot::Matrix6X& world = data_.foot_jacobian[i];
-    for (Eigen::Index j = 0; j < n; ++j) {
+    const auto turn = [&](Eigen::Index j) {
       jacobian->block<3, 1>(row, j) = to_sole * world.block<3, 1>(0, j);
       jacobian->block<3, 1>(row + 3, j) = to_sole * world.block<3, 1>(3, j);
-    }
+    };
+    for (Eigen::Index j = 0; j < 6; ++j) turn(j);
+    for (const int joint : contact_.legs()) turn(6 + joint);
     row += 6;
   }
 }

@@ -11,6 +11,9 @@
 
 namespace poise::balance {
 
+/// Contact dynamics of a robot that stands on its feet.
+ContactDynamics MakeContactDynamics(const robot::RobotModel& model);
+
 /// Kinematics, dynamics and contact dynamics of a state. A pure function of its arguments: asking
 /// again with equal arguments costs a comparison, so components of one process may share one
 /// object. Never allocates after construction.

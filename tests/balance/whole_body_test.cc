@@ -126,5 +126,52 @@ TEST(WholeBody, LosesNothingFarFromTheOrigin) {
   }
 }
 
+// Which joints count as legs decides the route, not the result: more of them than there are, apart
+// from one another, carrying others; or all.
+TEST(WholeBody, TheLegsChosenDoNotChangeTheDynamics) {
+  for (const auto& model : {Biped(), Humanoid()}) {
+    const int k = model->num_joints();
+    StateSampler sampler(model, 19);
+    WholeBody body(model);
+    std::vector<int> more(body.contact().legs().begin(), body.contact().legs().end());
+    if (k > 12) more.push_back(k - 1);
+    for (int i = 0; i < 20; ++i) {
+      const robot::RobotState state = sampler.Draw();
+      for (const auto& in_contact : {kDouble, kRight, kLeft}) {
+        ASSERT_TRUE(body.Update(state, in_contact));
+        const robot::RobotData& data = body.data();
+        const StackedTask task = PaperTask(body, in_contact);
+        const Eigen::Index m = in_contact == kDouble ? 12 : 6, t = task.jacobian.rows();
+        const Eigen::VectorXd bias = PaperContact(body, in_contact).gamma.cast<double>();
+        const Eigen::VectorXd torque = sampler.Vector(k, 50), wanted = sampler.Vector(t, 5);
+        Eigen::VectorXd acceleration(k + 6), other(k + 6), wrench(m), other_wrench(m);
+        Eigen::VectorXd command(k), other_command(k), projected = torque, other_projected = torque;
+        const auto evaluate = [&](const ContactDynamics& contact, Eigen::VectorXd* q,
+                                  Eigen::VectorXd* f, Eigen::VectorXd* gamma,
+                                  Eigen::VectorXd* null) {
+          contact.Acceleration(torque, *q);
+          contact.ExpectedWrench(torque, *f);
+          TaskDynamics dynamics(k, static_cast<int>(t));
+          ASSERT_TRUE(dynamics.Compute(contact, task.jacobian, task.bias_acceleration));
+          dynamics.TaskTorque(wanted, *gamma);
+          dynamics.ProjectIntoNullSpace(*null);
+        };
+        evaluate(body.contact(), &acceleration, &wrench, &command, &projected);
+        for (ContactDynamics contact : {ContactDynamics(k), ContactDynamics(k, more, true)}) {
+          ASSERT_TRUE(contact.Compute(data.mass_matrix, data.bias, data.gravity,
+                                      body.contact().contact_jacobian(), bias));
+          other_projected = torque;
+          evaluate(contact, &other, &other_wrench, &other_command, &other_projected);
+          EXPECT_LT(Residual(other, acceleration), 1e-10);
+          EXPECT_LT(Residual(other_wrench, wrench), 1e-10);
+          EXPECT_LT(Residual(other_command, command), 1e-10);
+          EXPECT_LT(Residual(other_projected, projected), 1e-10);
+          EXPECT_LT(Residual(contact.w_pinv(), body.contact().w_pinv()), 1e-10);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace poise::balance
