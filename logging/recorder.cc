@@ -18,6 +18,7 @@ namespace {
 
 constexpr int64_t kFlushInterval = 50'000'000;  // ns
 constexpr int kSpin = 50;                       // ms
+constexpr int kLastSpins = 20;                  // each takes a batch of every channel
 
 void WriteReport(const std::string& path, const RunSpec& spec, const RecorderReport& report,
                  const ChannelCollector& collector) {
@@ -83,6 +84,8 @@ RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
         next_flush = now + kFlushInterval;
       }
     }
+    // What came before the stop still waits in the channels' sockets.
+    for (int i = 0; i < kLastSpins; ++i) collector.Spin(0);
     writer.Close();
   } catch (const LogError& error) {
     // What this process prints may go to the same full disk.
