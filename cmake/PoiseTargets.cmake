@@ -1,5 +1,6 @@
 # Options, compile flags and the few target functions every folder uses.
 include(InstructionSet)
+set(POISE_CMAKE_DIR ${CMAKE_CURRENT_LIST_DIR})
 set(POISE_COMPILER "${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}")
 option(POISE_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 option(POISE_BUILD_TESTS "Build tests and benchmarks" ON)
@@ -9,6 +10,7 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # all libraries become one shared one, see poise_shared_library
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 if(NOT CMAKE_BUILD_TYPE)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
@@ -27,7 +29,8 @@ endif()
 add_compile_options(-ffp-contract=off ${POISE_MARCH})
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC collects its garbage from 128 MB on; from 512 MB on it takes a tenth less time.
-  add_compile_options(--param=ggc-min-heapsize=524288)
+  # No function of a shared library is replaced by another's: it may be inlined.
+  add_compile_options(--param=ggc-min-heapsize=524288 -fno-semantic-interposition)
 endif()
 if(POISE_SANITIZE)
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
@@ -40,9 +43,9 @@ target_include_directories(poise_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJE
 target_link_libraries(poise_options INTERFACE Eigen3::Eigen fmt::fmt)
 target_compile_options(poise_options INTERFACE -Wall -Wextra -Wconversion)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # GCC 12 raises them falsely: in its own AVX-512 headers wherever Eigen meets them (bug 105593), the last in fmt and std::string.
+  # GCC 12 raises them falsely: in its own AVX-512 headers wherever Eigen meets them (bug 105593), the last ones in fmt and std::string (bug 105651).
   target_compile_options(poise_options INTERFACE -Wno-uninitialized -Wno-maybe-uninitialized -Wno-array-bounds
-                         -Wno-stringop-overflow)
+                         -Wno-stringop-overflow -Wno-restrict)
 endif()
 if(POISE_WERROR)
   target_compile_options(poise_options INTERFACE -Werror)
@@ -83,6 +86,12 @@ function(poise_unite name)
   endif()
 endfunction()
 
+# An executable's code as a library's (-fPIC, not -fPIE): they share precompiled headers.
+function(poise_compile_as_library name)
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+  target_compile_options(${name} PRIVATE -fPIC)
+endfunction()
+
 # poise_library(name SOURCES ... DEPS ... [UNITE]): a static library of our own code; UNITE: see poise_unite.
 function(poise_library name)
   cmake_parse_arguments(A "UNITE" "" "SOURCES;DEPS" ${ARGN})
@@ -92,18 +101,57 @@ function(poise_library name)
     poise_unite(${name})
   endif()
   poise_reuse_headers(${name} poise_headers)
+  set_property(GLOBAL APPEND PROPERTY POISE_LIBRARIES ${name})
 endfunction()
 
-# poise_program(name SOURCES ... DEPS ...): an executable in build/<preset>/bin.
+# poise_shared_library(name LIBRARIES ...): the libraries of our own made so far as one shared library, which programs and
+# users' modules link instead of them, and the others' that they link. One copy of everything in a process: Protobuf allows no
+# second one of a schema.
+function(poise_shared_library name)
+  cmake_parse_arguments(A "" "" "LIBRARIES" ${ARGN})
+  get_property(own GLOBAL PROPERTY POISE_LIBRARIES)
+  set(files)
+  foreach(library ${own})
+    list(APPEND files $<TARGET_FILE:${library}>)
+  endforeach()
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.cc CONTENT "")
+  add_library(${name} SHARED ${PROJECT_BINARY_DIR}/${name}.cc)
+  # As files: named as targets they would be linked again for each other's sake.
+  target_link_libraries(${name} PRIVATE -Wl,--whole-archive ${files} -Wl,--no-whole-archive ${A_LIBRARIES})
+  target_link_options(${name} PRIVATE -Wl,-Bsymbolic-functions -Wl,--no-undefined)
+  add_dependencies(${name} ${own})
+  set_target_properties(${name} PROPERTIES OUTPUT_NAME poise LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib
+                        LINK_DEPENDS "${files}" INSTALL_RPATH "$ORIGIN")
+endfunction()
+
+# poise_program(name SOURCES ... DEPS ...): an executable in build/<preset>/bin. The shared library comes first: what it has
+# is not taken from the others.
 function(poise_program name)
   cmake_parse_arguments(A "" "" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
-  target_link_libraries(${name} PRIVATE poise_options ${A_DEPS})
+  poise_compile_as_library(${name})
+  target_link_libraries(${name} PRIVATE poise_options poise_shared ${A_DEPS})
   poise_reuse_headers(${name} poise_headers)
+  set_property(GLOBAL APPEND PROPERTY POISE_PROGRAMS ${name})
 endfunction()
 
+# poise_embed(FUNCTION file...): FUNCTION.cc, whose function gives the files' bytes.
+function(poise_embed name)
+  list(JOIN ARGN "," inputs)
+  add_custom_command(
+    OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.cc
+    COMMAND ${CMAKE_COMMAND} -DINPUTS=${inputs} -DOUTPUT=${CMAKE_CURRENT_BINARY_DIR}/${name}.cc -DFUNCTION=${name}
+            -P ${POISE_CMAKE_DIR}/EmbedFile.cmake
+    DEPENDS ${ARGN} ${POISE_CMAKE_DIR}/EmbedFile.cmake VERBATIM)
+endfunction()
+
+# Any of them may be imported by any: protoc tells dependencies of single files alone.
+file(GLOB_RECURSE POISE_ALL_PROTOS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/components/*.proto ${PROJECT_SOURCE_DIR}/sim*/*.proto
+     ${PROJECT_SOURCE_DIR}/hw_bridge/*.proto ${PROJECT_SOURCE_DIR}/tools/*.proto ${PROJECT_SOURCE_DIR}/tests/*.proto)
+
 # poise_proto_library(name PROTOS ... DEPS ...): C++ of .proto files of this folder, included by their path from the
-# top ("components/robot/robot.pb.h"). Generated code is not held to our warnings.
+# top ("components/robot/robot.pb.h"), and std::string_view poise::NAME_schema(), the schema with its comments. Generated code
+# is not held to our warnings.
 function(poise_proto_library name)
   cmake_parse_arguments(A "" "" "PROTOS;DEPS" ${ARGN})
   set(sources)
@@ -117,9 +165,19 @@ function(poise_proto_library name)
       DEPENDS ${PROJECT_SOURCE_DIR}/${relative} VERBATIM)
     list(APPEND sources ${PROJECT_BINARY_DIR}/${stem}.pb.cc)
   endforeach()
-  add_library(${name} STATIC ${sources})
+  set(schema ${CMAKE_CURRENT_BINARY_DIR}/${name}.binpb)
+  set(protos ${A_PROTOS})
+  list(TRANSFORM protos PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  add_custom_command(
+    OUTPUT ${schema}
+    COMMAND protobuf::protoc --descriptor_set_out=${schema} --include_imports --include_source_info
+            -I ${PROJECT_SOURCE_DIR} ${protos}
+    DEPENDS ${POISE_ALL_PROTOS} VERBATIM)
+  poise_embed(${name}_schema ${schema})
+  add_library(${name} STATIC ${sources} ${CMAKE_CURRENT_BINARY_DIR}/${name}_schema.cc)
   target_include_directories(${name} SYSTEM PUBLIC ${PROJECT_BINARY_DIR})
   target_link_libraries(${name} PUBLIC protobuf::libprotobuf ${A_DEPS})
+  set_property(GLOBAL APPEND PROPERTY POISE_LIBRARIES ${name})
 endfunction()
 
 # Tests' own code is run once: compiling it faster gains more. What they test is built as ever, with the same bits.
@@ -129,6 +187,7 @@ set(POISE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 function(poise_test name)
   cmake_parse_arguments(A "" "" "SOURCES;DEPS;LABELS" ${ARGN})
   add_executable(${name} ${A_SOURCES})
+  poise_compile_as_library(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   target_link_libraries(${name} PRIVATE poise_options ${A_DEPS} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${POISE_TEST_OPTIONS})

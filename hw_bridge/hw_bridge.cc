@@ -14,6 +14,8 @@
 #include "hw_bridge/units.h"
 
 namespace poise {
+
+std::string_view hw_bridge_proto_schema();  // generated
 namespace {
 
 void Require(bool condition, const char* field, const char* problem) {
@@ -425,7 +427,13 @@ ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
                           .link = "hw_bridge.ethercat.link",
                           .simulated_time = "hw_bridge.ethercat.simulated_time",
                           .profile = "hw_bridge.ethercat.master.profile",
-                          .capture = "hw_bridge.ethercat.capture"}}};
+                          .capture = "hw_bridge.ethercat.capture"}},
+          {Reads<drive_feedback_t>("drive_feedback"), Reads<joint_command_t>("joint_command"),
+           Reads<emergency_stop_t>("emergency_stop", InputKind::kLatest),
+           Writes<robot_sensors_t>("robot_sensors"), Writes<drive_command_t>("drive_command"),
+           Writes<bridge_status_t>("bridge_status")},
+          HwBridgeConfig::descriptor(),
+          hw_bridge_proto_schema};
 }
 
 }  // namespace poise

@@ -31,7 +31,7 @@ class ScalarVisitor {
 /// One message type at run time: for tools that meet types by name or fingerprint (logs, echo,
 /// replay).
 struct MessageType {
-  const char* name;  ///< "robot_state_t"
+  const char* name;  ///< "robot_state_t"; of another package than poise: "ankle.sway_t"
   int64_t fingerprint;
   std::span<const char* const> count_names;
   bool has_header;    ///< has run_id, tick, utime right after the counts
@@ -46,9 +46,15 @@ struct MessageType {
   /// Checks, decodes and visits every scalar. False (nothing visited) when the bytes are not such a
   /// message.
   bool (*visit)(const uint8_t* data, int64_t size, ScalarVisitor* visitor);
+  /// A message with its arrays sized, and its end.
+  void* (*make)(std::span<const int32_t> counts);
+  void (*destroy)(void* message);
+  /// Decodes into such a message; false when liblcm refuses it or a number in it is not finite. Does
+  /// not allocate when `data` has its counts.
+  bool (*decode)(const uint8_t* data, int size, void* message);
 };
 
-/// All message types, by name. Generated.
+/// All message types: Poise's own by name, then others as they were added (AddMessages).
 std::span<const MessageType> MessageTypes();
 /// nullptr when there is no such type.
 const MessageType* FindMessageType(std::string_view name);
@@ -183,6 +189,31 @@ template <class T>
 bool DecodeChecked(const uint8_t* data, int64_t size, T* message) {
   return size <= INT32_MAX && MessageTraits<T>::WellFormedSize(data, size) == size &&
          message->decode(data, 0, static_cast<int>(size)) == size;
+}
+
+/// What is known of T at run time.
+template <class T>
+MessageType MessageTypeOf() {
+  using Traits = MessageTraits<T>;
+  return {Traits::kName,
+          T::getHash(),
+          Traits::kCountNames,
+          Traits::kHasHeader,
+          Traits::kHasStrings,
+          Traits::kRunIdOffset,
+          &Traits::EncodedSize,
+          &Traits::WellFormedSize,
+          &message_internal::DecodeAndVisit<T>,
+          [](std::span<const int32_t> counts) -> void* {
+            auto* const message = new T();
+            Traits::Resize(*message, counts);
+            return message;
+          },
+          [](void* message) { delete static_cast<T*>(message); },
+          [](const uint8_t* data, int size, void* message) {
+            auto& m = *static_cast<T*>(message);
+            return m.decode(data, 0, size) == size && Traits::AllFinite(m);
+          }};
 }
 
 template <class T>

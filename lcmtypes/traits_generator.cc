@@ -1,7 +1,10 @@
-// Writes poise/message_traits.hpp, message_table.cc and message_field_table.cc from the .lcm files,
-// and refuses messages that the framework could not check before decoding. Usage:
-// poise_traits_generator OUTPUT_DIR FILE.lcm ...
+// Writes OUTPUT_DIR/NAME/message_traits.hpp and message_table.cc from the .lcm files of a set of
+// messages, and refuses messages that the framework could not check before decoding. A message of
+// package poise is called by its struct's name, another one PACKAGE.STRUCT. Usage:
+// poise_traits_generator NAME OUTPUT_DIR FILE.lcm ... [--import FILE.lcm ...]
+// Imported files give structs for fields, and nothing is written for them.
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <map>
@@ -16,11 +19,25 @@ const std::map<std::string, int> kScalarSizes = {{"int8_t", 1},  {"byte", 1},   
                                                  {"int16_t", 2}, {"int32_t", 4}, {"int64_t", 8},
                                                  {"float", 4},   {"double", 8}};
 
+/// As messages are called: "robot_state_t", "ankle.sway_t".
+std::string FullName(const std::string& package, const std::string& name) {
+  return package == "poise" ? name : package + "." + name;
+}
+
+/// "a.b.c_t" with `separator` for the dots.
+std::string Separated(std::string name, const std::string& separator) {
+  for (size_t dot = 0; (dot = name.find('.', dot)) != std::string::npos; dot += separator.size()) {
+    name.replace(dot, 1, separator);
+  }
+  return name;
+}
+
 struct Message {
-  LcmStruct lcm;
+  LcmStruct lcm;  // named in full
   std::vector<std::string> counts;
   bool has_header = false;
   bool has_strings = false;
+  std::string name;  // of the struct alone
 };
 
 [[noreturn]] void Fail(const LcmStruct& lcm, int line, const std::string& problem) {
@@ -30,8 +47,7 @@ struct Message {
 /// Splits off the leading counts and checks the rules of the house.
 Message Check(const LcmStruct& lcm, const std::set<std::string>& nested,
               const std::map<std::string, LcmStruct>& all) {
-  Message message{lcm, {}, false, false};
-  if (lcm.package != "poise") Fail(lcm, 1, "package must be poise");
+  Message message{lcm, {}, false, false, lcm.name.substr(lcm.name.rfind('.') + 1)};
   std::set<std::string> dimensions;
   for (const LcmField& field : lcm.fields) {
     if (!field.dimension.empty() && !field.literal_dimension()) dimensions.insert(field.dimension);
@@ -119,10 +135,10 @@ std::string EncodedSizeFormula(const Message& message,
 
 void WriteTraits(const Message& message, const std::map<std::string, LcmStruct>& all,
                  std::ostream& out) {
-  const std::string& name = message.lcm.name;
+  const std::string name = "::" + Separated(message.lcm.package, "::") + "::" + message.name;
   const size_t n = message.counts.size();
   out << "template <>\nstruct MessageTraits<" << name << "> {\n"
-      << "  static constexpr const char* kName = \"" << name << "\";\n"
+      << "  static constexpr const char* kName = \"" << message.lcm.name << "\";\n"
       << "  static constexpr int kNumCounts = " << n << ";\n"
       << "  static constexpr std::array<const char*, " << n << "> kCountNames = {";
   for (size_t i = 0; i < n; ++i) out << (i ? ", " : "") << '"' << message.counts[i] << '"';
@@ -206,84 +222,119 @@ std::string UnitOf(const std::string& comment) {
   return "";
 }
 
-void WriteFieldTable(const std::vector<Message>& messages, std::ostream& out) {
-  out << "// Generated from lcmtypes/*.lcm by poise_traits_generator.\n#include "
-         "\"lcmtypes/field_table.h\"\n\nnamespace poise {\nnamespace {\n\n";
+/// The C++ identifier that stands for a message's name.
+std::string Identifier(const Message& message) { return "k_" + Separated(message.lcm.name, "_"); }
+
+void WriteHeader(const std::string& set, const std::vector<Message>& messages,
+                 const std::map<std::string, LcmStruct>& all, std::ostream& out) {
+  out << "// Generated from .lcm files by poise_traits_generator.\n#pragma once\n\n"
+      << "#include <array>\n#include <cstdint>\n#include <span>\n\n"
+      << "#include \"lcmtypes/message_fields.h\"\n";
+  if (set != "poise") out << "#include \"poise/message_traits.hpp\"\n";
   for (const Message& m : messages) {
-    out << "constexpr FieldInfo k_" << m.lcm.name << "[] = {\n";
+    out << "#include \"" << Separated(m.lcm.package, "/") << "/" << m.name << ".hpp\"\n";
+  }
+  out << "\nnamespace poise {\n\n";
+  for (const Message& m : messages) WriteTraits(m, all, out);
+  if (set == "poise") {
+    out << "// Calls f.template operator()<T>() for every message type of Poise's own with a header.\n"
+        << "template <class F>\nvoid ForEachMessageType(F&& f) {\n";
+    for (const Message& m : messages) {
+      if (m.has_header) out << "  f.template operator()<" << m.lcm.name << ">();\n";
+    }
+    out << "}\n\n";
+  }
+  out << "}  // namespace poise\n";
+}
+
+void WriteTable(const std::string& set, const std::vector<Message>& messages,
+                const std::vector<std::string>& files, std::ostream& out) {
+  out << "// Generated from .lcm files by poise_traits_generator.\n#include \"" << set
+      << "/message_traits.hpp\"\n#include \"lcmtypes/field_table.h\"\n\nnamespace poise {\n"
+      << "namespace {\n\n";
+  for (const Message& m : messages) {
+    out << "constexpr FieldInfo " << Identifier(m) << "[] = {\n";
     for (const LcmField& f : m.lcm.fields) {
-      out << "    {\"" << f.name << "\", \"" << f.type << "\", \""
-          << (f.literal_dimension() ? "" : f.dimension) << "\", \"" << UnitOf(f.comment)
-          << "\"},\n";
+      const bool literal = f.literal_dimension();
+      out << "    {\"" << f.name << "\", \"" << f.type << "\", \"" << (literal ? "" : f.dimension)
+          << "\", \"" << UnitOf(f.comment) << "\", " << (literal ? f.dimension : "0") << "},\n";
     }
     out << "};\n";
   }
-  out << "\n}  // namespace\n\nstd::span<const FieldInfo> FieldsOf(std::string_view type) {\n";
+  out << "constexpr StructInfo kStructs[] = {\n";
   for (const Message& m : messages) {
-    out << "  if (type == \"" << m.lcm.name << "\") return k_" << m.lcm.name << ";\n";
+    out << "    {\"" << m.lcm.name << "\", " << Identifier(m) << "},\n";
   }
-  out << "  return {};\n}\n\n}  // namespace poise\n";
+  out << "};\nconstexpr const char* kDefinitions[] = {\n";
+  for (const std::string& file : files) {
+    std::ifstream in(file);
+    out << "    R\"lcm(" << in.rdbuf() << ")lcm\",\n";
+  }
+  out << "};\n\n}  // namespace\n\nMessageSet " << set << "_messages();\n\nMessageSet " << set
+      << "_messages() {\n  static const MessageType types[] = {\n";
+  for (const Message& m : messages) {
+    const std::string type = "::" + Separated(m.lcm.package, "::") + "::" + m.name;
+    if (m.has_header) out << "      MessageTypeOf<" << type << ">(),\n";
+  }
+  out << "  };\n  return {types, kStructs, kDefinitions};\n}\n\n";
+  // Linked in as an object, it makes its messages known by itself.
+  if (set != "poise") {
+    out << "namespace {\n[[maybe_unused]] const bool known = AddMessages(" << set
+        << "_messages());\n}  // namespace\n\n";
+  }
+  out << "}  // namespace poise\n";
 }
 
-int Generate(const std::string& output_dir, const std::vector<std::string>& files) {
-  std::map<std::string, LcmStruct> all;
+/// The structs of `files`, by full name; the types of their fields in full.
+std::map<std::string, LcmStruct> Parse(const std::vector<std::string>& files) {
+  std::map<std::string, LcmStruct> structs;
   for (const std::string& file : files) {
     LcmStruct lcm = ParseLcmFile(file);
-    all[lcm.name] = lcm;
+    for (LcmField& field : lcm.fields) {
+      if (field.type == "string" || kScalarSizes.contains(field.type)) continue;
+      const size_t dot = field.type.rfind('.');
+      field.type = dot == std::string::npos
+                       ? FullName(lcm.package, field.type)
+                       : FullName(field.type.substr(0, dot), field.type.substr(dot + 1));
+    }
+    lcm.name = FullName(lcm.package, lcm.name);
+    structs[lcm.name] = lcm;
+  }
+  return structs;
+}
+
+int Generate(const std::string& set, const std::string& output_dir,
+             const std::vector<std::string>& files, const std::vector<std::string>& imports) {
+  const std::map<std::string, LcmStruct> own = Parse(files);
+  std::map<std::string, LcmStruct> all = Parse(imports);
+  for (const auto& [name, lcm] : own) {
+    if ((lcm.package == "poise") != (set == "poise")) {
+      Fail(lcm, 1,
+           set == "poise" ? "package must be poise" : "package poise is Poise's own; choose another");
+    }
+    if (!all.emplace(name, lcm).second) Fail(lcm, lcm.line, name + " is there twice");
   }
   std::set<std::string> nested;
-  for (auto& [name, lcm] : all) {
-    for (LcmField& field : lcm.fields) {
-      if (field.type.starts_with("poise.")) field.type.erase(0, 6);
+  for (const auto& [name, lcm] : own) {
+    for (const LcmField& field : lcm.fields) {
       if (all.contains(field.type)) nested.insert(field.type);
     }
   }
   std::vector<Message> messages;
-  for (const auto& [name, lcm] : all) messages.push_back(Check(lcm, nested, all));
-
-  std::ofstream traits(output_dir + "/message_traits.hpp");
-  traits << "// Generated from lcmtypes/*.lcm by poise_traits_generator.\n#pragma once\n\n"
-         << "#include <array>\n#include <cstdint>\n#include <span>\n\n#include "
-            "\"lcmtypes/message_fields.h\"\n";
-  for (const Message& m : messages) traits << "#include \"poise/" << m.lcm.name << ".hpp\"\n";
-  traits << "\nnamespace poise {\n\n";
-  for (const Message& m : messages) WriteTraits(m, all, traits);
-  traits << "// Calls f.template operator()<T>() for every message type with a header.\n"
-         << "template <class F>\nvoid ForEachMessageType(F&& f) {\n";
-  for (const Message& m : messages) {
-    if (m.has_header) traits << "  f.template operator()<" << m.lcm.name << ">();\n";
+  for (const auto& [name, lcm] : own) messages.push_back(Check(lcm, nested, all));
+  for (const std::string& name : nested) {
+    if (!own.contains(name)) Check(all.at(name), nested, all);
   }
-  traits << "}\n\n}  // namespace poise\n";
 
-  std::ofstream table(output_dir + "/message_table.cc");
-  table << "// Generated from lcmtypes/*.lcm by poise_traits_generator.\n#include "
-           "\"poise/message_traits.hpp\"\n\n"
-        << "namespace poise {\nnamespace {\n\ntemplate <class T>\nMessageType TypeOf() {\n"
-        << "  using Traits = MessageTraits<T>;\n"
-        << "  return {Traits::kName, T::getHash(), Traits::kCountNames, Traits::kHasHeader, "
-           "Traits::kHasStrings,\n"
-        << "          Traits::kRunIdOffset, &Traits::EncodedSize, &Traits::WellFormedSize, "
-           "&message_internal::DecodeAndVisit<T>};\n}\n\n"
-        << "}  // namespace\n\nstd::span<const MessageType> MessageTypes() {\n"
-        << "  static const MessageType types[] = {\n";
-  for (const Message& m : messages) {
-    if (m.has_header) table << "      TypeOf<" << m.lcm.name << ">(),\n";
-  }
-  table << "  };\n  return types;\n}\n\n"
-        << "const MessageType* FindMessageType(std::string_view name) {\n"
-        << "  for (const MessageType& type : MessageTypes()) {\n    if (name == type.name) return "
-           "&type;\n  }\n"
-        << "  return nullptr;\n}\n\n"
-        << "const MessageType* FindMessageType(int64_t fingerprint) {\n"
-        << "  for (const MessageType& type : MessageTypes()) {\n"
-        << "    if (fingerprint == type.fingerprint) return &type;\n  }\n  return nullptr;\n}\n\n"
-        << "}  // namespace poise\n";
-  std::ofstream fields(output_dir + "/message_field_table.cc");
-  WriteFieldTable(messages, fields);
+  const std::string dir = output_dir + "/" + set;
+  std::filesystem::create_directories(dir);
+  std::ofstream traits(dir + "/message_traits.hpp");
+  WriteHeader(set, messages, all, traits);
+  std::ofstream table(dir + "/message_table.cc");
+  WriteTable(set, messages, files, table);
   traits.close();
   table.close();
-  fields.close();
-  if (!traits || !table || !fields) throw std::runtime_error(output_dir + ": cannot be written");
+  if (!traits || !table) throw std::runtime_error(dir + ": cannot be written");
   return 0;
 }
 
@@ -291,12 +342,15 @@ int Generate(const std::string& output_dir, const std::vector<std::string>& file
 }  // namespace poise
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::cerr << "usage: poise_traits_generator OUTPUT_DIR FILE.lcm ...\n";
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  const auto import = std::find(arguments.begin(), arguments.end(), "--import");
+  if (import - arguments.begin() < 3) {
+    std::cerr << "usage: poise_traits_generator NAME OUTPUT_DIR FILE.lcm ... [--import FILE.lcm ...]\n";
     return 2;
   }
   try {
-    return poise::Generate(argv[1], {argv + 2, argv + argc});
+    return poise::Generate(arguments[0], arguments[1], {arguments.begin() + 2, import},
+                           {import == arguments.end() ? import : import + 1, arguments.end()});
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

@@ -31,6 +31,28 @@ std::function<bool(int64_t, std::span<const uint8_t>)> AddTo(Series<T>* series) 
   };
 }
 
+/// Keeps what no series holds: as it is, if it can be read.
+std::function<bool(int64_t, std::span<const uint8_t>)> Keep(const std::string& type_name,
+                                                            Series<std::vector<uint8_t>>* series) {
+  class Nothing final : public ScalarVisitor {
+   public:
+    void Integer(std::string_view, int64_t) override {}
+    void Real(std::string_view, double value) override { finite = finite && std::isfinite(value); }
+    void Text(std::string_view, std::string_view) override {}
+    bool finite = true;
+  };
+  return [type = FindMessageType(type_name), series](int64_t tick,
+                                                     std::span<const uint8_t> data) {
+    Nothing values;
+    if (type == nullptr ||
+        !type->visit(data.data(), static_cast<int64_t>(data.size()), &values) || !values.finite) {
+      return false;
+    }
+    series->Set(tick, {data.begin(), data.end()});
+    return true;
+  };
+}
+
 using Adders =
     std::map<std::string, std::function<bool(int64_t, std::span<const uint8_t>)>, std::less<>>;
 
@@ -76,8 +98,8 @@ RunRecord ReadRun(const std::string& path) {
     if (channel.external() || !IsKept(run.spec, channel.name())) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
-    lanes.push_back(
-        {ChannelTicks(run.spec, channel, reader.file_size()), adder ? adder.mapped() : nullptr});
+    lanes.push_back({ChannelTicks(run.spec, channel, reader.file_size()),
+                     adder ? adder.mapped() : Keep(channel.type(), &run.other[channel.name()])});
   }
   LogEvent event;
   while (reader.Next(&event)) {

@@ -15,6 +15,7 @@
 #include "logging/log_reader.h"
 #include "logging/run_info.h"
 #include "logging/tick_series.h"
+#include "lcmtypes/message_fields.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
@@ -68,6 +69,25 @@ struct RunRecord {
   /// By estimator_status_t::METHOD_*: estimates of the methods that did not run; nullptr for what
   /// nobody has asked for. Not in the log, set by who can run the estimator.
   std::array<std::shared_ptr<const Estimates>, 2> other_estimates;
+
+  /// Messages of the graph's channels that have no series above (a module's own), by channel and
+  /// encoded, as they were recorded.
+  std::map<std::string, Series<std::vector<uint8_t>>, std::less<>> other;
+
+  /// The message of type T on `channel` at `tick`, of `other`; empty: there is none, or it is of
+  /// another type.
+  template <class T>
+  std::optional<T> Other(std::string_view channel, int64_t tick) const {
+    const auto found = other.find(channel);
+    const std::vector<uint8_t>* const data =
+        found == other.end() ? nullptr : found->second.at(tick);
+    T message;
+    if (data == nullptr ||
+        !DecodeChecked(data->data(), static_cast<int64_t>(data->size()), &message)) {
+      return {};
+    }
+    return message;
+  }
 
   /// s of the scenario's time, negative in the run's lead.
   double time(int64_t tick) const { return duration(tick - spec.lead_ticks()); }

@@ -19,6 +19,13 @@ ComponentTraits SimTraits(const std::string& engine) {
           .lockstep = {"sim.crane="}};
 }
 
+std::vector<PortType> SimPorts() {
+  return {Reads<drive_command_t>("drive_command", InputKind::kPreviousTick),
+          Reads<bridge_status_t>("bridge_status", InputKind::kPreviousTick),
+          Writes<drive_feedback_t>("drive_feedback"), Writes<external_push_t>("external_push"),
+          Writes<ground_truth_t>("ground_truth")};
+}
+
 void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
   const SimSetup setup = read_(context);
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "components/framework/component.h"
+#include "components/framework/component_type.h"
 #include "components/framework/component_traits.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
@@ -29,6 +30,8 @@ using SimReader = std::function<SimSetup(const ComponentContext&)>;
 
 /// Of the process of `engine`, which takes the scenario's `sim` and the field of the engine's name.
 ComponentTraits SimTraits(const std::string& engine);
+/// Whatever the engine.
+std::vector<PortType> SimPorts();
 
 /// drive_command and bridge_status of tick t - 1 -> one control period of simulation ->
 /// drive_feedback, external_push and ground_truth of tick t. The crane, if there is one, lets go

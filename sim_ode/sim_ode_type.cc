@@ -5,6 +5,8 @@
 #include "sim_ode/sim_ode.pb.h"
 
 namespace poise {
+
+std::string_view sim_ode_proto_schema();  // generated
 namespace {
 
 SimSetup ReadSetup(const ComponentContext& context) {
@@ -20,7 +22,8 @@ SimSetup ReadSetup(const ComponentContext& context) {
 
 ComponentType SimOdeType() {
   return {"sim_ode", "the robot, the ground and the pushes, simulated in ODE",
-          [] { return std::make_unique<SimComponent>(ReadSetup); }, SimTraits("ode")};
+          [] { return std::make_unique<SimComponent>(ReadSetup); }, SimTraits("ode"),
+          SimPorts(), SimOdeConfig::descriptor(), sim_ode_proto_schema};
 }
 
 }  // namespace poise

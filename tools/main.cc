@@ -13,6 +13,7 @@
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
+#include "components/framework/modules.h"
 #include "components/framework/say_error.h"
 #include "components/robot/robot_model.h"
 #include "fmt/format.h"
@@ -20,6 +21,7 @@
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
+#include "tools/scenario/registry.h"
 
 namespace {
 
@@ -93,6 +95,8 @@ int main(int argc, char** argv) {
     return poise::kExitUsage;
   }
   try {
+    poise::LoadModules();
+    poise::Components();  // what they add to a scenario
     return Flushed(command());
   } catch (const poise::ConfigError& error) {
     Fail(error.what());

@@ -4,7 +4,7 @@ import {createRequire} from 'node:module';
 import {mkdirSync, readFileSync, readdirSync, renameSync, writeFileSync} from 'node:fs';
 import {dirname, join, resolve} from 'node:path';
 import {fileURLToPath} from 'node:url';
-import {parseMessage} from './messages.mjs';
+import {parseMessage} from './src/messages.js';
 
 const web = dirname(fileURLToPath(import.meta.url));
 const output = resolve(process.argv[2] ?? join(web, '../build/web'));

@@ -13,6 +13,8 @@
 #include "components/messages/robot_resource.h"
 
 namespace poise {
+
+std::string_view contact_wrench_monitor_proto_schema();  // generated
 namespace {
 
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
@@ -274,7 +276,11 @@ ComponentType ContactWrenchMonitorType() {
   return {"contact_wrench_monitor",
           "expected wrenches and CoP control in the null space (39)",
           [] { return std::make_unique<ContactWrenchMonitor>(); },
-          {.parts = {{"balancing", "contact_wrench_monitor.balancing"}}}};
+          {.parts = {{"balancing", "contact_wrench_monitor.balancing"}}},
+          {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
+           Reads<task_torque_t>("task_torque"), Writes<balance_torque_t>("balance_torque")},
+          ContactWrenchMonitorConfig::descriptor(),
+          contact_wrench_monitor_proto_schema};
 }
 
 }  // namespace poise

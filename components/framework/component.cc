@@ -86,23 +86,4 @@ void Wiring::AddStage(std::string name, std::vector<InputPort*> inputs,
       {std::move(name), std::move(inputs), std::move(outputs), std::move(run), deadline});
 }
 
-void ComponentRegistry::Add(std::string type, std::string summary, ComponentFactory factory,
-                            ComponentTraits traits) {
-  if (!entries_.emplace(type, Entry{std::move(summary), std::move(factory), std::move(traits)})
-           .second) {
-    throw ConfigError(fmt::format("component type {} is registered twice", type));
-  }
-}
-
-const ComponentFactory* ComponentRegistry::Find(const std::string& type) const {
-  const auto found = entries_.find(type);
-  return found == entries_.end() ? nullptr : &found->second.factory;
-}
-
-const ComponentTraits& ComponentRegistry::TraitsOf(const std::string& type) const {
-  static const ComponentTraits none;
-  const auto found = entries_.find(type);
-  return found == entries_.end() ? none : found->second.traits;
-}
-
 }  // namespace poise

@@ -160,26 +160,7 @@ class Component {
   virtual bool failed() const { return false; }
 };
 
-/// Makes components by type name. One registration line per component, beside its definition.
+/// Makes components of one type.
 using ComponentFactory = std::function<std::unique_ptr<Component>()>;
-
-class ComponentRegistry {
- public:
-  void Add(std::string type, std::string summary, ComponentFactory factory,
-           ComponentTraits traits = {});
-  /// nullptr when there is no such type.
-  const ComponentFactory* Find(const std::string& type) const;
-  /// Those of a type without any when there is no such type.
-  const ComponentTraits& TraitsOf(const std::string& type) const;
-  struct Entry {
-    std::string summary;
-    ComponentFactory factory;
-    ComponentTraits traits;
-  };
-  const std::map<std::string, Entry>& entries() const { return entries_; }
-
- private:
-  std::map<std::string, Entry> entries_;
-};
 
 }  // namespace poise

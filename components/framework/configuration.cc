@@ -11,6 +11,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "components/framework/added_fields.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -54,7 +55,9 @@ void ParseTextProto(std::string_view text, std::string_view source,
   FirstError errors;
   google::protobuf::TextFormat::Parser parser;
   parser.RecordErrorsTo(&errors);
-  google::protobuf::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
+  parser.SetFinder(AddedFieldFinder());
+  const std::string prepared = WithBrackets(text, *message->GetDescriptor());
+  google::protobuf::io::ArrayInputStream stream(prepared.data(), static_cast<int>(prepared.size()));
   if (!parser.Parse(&stream, message) || errors.any()) throw ConfigError(errors.Describe(source));
 }
 

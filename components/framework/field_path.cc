@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "components/framework/configuration.h"
+#include "components/framework/added_fields.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
 
@@ -68,6 +69,7 @@ std::optional<std::vector<Step>> SplitPath(std::string_view path) {
 std::vector<std::string> FieldNames(const Descriptor& type) {
   std::vector<std::string> names;
   for (int i = 0; i < type.field_count(); ++i) names.push_back(type.field(i)->name());
+  for (const FieldDescriptor* field : AddedFields(type)) names.push_back(field->name());
   return names;
 }
 
@@ -282,13 +284,14 @@ int LocateField(std::string_view text, std::string_view field, const Message& pr
   parser.WriteLocationsTo(&tree);
   parser.AllowPartialMessage(true);
   const std::unique_ptr<Message> message(prototype.New());
-  parser.ParseFromString(std::string(text), message.get());
+  parser.SetFinder(AddedFieldFinder());
+  parser.ParseFromString(WithBrackets(text, *prototype.GetDescriptor()), message.get());
 
   const TextFormat::ParseInfoTree* level = &tree;
   const Descriptor* type = prototype.GetDescriptor();
   int line = 0;
   for (const Step& step : *steps) {
-    const FieldDescriptor* descriptor = type->FindFieldByName(step.name);
+    const FieldDescriptor* descriptor = FindField(*type, step.name);
     if (descriptor == nullptr) break;
     // Without an index a repeated field means its first element.
     const int index = descriptor->is_repeated() ? std::max(step.index, 0) : -1;
@@ -312,7 +315,7 @@ std::string ResolvePath(const Message& message, std::string_view path) {
     if (!resolved.empty()) resolved += '.';
     resolved += step.name;
     const FieldDescriptor* field =
-        level == nullptr ? nullptr : level->GetDescriptor()->FindFieldByName(step.name);
+        level == nullptr ? nullptr : FindField(*level->GetDescriptor(), step.name);
     int index = step.index;
     if (!step.key.empty() && field != nullptr && field->is_repeated()) {
       index = FindElement(*level, *field, step.key, path);
@@ -341,7 +344,7 @@ void SetField(Message* message, std::string_view path, std::string_view value) {
     const Step& step = (*steps)[i];
     const bool last = i + 1 == steps->size();
     const Descriptor& type = *level->GetDescriptor();
-    const FieldDescriptor* field = type.FindFieldByName(step.name);
+    const FieldDescriptor* field = FindField(type, step.name);
     if (field == nullptr) {
       fail(fmt::format("{} has no field '{}'; {}", walked.empty() ? type.name() : walked, step.name,
                        Suggest(step.name, FieldNames(type))));

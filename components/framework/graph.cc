@@ -6,6 +6,7 @@
 #include <set>
 
 #include "components/framework/graph_order.h"
+#include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 
@@ -53,8 +54,8 @@ void CheckChannels(const Graph& graph, Problems* problems) {
     if (!seen.insert(channel.name()).second) fail(".name", "named twice; names must be unique");
     const MessageType* type = FindMessageType(channel.type());
     if (type == nullptr || type->has_strings) {
-      fail(".type", fmt::format("'{}' is no message type of a channel; types: {}", channel.type(),
-                                TypeNames()));
+      fail(".type", fmt::format("'{}' is no message type of a channel; types: {}; {}",
+                                channel.type(), TypeNames(), ModulesSearched()));
     }
   }
 }
@@ -80,8 +81,8 @@ void CheckComponents(const Graph& graph, const ComponentRegistry& registry, Prob
       std::vector<std::string> types;
       for (const auto& [type, entry] : registry.entries()) types.push_back(type);
       fail(instance.has_type() ? ".type" : ".name",
-           fmt::format("unknown component type '{}'; types: {}", TypeOf(instance),
-                       fmt::join(types, ", ")));
+           fmt::format("unknown component type '{}'; types: {}; {}", TypeOf(instance),
+                       fmt::join(types, ", "), ModulesSearched()));
     }
   }
 }
@@ -159,41 +160,92 @@ int FindConnection(const google::protobuf::RepeatedPtrField<Connection>& connect
   return -1;
 }
 
-/// One direction of a component: every declared port connected, every
-/// connection declared, types equal.
-template <class Port>
-void CheckPorts(const Graph& graph, int component, const char* direction,
-                const google::protobuf::RepeatedPtrField<Connection>& connections,
-                const std::vector<Port*>& ports, Problems* problems) {
-  const std::string prefix =
-      fmt::format("component {}: {} ", graph.component(component).name(), direction);
+std::vector<PortType> PortsOf(const Wiring& wiring) {
+  std::vector<PortType> ports;
+  for (const InputPort* input : wiring.inputs()) {
+    ports.push_back({input->name(), input->type_name(), true, input->kind()});
+  }
+  for (const OutputPort* output : wiring.outputs()) {
+    ports.push_back({output->name(), output->type_name(), false});
+  }
+  return ports;
+}
+
+/// Every declared port connected, every connection declared, types equal; only an input that takes
+/// the latest message reads what comes from outside the graph.
+void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& ports,
+                Problems* problems) {
+  const ComponentInstance& instance = graph.component(component);
   const std::string field = fmt::format("component[{}]", component);
-  for (const Port* port : ports) {
-    const int k = FindConnection(connections, port->name());
-    if (k < 0) {
-      problems->push_back({field, fmt::format("{0}{1} is not connected; add {2} {{ port: "
-                                              "\"{1}\" channel: ... }}",
-                                              prefix, port->name(), direction)});
-      continue;
-    }
-    const int channel = ChannelIndex(graph, connections[k].channel());
-    if (channel >= 0 && graph.channel(channel).type() != port->type_name()) {
-      problems->push_back({fmt::format("{}.{}[{}]", field, direction, k),
-                           fmt::format("{}{} carries {}, but channel {} is {}", prefix,
-                                       port->name(), port->type_name(), connections[k].channel(),
-                                       graph.channel(channel).type())});
-    }
-  }
-  for (int k = 0; k < connections.size(); ++k) {
-    const auto same = [&](const Port* port) { return port->name() == connections[k].port(); };
-    if (std::any_of(ports.begin(), ports.end(), same)) continue;
+  for (const bool is_input : {true, false}) {
+    const char* const direction = is_input ? "input" : "output";
+    const auto& connections = is_input ? instance.input() : instance.output();
+    const std::string prefix = fmt::format("component {}: {} ", instance.name(), direction);
     std::vector<std::string> names;
-    for (const Port* port : ports) names.push_back(port->name());
-    problems->push_back(
-        {fmt::format("{}.{}[{}].port", field, direction, k),
-         fmt::format("{}'{}' does not exist; it has: {}", prefix, connections[k].port(),
-                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")))});
+    for (const PortType& port : ports) {
+      if (port.input != is_input) continue;
+      names.push_back(port.name);
+      const int k = FindConnection(connections, port.name);
+      if (k < 0) {
+        problems->push_back({field, fmt::format("{0}{1} is not connected; add {2} {{ port: "
+                                                "\"{1}\" channel: ... }}",
+                                                prefix, port.name, direction)});
+        continue;
+      }
+      const int at = ChannelIndex(graph, connections[k].channel());
+      if (at < 0) continue;
+      const Channel& channel = graph.channel(at);
+      const std::string place = fmt::format("{}.{}[{}]", field, direction, k);
+      if (channel.type() != port.type) {
+        problems->push_back({place, fmt::format("{}{} carries {}, but channel {} is {}", prefix,
+                                                port.name, port.type, channel.name(),
+                                                channel.type())});
+      }
+      if (!is_input || channel.external() == (port.kind == InputKind::kLatest)) continue;
+      problems->push_back(
+          {place, fmt::format("{}{} {}", prefix, port.name,
+                              channel.external()
+                                  ? fmt::format("waits for its message, but channel {} is external "
+                                                "and does not keep step with the ticks",
+                                                channel.name())
+                                  : fmt::format("takes the latest message, but channel {} is "
+                                                "written inside the graph: the result would depend "
+                                                "on timing",
+                                                channel.name()))});
+    }
+    for (int k = 0; k < connections.size(); ++k) {
+      if (std::find(names.begin(), names.end(), connections[k].port()) != names.end()) continue;
+      problems->push_back(
+          {fmt::format("{}.{}[{}].port", field, direction, k),
+           fmt::format("{}'{}' does not exist; it has: {}", prefix, connections[k].port(),
+                       names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")))});
+    }
   }
+}
+
+/// What a component declares of itself is what it is.
+void CheckDeclared(const Graph& graph, int component, const std::vector<PortType>& declared,
+                   const Wiring& wiring, Problems* problems) {
+  if (declared.empty()) return;
+  const auto describe = [](std::vector<PortType> ports) {
+    std::vector<std::string> lines;
+    for (const PortType& port : ports) {
+      lines.push_back(fmt::format("{} {} of {}{}", port.input ? "input" : "output", port.name,
+                                  port.type,
+                                  port.kind == InputKind::kPreviousTick ? " (tick before)"
+                                  : port.kind == InputKind::kLatest     ? " (latest)"
+                                                                        : ""));
+    }
+    std::sort(lines.begin(), lines.end());
+    return fmt::format("{}", fmt::join(lines, ", "));
+  };
+  const std::string says = describe(declared);
+  const std::string is = describe(PortsOf(wiring));
+  if (says == is) return;
+  problems->push_back(
+      {fmt::format("component[{}]", component),
+       fmt::format("component {}: its type declares {}; its Configure {}; make them equal",
+                   graph.component(component).name(), says, is)});
 }
 
 template <class Port>
@@ -207,8 +259,7 @@ bool InSomeStage(const std::vector<Stage>& stages, const Port* port,
 void CheckComponent(const Graph& graph, int i, const Wiring& wiring, Problems* problems) {
   const ComponentInstance& instance = graph.component(i);
   const std::string field = fmt::format("component[{}]", i);
-  CheckPorts(graph, i, "input", instance.input(), wiring.inputs(), problems);
-  CheckPorts(graph, i, "output", instance.output(), wiring.outputs(), problems);
+  CheckPorts(graph, i, PortsOf(wiring), problems);
   if (wiring.stages().empty()) {
     problems->push_back({field, fmt::format("component {}: has no stage", instance.name())});
   }
@@ -217,22 +268,6 @@ void CheckComponent(const Graph& graph, int i, const Wiring& wiring, Problems* p
       problems->push_back({field, fmt::format("component {}: no stage reads input {}",
                                               instance.name(), input->name())});
     }
-    const int k = FindConnection(instance.input(), input->name());
-    const int channel = k < 0 ? -1 : ChannelIndex(graph, instance.input(k).channel());
-    if (channel < 0) continue;
-    const bool external = graph.channel(channel).external();
-    if (external == (input->kind() == InputKind::kLatest)) continue;
-    const std::string& name = graph.channel(channel).name();
-    problems->push_back({fmt::format("{}.input[{}]", field, k),
-                         fmt::format("component {}: input {} ", instance.name(), input->name()) +
-                             (external ? fmt::format("waits for its message, but channel {} is "
-                                                     "external and does "
-                                                     "not keep step with the ticks",
-                                                     name)
-                                       : fmt::format("takes the latest message, but channel {} is "
-                                                     "written inside "
-                                                     "the graph: the result would depend on timing",
-                                                     name))});
   }
   for (const OutputPort* output : wiring.outputs()) {
     if (!InSomeStage(wiring.stages(), output, &Stage::outputs)) {
@@ -316,6 +351,10 @@ void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   CheckChannels(graph, &problems);
   CheckComponents(graph, registry, &problems);
   CheckConnections(graph, &problems);
+  for (int i = 0; i < graph.component_size(); ++i) {
+    const ComponentType* const type = registry.TypeNamed(TypeOf(graph.component(i)));
+    if (type != nullptr && !type->ports.empty()) CheckPorts(graph, i, type->ports, &problems);
+  }
   Throw(graph, std::move(problems));
 }
 
@@ -387,7 +426,14 @@ BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry) {
     const ComponentFactory* factory = registry.Find(TypeOf(spec.graph().component(i)));
     components_.push_back(ConfigureComponent(spec, i, *factory, &shared_));
   }
-  for (const ConfiguredComponent& component : components_) wirings.push_back(&component.wiring);
+  Problems problems;
+  for (int i = 0; i < num_components(); ++i) {
+    wirings.push_back(&component(i).wiring);
+    CheckDeclared(spec.graph(), i,
+                  registry.TypeNamed(TypeOf(spec.graph().component(i)))->ports, *wirings.back(),
+                  &problems);
+  }
+  Throw(spec.graph(), std::move(problems));
   plan_ = PlanGraph(spec.graph(), wirings);
 }
 

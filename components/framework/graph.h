@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/component.h"
+#include "components/framework/component_registry.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {
@@ -54,7 +54,8 @@ struct GraphPlan {
   std::vector<std::vector<int>> output_channel;  ///< [component][output]
 };
 
-/// Checks names, types and connections as far as the graph alone tells. Throws GraphError.
+/// Checks names, types and connections as far as the graph and the components' declared ports tell.
+/// Throws GraphError.
 void CheckGraph(const Graph& graph, const ComponentRegistry& registry);
 
 /// Checks one configured component against its place in the graph: ports, types. Throws GraphError.

@@ -72,7 +72,7 @@ class Input final : public InputPort {
   const T& operator*() const { return *message_; }
   const T* operator->() const { return message_; }
 
-  const char* type_name() const override { return T::getTypeName(); }
+  const char* type_name() const override { return MessageTraits<T>::kName; }
   int64_t fingerprint() const override { return T::getHash(); }
   std::span<const char* const> count_names() const override {
     return MessageTraits<T>::kCountNames;
@@ -150,7 +150,7 @@ class Output final : public OutputPort {
   T& operator*() { return message_; }
   T* operator->() { return &message_; }
 
-  const char* type_name() const override { return T::getTypeName(); }
+  const char* type_name() const override { return MessageTraits<T>::kName; }
   int64_t fingerprint() const override { return T::getHash(); }
   std::span<const char* const> count_names() const override {
     return MessageTraits<T>::kCountNames;

@@ -12,6 +12,8 @@
 #include "components/redistributor/redistributor_type.h"
 
 namespace poise {
+
+std::string_view redistributor_proto_schema();  // generated
 namespace {
 
 using balance::Vector6d;
@@ -274,7 +276,11 @@ ComponentType RedistributorType() {
           "ratio eta, contact transitions and the joint torque (53)",
           [] { return std::make_unique<Redistributor>(); },
           {.parts = {{"redistribution", "redistributor.redistribution"},
-                     {"transition", "redistributor.transition"}}}};
+                     {"transition", "redistributor.transition"}}},
+          {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
+           Reads<balance_torque_t>("balance_torque"), Writes<joint_command_t>("joint_command")},
+          RedistributorConfig::descriptor(),
+          redistributor_proto_schema};
 }
 
 }  // namespace poise

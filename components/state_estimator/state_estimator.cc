@@ -10,6 +10,8 @@
 #include "components/state_estimator/state_estimator_type.h"
 
 namespace poise {
+
+std::string_view state_estimator_proto_schema();  // generated
 namespace {
 
 using Eigen::Vector3d;
@@ -232,7 +234,11 @@ ComponentType StateEstimatorType() {
           {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
                      "state_estimator.invariant_ekf.gear_stiffness=0"},
            .methods = {"state_estimator.method=ANCHORED_FEET",
-                       "state_estimator.method=INVARIANT_EKF"}}};
+                       "state_estimator.method=INVARIANT_EKF"}},
+          {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
+           Writes<estimator_status_t>("estimator_status")},
+          StateEstimatorConfig::descriptor(),
+          state_estimator_proto_schema};
 }
 
 }  // namespace poise

@@ -14,6 +14,8 @@
 #include "components/step_planner/step_planner_type.h"
 
 namespace poise {
+
+std::string_view step_planner_proto_schema();  // generated
 namespace {
 
 int8_t TransitionCode(TransitionKind kind) {
@@ -395,7 +397,11 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
 ComponentType StepPlannerType() {
   return {"step_planner",
           "which feet carry, and where COM, body and feet go: phases, capture point",
-          [] { return std::make_unique<StepPlanner>(); }};
+          [] { return std::make_unique<StepPlanner>(); },
+          {},
+          {Reads<robot_state_t>("robot_state"), Writes<support_plan_t>("support_plan")},
+          StepPlannerConfig::descriptor(),
+          step_planner_proto_schema};
 }
 
 }  // namespace poise

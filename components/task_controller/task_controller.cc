@@ -13,6 +13,8 @@
 #include "components/task_controller/task_controller_type.h"
 
 namespace poise {
+
+std::string_view task_controller_proto_schema();  // generated
 namespace {
 
 // Rows that tasks and contacts determine, on one foot or two: COM and body, and each foot by its
@@ -143,8 +145,14 @@ bool TaskController::ComputeTorque(const std::array<bool, 2>& in_contact) {
 }
 
 ComponentType TaskControllerType() {
-  return {"task_controller", "the task torque (24) that follows the support plan",
-          [] { return std::make_unique<TaskController>(); }};
+  return {"task_controller",
+          "the task torque (24) that follows the support plan",
+          [] { return std::make_unique<TaskController>(); },
+          {},
+          {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
+           Writes<task_torque_t>("task_torque")},
+          TaskControllerConfig::descriptor(),
+          task_controller_proto_schema};
 }
 
 }  // namespace poise

@@ -11,6 +11,8 @@
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 
 namespace poise {
+
+std::string_view drive_emulator_proto_schema();  // generated
 namespace {
 
 using ethercat::kMillisecond;
@@ -334,7 +336,11 @@ ComponentType DriveEmulatorType() {
                           .link = "drive_emulator.link",
                           .simulated_time = "drive_emulator.simulated_time",
                           .profile = {},
-                          .capture = {}}}};
+                          .capture = {}}},
+          {Reads<drive_feedback_t>("drive_feedback"), Reads<drive_command_t>("bridge_command"),
+           Writes<drive_feedback_t>("sensor_feedback"), Writes<drive_command_t>("drive_command")},
+          DriveEmulatorConfig::descriptor(),
+          drive_emulator_proto_schema};
 }
 
 }  // namespace poise

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <set>
 #include <stdexcept>
-#include <type_traits>
+#include <variant>
+#include <vector>
 
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
@@ -18,22 +20,13 @@ namespace {
 
 namespace pb = google::protobuf;
 
-/// Element type of an array or a vector; else the type itself.
-template <class F>
-struct Element {
-  using Type = F;
-  static constexpr bool kRepeated = false;
-};
-template <class E>
-struct Element<std::vector<E>> {
-  using Type = E;
-  static constexpr bool kRepeated = true;
-};
-template <class E, size_t N>
-struct Element<E[N]> {
-  using Type = E;
-  static constexpr bool kRepeated = true;
-};
+/// The integers of 32 bits and less that LCM has.
+bool IsInt32(std::string_view type) {
+  return type == "int8_t" || type == "byte" || type == "boolean" || type == "int16_t" ||
+         type == "int32_t";
+}
+
+bool IsArray(const FieldInfo& field) { return *field.count != '\0' || field.length > 0; }
 
 /// Makes the file of all types.
 class SchemaBuilder {
@@ -41,27 +34,30 @@ class SchemaBuilder {
   SchemaBuilder(const ElementNames& names, pb::FileDescriptorProto* file)
       : names_(names), file_(file) {}
 
-  template <class T>
-  void AddMessageType();
+  void AddStruct(const std::string& type);
 
  private:
-  bool Has(const std::string& type) const;
-  template <class E>
-  void SetType(pb::FieldDescriptorProto* field);
-  template <class F>
-  void AddField(const char* name, pb::DescriptorProto* message);
+  bool Has(const std::string& name) const;
+  void SetType(const std::string& type, pb::FieldDescriptorProto* field);
+  void AddField(const std::string& type, const FieldInfo& info, pb::DescriptorProto* message);
   /// Adds the message of an array's named elements; returns its name, "joints_double".
-  template <class E>
   std::string AddElements(const FieldInfo& info, const std::vector<std::string>& names);
 
   const ElementNames& names_;
   pb::FileDescriptorProto* file_;
 };
 
-bool SchemaBuilder::Has(const std::string& type) const {
+/// The message of a struct: a package other than poise is a part of its name.
+std::string MessageName(std::string_view type) {
+  std::string name(type);
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+}
+
+bool SchemaBuilder::Has(const std::string& name) const {
   const auto& types = file_->message_type();
   return std::any_of(types.begin(), types.end(),
-                     [&](const pb::DescriptorProto& other) { return other.name() == type; });
+                     [&](const pb::DescriptorProto& other) { return other.name() == name; });
 }
 
 /// A name that Protobuf takes, of those in `taken` none.
@@ -76,31 +72,31 @@ std::string FieldName(const std::string& name, std::set<std::string>* taken) {
   return unique;
 }
 
-template <class E>
-void SchemaBuilder::SetType(pb::FieldDescriptorProto* field) {
+void SchemaBuilder::SetType(const std::string& type, pb::FieldDescriptorProto* field) {
   using Field = pb::FieldDescriptorProto;
-  if constexpr (std::is_integral_v<E>) {
-    field->set_type(sizeof(E) <= 4 ? Field::TYPE_INT32 : Field::TYPE_INT64);
-  } else if constexpr (std::is_same_v<E, double>) {
+  if (IsInt32(type)) {
+    field->set_type(Field::TYPE_INT32);
+  } else if (type == "int64_t") {
+    field->set_type(Field::TYPE_INT64);
+  } else if (type == "double") {
     field->set_type(Field::TYPE_DOUBLE);
-  } else if constexpr (std::is_same_v<E, float>) {
+  } else if (type == "float") {
     field->set_type(Field::TYPE_FLOAT);
-  } else if constexpr (std::is_same_v<E, std::string>) {
+  } else if (type == "string") {
     field->set_type(Field::TYPE_STRING);
   } else {
-    AddMessageType<E>();
+    AddStruct(type);
     field->set_type(Field::TYPE_MESSAGE);
-    field->set_type_name("." + ProtobufMessages::FullName(MessageTraits<E>::kName));
+    field->set_type_name("." + ProtobufMessages::FullName(type));
   }
 }
 
-template <class E>
 std::string SchemaBuilder::AddElements(const FieldInfo& info,
                                        const std::vector<std::string>& names) {
   constexpr std::string_view kCount = "num_";
   pb::DescriptorProto message;
-  message.set_name(
-      fmt::format("{}_{}", std::string_view(info.count).substr(kCount.size()), info.type));
+  message.set_name(fmt::format("{}_{}", std::string_view(info.count).substr(kCount.size()),
+                               MessageName(info.type)));
   if (Has(message.name())) return message.name();
   std::set<std::string> taken;
   for (const std::string& name : names) {
@@ -108,107 +104,139 @@ std::string SchemaBuilder::AddElements(const FieldInfo& info,
     field->set_name(FieldName(name, &taken));
     field->set_number(message.field_size());
     field->set_label(pb::FieldDescriptorProto::LABEL_OPTIONAL);
-    SetType<E>(field);
+    SetType(info.type, field);
   }
   *file_->add_message_type() = message;
   return message.name();
 }
 
-template <class F>
-void SchemaBuilder::AddField(const char* name, pb::DescriptorProto* message) {
+void SchemaBuilder::AddField(const std::string& type, const FieldInfo& info,
+                             pb::DescriptorProto* message) {
   using Field = pb::FieldDescriptorProto;
-  using E = typename Element<F>::Type;
   Field* const field = message->add_field();
-  field->set_name(name);
+  field->set_name(info.name);
   field->set_number(message->field_size());
-  const std::vector<std::string>& names = names_.Of(message->name(), name);
+  const std::vector<std::string>& names = names_.Of(type, info.name);
   if (!names.empty()) {
     field->set_label(Field::LABEL_OPTIONAL);
     field->set_type(Field::TYPE_MESSAGE);
-    const std::string elements = AddElements<E>(*FirstField(message->name(), name), names);
-    field->set_type_name("." + ProtobufMessages::FullName(elements));
+    field->set_type_name("." + ProtobufMessages::FullName(AddElements(info, names)));
     return;
   }
-  field->set_label(Element<F>::kRepeated ? Field::LABEL_REPEATED : Field::LABEL_OPTIONAL);
-  SetType<E>(field);
-  if (Element<F>::kRepeated && std::is_arithmetic_v<E>) field->mutable_options()->set_packed(true);
+  field->set_label(IsArray(info) ? Field::LABEL_REPEATED : Field::LABEL_OPTIONAL);
+  SetType(info.type, field);
+  const bool number =
+      field->type() != Field::TYPE_MESSAGE && field->type() != Field::TYPE_STRING;
+  if (IsArray(info) && number) field->mutable_options()->set_packed(true);
 }
 
-template <class T>
-void SchemaBuilder::AddMessageType() {
-  if (Has(MessageTraits<T>::kName)) return;
+void SchemaBuilder::AddStruct(const std::string& type) {
+  if (Has(MessageName(type))) return;
   pb::DescriptorProto message;
-  message.set_name(MessageTraits<T>::kName);
-  const T none{};
-  MessageTraits<T>::VisitFields(none, [&](const char* name, const auto& member) {
-    AddField<std::remove_cvref_t<decltype(member)>>(name, &message);
-  });
+  message.set_name(MessageName(type));
+  for (const FieldInfo& field : FieldsOf(type)) AddField(type, field, &message);
   *file_->add_message_type() = std::move(message);
 }
 
-/// False: an array has other than the named elements.
-template <class T>
-bool Fill(const T& from, pb::Message* to);
+/// The scalars of a message, in the order of declaration.
+class Scalars final : public ScalarVisitor {
+ public:
+  using Value = std::variant<int64_t, double, std::string>;
 
-/// Sets a field, or appends to it, with one value.
-template <class E>
-bool Put(const E& value, const pb::FieldDescriptor* field, pb::Message* to) {
-  const pb::Reflection& reflection = *to->GetReflection();
-  const bool add = field->is_repeated();
-  if constexpr (std::is_integral_v<E> && sizeof(E) <= 4) {
-    add ? reflection.AddInt32(to, field, value) : reflection.SetInt32(to, field, value);
-  } else if constexpr (std::is_integral_v<E>) {
-    add ? reflection.AddInt64(to, field, value) : reflection.SetInt64(to, field, value);
-  } else if constexpr (std::is_same_v<E, double>) {
-    add ? reflection.AddDouble(to, field, value) : reflection.SetDouble(to, field, value);
-  } else if constexpr (std::is_same_v<E, float>) {
-    add ? reflection.AddFloat(to, field, value) : reflection.SetFloat(to, field, value);
-  } else if constexpr (std::is_same_v<E, std::string>) {
-    const std::string text = IsUtf8(value) ? value : LinesForTerminal(value);  // as Protobuf's are
-    add ? reflection.AddString(to, field, text) : reflection.SetString(to, field, text);
-  } else {
-    return Fill(value,
-                add ? reflection.AddMessage(to, field) : reflection.MutableMessage(to, field));
+  void Integer(std::string_view, int64_t value) override { values_.emplace_back(value); }
+  void Real(std::string_view, double value) override { values_.emplace_back(value); }
+  void Text(std::string_view, std::string_view value) override {
+    values_.emplace_back(std::string(value));
   }
-  return true;
-}
 
-/// An array, repeated or with a field for each element.
-template <class A>
-bool PutAll(const A& values, const pb::FieldDescriptor* field, pb::Message* to) {
-  bool good = true;
-  if (field->is_repeated()) {
-    for (const auto& value : values) good = Put(value, field, to) && good;
+  /// Precondition: there is one more, as of the message's own fields there is.
+  const Value& Next() { return values_.at(next_++); }
+
+ private:
+  std::vector<Value> values_;
+  size_t next_ = 0;
+};
+
+/// Fills a message from its scalars. False: an array has other than the named elements.
+class Filler {
+ public:
+  explicit Filler(Scalars* from) : from_(from) {}
+
+  bool Fill(std::string_view type, pb::Message* to) {
+    bool good = true;
+    int index = 0;
+    for (const FieldInfo& info : FieldsOf(type)) {
+      const pb::FieldDescriptor* const field = to->GetDescriptor()->field(index++);
+      good = PutField(info, field, to) && good;
+    }
     return good;
   }
-  pb::Message* const elements = to->GetReflection()->MutableMessage(to, field);
-  if (elements->GetDescriptor()->field_count() != static_cast<int>(std::size(values))) return false;
-  int index = 0;
-  for (const auto& value : values) {
-    good = Put(value, elements->GetDescriptor()->field(index++), elements) && good;
-  }
-  return good;
-}
 
-template <class T>
-bool Fill(const T& from, pb::Message* to) {
-  int index = 0;
-  bool good = true;
-  MessageTraits<T>::VisitFields(from, [&](const char*, const auto& member) {
-    const pb::FieldDescriptor* const field = to->GetDescriptor()->field(index++);
-    if constexpr (Element<std::remove_cvref_t<decltype(member)>>::kRepeated) {
-      good = PutAll(member, field, to) && good;
-    } else {
-      good = Put(member, field, to) && good;
+ private:
+  bool PutField(const FieldInfo& info, const pb::FieldDescriptor* field, pb::Message* to) {
+    if (!IsArray(info)) return Put(info, field, to);
+    const int64_t length = *info.count != '\0' ? counts_[info.count] : info.length;
+    bool good = true;
+    if (field->is_repeated()) {
+      for (int64_t i = 0; i < length; ++i) good = Put(info, field, to) && good;
+      return good;
     }
-  });
-  return good;
-}
+    pb::Message* const elements = to->GetReflection()->MutableMessage(to, field);
+    if (elements->GetDescriptor()->field_count() != length) return false;
+    for (int i = 0; i < static_cast<int>(length); ++i) {
+      good = Put(info, elements->GetDescriptor()->field(i), elements) && good;
+    }
+    return good;
+  }
+
+  /// Sets a field, or appends to it, with one value.
+  bool Put(const FieldInfo& info, const pb::FieldDescriptor* field, pb::Message* to) {
+    const pb::Reflection& reflection = *to->GetReflection();
+    const bool add = field->is_repeated();
+    if (field->cpp_type() == pb::FieldDescriptor::CPPTYPE_MESSAGE) {
+      return Fill(info.type,
+                  add ? reflection.AddMessage(to, field) : reflection.MutableMessage(to, field));
+    }
+    const Scalars::Value& value = from_->Next();
+    switch (field->cpp_type()) {
+      case pb::FieldDescriptor::CPPTYPE_INT32: {
+        const auto number = static_cast<int32_t>(std::get<int64_t>(value));
+        counts_[info.name] = number;
+        add ? reflection.AddInt32(to, field, number) : reflection.SetInt32(to, field, number);
+        break;
+      }
+      case pb::FieldDescriptor::CPPTYPE_INT64: {
+        const int64_t number = std::get<int64_t>(value);
+        add ? reflection.AddInt64(to, field, number) : reflection.SetInt64(to, field, number);
+        break;
+      }
+      case pb::FieldDescriptor::CPPTYPE_DOUBLE: {
+        const double number = std::get<double>(value);
+        add ? reflection.AddDouble(to, field, number) : reflection.SetDouble(to, field, number);
+        break;
+      }
+      case pb::FieldDescriptor::CPPTYPE_FLOAT: {
+        const auto number = static_cast<float>(std::get<double>(value));
+        add ? reflection.AddFloat(to, field, number) : reflection.SetFloat(to, field, number);
+        break;
+      }
+      default: {
+        const std::string& raw = std::get<std::string>(value);
+        const std::string text = IsUtf8(raw) ? raw : LinesForTerminal(raw);  // as Protobuf's are
+        add ? reflection.AddString(to, field, text) : reflection.SetString(to, field, text);
+      }
+    }
+    return true;
+  }
+
+  Scalars* from_;
+  std::map<std::string_view, int64_t> counts_;  // of the message: its leading fields
+};
 
 }  // namespace
 
 std::string ProtobufMessages::FullName(std::string_view type) {
-  return "poise." + std::string(type);
+  return "poise." + MessageName(type);
 }
 
 ProtobufMessages::ProtobufMessages(const ElementNames& names) : factory_(&pool_) {
@@ -218,7 +246,7 @@ ProtobufMessages::ProtobufMessages(const ElementNames& names) : factory_(&pool_)
   file->set_package("poise");
   file->set_syntax("proto2");
   SchemaBuilder builder(names, file);
-  ForEachMessageType([&]<class T>() { builder.AddMessageType<T>(); });
+  for (const MessageType& type : MessageTypes()) builder.AddStruct(type.name);
   if (pool_.BuildFile(*file) == nullptr) {
     throw std::logic_error("the message types make no Protobuf file");
   }
@@ -227,16 +255,15 @@ ProtobufMessages::ProtobufMessages(const ElementNames& names) : factory_(&pool_)
 
 std::optional<std::string> ProtobufMessages::Convert(std::string_view type,
                                                      std::span<const uint8_t> data) {
-  std::optional<std::string> bytes;
-  ForEachMessageType([&]<class T>() {
-    if (type != MessageTraits<T>::kName) return;
-    T message{};
-    if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &message)) return;
-    const pb::Descriptor* const descriptor = pool_.FindMessageTypeByName(FullName(type));
-    const std::unique_ptr<pb::Message> converted(factory_.GetPrototype(descriptor)->New());
-    if (Fill(message, converted.get())) bytes = converted->SerializeAsString();
-  });
-  return bytes;
+  const MessageType* const known = FindMessageType(type);
+  Scalars scalars;
+  if (known == nullptr || !known->visit(data.data(), static_cast<int64_t>(data.size()), &scalars)) {
+    return {};
+  }
+  const pb::Descriptor* const descriptor = pool_.FindMessageTypeByName(FullName(type));
+  const std::unique_ptr<pb::Message> converted(factory_.GetPrototype(descriptor)->New());
+  if (!Filler(&scalars).Fill(type, converted.get())) return {};
+  return converted->SerializeAsString();
 }
 
 }  // namespace poise::logging

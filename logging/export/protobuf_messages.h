@@ -25,7 +25,7 @@ class ProtobufMessages {
 
   /// A serialised google.protobuf.FileDescriptorSet with all types.
   const std::string& file_descriptor_set() const { return file_descriptor_set_; }
-  /// "poise.robot_state_t"
+  /// "poise.robot_state_t"; of package ankle: "poise.ankle_sway_t"
   static std::string FullName(std::string_view type);
   /// An encoded LCM message of a type, as Protobuf; empty: not such a message, or with other than
   /// the named elements. A text that is no

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
 #include "logging/metrics/metric_groups.h"
 
 namespace poise::logging {
 namespace {
+
+constexpr size_t kMostMetrics = 4096;
 
 MetricList MakeMetrics() {
   MetricList list;
@@ -24,10 +28,30 @@ MetricList MakeMetrics() {
 
 }  // namespace
 
-std::span<const Metric> Metrics() {
-  static const MetricList list = MakeMetrics();
+namespace {
+
+MetricList& Known() {
+  static MetricList list = [] {
+    MetricList own = MakeMetrics();
+    own.reserve(kMostMetrics);  // pointers to them last
+    return own;
+  }();
   return list;
 }
+
+}  // namespace
+
+void AddMetric(Metric metric) {
+  if (FindMetric(metric.name) != nullptr) {
+    throw ConfigError(fmt::format("metric {} is there twice", metric.name));
+  }
+  if (Known().size() == kMostMetrics) {
+    throw ConfigError(fmt::format("metric {} is one too many", metric.name));
+  }
+  Known().push_back(std::move(metric));
+}
+
+std::span<const Metric> Metrics() { return Known(); }
 
 const Metric* FindMetric(std::string_view name) {
   const auto metrics = Metrics();

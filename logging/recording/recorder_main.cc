@@ -6,6 +6,7 @@
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
+#include "components/framework/modules.h"
 #include "components/framework/say_error.h"
 #include "fmt/format.h"
 #include "logging/recording/recorder.h"
@@ -47,6 +48,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
+    poise::LoadModules();  // their messages
     poise::RunSpec spec;
     poise::ReadTextProto(run_file, &spec);
     if (!scenario_file.empty()) options.scenario = poise::ReadFile(scenario_file);

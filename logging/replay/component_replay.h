@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/component.h"
+#include "components/framework/component_registry.h"
 #include "components/framework/graph.pb.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_messages.h"

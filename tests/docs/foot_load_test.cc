@@ -1,5 +1,5 @@
-// The component of docs/tutorials/own_component.md, compiled from that page.
-#include "components/foot_load/foot_load.h"
+// The component of examples/foot_load, which docs/tutorials/own_component.md shows.
+#include "foot_load.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,9 @@
 
 namespace poise {
 namespace {
+
+using gait_lab::foot_load_t;
+using gait_lab::FootLoad;
 
 std::string DyrosFile(const std::string& ending) {
   return ReadFile(POISE_SOURCE_DIR "/deploy/robots/dyros/dyros_legs." + ending);
@@ -27,7 +30,7 @@ void Configure(const std::string& config, FootLoad* component, Wiring* wiring) {
 }
 
 // A step of the load against the closed form of a first-order low-pass.
-TEST(OwnComponentTutorial, FiltersAStepOfTheLoad) {
+TEST(FootLoadExample, FiltersAStepOfTheLoad) {
   FootLoad component;
   Wiring wiring;
   Configure("time_constant: 0.02", &component, &wiring);
@@ -44,10 +47,11 @@ TEST(OwnComponentTutorial, FiltersAStepOfTheLoad) {
     EXPECT_NEAR(out.load[0], right, 1e-9);
     EXPECT_NEAR(out.load[1], 50, 1e-9);
     EXPECT_NEAR(out.total, right + 50, 1e-9);
+    EXPECT_EQ(out.sum.force[2], tick == 0 ? -150 : -250);  // as measured
   }
 }
 
-TEST(OwnComponentTutorial, RefusesATimeThatCannotBe) {
+TEST(FootLoadExample, RefusesATimeThatCannotBe) {
   FootLoad component;
   Wiring wiring;
   EXPECT_THROW(Configure("time_constant: -1", &component, &wiring), ConfigError);

@@ -66,10 +66,11 @@ TEST_F(GraphTest, ARightGraphIsPlanned) {
 
 TEST_F(GraphTest, UnknownComponentType) {
   graph_.mutable_component(1)->set_type("toy_filtre");
-  EXPECT_EQ(Problems(graph_),
-            "graph toy_loop: component[1].type: component filter: unknown component type "
-            "'toy_filtre'; types: toy_clock, "
-            "toy_controller, toy_echo, toy_filter, toy_plant, toy_sink");
+  EXPECT_THAT(Problems(graph_),
+              HasSubstr("graph toy_loop: component[1].type: component filter: unknown component "
+                        "type 'toy_filtre'; types: toy_clock, "
+                        "toy_controller, toy_echo, toy_filter, toy_plant, toy_sink; "
+                        "modules with others are looked for in"));
 }
 
 TEST_F(GraphTest, TheTypeDefaultsToTheName) {
@@ -285,6 +286,67 @@ TEST(WiringTest, RefusesWhatCannotWork) {
   wiring.AddStage("s", {&input}, {&output}, [](const Tick&) {});
   EXPECT_EQ(error_of([&] { wiring.AddStage("t", {}, {&output}, {}); }),
             "output out belongs to the stages s and t; one only");
+}
+
+// What a type declares is checked without configuring anything, and is what it is.
+class DeclaredPortsTest : public GraphTest {
+ protected:
+  /// The toy filter, declared with these ports.
+  std::string ProblemsWith(std::vector<PortType> ports, bool bind) {
+    ComponentRegistry registry;
+    for (const auto& [name, type] : registry_.entries()) {
+      ComponentType copy = type;
+      if (name == "toy_filter") copy.ports = ports;
+      registry.Add(copy);
+    }
+    try {
+      if (bind) {
+        BoundGraph(ToyRun(graph_, 10), registry);
+      } else {
+        CheckGraph(graph_, registry);
+      }
+    } catch (const GraphError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  /// As the filter has them.
+  std::vector<PortType> Right() {
+    std::vector<PortType> ports;
+    const BoundGraph bound(ToyRun(graph_, 10), registry_);
+    const Wiring& wiring = const_cast<BoundGraph&>(bound).component(1).wiring;
+    for (const InputPort* input : wiring.inputs()) {
+      ports.push_back({input->name(), input->type_name(), true, input->kind()});
+    }
+    for (const OutputPort* output : wiring.outputs()) {
+      ports.push_back({output->name(), output->type_name(), false});
+    }
+    return ports;
+  }
+};
+
+TEST_F(DeclaredPortsTest, AreCheckedAgainstTheGraphAlone) {
+  EXPECT_EQ(ProblemsWith(Right(), false), "");
+  std::vector<PortType> ports = Right();
+  ports[0].type = "health_t";
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("carries health_t, but channel"));
+  ports = Right();
+  ports.push_back({"more", "robot_state_t", true});
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("input more is not connected"));
+  ports = Right();
+  ports.erase(ports.begin());
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("does not exist; it has"));
+  ports = Right();
+  ports[0].kind = InputKind::kLatest;
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("the result would depend on timing"));
+}
+
+TEST_F(DeclaredPortsTest, AreWhatTheComponentIs) {
+  EXPECT_EQ(ProblemsWith(Right(), true), "");
+  std::vector<PortType> ports = Right();
+  ports[0].kind = InputKind::kPreviousTick;
+  EXPECT_THAT(ProblemsWith(ports, true), HasSubstr("make them equal"));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ std::string Generate(const std::string& name, const std::string& text) {
   const std::filesystem::path file = folder / (name + ".lcm");
   std::ofstream(file) << text;
   const std::string command =
-      std::string(POISE_TRAITS_GENERATOR) + " " + folder.string() + " " + file.string() + " 2>&1";
+      std::string(POISE_TRAITS_GENERATOR) + " poise " + folder.string() + " " + file.string() + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   std::string output;
   std::array<char, 512> buffer;
@@ -80,6 +80,46 @@ TEST(TraitsGenerator, RefusesWhatItCannotRead) {
       "a_t.lcm:2: count num_a sizes no array\n");
   EXPECT_EQ(Generate("a_t", "package poise;\nstruct a_t {\n int64_t run_id"),
             "a_t.lcm:3: unexpected end of file\n");
+}
+
+/// What the generator prints for a set `lab` of one file that may use structs of Poise's.
+std::string GenerateLab(const std::string& text) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / ("lab_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "a_t.lcm") << text;
+  const std::string command = std::string(POISE_TRAITS_GENERATOR) + " lab " + folder.string() + " " +
+                              (folder / "a_t.lcm").string() + " --import " POISE_SOURCE_DIR
+                              "/lcmtypes/wrench_t.lcm 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  std::string output;
+  std::array<char, 512> buffer;
+  while (fgets(buffer.data(), buffer.size(), pipe) != nullptr) output += buffer.data();
+  if (pclose(pipe) == 0) {
+    std::ifstream in(folder / "lab/message_traits.hpp");
+    output.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  std::filesystem::remove_all(folder);
+  return output;
+}
+
+TEST(TraitsGenerator, TakesAnyPackageAndStructsOfPoise) {
+  const std::string traits = GenerateLab(
+      "package gait.lab;\nstruct a_t {\n int64_t run_id, tick, utime;\n poise.wrench_t w;\n}\n");
+  EXPECT_NE(traits.find("#include \"gait/lab/a_t.hpp\""), std::string::npos) << traits;
+  EXPECT_NE(traits.find("struct MessageTraits<::gait::lab::a_t>"), std::string::npos);
+  EXPECT_NE(traits.find("kName = \"gait.lab.a_t\""), std::string::npos);
+  // 8 bytes of fingerprint, three of 8, and six doubles of a wrench.
+  EXPECT_NE(traits.find("return 80;"), std::string::npos) << traits;
+}
+
+TEST(TraitsGenerator, KeepsPoisesPackageToItself) {
+  EXPECT_NE(GenerateLab("package poise;\nstruct a_t {\n int64_t run_id, tick, utime;\n}\n")
+                .find("a_t.lcm:1: package poise is Poise's own; choose another"),
+            std::string::npos);
+  EXPECT_NE(GenerateLab("package lab;\nstruct a_t {\n int64_t run_id, tick, utime;\n wrench_t w;\n}\n")
+                .find("unknown type lab.wrench_t"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ Outcome Start(const Lost& lost, std::vector<std::string> set = {}, bool realtime
   CheckRun(loaded, &spec);
   ComponentRegistry registry;
   for (const auto& [type, entry] : Components().entries()) {
-    ComponentFactory factory = entry.factory;
+    ComponentFactory factory = entry.make;
     if (type == "redistributor") {
       factory = [factory, lost] { return std::make_unique<Loser>(factory(), lost); };
     }

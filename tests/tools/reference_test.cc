@@ -10,7 +10,7 @@
 #include "components/framework/graph.pb.h"
 #include "components/robot/robot.pb.h"
 #include "poise/message_traits.hpp"
-#include "tools/reference/field_reference.h"
+#include "tools/reference/schemas.h"
 #include "tools/reference/message_reference.h"
 #include "tools/reference/reference_text.h"
 #include "tools/scenario/scenario.pb.h"

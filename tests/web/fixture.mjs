@@ -1,6 +1,6 @@
 // Runs for tests, with every signal given in the page's own format.
 import {readFileSync, readdirSync} from 'node:fs';
-import {parseMessage} from '../../web/messages.mjs';
+import {parseMessage} from '../../web/src/messages.js';
 import {Run} from '../../web/src/data.js';
 import {addDerivedSignals} from '../../web/src/derived.js';
 

@@ -5,6 +5,7 @@
 #include "fmt/format.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/graph_files.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -19,9 +20,8 @@ bool IsScenario(const std::string& file) {
   try {
     ReadTextProto(file, &scenario);
   } catch (const ConfigError&) {
-    Graph graph;
     try {
-      ReadTextProto(file, &graph);
+      GraphFiles{file};
       return false;
     } catch (const ConfigError&) {
       // Neither parses: the file's folder decides which error is shown.

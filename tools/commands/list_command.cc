@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "components/framework/configuration.h"
+#include "components/framework/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
@@ -14,6 +15,7 @@
 #include "tools/reference/reference_text.h"
 #include "tools/run/run_registry.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/graph_files.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/scenario_files.h"
 #include "tools/sweep/sweep.pb.h"
@@ -60,7 +62,7 @@ size_t TextWidth() { return static_cast<size_t>(std::min(ScreenStyle().columns, 
 ChannelsByType GraphChannels() {
   ChannelsByType channels;
   for (const std::string& name : ListNames("graphs")) {
-    const auto graph = ReadMessage<Graph>(InstalledFile("graphs", name).string());
+    const Graph graph = GraphFiles(InstalledFile("graphs", name).string()).Merged();
     for (const Channel& channel : graph.channel()) {
       std::vector<std::string>& names = channels[channel.type()];
       if (std::find(names.begin(), names.end(), channel.name()) == names.end()) {
@@ -144,6 +146,31 @@ void PrintMetrics() {
   }
 }
 
+/// Ports and settings of one type.
+int ListComponent(const std::string& name) {
+  const ComponentType* const type = Components().TypeNamed(name);
+  if (type == nullptr) {
+    std::vector<std::string> names;
+    for (const auto& [other, entry] : Components().entries()) names.push_back(other);
+    throw ConfigError(
+        fmt::format("there is no component '{}'; {}", name, Suggest(name, std::move(names))));
+  }
+  fmt::print("{}: {}\n", type->name, type->summary);
+  for (const PortType& port : type->ports) {
+    const char* const kind = port.kind == InputKind::kPreviousTick ? ", of the tick before"
+                             : port.kind == InputKind::kLatest     ? ", the latest"
+                                                                   : "";
+    fmt::print("  {:<7} {:<18} {}{}\n", port.input ? "input" : "output", port.name, port.type,
+               kind);
+  }
+  if (type->config == nullptr || type->schema == nullptr) return kExitOk;
+  AddSchema(type->schema());
+  const std::vector<std::string>& sections = type->traits.sections;
+  const std::string prefix = sections.size() > 1 ? "" : (sections.empty() ? name : sections[0]) + ".";
+  fmt::print("\n{}", FieldsAsText(FieldsOfType(type->config->full_name(), prefix), TextWidth()));
+  return kExitOk;
+}
+
 int List(const ListRequest& request) {
   const std::string& what = request.what;
   if (request.folders) {
@@ -154,8 +181,9 @@ int List(const ListRequest& request) {
   if (request.markdown) KeepUnicode();
   if (what == "fields") return ListFields(request);
   if (what == "messages") return ListMessages(request);
+  if (what == "components" && !request.name.empty()) return ListComponent(request.name);
   if (!request.name.empty()) {
-    throw ConfigError("NAME goes with `poise list fields` and `poise list messages`");
+    throw ConfigError("NAME goes with `poise list fields`, `messages` and `components`");
   }
   if (request.markdown) {
     if (what == "metrics") return ListMetricsAsMarkdown();
@@ -192,7 +220,7 @@ int List(const ListRequest& request) {
   }
   if (wanted("graphs")) {
     ListFiles("graphs", [](const std::string& file) {
-      const Graph g = ReadMessage<Graph>(file);
+      const Graph g = GraphFiles(file).Merged();
       return fmt::format("{} ({} components, {} channels)", g.description(), g.component_size(),
                          g.channel_size());
     });
@@ -231,7 +259,8 @@ void AddListCommand(CLI::App* app, Command* command) {
                              "metrics", "fields", "messages"}));
   list->add_option("name", request->name,
                    "of fields: a path or its beginning (sim.push), or a part of a field's "
-                   "name (stiffness); of messages: a type or a channel (ROBOT_STATE)");
+                   "name (stiffness); of messages: a type or a channel (ROBOT_STATE); of "
+                   "components: a type, whose ports and settings are shown");
   list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
       ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));
   list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");

@@ -6,7 +6,7 @@
 
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
-#include "tools/reference/field_reference.h"
+#include "tools/reference/schemas.h"
 #include "tools/sweep/sweep_points.h"
 
 namespace poise {

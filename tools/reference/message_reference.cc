@@ -7,29 +7,32 @@
 #include "components/framework/configuration.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
+#include "lcmtypes/field_table.h"
 
 namespace poise {
 
-std::string_view EmbeddedMessages();  // all .lcm files, one after the other
-
 namespace {
-
-constexpr std::string_view kFileStart = "package poise;";
 
 /// The entry of one file; its package line is gone.
 MessageEntry ParseFile(std::string_view file) {
   MessageEntry entry;
   std::istringstream lines{std::string(file)};
   std::string line;
+  std::string prefix;
   bool in_struct = false;
   while (std::getline(lines, line)) {
+    if (line.starts_with("package ")) {
+      const std::string package = line.substr(8, line.find(';') - 8);
+      if (package != "poise") prefix = package + ".";
+      continue;
+    }
     if (line.starts_with("//") && !in_struct) {
       if (!entry.summary.empty()) entry.summary += ' ';
       entry.summary.append(line, line.find_first_not_of("/ "));
     }
     if (line.starts_with("struct ")) {
       in_struct = true;
-      entry.type = line.substr(7, line.find_first_of(" {", 7) - 7);
+      entry.type = prefix + line.substr(7, line.find_first_of(" {", 7) - 7);
     }
     if (in_struct) entry.definition += line + "\n";
     if (line.starts_with("}")) break;
@@ -41,13 +44,7 @@ MessageEntry ParseFile(std::string_view file) {
 
 std::vector<MessageEntry> MessageReference() {
   std::vector<MessageEntry> messages;
-  std::string_view rest = EmbeddedMessages();
-  while (!rest.empty()) {
-    rest.remove_prefix(std::min(rest.find(kFileStart), rest.size()));
-    if (rest.empty()) break;
-    rest.remove_prefix(kFileStart.size());
-    messages.push_back(ParseFile(rest.substr(0, rest.find(kFileStart))));
-  }
+  for (const std::string_view file : MessageDefinitions()) messages.push_back(ParseFile(file));
   std::sort(messages.begin(), messages.end(),
             [](const auto& a, const auto& b) { return a.type < b.type; });
   for (MessageEntry& message : messages) {

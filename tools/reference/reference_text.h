@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/reference/field_reference.h"
+#include "tools/reference/schemas.h"
 #include "tools/reference/message_reference.h"
 
 namespace poise {

@@ -15,7 +15,9 @@
 #include <sstream>
 
 #include "components/framework/configuration.h"
+#include "components/framework/modules.h"
 #include "fmt/format.h"
+#include "lcmtypes/field_table.h"
 #include "logging/export/column_codec.h"
 #include "logging/export/signal_table.h"
 #include "logging/metrics/events.h"
@@ -30,8 +32,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kDataMark = "<!--POISE-RUN-DATA-->";
 
-/// build/web/report.html, beside build/PRESET/bin/poise.
+/// PREFIX/share/poise/report.html where Poise is installed; else build/web/report.html, beside
+/// build/PRESET/bin/poise.
 fs::path TemplatePath() {
+  const fs::path prefix = InstalledPrefix();
+  if (!prefix.empty()) return prefix / "share" / "poise" / "report.html";
   return fs::read_symlink("/proc/self/exe").parent_path() / ".." / ".." / "web" / "report.html";
 }
 
@@ -171,6 +176,10 @@ Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
   json["scenario_text"] = record.info.scenario;
   json["robot"] = RobotJson(record);
   json["events"] = Json::array();
+  json["messages"] = Json::array();  // the page has Poise's own
+  for (const std::string_view file : MessageDefinitions()) {
+    if (file.find("package poise;") == std::string_view::npos) json["messages"].push_back(file);
+  }
   return json;
 }
 

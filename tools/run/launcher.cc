@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstring>
 
+#include "components/framework/modules.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/timing.h"
@@ -56,7 +57,7 @@ RunOutcome Launcher::Run() {
 void Launcher::StartProcesses() {
   const auto start = [&](const std::string& name, std::vector<std::string> command,
                          bool restart = false) {
-    command[0] = files_.program_dir + "/" + command[0];
+    command[0] = FindProgram(command[0]).string();
     processes_.push_back(std::make_unique<ComponentProcess>(
         name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart));
   };

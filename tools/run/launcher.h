@@ -19,7 +19,6 @@
 namespace poise {
 
 struct LaunchFiles {
-  std::string program_dir;  ///< holds the components' programs and the recorder
   std::string run_dir;      ///< gets run.lcm, recorder.json and each process's output
   std::string spec_file;
   std::string scenario_file;

@@ -72,8 +72,8 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
   if (in_process) {
     return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
   }
-  const LaunchFiles files{fs::read_symlink("/proc/self/exe").parent_path().string(), dir.string(),
-                          (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
+  const LaunchFiles files{dir.string(), (dir / kSpecFile).string(),
+                          (dir / kScenarioFile).string()};
   return Launcher(spec, files, launch, &progress).Run();
 }
 

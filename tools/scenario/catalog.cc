@@ -5,6 +5,7 @@
 #include <set>
 
 #include "components/framework/configuration.h"
+#include "components/framework/modules.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
 #include "tools/cli/text_table.h"
@@ -27,7 +28,11 @@ std::vector<fs::path> Candidates(const std::string& kind, const std::string& nam
                                  const fs::path& beside) {
   const fs::path file = name.ends_with(kEnding) ? name : name + kEnding;
   if (file.is_absolute()) return {file.lexically_normal()};
-  return {(beside / file).lexically_normal(), (DeployDir() / kind / file).lexically_normal()};
+  std::vector<fs::path> candidates = {(beside / file).lexically_normal()};
+  for (const fs::path& folder : DataFolders()) {
+    candidates.push_back((folder / kind / file).lexically_normal());
+  }
+  return candidates;
 }
 
 /// Names of the files in the folders of `candidates`, as `name` could have been written.
@@ -49,7 +54,19 @@ std::set<std::string> NamesThere(const std::vector<fs::path>& candidates, const 
 
 fs::path DeployDir() {
   const char* const dir = std::getenv("POISE_DEPLOY_DIR");
-  return dir != nullptr && *dir != '\0' ? fs::path(dir) : fs::path(POISE_SOURCE_DIR) / "deploy";
+  if (dir != nullptr && *dir != '\0') return dir;
+  const fs::path prefix = InstalledPrefix();
+  return prefix.empty() ? fs::path(POISE_SOURCE_DIR) / "deploy" : prefix / "share" / "poise";
+}
+
+std::vector<fs::path> DataFolders() {
+  std::vector<fs::path> folders;
+  const fs::path own = DeployDir();
+  for (const fs::path& prefix : PoisePath()) {
+    if (prefix != InstalledPrefix()) folders.push_back(prefix / "share" / "poise");
+  }
+  folders.push_back(own);
+  return folders;
 }
 
 std::optional<fs::path> LookForFile(const std::string& kind, const std::string& name,
@@ -88,8 +105,7 @@ std::string KindNames(const std::vector<std::string>& kinds) {
       }
     }
     names.merge(NamesThere(candidates, name));
-    std::error_code error;
-    if (name.ends_with(kEnding) || !fs::is_directory(DeployDir() / kind, error)) continue;
+    if (name.ends_with(kEnding)) continue;
     for (const std::string& listed : ListNames(kind)) names.insert(listed);
   }
   if (bases == BaseFiles::kRefused) std::erase_if(names, IsBase);
@@ -115,20 +131,27 @@ fs::path FindFileOfKinds(const std::vector<std::string>& kinds, const std::strin
 }
 
 std::vector<std::string> ListNames(const std::string& kind) {
-  std::vector<std::string> names;
-  const fs::path dir = DeployDir() / kind;
-  std::error_code error;
-  for (const auto& entry : fs::recursive_directory_iterator(dir, error)) {
-    if (entry.path().extension() != kEnding) continue;
-    const std::string name = fs::relative(entry.path(), dir).replace_extension().string();
-    if (!IsBase(name)) names.push_back(name);
+  std::set<std::string> names;
+  for (const fs::path& folder : DataFolders()) {
+    const fs::path dir = folder / kind;
+    std::error_code error;
+    if (!fs::is_directory(dir, error)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(dir, error)) {
+      if (entry.path().extension() != kEnding) continue;
+      const std::string name = fs::relative(entry.path(), dir).replace_extension().string();
+      if (!IsBase(name)) names.insert(name);
+    }
+    if (error) throw ConfigError(fmt::format("{}: {}", dir.string(), error.message()));
   }
-  if (error) throw ConfigError(fmt::format("{}: {}", dir.string(), error.message()));
-  std::sort(names.begin(), names.end());
-  return names;
+  return {names.begin(), names.end()};
 }
 
 fs::path InstalledFile(const std::string& kind, const std::string& name) {
+  std::error_code error;
+  for (const fs::path& folder : DataFolders()) {
+    const fs::path file = folder / kind / (name + kEnding);
+    if (fs::is_regular_file(file, error)) return file;
+  }
   return DeployDir() / kind / (name + kEnding);
 }
 

@@ -8,8 +8,13 @@
 
 namespace poise {
 
-/// The installed files: $POISE_DEPLOY_DIR, else deploy/ of the source this program was built from.
+/// Poise's own files: $POISE_DEPLOY_DIR, else share/poise where it is installed, else deploy/ of the
+/// source this program was built from.
 std::filesystem::path DeployDir();
+
+/// Where files are looked for that are not beside the one that names them: share/poise of each
+/// folder of $POISE_PATH, then DeployDir.
+std::vector<std::filesystem::path> DataFolders();
 
 /// Whether a name may mean a file in a folder named base: one that others are based on, not to be
 /// used by itself.
@@ -17,7 +22,7 @@ enum class BaseFiles { kRefused, kTaken };
 
 /// The file of a `kind` ("scenarios", "robots", ...) that `name` means, by the one rule for all of
 /// them: NAME or NAME.pbtxt beside the file that names it, in `beside` (for a name of the command
-/// line: the current folder), then in deploy/`kind`. A name that ends in .pbtxt means no other
+/// line: the current folder), then in `kind` of each of DataFolders. A name that ends in .pbtxt means no other
 /// ending; an absolute one is looked for only there.
 std::optional<std::filesystem::path> LookForFile(const std::string& kind, const std::string& name,
                                                  const std::filesystem::path& beside,
@@ -32,10 +37,10 @@ std::filesystem::path FindFile(const std::string& kind, const std::string& name,
 std::filesystem::path FindFileOfKinds(const std::vector<std::string>& kinds,
                                       const std::string& name, const std::filesystem::path& beside);
 
-/// Names of the files in deploy/`kind`, sorted, those in a folder named base aside.
+/// Names of the files in `kind` of DataFolders, sorted, those in a folder named base aside.
 std::vector<std::string> ListNames(const std::string& kind);
 
-/// The file of deploy/`kind` with one of these names.
+/// The file with one of these names.
 std::filesystem::path InstalledFile(const std::string& kind, const std::string& name);
 
 }  // namespace poise

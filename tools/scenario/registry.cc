@@ -1,6 +1,8 @@
 #include "tools/scenario/registry.h"
 
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
+#include "components/framework/added_fields.h"
+#include "components/framework/modules.h"
 #include "components/redistributor/redistributor_type.h"
 #include "components/state_estimator/state_estimator_type.h"
 #include "components/step_planner/step_planner_type.h"
@@ -8,6 +10,7 @@
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 #include "hw_bridge/hw_bridge_type.h"
 #include "sim_ode/sim_ode_type.h"
+#include "tools/scenario/scenario.pb.h"
 
 namespace poise {
 
@@ -17,7 +20,12 @@ const ComponentRegistry& Components() {
     for (const ComponentType& type : {SimOdeType(), HwBridgeType(), DriveEmulatorType(),
                                       StateEstimatorType(), StepPlannerType(), TaskControllerType(),
                                       ContactWrenchMonitorType(), RedistributorType()}) {
-      r.Add(type.name, type.summary, type.make, type.traits);
+      r.Add(type);
+    }
+    // A scenario holds the configuration of a component that it does not know, too.
+    for (const ComponentType& type : AddedComponents()) {
+      r.Add(type);
+      if (type.config != nullptr) AddField(*Scenario::descriptor(), type.name, *type.config);
     }
     return r;
   }();

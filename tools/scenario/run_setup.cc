@@ -1,7 +1,6 @@
 #include "tools/scenario/run_setup.h"
 
 #include <google/protobuf/message.h>
-#include <google/protobuf/text_format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,6 +10,7 @@
 #include <filesystem>
 #include <random>
 
+#include "components/framework/added_fields.h"
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
@@ -18,6 +18,7 @@
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"
+#include "tools/scenario/graph_files.h"
 #include "tools/scenario/library_versions.h"
 #include "tools/scenario/registry.h"
 
@@ -34,7 +35,7 @@ using google::protobuf::FieldDescriptor;
 
 /// The scenario's field `section`, which holds a configuration; nullptr when there is none.
 const FieldDescriptor* ConfigField(const std::string& section) {
-  const auto* field = Scenario::descriptor()->FindFieldByName(section);
+  const auto* field = FindField(*Scenario::descriptor(), section);
   const bool is_config = field != nullptr && !field->is_repeated() &&
                          field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
   return is_config ? field : nullptr;
@@ -59,9 +60,9 @@ std::string ConfigText(const Scenario& scenario, const std::string& type) {
   const FieldDescriptor* field = ConfigField(sections[0]);
   std::string text;
   if (sections.size() > 1) {
-    google::protobuf::TextFormat::PrintToString(own, &text);
+    text = TextOf(own);
   } else if (field != nullptr) {
-    google::protobuf::TextFormat::PrintToString(reflection.GetMessage(own, field), &text);
+    text = TextOf(reflection.GetMessage(own, field));
   }
   return text;
 }
@@ -127,21 +128,12 @@ void AddResource(RunSpec* spec, const std::string& name, const fs::path& file) {
   resource->set_text(ReadFile(file.string()));
 }
 
-/// "file:line: field: problem" of a problem in a graph's file.
-std::string GraphLine(const std::string& file, const std::string& text,
-                      const GraphError::Problem& problem) {
-  const int line = LocateField(text, problem.field, Graph());
-  const std::string where = line > 0 ? fmt::format("{}:{}", file, line) : file;
-  return problem.field.empty() ? fmt::format("{}: {}", where, problem.text)
-                               : fmt::format("{}: {}: {}", where, problem.field, problem.text);
-}
-
 [[noreturn]] void FailGraph(const std::string& file, const GraphError& error) {
-  const std::string text = ReadFile(file);
+  const GraphFiles files(file);
   std::string lines;
   for (const GraphError::Problem& problem : error.problems()) {
     if (!lines.empty()) lines += "\n";
-    lines += GraphLine(file, text, problem);
+    lines += files.Line(problem);
   }
   throw ConfigError(lines);
 }
@@ -170,7 +162,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   std::random_device random;
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
   spec.set_scenario(NameOf(loaded));
-  ReadTextProto(loaded.graph_file, spec.mutable_graph());
+  *spec.mutable_graph() = GraphFiles(loaded.graph_file).Merged();
   ChooseEngine(loaded, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
@@ -228,8 +220,7 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
 }
 
 void CheckGraphFile(const std::string& path) {
-  Graph graph;
-  ReadTextProto(path, &graph);
+  const Graph graph = GraphFiles(path).Merged();
   try {
     CheckGraph(graph, Components());
   } catch (const GraphError& error) {

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <optional>
 
+#include "components/framework/added_fields.h"
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
@@ -27,7 +28,7 @@ int Count(const Message& message, std::string_view field) {
     const std::string_view step = field.substr(0, dot);
     const size_t bracket = step.find('[');
     const FieldDescriptor* descriptor =
-        level->GetDescriptor()->FindFieldByName(std::string(step.substr(0, bracket)));
+        FindField(*level->GetDescriptor(), step.substr(0, bracket));
     if (descriptor == nullptr) return 0;
     const google::protobuf::Reflection& reflection = *level->GetReflection();
     const bool last = dot == std::string_view::npos;

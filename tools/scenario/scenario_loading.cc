@@ -1,19 +1,18 @@
 #include "tools/scenario/scenario_loading.h"
 
-#include <google/protobuf/text_format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 
+#include "components/framework/added_fields.h"
 #include "components/framework/configuration.h"
 #include "components/framework/field_path.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
-#include "tools/reference/field_reference.h"
+#include "tools/reference/schemas.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
 #include "tools/scenario/registry.h"
@@ -317,7 +316,7 @@ google::protobuf::Message* Group(Scenario* scenario, std::string_view path) {
   for (size_t begin = 0; begin <= path.size();) {
     const size_t end = std::min(path.find('.', begin), path.size());
     const std::string name(path.substr(begin, end - begin));
-    const auto* const field = group->GetDescriptor()->FindFieldByName(name);
+    const auto* const field = FindField(*group->GetDescriptor(), name);
     group = group->GetReflection()->MutableMessage(group, field);
     begin = end + 1;
   }
@@ -459,9 +458,7 @@ std::string FormatChanges(const Scenario& scenario) {
 }
 
 std::string ScenarioText(const Scenario& scenario) {
-  std::string text;
-  google::protobuf::TextFormat::PrintToString(scenario, &text);
-  return text;
+  return TextOf(scenario);
 }
 
 }  // namespace poise

@@ -8,6 +8,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "components/framework/added_fields.h"
 #include "components/framework/build_info.h"
 #include "components/framework/configuration.h"
 #include "components/framework/suggest.h"
@@ -52,7 +53,7 @@ std::vector<std::string> Split(std::string_view text, char at) {
 /// True for what starts like a field of a scenario, not a name of one's own.
 bool IsField(const std::string& name) {
   return name.find_first_of(".[") != std::string::npos ||
-         Scenario::descriptor()->FindFieldByName(name) != nullptr;
+         FindField(*Scenario::descriptor(), name) != nullptr;
 }
 
 /// FROM:TO[:STEPS][:FLAG...]. False when it is none.

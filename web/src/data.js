@@ -1,6 +1,7 @@
 // A run's signals by tick, whether they come with the page or arrive while the run goes on.
 import {unpack} from './codec.js';
 import {Column} from './column.js';
+import {parseMessage} from './messages.js';
 
 /** Names of the elements of lists by their count in a message; motors stand in the order of the joints that they drive. */
 function elementNames(robot) {
@@ -95,7 +96,7 @@ class Channel {
 }
 
 /**
- * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.mjs; `blob`: gives the text of a packed
+ * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.js; `blob`: gives the text of a packed
  * column by its id. It holds the ticks from `firstTick` on, a row each; a part of a run begins later than 0. A live run (meta.live) starts without ticks, grows
  * by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
  */
@@ -110,10 +111,11 @@ export class Run extends EventTarget {
     this.keep = meta.live?.keep ?? Infinity;
     this.signals = new Map();
     const names = elementNames(meta.robot);
+    const known = {...messages, ...Object.fromEntries((meta.messages ?? []).map(parseMessage).map((m) => [m.name, m]))};
     this.channels = meta.channels.map((spec) => {
       const channel = new Channel(this, spec, blob);
       for (const signal of spec.signals) {
-        this.add(new Signal(channel, signal, describeField(messages, spec.type, signal.field, names)));
+        this.add(new Signal(channel, signal, describeField(known, spec.type, signal.field, names)));
       }
       return channel;
     });

@@ -1,6 +1,7 @@
 #include "components/framework/bus/collected_channel.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 
 #include "components/framework/component.h"
@@ -9,6 +10,26 @@
 
 namespace poise {
 namespace {
+
+/// An input of whatever type, for whom only receives.
+class AnyInput final : public InputPort {
+ public:
+  explicit AnyInput(const MessageType& type) : type_(type) {}
+  const char* type_name() const override { return type_.name; }
+  int64_t fingerprint() const override { return type_.fingerprint; }
+  std::span<const char* const> count_names() const override { return type_.count_names; }
+  void* NewMessage() const override { return type_.make(counts_); }
+  void DeleteMessage(void* message) const override { type_.destroy(message); }
+  void CopyMessage(const void*, void*) const override { std::abort(); }  // nobody shows it
+  int encoded_size() const override { return static_cast<int>(type_.encoded_size(counts_)); }
+  bool Decode(const uint8_t* data, int size, void* message) const override {
+    return type_.decode(data, size, message);
+  }
+  void Bind(const void*) override {}
+
+ private:
+  const MessageType& type_;
+};
 
 std::unique_ptr<InputPort> MakePort(const Channel& channel) {
   const MessageType* type = FindMessageType(channel.type());
@@ -22,16 +43,7 @@ std::unique_ptr<InputPort> MakePort(const Channel& channel) {
         "channel {}: the run gives {} counts, {} has {}; fill them in from the checked graph",
         channel.name(), counts.size(), channel.type(), type->count_names.size()));
   }
-  std::unique_ptr<InputPort> port;
-  ForEachMessageType([&]<class T>() {
-    if constexpr (MessageTraits<T>::kHasHeader && !MessageTraits<T>::kHasStrings) {
-      if (channel.type() == MessageTraits<T>::kName) port = std::make_unique<Input<T>>();
-    }
-  });
-  if (port == nullptr) {
-    throw ConfigError(fmt::format("channel {}: '{}' is no message type of a channel",
-                                  channel.name(), channel.type()));
-  }
+  auto port = std::make_unique<AnyInput>(*type);
   Wiring().AddInput(port.get(), channel.name(), counts);
   return port;
 }

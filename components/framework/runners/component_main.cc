@@ -7,6 +7,8 @@
 #include <cstdio>
 
 #include "components/framework/build_info.h"
+#include "components/framework/component_description.h"
+#include "components/framework/modules.h"
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/process_runner.h"
@@ -46,7 +48,12 @@ int ComponentMain(int argc, char** argv, const ComponentType& of) {
                   type),
       type};
   app.set_version_flag("--version", VersionText(type));
-  app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
+  bool describe = false;
+  CLI::Option* const describe_flag = app.add_flag(
+      "--describe", describe, "print ports, settings and properties as JSON, and do nothing else");
+  CLI::Option* const run_option =
+      app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec");
+  describe_flag->excludes(run_option);
   app.add_option("--component", name, "name of this component in the run's graph")
       ->capture_default_str();
   std::string state;
@@ -62,7 +69,15 @@ int ComponentMain(int argc, char** argv, const ComponentType& of) {
     SayError(fmt::format("{}: {}; see {} --help", type, error.what(), type));
     return 2;
   }
+  if (!describe && run_file.empty()) {
+    SayError(fmt::format("{}: --run is required; see {} --help", type, type));
+    return 2;
+  }
   try {
+    if (describe) {
+      fmt::print("{}\n", DescriptionOf(of).dump(2));
+      return 0;
+    }
     RunSpec spec;
     ReadTextProto(run_file, &spec);
     for (const ComponentInstance& instance : spec.graph().component()) {
@@ -86,6 +101,19 @@ int ComponentMain(int argc, char** argv, const ComponentType& of) {
     SayError(fmt::format("{}: {}", name, error.what()));
     return 1;
   }
+}
+
+int ModuleComponentMain(int argc, char** argv, const char* type, void (*module)()) {
+  try {
+    module();
+    for (const ComponentType& each : AddedComponents()) {
+      if (each.name == type) return ComponentMain(argc, argv, each);
+    }
+    SayError(fmt::format("{}: its POISE_MODULE adds no component of this name", type));
+  } catch (const std::exception& error) {
+    SayError(fmt::format("{}: {}", type, error.what()));
+  }
+  return 2;
 }
 
 }  // namespace poise

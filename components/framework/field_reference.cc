@@ -1,4 +1,4 @@
-#include "tools/reference/field_reference.h"
+#include "components/framework/field_reference.h"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -13,32 +13,21 @@
 
 namespace poise {
 
-std::string_view EmbeddedSchemas();  // a FileDescriptorSet with source information
-
 namespace {
 
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 using google::protobuf::SourceLocation;
 
-/// The schemas with their comments, which the compiled classes lack.
-const google::protobuf::DescriptorPool& Schemas() {
-  static const google::protobuf::DescriptorPool* const pool = [] {
-    google::protobuf::FileDescriptorSet files;
-    const std::string_view bytes = EmbeddedSchemas();
-    auto* result = new google::protobuf::DescriptorPool;
-    bool good = files.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-    for (const auto& file : files.file()) good = good && result->BuildFile(file) != nullptr;
-    if (!good) throw std::logic_error("the embedded schemas cannot be read");
-    return result;
-  }();
+google::protobuf::DescriptorPool& Schemas() {
+  static auto* const pool = new google::protobuf::DescriptorPool;
   return *pool;
 }
 
-const Descriptor& Root(Schema schema) {
-  static constexpr std::array kNames = {"poise.Scenario", "poise.Robot", "poise.Sweep",
-                                        "poise.Graph"};
-  return *Schemas().FindMessageTypeByName(kNames[static_cast<size_t>(schema)]);
+const Descriptor& TypeNamed(const std::string& type) {
+  const Descriptor* const found = Schemas().FindMessageTypeByName(type);
+  if (found == nullptr) throw std::logic_error("no schema has the type " + type);
+  return *found;
 }
 
 /// Words with one space between them.
@@ -189,9 +178,30 @@ std::pair<std::string, std::string> SplitUnit(std::string_view comment) {
   return {"", std::string(comment)};
 }
 
-std::vector<FieldEntry> FieldReference(Schema schema) {
+void AddSchema(std::string_view descriptor_set) {
+  google::protobuf::FileDescriptorSet files;
+  bool good = files.ParseFromArray(descriptor_set.data(), static_cast<int>(descriptor_set.size()));
+  for (const auto& file : files.file()) {
+    if (Schemas().FindFileByName(file.name()) != nullptr) continue;
+    good = good && Schemas().BuildFile(file) != nullptr;
+  }
+  if (!good) throw std::logic_error("a schema cannot be read");
+}
+
+std::vector<FieldEntry> FieldsOfType(const std::string& type, const std::string& prefix) {
   std::vector<FieldEntry> entries;
-  Append(Root(schema), "", &entries);
+  Append(TypeNamed(type), prefix, &entries);
+  return entries;
+}
+
+std::vector<FieldEntry> FieldsOfGroup(const std::string& type, const std::string& path) {
+  FieldEntry group;
+  group.path = path;
+  group.type = "group";
+  group.meaning = Comment(TypeNamed(type));
+  group.group = true;
+  std::vector<FieldEntry> entries = {group};
+  Append(TypeNamed(type), path + ".", &entries);
   return entries;
 }
 

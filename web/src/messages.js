@@ -1,6 +1,9 @@
-// Units, texts and names of constants of the messages' fields, read from the comments of the .lcm files.
+// Units, texts and names of constants of the messages' fields, read from the comments of the .lcm files: of Poise's own when
+// the page is built, of a module's where it is shown.
 
 const UNITS = ['m/s^2', 'rad/s', 'm/s', 'N·m', 'rad', 'us', 'm', 'N', 'A', 's'];
+
+const SCALARS = new Set(['int8_t', 'byte', 'boolean', 'int16_t', 'int32_t', 'int64_t', 'float', 'double', 'string']);
 
 /** The unit that a field's comment begins with; '' when it begins with none. */
 export function unitOf(comment) {
@@ -13,13 +16,17 @@ export function unitOf(comment) {
  * list of such length; values: names by number.
  */
 export function parseMessage(source) {
-  const name = /^struct\s+(\w+)/m.exec(source)[1];
+  const [, own] = /^package\s+([\w.]+);/m.exec(source) ?? [];
+  const full = (type, of = own) => (of === undefined || of === 'poise' ? type : `${of}.${type}`);
+  const name = full(/^struct\s+(\w+)/m.exec(source)[1]);
   const head = source.slice(0, source.indexOf('struct'));
   const text = [...head.matchAll(/^\/\/\s?(.*)$/gm)].map((m) => m[1]).join(' ');
   const fields = {};
-  for (const m of source.matchAll(/^\s+(\w+)\s+(\w+)(?:\[(\w+)\])?;[ \t]*(?:\/\/[ \t]*(.*))?$/gm)) {
+  for (const m of source.matchAll(/^\s+([\w.]+)\s+(\w+)(?:\[(\w+)\])?;[ \t]*(?:\/\/[ \t]*(.*))?$/gm)) {
     const comment = m[4] ?? '';
-    fields[m[2]] = {type: m[1], unit: unitOf(comment), text: comment, count: /^num_/.test(m[3] ?? '') ? m[3] : undefined};
+    const dot = m[1].lastIndexOf('.');
+    const type = SCALARS.has(m[1]) ? m[1] : dot < 0 ? full(m[1]) : full(m[1].slice(dot + 1), m[1].slice(0, dot));
+    fields[m[2]] = {type, unit: unitOf(comment), text: comment, count: /^num_/.test(m[3] ?? '') ? m[3] : undefined};
   }
   const code = source.replace(/\/\/.*$/gm, '');
   const constants = [...code.matchAll(/\bconst\s+\w+\s+([^;]+);/g)]

@@ -1,5 +1,5 @@
-// Every field of Poise's files with type, default, unit and meaning, from the schemas and their
-// comments.
+// Every field of a file or a configuration with type, default, unit and meaning, from the schemas
+// and their comments.
 #pragma once
 
 #include <string>
@@ -8,9 +8,6 @@
 #include <vector>
 
 namespace poise {
-
-/// A kind of file that users write.
-enum class Schema { kScenario, kRobot, kSweep, kGraph };
 
 struct FieldEntry {
   std::string path;           ///< as --set takes it, [i] for a list's index: "sim.push[i].peak"
@@ -22,9 +19,17 @@ struct FieldEntry {
   bool group = false;  ///< holds fields, which follow, and cannot be set itself
 };
 
-/// All fields in the schema's order, each group before its fields. What Poise itself writes into a
-/// file (Scenario.applied) is left out.
-std::vector<FieldEntry> FieldReference(Schema schema);
+/// Makes the types of a serialised FileDescriptorSet known, with the comments that compiled classes
+/// lack. Files that are known are passed over. Throws std::logic_error when it is none.
+void AddSchema(std::string_view descriptor_set);
+
+/// All fields of a known type ("poise.Scenario") in the schema's order, each group before its
+/// fields, paths after `prefix`. What Poise itself writes into a file (Scenario.applied) is left
+/// out.
+std::vector<FieldEntry> FieldsOfType(const std::string& type, const std::string& prefix = "");
+
+/// The entry of a group of that type which stands under the name `path`, then its fields.
+std::vector<FieldEntry> FieldsOfGroup(const std::string& type, const std::string& path);
 
 /// The fields at and below the path `beginning` ("sim.push", "sim.push[0]", "sim."); if
 /// there are none, those whose name holds it. Empty: all. Throws ConfigError with near names when

@@ -1,0 +1,133 @@
+// examples/foot_load is built against an installed tree that was moved, and runs with the installed programs alone.
+// Usage: POISE_BUILD=build/release node --test installed_test.mjs
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {cpSync, existsSync, mkdtempSync, readFileSync, renameSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {dirname, join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {fileURLToPath} from 'node:url';
+
+const root = join(dirname(fileURLToPath(import.meta.url)), '../..');
+const build = process.env.POISE_BUILD ?? join(root, 'build/release');
+const folder = mkdtempSync(join(tmpdir(), 'poise-installed-'));
+const prefix = join(folder, 'poise'), project = join(folder, 'lab'), own = join(folder, 'lab-build');
+
+/** What a command prints; only the environment given, so that nothing of this checkout is found by it. */
+function run(command, args, {env = {}, exit = 0} = {}) {
+  const result = spawnSync(command, args, {
+    encoding: 'utf8', cwd: folder, timeout: 280_000, maxBuffer: 1 << 27,
+    env: {PATH: '/usr/local/bin:/usr/bin:/bin', HOME: folder, LANG: 'C.UTF-8', POISE_RUNS_DIR: join(folder, 'runs'), ...env},
+  });
+  assert.equal(result.status, exit, `${command} ${args.join(' ')}: ${result.stdout}${result.stderr}${result.error ?? ''}`);
+  return result.stdout + result.stderr;
+}
+const poise = (args, options = {}) =>
+  run(join(prefix, 'bin/poise'), args, {env: {POISE_PATH: own}, ...options});
+
+before(() => {
+  run('cmake', ['--install', build, '--prefix', join(folder, 'elsewhere')]);
+  renameSync(join(folder, 'elsewhere'), prefix);
+  cpSync(join(prefix, 'share/poise/examples/foot_load'), project, {recursive: true});
+  run('cmake', ['-S', project, '-B', own, '-G', 'Ninja', `-DCMAKE_PREFIX_PATH=${prefix}`]);
+  run('cmake', ['--build', own]);
+});
+after(() => rmSync(folder, {recursive: true, force: true}));
+
+test('the installed tree names no folder of this machine', () => {
+  for (const file of ['lib/cmake/poise/poise-config.cmake', 'lib/cmake/poise/PoiseModule.cmake']) {
+    assert.ok(!readFileSync(join(prefix, file), 'utf8').includes(root), file);
+  }
+});
+
+test('runs without any module', () => {
+  const out = poise(['run', 'stand', '--duration', '0.5', '--in-process', '--no-html'], {env: {}});
+  assert.match(out, /stands: ticks fallen/);
+  assert.match(poise(['list', 'scenarios'], {env: {}}), /push_double_support/);
+});
+
+test('lists what the module brings', () => {
+  assert.match(poise(['list', 'scenarios']), /watch_load +Stands, and watches/);
+  assert.match(poise(['list', 'graphs']), /balance_load/);
+  assert.match(poise(['list', 'metrics']), /foot_load_peak +N +largest filtered load/);
+  assert.match(poise(['list', 'messages', 'gait_lab.foot_load_t']), /N, of all feet/);
+  assert.match(poise(['list', 'components', 'foot_load']), /output +foot_load +gait_lab\.foot_load_t/);
+  const fields = poise(['list', 'fields', 'foot_load']);
+  assert.match(fields, /foot_load\.time_constant.*\n.*first-order low-pass/);
+  assert.match(fields, /0\.05/);
+  poise(['graph', 'check', 'balance_load']);
+});
+
+test('its program describes itself', () => {
+  const about = JSON.parse(run(join(own, 'lib/poise/bin/foot_load'), ['--describe']));
+  assert.deepEqual(about.inputs, [{name: 'robot_state', type: 'robot_state_t', kind: 'same tick'}]);
+  assert.deepEqual(about.outputs, [{name: 'foot_load', type: 'gait_lab.foot_load_t'}]);
+  assert.deepEqual(about.settings, [{path: 'foot_load.time_constant', type: 'number', default: '0.05', unit: 's',
+                                     meaning: 'of the first-order low-pass'}]);
+});
+
+let bits;
+for (const [how, flags] of [['processes', []], ['one process', ['--in-process']]]) {
+  test(`runs as ${how}, replays, reports`, () => {
+    const out = join(folder, how.replace(' ', '_'));
+    const printed = poise(['run', 'watch_load', ...flags, '--out', out]);
+    assert.match(printed, /largest load of a foot/);
+    const replay = poise(['replay', out, '--component', 'foot_load']);
+    assert.match(replay, /FOOT_LOAD.*\b0\b/);
+    const csv = poise(['echo', 'FOOT_LOAD', 'load', 'total', 'sum', '--csv', '--log', out]);
+    assert.ok(csv.split('\n').length > 1000, csv.slice(0, 500));
+    bits ??= csv;
+    assert.equal(csv, bits);  // as processes and in one process: the same numbers
+    const page = readFileSync(join(out, 'report.html'), 'utf8');
+    assert.match(page, /"name":"FOOT_LOAD"/);
+    assert.match(page, /N, filtered, positive when the foot presses/);
+    poise(['log', 'export', out, '--format', 'mcap', '--out', join(folder, 'log.mcap')]);
+    assert.match(readFileSync(join(folder, 'log.mcap'), 'latin1'), /poise\.gait_lab_foot_load_t/);
+  });
+}
+
+// The robot stands: the filtered loads of both feet are its weight, whatever the filter does.
+test('the numbers are right', () => {
+  const rows = bits.trim().split('\n').map((line) => line.split(','));
+  const total = rows[0].findIndex((name) => name.endsWith('total'));
+  assert.ok(total > 0, rows[0].join());
+  const last = Number(rows.at(-1)[total]);
+  assert.ok(Math.abs(last - 45 * 9.81) < 0.05 * 45 * 9.81, `${last} N`);
+});
+
+test('a setting of hers is set, and refused, like any', () => {
+  const slow = poise(['run', 'watch_load', '--in-process', '--no-html', '--set', 'foot_load.time_constant=0.5', '--out', join(folder, 'slow')]);
+  assert.match(slow, /--set: foot_load\.time_constant=0\.5/);
+  assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_constant=-1'], {exit: 2}), /foot_load\.time_constant: must be a time/);
+  assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_konstant=1'], {exit: 2}), /did you mean.*time_constant/);
+});
+
+test('what is not there is said with the places that were searched', () => {
+  const without = {env: {}, exit: 2};
+  const scenario = join(project, 'share/scenarios/watch_load.pbtxt');
+  assert.match(poise(['run', scenario], without), /balance_load.*searched:.*share\/poise\/graphs|foot_load/s);
+  assert.match(poise(['run', 'watch_load'], without), /no scenario named 'watch_load'/);
+  assert.match(poise(['list', 'graphs'], {env: {POISE_PATH: join(folder, 'nowhere')}, exit: 2}), /POISE_PATH: .*nowhere: there is no such folder/);
+});
+
+test('a module of another Poise is refused by name', () => {
+  const other = join(folder, 'other');
+  cpSync(join(own, 'lib'), join(other, 'lib'), {recursive: true});
+  const module = join(other, 'lib/poise/modules/gait_lab.so');
+  const bytes = readFileSync(module);
+  const at = bytes.indexOf('poise-module-build:') + 'poise-module-build:'.length;
+  bytes.write('x', at);
+  writeFileSync(module, bytes);
+  assert.match(poise(['list', 'graphs'], {env: {POISE_PATH: other}, exit: 2}), /gait_lab\.so: was built against Poise x.*build it anew/);
+  writeFileSync(module, 'no module');
+  assert.match(poise(['list', 'graphs'], {env: {POISE_PATH: other}, exit: 2}), /gait_lab\.so: is no module of Poise/);
+});
+
+test('what was installed of the project is found there', () => {
+  const installed = join(folder, 'installed');
+  run('cmake', ['--install', own, '--prefix', installed]);
+  assert.ok(existsSync(join(installed, 'lib/poise/bin/foot_load')));
+  const out = poise(['run', 'watch_load', '--duration', '0.2', '--no-html', '--out', join(folder, 'third')],
+                    {env: {POISE_PATH: installed}});
+  assert.match(out, /largest load of a foot/);
+});
