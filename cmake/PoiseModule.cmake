@@ -83,7 +83,7 @@ function(poise_module name)
   target_include_directories(${name}_objects SYSTEM PUBLIC ${dir})
   target_link_libraries(${name}_objects PUBLIC poise::poise ${A_MESSAGES} ${A_DEPS})
   add_library(${name} MODULE)
-  target_link_libraries(${name} PRIVATE ${name}_objects)
+  target_link_libraries(${name} PRIVATE ${name}_objects ${A_MESSAGES})  # objects are linked by those who name them
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/poise/modules)
   install(TARGETS ${name} DESTINATION lib/poise/modules)
   foreach(component ${A_COMPONENTS})
@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
 }
 ]] @ONLY)
     add_executable(${component} ${dir}/${component}_main.cc)
-    target_link_libraries(${component} PRIVATE ${name}_objects)
+    target_link_libraries(${component} PRIVATE ${name}_objects ${A_MESSAGES})
     set_target_properties(${component} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/poise/bin
                           INSTALL_RPATH_USE_LINK_PATH ON)
     install(TARGETS ${component} DESTINATION lib/poise/bin)

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,6 +47,14 @@ int Flushed(int code) {
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
   poise::UsePlainStreams();
+  // Before the commands, which tell what there is. Help and version are there without them.
+  std::exception_ptr modules;
+  try {
+    poise::LoadModules();
+    poise::Components();
+  } catch (...) {
+    modules = std::current_exception();
+  }
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
                "poise"};
   app.set_version_flag("--version", poise::VersionText("poise"));
@@ -95,8 +104,7 @@ int main(int argc, char** argv) {
     return poise::kExitUsage;
   }
   try {
-    poise::LoadModules();
-    poise::Components();  // what they add to a scenario
+    if (modules) std::rethrow_exception(modules);
     return Flushed(command());
   } catch (const poise::ConfigError& error) {
     Fail(error.what());

@@ -63,38 +63,40 @@ Eigen::Vector2d NearestOnBoundary(const ConvexPolygon& polygon, const Eigen::Vec
 }  // namespace
 
 ConvexPolygon ConvexHull(std::span<const Eigen::Vector2d> points) {
-  // Andrew's monotone chain.
+  // Andrew's monotone chain. Order and turns are those of points whose x is a whole number of
+  // kAligned: on a line along y they then come in order along it, whatever rounding does to their x.
+  // Both must be of the same points: else the chain may cross itself.
+  struct Corner {
+    Eigen::Vector2d at, given;
+  };
   ConvexPolygon hull;
   const size_t n = std::min<size_t>(points.size(), ConvexPolygon::kMaxCorners);
-  std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners> sorted;
+  std::array<Corner, ConvexPolygon::kMaxCorners> sorted;
   for (size_t i = 0; i < n; ++i) {
     if (!points[i].allFinite()) return hull;
-    sorted[i] = points[i];
+    sorted[i] = {{std::round(points[i].x() / kAligned) * kAligned, points[i].y()}, points[i]};
   }
   const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(n);
-  // Points on one line along y must come in order along it, whatever rounding does to their x.
-  std::sort(sorted.begin(), end, [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    const double ax = std::round(a.x() / kAligned), bx = std::round(b.x() / kAligned);
-    if (ax != bx) return ax < bx;
-    return a.y() < b.y() || (a.y() == b.y() && a.x() < b.x());
+  std::sort(sorted.begin(), end, [](const Corner& a, const Corner& b) {
+    if (a.at.x() != b.at.x()) return a.at.x() < b.at.x();
+    return a.at.y() < b.at.y() || (a.at.y() == b.at.y() && a.given.x() < b.given.x());
   });
-  const auto m = static_cast<size_t>(std::unique(sorted.begin(), end) - sorted.begin());
-  if (m <= 2) {
-    std::copy_n(sorted.begin(), m, hull.corner.begin());
-    hull.num_corners = static_cast<int>(m);
-    return hull;
-  }
-  std::array<Eigen::Vector2d, 2 * ConvexPolygon::kMaxCorners> chain;
+  const auto same = [](const Corner& a, const Corner& b) { return a.at == b.at; };
+  const auto m = static_cast<size_t>(std::unique(sorted.begin(), end, same) - sorted.begin());
+  std::array<Corner, 2 * ConvexPolygon::kMaxCorners> chain;
   size_t count = 0;
-  const auto append = [&](const Eigen::Vector2d& point, size_t first) {
-    while (count >= first + 2 && !TurnsLeft(chain[count - 2], chain[count - 1], point)) --count;
+  const auto append = [&](const Corner& point, size_t first) {
+    while (count >= first + 2 && !TurnsLeft(chain[count - 2].at, chain[count - 1].at, point.at)) {
+      --count;
+    }
     chain[count++] = point;
   };
   for (size_t i = 0; i < m; ++i) append(sorted[i], 0);
   const size_t upper = count - 1;
-  for (size_t i = m - 1; i-- > 0;) append(sorted[i], upper);
-  hull.num_corners = static_cast<int>(count - 1);  // the last is the first
-  std::copy_n(chain.begin(), count - 1, hull.corner.begin());
+  for (size_t i = m - 1; m > 2 && i-- > 0;) append(sorted[i], upper);
+  if (m > 2) --count;  // the last is the first
+  hull.num_corners = static_cast<int>(count);
+  for (size_t i = 0; i < count; ++i) hull.corner[i] = chain[i].given;
   return hull;
 }
 

@@ -15,6 +15,7 @@ namespace {
 namespace pb = google::protobuf;
 
 constexpr int kFirstNumber = 1000;
+constexpr int kTab = 8;  // columns, as the tokenizer counts
 constexpr char kPackage[] = "poise.added";
 
 /// The fields are extensions, declared at run time in files of their own.
@@ -136,8 +137,10 @@ std::string WithBrackets(std::string_view text, const pb::Descriptor& type) {
         FindField(type, token.text) != nullptr && FindField(type, token.text)->is_extension();
     in_name = token.text != ":" && token.text != "[";
     if (!added) continue;
-    // Columns count a tab as up to eight: the name is looked for in its line.
-    const size_t at = text.find(token.text, std::max(copied, line_start));
+    size_t at = line_start;
+    for (int column = 0; column < token.column; ++at) {
+      column = text[at] == '\t' ? (column / kTab + 1) * kTab : column + 1;
+    }
     result.append(text.substr(copied, at - copied)).append("[").append(token.text).append("]");
     copied = at + token.text.size();
   }

@@ -54,6 +54,41 @@ TEST(ConvexHull, OfSolesAlignedToRoundingIsTheirRectangle) {
   }
 }
 
+// Soles of a standing robot: their corners along y are level to anything between rounding and a
+// micrometre. Once they crossed a hull of ten corners, and a robot that stood still was pushed down.
+TEST(ConvexHull, OfNearlyAlignedSolesCoversThemAndTurnsLeft) {
+  std::mt19937_64 random(TestSeed(291));
+  std::uniform_real_distribution<double> exponent(-18, -6), unit(-1, 1);
+  double worst_support = 0, worst_area = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const double noise = std::pow(10, exponent(random));
+    const double half = trial % 2 == 0 ? 0.14 : 0.1 + 0.05 * unit(random);
+    std::vector<Vector2d> points;
+    for (const double side : {-0.105, 0.105}) {
+      for (const double x : {-half, half}) {
+        for (const double y : {-0.065, 0.065}) {
+          points.push_back({x + noise * unit(random), side + y + noise * unit(random)});
+        }
+      }
+    }
+    std::shuffle(points.begin(), points.end(), random);
+    const ConvexPolygon hull = ConvexHull(points);
+    ASSERT_GE(hull.num_corners, 4);
+    ASSERT_LE(hull.num_corners, 8);
+    for (int i = 0; i < 36; ++i) {  // the hull reaches as far as the points, whichever way
+      const Vector2d way(std::cos(i * M_PI / 18), std::sin(i * M_PI / 18));
+      double of_points = -1, of_hull = -1;
+      for (const Vector2d& point : points) of_points = std::max(of_points, way.dot(point));
+      for (const Vector2d& corner : hull.corners()) of_hull = std::max(of_hull, way.dot(corner));
+      worst_support = std::max(worst_support, std::abs(of_points - of_hull));
+    }
+    worst_area = std::max(worst_area, std::abs(Area(hull) - 2 * half * 0.34) - 4 * noise);
+    EXPECT_GT(SignedDistance(hull, {0, 0}), 0.04) << trial;
+  }
+  EXPECT_LT(worst_support, 2e-9);
+  EXPECT_LT(worst_area, 2e-9);
+}
+
 TEST(ConvexHull, OfASoleAheadOfTheOtherHasSixCorners) {
   std::vector<Vector2d> corners;
   for (const Vector2d& at : {Vector2d(0, -0.1), Vector2d(0.2, 0.1)}) {

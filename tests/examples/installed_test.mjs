@@ -41,7 +41,7 @@ test('the installed tree names no folder of this machine', () => {
 });
 
 test('runs without any module', () => {
-  const out = poise(['run', 'stand', '--duration', '0.5', '--in-process', '--no-html'], {env: {}});
+  const out = poise(['run', 'stand', '--duration', '0.5', '--inline'], {env: {}});
   assert.match(out, /stands: ticks fallen/);
   assert.match(poise(['list', 'scenarios'], {env: {}}), /push_double_support/);
 });
@@ -67,7 +67,7 @@ test('its program describes itself', () => {
 });
 
 let bits;
-for (const [how, flags] of [['processes', []], ['one process', ['--in-process']]]) {
+for (const [how, flags] of [['processes', []], ['one process', ['--inline']]]) {
   test(`runs as ${how}, replays, reports`, () => {
     const out = join(folder, how.replace(' ', '_'));
     const printed = poise(['run', 'watch_load', ...flags, '--out', out]);
@@ -78,7 +78,8 @@ for (const [how, flags] of [['processes', []], ['one process', ['--in-process']]
     assert.ok(csv.split('\n').length > 1000, csv.slice(0, 500));
     bits ??= csv;
     assert.equal(csv, bits);  // as processes and in one process: the same numbers
-    const page = readFileSync(join(out, 'report.html'), 'utf8');
+    poise(['report', out, '--html', join(folder, 'page.html')]);
+    const page = readFileSync(join(folder, 'page.html'), 'utf8');
     assert.match(page, /"name":"FOOT_LOAD"/);
     assert.match(page, /N, filtered, positive when the foot presses/);
     poise(['log', 'export', out, '--format', 'mcap', '--out', join(folder, 'log.mcap')]);
@@ -96,7 +97,7 @@ test('the numbers are right', () => {
 });
 
 test('a setting of hers is set, and refused, like any', () => {
-  const slow = poise(['run', 'watch_load', '--in-process', '--no-html', '--set', 'foot_load.time_constant=0.5', '--out', join(folder, 'slow')]);
+  const slow = poise(['run', 'watch_load', '--inline', '--set', 'foot_load.time_constant=0.5', '--out', join(folder, 'slow')]);
   assert.match(slow, /--set: foot_load\.time_constant=0\.5/);
   assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_constant=-1'], {exit: 2}), /foot_load\.time_constant: must be a time/);
   assert.match(poise(['run', 'watch_load', '--set', 'foot_load.time_konstant=1'], {exit: 2}), /did you mean.*time_constant/);
@@ -127,7 +128,7 @@ test('what was installed of the project is found there', () => {
   const installed = join(folder, 'installed');
   run('cmake', ['--install', own, '--prefix', installed]);
   assert.ok(existsSync(join(installed, 'lib/poise/bin/foot_load')));
-  const out = poise(['run', 'watch_load', '--duration', '0.2', '--no-html', '--out', join(folder, 'third')],
+  const out = poise(['run', 'watch_load', '--duration', '0.2', '--out', join(folder, 'third')],
                     {env: {POISE_PATH: installed}});
   assert.match(out, /largest load of a foot/);
 });

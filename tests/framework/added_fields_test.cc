@@ -32,7 +32,7 @@ constexpr char kText[] =
     "  name: \"walker\"\n"
     "  kp: 2.5\n"
     "}\n"
-    "label: \"walker { } arms\" gains { kp: 3 } arms < joints: 7 >\n";
+    "\tlabel: \"walker { } arms\"\t gains { kp: 3 } arms < joints: 7 >\n";
 
 TEST_F(AddedFieldsTest, AreReadLikeAnyOther) {
   ToyConfig config;

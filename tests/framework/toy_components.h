@@ -3,7 +3,7 @@
 // channel.
 #pragma once
 
-#include "components/framework/component.h"
+#include "components/framework/component_registry.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {

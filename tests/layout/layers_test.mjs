@@ -5,7 +5,7 @@ import {join} from 'node:path';
 import {test} from 'node:test';
 import {repositoryFiles, root} from '../docs/markdown.mjs';
 
-const files = repositoryFiles().filter((f) => !f.startsWith('tests/'));
+const files = repositoryFiles().filter((f) => !/^(tests|examples)\//.test(f));  // examples: users' own projects
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
 const BUS = ['lcmtypes', 'components/framework', 'components/framework/bus', 'components/framework/runners',
