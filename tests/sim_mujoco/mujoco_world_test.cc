@@ -1,0 +1,250 @@
+// What MuJoCo alone is told, and the laws that its world is made to obey, against closed forms and
+// the equations of motion of components/robot.
+#include "sim_mujoco/mujoco_world.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "components/framework/configuration.h"
+#include "tests/sim/simulation_fixture.h"
+#include "tests/test_seed.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+TEST(MujocoConfig, ValuesOutOfRangeAreRefused) {
+  const auto field = [](double time, double softness, double friction) -> std::string {
+    MujocoConfig config;
+    config.set_contact_time_constant(time);
+    config.set_contact_softness(softness);
+    config.set_friction_softness(friction);
+    try {
+      MujocoWorlds(config);
+    } catch (const ConfigError& error) {
+      return error.field();
+    }
+    return "";
+  };
+  EXPECT_EQ(field(0.005, 1e-7, 1e-7), "");
+  EXPECT_EQ(field(0, 1e-7, 1e-7), "contact_time_constant");
+  EXPECT_EQ(field(0.005, -1, 1e-7), "contact_softness");
+  EXPECT_EQ(field(0.005, 1e-7, 0), "friction_softness");
+  EXPECT_EQ(field(std::numeric_limits<double>::quiet_NaN(), 1e-7, 1e-7), "contact_time_constant");
+}
+
+TEST(MujocoConfig, AStepLongerThanTheContactsTimeIsRefused) {
+  MujocoConfig config;
+  config.set_contact_time_constant(0.0005);
+  const robot::RobotModel model = PaperRobot();
+  EXPECT_NO_THROW(MujocoWorlds(config)(model, 8, 0.0005));
+  EXPECT_THROW(MujocoWorlds(config)(model, 8, 0.001), ConfigError);
+}
+
+/// A state with the robot high above the ground, everything in motion.
+robot::RobotState Moving(const robot::RobotModel& model, std::mt19937* random) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  robot::RobotState state(model.num_joints());
+  const auto draw = [&] { return uniform(*random); };
+  state.base_position = {draw(), draw(), 3};
+  state.base_orientation = Eigen::Quaterniond(1, draw(), draw(), draw()).normalized();
+  state.base_linear_velocity = {draw(), draw(), draw()};
+  state.base_angular_velocity = {draw(), draw(), draw()};
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
+    state.joint_position[j] = joint.lower + (joint.upper - joint.lower) * (0.5 + 0.4 * draw());
+    state.joint_velocity[j] = draw();
+  }
+  return state;
+}
+
+/// The robot's own mass matrix and forces, without rotors: rows of the joints carry them.
+robot::RobotModel WithoutRotors() {
+  return EditedRobot([](Robot* description) {
+    for (auto& motor : *description->mutable_motor()) motor.set_rotor_inertia(0);
+  });
+}
+
+// M (v' - v) / h + bias = torque + (velocity - qd') / cfm, for rows soft and stiff at once.
+TEST(MujocoWorld, JointRowsAreLinearInTheVelocityAtTheStepsEnd) {
+  const robot::RobotModel model = WithoutRotors();
+  const double h = 1e-3;
+  std::mt19937 random(TestSeed(5));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto world = MujocoWorlds(MujocoConfig())(model, 8, h);
+  robot::RobotData data(model);
+  robot::RobotState after(model.num_joints());
+  for (int trial = 0; trial < 20; ++trial) {
+    const robot::RobotState state = Moving(model, &random);
+    robot::ComputeKinematics(model, state, &data);
+    robot::ComputeDynamics(model, state, &data);
+    Eigen::MatrixXd matrix = data.mass_matrix / h;
+    VectorXd velocity(model.num_velocities());
+    velocity << state.base_linear_velocity, state.base_angular_velocity, state.joint_velocity;
+    VectorXd force = matrix * velocity - data.gravity - data.coriolis;
+    world->SetState(state);
+    for (int j = 0; j < model.num_joints(); ++j) {
+      JointRow row;
+      row.active = j % 4 != 3;
+      row.cfm = std::pow(10, -j);
+      row.velocity = uniform(random);
+      row.torque = 20 * uniform(random);
+      world->SetJoint(j, row);
+      force[6 + j] += row.torque;
+      if (!row.active) continue;
+      force[6 + j] += row.velocity / row.cfm;
+      matrix(6 + j, 6 + j) += 1 / row.cfm;
+    }
+    ASSERT_TRUE(world->Step()) << world->message();
+    world->GetState(&after);
+    const VectorXd expected = matrix.llt().solve(force).tail(model.num_joints());
+    EXPECT_LT((after.joint_velocity - expected).lpNorm<Eigen::Infinity>(), 1e-8) << trial;
+  }
+}
+
+// A robot of stiff joints on points that are springs and dampers: implicit Euler's own recursion,
+// m (v' - v) / h = n (k (depth - h v') - d v') - m g, step by step from a drop.
+TEST(MujocoWorld, SoftContactsAreSpringsAndDampersUnderImplicitEuler) {
+  const robot::RobotModel model = RigidRobot();
+  const double h = 1e-3, k = 5000, d = 20;
+  constexpr int kPoints = 4;
+  const auto world = MujocoWorlds(MujocoConfig())(model, kPoints, h);
+  robot::RobotState state(model.num_joints());
+  state.base_position.z() = 2;
+  world->SetState(state);
+  Vector3d com = Vector3d::Zero();
+  for (int b = 0; b < static_cast<int>(model.bodies().size()); ++b) {
+    com += model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
+  }
+  double depth = 0, v = -0.3;  // m, m/s
+  state.base_linear_velocity.z() = v;
+  world->SetState(state);
+  const double m = model.total_mass();
+  const JointRow locked{true, 0, 1e-9, 0};
+  for (int i = 0; i < 100 && depth >= 0; ++i) {
+    for (int j = 0; j < model.num_joints(); ++j) world->SetJoint(j, locked);
+    const double z = world->pose(0).translation().z();
+    for (int c = 0; c < kPoints; ++c) {
+      const Vector3d arm((c & 1 ? -0.1 : 0.1), (c & 2 ? -0.1 : 0.1), 0);
+      const Vector3d point = com + arm + Vector3d(0, 0, z - 2);
+      world->AddContact({0, point, Vector3d::UnitZ(), depth, 0, {0.5, k, d}});
+    }
+    ASSERT_TRUE(world->Step()) << world->message();
+    const double before = v;
+    v = (m * v / h + kPoints * k * depth - m * robot::kGravity) / (m / h + kPoints * (h * k + d));
+    double sum = 0;
+    for (int c = 0; c < kPoints; ++c) sum += world->contact_force(c).z();
+    const double expected = m * ((v - before) / h + robot::kGravity);
+    if (expected < 0) break;  // it leaves the springs
+    EXPECT_NEAR(sum, expected, 1e-4 * m * robot::kGravity) << i;
+    depth -= h * v;
+    EXPECT_NEAR(world->pose(0).translation().z(), 2 - depth, 1e-8) << i;
+  }
+}
+
+/// One foot's four corners on rigid level ground, the robot stiff and sliding with (vx, vy).
+struct Slide {
+  Vector3d force = Vector3d::Zero();
+  Vector3d velocity;
+  int solutions;
+};
+
+Slide SlideOneStep(const ContactMaterial& material, double vx, double vy, double load) {
+  const robot::RobotModel model = RigidRobot();
+  const auto world = MujocoWorlds(MujocoConfig())(model, 4, 1e-3);
+  robot::RobotState state(model.num_joints());
+  state.base_position.z() = 2;
+  state.base_linear_velocity = {vx, vy, 0};
+  world->SetState(state);
+  Vector3d com = Vector3d::Zero();
+  for (int b = 0; b < static_cast<int>(model.bodies().size()); ++b) {
+    com += model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
+  }
+  for (int j = 0; j < model.num_joints(); ++j) world->SetJoint(j, {true, 0, 1e-9, 0});
+  // At the COM's height: friction then does not turn the robot.
+  for (int c = 0; c < 4; ++c) {
+    const Vector3d arm((c & 1 ? -0.1 : 0.1), (c & 2 ? -0.1 : 0.1), 0);
+    world->AddContact({0, com + arm, Vector3d::UnitZ(), 0, 0, material});
+  }
+  world->AddForce(0, {0, 0, -load}, com);
+  EXPECT_TRUE(world->Step()) << world->message();
+  Slide slide;
+  for (int c = 0; c < 4; ++c) slide.force += world->contact_force(c);
+  slide.velocity = world->com_velocity(0);
+  slide.solutions = static_cast<const MujocoWorld&>(*world).solutions();
+  return slide;
+}
+
+// Coulomb: mu N against the slip, in every direction, and N is what carries the weight and the load,
+// however fast it slides. MuJoCo's own cone would throw the robot up at mu times the slip.
+TEST(MujocoWorld, SlidingSolesObeyCoulombsLaw) {
+  const double weight = RigidRobot().total_mass() * robot::kGravity;
+  for (const double mu : {0.1, 0.9}) {
+    for (const double speed : {0.05, 1.0, 5.0}) {
+      for (const double angle : {0.0, 0.5, 0.785, 2.0}) {
+        for (const double load : {0.0, 300.0}) {
+          const Vector3d along(std::cos(angle), std::sin(angle), 0);
+          const Slide slide = SlideOneStep({mu, 0, 0}, speed * along.x(), speed * along.y(), load);
+          const double normal = weight + load;
+          EXPECT_NEAR(slide.force.z(), normal, 1e-4 * normal);
+          EXPECT_LT((slide.force.head<2>() + mu * normal * along.head<2>()).norm(), 1e-4 * normal)
+              << mu << " " << speed << " " << angle;
+          EXPECT_NEAR(slide.velocity.z(), 0, 1e-4);
+          EXPECT_LE(slide.solutions, 10);
+        }
+      }
+    }
+  }
+}
+
+TEST(MujocoWorld, WithoutFrictionNothingHoldsSideways) {
+  const Slide slide = SlideOneStep({0, 0, 0}, 0.5, 0.1, 0);
+  EXPECT_NEAR(slide.force.z(), RigidRobot().total_mass() * robot::kGravity, 1e-3);
+  EXPECT_EQ(slide.force.x(), 0);
+  EXPECT_EQ(slide.force.y(), 0);
+}
+
+// A point that sticks creeps sideways at softness times force, and no more.
+TEST(MujocoWorld, SticksBelowTheCone) {
+  const Slide slide = SlideOneStep({0.9, 0, 0}, 0.001, 0, 0);
+  const double stop = RigidRobot().total_mass() * 0.001 / 1e-3;  // N, that stops it in a step
+  EXPECT_NEAR(slide.force.x(), -stop, 0.01 * stop);
+  EXPECT_LT(std::abs(slide.velocity.x()), 2 * stop / 4 * MujocoConfig().friction_softness());
+}
+
+// The ground yields by what its softness says, whatever the step.
+TEST(MujocoConfig, SoftensTheGround) {
+  MujocoConfig config;
+  config.set_contact_softness(1e-5);
+  for (const double time : {0.005, 0.01}) {
+    config.set_contact_time_constant(time);
+    for (const double step : {0.001, 0.0005}) {
+      SimConfig sim = StandingConfig();
+      sim.set_step(step);
+      Simulation simulation(RigidRobot(), sim, MujocoWorlds(config), kTick, 1);
+      const double start = simulation.truth().com.z();
+      for (int i = 0; i < 1000; ++i) simulation.Advance();
+      const double weight = simulation.model().total_mass() * robot::kGravity;
+      const double sink = weight / 8 * 1e-5 * time;
+      EXPECT_NEAR(start - simulation.truth().com.z(), sink, 0.02 * sink);
+    }
+  }
+}
+
+TEST(MujocoWorld, ContactsBeyondItsRoomAreDropped) {
+  const robot::RobotModel model = PaperRobot();
+  const auto world = MujocoWorlds(MujocoConfig())(model, 1, 1e-3);
+  const TerrainContact contact{0, Vector3d::Zero(), Vector3d::UnitZ(), 0, 0, {0.5, 0, 0}};
+  world->AddContact(contact);
+  world->AddContact(contact);
+  EXPECT_TRUE(world->Step()) << world->message();
+}
+
+}  // namespace
+}  // namespace poise
