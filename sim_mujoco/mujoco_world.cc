@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 
 #include "components/framework/configuration.h"
@@ -269,15 +270,22 @@ void MujocoWorld::SolveContacts() {
   const mjModel* m = robot_.model.get();
   mjData* d = data_.get();
   iterations_ = 0;
+  double last = std::numeric_limits<double>::infinity();
+  bool ahead = true;
   for (solutions_ = 1;; ++solutions_) {
     mj_fwdConstraint(m, d);
     iterations_ += d->solver_iter;
-    if (solutions_ == kMostSolutions || CorrectSlip() <= kSlipTolerance) return;
+    if (solutions_ == kMostSolutions) return;
+    const double change = CorrectSlip(ahead);
+    if (change <= kSlipTolerance) return;
+    ahead = ahead && change < last;
+    last = change;
   }
 }
 
-// Sets each point's slip to that of the solution; returns the largest change.
-double MujocoWorld::CorrectSlip() {
+// Takes each point's slip from the solution, `ahead` of it by what is exact for a mass without
+// rotation; returns the largest change.
+double MujocoWorld::CorrectSlip(bool ahead) {
   mjData* d = data_.get();
   double largest = 0;
   mj_mulJacVec(robot_.model.get(), d, d->efc_b, d->qacc);
@@ -290,9 +298,10 @@ double MujocoWorld::CorrectSlip() {
                                     d->efc_vel[row + 2] + step_ * d->efc_b[row + 2]);
     // Beyond what a point that sticks creeps at.
     const double creep = friction_softness_ * cone.friction[0] * d->efc_force[row];
-    const double slip = std::max(0.0, speed - creep);
-    largest = std::max(largest, std::abs(slip - contact.slip));
-    contact.slip = slip;
+    const double change = std::max(0.0, speed - creep) - contact.slip;
+    largest = std::max(largest, std::abs(change));
+    const double gain = ahead ? 1 + cone.friction[0] * cone.friction[0] : 1;
+    contact.slip = std::max(0.0, contact.slip + gain * change);
     SetNormalReference(contact, row);
   }
   return largest;
@@ -324,18 +333,35 @@ void MujocoWorld::Integrate() {
   mjData* d = data_.get();
   Vector3d force = applied_force_;
   for (size_t i = 0; i < num_contacts_; ++i) force += contacts_[i].force;
+  const mjtNum* const robot_com = d->subtree_com + 3 * robot_.body[0];
   const Vector3d velocity =
       RobotVelocity() +
       step_ * (force / model_.total_mass() - robot::kGravity * Vector3d::UnitZ());
+  const Vector3d com = ToEigen(robot_com) + step_ * velocity;
   VectorMap(d->qvel, m->nv) += step_ * ConstVectorMap(d->qacc, m->nv);
   mj_integratePos(m, d->qpos, d->qvel, step_);
   d->time += step_;
   UpdateKinematics();
-  // The velocities turn with the bodies after the step's forces were balanced, which leaves the
-  // momentum wrong by a term of second order. The base takes it up; the joints keep their law.
-  const Vector3d missing = velocity - RobotVelocity();
-  Eigen::Map<Vector3d>(d->qvel) += missing;
-  for (const int body : robot_.body) Eigen::Map<Vector3d>(d->cvel + 6 * body + 3) += missing;
+  // The step's forces were balanced before the bodies turned, which leaves the robot's COM wrong by
+  // terms of second order. The base takes them up; the joints keep their law.
+  MoveRobot(com - ToEigen(robot_com), velocity - RobotVelocity());
+}
+
+// All bodies alike: what MuJoCo holds about the COM stays.
+void MujocoWorld::MoveRobot(const Vector3d& distance, const Vector3d& velocity) {
+  const mjModel* m = robot_.model.get();
+  mjData* d = data_.get();
+  const auto add = [](const Vector3d& v, mjtNum* to) { Eigen::Map<Vector3d>(to) += v; };
+  add(distance, d->qpos);
+  add(velocity, d->qvel);
+  for (const int body : robot_.body) {
+    add(distance, d->xpos + 3 * body);
+    add(distance, d->xipos + 3 * body);
+    add(distance, d->subtree_com + 3 * body);
+    add(velocity, d->cvel + 6 * body + 3);
+  }
+  for (const int geom : robot_.geom) add(distance, d->geom_xpos + 3 * geom);
+  for (int joint = 0; joint < m->njnt; ++joint) add(distance, d->xanchor + 3 * joint);
 }
 
 Vector3d MujocoWorld::contact_force(int index) const {

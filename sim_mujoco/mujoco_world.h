@@ -31,7 +31,7 @@ ContactLaw SpringDamperLaw(double k, double d, double depth, double h);
 ///  - Contacts obey a ContactLaw in place of solref and solimp.
 ///  - A contact that slides does not push itself off the ground (Coulomb's law; MuJoCo's cone of
 ///    forces alone would lift it by friction times the slip).
-///  - The robot's momentum changes by the forces on it, exactly.
+///  - The robot's COM moves by the forces on it, exactly.
 /// docs/engines.md derives them. First order in the step; repeatable bit for bit.
 class MujocoWorld : public World {
  public:
@@ -77,9 +77,10 @@ class MujocoWorld : public World {
   void SetLaws();
   void SetNormalReference(const Contact& contact, int row);
   void SolveContacts();
-  double CorrectSlip();
+  double CorrectSlip(bool ahead);
   void ReadContacts();
   void Integrate();
+  void MoveRobot(const Eigen::Vector3d& distance, const Eigen::Vector3d& velocity);
   void UpdateKinematics();
   Eigen::Vector3d RobotVelocity() const;
 
