@@ -102,6 +102,11 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
 TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
   ExpectRefused({"run", StandScenario(), "--set", "engine=od"},
                 {"--set engine", "no engine 'od'", "ode"});
+  ExpectRefused({"run", StandScenario(), "--world", "mujuco"},
+                {"--world engine", "no engine 'mujuco'", "mujoco"});
+  ExpectRefused({"run", StandScenario(), "--world", "mujoco", "--set",
+                 "mujoco.contact_time_constant=0.0005"},
+                {"mujoco.contact_time_constant", "less than a step"});
   ExpectRefused({"run", StandScenario(), "--set", "ode.contact_cfm=0"},
                 {"--set ode.contact_cfm", "greater than 0"});
   EXPECT_EQ(RunPoise({"run", StandScenario(), "--inline", "--set", "engine=ode", "--out",
