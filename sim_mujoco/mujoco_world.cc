@@ -175,9 +175,12 @@ void MujocoWorld::AddContact(const TerrainContact& at) {
   Contact& contact = contacts_[num_contacts_++];
   contact.at = at;
   const ContactMaterial& material = at.material;
-  contact.law = material.stiffness > 0 ? SpringDamperLaw(material.stiffness, material.damping,
-                                                         at.depth, step_)
-                                       : ContactLaw{at.depth / time_constant_, softness_};
+  if (material.stiffness > 0) {
+    contact.law = SpringDamperLaw(material.stiffness, material.damping, at.depth, step_);
+  } else {
+    // A gap may close within the step.
+    contact.law = {at.depth / (at.depth < 0 ? step_ : time_constant_), softness_};
+  }
   contact.law.target += at.velocity;
   contact.slip = 0;
   contact.com = com_position(at.body);
@@ -234,14 +237,39 @@ void MujocoWorld::AddContacts() {
   }
 }
 
+// m/s², acceleration of the contact's point at constant qvel. In a step the point goes
+// h J v' + h² / 2 of this: J v' alone would leave a gap under a foot while the robot turns above it.
+Vector3d MujocoWorld::PointBias(const TerrainContact& at) const {
+  const mjModel* m = robot_.model.get();
+  const mjData* d = data_.get();
+  const int body = robot_.body[static_cast<size_t>(at.body)];
+  Vector3d angular = Vector3d::Zero(), linear = Vector3d::Zero();
+  for (int dof = m->body_dofadr[body] + m->body_dofnum[body] - 1; dof >= 0;
+       dof = m->dof_parentid[dof]) {
+    angular += d->qvel[dof] * ToEigen(d->cdof_dot + 6 * dof);
+    linear += d->qvel[dof] * ToEigen(d->cdof_dot + 6 * dof + 3);
+  }
+  const Vector3d arm = at.position - ToEigen(d->subtree_com + 3 * m->body_rootid[body]);
+  const Vector3d spin = ToEigen(d->cvel + 6 * body);
+  const Vector3d velocity = ToEigen(d->cvel + 6 * body + 3) + spin.cross(arm);
+  return linear + angular.cross(arm) + spin.cross(velocity);
+}
+
 // Rows in MuJoCo's form: R force = aref - a, with a = (v' - v) / h.
 void MujocoWorld::SetLaws() {
   mjData* d = data_.get();
   mj_mulJacVec(robot_.model.get(), d, d->efc_vel, d->qvel);
+  // What the integration adds to a point's way, see Integrate and PointBias.
+  const Vector3d com_bias =
+      ToEigen(d->qfrc_bias) / model_.total_mass() - robot::kGravity * Vector3d::UnitZ();
   for (int i = 0; i < d->ncon; ++i) {
     Contact& contact = contacts_[static_cast<size_t>(i)];
     mjContact& cone = d->contact[i];
     const int row = cone.efc_address;
+    const Vector3d bias = PointBias(contact.at) + com_bias;
+    for (int k = 0; k < cone.dim; ++k) {
+      d->efc_vel[row + k] += step_ / 2 * ToEigen(cone.frame + 3 * k).dot(bias);
+    }
     d->efc_R[row] = contact.law.softness / step_;
     d->efc_D[row] = 1 / d->efc_R[row];
     for (int k = row + 1; k < row + cone.dim; ++k) {
@@ -347,7 +375,7 @@ void MujocoWorld::Integrate() {
   MoveRobot(com - ToEigen(robot_com), velocity - RobotVelocity());
 }
 
-// All bodies alike: what MuJoCo holds about the COM stays.
+// All bodies alike.
 void MujocoWorld::MoveRobot(const Vector3d& distance, const Vector3d& velocity) {
   const mjModel* m = robot_.model.get();
   mjData* d = data_.get();
@@ -358,10 +386,10 @@ void MujocoWorld::MoveRobot(const Vector3d& distance, const Vector3d& velocity) 
     add(distance, d->xpos + 3 * body);
     add(distance, d->xipos + 3 * body);
     add(distance, d->subtree_com + 3 * body);
-    add(velocity, d->cvel + 6 * body + 3);
   }
   for (const int geom : robot_.geom) add(distance, d->geom_xpos + 3 * geom);
   for (int joint = 0; joint < m->njnt; ++joint) add(distance, d->xanchor + 3 * joint);
+  mj_comVel(m, d);
 }
 
 Vector3d MujocoWorld::contact_force(int index) const {

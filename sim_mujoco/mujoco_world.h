@@ -75,6 +75,7 @@ class MujocoWorld : public World {
   void Advance();
   void AddContacts();
   void SetLaws();
+  Eigen::Vector3d PointBias(const TerrainContact& at) const;
   void SetNormalReference(const Contact& contact, int row);
   void SolveContacts();
   double CorrectSlip(bool ahead);
