@@ -25,10 +25,12 @@ using ConstVectorMap = Eigen::Map<const Eigen::VectorXd>;
 constexpr double kLeastCfm = 1e-12;  // rad/s per N·m
 // Where MuJoCo's cone ends: a point with less friction has none.
 constexpr double kLeastFriction = mjMINMU;
-// Coulomb's law is solved when no point's slip changes by more; it takes two or three solutions, and
-// some more where a sole starts or stops sliding.
+// Coulomb's law is solved when no point's slip changes by more than this and this share of it; it
+// takes one to three solutions, and some more where a sole starts or stops sliding.
 constexpr double kSlipTolerance = 1e-8;  // m/s
-constexpr int kMostSolutions = 30;
+constexpr double kSlipShare = 1e-7;
+constexpr int kMostSolutions = 60;
+constexpr double kLeastPace = 0.05, kMostPace = 20;
 
 static_assert(sizeof(mjtNum) == sizeof(double), "MuJoCo's headers must be set for double precision");
 
@@ -182,7 +184,7 @@ void MujocoWorld::AddContact(const TerrainContact& at) {
     contact.law = {at.depth / (at.depth < 0 ? step_ : time_constant_), softness_};
   }
   contact.law.target += at.velocity;
-  contact.slip = 0;
+  contact.slip = contact.slip_change = 0;
   contact.com = com_position(at.body);
 }
 
@@ -295,27 +297,26 @@ void MujocoWorld::SetNormalReference(const Contact& contact, int row) {
 }
 
 void MujocoWorld::SolveContacts() {
-  const mjModel* m = robot_.model.get();
-  mjData* d = data_.get();
   iterations_ = 0;
-  double last = std::numeric_limits<double>::infinity();
-  bool ahead = true;
+  double pace = 1;
   for (solutions_ = 1;; ++solutions_) {
-    mj_fwdConstraint(m, d);
-    iterations_ += d->solver_iter;
-    if (solutions_ == kMostSolutions) return;
-    const double change = CorrectSlip(ahead);
-    if (change <= kSlipTolerance) return;
-    ahead = ahead && change < last;
-    last = change;
+    mj_fwdConstraint(robot_.model.get(), data_.get());
+    iterations_ += data_->solver_iter;
+    const SlipChange change = FindSlipChange();
+    if (change.largest <= 1) return;
+    if (solutions_ == kMostSolutions) break;
+    // Aitken's: what the last two changes say of the way to their end (Irons and Tuck, 1969).
+    if (solutions_ > 1 && change.difference > 0) {
+      pace = std::clamp(-pace * change.along / change.difference, kLeastPace, kMostPace);
+    }
+    CorrectSlip(pace);
   }
+  ++unsolved_steps_;
 }
 
-// Takes each point's slip from the solution, `ahead` of it by what is exact for a mass without
-// rotation; returns the largest change.
-double MujocoWorld::CorrectSlip(bool ahead) {
+MujocoWorld::SlipChange MujocoWorld::FindSlipChange() {
   mjData* d = data_.get();
-  double largest = 0;
+  SlipChange all;
   mj_mulJacVec(robot_.model.get(), d, d->efc_b, d->qacc);
   for (int i = 0; i < d->ncon; ++i) {
     const mjContact& cone = d->contact[i];
@@ -327,12 +328,27 @@ double MujocoWorld::CorrectSlip(bool ahead) {
     // Beyond what a point that sticks creeps at.
     const double creep = friction_softness_ * cone.friction[0] * d->efc_force[row];
     const double change = std::max(0.0, speed - creep) - contact.slip;
-    largest = std::max(largest, std::abs(change));
-    const double gain = ahead ? 1 + cone.friction[0] * cone.friction[0] : 1;
-    contact.slip = std::max(0.0, contact.slip + gain * change);
-    SetNormalReference(contact, row);
+    all.largest =
+        std::max(all.largest, std::abs(change) / (kSlipTolerance + kSlipShare * speed));
+    const double difference = change - contact.slip_change;
+    all.along += contact.slip_change * difference;
+    all.difference += difference * difference;
+    contact.slip_change = change;
   }
-  return largest;
+  return all;
+}
+
+// Pace 1 is exact for a mass that does not turn.
+void MujocoWorld::CorrectSlip(double pace) {
+  const mjData* d = data_.get();
+  for (int i = 0; i < d->ncon; ++i) {
+    const mjContact& cone = d->contact[i];
+    if (cone.dim == 1) continue;
+    Contact& contact = contacts_[static_cast<size_t>(i)];
+    const double gain = pace * (1 + cone.friction[0] * cone.friction[0]);
+    contact.slip = std::max(0.0, contact.slip + gain * contact.slip_change);
+    SetNormalReference(contact, cone.efc_address);
+  }
 }
 
 void MujocoWorld::ReadContacts() {

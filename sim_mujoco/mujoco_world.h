@@ -63,13 +63,21 @@ class MujocoWorld : public World {
   /// Of the last step: Newton iterations, and solutions that Coulomb's law took.
   int solver_iterations() const { return iterations_; }
   int solutions() const { return solutions_; }
+  /// Steps since construction in which that many were not enough: the last one was taken.
+  int unsolved_steps() const { return unsolved_steps_; }
 
  private:
   struct Contact {
     TerrainContact at;
     ContactLaw law;  // along the normal, the surface's velocity included
     double slip;     // m/s, at which it is taken to slide
+    double slip_change;  // m/s, that the last solution asks for
     Eigen::Vector3d com, force, moment;
+  };
+
+  struct SlipChange {
+    double largest = 0;                // of a point, over what may remain
+    double along = 0, difference = 0;  // (m/s)², of all points: change before · (now - before), |..|²
   };
 
   void Advance();
@@ -78,7 +86,8 @@ class MujocoWorld : public World {
   Eigen::Vector3d PointBias(const TerrainContact& at) const;
   void SetNormalReference(const Contact& contact, int row);
   void SolveContacts();
-  double CorrectSlip(bool ahead);
+  SlipChange FindSlipChange();
+  void CorrectSlip(double pace);
   void ReadContacts();
   void Integrate();
   void MoveRobot(const Eigen::Vector3d& distance, const Eigen::Vector3d& velocity);
@@ -94,7 +103,7 @@ class MujocoWorld : public World {
   size_t num_contacts_ = 0;  // of the step to come, or of the last one
   bool stepped_ = false;     // since contacts were added
   Eigen::Vector3d applied_force_ = Eigen::Vector3d::Zero();  // N, sum of AddForce
-  int iterations_ = 0, solutions_ = 0;
+  int iterations_ = 0, solutions_ = 0, unsolved_steps_ = 0;
   char message_[160] = "";
 };
 

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "components/framework/configuration.h"
 #include "tests/sim/simulation_fixture.h"
@@ -203,6 +205,119 @@ TEST(MujocoWorld, SlidingSolesObeyCoulombsLaw) {
       }
     }
   }
+}
+
+// Both feet on tilted ground, all joints in motion: each point's way over the whole step, read from
+// the bodies' poses, obeys Signorini's and Coulomb's law with its forces.
+TEST(MujocoWorld, EveryPointObeysItsLawOverTheStepsWholeWay) {
+  const robot::RobotModel model = PaperRobot();
+  const double h = 2e-4, softness = 1e-4;
+  constexpr double kTolerance = 2e-5;  // m/s, beside what an impact's change of velocity turns
+  MujocoConfig config;
+  config.set_contact_softness(softness);
+  const auto world = MujocoWorlds(config)(model, 8, h);
+  std::mt19937 random(TestSeed(7));
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int open = 0, stuck = 0, sliding = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const double mu = std::array{0.1, 0.6, 0.9, 1.5}[static_cast<size_t>(trial % 4)];
+    robot::RobotState state = Moving(model, &random);
+    if (trial % 3 == 0) {  // so slow that most points stick
+      state.base_linear_velocity *= 1e-3;
+      state.base_angular_velocity *= 1e-3;
+      state.joint_velocity *= 1e-3;
+    }
+    world->SetState(state);
+    for (int j = 0; j < model.num_joints(); ++j) world->SetJoint(j, {true, 0, h / 0.1, 0});
+    std::vector<TerrainContact> contacts;
+    std::vector<Vector3d> in_body;
+    for (const robot::FootModel& foot : model.feet()) {
+      const Eigen::Isometry3d sole = world->pose(foot.body) * foot.sole;
+      for (int c = 0; c < 4; ++c) {
+        const Vector3d corner((c & 1 ? -0.5 : 0.5) * foot.length,
+                              (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+        const Vector3d normal =
+            (sole.linear().col(2) + 0.1 * Vector3d(uniform(random), uniform(random), 0))
+                .normalized();
+        contacts.push_back({foot.body, sole * corner, normal, 1e-4 * uniform(random), 0,
+                            {mu, 0, 0}});
+        in_body.push_back(foot.sole * corner);
+        world->AddContact(contacts.back());
+      }
+    }
+    ASSERT_TRUE(world->Step()) << world->message();
+    robot::RobotState after(model.num_joints());
+    world->GetState(&after);
+    const double tolerance =
+        kTolerance + h * ((after.joint_velocity - state.joint_velocity).norm() +
+                          (after.base_angular_velocity - state.base_angular_velocity).norm());
+    for (size_t c = 0; c < contacts.size(); ++c) {
+      const TerrainContact& at = contacts[c];
+      const Vector3d way = (world->pose(at.body) * in_body[c] - at.position) / h;
+      const Vector3d force = world->contact_force(static_cast<int>(c));
+      const double normal = at.normal.dot(force);
+      const Vector3d tangential = force - normal * at.normal;
+      const Vector3d slip = way - at.normal.dot(way) * at.normal;
+      const double target =
+          at.depth / (at.depth < 0 ? h : config.contact_time_constant());
+      const double beyond = at.normal.dot(way) - target;  // m/s, that the force has to make up for
+      if (normal == 0) {
+        ++open;
+        EXPECT_GT(beyond, -tolerance);
+        continue;
+      }
+      EXPECT_GT(normal, 0);
+      EXPECT_NEAR(beyond, -softness * normal, tolerance) << trial << " " << c;
+      EXPECT_LT(tangential.norm(), mu * normal * (1 + 1e-6));
+      if (slip.norm() < 20 * tolerance) {
+        ++stuck;
+        continue;
+      }
+      ++sliding;
+      EXPECT_LT((tangential + mu * normal * slip.normalized()).norm(), 0.1 * mu * normal)
+          << trial << " " << c << " " << slip.norm();
+    }
+  }
+  EXPECT_EQ(static_cast<const MujocoWorld&>(*world).unsolved_steps(), 0);
+  EXPECT_GT(open, 100);
+  EXPECT_GT(stuck, 100);
+  EXPECT_GT(sliding, 100);
+}
+
+// The robot turns above a foot that stands, at constant joint velocities: the foot stays where it is,
+// though J̇ v would carry its points off by h² / 2 of it, some 1e-6 m a step.
+TEST(MujocoWorld, AFootThatStandsStaysWhileTheRobotTurnsAboveIt) {
+  const robot::RobotModel model = PaperRobot();
+  const double h = 1e-3;
+  const auto world = MujocoWorlds(MujocoConfig())(model, 4, h);
+  robot::RobotState state(model.num_joints());
+  for (int j = 0; j < model.num_joints(); ++j) state.joint_velocity[j] = j % 2 == 0 ? 1 : -1.5;
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  // The base moves so that the right foot does not.
+  const Eigen::MatrixXd& jacobian = data.foot_jacobian[0];
+  const robot::Vector6d base =
+      jacobian.leftCols<6>().partialPivLu().solve(-jacobian.rightCols(12) * state.joint_velocity);
+  state.base_linear_velocity = base.head<3>();
+  state.base_angular_velocity = base.tail<3>();
+  world->SetState(state);
+  const robot::FootModel& foot = model.feet()[0];
+  const Eigen::Isometry3d sole = world->pose(foot.body) * foot.sole;
+  for (int j = 0; j < model.num_joints(); ++j) {
+    world->SetJoint(j, {true, state.joint_velocity[j], 1e-9, 0});
+  }
+  for (int c = 0; c < 4; ++c) {
+    const Vector3d corner((c & 1 ? -0.5 : 0.5) * foot.length, (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+    world->AddContact({foot.body, sole * corner, sole.linear().col(2), 0, 0, {5, 0, 0}});
+  }
+  world->AddForce(foot.body, -5000 * sole.linear().col(2), sole.translation());
+  ASSERT_TRUE(world->Step()) << world->message();
+  const Eigen::Isometry3d after = world->pose(foot.body) * foot.sole;
+  // Into the ground by softness times force, and no further.
+  const double yield = h * MujocoConfig().contact_softness() * 5000;
+  EXPECT_LT((after.translation() - sole.translation()).norm(), yield);
+  EXPECT_GT(h * h / 2 * data.foot_bias_acceleration[0].norm(), 1e-6) << "the test would see nothing";
 }
 
 TEST(MujocoWorld, WithoutFrictionNothingHoldsSideways) {
