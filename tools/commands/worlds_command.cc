@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <set>
+#include <utility>
 
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
@@ -47,24 +48,26 @@ std::vector<std::string> Engines() {
 
 std::string OutcomeText(const WorldRun& world) {
   if (!world.result.problem.empty()) return "could not be run";
-  const std::string& message = world.result.summary.outcome.message;
-  return world.stands() ? "stands" : message;
+  return world.stands() ? "stands" : world.result.summary.outcome.message;
 }
+
+/// Engines whose distances from the paper's figure differ by less than this share of it are equal.
+constexpr double kEqualShare = 0.01;
 
 /// The engine whose figure is nearest to the paper's; empty without that figure or between equals.
 std::string Nearest(const std::vector<WorldRun>& worlds, size_t row) {
-  std::string nearest;
-  double least = std::numeric_limits<double>::infinity();
+  std::vector<std::pair<double, std::string>> distances;
+  double paper = 0;
   for (const WorldRun& world : worlds) {
     const CheckResult& check = world.result.summary.checks[row];
     if (!check.measured || !check.paper_value) return "";
-    const double distance = std::abs(*check.measured - *check.paper_value);
-    if (distance == least) nearest.clear();
-    if (distance >= least) continue;
-    least = distance;
-    nearest = world.engine;
+    paper = *check.paper_value;
+    distances.emplace_back(std::abs(*check.measured - paper), world.engine);
   }
-  return nearest;
+  std::sort(distances.begin(), distances.end());
+  if (distances.size() < 2) return "";
+  const bool equal = distances[1].first - distances[0].first < kEqualShare * std::abs(paper);
+  return equal ? "" : distances[0].second;
 }
 
 /// Each figure over the first engine's; empty where that is none or 0.
