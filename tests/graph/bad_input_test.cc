@@ -103,7 +103,7 @@ TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
   ExpectRefused({"run", StandScenario(), "--set", "engine=od"},
                 {"--set engine", "no engine 'od'", "ode"});
   ExpectRefused({"run", StandScenario(), "--world", "mujuco"},
-                {"--world engine", "no engine 'mujuco'", "mujoco"});
+                {"--world: engine", "no engine 'mujuco'", "mujoco"});
   ExpectRefused({"run", StandScenario(), "--world", "mujoco", "--set",
                  "mujoco.contact_time_constant=0.0005"},
                 {"mujoco.contact_time_constant", "less than a step"});
