@@ -36,12 +36,12 @@ void Copy(const Quaterniond& from, mjtNum* to) {
   std::copy_n(numbers, 4, to);
 }
 
-// The tree alone: its compiler checks and sorts it, its numbers are filled in afterwards, so that no
-// number goes through text and MuJoCo's own thresholds refuse no robot that poise has accepted.
+// The tree alone: its compiler checks and sorts it, its numbers are filled in afterwards, so that
+// no number goes through text and MuJoCo's own thresholds refuse no robot that poise has accepted.
 void WriteBody(const robot::RobotModel& model, size_t index, std::string* xml) {
   const robot::Body& body = model.bodies()[index];
-  *xml += fmt::format("<body name='b{}'><inertial pos='0 0 0.1' mass='1' diaginertia='1 1 1'/>",
-                      index);
+  *xml +=
+      fmt::format("<body name='b{}'><inertial pos='0 0 0.1' mass='1' diaginertia='1 1 1'/>", index);
   *xml += body.parent < 0 ? std::string("<freejoint name='base'/>")
                           : fmt::format("<joint name='j{}' type='hinge'/>", body.joint);
   *xml += fmt::format("<geom name='g{}' type='sphere' size='0.01'/>", index);

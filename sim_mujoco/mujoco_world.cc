@@ -32,7 +32,8 @@ constexpr double kSlipShare = 1e-7;
 constexpr int kMostSolutions = 60;
 constexpr double kLeastPace = 0.05, kMostPace = 20;
 
-static_assert(sizeof(mjtNum) == sizeof(double), "MuJoCo's headers must be set for double precision");
+static_assert(sizeof(mjtNum) == sizeof(double),
+              "MuJoCo's headers must be set for double precision");
 
 Vector3d ToEigen(const mjtNum* v) { return {v[0], v[1], v[2]}; }
 
@@ -49,9 +50,10 @@ WorldFactory MujocoWorlds(const MujocoConfig& config) {
   RequirePositive(config.friction_softness(), "friction_softness");
   return [config](const robot::RobotModel& model, int max_contacts, double step) {
     if (config.contact_time_constant() < step) {
-      throw ConfigError(fmt::format("mujoco.contact_time_constant: {} s is less than a step of {} "
-                                    "s: the ground would throw the robot off",
-                                    config.contact_time_constant(), step));
+      throw ConfigError(
+          fmt::format("mujoco.contact_time_constant: {} s is less than a step of {} "
+                      "s: the ground would throw the robot off",
+                      config.contact_time_constant(), step));
     }
     return std::make_unique<MujocoWorld>(config, model, max_contacts, step);
   };
@@ -76,8 +78,13 @@ void MujocoWorld::SetState(const robot::RobotState& state) {
   mjData* d = data_.get();
   const Quaterniond& q = state.base_orientation;
   const Vector3d spin = q.conjugate() * state.base_angular_velocity;  // MuJoCo's is the body's own
-  const double position[7] = {state.base_position.x(), state.base_position.y(),
-                              state.base_position.z(), q.w(), q.x(), q.y(), q.z()};
+  const double position[7] = {state.base_position.x(),
+                              state.base_position.y(),
+                              state.base_position.z(),
+                              q.w(),
+                              q.x(),
+                              q.y(),
+                              q.z()};
   std::copy_n(position, 7, d->qpos);
   std::copy_n(state.base_linear_velocity.data(), 3, d->qvel);
   std::copy_n(spin.data(), 3, d->qvel + 3);
@@ -240,7 +247,8 @@ void MujocoWorld::AddContacts() {
 }
 
 // m/s², acceleration of the contact's point at constant qvel. In a step the point goes
-// h J v' + h² / 2 of this: J v' alone would leave a gap under a foot while the robot turns above it.
+// h J v' + h² / 2 of this: J v' alone would leave a gap under a foot while the robot turns above
+// it.
 Vector3d MujocoWorld::PointBias(const TerrainContact& at) const {
   const mjModel* m = robot_.model.get();
   const mjData* d = data_.get();
@@ -328,8 +336,7 @@ MujocoWorld::SlipChange MujocoWorld::FindSlipChange() {
     // Beyond what a point that sticks creeps at.
     const double creep = friction_softness_ * cone.friction[0] * d->efc_force[row];
     const double change = std::max(0.0, speed - creep) - contact.slip;
-    all.largest =
-        std::max(all.largest, std::abs(change) / (kSlipTolerance + kSlipShare * speed));
+    all.largest = std::max(all.largest, std::abs(change) / (kSlipTolerance + kSlipShare * speed));
     const double difference = change - contact.slip_change;
     all.along += contact.slip_change * difference;
     all.difference += difference * difference;
@@ -379,8 +386,7 @@ void MujocoWorld::Integrate() {
   for (size_t i = 0; i < num_contacts_; ++i) force += contacts_[i].force;
   const mjtNum* const robot_com = d->subtree_com + 3 * robot_.body[0];
   const Vector3d velocity =
-      RobotVelocity() +
-      step_ * (force / model_.total_mass() - robot::kGravity * Vector3d::UnitZ());
+      RobotVelocity() + step_ * (force / model_.total_mass() - robot::kGravity * Vector3d::UnitZ());
   const Vector3d com = ToEigen(robot_com) + step_ * velocity;
   VectorMap(d->qvel, m->nv) += step_ * ConstVectorMap(d->qacc, m->nv);
   mj_integratePos(m, d->qpos, d->qvel, step_);

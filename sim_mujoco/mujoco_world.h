@@ -69,15 +69,16 @@ class MujocoWorld : public World {
  private:
   struct Contact {
     TerrainContact at;
-    ContactLaw law;  // along the normal, the surface's velocity included
-    double slip;     // m/s, at which it is taken to slide
+    ContactLaw law;      // along the normal, the surface's velocity included
+    double slip;         // m/s, at which it is taken to slide
     double slip_change;  // m/s, that the last solution asks for
     Eigen::Vector3d com, force, moment;
   };
 
   struct SlipChange {
-    double largest = 0;                // of a point, over what may remain
-    double along = 0, difference = 0;  // (m/s)², of all points: change before · (now - before), |..|²
+    double largest = 0;  // of a point, over what may remain
+    double along = 0,
+           difference = 0;  // (m/s)², of all points: change before · (now - before), |..|²
   };
 
   void Advance();

@@ -1,6 +1,6 @@
-// A step of the simulated robot in each engine: standing on both feet with friction and rotors, held by a
-// spring and a damper at each joint. `--robot FILE`, as often as there are robots: Robot files beside the
-// paper's.
+// A step of the simulated robot in each engine: standing on both feet with friction and rotors,
+// held by a spring and a damper at each joint. `--robot FILE`, as often as there are robots: Robot
+// files beside the paper's.
 #include <benchmark/benchmark.h>
 
 #include <string>

@@ -41,8 +41,8 @@ TEST_F(WorldsTest, HasEveryCheckOfEveryEngine) {
 }
 
 TEST_F(WorldsTest, AFailedCheckInAnEngineFails) {
-  const ProgramResult result = RunPoise({"worlds", "pushed", "--set", "check[push_peak].at_most=1",
-                                         "--out", deploy_ / "worlds"});
+  const ProgramResult result = RunPoise(
+      {"worlds", "pushed", "--set", "check[push_peak].at_most=1", "--out", deploy_ / "worlds"});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_NE(result.output.find("FAILED"), std::string::npos);
 }
@@ -50,10 +50,11 @@ TEST_F(WorldsTest, AFailedCheckInAnEngineFails) {
 // The same bits as processes and in one process, as with ODE.
 TEST_F(WorldsTest, MujocoGivesTheSameBitsInOneProcessAndInMany) {
   const std::string one = deploy_ / "one", many = deploy_ / "many";
-  EXPECT_EQ(RunPoise({"run", "pushed", "--world", "mujoco", "--inline", "--out", one}).exit_code, 0);
-  EXPECT_EQ(RunPoise({"run", "pushed", "--world", "mujoco", "--drop", "0.02", "--out", many})
-                .exit_code,
+  EXPECT_EQ(RunPoise({"run", "pushed", "--world", "mujoco", "--inline", "--out", one}).exit_code,
             0);
+  EXPECT_EQ(
+      RunPoise({"run", "pushed", "--world", "mujoco", "--drop", "0.02", "--out", many}).exit_code,
+      0);
   const ProgramResult result = RunPoise({"compare", one, many});
   EXPECT_EQ(result.exit_code, 0) << result.output;
 }

@@ -122,7 +122,8 @@ TEST(MujocoWorld, SoftContactsAreSpringsAndDampersUnderImplicitEuler) {
   world->SetState(state);
   Vector3d com = Vector3d::Zero();
   for (int b = 0; b < static_cast<int>(model.bodies().size()); ++b) {
-    com += model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
+    com +=
+        model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
   }
   double depth = 0, v = -0.3;  // m, m/s
   state.base_linear_velocity.z() = v;
@@ -166,7 +167,8 @@ Slide SlideOneStep(const ContactMaterial& material, double vx, double vy, double
   world->SetState(state);
   Vector3d com = Vector3d::Zero();
   for (int b = 0; b < static_cast<int>(model.bodies().size()); ++b) {
-    com += model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
+    com +=
+        model.bodies()[static_cast<size_t>(b)].mass / model.total_mass() * world->com_position(b);
   }
   for (int j = 0; j < model.num_joints(); ++j) world->SetJoint(j, {true, 0, 1e-9, 0});
   // At the COM's height: friction then does not turn the robot.
@@ -183,8 +185,8 @@ Slide SlideOneStep(const ContactMaterial& material, double vx, double vy, double
   return slide;
 }
 
-// Coulomb: mu N against the slip, in every direction, and N is what carries the weight and the load,
-// however fast it slides. MuJoCo's own cone would throw the robot up at mu times the slip.
+// Coulomb: mu N against the slip, in every direction, and N is what carries the weight and the
+// load, however fast it slides. MuJoCo's own cone would throw the robot up at mu times the slip.
 TEST(MujocoWorld, SlidingSolesObeyCoulombsLaw) {
   const double mass = RigidRobot().total_mass();
   // In its first step the ground yields at softness times force: m v' = -m softness N / 4.
@@ -234,13 +236,13 @@ TEST(MujocoWorld, EveryPointObeysItsLawOverTheStepsWholeWay) {
     for (const robot::FootModel& foot : model.feet()) {
       const Eigen::Isometry3d sole = world->pose(foot.body) * foot.sole;
       for (int c = 0; c < 4; ++c) {
-        const Vector3d corner((c & 1 ? -0.5 : 0.5) * foot.length,
-                              (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+        const Vector3d corner((c & 1 ? -0.5 : 0.5) * foot.length, (c & 2 ? -0.5 : 0.5) * foot.width,
+                              0);
         const Vector3d normal =
             (sole.linear().col(2) + 0.1 * Vector3d(uniform(random), uniform(random), 0))
                 .normalized();
-        contacts.push_back({foot.body, sole * corner, normal, 1e-4 * uniform(random), 0,
-                            {mu, 0, 0}});
+        contacts.push_back(
+            {foot.body, sole * corner, normal, 1e-4 * uniform(random), 0, {mu, 0, 0}});
         in_body.push_back(foot.sole * corner);
         world->AddContact(contacts.back());
       }
@@ -258,8 +260,7 @@ TEST(MujocoWorld, EveryPointObeysItsLawOverTheStepsWholeWay) {
       const double normal = at.normal.dot(force);
       const Vector3d tangential = force - normal * at.normal;
       const Vector3d slip = way - at.normal.dot(way) * at.normal;
-      const double target =
-          at.depth / (at.depth < 0 ? h : config.contact_time_constant());
+      const double target = at.depth / (at.depth < 0 ? h : config.contact_time_constant());
       const double beyond = at.normal.dot(way) - target;  // m/s, that the force has to make up for
       if (normal == 0) {
         ++open;
@@ -284,8 +285,8 @@ TEST(MujocoWorld, EveryPointObeysItsLawOverTheStepsWholeWay) {
   EXPECT_GT(sliding, 100);
 }
 
-// The robot turns above a foot that stands, at constant joint velocities: the foot stays where it is,
-// though J̇ v would carry its points off by h² / 2 of it, some 1e-6 m a step.
+// The robot turns above a foot that stands, at constant joint velocities: the foot stays where it
+// is, though J̇ v would carry its points off by h² / 2 of it, some 1e-6 m a step.
 TEST(MujocoWorld, AFootThatStandsStaysWhileTheRobotTurnsAboveIt) {
   const robot::RobotModel model = PaperRobot();
   const double h = 1e-3;
@@ -317,7 +318,8 @@ TEST(MujocoWorld, AFootThatStandsStaysWhileTheRobotTurnsAboveIt) {
   // Into the ground by softness times force, and no further.
   const double yield = h * MujocoConfig().contact_softness() * 5000;
   EXPECT_LT((after.translation() - sole.translation()).norm(), yield);
-  EXPECT_GT(h * h / 2 * data.foot_bias_acceleration[0].norm(), 1e-6) << "the test would see nothing";
+  EXPECT_GT(h * h / 2 * data.foot_bias_acceleration[0].norm(), 1e-6)
+      << "the test would see nothing";
 }
 
 TEST(MujocoWorld, WithoutFrictionNothingHoldsSideways) {

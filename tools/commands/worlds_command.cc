@@ -124,7 +124,7 @@ std::string WorldsCsv(const std::string& scenario, const std::vector<WorldRun>& 
 }
 
 WorldRun RunWorld(const std::string& scenario, const std::string& engine, RunOptions options,
-               const fs::path& dir) {
+                  const fs::path& dir) {
   WorldRun world{engine, {}};
   options.changes.world = engine;
   fmt::print("{}: ", engine);
@@ -170,15 +170,14 @@ int Worlds(WorldsArguments arguments) {
     for (const std::string& engine : engines) {
       if (StopSignal() != 0) return kExitFailed;
       worlds.push_back(RunWorld(scenarios[i], engine, options, folder.path() / name / engine));
-      passed = passed && worlds.back().result.problem.empty() &&
-               worlds.back().result.summary.passed;
+      passed =
+          passed && worlds.back().result.problem.empty() && worlds.back().result.summary.passed;
     }
     fmt::print("\n{}\n", FormatWorlds(worlds));
     csv += WorldsCsv(name, worlds);
   }
   WriteFile(folder.path() / "worlds.csv", csv);
-  fmt::print("{}; {}\n", passed ? "all passed" : "FAILED",
-             (folder.path() / "worlds.csv").string());
+  fmt::print("{}; {}\n", passed ? "all passed" : "FAILED", (folder.path() / "worlds.csv").string());
   return passed ? kExitOk : kExitFailed;
 }
 
