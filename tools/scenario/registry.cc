@@ -15,9 +15,10 @@ namespace poise {
 const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
-    for (const ComponentType& type : {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(),
-                                      StateEstimatorType(), StepPlannerType(), TaskControllerType(),
-                                      ContactWrenchMonitorType(), RedistributorType()}) {
+    for (const ComponentType& type :
+         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), StateEstimatorType(),
+          StepPlannerType(), TaskControllerType(), ContactWrenchMonitorType(),
+          RedistributorType()}) {
       r.Add(type.name, type.summary, type.make, type.traits);
     }
     return r;
