@@ -13,7 +13,7 @@ install(TARGETS poise_shared DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
 # Headers as they are included, and the schemas that others' schemas may import.
 set(_headers include/poise)
-foreach(folder lcmtypes components sim sim_ode hw_bridge logging)
+foreach(folder lcmtypes components sim sim_ode sim_mujoco hw_bridge logging)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${_headers}
           FILES_MATCHING PATTERN "*.h" PATTERN "*.proto")
   if(NOT folder STREQUAL lcmtypes)

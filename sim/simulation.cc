@@ -301,7 +301,7 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     if (depth < -kContactMargin) continue;
     ++count;
     if (add) {
-      world_->AddContact({body, p, surface.normal, std::max(depth, 0.0),
+      world_->AddContact({body, p, surface.normal, depth,
                           surface.velocity * surface.normal.z(), terrain_.material(surface.block)});
     }
   }

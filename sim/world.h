@@ -39,7 +39,7 @@ struct TerrainContact {
   int body = 0;
   Eigen::Vector3d position;  ///< m, world
   Eigen::Vector3d normal;    ///< unit, world, out of the terrain
-  double depth = 0;          ///< m, not negative, of the body's point below the surface
+  double depth = 0;          ///< m, of the body's point below the surface; a gap is negative
   double velocity = 0;       ///< m/s, of the surface along the normal
   ContactMaterial material;
 };

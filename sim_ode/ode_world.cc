@@ -1,5 +1,6 @@
 #include "sim_ode/ode_world.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -244,7 +245,7 @@ void OdeWorld::AddContact(const TerrainContact& at) {
     contact.geom.pos[i] = at.position[i];
     contact.geom.normal[i] = at.normal[i];
   }
-  contact.geom.depth = at.depth;
+  contact.geom.depth = std::max(at.depth, 0.0);
   const dJointID joint = dJointCreateContact(world_, contacts_, &contact);
   dJointAttach(joint, bodies_[static_cast<size_t>(at.body)], nullptr);
   dJointSetFeedback(joint, &feedback_[num_contacts_++]);

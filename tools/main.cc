@@ -65,6 +65,7 @@ int main(int argc, char** argv) {
   poise::Command command;
   poise::AddRunCommand(&app, &command);
   poise::AddMatrixCommand(&app, &command);
+  poise::AddWorldsCommand(&app, &command);
   poise::AddSweepCommand(&app, &command);
   poise::AddLimitCommand(&app, &command);
   poise::AddReportCommand(&app, &command);

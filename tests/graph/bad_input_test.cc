@@ -78,8 +78,7 @@ TEST_F(BadInputTest, ImpossibleDuration) {
 }
 
 TEST_F(BadInputTest, SetNamesItsFlagAndField) {
-  ExpectRefused({"run", StandScenario(), "--set", "sim.push[0].peek=1"},
-                {"--set", "peek", "peak"});
+  ExpectRefused({"run", StandScenario(), "--set", "sim.push[0].peek=1"}, {"--set", "peek", "peak"});
   ExpectRefused({"run", StandScenario(), "--set", "sim.push[0].peak=much"},
                 {"--set", "sim.push[0].peak"});
   ExpectRefused({"run", StandScenario(), "--set", "duration"}, {"--set", "value"});
@@ -94,14 +93,20 @@ TEST_F(BadInputTest, AFormerNameIsAnsweredWithTheNewOne) {
                 {"--set sim_ode.push[0].peak", "write sim.push[0].peak"});
   ExpectRefused({"run", StandScenario(), "--set", "sim_ode.ground.cfm=1e-6"},
                 {"write ode.contact_cfm"});
-  ExpectRefused({"run", Changed("duration: 0.4", "duration: 0.4 assumption { field: "
-                                                 "\"sim_ode.push\" kind: \"assumed\" }")},
+  ExpectRefused({"run", Changed("duration: 0.4",
+                                "duration: 0.4 assumption { field: "
+                                "\"sim_ode.push\" kind: \"assumed\" }")},
                 {"assumption[0].field", "write sim.push"});
 }
 
 TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
   ExpectRefused({"run", StandScenario(), "--set", "engine=od"},
                 {"--set engine", "no engine 'od'", "ode"});
+  ExpectRefused({"run", StandScenario(), "--world", "mujuco"},
+                {"--world: engine", "no engine 'mujuco'", "mujoco"});
+  ExpectRefused(
+      {"run", StandScenario(), "--world", "mujoco", "--set", "mujoco.contact_time_constant=0.0005"},
+      {"mujoco.contact_time_constant", "less than a step"});
   ExpectRefused({"run", StandScenario(), "--set", "ode.contact_cfm=0"},
                 {"--set ode.contact_cfm", "greater than 0"});
   EXPECT_EQ(RunPoise({"run", StandScenario(), "--inline", "--set", "engine=ode", "--out",

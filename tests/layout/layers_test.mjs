@@ -23,6 +23,7 @@ const BELOW = {
   'components': BUS,
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
+  'sim_mujoco': [...BUS, 'sim'],
   'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/drive_emulator'],
   'hw_bridge/ethercat': [...BUS, 'hw_bridge', 'hw_bridge/ethercat/links'],
   'hw_bridge/ethercat/links': [...BUS, 'hw_bridge/ethercat'],

@@ -19,6 +19,7 @@ using Command = std::function<int()>;
 /// anything else (failure).
 void AddRunCommand(CLI::App* app, Command* command);
 void AddMatrixCommand(CLI::App* app, Command* command);
+void AddWorldsCommand(CLI::App* app, Command* command);
 void AddSweepCommand(CLI::App* app, Command* command);
 void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);

@@ -33,6 +33,7 @@ constexpr int64_t kMatrixStopPatience = 3'000'000'000;  // ns between SIGTERM an
 struct MatrixOptions {
   std::vector<std::string> scenarios = {kAllScenarios};
   std::vector<std::string> ablations;
+  std::string world;  ///< see RunChanges
   std::string out;
   bool force = false;
   int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -51,8 +52,9 @@ struct Job {
 
 /// Checks a cell's configuration. Throws ConfigError.
 Job MakeJob(const std::string& scenario, const std::string& unique_name, const std::string& variant,
-            const Ablation& ablation) {
+            const Ablation& ablation, const std::string& world) {
   RunChanges changes;
+  changes.world = world;
   changes.variant = variant;
   changes.ideal = ablation.ideal;
   changes.without = ablation.without;
@@ -69,6 +71,7 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   job.cell.must_pass = own_checks && ablation.flags().empty();
   job.arguments = {"run", scenario, "--inline", "--quiet"};
   if (!variant.empty()) job.arguments.insert(job.arguments.end(), {"--variant", variant});
+  if (!world.empty()) job.arguments.insert(job.arguments.end(), {"--world", world});
   for (const std::string& flag : ablation.flags()) job.arguments.push_back(flag);
   job.name = fmt::format("{}/{}", unique_name, variant.empty() ? ablation.name : variant);
   job.log_size = ExpectedLogSize(spec) * (loaded.scenario.has_reference() ? 2 : 1);
@@ -89,11 +92,11 @@ std::vector<Job> MakeJobs(const MatrixOptions& options) {
       columns.insert(ablation.name);
       if (wanted.empty() ||
           std::find(wanted.begin(), wanted.end(), ablation.name) != wanted.end()) {
-        jobs.push_back(MakeJob(scenario, name, "", ablation));
+        jobs.push_back(MakeJob(scenario, name, "", ablation, options.world));
       }
     }
     for (const Variant& variant : loaded.scenario.variant()) {
-      jobs.push_back(MakeJob(scenario, name, variant.name(), Ablations().front()));
+      jobs.push_back(MakeJob(scenario, name, variant.name(), Ablations().front(), options.world));
       jobs.back().name = fmt::format("{}/{}", name, UniqueName(variant.name(), &columns));
     }
   }
@@ -251,6 +254,8 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       ->check(CLI::IsMember(names))
       ->allow_extra_args(false)
       ->take_all();
+  matrix->add_option("--world", options->world,
+                     "engine of the simulated robot: ode or mujoco; default: the scenarios'");
   matrix->add_option("--jobs", options->jobs, "runs at a time; default: the processor's cores")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();

@@ -103,6 +103,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "a robot without joint friction, sensor noise, drive train and model error");
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
+  run->add_option("--world", options->changes.world,
+                  "engine of the simulated robot: ode or mujoco; default: the scenario's");
   run->add_option("--set", options->changes.set,
                   "change a field of the scenario, e.g. --set sim.push[0].peak=120 or "
                   "--set 'check[push_peak].at_most=200' (poise list fields); "

@@ -9,6 +9,7 @@
 #include "components/task_controller/task_controller_type.h"
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 #include "hw_bridge/hw_bridge_type.h"
+#include "sim_mujoco/sim_mujoco_type.h"
 #include "sim_ode/sim_ode_type.h"
 #include "tools/scenario/scenario.pb.h"
 
@@ -17,7 +18,7 @@ namespace poise {
 const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
-    for (const ComponentType& type : {SimOdeType(), HwBridgeType(), DriveEmulatorType(),
+    for (const ComponentType& type : {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(),
                                       StateEstimatorType(), StepPlannerType(), TaskControllerType(),
                                       ContactWrenchMonitorType(), RedistributorType()}) {
       r.Add(type);

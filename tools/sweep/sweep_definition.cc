@@ -192,6 +192,7 @@ SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(st
   if (!changes.variant.empty()) sweep.set_variant(changes.variant);
   for (const std::string& part : changes.without) sweep.add_without(part);
   if (changes.ideal) sweep.set_ideal(true);
+  if (!changes.world.empty()) sweep.add_set("engine=" + changes.world);
   for (const std::string& set : changes.set) sweep.add_set(set);
   if (changes.duration) sweep.add_set(fmt::format("duration={}", *changes.duration));
   if (arguments.limit) sweep.mutable_limit()->MergeFrom(*arguments.limit);

@@ -103,6 +103,8 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
       ->check(CLI::IsMember(RemovableParts()));
   app->add_flag("--ideal", changes->ideal,
                 "a robot without joint friction, sensor noise, drive train and model error");
+  app->add_option("--world", changes->world,
+                  "engine of the simulated robot: ode or mujoco; default: the scenario's");
   list("--set", &changes->set, "change a field of the scenario in every run (poise list fields)",
        "FIELD=VALUE");
   app->add_option("--duration", changes->duration, "simulated time of a run, s")

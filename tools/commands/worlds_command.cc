@@ -1,0 +1,222 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "components/framework/configuration.h"
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/signals.h"
+#include "tools/commands/commands.h"
+#include "tools/run/run_dir.h"
+#include "tools/run/scenario_run.h"
+#include "tools/run/several_runs.h"
+#include "tools/scenario/registry.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct WorldsArguments {
+  std::vector<std::string> scenarios = {kAllScenarios};
+  std::string out;
+  RunOptions options;
+};
+
+/// A scenario in one engine.
+struct WorldRun {
+  std::string engine;
+  RunResult result;
+  bool stands() const { return result.problem.empty() && result.summary.outcome.completed; }
+};
+
+std::vector<std::string> Engines() {
+  std::vector<std::string> engines;
+  for (const auto& [type, entry] : Components().entries()) {
+    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
+  }
+  std::sort(engines.begin(), engines.end());
+  // The paper's experiments were fitted in ODE: what it gives stands first.
+  std::stable_partition(engines.begin(), engines.end(),
+                        [](const std::string& engine) { return engine == "ode"; });
+  return engines;
+}
+
+std::string OutcomeText(const WorldRun& world) {
+  if (!world.result.problem.empty()) return "could not be run";
+  return world.stands() ? "stands" : world.result.summary.outcome.message;
+}
+
+/// Engines whose distances from the paper's figure differ by less than this share of it are equal.
+constexpr double kEqualShare = 0.01;
+
+/// The engine whose figure is nearest to the paper's; empty without that figure or between equals.
+std::string Nearest(const std::vector<WorldRun>& worlds, size_t row) {
+  std::vector<std::pair<double, std::string>> distances;
+  double paper = 0;
+  for (const WorldRun& world : worlds) {
+    const CheckResult& check = world.result.summary.checks[row];
+    if (!check.measured || !check.paper_value) return "";
+    paper = *check.paper_value;
+    distances.emplace_back(std::abs(*check.measured - paper), world.engine);
+  }
+  std::sort(distances.begin(), distances.end());
+  if (distances.size() < 2) return "";
+  const bool equal = distances[1].first - distances[0].first < kEqualShare * std::abs(paper);
+  return equal ? "" : distances[0].second;
+}
+
+/// Each figure over the first engine's; empty where that is none or 0.
+std::string Ratio(const CheckResult& first, const CheckResult& other) {
+  if (!first.measured || !other.measured || *first.measured == 0) return "";
+  return fmt::format("{:.3f}", *other.measured / *first.measured);
+}
+
+/// A row for the outcome and each check, a column for each engine.
+std::string FormatWorlds(const std::vector<WorldRun>& worlds) {
+  std::vector<TableRow> rows = {{"what", "limit", "paper"}, {"outcome", "", ""}};
+  for (const WorldRun& world : worlds) {
+    rows[0].emplace_back(world.engine);
+    rows[1].emplace_back(OutcomeText(world), world.stands() ? Tone::kGood : Tone::kBad);
+  }
+  rows[0].insert(rows[0].end(), {"ratio", "nearer the paper"});
+  rows[1].insert(rows[1].end(), {"", ""});
+  const auto ran = [](const WorldRun& world) { return world.result.problem.empty(); };
+  if (!std::all_of(worlds.begin(), worlds.end(), ran)) return FormatColumns(rows);
+  const std::vector<CheckResult>& first = worlds[0].result.summary.checks;
+  for (size_t i = 0; i < first.size(); ++i) {
+    if (first[i].of_every_run) continue;
+    TableRow row = {first[i].label, FormatLimit(first[i]), first[i].paper};
+    for (const WorldRun& world : worlds) {
+      const CheckResult& check = world.result.summary.checks[i];
+      row.emplace_back(FormatMeasured(check) + (check.passed ? "" : " FAILED"),
+                       check.passed ? Tone::kPlain : Tone::kBad);
+    }
+    row.emplace_back(Ratio(first[i], worlds.back().result.summary.checks[i]));
+    row.emplace_back(Nearest(worlds, i));
+    rows.push_back(std::move(row));
+  }
+  return FormatColumns(rows);
+}
+
+constexpr char kCsvHead[] =
+    "scenario,metric,label,unit,at_least,at_most,paper,engine,measured,passed\n";
+
+std::string CsvNumber(const std::optional<double>& value) {
+  return value ? fmt::format("{}", *value) : "";
+}
+
+std::string WorldsCsv(const std::string& scenario, const std::vector<WorldRun>& worlds) {
+  std::string lines;
+  for (const WorldRun& world : worlds) {
+    for (const CheckResult& check : world.result.summary.checks) {
+      lines += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", CsvCell(scenario), check.name,
+                           CsvCell(check.label), CsvCell(check.unit), CsvNumber(check.at_least),
+                           CsvNumber(check.at_most), CsvNumber(check.paper_value), world.engine,
+                           CsvNumber(check.measured), check.passed ? 1 : 0);
+    }
+  }
+  return lines;
+}
+
+WorldRun RunWorld(const std::string& scenario, const std::string& engine, RunOptions options,
+                  const fs::path& dir) {
+  WorldRun world{engine, {}};
+  options.changes.world = engine;
+  fmt::print("{}: ", engine);
+  std::fflush(stdout);
+  try {
+    world.result = ScenarioRun(scenario, options).Run(dir.string(), /*latest=*/false);
+  } catch (const std::exception& error) {
+    std::fflush(stdout);
+    fmt::print(stderr, "poise: {}: {}\n", engine, error.what());
+    world.result.problem = error.what();
+  }
+  return world;
+}
+
+int Worlds(WorldsArguments arguments) {
+  RunOptions& options = arguments.options;
+  options.in_process = true;
+  options.quiet = true;
+  const std::vector<std::string> engines = Engines();
+  const std::vector<std::string> scenarios = ExpandScenarios(arguments.scenarios);
+  std::vector<std::string> names;
+  LogSizes sizes;
+  for (const std::string& scenario : scenarios) {
+    for (const std::string& engine : engines) {
+      RunOptions checked = options;
+      checked.changes.world = engine;
+      const ScenarioRun run(scenario, checked);
+      if (engine == engines.front()) names.push_back(run.name());
+      sizes.sum += run.log_sizes().sum;
+      sizes.largest = std::max(sizes.largest, run.log_sizes().largest);
+    }
+  }
+  CheckSpace(arguments.out.empty() ? RunsDir() : fs::path(arguments.out), sizes, options.force);
+  const RunDir folder = MakeRunDir(arguments.out, "worlds", options.force);
+  CatchStopSignals();
+  bool passed = true;
+  std::set<std::string> taken;
+  std::string csv = kCsvHead;
+  for (size_t i = 0; i < scenarios.size(); ++i) {
+    const std::string name = UniqueName(names[i], &taken);
+    fmt::print("{}\n", name);
+    std::vector<WorldRun> worlds;
+    for (const std::string& engine : engines) {
+      if (StopSignal() != 0) return kExitFailed;
+      worlds.push_back(RunWorld(scenarios[i], engine, options, folder.path() / name / engine));
+      passed =
+          passed && worlds.back().result.problem.empty() && worlds.back().result.summary.passed;
+    }
+    fmt::print("\n{}\n", FormatWorlds(worlds));
+    csv += WorldsCsv(name, worlds);
+  }
+  WriteFile(folder.path() / "worlds.csv", csv);
+  fmt::print("{}; {}\n", passed ? "all passed" : "FAILED", (folder.path() / "worlds.csv").string());
+  return passed ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddWorldsCommand(CLI::App* app, Command* command) {
+  auto arguments = std::make_shared<WorldsArguments>();
+  RunOptions* const options = &arguments->options;
+  CLI::App* worlds = app->add_subcommand(
+      "worlds", "run scenarios in every physics engine and compare what comes of them");
+  worlds->footer(
+      "Ratio: of the last engine's figure to the first one's. Exit code 1 when a check failed in "
+      "an engine.");
+  worlds
+      ->add_option("scenario", arguments->scenarios,
+                   "names or .pbtxt files; all: every experiment of the paper")
+      ->capture_default_str();
+  worlds->add_option("--variant", options->changes.variant, "of the scenario");
+  worlds->add_option("--without", options->changes.without, "leave out a part of the controller")
+      ->check(CLI::IsMember(RemovableParts()))
+      ->allow_extra_args(false)
+      ->take_all();
+  worlds->add_flag("--ideal", options->changes.ideal,
+                   "a robot without joint friction, sensor noise, drive train and model error");
+  worlds
+      ->add_option("--set", options->changes.set,
+                   "change a field of the scenario in every engine (poise list fields)")
+      ->type_name("FIELD=VALUE")
+      ->allow_extra_args(false)
+      ->take_all();
+  worlds->add_option("--duration", options->changes.duration, "simulated time, s")
+      ->check(Within("a number of seconds in (0, 36000]",
+                     [](double s) { return s > 0 && s <= 36000; }));
+  worlds->add_option("--out", arguments->out,
+                     "folder for a run's folder each and worlds.csv; default: a dated one under "
+                     "runs/");
+  worlds->add_flag("--force", options->force,
+                   "replace what --out holds; start though the logs may not fit the disk");
+  worlds->callback([arguments, command] { *command = [arguments] { return Worlds(*arguments); }; });
+}
+
+}  // namespace poise
