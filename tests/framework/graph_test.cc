@@ -59,7 +59,7 @@ TEST_F(GraphTest, ARightGraphIsPlanned) {
   EXPECT_EQ(plan.channels[0].readers.size(), 3u);
   EXPECT_THAT(plan.channels[0].counts, ElementsAre(3, 2));
   EXPECT_EQ(plan.channels[5].writer.component, -1);
-  FillCounts(plan, &graph_);
+  FillPlan(plan, &graph_);
   EXPECT_THAT(graph_.channel(0).count(), ElementsAre(3, 2));
   EXPECT_EQ(graph_.channel(4).count_size(), 0);
 }

@@ -97,7 +97,7 @@ Messages RunInline(const RunSpec& spec) {
 ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
   ComponentRegistry registry;
   AddToyComponents(&registry);
-  FillCounts(BoundGraph(spec, registry).plan(), spec.mutable_graph());
+  FillPlan(BoundGraph(spec, registry).plan(), spec.mutable_graph());
   spec.set_recorded(options.collect);
 
   ProcessRun run;

@@ -37,7 +37,7 @@ RunSpec Toys() {
   spec.mutable_realtime_options()->set_priority(0);
   ComponentRegistry registry;
   AddToyComponents(&registry);
-  FillCounts(BoundGraph(spec, registry).plan(), spec.mutable_graph());
+  FillPlan(BoundGraph(spec, registry).plan(), spec.mutable_graph());
   return spec;
 }
 

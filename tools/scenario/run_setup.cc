@@ -208,7 +208,7 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
   try {
     CheckGraph(spec->graph(), Components());
     const BoundGraph bound(*spec, Components());
-    FillCounts(bound.plan(), spec->mutable_graph());
+    FillPlan(bound.plan(), spec->mutable_graph());
   } catch (const GraphError& error) {
     FailGraph(loaded.graph_file, error);
   } catch (const ConfigError& error) {

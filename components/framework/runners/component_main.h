@@ -1,4 +1,4 @@
-// main() of every component's program.
+// main() of every component's program, and of the one that runs several.
 #pragma once
 
 #include <string>
@@ -14,5 +14,12 @@ namespace poise {
 /// failed: health says so), 1 when the bus failed or an output was not finite, 2 for
 /// wrong usage or configuration (one line on stderr). Ends with its parent process.
 int ComponentMain(int argc, char** argv, const ComponentType& type);
+
+/// The program that runs components which share a process.
+inline constexpr char kHostProgram[] = "component_host";
+
+/// Runs the components of process --process NAME, whose types `registry` has; else as
+/// ComponentMain.
+int HostMain(int argc, char** argv, const ComponentRegistry& registry);
 
 }  // namespace poise
