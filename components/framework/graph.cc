@@ -3,6 +3,7 @@
 #include "components/framework/graph.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "components/framework/graph_order.h"
@@ -82,57 +83,6 @@ void CheckComponents(const Graph& graph, const ComponentRegistry& registry, Prob
       fail(instance.has_type() ? ".type" : ".name",
            fmt::format("unknown component type '{}'; types: {}", TypeOf(instance),
                        fmt::join(types, ", ")));
-    }
-  }
-}
-
-/// Whether the components of each process can live and die together.
-void CheckProcesses(const Graph& graph, Problems* problems) {
-  for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance& instance = graph.component(i);
-    if (!instance.has_process()) continue;
-    const std::string& process = instance.process();
-    const auto fail = [&](const std::string& text) {
-      problems->push_back({fmt::format("component[{}].process", i),
-                           fmt::format("component {}: {}", instance.name(), text)});
-    };
-    if (!IsName(process, 'a', 'z')) {
-      fail(fmt::format("'{}' is no process name; use small letters, digits and _, at most 48",
-                       process));
-      continue;
-    }
-    if (process == kRecorderName) fail("the recorder runs in a process of its own; choose another");
-    const std::vector<int> members = ComponentsOf(graph, process);
-    if (members.size() < 2) continue;
-    if (instance.owns_clock()) {
-      fail(
-          fmt::format("owns the clock and must outlive the others of process {}; leave it in a "
-                      "process of its own",
-                      process));
-    }
-    // One that disagrees with the first is named once.
-    const ComponentInstance& first = graph.component(members.front());
-    const auto agree = [&](const char* what, bool own, bool others) {
-      if (own == others) return;
-      fail(
-          fmt::format("has {0}: {1}, but {2}, in the same process {3}, has {0}: {4}; components "
-                      "of one process must agree",
-                      what, own, first.name(), process, others));
-    };
-    agree("restart", instance.restart(), first.restart());
-    agree("plant", instance.plant(), first.plant());
-  }
-  for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentInstance& instance = graph.component(i);
-    if (!instance.has_process() || instance.process() == instance.name()) continue;
-    for (int k = 0; k < graph.component_size(); ++k) {
-      const ComponentInstance& other = graph.component(k);
-      if (other.name() != instance.process() || ProcessOf(other) == instance.process()) continue;
-      problems->push_back(
-          {fmt::format("component[{}].process", i),
-           fmt::format("component {}: process {} has the name of a component that is not in it; "
-                       "choose another",
-                       instance.name(), instance.process())});
     }
   }
 }
@@ -362,11 +312,63 @@ GraphError::GraphError(const std::string& graph_name, std::vector<Problem> probl
       }()),
       problems_(std::move(problems)) {}
 
+std::vector<GraphError::Problem> ProcessProblems(const Graph& graph) {
+  Problems problems;
+  for (int i = 0; i < graph.component_size(); ++i) {
+    const ComponentInstance& instance = graph.component(i);
+    if (!instance.has_process()) continue;
+    const std::string& process = instance.process();
+    const auto fail = [&](const std::string& text) {
+      problems.push_back({fmt::format("component[{}].process", i),
+                          fmt::format("component {}: {}", instance.name(), text)});
+    };
+    if (!IsName(process, 'a', 'z')) {
+      fail(fmt::format("'{}' is no process name; use small letters, digits and _, at most 48",
+                       process));
+      continue;
+    }
+    if (process == kRecorderName) fail("the recorder runs in a process of its own; choose another");
+    const std::vector<int> members = ComponentsOf(graph, process);
+    if (members.size() < 2) continue;
+    if (instance.owns_clock()) {
+      fail(
+          fmt::format("owns the clock and must outlive the others of process {}; leave it in a "
+                      "process of its own",
+                      process));
+    }
+    // One that disagrees with the first is named once.
+    const ComponentInstance& first = graph.component(members.front());
+    const auto agree = [&](const char* what, bool own, bool others) {
+      if (own == others) return;
+      fail(
+          fmt::format("has {0}: {1}, but {2}, in the same process {3}, has {0}: {4}; components "
+                      "of one process must agree",
+                      what, own, first.name(), process, others));
+    };
+    agree("restart", instance.restart(), first.restart());
+    agree("plant", instance.plant(), first.plant());
+  }
+  for (int i = 0; i < graph.component_size(); ++i) {
+    const ComponentInstance& instance = graph.component(i);
+    if (!instance.has_process() || instance.process() == instance.name()) continue;
+    for (int k = 0; k < graph.component_size(); ++k) {
+      const ComponentInstance& other = graph.component(k);
+      if (other.name() != instance.process() || ProcessOf(other) == instance.process()) continue;
+      problems.push_back(
+          {fmt::format("component[{}].process", i),
+           fmt::format("component {}: process {} has the name of a component that is not in it; "
+                       "choose another",
+                       instance.name(), instance.process())});
+    }
+  }
+  return problems;
+}
+
 void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   Problems problems;
   CheckChannels(graph, &problems);
   CheckComponents(graph, registry, &problems);
-  CheckProcesses(graph, &problems);
+  std::ranges::move(ProcessProblems(graph), std::back_inserter(problems));
   CheckConnections(graph, &problems);
   Throw(graph, std::move(problems));
 }

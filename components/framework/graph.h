@@ -54,6 +54,10 @@ struct GraphPlan {
   std::vector<std::vector<int>> output_channel;  ///< [component][output]
 };
 
+/// What is wrong with the graph's processes: components of one must be able to live and die
+/// together.
+std::vector<GraphError::Problem> ProcessProblems(const Graph& graph);
+
 /// Checks names, types and connections as far as the graph alone tells. Throws GraphError.
 void CheckGraph(const Graph& graph, const ComponentRegistry& registry);
 
