@@ -494,13 +494,14 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::FailStage(size_t component,
 
 bool ProcessRunner::Impl::EndTick() {
   const Tick tick = MakeTick(tick_, period_, lead_);
+  // At once after the command has left: a death in between loses the tick's state.
+  if (store_ != nullptr && can_be_taken_over_) KeepState();
   bus_.SendRest();
   bus_.KeepDelayed();
   EachHealth([&](health_t& health) {
     health.tick = tick.index;
     health.utime = tick.utime;
   });
-  if (store_ != nullptr && can_be_taken_over_) KeepState();
   progress_ = NowNanoseconds();
   any_tick_ = false;
   ++tick_;
