@@ -319,10 +319,12 @@ int Run(const std::string& program, double seconds, int rounds) {
   fs::remove_all(folder);
   fs::remove(folder.string() + ".txt");
   fmt::print("ROBOT_SENSORS to JOINT_COMMAND, 500 Hz, us\n");
-  fmt::print("{:<30}{:>9}{:>9}{:>9}{:>9}{:>9}\n", "", "ticks", "median", "p99", "p99.9", "worst");
+  fmt::print("{:<30}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}\n", "", "ticks", "p1", "median", "p99", "p99.9",
+             "worst");
   const auto row = [](const char* name, const Latencies& l) {
-    fmt::print("{:<30}{:>9}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, l.us.size(), l.Quantile(0.5),
-               l.Quantile(0.99), l.Quantile(0.999), l.Quantile(1));
+    fmt::print("{:<30}{:>9}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, l.us.size(),
+               l.Quantile(0.01), l.Quantile(0.5), l.Quantile(0.99), l.Quantile(0.999),
+               l.Quantile(1));
   };
   row("five processes, with control", processes);
   row("liblcm alone, five hops", bare);
