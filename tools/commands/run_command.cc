@@ -56,8 +56,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "its messages in memory, and sends them to all others as ever")
       ->excludes(in_process);
   run->add_option("--host", options->changes.host,
-                  "put these components into one process, e.g. "
-                  "--host estimation=state_estimator,step_planner")
+                  "put these components of the graph into one process of that name")
       ->type_name("PROCESS=A,B,...")
       ->allow_extra_args(false)
       ->take_all()
