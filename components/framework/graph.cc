@@ -3,6 +3,7 @@
 #include "components/framework/graph.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 
 #include "components/framework/graph_order.h"
@@ -346,10 +347,63 @@ GraphError::GraphError(const std::string& graph_name, std::vector<Problem> probl
       }()),
       problems_(std::move(problems)) {}
 
+std::vector<GraphError::Problem> ProcessProblems(const Graph& graph) {
+  Problems problems;
+  for (int i = 0; i < graph.component_size(); ++i) {
+    const ComponentInstance& instance = graph.component(i);
+    if (!instance.has_process()) continue;
+    const std::string& process = instance.process();
+    const auto fail = [&](const std::string& text) {
+      problems.push_back({fmt::format("component[{}].process", i),
+                          fmt::format("component {}: {}", instance.name(), text)});
+    };
+    if (!IsName(process, 'a', 'z')) {
+      fail(fmt::format("'{}' is no process name; use small letters, digits and _, at most 48",
+                       process));
+      continue;
+    }
+    if (process == kRecorderName) fail("the recorder runs in a process of its own; choose another");
+    const std::vector<int> members = ComponentsOf(graph, process);
+    if (members.size() < 2) continue;
+    if (instance.owns_clock()) {
+      fail(
+          fmt::format("owns the clock and must outlive the others of process {}; leave it in a "
+                      "process of its own",
+                      process));
+    }
+    // One that disagrees with the first is named once.
+    const ComponentInstance& first = graph.component(members.front());
+    const auto agree = [&](const char* what, bool own, bool others) {
+      if (own == others) return;
+      fail(
+          fmt::format("has {0}: {1}, but {2}, in the same process {3}, has {0}: {4}; components "
+                      "of one process must agree",
+                      what, own, first.name(), process, others));
+    };
+    agree("restart", instance.restart(), first.restart());
+    agree("plant", instance.plant(), first.plant());
+  }
+  for (int i = 0; i < graph.component_size(); ++i) {
+    const ComponentInstance& instance = graph.component(i);
+    if (!instance.has_process() || instance.process() == instance.name()) continue;
+    for (int k = 0; k < graph.component_size(); ++k) {
+      const ComponentInstance& other = graph.component(k);
+      if (other.name() != instance.process() || ProcessOf(other) == instance.process()) continue;
+      problems.push_back(
+          {fmt::format("component[{}].process", i),
+           fmt::format("component {}: process {} has the name of a component that is not in it; "
+                       "choose another",
+                       instance.name(), instance.process())});
+    }
+  }
+  return problems;
+}
+
 void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   Problems problems;
   CheckChannels(graph, &problems);
   CheckComponents(graph, registry, &problems);
+  std::ranges::move(ProcessProblems(graph), std::back_inserter(problems));
   CheckConnections(graph, &problems);
   for (int i = 0; i < graph.component_size(); ++i) {
     const ComponentType* const type = registry.TypeNamed(TypeOf(graph.component(i)));
@@ -380,10 +434,19 @@ GraphPlan PlanGraph(const Graph& graph, const std::vector<const Wiring*>& wiring
   return plan;
 }
 
-void FillCounts(const GraphPlan& plan, Graph* graph) {
+void FillPlan(const GraphPlan& plan, Graph* graph) {
   for (int i = 0; i < graph->channel_size(); ++i) {
     const MessageCounts& counts = plan.channels[static_cast<size_t>(i)].counts;
     graph->mutable_channel(i)->mutable_count()->Assign(counts.begin(), counts.end());
+  }
+  for (int i = 0; i < graph->component_size(); ++i) {
+    ComponentInstance* instance = graph->mutable_component(i);
+    instance->clear_stage_place();
+    if (ComponentsOf(*graph, ProcessOf(*instance)).size() < 2) continue;
+    for (size_t place = 0; place < plan.order.size(); ++place) {
+      // Its own stages stand in their order.
+      if (plan.order[place].component == i) instance->add_stage_place(static_cast<int>(place));
+    }
   }
 }
 
@@ -391,6 +454,7 @@ ConfiguredComponent ConfigureComponent(const RunSpec& spec, int index,
                                        const ComponentFactory& factory, SharedObjects* shared) {
   ConfiguredComponent result;
   const ComponentInstance& instance = spec.graph().component(index);
+  result.index = index;
   result.name = instance.name();
   result.component = factory();
   ComponentContext context;

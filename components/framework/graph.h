@@ -54,6 +54,10 @@ struct GraphPlan {
   std::vector<std::vector<int>> output_channel;  ///< [component][output]
 };
 
+/// What is wrong with the graph's processes: components of one must be able to live and die
+/// together.
+std::vector<GraphError::Problem> ProcessProblems(const Graph& graph);
+
 /// Checks names, types and connections as far as the graph and the components' declared ports tell.
 /// Throws GraphError.
 void CheckGraph(const Graph& graph, const ComponentRegistry& registry);
@@ -64,11 +68,13 @@ void CheckWiring(const Graph& graph, int component, const Wiring& wiring);
 /// Checks everything; wirings[i] belongs to graph.component(i). Throws GraphError.
 GraphPlan PlanGraph(const Graph& graph, const std::vector<const Wiring*>& wirings);
 
-/// Writes the counts of every channel into `graph` (Channel.count).
-void FillCounts(const GraphPlan& plan, Graph* graph);
+/// Writes what processes must know of the whole into `graph`: the counts of every channel
+/// (Channel.count), and the order of the stages of components that share a process (stage_place).
+void FillPlan(const GraphPlan& plan, Graph* graph);
 
 /// One configured component of a run.
 struct ConfiguredComponent {
+  int index = -1;  ///< in the graph
   std::string name;
   std::unique_ptr<Component> component;
   Wiring wiring;

@@ -1,5 +1,6 @@
 #include "components/framework/run.h"
 
+#include <algorithm>
 #include <cctype>
 
 #include "fmt/format.h"
@@ -48,6 +49,27 @@ uint64_t InstanceSeed(uint64_t seed, std::string_view name) {
 
 const std::string& TypeOf(const ComponentInstance& instance) {
   return instance.has_type() ? instance.type() : instance.name();
+}
+
+const std::string& ProcessOf(const ComponentInstance& instance) {
+  return instance.has_process() ? instance.process() : instance.name();
+}
+
+std::vector<std::string> ProcessNames(const Graph& graph) {
+  std::vector<std::string> names;
+  for (const ComponentInstance& instance : graph.component()) {
+    const std::string& name = ProcessOf(instance);
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<int> ComponentsOf(const Graph& graph, std::string_view process) {
+  std::vector<int> components;
+  for (int i = 0; i < graph.component_size(); ++i) {
+    if (ProcessOf(graph.component(i)) == process) components.push_back(i);
+  }
+  return components;
 }
 
 std::string ServiceUrl(const RunSpec& spec) { return Url(spec, 0); }

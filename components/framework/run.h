@@ -25,6 +25,13 @@ uint64_t InstanceSeed(uint64_t seed, std::string_view name);
 /// Component type of an instance: its type, or its name when it has none.
 const std::string& TypeOf(const ComponentInstance& instance);
 
+/// Process that an instance runs in: its process, or its name when it has none.
+const std::string& ProcessOf(const ComponentInstance& instance);
+/// Names of the graph's processes, each where its first component stands.
+std::vector<std::string> ProcessNames(const Graph& graph);
+/// Indexes of the components that run in a process, in the graph's order.
+std::vector<int> ComponentsOf(const Graph& graph, std::string_view process);
+
 /// "udpm://GROUP:PORT?ttl=TTL" of the services port (CONTROL, HEALTH_*), the public mirror, channel
 /// `i` of the graph.
 std::string ServiceUrl(const RunSpec& spec);

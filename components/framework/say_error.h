@@ -6,8 +6,8 @@
 
 namespace poise {
 
-/// Writes `line` to stderr if that can be written. fmt::print throws where a full disk takes nothing
-/// more, which would end a catch handler, and with it the program, by SIGABRT.
+/// Writes `line` to stderr if that can be written. fmt::print throws where a full disk takes
+/// nothing more, which would end a catch handler, and with it the program, by SIGABRT.
 inline void SayError(const std::string& line) {
   std::fputs((line + "\n").c_str(), stderr);
   std::fflush(stderr);

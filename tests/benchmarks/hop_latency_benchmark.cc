@@ -1,5 +1,6 @@
-// Time from a sensor message on the bus to the command that answers it: the control components as
-// processes at 500 Hz, and the same hops, sizes, readers and scheduling with liblcm alone, in turn.
+// Time from a sensor message on the bus to the command that answers it, at 500 Hz, in turn: the
+// control components as processes; all of them in one process; and the hops of either, with the
+// same sizes, readers and scheduling, with liblcm alone.
 // Times are the kernel's, of the datagrams' arrival at one listener: neither side is asked.
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -41,7 +42,7 @@ constexpr int64_t kSecond = 1'000'000'000;  // ns
 constexpr int64_t kPeriod = kSecond / 500;  // ns
 constexpr const char* kHops[] = {"ROBOT_SENSORS", "ROBOT_STATE",    "SUPPORT_PLAN",
                                  "TASK_TORQUE",   "BALANCE_TORQUE", "JOINT_COMMAND"};
-constexpr int kNumHops = 6;
+constexpr int kNumMessages = 6;
 
 /// Hears the datagrams of one channel with the time at which the kernel got them.
 class Ear {
@@ -132,11 +133,16 @@ void Listen(const std::string& group, int first_port, int last_port, size_t firs
 /// A ring of processes over liblcm: each answers the channel before its own.
 class BareRing {
  public:
-  /// `sizes` of the six messages; `readers[i]`: channels that process i reads beside the one it
-  /// answers.
-  BareRing(const RunSpec& spec, int first_port, const std::vector<size_t>& sizes)
-      : spec_(spec), first_port_(first_port), sizes_(sizes) {
-    for (int i = 0; i < kNumHops; ++i) {
+  /// The messages on the way, with their sizes; each but the first is a process's answer to the one
+  /// before.
+  BareRing(const RunSpec& spec, int first_port, std::vector<const char*> names,
+           std::vector<size_t> sizes)
+      : spec_(spec),
+        first_port_(first_port),
+        num_(static_cast<int>(names.size())),
+        names_(std::move(names)),
+        sizes_(std::move(sizes)) {
+    for (int i = 0; i < num_; ++i) {
       const pid_t parent = getpid();
       const pid_t pid = fork();
       if (pid == 0) {
@@ -144,7 +150,7 @@ class BareRing {
         if (getppid() != parent) _exit(1);
         prctl(PR_SET_TIMERSLACK, 1000);
         AskForRealtime(spec_.realtime_options(), i == 0 ? Timing::kOwner : Timing::kFollower,
-                       i == 0 ? 0 : kNumHops - i);
+                       i == 0 ? 0 : num_ - i);
         if (i == 0) Source();
         Answer(i);
       }
@@ -159,24 +165,25 @@ class BareRing {
   BareRing& operator=(const BareRing&) = delete;
 
  private:
+  const char* Name(int hop) const { return names_[static_cast<size_t>(hop)]; }
   std::string Url(int hop) const {
     return fmt::format("udpm://{}:{}?ttl=0", spec_.multicast_group(), first_port_ + hop);
   }
   /// Every period a message, and the answer is waited for as the bridge does.
   [[noreturn]] void Source() {
-    lcm::LCM out(Url(0)), in(Url(kNumHops - 1));
+    lcm::LCM out(Url(0)), in(Url(num_ - 1));
     if (!out.good() || !in.good()) _exit(1);
     struct Handler {
       void Handle(const lcm::ReceiveBuffer*, const std::string&) {}
     } handler;
-    in.subscribe(kHops[kNumHops - 1], &Handler::Handle, &handler)->setQueueCapacity(0);
+    in.subscribe(Name(num_ - 1), &Handler::Handle, &handler)->setQueueCapacity(0);
     std::vector<uint8_t> data(sizes_[0]);
     int64_t next = NowNanoseconds();
     for (int64_t tick = 0;; ++tick) {
       const timespec deadline{next / kSecond, next % kSecond};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr);
       Stamp(tick, &data);
-      out.publish(kHops[0], data.data(), static_cast<unsigned>(data.size()));
+      out.publish(Name(0), data.data(), static_cast<unsigned>(data.size()));
       in.handleTimeout(1);
       next += kPeriod;
     }
@@ -190,18 +197,18 @@ class BareRing {
       void Handle(const lcm::ReceiveBuffer* buffer, const std::string&) {
         if (out == nullptr) return;
         std::memcpy(data.data(), buffer->data, 8);
-        out->publish(kHops[hop], data.data(), static_cast<unsigned>(data.size()));
+        out->publish(name, data.data(), static_cast<unsigned>(data.size()));
       }
       lcm::LCM* out = nullptr;
-      int hop = 0;
+      const char* name = nullptr;
       std::vector<uint8_t> data;
     };
-    Handler handler{&out, hop, std::vector<uint8_t>(sizes_[static_cast<size_t>(hop)])};
+    Handler handler{&out, Name(hop), std::vector<uint8_t>(sizes_[static_cast<size_t>(hop)])};
     Handler ignore{};
-    in.subscribe(kHops[hop - 1], &Handler::Handle, &handler)->setQueueCapacity(0);
+    in.subscribe(Name(hop - 1), &Handler::Handle, &handler)->setQueueCapacity(0);
     for (int other = 1; other < std::min(hop - 1, 3); ++other) {
       others.push_back(std::make_unique<lcm::LCM>(Url(other)));
-      others.back()->subscribe(kHops[other], &Handler::Handle, &ignore)->setQueueCapacity(0);
+      others.back()->subscribe(Name(other), &Handler::Handle, &ignore)->setQueueCapacity(0);
     }
     std::vector<pollfd> fds = {{in.getFileno(), POLLIN, 0}};
     for (const auto& other : others) fds.push_back({other->getFileno(), POLLIN, 0});
@@ -222,6 +229,8 @@ class BareRing {
 
   const RunSpec& spec_;
   int first_port_;
+  int num_;
+  std::vector<const char*> names_;
   std::vector<size_t> sizes_;
   std::vector<pid_t> pids_;
 };
@@ -237,66 +246,94 @@ const MessageType& TypeOfChannel(const RunSpec& spec, int channel) {
   return *FindMessageType(spec.graph().channel(channel).type());
 }
 
+/// Runs the control graph for `seconds` and measures it; `spec` gets the run. False when it failed.
+bool MeasureRun(const std::string& program, double seconds, bool hosted,
+                const std::filesystem::path& folder, RunSpec* spec, Latencies* latencies) {
+  std::filesystem::remove_all(folder);
+  std::vector<std::string> command = {program,
+                                      "run",
+                                      "push_double_support",
+                                      "--set",
+                                      "sim.push=",
+                                      "--realtime",
+                                      "--no-log",
+                                      "--no-reference",
+                                      "--quiet",
+                                      "--duration",
+                                      fmt::format("{}", seconds + 3),
+                                      "--out",
+                                      folder.string()};
+  if (hosted) command.emplace_back("--hosted");
+  ChildProcess run("poise", command, folder.string() + ".txt");
+  const std::filesystem::path file = folder / "run_spec.pbtxt";
+  usleep(2'000'000);  // until it runs
+  if (run.ended() || !std::filesystem::exists(file)) {
+    for (const std::string& line : LastLines(run.log_path(), 5)) fmt::print(stderr, "{}\n", line);
+    return false;
+  }
+  ReadTextProto(file.string(), spec);
+  const int first = ChannelIndex(*spec, kHops[0]),
+            last = ChannelIndex(*spec, kHops[kNumMessages - 1]);
+  const auto offset = [&](int channel) {
+    return static_cast<size_t>(TypeOfChannel(*spec, channel).run_id_offset) + 8;
+  };
+  Listen(spec->multicast_group(), spec->first_port() + 2 + first, spec->first_port() + 2 + last,
+         offset(first), offset(last), seconds, latencies);
+  while (!run.ended()) usleep(10'000);
+  return true;
+}
+
+/// The same with liblcm alone, over the messages `hops` of a run that is over.
+void MeasureBare(const RunSpec& spec, const std::vector<const char*>& hops, double seconds,
+                 Latencies* latencies) {
+  std::vector<size_t> sizes;
+  for (const char* hop : hops) {
+    const int channel = ChannelIndex(spec, hop);
+    const auto& counts = spec.graph().channel(channel).count();
+    sizes.push_back(
+        static_cast<size_t>(TypeOfChannel(spec, channel)
+                                .encoded_size(std::vector<int32_t>(counts.begin(), counts.end()))));
+  }
+  // The run's own ports are free again.
+  BareRing ring(spec, spec.first_port(), hops, sizes);
+  usleep(500'000);
+  Listen(spec.multicast_group(), spec.first_port(),
+         spec.first_port() + static_cast<int>(hops.size()) - 1, 0, 0, seconds, latencies);
+}
+
 int Run(const std::string& program, double seconds, int rounds) {
   namespace fs = std::filesystem;
-  Latencies ours, bare;
+  Latencies processes, bare, hosted, bare_hosted;
   const fs::path folder = fs::temp_directory_path() / fmt::format("poise_hops_{}", getpid());
-  for (int round = 0; round < rounds; ++round) {
-    fmt::print(stderr, "round {} of {}: {:.0f} s each\n", round + 1, rounds, seconds);
-    fs::remove_all(folder);
+  bool good = true;
+  for (int round = 0; good && round < rounds; ++round) {
+    fmt::print(stderr, "round {} of {}: {:.0f} s each of four\n", round + 1, rounds, seconds);
     RunSpec spec;
-    {
-      ChildProcess run("poise",
-                       {program, "run", "push_double_support", "--set", "sim.push=", "--realtime",
-                        "--no-log", "--no-reference", "--quiet", "--duration",
-                        fmt::format("{}", seconds + 3), "--out", folder.string()},
-                       folder.string() + ".txt");
-      const fs::path file = folder / "run_spec.pbtxt";
-      usleep(2'000'000);  // until it runs
-      if (run.ended() || !fs::exists(file)) {
-        for (const std::string& line : LastLines(run.log_path(), 5))
-          fmt::print(stderr, "{}\n", line);
-        return 1;
-      }
-      ReadTextProto(file.string(), &spec);
-      const int first = ChannelIndex(spec, kHops[0]),
-                last = ChannelIndex(spec, kHops[kNumHops - 1]);
-      const auto offset = [&](int channel) {
-        return static_cast<size_t>(TypeOfChannel(spec, channel).run_id_offset) + 8;
-      };
-      Listen(spec.multicast_group(), spec.first_port() + 2 + first, spec.first_port() + 2 + last,
-             offset(first), offset(last), seconds, &ours);
-      while (!run.ended()) usleep(10'000);
-    }
-    std::vector<size_t> sizes;
-    for (const char* hop : kHops) {
-      const int channel = ChannelIndex(spec, hop);
-      const auto& counts = spec.graph().channel(channel).count();
-      sizes.push_back(static_cast<size_t>(
-          TypeOfChannel(spec, channel)
-              .encoded_size(std::vector<int32_t>(counts.begin(), counts.end()))));
-    }
-    // The run's own ports are free again.
-    BareRing ring(spec, spec.first_port(), sizes);
-    usleep(500'000);
-    Listen(spec.multicast_group(), spec.first_port(), spec.first_port() + kNumHops - 1, 0, 0,
-           seconds, &bare);
+    good = MeasureRun(program, seconds, false, folder, &spec, &processes);
+    if (!good) break;
+    MeasureBare(spec, {std::begin(kHops), std::end(kHops)}, seconds, &bare);
+    good = MeasureRun(program, seconds, true, folder, &spec, &hosted);
+    if (!good) break;
+    MeasureBare(spec, {kHops[0], kHops[kNumMessages - 1]}, seconds, &bare_hosted);
   }
   fs::remove_all(folder);
   fs::remove(folder.string() + ".txt");
-  fmt::print("ROBOT_SENSORS to JOINT_COMMAND, five hops, 500 Hz, us\n");
-  fmt::print("{:<22}{:>9}{:>9}{:>9}{:>9}{:>9}\n", "", "ticks", "median", "p99", "p99.9", "worst");
+  fmt::print("ROBOT_SENSORS to JOINT_COMMAND, 500 Hz, us\n");
+  fmt::print("{:<30}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}\n", "", "ticks", "p1", "median", "p99", "p99.9",
+             "worst");
   const auto row = [](const char* name, const Latencies& l) {
-    fmt::print("{:<22}{:>9}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, l.us.size(), l.Quantile(0.5),
-               l.Quantile(0.99), l.Quantile(0.999), l.Quantile(1));
+    fmt::print("{:<30}{:>9}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}{:>9.1f}\n", name, l.us.size(),
+               l.Quantile(0.01), l.Quantile(0.5), l.Quantile(0.99), l.Quantile(0.999),
+               l.Quantile(1));
   };
-  row("Poise, with control", ours);
-  row("liblcm alone", bare);
-  if (ours.us.empty() || bare.us.empty()) return 1;
-  fmt::print("{:<22}{:>9}{:>9.2f}{:>9.2f}{:>9.2f}{:>9.2f}\n", "ratio", "",
-             ours.Quantile(0.5) / bare.Quantile(0.5), ours.Quantile(0.99) / bare.Quantile(0.99),
-             ours.Quantile(0.999) / bare.Quantile(0.999), ours.Quantile(1) / bare.Quantile(1));
-  return 0;
+  row("five processes, with control", processes);
+  row("liblcm alone, five hops", bare);
+  row("hosted in one, with control", hosted);
+  row("liblcm alone, one hop", bare_hosted);
+  return good && !processes.us.empty() && !bare.us.empty() && !hosted.us.empty() &&
+                 !bare_hosted.us.empty()
+             ? 0
+             : 1;
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST_F(GraphTest, ARightGraphIsPlanned) {
   EXPECT_EQ(plan.channels[0].readers.size(), 3u);
   EXPECT_THAT(plan.channels[0].counts, ElementsAre(3, 2));
   EXPECT_EQ(plan.channels[5].writer.component, -1);
-  FillCounts(plan, &graph_);
+  FillPlan(plan, &graph_);
   EXPECT_THAT(graph_.channel(0).count(), ElementsAre(3, 2));
   EXPECT_EQ(graph_.channel(4).count_size(), 0);
 }
@@ -101,6 +101,39 @@ TEST_F(GraphTest, NamesMustBeUniqueAndWellFormed) {
     graph_.mutable_channel(6)->set_name(name);
     EXPECT_THAT(Problems(graph_), HasSubstr("the name is taken by the framework"));
   }
+}
+
+TEST_F(GraphTest, ComponentsOfOneProcessMustAgree) {
+  for (ComponentInstance& instance : *graph_.mutable_component()) instance.set_process("host");
+  EXPECT_EQ(Problems(graph_), "");
+  Graph graph = graph_;
+  graph.mutable_component(1)->set_restart(true);
+  EXPECT_EQ(Problems(graph),
+            "graph toy_loop: component[1].process: component filter: has restart: true, but "
+            "controller, in the same process host, has restart: false; components of one process "
+            "must agree");
+  graph = graph_;
+  graph.mutable_component(2)->set_plant(true);
+  EXPECT_THAT(Problems(graph), HasSubstr("component plant: has plant: true, but controller"));
+  graph = graph_;
+  graph.mutable_component(0)->set_owns_clock(true);
+  EXPECT_THAT(Problems(graph),
+              HasSubstr("component controller: owns the clock and must outlive the others of "
+                        "process host; leave it in a process of its own"));
+  graph = graph_;
+  graph.mutable_component(0)->set_process("Host");
+  EXPECT_THAT(Problems(graph), HasSubstr("'Host' is no process name"));
+  graph.mutable_component(0)->set_process("recorder");
+  EXPECT_THAT(Problems(graph), HasSubstr("the recorder runs in a process of its own"));
+  graph = graph_;
+  graph.mutable_component(0)->clear_process();
+  graph.mutable_component(1)->set_process("controller");
+  graph.mutable_component(2)->set_process("plant");
+  EXPECT_EQ(Problems(graph), "");  // filter joins controller
+  graph.mutable_component(0)->set_process("plant");
+  EXPECT_THAT(Problems(graph),
+              HasSubstr("component filter: process controller has the name of a component that is "
+                        "not in it"));
 }
 
 TEST_F(GraphTest, UnknownMessageType) {

@@ -55,9 +55,13 @@ class Children {
     }
     unlink(path_.c_str());
   }
-  void StartOne(const ComponentInstance& instance) {
-    pids[instance.name()] =
-        Start({TOY_PROCESS, TypeOf(instance), "--run", path_, "--component", instance.name()});
+  void StartOne(const Graph& graph, const std::string& process) {
+    const std::vector<int> members = ComponentsOf(graph, process);
+    const ComponentInstance& first = graph.component(members.front());
+    pids[process] =
+        members.size() > 1
+            ? Start({TOY_PROCESS, "host", "--run", path_, "--process", process})
+            : Start({TOY_PROCESS, TypeOf(first), "--run", path_, "--component", first.name()});
   }
   /// Collects those that have ended.
   void Reap(std::map<std::string, int>* exit_codes) {
@@ -97,7 +101,7 @@ Messages RunInline(const RunSpec& spec) {
 ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
   ComponentRegistry registry;
   AddToyComponents(&registry);
-  FillCounts(BoundGraph(spec, registry).plan(), spec.mutable_graph());
+  FillPlan(BoundGraph(spec, registry).plan(), spec.mutable_graph());
   spec.set_recorded(options.collect);
 
   ProcessRun run;
@@ -118,11 +122,11 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
                               nullptr});
   ControlClient control(spec);
   Children children(spec);
-  std::vector<ComponentInstance> order(spec.graph().component().begin(),
-                                       spec.graph().component().end());
+  std::vector<std::string> order = ProcessNames(spec.graph());
   if (options.reverse) std::reverse(order.begin(), order.end());
   bool late = options.late_after_ms > 0;
-  for (size_t i = 0; i + (late ? 1 : 0) < order.size(); ++i) children.StartOne(order[i]);
+  for (size_t i = 0; i + (late ? 1 : 0) < order.size(); ++i)
+    children.StartOne(spec.graph(), order[i]);
 
   const auto begin = Clock::now();
   auto next_start = begin;
@@ -135,7 +139,7 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
     children.Reap(&run.exit_codes);
     const auto now = Clock::now();
     if (late && now - begin > std::chrono::milliseconds(options.late_after_ms)) {
-      children.StartOne(order.back());
+      children.StartOne(spec.graph(), order.back());
       late = false;
     }
     running = running || control.AllReached(health_t::STATE_RUNNING);
@@ -169,6 +173,28 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
     }
   }
   return run;
+}
+
+void Configure(RunSpec* spec, const std::string& name, const std::string& text) {
+  ComponentConfig* config = spec->add_config();
+  config->set_component(name);
+  config->set_text(text);
+}
+
+void ExpectEqualToInline(const RunSpec& spec, const ProcessRun& run, int64_t ticks) {
+  ASSERT_FALSE(run.timed_out);
+  EXPECT_EQ(run.final_tick, ticks - 1);
+  EXPECT_EQ(run.missing, 0);
+  for (const auto& [name, code] : run.exit_codes) EXPECT_EQ(code, 0) << name;
+  EXPECT_EQ(run.exit_codes.size(), ProcessNames(spec.graph()).size());
+  const Messages expected = RunInline(spec);
+  for (size_t channel = 0; channel < expected.size(); ++channel) {
+    const std::string& name = spec.graph().channel(static_cast<int>(channel)).name();
+    ASSERT_EQ(run.messages[channel].size(), expected[channel].size()) << name;
+    for (size_t tick = 0; tick < expected[channel].size(); ++tick) {
+      ASSERT_EQ(run.messages[channel][tick], expected[channel][tick]) << name << " tick " << tick;
+    }
+  }
 }
 
 std::pair<int, std::string> RunProgram(const std::vector<std::string>& arguments) {

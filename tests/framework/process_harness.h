@@ -23,15 +23,16 @@ Messages RunInline(const RunSpec& spec);
 struct ProcessRun {
   Messages messages;
   std::map<std::string, health_t> health;  ///< last seen, by component
-  std::map<std::string, int> exit_codes;   ///< minus the signal for a process that one ended
+  std::map<std::string, int>
+      exit_codes;  ///< by process; minus the signal for a process that one ended
   int64_t final_tick = -1;
   int64_t missing = -1;
   bool timed_out = false;
 };
 
 struct HarnessOptions {
-  bool reverse = false;   ///< start the components in reverse order
-  int late_after_ms = 0;  ///< start the last component this long after the first COMMAND_START
+  bool reverse = false;   ///< start the processes in reverse order
+  int late_after_ms = 0;  ///< start the last process this long after the first COMMAND_START
   bool collect = true;    ///< a recorder takes part
   int max_seconds = 60;   ///< a run that takes longer is ended and marked
   std::function<void()> while_running = nullptr;  ///< called every few milliseconds once all run
@@ -41,7 +42,14 @@ struct HarnessOptions {
   std::function<bool(const std::map<std::string, pid_t>&)> end = nullptr;
 };
 
-/// Fills in the channels' counts, runs `spec` and waits until all processes have gone.
+/// All processes of `run` gone with exit code 0, nothing missing, every byte as inline.
+void ExpectEqualToInline(const RunSpec& spec, const ProcessRun& run, int64_t ticks);
+
+/// Adds a component's own configuration.
+void Configure(RunSpec* spec, const std::string& name, const std::string& text);
+
+/// Fills in what processes must know of the graph, runs `spec` and waits until all processes have
+/// gone.
 ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options = {});
 
 /// Runs a program and returns its exit code and what it wrote to stderr.

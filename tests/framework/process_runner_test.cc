@@ -19,29 +19,6 @@ using ::testing::HasSubstr;
 
 constexpr int64_t kTicks = 1500;
 
-void Configure(RunSpec* spec, const std::string& name, const std::string& text) {
-  ComponentConfig* config = spec->add_config();
-  config->set_component(name);
-  config->set_text(text);
-}
-
-/// All processes gone with exit code 0, nothing missing, every byte as inline.
-void ExpectEqualToInline(const RunSpec& spec, const ProcessRun& run, int64_t ticks) {
-  ASSERT_FALSE(run.timed_out);
-  EXPECT_EQ(run.final_tick, ticks - 1);
-  EXPECT_EQ(run.missing, 0);
-  for (const auto& [name, code] : run.exit_codes) EXPECT_EQ(code, 0) << name;
-  EXPECT_EQ(run.exit_codes.size(), static_cast<size_t>(spec.graph().component_size()));
-  const Messages expected = RunInline(spec);
-  for (size_t channel = 0; channel < expected.size(); ++channel) {
-    const std::string& name = spec.graph().channel(static_cast<int>(channel)).name();
-    ASSERT_EQ(run.messages[channel].size(), expected[channel].size()) << name;
-    for (size_t tick = 0; tick < expected[channel].size(); ++tick) {
-      ASSERT_EQ(run.messages[channel][tick], expected[channel][tick]) << name << " tick " << tick;
-    }
-  }
-}
-
 TEST(ProcessRunner, GivesTheBytesOfTheInlineRunner) {
   const RunSpec spec = ToyRun(ToyLoop(), kTicks);
   const ProcessRun run = RunAsProcesses(spec);

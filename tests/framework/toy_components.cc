@@ -173,6 +173,10 @@ class ToySink final : public Toy {
       MaybeFinish(tick);
     });
   }
+  bool Archive(StateArchive* archive) override {
+    archive->Show(sum_->force[0]);
+    return true;
+  }
 
  private:
   Input<external_push_t> push_;

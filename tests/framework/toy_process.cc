@@ -1,4 +1,5 @@
-// The toy components as processes: toy_process TYPE --run FILE --component NAME.
+// The toy components as processes: toy_process TYPE --run FILE --component NAME, or several in one:
+// toy_process host --run FILE --process NAME.
 #include "components/framework/runners/component_main.h"
 #include "tests/framework/toy_components.h"
 
@@ -7,6 +8,7 @@ int main(int argc, char** argv) {
   poise::ComponentRegistry registry;
   poise::AddToyComponents(&registry);
   const std::string type = argv[1];
+  if (type == "host") return poise::HostMain(argc - 1, argv + 1, registry);
   const poise::ComponentFactory* factory = registry.Find(type);
   if (factory == nullptr) return 2;
   return poise::ComponentMain(argc - 1, argv + 1, {type, "", *factory});

@@ -44,6 +44,31 @@ TEST(Realtime, EveryProcessThatIsKilledIsReplacedAndTheRobotMissesNoCycle) {
   EXPECT_LE(restarts, killed);
 }
 
+TEST(Realtime, AHostedControllerThatIsKilledIsReplacedAsOne) {
+  RunFolder folder;
+  const std::string run = folder / "run";
+  const ProgramResult result =
+      RunPoise({"run", StandScenario(), "--realtime", "--hosted", "--duration", "3", "--kill", "4",
+                "--kill-seed", "3", "--out", run});
+  const int killed = LinesWith(result.output, "killed ");
+  const int faults = killed + LinesWith(result.output, "stopped 100 ms ");
+  ASSERT_GE(killed, 1) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("3 processes (controller: state_estimator, step_planner"));
+  EXPECT_THAT(result.output, HasSubstr(std::to_string(faults) + " faults, " +
+                                       std::to_string(killed) + " processes replaced"));
+  EXPECT_TRUE(ProcessesWith(run).empty());
+  const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
+  ASSERT_GT(record.num_ticks, 100);
+  for (int64_t tick = 0; tick < record.num_ticks - 20; ++tick) {
+    ASSERT_NE(record.bridge.at(tick), nullptr) << tick;
+  }
+  // All were replaced together.
+  for (const char* name : {"state_estimator", "step_planner", "task_controller",
+                           "contact_wrench_monitor", "redistributor"}) {
+    EXPECT_EQ(record.health.at(name).restarts, killed) << name;
+  }
+}
+
 TEST(Realtime, ALongRunNeedsNoLog) {
   RunFolder folder;
   const std::string run = folder / "run";
@@ -61,6 +86,19 @@ TEST(Realtime, RefusesWhatOnlyRealTimeHas) {
   ExpectUsageError({"run", StandScenario(), "--realtime", "--kill", "100", "--duration", "1",
                     "--out", folder / "run"},
                    {"--kill 100", "0.5 s each"});
+}
+
+TEST(Hosting, RefusesGroupsThatCannotLiveTogether) {
+  ExpectUsageError({"run", StandScenario(), "--host", "a=hw_bridge,redistributor"},
+                   {"--host a=hw_bridge,redistributor: component hw_bridge: owns the clock"});
+  ExpectUsageError({"run", StandScenario(), "--host", "a=sim,redistributor"},
+                   {"component redistributor: has restart: true, but sim, in the same process a, "
+                    "has restart: false"});
+  ExpectUsageError({"run", StandScenario(), "--host", "a=state_estimater,redistributor"},
+                   {"has no component 'state_estimater'; did you mean state_estimator?"});
+  ExpectUsageError({"run", StandScenario(), "--host", "a=redistributor"},
+                   {"must be PROCESS=A,B: two or more components of the graph"});
+  ExpectUsageError({"run", StandScenario(), "--hosted", "--inline"}, {"--hosted", "--inline"});
 }
 
 }  // namespace

@@ -12,10 +12,10 @@
 namespace poise {
 namespace {
 
-const std::vector<std::string> kComponents = {"sim",         "hw_bridge",
-                                              "state_estimator", "step_planner",
-                                              "task_controller", "contact_wrench_monitor",
-                                              "redistributor",   "recorder"};
+const std::vector<std::string> kComponents = {
+    "sim",           "hw_bridge",       "state_estimator",
+    "step_planner",  "task_controller", "contact_wrench_monitor",
+    "redistributor", "recorder"};
 
 /// The simulated robot's program is its engine's.
 std::string ProgramOf(const std::string& component) {
@@ -91,6 +91,21 @@ TEST_F(SupervisionTest, DeathOfAnyProcessEndsTheRunNamingIt) {
     EXPECT_NE(result.output.find(component + ".log"), std::string::npos) << result.output;
     EXPECT_TRUE(ProcessesWith(run_).empty()) << component;
   }
+}
+
+TEST_F(SupervisionTest, DeathOfASharedProcessEndsTheRunNamingIt) {
+  PoiseProgram program = Start({"--hosted"});
+  ASSERT_TRUE(WaitForLog(run_, kUnderWay));
+  EXPECT_LT(ComponentProcess(run_, "state_estimator"), 0);
+  const pid_t pid = ComponentProcess(run_, "component_host");
+  ASSERT_GT(pid, 0);
+  kill(pid, SIGKILL);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_NE(result.output.find("controller was ended by signal 9 (Killed)"), std::string::npos)
+      << result.output;
+  EXPECT_NE(result.output.find("controller.log"), std::string::npos) << result.output;
+  EXPECT_TRUE(ProcessesWith(run_).empty());
 }
 
 TEST_F(SupervisionTest, StoppedProcessIsEndedToo) {

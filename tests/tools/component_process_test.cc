@@ -7,12 +7,15 @@
 #include <csignal>
 #include <fstream>
 #include <map>
+#include <thread>
 
 #include "components/framework/bus/channel_collector.h"
 #include "components/framework/bus/control_client.h"
 #include "components/framework/clock.h"
+#include "components/framework/configuration.h"
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
+#include "poise/external_push_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 #include "poise/robot_state_t.hpp"
 #include "tests/framework/toy_components.h"
@@ -24,8 +27,20 @@ namespace {
 constexpr int64_t kTicks = 500;
 constexpr int64_t kSecond = 1'000'000'000;
 
-RunSpec Toys() {
+/// The loop; `shared`: a second component shares the filter's process.
+RunSpec Toys(bool shared) {
   Graph graph = ToyLoop();
+  if (shared) {
+    Channel* const sum = graph.add_channel();
+    sum->set_name("SUM");
+    sum->set_type("external_push_t");
+    ComponentInstance* const sink = graph.add_component();
+    ParseTextProto(R"(name: "sink" type: "toy_sink" restart: true process: "host"
+                      input { port: "push" channel: "PUSH" }
+                      output { port: "sum" channel: "SUM" })",
+                   "sink", sink);
+    graph.mutable_component(1)->set_process("host");
+  }
   for (ComponentInstance& instance : *graph.mutable_component()) {
     if (instance.name() == "plant") instance.set_plant(true);
     if (instance.name() == "controller") instance.set_owns_clock(true);
@@ -37,7 +52,7 @@ RunSpec Toys() {
   spec.mutable_realtime_options()->set_priority(0);
   ComponentRegistry registry;
   AddToyComponents(&registry);
-  FillCounts(BoundGraph(spec, registry).plan(), spec.mutable_graph());
+  FillPlan(BoundGraph(spec, registry).plan(), spec.mutable_graph());
   return spec;
 }
 
@@ -48,8 +63,11 @@ T Decode(std::span<const uint8_t> data) {
   return message;
 }
 
-TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
-  const RunSpec spec = Toys();
+class Takeover : public testing::TestWithParam<bool> {};
+
+TEST_P(Takeover, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
+  const bool shared = GetParam();
+  const RunSpec spec = Toys(shared);
   logging::TemporaryFolder folder;
   const std::string run = folder.path("run.pbtxt");
   std::string text;
@@ -58,22 +76,27 @@ TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
 
   std::map<int64_t, robot_sensors_t> sensors;
   std::map<int64_t, robot_state_t> states;
+  std::map<int64_t, external_push_t> pushes, sums;
   ChannelCollector::Callbacks callbacks;
   callbacks.message = [&](int channel, int64_t tick, std::span<const uint8_t> data) {
     if (channel == 0) sensors[tick] = Decode<robot_sensors_t>(data);
     if (channel == 1) states[tick] = Decode<robot_state_t>(data);
+    if (channel == 4) pushes[tick] = Decode<external_push_t>(data);
+    if (channel == 6) sums[tick] = Decode<external_push_t>(data);
   };
   ChannelCollector collector(spec, "recorder", callbacks);
   ControlClient control(spec);
   std::map<std::string, std::unique_ptr<ComponentProcess>> processes;
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    processes[instance.name()] = std::make_unique<ComponentProcess>(
-        instance.name(),
-        std::vector<std::string>{TOY_PROCESS, TypeOf(instance), "--run", run, "--component",
-                                 instance.name()},
-        folder.path(instance.name() + ".log"), instance.restart());
+  for (const std::string& process : ProcessNames(spec.graph())) {
+    const std::vector<int> members = ComponentsOf(spec.graph(), process);
+    const ComponentInstance& first = spec.graph().component(members.front());
+    std::vector<std::string> command = {TOY_PROCESS, TypeOf(first), "--run",
+                                        run,         "--component", first.name()};
+    if (members.size() > 1) command = {TOY_PROCESS, "host", "--run", run, "--process", process};
+    processes[process] = std::make_unique<ComponentProcess>(
+        process, command, folder.path(process + ".log"), first.restart());
   }
-  ComponentProcess& filter = *processes.at("filter");
+  ComponentProcess& filter = *processes.at(shared ? "host" : "filter");
   const pid_t first = filter.process().pid();
   const int64_t deadline = NowNanoseconds() + 60 * kSecond;
   int64_t killed_after = -1;
@@ -88,6 +111,8 @@ TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
     }
     if (killed_after < 0 && states.size() >= 100) {
       killed_after = states.rbegin()->first;
+      // Between two ticks, which are 2 ms apart: its last state is then kept.
+      std::this_thread::sleep_for(std::chrono::microseconds(700));
       filter.process().Signal(SIGKILL);
     }
   }
@@ -96,6 +121,9 @@ TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
   EXPECT_NE(filter.process().pid(), first);
   EXPECT_EQ(control.statuses().at("filter").health.restarts, 1);
   ASSERT_GT(states.rbegin()->first, killed_after + 10);
+  if (shared) {
+    EXPECT_EQ(control.statuses().at("sink").health.restarts, 1);
+  }
 
   // state(t) = state(before t) / 2 + sensors(t) / 2, over the change of processes too.
   for (auto state = std::next(states.begin()); state != states.end(); ++state) {
@@ -105,6 +133,13 @@ TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
                     0.5 * sensors.at(state->first).joint_position[i])
           << "tick " << state->first;
     }
+  }
+  // sum(t) = sum(before t) + push(t), likewise.
+  EXPECT_EQ(sums.empty(), !shared);
+  for (auto sum = sums.begin(); sum != sums.end(); ++sum) {
+    const double before = sum == sums.begin() ? 0 : std::prev(sum)->second.force[0];
+    EXPECT_EQ(sum->second.force[0], before + pushes.at(sum->first).force[0])
+        << "tick " << sum->first;
   }
   for (const auto& [name, process] : processes) process->StopRestarts();
   while (NowNanoseconds() < deadline) {
@@ -118,6 +153,10 @@ TEST(ComponentProcess, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
     EXPECT_TRUE(process->process().ended() && process->process().succeeded()) << name;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(ComponentProcess, Takeover, testing::Bool(), [](const auto& shared) {
+  return shared.param ? "OfSeveralInOneProcess" : "OfOne";
+});
 
 TEST(ComponentProcess, OneThatDiesAgainAndAgainHasEnded) {
   logging::TemporaryFolder folder;

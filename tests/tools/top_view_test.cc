@@ -92,6 +92,12 @@ TEST_F(TopViewTest, ShowsAProcess) {
                                      "1278.4", "7", "11", "44", "22", "33", "55", "0.1"));
 }
 
+TEST_F(TopViewTest, NamesTheProcessThatAComponentShares) {
+  ASSERT_EQ(spec.graph().component(0).name(), "sim");
+  spec.mutable_graph()->mutable_component(0)->set_process("all");
+  EXPECT_EQ(Row("all/sim").at(1), "running");
+}
+
 TEST_F(TopViewTest, ShowsRealTimeWhereThereIsAny) {
   EXPECT_THAT(Text(), Not(HasSubstr("skipped")));
   EXPECT_THAT(Text(), Not(HasSubstr("restarted")));

@@ -34,6 +34,7 @@ constexpr int kExitOtherBuild = 3;
 struct BitsArguments {
   std::vector<std::string> names;
   bool processes = false;
+  bool hosted = false;
   double drop_rate = 0;
   bool record = false;
 };
@@ -97,11 +98,12 @@ std::vector<ChannelBits> RunEntry(const ordered_json& entry, const BitsArguments
   options.quiet = true;
   options.changes.reference = false;
   options.changes.drop_rate = arguments.drop_rate;
+  options.changes.hosted = arguments.hosted;
   options.changes.drives = entry.value("drives", "");
   options.changes.set = entry.value("set", std::vector<std::string>());
   if (entry.contains("duration")) options.changes.duration = entry["duration"].get<double>();
-  options.in_process =
-      !arguments.processes && arguments.drop_rate == 0 && options.changes.drives.empty();
+  options.in_process = !arguments.processes && !arguments.hosted && arguments.drop_rate == 0 &&
+                       options.changes.drives.empty();
   const TemporaryDir dir;
   ScenarioRun run(entry.at("scenario").get<std::string>(), options);
   *versions = BuildVersions(run.spec());
@@ -173,6 +175,8 @@ void AddBitsCommand(CLI::App* app, Command* command) {
       "bits", "run what deploy/bits has a record of and compare every message, bit for bit");
   bits->add_option("run", arguments->names, "of the record; default: all");
   bits->add_flag("--processes", arguments->processes, "as processes; default: in one process");
+  bits->add_flag("--hosted", arguments->hosted,
+                 "as processes, of which one runs the whole controller");
   bits->add_option("--drop", arguments->drop_rate,
                    "as processes, each of which drops this share of its messages")
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }));

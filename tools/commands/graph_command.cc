@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "components/framework/configuration.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
@@ -45,6 +46,13 @@ void ShowRun(const RunSpec& spec) {
     fmt::print("  {:<16} {:<18} {:>5} bytes  {} -> {}\n", channel.name, channel.type,
                channel.encoded_size, channel.external ? "(operator)" : name_of(channel.writer),
                readers.empty() ? "(log)" : readers);
+  }
+  for (const std::string& process : ProcessNames(spec.graph())) {
+    const std::vector<int> members = ComponentsOf(spec.graph(), process);
+    if (members.size() < 2) continue;
+    fmt::print("process {}:", process);
+    for (const int member : members) fmt::print(" {}", spec.graph().component(member).name());
+    fmt::print("\n");
   }
   fmt::print("one tick:");
   for (const GraphPlan::StageRef& ref : plan.order) {

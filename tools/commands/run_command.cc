@@ -51,6 +51,16 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "dated one under runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
+  run->add_flag("--hosted", options->changes.hosted,
+                "the whole controller in one process: what the graph marks restart: true passes "
+                "its messages in memory, and sends them to all others as ever")
+      ->excludes(in_process);
+  run->add_option("--host", options->changes.host,
+                  "put these components of the graph into one process of that name")
+      ->type_name("PROCESS=A,B,...")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->excludes(in_process);
   CLI::Option* const realtime = run->add_flag(
       "--realtime", options->changes.realtime,
       "the bridge owns the clock and holds the last command; processes that die are replaced. "

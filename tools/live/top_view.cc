@@ -88,18 +88,30 @@ void AddRealTime(const health_t& h, std::vector<ViewLine>* lines) {
   lines->push_back({"  " + Joined(parts, "; "), odd ? Style::kWarning : Style::kPlain});
 }
 
-void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
+/// "controller/state_estimator" for a component that shares a process.
+std::string ProcessLabel(const RunSpec& spec, const std::string& component) {
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    const std::string& process = ProcessOf(instance);
+    if (instance.name() != component || process == component) continue;
+    return process + "/" + component;
+  }
+  return component;
+}
+
+void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t width = 8;
-  for (const auto& process : snapshot.processes) width = std::max(width, process.name.size());
+  for (const auto& process : snapshot.processes) {
+    width = std::max(width, ProcessLabel(spec, process.name).size());
+  }
   lines->push_back(
       {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
                    "PROCESS", width, "STATE", "TICK", "TICKS/S", "MEDIAN us", "P99 us", "MAX us",
                    "LATE", "GAPS", "RESENT", "REFUSED", "DROPPED", "UNSENT", "AGE s"),
        Style::kTitle});
   for (const auto& process : snapshot.processes) {
+    const std::string label = ProcessLabel(spec, process.name);
     if (!process.seen) {
-      lines->push_back(
-          {fmt::format("{:<{}} {}", process.name, width, "not heard of"), Style::kWarning});
+      lines->push_back({fmt::format("{:<{}} {}", label, width, "not heard of"), Style::kWarning});
       continue;
     }
     const health_t& h = process.health;
@@ -108,8 +120,8 @@ void AddProcesses(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
     const bool stale = process.age > kStale && h.state <= health_t::STATE_RUNNING;
     lines->push_back(
         {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
-                     process.name, width, StateName(h.state), Count(h.tick),
-                     Number(process.tick_rate, 1), Number(timed ? h.latency_median : -1, 1),
+                     label, width, StateName(h.state), Count(h.tick), Number(process.tick_rate, 1),
+                     Number(timed ? h.latency_median : -1, 1),
                      Number(timed ? h.latency_p99 : -1, 1), Number(timed ? h.latency_max : -1, 1),
                      h.deadline_misses, h.gaps, h.resends, h.messages_refused, h.messages_dropped,
                      h.publish_errors, Number(process.age, 1)),
@@ -172,7 +184,7 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& 
   std::vector<ViewLine> lines;
   AddHeader(spec, names, dir, snapshot, refused, &lines);
   lines.emplace_back();
-  AddProcesses(snapshot, &lines);
+  AddProcesses(spec, snapshot, &lines);
   lines.emplace_back();
   AddChannels(snapshot, &lines);
   return lines;

@@ -229,7 +229,7 @@ std::string FormatFaults(const RunOutcome& outcome) {
   for (const InjectedFault& fault : outcome.faults) {
     const bool known = fault.regained >= 0;
     if (known) regained.push_back(fault.regained * 1e3);
-    rows.push_back({fault.killed ? "killed" : "stopped 100 ms", fault.component,
+    rows.push_back({fault.killed ? "killed" : "stopped 100 ms", fault.process,
                     fmt::format("{:.3f}", fault.time),
                     known ? fmt::format("{:.1f}", fault.regained * 1e3) : "never",
                     fmt::format("{}", fault.cycles)});

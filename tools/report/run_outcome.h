@@ -13,14 +13,15 @@ namespace poise {
 
 /// A fault that the launcher caused on purpose.
 struct InjectedFault {
-  std::string component;
+  std::string process;
   bool killed = false;   ///< SIGKILL; else SIGSTOP for 100 ms
   double time = 0;       ///< s of wall time, in the scenario's time
   double regained = -1;  ///< s until control was regained; 0: no command was late; -1: not in time
   int32_t cycles = 0;    ///< longest age of a command meanwhile
 };
 
-/// What a process of a run says of itself at the end, and its memory.
+/// What a component of a run says of itself at the end, and the memory of its process: of several
+/// in one, with the first.
 struct ProcessReport {
   health_t health;
   int64_t resident_first = 0;  ///< bytes, 10 s after the start; 0: the run was shorter
@@ -34,11 +35,12 @@ struct RunOutcome {
   std::vector<std::string> details;  ///< last lines of the output of the process at fault
   int64_t refused = 0;               ///< packets that the launcher refused on the service port
   std::vector<InjectedFault> faults;
-  std::vector<ProcessReport> processes;  ///< in the graph's order; none of a run in one process
-  int32_t takeovers = 0;                 ///< processes that took the place of one that died
-  std::optional<MachineLoad> machine;    ///< in real time
-  std::optional<double> crane_let_go;    ///< s of the scenario's time; empty: no crane, or not yet
-  double wall_time = 0;                  ///< s, from the start command to the last tick
+  std::vector<ProcessReport>
+      processes;                       ///< by component, in the graph's order; none of a run inline
+  int32_t takeovers = 0;               ///< processes that took the place of one that died
+  std::optional<MachineLoad> machine;  ///< in real time
+  std::optional<double> crane_let_go;  ///< s of the scenario's time; empty: no crane, or not yet
+  double wall_time = 0;                ///< s, from the start command to the last tick
 };
 
 }  // namespace poise

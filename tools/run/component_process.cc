@@ -19,11 +19,14 @@ constexpr int64_t kSuccessorPatience = 5 * kSecondNs;  // for a successor
 }  // namespace
 
 ComponentProcess::ComponentProcess(std::string name, std::vector<std::string> command,
-                                   std::string log_path, bool restart)
+                                   std::string log_path, bool restart,
+                                   std::vector<std::string> components)
     : name_(std::move(name)),
       command_(std::move(command)),
       log_path_(std::move(log_path)),
-      restart_(restart) {
+      restart_(restart),
+      components_(std::move(components)) {
+  if (components_.empty()) components_.push_back(name_);
   if (restart_) {
     memory_fd_ = StateStore::MakeMemoryFile(name_);
     const std::string path = fmt::format("/proc/{}/fd/{}", getpid(), memory_fd_);

@@ -1,4 +1,4 @@
-// The process of one component, and one more that waits to take its place.
+// A process of the run, and one more that waits to take its place.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,10 @@ namespace poise {
 class ComponentProcess {
  public:
   /// Starts. `command[0]` is the program's path; `log_path` gets its output, a successor's goes to
-  /// log_path with a number. Throws std::system_error.
+  /// log_path with a number. `components`: those that it runs, empty: the one of its name. Throws
+  /// std::system_error.
   ComponentProcess(std::string name, std::vector<std::string> command, std::string log_path,
-                   bool restart);
+                   bool restart, std::vector<std::string> components = {});
   ~ComponentProcess();
   ComponentProcess(const ComponentProcess&) = delete;
   ComponentProcess& operator=(const ComponentProcess&) = delete;
@@ -35,6 +36,8 @@ class ComponentProcess {
 
   ChildProcess& process() { return *process_; }
   const std::string& name() const { return name_; }
+  /// Those that it runs, by their names in the graph; the recorder for its own.
+  const std::vector<std::string>& components() const { return components_; }
   bool restarts() const { return restart_; }
   int32_t takeovers() const { return takeovers_; }
   /// Memory that the process has in RAM now, bytes; 0 when it has none any more.
@@ -52,6 +55,7 @@ class ComponentProcess {
   std::vector<std::string> command_;
   std::string log_path_;
   bool restart_;
+  std::vector<std::string> components_;
   int memory_fd_ = -1;
   std::unique_ptr<StateStore> store_;
   std::unique_ptr<ChildProcess> process_, spare_;

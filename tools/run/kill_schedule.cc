@@ -84,7 +84,7 @@ void KillSchedule::Act(int64_t now, int64_t elapsed,
   if (targets.empty()) return;
   ComponentProcess& target = *targets[random_() % targets.size()];
   InjectedFault fault;
-  fault.component = target.name();
+  fault.process = target.name();
   fault.killed = random_() % 2 == 0;
   fault.time = static_cast<double>(elapsed) * 1e-9 - lead_;
   target.process().Signal(fault.killed ? SIGKILL : SIGSTOP);

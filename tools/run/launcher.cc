@@ -7,6 +7,7 @@
 #include "components/framework/modules.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
+#include "components/framework/runners/component_main.h"
 #include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
@@ -56,10 +57,11 @@ RunOutcome Launcher::Run() {
 
 void Launcher::StartProcesses() {
   const auto start = [&](const std::string& name, std::vector<std::string> command,
-                         bool restart = false) {
+                         bool restart = false, std::vector<std::string> components = {}) {
     command[0] = FindProgram(command[0]).string();
     processes_.push_back(std::make_unique<ComponentProcess>(
-        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart));
+        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart,
+        std::move(components)));
   };
   if (log_) {
     start(kRecorderName,
@@ -67,10 +69,17 @@ void Launcher::StartProcesses() {
            files_.run_dir + "/run.lcm", "--report", files_.run_dir + "/recorder.json"});
   }
   // In lockstep a successor would lack the messages of its tick; and the run can be repeated.
-  for (const ComponentInstance& instance : spec_.graph().component()) {
-    start(instance.name(),
-          {TypeOf(instance), "--run", files_.spec_file, "--component", instance.name()},
-          spec_.realtime() && instance.restart());
+  const Graph& graph = spec_.graph();
+  for (const std::string& process : ProcessNames(graph)) {
+    std::vector<std::string> names;
+    for (const int i : ComponentsOf(graph, process)) names.push_back(graph.component(i).name());
+    const ComponentInstance& first = graph.component(ComponentsOf(graph, process).front());
+    const std::vector<std::string> command =
+        names.size() == 1 ? std::vector<std::string>{TypeOf(first), "--run", files_.spec_file,
+                                                     "--component", first.name()}
+                          : std::vector<std::string>{kHostProgram, "--run", files_.spec_file,
+                                                     "--process", process};
+    start(process, command, spec_.realtime() && first.restart(), names);
   }
 }
 
@@ -80,12 +89,15 @@ void Launcher::Fail(std::string message, std::vector<std::string> details) {
   outcome_.details = std::move(details);
 }
 
-void Launcher::FailProcess(ChildProcess& process) {
-  const health_t& health = control_.statuses().at(process.name()).health;
-  if (health.state == health_t::STATE_FAILED && !health.detail.empty()) {
-    Fail(fmt::format("{}: {}", process.name(), health.detail));
-    return;
+void Launcher::FailProcess(ComponentProcess& component_process) {
+  for (const std::string& name : component_process.components()) {
+    const health_t& health = control_.statuses().at(name).health;
+    if (health.state == health_t::STATE_FAILED && !health.detail.empty()) {
+      Fail(fmt::format("{}: {}", name, health.detail));
+      return;
+    }
   }
+  ChildProcess& process = component_process.process();
   const int64_t tick = Tick();
   Fail(fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
                    tick < 0
@@ -104,10 +116,12 @@ bool Launcher::Healthy() {
   }
   // One that died first may have others follow: a non-zero end names the culprit best.
   const int64_t now = NowNanoseconds();
-  ChildProcess* dead = nullptr;
+  ComponentProcess* dead = nullptr;
   outcome_.takeovers = 0;
   for (const auto& process : processes_) {
-    if (!process->Alive(now) && (dead == nullptr || dead->succeeded())) dead = &process->process();
+    if (!process->Alive(now) && (dead == nullptr || dead->process().succeeded())) {
+      dead = process.get();
+    }
     outcome_.takeovers += process->takeovers();
   }
   if (dead != nullptr) FailProcess(*dead);
@@ -144,7 +158,9 @@ bool Launcher::WaitUntilReady() {
       std::string names;
       std::vector<std::string> details;
       for (const auto& process : processes_) {
-        const bool seen = control_.statuses().at(process->name()).seen;
+        const bool seen = std::ranges::all_of(process->components(), [&](const auto& name) {
+          return control_.statuses().at(name).seen;
+        });
         if (seen && process->StandbyReady()) continue;
         names += (names.empty() ? "" : ", ") + process->name() + (seen ? " (its stand-by)" : "");
         for (const std::string& line : LastLines(process->process().log_path(), 1)) {
@@ -264,10 +280,13 @@ void Launcher::MeasureMemory(int64_t now, int64_t start) {
   if (now < next_measure_ || now - start < kSettled) return;
   next_measure_ = now + kSecond;
   outcome_.processes.resize(static_cast<size_t>(spec_.graph().component_size()));
-  for (size_t i = 0; i < outcome_.processes.size(); ++i) {
-    ProcessReport& report = outcome_.processes[i];
-    const ComponentProcess& process = *processes_[i + (log_ ? 1 : 0)];
-    report.resident_last = process.ResidentBytes();
+  const Graph& graph = spec_.graph();
+  for (const auto& process : processes_) {
+    const std::vector<int> members = ComponentsOf(graph, process->name());
+    if (members.empty()) continue;  // the recorder
+    // The memory of several is their first's.
+    ProcessReport& report = outcome_.processes[static_cast<size_t>(members.front())];
+    report.resident_last = process->ResidentBytes();
     if (report.resident_first == 0) report.resident_first = report.resident_last;
   }
 }
@@ -283,7 +302,8 @@ void Launcher::ReportProcesses() {
 void Launcher::EndSilent(int64_t now) {
   for (const auto& process : processes_) {
     if (!process->restarts()) continue;
-    const ControlClient::Status& status = control_.statuses().at(process->name());
+    // All components of a process speak or are silent together.
+    const ControlClient::Status& status = control_.statuses().at(process->components().front());
     if (status.seen && now - status.last_seen > kSilence) process->process().Signal(SIGKILL);
   }
 }
@@ -316,7 +336,7 @@ void Launcher::StopProcesses() {
       const std::string reason = outcome_.message;
       outcome_.message.clear();
       if (process->ended()) {
-        FailProcess(*process);
+        FailProcess(*component);
       } else {
         Fail(fmt::format("{} did not stop after the end and was killed; its output: {}",
                          process->name(), process->log_path()),

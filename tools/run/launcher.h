@@ -57,7 +57,7 @@ class Launcher {
   /// Notes the end of the run when the recorder says that it cannot go on.
   bool RecorderFailed();
   void Fail(std::string message, std::vector<std::string> details = {});
-  void FailProcess(ChildProcess& process);
+  void FailProcess(ComponentProcess& process);
   int64_t Tick() const;  ///< last tick that any component has completed
 
   RunSpec spec_;

@@ -27,6 +27,20 @@ namespace fs = std::filesystem;
 constexpr char kSpecFile[] = "run_spec.pbtxt";
 constexpr char kScenarioFile[] = "scenario.pbtxt";
 
+/// "7 processes", or "3 processes (controller: state_estimator, step_planner)".
+std::string ProcessesText(const Graph& graph) {
+  const std::vector<std::string> processes = ProcessNames(graph);
+  std::string shared;
+  for (const std::string& process : processes) {
+    std::vector<std::string> names;
+    for (const int i : ComponentsOf(graph, process)) names.push_back(graph.component(i).name());
+    if (names.size() < 2) continue;
+    shared += fmt::format("{}{}: {}", shared.empty() ? "" : "; ", process, fmt::join(names, ", "));
+  }
+  return fmt::format("{} processes{}", processes.size(),
+                     shared.empty() ? "" : fmt::format(" ({})", shared));
+}
+
 void PrintOutcome(const std::string& what, const RunOutcome& outcome) {
   if (outcome.message.empty()) return;
   fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
@@ -97,7 +111,7 @@ void ScenarioRun::PrintHeading() const {
   text += fmt::format(
       "{} s at {} Hz, {}; seed {}; poise {}{}\n", scenario.duration(), scenario.tick_rate(),
       options_.in_process ? "in one process"
-                          : fmt::format("{} processes{}", spec.graph().component_size(),
+                          : fmt::format("{}{}", ProcessesText(spec.graph()),
                                         options_.launch.log ? " and the recorder" : ", no log"),
       spec.seed(), PoiseVersion(),
       *PoiseCommit() == '\0' ? "" : fmt::format(" ({})", PoiseCommit()));

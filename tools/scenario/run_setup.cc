@@ -31,6 +31,8 @@ namespace fs = std::filesystem;
 constexpr int kFirstPort = 12000;
 constexpr int kLastPort = 32000;
 
+constexpr char kControllerProcess[] = "controller";  // of --hosted
+
 using google::protobuf::FieldDescriptor;
 
 /// The scenario's field `section`, which holds a configuration; nullptr when there is none.
@@ -121,6 +123,54 @@ void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
   }
 }
 
+/// Puts components of `graph` into the process of that name.
+void PutInto(const std::string& process, const std::vector<std::string>& components,
+             const std::string& flag, Graph* graph) {
+  std::vector<std::string> names;
+  for (const ComponentInstance& instance : graph->component()) names.push_back(instance.name());
+  for (const std::string& component : components) {
+    const auto found = std::ranges::find(names, component);
+    if (found == names.end()) {
+      throw ConfigError(fmt::format("{}: the graph {} has no component '{}'; {}", flag,
+                                    graph->name(), component, Suggest(component, names)));
+    }
+    graph->mutable_component(static_cast<int>(found - names.begin()))->set_process(process);
+  }
+  const std::vector<GraphError::Problem> problems = ProcessProblems(*graph);
+  if (!problems.empty()) throw ConfigError(fmt::format("{}: {}", flag, problems.front().text));
+}
+
+/// --hosted and --host.
+void HostComponents(const RunChanges& changes, Graph* graph) {
+  if (changes.hosted) {
+    std::vector<std::string> names;
+    for (const ComponentInstance& instance : graph->component()) {
+      if (instance.restart()) names.push_back(instance.name());
+    }
+    if (names.size() < 2) {
+      throw ConfigError(fmt::format(
+          "--hosted: the graph {} marks fewer than two components restart: true; name them with "
+          "--host PROCESS=A,B",
+          graph->name()));
+    }
+    PutInto(kControllerProcess, names, "--hosted", graph);
+  }
+  for (const std::string& host : changes.host) {
+    const std::string flag = "--host " + host;
+    const size_t equals = host.find('=');
+    std::vector<std::string> names;
+    for (size_t at = equals; at != std::string::npos;) {
+      const size_t end = host.find(',', at + 1);
+      names.push_back(host.substr(at + 1, end == std::string::npos ? end : end - at - 1));
+      at = end;
+    }
+    if (equals == 0 || names.size() < 2) {
+      throw ConfigError(flag + ": must be PROCESS=A,B: two or more components of the graph");
+    }
+    PutInto(host.substr(0, equals), names, flag, graph);
+  }
+}
+
 void AddResource(RunSpec* spec, const std::string& name, const fs::path& file) {
   Resource* resource = spec->add_resource();
   resource->set_name(name);
@@ -164,6 +214,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.set_scenario(NameOf(loaded));
   *spec.mutable_graph() = GraphFiles(loaded.graph_file).Merged();
   ChooseEngine(loaded, spec.mutable_graph());
+  HostComponents(changes, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
   spec.set_lead_ticks(std::llround(scenario.lead() * scenario.tick_rate()));
@@ -200,7 +251,7 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
   try {
     CheckGraph(spec->graph(), Components());
     const BoundGraph bound(*spec, Components());
-    FillCounts(bound.plan(), spec->mutable_graph());
+    FillPlan(bound.plan(), spec->mutable_graph());
   } catch (const GraphError& error) {
     FailGraph(loaded.graph_file, error);
   } catch (const ConfigError& error) {

@@ -28,7 +28,10 @@ struct RunChanges {
   bool realtime = false;
   std::optional<int> priority;  ///< SCHED_FIFO, in real time; 0: the ordinary scheduler
   std::optional<int> cpu;       ///< that the controller is pinned to in real time
-  std::string drives;           ///< "ethercat"; empty: the simulated robot's own
+  /// Components that share a process, "PROCESS=A,B,C".
+  std::vector<std::string> host;
+  bool hosted = false;  ///< those that the graph marks restart: true share the process "controller"
+  std::string drives;   ///< "ethercat"; empty: the simulated robot's own
   std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
   std::string capture;  ///< file for all EtherCAT frames; empty: none
 };

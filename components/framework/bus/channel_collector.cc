@@ -80,7 +80,7 @@ class ChannelCollector::Impl {
 };
 
 ChannelCollector::Impl::Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks)
-    : callbacks_(std::move(callbacks)), service_(spec, name), realtime_(spec.realtime()) {
+    : callbacks_(std::move(callbacks)), service_(spec, {name}), realtime_(spec.realtime()) {
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (int i = 0; i < spec.graph().channel_size(); ++i) {
     lanes_.push_back(std::make_unique<Lane>(spec, i));

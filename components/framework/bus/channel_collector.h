@@ -29,7 +29,7 @@ class ChannelCollector {
     std::function<void(int channel, int64_t tick)> skipped = nullptr;
   };
 
-  /// `spec` must hold the channels' counts (FillCounts). Throws BusError; ConfigError when counts
+  /// `spec` must hold the channels' counts (FillPlan). Throws BusError; ConfigError when counts
   /// are missing.
   ChannelCollector(const RunSpec& spec, const std::string& name, Callbacks callbacks);
   ~ChannelCollector();

@@ -14,7 +14,7 @@ namespace poise {
 /// Keeps the first usable packet of each tick in a window. Takes all its memory at construction.
 class CollectedChannel {
  public:
-  /// `channel` with its counts (FillCounts). Throws ConfigError.
+  /// `channel` with its counts (FillPlan). Throws ConfigError.
   CollectedChannel(const Channel& channel, int64_t run_id);
 
   /// A packet of this channel. An accepted one of an external channel is the caller's to deliver;

@@ -5,8 +5,9 @@
 
 namespace poise {
 
-Inbox::Inbox(InputPort* port, int64_t run_id, Join join)
+Inbox::Inbox(InputPort* port, int64_t run_id, Join join, size_t component)
     : port_(port),
+      component_(component),
       join_(join),
       filter_(port->fingerprint(), port->encoded_size(), port->counts(), run_id),
       message_(port),

@@ -21,7 +21,8 @@ enum class Join {
 /// memory is taken at construction.
 class Inbox {
  public:
-  Inbox(InputPort* port, int64_t run_id, Join join = Join::kEvery);
+  /// `component`: whose port it is, among those of its process.
+  Inbox(InputPort* port, int64_t run_id, Join join = Join::kEvery, size_t component = 0);
 
   /// A packet of this input's channel.
   void Offer(const uint8_t* data, size_t size);
@@ -52,6 +53,7 @@ class Inbox {
   }
 
   const InputPort& port() const { return *port_; }
+  size_t component() const { return component_; }
   const PacketCounters& counters() const { return counters_; }
   int64_t duplicates() const { return duplicates_; }
   int64_t gaps() const { return gaps_; }
@@ -60,6 +62,7 @@ class Inbox {
   PacketVerdict Keep(const uint8_t* data, size_t size);
 
   InputPort* port_;
+  size_t component_;
   Join join_;
   PacketFilter filter_;
   OwnedMessage message_;

@@ -4,9 +4,12 @@
 
 namespace poise {
 
-Outbox::Outbox(OutputPort* port, int channel, std::string channel_name, const std::string& url)
+Outbox::Outbox(OutputPort* port, size_t component, int channel, std::string channel_name,
+               const std::string& url, bool awaited)
     : port_(port),
+      component_(component),
       channel_(channel),
+      awaited_(awaited),
       channel_name_(std::move(channel_name)),
       sender_(url),
       size_(static_cast<size_t>(port->encoded_size())),

@@ -14,11 +14,15 @@ namespace poise {
 /// at construction.
 class Outbox {
  public:
-  /// Throws BusError.
-  Outbox(OutputPort* port, int channel, std::string channel_name, const std::string& url);
+  /// `component`: whose port it is, among those of its process. `awaited`: a component of another
+  /// process reads the channel. Throws BusError.
+  Outbox(OutputPort* port, size_t component, int channel, std::string channel_name,
+         const std::string& url, bool awaited);
 
   OutputPort& port() { return *port_; }
+  size_t component() const { return component_; }
   int channel() const { return channel_; }
+  bool awaited() const { return awaited_; }
   /// Encodes the port's message of `tick` and sends it. False when that failed (the message is
   /// kept).
   bool Send(int64_t tick);
@@ -28,7 +32,9 @@ class Outbox {
 
  private:
   OutputPort* port_;
+  size_t component_;
   int channel_;
+  bool awaited_;
   std::string channel_name_;
   BusSender sender_;
   size_t size_;

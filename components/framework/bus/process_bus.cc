@@ -1,6 +1,7 @@
 #include "components/framework/bus/process_bus.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
@@ -17,63 +18,153 @@ bool FaultInjector::Drop() {
   return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53 < rate_;
 }
 
-ProcessBus::ProcessBus(const RunSpec& spec, int index, ConfiguredComponent* component, Join join,
-                       bool open)
-    : service_(spec, component->name),
-      faults_(spec.drop_rate(), InstanceSeed(spec.seed(), component->name + "/drops")) {
-  const Graph& graph = spec.graph();
-  const ComponentInstance& instance = graph.component(index);
-  const auto channel_of = [&](const auto& connections, const std::string& port) {
-    for (const Connection& connection : connections) {
-      if (connection.port() != port) continue;
-      for (int i = 0; i < graph.channel_size(); ++i) {
-        if (graph.channel(i).name() == connection.channel()) return i;
-      }
+namespace {
+
+std::vector<std::string> NamesOf(const std::vector<ConfiguredComponent>& components) {
+  std::vector<std::string> names;
+  for (const ConfiguredComponent& component : components) names.push_back(component.name);
+  return names;
+}
+
+/// Index of the channel that a port is connected to.
+int ChannelOf(const Graph& graph, const std::string& component,
+              const google::protobuf::RepeatedPtrField<Connection>& connections,
+              const std::string& port) {
+  for (const Connection& connection : connections) {
+    if (connection.port() != port) continue;
+    for (int i = 0; i < graph.channel_size(); ++i) {
+      if (graph.channel(i).name() == connection.channel()) return i;
     }
-    throw ConfigError(fmt::format("component {}: port {} is not connected to a channel of graph {}",
-                                  component->name, port, graph.name()));
-  };
-  const Wiring& wiring = component->wiring;
-  std::vector<int> input_channels;
-  for (InputPort* input : wiring.inputs()) {
-    const int channel = channel_of(instance.input(), input->name());
-    input_channels.push_back(channel);
-    inboxes_.push_back(std::make_unique<Inbox>(input, spec.run_id(), join));
-    auto link = std::find_if(links_.begin(), links_.end(),
-                             [&](const auto& l) { return l->channel == channel; });
-    if (link == links_.end()) {
-      links_.push_back(std::make_unique<DataLink>());
-      links_.back()->url = ChannelUrl(spec, channel);
-      links_.back()->channel = channel;
-      links_.back()->channel_name = graph.channel(channel).name();
-      link = links_.end() - 1;
-    }
-    (*link)->inboxes.push_back(inboxes_.back().get());
   }
-  for (OutputPort* output : wiring.outputs()) {
-    const int channel = channel_of(instance.output(), output->name());
-    outboxes_.push_back(std::make_unique<Outbox>(output, channel, graph.channel(channel).name(),
-                                                 ChannelUrl(spec, channel)));
-  }
-  for (const Stage& stage : wiring.stages()) {
-    BoundStage bound{&stage, {}, {}};
-    for (const InputPort* input : stage.inputs) {
-      const auto k =
-          static_cast<size_t>(std::find(wiring.inputs().begin(), wiring.inputs().end(), input) -
-                              wiring.inputs().begin());
-      bound.inputs.push_back({inboxes_[k].get(), input_channels[k]});
+  throw ConfigError(fmt::format("component {}: port {} is not connected to a channel of graph {}",
+                                component, port, graph.name()));
+}
+
+/// True when a component outside `process` reads the channel.
+bool Awaited(const Graph& graph, const std::string& process, const std::string& channel) {
+  return std::ranges::any_of(graph.component(), [&](const ComponentInstance& instance) {
+    return ProcessOf(instance) != process &&
+           std::ranges::any_of(instance.input(), [&](const Connection& connection) {
+             return connection.channel() == channel;
+           });
+  });
+}
+
+}  // namespace
+
+ProcessBus::ProcessBus(const RunSpec& spec, const std::string& process,
+                       std::vector<ConfiguredComponent>* components, Join join, bool open)
+    : join_(join),
+      service_(spec, NamesOf(*components)),
+      faults_(spec.drop_rate(), InstanceSeed(spec.seed(), process + "/drops")),
+      counters_(components->size()) {
+  BindOutputs(spec, *components);
+  std::vector<int> places;  // of stages_, in the tick
+  for (size_t i = 0; i < components->size(); ++i) {
+    const ConfiguredComponent& configured = (*components)[i];
+    const ComponentInstance& instance = spec.graph().component(configured.index);
+    const size_t count = configured.wiring.stages().size();
+    if (components->size() == 1) {
+      for (size_t s = 0; s < count; ++s) places.push_back(static_cast<int>(s));
+    } else if (static_cast<size_t>(instance.stage_place_size()) == count) {
+      places.insert(places.end(), instance.stage_place().begin(), instance.stage_place().end());
+    } else {
+      throw ConfigError(fmt::format(
+          "component {}: the run gives the places of {} of its {} stages; fill them in from the "
+          "checked graph",
+          configured.name, instance.stage_place_size(), count));
     }
-    for (const OutputPort* output : stage.outputs) {
-      const auto o =
-          static_cast<size_t>(std::find(wiring.outputs().begin(), wiring.outputs().end(), output) -
-                              wiring.outputs().begin());
-      bound.outputs.push_back(outboxes_[o].get());
-    }
-    stages_.push_back(std::move(bound));
+    BindStages(spec, i, configured);
   }
+  std::vector<size_t> order(stages_.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, {}, [&](size_t s) { return places[s]; });
+  std::vector<BoundStage> sorted;
+  for (const size_t s : order) sorted.push_back(std::move(stages_[s]));
+  stages_ = std::move(sorted);
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (size_t i = 0; i < links_.size(); ++i) poll_fds_.push_back({-1, POLLIN, 0});
   if (open) OpenInputs();
+}
+
+void ProcessBus::BindOutputs(const RunSpec& spec,
+                             const std::vector<ConfiguredComponent>& components) {
+  const Graph& graph = spec.graph();
+  for (size_t i = 0; i < components.size(); ++i) {
+    const ComponentInstance& instance = graph.component(components[i].index);
+    for (OutputPort* output : components[i].wiring.outputs()) {
+      const int channel = ChannelOf(graph, instance.name(), instance.output(), output->name());
+      const std::string& name = graph.channel(channel).name();
+      outboxes_.push_back(std::make_unique<Outbox>(output, i, channel, name,
+                                                   ChannelUrl(spec, channel),
+                                                   Awaited(graph, ProcessOf(instance), name)));
+    }
+  }
+  unsent_.reserve(outboxes_.size());
+}
+
+void ProcessBus::BindStages(const RunSpec& spec, size_t component,
+                            const ConfiguredComponent& configured) {
+  const ComponentInstance& instance = spec.graph().component(configured.index);
+  for (const Stage& stage : configured.wiring.stages()) {
+    BoundStage bound{component, &stage, {}, {}, {}};
+    for (InputPort* input : stage.inputs) {
+      BindInput(spec, instance, input, &bound);
+    }
+    for (const OutputPort* output : stage.outputs) {
+      const auto outbox =
+          std::ranges::find_if(outboxes_, [&](const auto& o) { return &o->port() == output; });
+      bound.outputs.push_back(outbox->get());
+    }
+    stages_.push_back(std::move(bound));
+  }
+}
+
+void ProcessBus::BindInput(const RunSpec& spec, const ComponentInstance& instance, InputPort* input,
+                           BoundStage* stage) {
+  const int channel = ChannelOf(spec.graph(), instance.name(), instance.input(), input->name());
+  const auto writer =
+      std::ranges::find_if(outboxes_, [&](const auto& o) { return o->channel() == channel; });
+  // What a component says to itself goes over the bus when it is alone, as ever.
+  if (writer == outboxes_.end() || counters_.size() == 1) {
+    stage->inputs.push_back({InboxOf(spec, stage->component, channel, input), channel});
+    return;
+  }
+  const OutputPort& output = (*writer)->port();
+  if (input->counts() != output.counts()) {
+    throw ConfigError(
+        fmt::format("component {}: input {} and the writer of channel {} differ in "
+                    "their counts",
+                    instance.name(), input->name(), spec.graph().channel(channel).name()));
+  }
+  if (input->kind() == InputKind::kSameTick) {
+    stage->locals.push_back({input, output.message()});
+    return;
+  }
+  auto delayed =
+      std::ranges::find_if(delayed_, [&](const Delayed& d) { return d.output == &output; });
+  if (delayed == delayed_.end()) {
+    delayed_.push_back({input, &output, OwnedMessage(input)});
+    delayed = delayed_.end() - 1;
+  }
+  stage->locals.push_back({input, delayed->message.get()});
+}
+
+Inbox* ProcessBus::InboxOf(const RunSpec& spec, size_t component, int channel, InputPort* input) {
+  for (const auto& inbox : inboxes_) {
+    if (&inbox->port() == input) return inbox.get();  // of a stage before
+  }
+  inboxes_.push_back(std::make_unique<Inbox>(input, spec.run_id(), join_, component));
+  auto link = std::ranges::find_if(links_, [&](const auto& l) { return l->channel == channel; });
+  if (link == links_.end()) {
+    links_.push_back(std::make_unique<DataLink>());
+    link = links_.end() - 1;
+    (*link)->url = ChannelUrl(spec, channel);
+    (*link)->channel = channel;
+    (*link)->channel_name = spec.graph().channel(channel).name();
+  }
+  (*link)->inboxes.push_back(inboxes_.back().get());
+  return inboxes_.back().get();
 }
 
 void ProcessBus::OpenInputs() {
@@ -117,7 +208,7 @@ void ProcessBus::Receive(DataLink& link, int batch) {
     if (packet.channel != link.channel_name) {
       if (packet.channel != "LCM_SELF_TEST") ++link.foreign;
     } else if (faults_.Drop()) {
-      ++dropped_;
+      ++counters_[link.inboxes.front()->component()].dropped;
     } else {
       for (Inbox* inbox : link.inboxes) inbox->Offer(packet.data, packet.size);
     }
@@ -146,7 +237,9 @@ void ProcessBus::OnControl(const run_control_t& control) {
       break;
     case run_control_t::COMMAND_RESEND:
       for (const auto& outbox : outboxes_) {
-        if (outbox->channel() == control.channel && outbox->Resend(control.tick)) ++resends_;
+        if (outbox->channel() == control.channel && outbox->Resend(control.tick)) {
+          ++counters_[outbox->component()].resends;
+        }
       }
       break;
     case run_control_t::COMMAND_RECORDED:
@@ -166,37 +259,68 @@ bool ProcessBus::NearEnough(int64_t tick) const {
                      [&](const Reporter& reporter) { return tick - reporter.tick <= kMaxLead; });
 }
 
+void ProcessBus::Send(Outbox* outbox, int64_t tick) {
+  if (outbox->awaited()) {
+    CountSend(outbox->Send(tick), outbox->component());
+  } else {
+    unsent_.push_back({outbox, tick});
+  }
+}
+
+void ProcessBus::SendRest() {
+  for (const Unsent& unsent : unsent_) {
+    CountSend(unsent.outbox->Send(unsent.tick), unsent.outbox->component());
+  }
+  unsent_.clear();
+}
+
+void ProcessBus::KeepDelayed() {
+  for (Delayed& delayed : delayed_) {
+    delayed.port->CopyMessage(delayed.output->message(), delayed.message.get());
+  }
+}
+
 void ProcessBus::Ask(const BoundStage& stage, int64_t tick) {
   for (const BoundStage::BoundInput& input : stage.inputs) {
     const InputKind kind = input.inbox->port().kind();
     if (input.inbox->ready() || (tick == 0 && kind == InputKind::kPreviousTick)) continue;
     input.inbox->CountGap();
-    CountSend(SendControl(run_control_t::COMMAND_RESEND, input.inbox->wanted(), input.channel));
+    SendControl(run_control_t::COMMAND_RESEND, input.inbox->wanted(), input.channel);
   }
 }
 
-void ProcessBus::CountSend(bool sent) {
+bool ProcessBus::SendControl(int8_t command, int64_t tick, int32_t channel) {
+  const bool sent = service_.SendControl(command, tick, channel);
+  CountSend(sent, 0);
+  return sent;
+}
+
+void ProcessBus::CountSend(bool sent, size_t component) {
   if (!broken()) send_failures_ = sent ? 0 : send_failures_ + 1;
-  publish_errors_ += sent ? 0 : 1;
+  counters_[component].publish_errors += sent ? 0 : 1;
 }
 
 void ProcessBus::SendHealth() {
-  health_t& health = service_.health();
-  health.messages_received = health.messages_duplicate = health.gaps = 0;
-  health.messages_refused = service_.refused();
+  for (size_t i = 0; i < counters_.size(); ++i) {
+    health_t& health = service_.health(i);
+    health.messages_received = health.messages_duplicate = health.gaps = 0;
+    health.messages_refused = i == 0 ? service_.refused() : 0;
+    health.messages_dropped = counters_[i].dropped;
+    health.resends = counters_[i].resends;
+    health.publish_errors = counters_[i].publish_errors;
+  }
   for (const auto& inbox : inboxes_) {
+    health_t& health = service_.health(inbox->component());
     health.messages_received += inbox->counters().accepted();
     health.messages_refused += inbox->counters().refused();
     health.messages_duplicate += inbox->duplicates();
     health.gaps += inbox->gaps();
   }
   for (const auto& link : links_) {
-    health.messages_refused += link->foreign + (link->receiver ? link->receiver->malformed() : 0);
+    service_.health(link->inboxes.front()->component()).messages_refused +=
+        link->foreign + (link->receiver ? link->receiver->malformed() : 0);
   }
-  health.messages_dropped = dropped_;
-  health.resends = resends_;
-  health.publish_errors = publish_errors_;
-  CountSend(service_.SendHealth());
+  for (size_t i = 0; i < counters_.size(); ++i) CountSend(service_.SendHealth(i), i);
 }
 
 }  // namespace poise

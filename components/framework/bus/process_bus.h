@@ -1,4 +1,5 @@
-// ProcessBus: one process's side of the bus: its inputs, outputs, commands, devices and health.
+// ProcessBus: one process's side of the bus: its components' inputs, outputs, commands, devices and
+// health.
 #pragma once
 
 #include <poll.h>
@@ -12,6 +13,7 @@
 
 #include "components/framework/bus/inbox.h"
 #include "components/framework/bus/outbox.h"
+#include "components/framework/bus/owned_message.h"
 #include "components/framework/bus/service_link.h"
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/graph.h"
@@ -29,13 +31,15 @@ class FaultInjector {
   uint64_t state_;
 };
 
-/// Binds a configured component's ports to the channels of its graph. After construction nothing
+/// Binds the ports of a process's components to the channels of its graph, and to each other where
+/// one reads what another writes: such messages stay in memory. After construction nothing
 /// allocates, throws or locks.
 class ProcessBus {
  public:
-  /// `component` must outlive this. With `open` false nothing is received but on the service port,
-  /// until OpenInputs. Throws BusError or ConfigError.
-  ProcessBus(const RunSpec& spec, int index, ConfiguredComponent* component, Join join, bool open);
+  /// `components`: all that run in `process`; they must outlive this. With `open` false nothing is
+  /// received but on the service port, until OpenInputs. Throws BusError or ConfigError.
+  ProcessBus(const RunSpec& spec, const std::string& process,
+             std::vector<ConfiguredComponent>* components, Join join, bool open);
 
   /// Opens the input channels (a process that takes over hears nothing of what came before).
   /// Throws BusError.
@@ -46,12 +50,22 @@ class ProcessBus {
       Inbox* inbox;
       int channel;
     };
+    /// Written by a component of this process, in this tick or the one before.
+    struct LocalInput {
+      InputPort* port;
+      const void* message;
+    };
+    size_t component;  ///< among those of this process
     const Stage* stage;
     std::vector<BoundInput> inputs;
+    std::vector<LocalInput> locals;
     std::vector<Outbox*> outputs;
   };
+  /// In the tick's order.
   const std::vector<BoundStage>& stages() const { return stages_; }
   const std::vector<std::unique_ptr<Inbox>>& inboxes() const { return inboxes_; }
+  /// True when a component reads what another of this process wrote in the tick before.
+  bool has_local_delay() const { return !delayed_.empty(); }
 
   /// Handles what arrives until `deadline` (ns; the past: only what is there); returns after the
   /// first packets, `batch` at most a channel. Serves devices when they are readable and at least
@@ -60,12 +74,17 @@ class ProcessBus {
   /// Devices to serve from now on; `interval` in ns. Allocates.
   void AttachDevices(const std::vector<Device*>& devices, int64_t interval);
 
+  /// Sends the message of `tick` at once when a component of another process waits for it; else
+  /// with the next SendRest, before the port's message changes.
+  void Send(Outbox* outbox, int64_t tick);
+  /// Sends what only the recorder and other listeners hear.
+  void SendRest();
+  /// Ends a tick: what its components wrote is now of the tick before.
+  void KeepDelayed();
+
   /// Asks for the wanted messages of a stage that have not come.
   void Ask(const BoundStage& stage, int64_t tick);
-  void CountSend(bool sent);
-  bool SendControl(int8_t command, int64_t tick, int32_t channel) {
-    return service_.SendControl(command, tick, channel);
-  }
+  bool SendControl(int8_t command, int64_t tick, int32_t channel);
 
   /// COMMAND_START, COMMAND_STOP seen.
   bool started() const { return started_; }
@@ -79,9 +98,13 @@ class ProcessBus {
   bool NearEnough(int64_t tick) const;
   void set_tick(int64_t tick) { tick_ = tick; }
 
-  health_t& health() { return service_.health(); }
-  void SetDetail(std::string_view detail) { service_.SetDetail(detail); }
-  /// Fills in the counters of the bus and sends.
+  size_t num_components() const { return counters_.size(); }
+  health_t& health(size_t component) { return service_.health(component); }
+  void SetDetail(size_t component, std::string_view detail) {
+    service_.SetDetail(detail, component);
+  }
+  /// Fills in the counters of the bus and sends the health of each component. What concerns the
+  /// process as a whole is its first component's.
   void SendHealth();
 
  private:
@@ -99,17 +122,42 @@ class ProcessBus {
     int32_t channel;  // as in run_control_t: component index, -1 the recorder
     int64_t tick;
   };
+  struct Counters {
+    int64_t resends = 0;
+    int64_t dropped = 0;
+    int64_t publish_errors = 0;
+  };
+  /// A message of the tick before, for readers in this process.
+  struct Delayed {
+    const InputPort* port;  // any reader: knows how to copy
+    const OutputPort* output;
+    OwnedMessage message;
+  };
+  struct Unsent {
+    Outbox* outbox;
+    int64_t tick;
+  };
 
+  void BindOutputs(const RunSpec& spec, const std::vector<ConfiguredComponent>& components);
+  void BindStages(const RunSpec& spec, size_t component, const ConfiguredComponent& configured);
+  void BindInput(const RunSpec& spec, const ComponentInstance& instance, InputPort* input,
+                 BoundStage* stage);
+  Inbox* InboxOf(const RunSpec& spec, size_t component, int channel, InputPort* input);
   void Receive(DataLink& link, int batch);
   void ReceiveService(int batch);
   void OnControl(const run_control_t& control);
+  void CountSend(bool sent, size_t component);
 
+  Join join_;
   ServiceLink service_;
   FaultInjector faults_;
   std::vector<std::unique_ptr<Inbox>> inboxes_;
   std::vector<std::unique_ptr<Outbox>> outboxes_;
   std::vector<std::unique_ptr<DataLink>> links_;
+  std::vector<Delayed> delayed_;
   std::vector<BoundStage> stages_;
+  std::vector<Unsent> unsent_;  // as many at most as there are outputs
+  std::vector<Counters> counters_;
   std::vector<Device*> devices_;
   std::vector<pollfd> poll_fds_;  // the service port, then links_, then devices_
   std::vector<Reporter> reporters_;
@@ -119,9 +167,6 @@ class ProcessBus {
   int send_failures_ = 0;
   bool started_ = false;
   bool stopped_ = false;
-  int64_t resends_ = 0;
-  int64_t dropped_ = 0;
-  int64_t publish_errors_ = 0;
 };
 
 }  // namespace poise

@@ -4,15 +4,17 @@
 
 namespace poise {
 
-ServiceLink::ServiceLink(const RunSpec& spec, const std::string& component)
+ServiceLink::ServiceLink(const RunSpec& spec, const std::vector<std::string>& components)
     : run_id_(spec.run_id()),
       sender_(ServiceUrl(spec)),
       receiver_(ServiceUrl(spec)),
-      filter_(spec, {component}),
-      health_channel_(HealthChannel(component)),
+      filter_(spec, components),
       control_bytes_(static_cast<size_t>(control_.getEncodedSize())) {
-  health_.component = component;
-  SetDetail("");
+  for (const std::string& component : components) {
+    reports_.push_back({HealthChannel(component), {}, {}});
+    reports_.back().health.component = component;
+    SetDetail("", reports_.size() - 1);
+  }
 }
 
 bool ServiceLink::SendControl(int8_t command, int64_t tick, int32_t channel) {
@@ -26,16 +28,19 @@ bool ServiceLink::SendControl(int8_t command, int64_t tick, int32_t channel) {
          sender_.Send(kControlChannel, control_bytes_.data(), static_cast<size_t>(size));
 }
 
-void ServiceLink::SetDetail(std::string_view detail) {
-  health_.detail = detail;
-  health_bytes_.resize(static_cast<size_t>(health_.getEncodedSize()));
+void ServiceLink::SetDetail(std::string_view detail, size_t component) {
+  Report& report = reports_[component];
+  report.health.detail = detail;
+  report.bytes.resize(static_cast<size_t>(report.health.getEncodedSize()));
 }
 
-bool ServiceLink::SendHealth() {
-  health_.run_id = run_id_;
-  const int size = health_.encode(health_bytes_.data(), 0, static_cast<int>(health_bytes_.size()));
+bool ServiceLink::SendHealth(size_t component) {
+  Report& report = reports_[component];
+  report.health.run_id = run_id_;
+  const int size =
+      report.health.encode(report.bytes.data(), 0, static_cast<int>(report.bytes.size()));
   return size > 0 &&
-         sender_.Send(health_channel_.c_str(), health_bytes_.data(), static_cast<size_t>(size));
+         sender_.Send(report.channel.c_str(), report.bytes.data(), static_cast<size_t>(size));
 }
 
 }  // namespace poise

@@ -1,4 +1,4 @@
-// A process's place on the service port: commands in and out, its health out.
+// A process's place on the service port: commands in and out, the health of its components out.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ namespace poise {
 /// except in SetDetail.
 class ServiceLink {
  public:
-  /// Throws BusError.
-  ServiceLink(const RunSpec& spec, const std::string& component);
+  /// `components`: those of this process, one at least. Throws BusError.
+  ServiceLink(const RunSpec& spec, const std::vector<std::string>& components);
 
   int fd() const { return receiver_.fd(); }
   BusReceiver& receiver() { return receiver_; }
@@ -28,21 +28,26 @@ class ServiceLink {
   int64_t refused() const { return filter_.refused() + receiver_.malformed(); }
 
   bool SendControl(int8_t command, int64_t tick, int32_t channel);
-  /// Health as it is sent; state, counters and latencies are the caller's to fill in.
-  health_t& health() { return health_; }
-  void SetDetail(std::string_view detail);
-  bool SendHealth();
+  /// Health of a component as it is sent; state, counters and latencies are the caller's to fill
+  /// in.
+  health_t& health(size_t component = 0) { return reports_[component].health; }
+  void SetDetail(std::string_view detail, size_t component = 0);
+  bool SendHealth(size_t component = 0);
 
  private:
+  struct Report {
+    std::string channel;
+    health_t health{};
+    std::vector<uint8_t> bytes;
+  };
+
   int64_t run_id_;
   BusSender sender_;
   BusReceiver receiver_;
   ServiceFilter filter_;
-  std::string health_channel_;
-  health_t health_{};
+  std::vector<Report> reports_;
   run_control_t control_{};
   std::vector<uint8_t> control_bytes_;
-  std::vector<uint8_t> health_bytes_;
 };
 
 }  // namespace poise

@@ -36,71 +36,118 @@ void CatchSignals() {
   prctl(PR_SET_TIMERSLACK, 1000);  // ns: deadlines of a tick are not to be rounded to 50 us
 }
 
+/// Where a process's program finds what it is to do.
+struct Arguments {
+  std::string run_file;
+  std::string name;  ///< of a component or of a process
+  std::string state;
+  bool standby = false;
+};
+
+/// Adds the options that every process has.
+void AddOptions(CLI::App* app, Arguments* arguments) {
+  app->add_option("--run", arguments->run_file, "the run: protobuf text of poise.RunSpec")
+      ->required();
+  CLI::Option* const state_option = app->add_option(
+      "--state", arguments->state, "file that keeps the state for a process that takes over");
+  app->add_flag("--standby", arguments->standby,
+                "wait for SIGUSR2, then take the place of a process that died")
+      ->needs(state_option);
+}
+
+/// Runs the process that `find` names; returns the exit code.
+template <class Find>
+int RunProcess(CLI::App* app, int argc, char** argv, const Arguments& arguments,
+               const ComponentRegistry& registry, const Find& find) {
+  CatchSignals();
+  try {
+    app->parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app->exit(error);
+    SayError(fmt::format("{}: {}; see {} --help", app->get_name(), error.what(), app->get_name()));
+    return 2;
+  }
+  try {
+    RunSpec spec;
+    ReadTextProto(arguments.run_file, &spec);
+    ProcessRunnerOptions options;
+    options.stop = &stop_asked;
+    options.state_path = arguments.state;
+    if (arguments.standby) options.take_over = &take_over_asked;
+    ProcessRunner runner(spec, find(spec), registry, options);
+    if (runner.Run()) return 0;
+    SayError(fmt::format("{}: {}", arguments.name, runner.error()));
+    return 1;
+  } catch (const ConfigError& error) {
+    SayError(fmt::format("{}: {}", arguments.name, error.what()));
+    return 2;
+  } catch (const std::exception& error) {
+    SayError(fmt::format("{}: {}", arguments.name, error.what()));
+    return 1;
+  }
+}
+
+/// The process of component `name`, which this program of one type can run alone.
+std::string ProcessOfComponent(const RunSpec& spec, const std::string& name,
+                               const std::string& type) {
+  std::vector<std::string> names;
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    names.push_back(instance.name());
+    if (instance.name() != name) continue;
+    if (TypeOf(instance) != type) {
+      throw ConfigError(fmt::format("component {} is of type {}; this program is {}", name,
+                                    TypeOf(instance), type));
+    }
+    if (ComponentsOf(spec.graph(), ProcessOf(instance)).size() > 1) {
+      throw ConfigError(
+          fmt::format("component {} shares process {} with others; run: {} --process "
+                      "{}",
+                      name, ProcessOf(instance), kHostProgram, ProcessOf(instance)));
+    }
+    return ProcessOf(instance);
+  }
+  throw ConfigError(fmt::format("graph {}: has no component '{}'; it has {}", spec.graph().name(),
+                                name, fmt::join(names, ", ")));
+}
+
 }  // namespace
 
 int ComponentMain(int argc, char** argv, const ComponentType& of) {
-  const std::string& type = of.name;
-  CatchSignals();
-  std::string run_file;
-  std::string name = type;
   CLI::App app{
       fmt::format("One process of a Poise run: component {}. Usually started by `poise run`.",
-                  type),
-      type};
-  app.set_version_flag("--version", VersionText(type));
-  bool describe = false;
-  CLI::Option* const describe_flag = app.add_flag(
-      "--describe", describe, "print ports, settings and properties as JSON, and do nothing else");
-  CLI::Option* const run_option =
-      app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec");
-  describe_flag->excludes(run_option);
-  app.add_option("--component", name, "name of this component in the run's graph")
+                  of.name),
+      of.name};
+  app.set_version_flag("--version", VersionText(of.name));
+  Arguments arguments;
+  arguments.name = of.name;
+  AddOptions(&app, &arguments);
+  app.add_option("--component", arguments.name, "name of this component in the run's graph")
       ->capture_default_str();
-  std::string state;
-  bool standby = false;
-  CLI::Option* const state_option = app.add_option(
-      "--state", state, "file that keeps the component's state for a process that takes over");
-  app.add_flag("--standby", standby, "wait for SIGUSR2, then take the place of a process that died")
-      ->needs(state_option);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    SayError(fmt::format("{}: {}; see {} --help", type, error.what(), type));
-    return 2;
-  }
-  if (!describe && run_file.empty()) {
-    SayError(fmt::format("{}: --run is required; see {} --help", type, type));
-    return 2;
-  }
-  try {
-    if (describe) {
-      fmt::print("{}\n", DescriptionOf(of).dump(2));
-      return 0;
-    }
-    RunSpec spec;
-    ReadTextProto(run_file, &spec);
-    for (const ComponentInstance& instance : spec.graph().component()) {
-      if (instance.name() == name && TypeOf(instance) != type) {
-        throw ConfigError(fmt::format("component {} is of type {}; this program is {}", name,
-                                      TypeOf(instance), type));
-      }
-    }
-    ProcessRunnerOptions options;
-    options.stop = &stop_asked;
-    options.state_path = state;
-    if (standby) options.take_over = &take_over_asked;
-    ProcessRunner runner(spec, name, of.make, options);
-    if (runner.Run()) return 0;
-    SayError(fmt::format("{}: {}", name, runner.error()));
-    return 1;
-  } catch (const ConfigError& error) {
-    SayError(fmt::format("{}: {}", name, error.what()));
-    return 2;
-  } catch (const std::exception& error) {
-    SayError(fmt::format("{}: {}", name, error.what()));
-    return 1;
-  }
+  app.add_flag_callback(
+         "--describe",
+         [&of] {
+           fmt::print("{}\n", DescriptionOf(of).dump(2));
+           throw CLI::Success();
+         },
+         "print ports, settings and properties as JSON, and do nothing else")
+      ->trigger_on_parse();
+  ComponentRegistry registry;
+  registry.Add(of);
+  return RunProcess(&app, argc, argv, arguments, registry, [&](const RunSpec& spec) {
+    return ProcessOfComponent(spec, arguments.name, of.name);
+  });
+}
+
+int HostMain(int argc, char** argv, const ComponentRegistry& registry) {
+  CLI::App app{
+      "One process of a Poise run: all components that share it. Usually started by `poise run`.",
+      kHostProgram};
+  app.set_version_flag("--version", VersionText(kHostProgram));
+  Arguments arguments;
+  AddOptions(&app, &arguments);
+  app.add_option("--process", arguments.name, "name of the process in the run's graph")->required();
+  return RunProcess(&app, argc, argv, arguments, registry,
+                    [&](const RunSpec&) { return arguments.name; });
 }
 
 int ModuleComponentMain(int argc, char** argv, const char* type, void (*module)()) {

@@ -1,4 +1,4 @@
-// main() of every component's program.
+// main() of every component's program, and of the one that runs several.
 #pragma once
 
 #include <string>
@@ -17,5 +17,12 @@ int ComponentMain(int argc, char** argv, const ComponentType& type);
 
 /// The same of a component that this program's POISE_MODULE adds.
 int ModuleComponentMain(int argc, char** argv, const char* type, void (*module)());
+
+/// The program that runs components which share a process.
+inline constexpr char kHostProgram[] = "component_host";
+
+/// Runs the components of process --process NAME, whose types `registry` has; else as
+/// ComponentMain.
+int HostMain(int argc, char** argv, const ComponentRegistry& registry);
 
 }  // namespace poise

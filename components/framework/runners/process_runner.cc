@@ -10,6 +10,7 @@
 #include "components/framework/bus/process_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
+#include "components/framework/runners/component_group.h"
 #include "components/framework/runners/latency_histogram.h"
 #include "components/framework/runners/state_store.h"
 #include "components/framework/runners/timing.h"
@@ -28,16 +29,6 @@ constexpr int64_t kLongestOutage = 5000 * kMillisecondNs;  // between a process 
 
 using BoundStage = ProcessBus::BoundStage;
 
-int FindComponent(const Graph& graph, const std::string& name) {
-  std::vector<std::string> names;
-  for (int i = 0; i < graph.component_size(); ++i) {
-    if (graph.component(i).name() == name) return i;
-    names.push_back(graph.component(i).name());
-  }
-  throw ConfigError(fmt::format("graph {}: has no component '{}'; it has {}", graph.name(), name,
-                                fmt::join(names, ", ")));
-}
-
 Join JoinOf(Timing timing) {
   if (timing == Timing::kOwner) return Join::kLate;
   return timing == Timing::kFollower ? Join::kNewest : Join::kEvery;
@@ -47,7 +38,7 @@ Join JoinOf(Timing timing) {
 
 class ProcessRunner::Impl {
  public:
-  Impl(const RunSpec& spec, const std::string& name, const ComponentFactory& factory,
+  Impl(const RunSpec& spec, const std::string& process, const ComponentRegistry& registry,
        const ProcessRunnerOptions& options);
 
   bool Run();
@@ -60,6 +51,8 @@ class ProcessRunner::Impl {
   bool Asked() const { return bus_.stopped() || (options_.stop != nullptr && *options_.stop != 0); }
   bool Stopped() const { return Asked() || !error_.empty(); }
 
+  void CheckTiming(const RunSpec& spec, const std::string& process);
+  bool IsSource(size_t component) const;
   void Open();
   void WaitForStart();
   bool TakeOver();
@@ -74,18 +67,27 @@ class ProcessRunner::Impl {
   Outcome WaitForInputs(const BoundStage& stage);
   bool ChooseTick();
   Outcome RunStage(const BoundStage& stage, const Tick& tick);
+  /// Ends the run as failed for a component's own reason.
+  Outcome FailStage(size_t component, const std::string& reason);
   /// Ends tick_. True when the component or the run has come to its end.
   bool EndTick();
   void WaitUntil(int64_t time);
   void KeepState();
   void ReportProgress();
-  void End(int8_t state, std::string_view detail);
+  void End(size_t component, int8_t state, std::string_view detail);
+  /// All components come to their end together.
+  void EndAll();
   void StayUntilStop();
   void Close();
   void Fail(std::string message);
 
   void Poll(int64_t deadline, int batch);
   void PublishHealth(int64_t now);
+  template <class Change>
+  void EachHealth(const Change& change) {
+    for (size_t i = 0; i < bus_.num_components(); ++i) change(bus_.health(i));
+  }
+  const std::string& NameOf(size_t component) { return group_.components()[component].name; }
 
   ProcessRunnerOptions options_;
   double period_;
@@ -94,32 +96,29 @@ class ProcessRunner::Impl {
   int64_t lead_;  // ticks
   int64_t num_ticks_;
   int64_t run_id_;
-  int num_components_;
-  int index_;
-  Timing timing_;
+  int num_components_;  // of the graph
   RealtimeOptions realtime_options_;
-  SharedObjects shared_;
-  ConfiguredComponent configured_;
+  ComponentGroup group_;
+  Timing timing_;  // of all of the group
   ProcessBus bus_;
   std::unique_ptr<StateStore> store_;
   bool can_be_taken_over_ = false;
   bool is_source_ = false;
-  bool must_report_ = false;
-  bool opened_ = false;
+  std::vector<int> reporters_;  // those of the group that report their progress
 
   int64_t tick_ = 0;     // the one that runs
   int64_t arrival_ = 0;  // ns, of the last packets
   bool polled_ = false;  // in this tick
   int64_t next_health_ = 0;
-  double lateness_ = 0;    // s, of this cycle
-  int64_t progress_ = 0;   // ns, end of the last tick
-  bool any_tick_ = false;  // taken over without a state: the first tick may be any
-  LatencyHistogram latency_;
+  double lateness_ = 0;                    // s, of this cycle
+  int64_t progress_ = 0;                   // ns, end of the last tick
+  bool any_tick_ = false;                  // taken over without a state: the first tick may be any
+  std::vector<LatencyHistogram> latency_;  // by component
   std::string error_;
 };
 
-ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& name,
-                          const ComponentFactory& factory, const ProcessRunnerOptions& options)
+ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& process,
+                          const ComponentRegistry& registry, const ProcessRunnerOptions& options)
     : options_(options),
       period_(spec.tick_period()),
       period_ns_(static_cast<int64_t>(spec.tick_period() * 1e9)),
@@ -128,43 +127,64 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& name,
       num_ticks_(spec.num_ticks()),
       run_id_(spec.run_id()),
       num_components_(spec.graph().component_size()),
-      index_(FindComponent(spec.graph(), name)),
-      timing_(TimingOf(spec, index_)),
       realtime_options_(spec.realtime_options()),
-      configured_(ConfigureComponent(spec, index_, factory, &shared_)),
-      bus_(spec, index_, &configured_, JoinOf(timing_), options.take_over == nullptr) {
-  const Graph& graph = spec.graph();
+      group_(spec, process, registry),
+      timing_(TimingOf(spec, group_.components().front().index)),
+      bus_(spec, process, &group_.components(), JoinOf(timing_), options.take_over == nullptr),
+      latency_(group_.components().size()) {
   if (!(period_ > 0)) throw ConfigError("run: tick_period must be greater than 0");
-  CheckWiring(graph, index_, configured_.wiring);
-  const BoundStage& first = bus_.stages()[0];
-  is_source_ = std::none_of(first.inputs.begin(), first.inputs.end(), [](const auto& input) {
-    return input.inbox->port().kind() == InputKind::kSameTick;
-  });
-  if (timing_ == Timing::kFollower && is_source_) {
-    throw ConfigError(
-        fmt::format("graph {}: component {} waits for no message of its tick; in real time it must "
-                    "own the clock "
-                    "(owns_clock) or stand for the robot (plant)",
-                    graph.name(), name));
-  }
-  // The wall clock waits for nobody: in real time the recorder and others must keep up.
-  if (timing_ == Timing::kLockstep) {
-    must_report_ = MustReportProgress(graph, index_);
-    if (is_source_) {
-      for (const int reporter : ProgressReporters(graph, index_)) bus_.WaitFor(reporter);
-      if (options_.wait_for_recorder || spec.recorded()) bus_.WaitFor(-1);
-    }
-  }
+  CheckTiming(spec, process);
   if (!options_.state_path.empty()) {
     store_ = std::make_unique<StateStore>(options_.state_path);
     StateArchive measure;
-    can_be_taken_over_ = configured_.component->Archive(&measure);
+    can_be_taken_over_ = group_.Archive(&measure);
     if (measure.size() > StateStore::kCapacity) {
       throw ConfigError(
-          fmt::format("component {}: its state of {} bytes is more than the {} that are kept", name,
-                      measure.size(), StateStore::kCapacity));
+          fmt::format("process {}: its state of {} bytes is more than the {} that are kept",
+                      process, measure.size(), StateStore::kCapacity));
     }
   }
+}
+
+/// Whether its components can keep step, and whom its tick sources wait for.
+void ProcessRunner::Impl::CheckTiming(const RunSpec& spec, const std::string& process) {
+  const Graph& graph = spec.graph();
+  for (size_t i = 0; i < group_.components().size(); ++i) {
+    const int index = group_.components()[i].index;
+    const bool source = IsSource(i);
+    is_source_ = is_source_ || source;
+    if (timing_ == Timing::kFollower && source) {
+      throw ConfigError(fmt::format(
+          "graph {}: component {} waits for no message of its tick; in real time it must own the "
+          "clock (owns_clock) or stand for the robot (plant)",
+          graph.name(), NameOf(i)));
+    }
+    // The wall clock waits for nobody: in real time the recorder and others must keep up.
+    if (timing_ != Timing::kLockstep) continue;
+    if (MustReportProgress(graph, index)) reporters_.push_back(index);
+    if (!source) continue;
+    for (const int reporter : ProgressReporters(graph, index)) {
+      if (!group_.Has(reporter)) bus_.WaitFor(reporter);
+    }
+  }
+  if (timing_ == Timing::kLockstep && is_source_ &&
+      (options_.wait_for_recorder || spec.recorded())) {
+    bus_.WaitFor(-1);
+  }
+  if (timing_ == Timing::kFollower && bus_.has_local_delay()) {
+    throw ConfigError(fmt::format(
+        "graph {}: in process {} one component reads another's message of the tick before, which "
+        "may have been skipped in real time; run them in processes of their own",
+        graph.name(), process));
+  }
+}
+
+/// True when a component's first stage waits for no message of its tick.
+bool ProcessRunner::Impl::IsSource(size_t component) const {
+  const auto first = std::ranges::find(bus_.stages(), component, &BoundStage::component);
+  const std::vector<InputPort*>& inputs = first->stage->inputs;
+  return std::ranges::none_of(
+      inputs, [](const InputPort* input) { return input->kind() == InputKind::kSameTick; });
 }
 
 bool ProcessRunner::Impl::Run() {
@@ -175,10 +195,12 @@ bool ProcessRunner::Impl::Run() {
     if (!Stopped()) WaitForStart();
   }
   // The simulated robot must not be late either, but stands below the controller.
-  const int below = timing_ == Timing::kOwner   ? 0
-                    : timing_ == Timing::kPlant ? num_components_ + 1
-                                                : num_components_ - index_;
-  bus_.health().scheduling = AskForRealtime(realtime_options_, timing_, below);
+  const int below = timing_ == Timing::kOwner ? 0
+                    : timing_ == Timing::kPlant
+                        ? num_components_ + 1
+                        : num_components_ - group_.components().back().index;
+  const int8_t granted = AskForRealtime(realtime_options_, timing_, below);
+  EachHealth([&](health_t& health) { health.scheduling = granted; });
   if (progress_ == 0) progress_ = NowNanoseconds();
   const auto run = [&] {
     switch (timing_) {
@@ -203,27 +225,28 @@ void ProcessRunner::Impl::Fail(std::string message) {
 
 void ProcessRunner::Impl::Open() {
   try {
-    configured_.component->Open();
-    opened_ = true;
-    bus_.AttachDevices(configured_.component->devices(), period_ns_);
+    group_.Open();
+    bus_.AttachDevices(group_.devices(), period_ns_);
   } catch (const std::exception& error) {
     Fail(error.what());
-    End(health_t::STATE_FAILED, error_);
+    End(std::min(group_.opened(), latency_.size() - 1), health_t::STATE_FAILED, error_);
     PublishHealth(NowNanoseconds());
   }
 }
 
 void ProcessRunner::Impl::WaitForStart() {
-  bus_.health().state = health_t::STATE_READY;
-  bus_.health().tick = -1;
+  EachHealth([](health_t& health) {
+    health.state = health_t::STATE_READY;
+    health.tick = -1;
+  });
   int64_t next_idle = NowNanoseconds();
   while (!bus_.started() && !Stopped()) {
     Poll(next_idle, kDrainBatch);
     if (NowNanoseconds() < next_idle) continue;
-    configured_.component->Idle();
+    group_.Idle();
     next_idle += period_ns_;
   }
-  bus_.health().state = health_t::STATE_RUNNING;
+  EachHealth([](health_t& health) { health.state = health_t::STATE_RUNNING; });
   next_health_ = 0;  // at once: the launcher waits for it
 }
 
@@ -236,13 +259,13 @@ bool ProcessRunner::Impl::TakeOver() {
   }
   if (store_->tick() >= 0 && can_be_taken_over_) {
     StateArchive restore = StateArchive::Restoring(store_->latest());
-    configured_.component->Archive(&restore);
+    group_.Archive(&restore);
     if (!restore.ok()) {
-      Fail("the stored state does not fit this component");
+      Fail("the stored state does not fit the components");
       return false;
     }
     tick_ = store_->tick() + 1;
-    bus_.health().tick = store_->tick();
+    EachHealth([&](health_t& health) { health.tick = store_->tick(); });
     progress_ = NowNanoseconds() - kLongestOutage;
   } else {
     any_tick_ = true;
@@ -254,7 +277,7 @@ bool ProcessRunner::Impl::TakeOver() {
     Fail(error.what());
     return false;
   }
-  bus_.health().state = health_t::STATE_RUNNING;
+  EachHealth([](health_t& health) { health.state = health_t::STATE_RUNNING; });
   next_health_ = 0;
   return true;
 }
@@ -333,7 +356,7 @@ bool ProcessRunner::Impl::ChooseTick() {
           return input.inbox->port().kind() != InputKind::kSameTick || input.inbox->Has(newest);
         });
     if (whole && polled_) {
-      bus_.health().ticks_skipped += newest - expected;
+      EachHealth([&](health_t& health) { health.ticks_skipped += newest - expected; });
       tick_ = newest;
       return true;
     }
@@ -357,7 +380,7 @@ bool ProcessRunner::Impl::RunOwner() {
     next_request = NowNanoseconds() + kAnnounceInterval;
   }
   int64_t time = NowNanoseconds();
-  health_t& health = bus_.health();
+  health_t& health = bus_.health(0);  // the owner is alone
   while (true) {
     WaitUntil(time);
     const int64_t start = NowNanoseconds();
@@ -378,11 +401,11 @@ bool ProcessRunner::Impl::RunOwner() {
       if (ran != Outcome::kDone) return true;
     }
     const int64_t end = NowNanoseconds();
-    latency_.Add(end - start);
+    latency_[0].Add(end - start);
     if (end > time + period_ns_) ++health.deadline_misses;
     if (EndTick()) return true;
     if (Stopped()) return false;
-    time += period_ns_ + configured_.component->cycle_correction();
+    time += period_ns_ + group_.cycle_correction();
     // Whole cycles that are lost stay lost: a burst of them would not help the robot.
     const int64_t behind = NowNanoseconds() - time;
     if (behind >= period_ns_) {
@@ -441,40 +464,50 @@ ProcessRunner::Impl::Outcome ProcessRunner::Impl::RunStage(const BoundStage& bou
   for (const BoundStage::BoundInput& input : bound.inputs) {
     input.inbox->Show(tick.index == 0 && input.inbox->port().kind() == InputKind::kPreviousTick);
   }
+  for (const BoundStage::LocalInput& input : bound.locals) {
+    const bool absent = tick.index == 0 && input.port->kind() == InputKind::kPreviousTick;
+    input.port->Bind(absent ? nullptr : input.message);
+  }
   for (Outbox* outbox : bound.outputs) outbox->port().Stamp(run_id_, tick.index, tick.utime);
   bound.stage->run(tick);
   for (const BoundStage::BoundInput& input : bound.inputs) input.inbox->Hide();
+  for (const BoundStage::LocalInput& input : bound.locals) input.port->Bind(nullptr);
   for (Outbox* outbox : bound.outputs) {
     if (outbox->port().TakeWithheld() && timing_ == Timing::kOwner) continue;
     if (!outbox->port().Finite()) {
-      Fail(fmt::format("output {} is not finite at tick {}", outbox->port().name(), tick.index));
-      End(health_t::STATE_FAILED, error_);
-      return Outcome::kEnded;
+      return FailStage(bound.component, fmt::format("output {} is not finite at tick {}",
+                                                    outbox->port().name(), tick.index));
     }
-    bus_.CountSend(outbox->Send(tick.index));
+    bus_.Send(outbox, tick.index);
   }
   // The owner's latency is that of the whole cycle.
-  if (timing_ != Timing::kOwner) latency_.Add(NowNanoseconds() - arrival_);
+  if (timing_ != Timing::kOwner) latency_[bound.component].Add(NowNanoseconds() - arrival_);
   return Outcome::kDone;
+}
+
+ProcessRunner::Impl::Outcome ProcessRunner::Impl::FailStage(size_t component,
+                                                            const std::string& reason) {
+  Fail(latency_.size() == 1 ? reason : fmt::format("{}: {}", NameOf(component), reason));
+  End(component, health_t::STATE_FAILED, reason);
+  return Outcome::kEnded;
 }
 
 bool ProcessRunner::Impl::EndTick() {
   const Tick tick = MakeTick(tick_, period_, lead_);
-  bus_.health().tick = tick.index;
-  bus_.health().utime = tick.utime;
+  // At once after the command has left: a death in between loses the tick's state.
   if (store_ != nullptr && can_be_taken_over_) KeepState();
+  bus_.SendRest();
+  bus_.KeepDelayed();
+  EachHealth([&](health_t& health) {
+    health.tick = tick.index;
+    health.utime = tick.utime;
+  });
   progress_ = NowNanoseconds();
   any_tick_ = false;
   ++tick_;
-  if (must_report_ && tick_ % kProgressInterval == 0) ReportProgress();
-  const std::string_view finished = configured_.component->finished();
-  if (!finished.empty()) {
-    End(configured_.component->failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED,
-        finished);
-    return true;
-  }
-  if (num_ticks_ > 0 && tick_ >= num_ticks_) {
-    End(health_t::STATE_FINISHED, "");
+  if (tick_ % kProgressInterval == 0) ReportProgress();
+  if (group_.finished() != nullptr || (num_ticks_ > 0 && tick_ >= num_ticks_)) {
+    EndAll();
     return true;
   }
   return false;
@@ -482,18 +515,29 @@ bool ProcessRunner::Impl::EndTick() {
 
 void ProcessRunner::Impl::KeepState() {
   StateArchive save = StateArchive::Saving(store_->Next());
-  configured_.component->Archive(&save);
+  group_.Archive(&save);
   if (save.ok()) store_->Commit(tick_, save.size());
 }
 
 void ProcessRunner::Impl::ReportProgress() {
-  bus_.CountSend(bus_.SendControl(run_control_t::COMMAND_RECORDED, tick_ - 1, index_));
+  for (const int index : reporters_) {
+    bus_.SendControl(run_control_t::COMMAND_RECORDED, tick_ - 1, index);
+  }
 }
 
-void ProcessRunner::Impl::End(int8_t state, std::string_view detail) {
-  bus_.health().state = state;
-  bus_.SetDetail(detail);
+void ProcessRunner::Impl::End(size_t component, int8_t state, std::string_view detail) {
+  bus_.health(component).state = state;
+  bus_.SetDetail(component, detail);
   next_health_ = 0;
+}
+
+void ProcessRunner::Impl::EndAll() {
+  for (size_t i = 0; i < bus_.num_components(); ++i) {
+    const Component& component = *group_.components()[i].component;
+    const std::string_view finished = component.finished();
+    const bool failed = !finished.empty() && component.failed();
+    End(i, failed ? health_t::STATE_FAILED : health_t::STATE_FINISHED, finished);
+  }
 }
 
 void ProcessRunner::Impl::StayUntilStop() {
@@ -501,19 +545,19 @@ void ProcessRunner::Impl::StayUntilStop() {
   while (!Asked()) {
     Poll(next_idle, kDrainBatch);
     if (NowNanoseconds() < next_idle) continue;
-    if (opened_) configured_.component->Idle();
+    group_.Idle();
     next_idle += period_ns_;
   }
 }
 
 void ProcessRunner::Impl::Close() {
-  if (!opened_) return;
-  const std::string problem = configured_.component->Close();
+  const std::string problem = group_.Close();
   if (!problem.empty()) Fail(problem);
 }
 
 void ProcessRunner::Impl::Poll(int64_t deadline, int batch) {
   polled_ = true;
+  bus_.SendRest();
   const int64_t now = NowNanoseconds();
   if (now >= next_health_) PublishHealth(now);
   if (timing_ == Timing::kFollower) {
@@ -526,23 +570,26 @@ void ProcessRunner::Impl::Poll(int64_t deadline, int batch) {
 }
 
 void ProcessRunner::Impl::PublishHealth(int64_t now) {
-  health_t& health = bus_.health();
-  const bool running = health.state == health_t::STATE_RUNNING;
+  bool running = false;
+  for (size_t i = 0; i < latency_.size(); ++i) {
+    health_t& health = bus_.health(i);
+    running = running || health.state == health_t::STATE_RUNNING;
+    health.ticks_completed = tick_;
+    health.latency_median = latency_[i].median();
+    health.latency_p99 = latency_[i].p99();
+    health.latency_max = latency_[i].max();
+    std::ranges::copy(latency_[i].HalfOctaves(), health.latency_count);
+    health.restarts = store_ == nullptr ? 0 : store_->restarts();
+  }
   next_health_ = now + (running ? kHealthInterval : kAnnounceInterval);
-  health.ticks_completed = tick_;
-  health.latency_median = latency_.median();
-  health.latency_p99 = latency_.p99();
-  health.latency_max = latency_.max();
-  std::ranges::copy(latency_.HalfOctaves(), health.latency_count);
-  health.restarts = store_ == nullptr ? 0 : store_->restarts();
   bus_.SendHealth();
   // Also covers a report that was lost.
-  if (must_report_ && tick_ > 0) ReportProgress();
+  if (tick_ > 0) ReportProgress();
 }
 
-ProcessRunner::ProcessRunner(const RunSpec& spec, const std::string& name,
-                             const ComponentFactory& factory, const ProcessRunnerOptions& options)
-    : impl_(std::make_unique<Impl>(spec, name, factory, options)) {}
+ProcessRunner::ProcessRunner(const RunSpec& spec, const std::string& process,
+                             const ComponentRegistry& registry, const ProcessRunnerOptions& options)
+    : impl_(std::make_unique<Impl>(spec, process, registry, options)) {}
 ProcessRunner::~ProcessRunner() = default;
 bool ProcessRunner::Run() { return impl_->Run(); }
 const std::string& ProcessRunner::error() const { return impl_->error(); }

@@ -1,4 +1,4 @@
-// Runs one component of a run as a process on the bus.
+// Runs a process of a run on the bus: one component, or several that share it.
 #pragma once
 
 #include <csignal>
@@ -25,17 +25,18 @@ struct ProcessRunnerOptions {
 /// Lockstep: joins inputs by tick, runs each stage as soon as its inputs are there, sends its
 /// outputs, asks again for what does not come and answers such requests. Real time: see Timing. The
 /// start waits for COMMAND_START, the end for COMMAND_STOP. After the start nothing allocates,
-/// throws or locks.
+/// throws or locks. Between its components messages pass by reference; what no other process waits
+/// for is sent when nothing else is to be done.
 class ProcessRunner {
  public:
-  /// Configures component `name` of the run. Throws GraphError, ConfigError, BusError or
-  /// std::system_error (the state's file).
-  ProcessRunner(const RunSpec& spec, const std::string& name, const ComponentFactory& factory,
+  /// Configures the components of `process`, whose types `registry` has. Throws GraphError,
+  /// ConfigError, BusError or std::system_error (the state's file).
+  ProcessRunner(const RunSpec& spec, const std::string& process, const ComponentRegistry& registry,
                 const ProcessRunnerOptions& options);
   ~ProcessRunner();
 
-  /// Runs until COMMAND_STOP or *options.stop. Returns false when the bus failed, the component
-  /// sent a number that is not finite, or its hardware did not start or stop; error() says which.
+  /// Runs until COMMAND_STOP or *options.stop. Returns false when the bus failed, a component sent
+  /// a number that is not finite, or its hardware did not start or stop; error() says which.
   bool Run();
   const std::string& error() const;
 
