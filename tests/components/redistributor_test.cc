@@ -29,7 +29,7 @@ class Chain {
       : model_(robot::LoadTestRobot(robot)),
         context_(robot),
         planner_(&context_, phases),
-        task_(&context_, TaskConfig()),
+        task_(&context_, TaskControllerText()),
         monitor_(&context_, monitor),
         redistributor_(&context_, redistributor) {
     planner_.Bind("robot_state", &state_);

@@ -7,13 +7,15 @@ namespace {
 
 class FrameTask : public Task {
  public:
-  FrameTask(const TaskGains& gains, robot::Frame frame, std::vector<int> rows, int num_velocities)
-      : gains_(gains),
-        frame_(std::move(frame)),
+  FrameTask(robot::Frame frame, std::vector<int> rows, int num_velocities)
+      : frame_(std::move(frame)),
         rows_(std::move(rows)),
         jacobian_(Eigen::MatrixXd::Zero(6, num_velocities)) {}
 
   int num_rows() const override { return static_cast<int>(rows_.size()); }
+  TargetParts needs() const override {
+    return {.position = rows_.front() < 3, .rotation = rows_.back() >= 3};
+  }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     const FrameMotion motion = ComputeFrameMotion(state.data, frame_);
@@ -27,7 +29,7 @@ class FrameTask : public Task {
       const int axis = rows_[static_cast<size_t>(i)];
       rows->jacobian.row(i) = jacobian_.row(axis);
       rows->bias_acceleration[i] = motion.bias_acceleration[axis];
-      rows->acceleration[i] = PdAcceleration(gains_, acceleration[axis], error[axis],
+      rows->acceleration[i] = PdAcceleration(gains(), acceleration[axis], error[axis],
                                              velocity[axis] - motion.velocity[axis]);
     }
   }
@@ -43,7 +45,6 @@ class FrameTask : public Task {
   }
 
  private:
-  TaskGains gains_;
   robot::Frame frame_;
   std::vector<int> rows_;
   mutable Eigen::MatrixXd jacobian_;  // scratch; columns of joints that do not carry the frame stay 0
@@ -52,8 +53,9 @@ class FrameTask : public Task {
 }  // namespace
 
 std::unique_ptr<Task> MakeFrameTask(const TaskSpec& spec, const robot::RobotModel& model) {
-  return std::make_unique<FrameTask>(spec.gains, TaskFrame(spec, model),
-                                     SelectedRows(spec.axes, kX, 6), model.num_velocities());
+  RefuseJoints(spec);
+  return std::make_unique<FrameTask>(TaskFrame(spec, model), SelectedRows(spec.axes, kX, 6),
+                                     model.num_velocities());
 }
 
 }  // namespace poise::balance
