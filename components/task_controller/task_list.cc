@@ -223,6 +223,10 @@ const balance::TaskTarget& TaskList::Target(const Entry& entry) const {
 bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDynamics& contact,
                        const FeetInContact& in_contact) {
   level_rows_.clear();
+  if (in_contact != written_for_) {
+    jacobian_.setZero();
+    written_for_ = in_contact;
+  }
   Eigen::Index row = 0;
   const Entry* last = nullptr;
   for (const Entry& entry : entries_) {
@@ -230,7 +234,6 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     const Eigen::Index t = entry.task->num_rows();
     balance::TaskRows rows{jacobian_.middleRows(row, t), bias_acceleration_.segment(row, t),
                            acceleration_.segment(row, t)};
-    rows.jacobian.setZero();
     entry.task->Write(state, Target(entry), &rows);
     if (last == nullptr || entry.level != last->level) level_rows_.push_back(0);
     level_rows_.back() += static_cast<int>(t);

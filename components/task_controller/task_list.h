@@ -71,6 +71,7 @@ class TaskList {
   std::optional<balance::TaskHierarchy> hierarchy_;
   std::vector<int> level_rows_;
   Eigen::MatrixXd jacobian_;
+  FeetInContact written_for_{false, false};  // other feet, other rows
   Eigen::VectorXd bias_acceleration_, acceleration_;
 };
 

@@ -13,9 +13,9 @@ class ComTask : public Task {
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     const robot::RobotData& data = state.data;
+    CopySelected(rows_, data.com_jacobian, rows->jacobian);
     for (int i = 0; i < num_rows(); ++i) {
       const int axis = rows_[static_cast<size_t>(i)];
-      rows->jacobian.row(i) = data.com_jacobian.row(axis);
       rows->bias_acceleration[i] = data.com_bias_acceleration[axis];
       rows->acceleration[i] =
           PdAcceleration(gains(), target.acceleration[axis], target.position[axis] - data.com[axis],

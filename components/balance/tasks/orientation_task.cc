@@ -20,12 +20,13 @@ class OrientationTask : public Task {
     const auto b = static_cast<size_t>(frame_.body);
     const Vector3d error = OrientationError(target.rotation, Rotation(data));
     const Vector3d velocity_error = target.angular_velocity - data.body_angular_velocity[b];
+    for (const int joint : state.model.supporting_joints(frame_.body)) {
+      CopySelected(rows_, data.joint_axis[static_cast<size_t>(joint)],
+                   rows->jacobian.col(6 + joint));
+    }
     for (int i = 0; i < num_rows(); ++i) {
       const int axis = rows_[static_cast<size_t>(i)];
       rows->jacobian(i, 3 + axis) = 1;
-      for (const int joint : state.model.supporting_joints(frame_.body)) {
-        rows->jacobian(i, 6 + joint) = data.joint_axis[static_cast<size_t>(joint)][axis];
-      }
       rows->bias_acceleration[i] = data.body_angular_bias[b][axis];
       rows->acceleration[i] = PdAcceleration(gains(), target.angular_acceleration[axis], error[axis],
                                              velocity_error[axis]);

@@ -45,7 +45,8 @@ struct TaskState {
 
 /// Rows of ẍ = J q̈ + J̇ q̇ and the f* that ẍ shall be; a task fills its own.
 struct TaskRows {
-  Eigen::Ref<Eigen::MatrixXd> jacobian;           ///< J, t×n; zero when a task gets it
+  /// J, t×n; zero when a task gets it, or as the task itself left it.
+  Eigen::Ref<Eigen::MatrixXd> jacobian;
   Eigen::Ref<Eigen::VectorXd> bias_acceleration;  ///< J̇ q̇, t×1
   Eigen::Ref<Eigen::VectorXd> acceleration;       ///< f*, t×1: (25), the reference's fed forward
 };
@@ -106,6 +107,18 @@ std::unique_ptr<Task> CreateTask(const TaskSpec& spec, const robot::RobotModel& 
 
 /// Smallest rotation vector from `actual` to `desired`, rad, in the axes both are given in.
 Eigen::Vector3d OrientationError(const Eigen::Matrix3d& desired, const Eigen::Matrix3d& actual);
+
+/// Copies the rows `selected` of `all`, which has as many as are known when compiling, to `to`.
+template <class All, class To>
+void CopySelected(const std::vector<int>& selected, const All& all, To&& to) {
+  if (static_cast<Eigen::Index>(selected.size()) == All::RowsAtCompileTime) {
+    to.template topRows<All::RowsAtCompileTime>() = all;
+    return;
+  }
+  for (size_t i = 0; i < selected.size(); ++i) {
+    to.row(static_cast<Eigen::Index>(i)) = all.row(selected[i]);
+  }
+}
 
 /// Rows that `axes` selects of those from `first` to first + count; all when none is selected.
 /// Throws std::invalid_argument for an axis outside of them.
