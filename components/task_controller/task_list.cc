@@ -82,9 +82,9 @@ balance::TargetParts PartsOf(TaskConfig::Reference reference) {
 void CheckReference(const balance::TargetParts& needed, const TaskConfig& task,
                     TaskConfig::Reference reference, const std::string& field) {
   const balance::TargetParts has = PartsOf(reference);
-  const char* missing = needed.position && !has.position   ? "position"
-                        : needed.rotation && !has.rotation ? "rotation"
-                        : needed.joints && !has.joints     ? "joint positions"
+  const char* missing = needed.position && !has.position                   ? "position"
+                        : needed.rotation && !has.rotation                 ? "rotation"
+                        : needed.joints && !has.joints                     ? "joint positions"
                         : needed.angular_momentum && !has.angular_momentum ? "angular momentum"
                                                                            : nullptr;
   if (missing == nullptr) return;
@@ -166,8 +166,8 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   const balance::TargetParts needed = entry.task->needs();
   CheckReference(needed, task, entry.reference, field);
   const NamedGains gains = GainsOf(task, entry.reference, field, config);
-  entry.task->set_gains(ReadGains(*gains.gains, gains.field,
-                                  needed.position || needed.rotation || needed.joints));
+  entry.task->set_gains(
+      ReadGains(*gains.gains, gains.field, needed.position || needed.rotation || needed.joints));
   for (const int foot : {0, 1}) {
     const auto own = static_cast<TaskConfig::Foot>(foot);
     entry.rests[static_cast<size_t>(foot)] =

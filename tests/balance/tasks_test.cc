@@ -62,8 +62,8 @@ VectorXd Rate(const Task& task, const robot::RobotModel& model, const robot::Rob
 }
 
 std::vector<TaskSpec> AllTypes(const std::string& link) {
-  std::vector<TaskSpec> specs{Spec("com"), Spec("orientation"), Spec("frame"), Spec("frame"),
-                              Spec("joint_posture"), Spec("angular_momentum")};
+  std::vector<TaskSpec> specs{Spec("com"),   Spec("orientation"),   Spec("frame"),
+                              Spec("frame"), Spec("joint_posture"), Spec("angular_momentum")};
   specs[1].link = link;
   specs[2].link = link;
   specs[2].point = Vector3d(0.1, -0.2, 0.3);
@@ -112,8 +112,7 @@ TEST(Tasks, GainsActOnTheErrorAndItsRate) {
     const TaskGains gains{.kp = task->needs().angular_momentum ? 0.0 : 100.0, .kd = 7};
     task->set_gains(gains);
     // 1 ms earlier at the same velocity: the target.
-    const robot::RobotState before =
-        After(state, VectorXd::Zero(model->num_velocities()), -1e-4);
+    const robot::RobotState before = After(state, VectorXd::Zero(model->num_velocities()), -1e-4);
     TaskTarget target;
     const robot::RobotData then = Evaluate(*model, before), now = Evaluate(*model, state);
     task->Hold({*model, before, then}, &target);
@@ -123,8 +122,7 @@ TEST(Tasks, GainsActOnTheErrorAndItsRate) {
     TaskRows rows{jacobian, bias, wanted};
     task->Write({*model, state, now}, target, &rows);
     const VectorXd rate = jacobian * Velocity(state);
-    EXPECT_LT((wanted + (gains.kp * 1e-4 + gains.kd) * rate).norm(),
-              2e-3 * (1 + rate.norm()))
+    EXPECT_LT((wanted + (gains.kp * 1e-4 + gains.kd) * rate).norm(), 2e-3 * (1 + rate.norm()))
         << spec.type;
   }
 }

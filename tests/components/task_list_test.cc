@@ -115,8 +115,8 @@ double LargestSlope(const Dynamics& dynamics, const std::vector<Level>& levels) 
     const MatrixXd q = taken.householderQ();
     const MatrixXd free = q.rightCols(above.cols() - taken.rank());
     const VectorXd weight = Mobility(dynamics, level.rows).cwiseInverse();
-    const VectorXd slope =
-        free.transpose() * level.rows.transpose() * weight.asDiagonal() * (level.got - level.wanted);
+    const VectorXd slope = free.transpose() * level.rows.transpose() * weight.asDiagonal() *
+                           (level.got - level.wanted);
     if (slope.size() > 0) largest = std::max(largest, slope.cwiseAbs().maxCoeff());
     above = Stacked(above, level.rows);
   }
@@ -248,8 +248,8 @@ TEST_P(TaskListCase, ThreeLevelsOfARobotWithAHand) {
     constexpr double kStep = 1e-4;
     const VectorXd velocity = robot::Velocity(now);
     const auto after = [&](double time) {
-      return place(robot::Evaluate(
-          model, robot::Moved(now, velocity + 0.5 * time * acceleration, time)));
+      return place(
+          robot::Evaluate(model, robot::Moved(now, velocity + 0.5 * time * acceleration, time)));
     };
     const Vector3d got = (after(kStep) - 2 * after(0) + after(-kStep)) / (kStep * kStep);
     const Vector3d wanted = 64 * (held - place(d)) - 16 * reach * velocity;
@@ -266,11 +266,11 @@ TEST_P(TaskListCase, ThreeLevelsOfARobotWithAHand) {
     MatrixXd joints = MatrixXd::Zero(k, k + 6);
     joints.rightCols(k).setIdentity();
     slope = std::max(
-        slope, LargestSlope(dynamics, {{first, none, none},
-                                       {reach, Vector3d::Zero(), Vector3d::Zero()},
-                                       {joints, acceleration.tail(k),
-                                        80 * (posture - now.joint_position) -
-                                            12 * now.joint_velocity}}));
+        slope,
+        LargestSlope(dynamics, {{first, none, none},
+                                {reach, Vector3d::Zero(), Vector3d::Zero()},
+                                {joints, acceleration.tail(k),
+                                 80 * (posture - now.joint_position) - 12 * now.joint_velocity}}));
   }
   EXPECT_LT(worst, 1e-4);  // of the second difference
   EXPECT_LT(slope, 1e-7);
@@ -311,7 +311,8 @@ std::vector<std::vector<double>> Torques(TestRobot robot, const std::string& con
 TEST(TaskList, WithoutAListThereAreThePapersTasks) {
   const std::string list =
       "task { type: 'com' } task { type: 'orientation' reference: BODY }"
-      "task { type: 'frame' foot: RIGHT } task { type: 'frame' foot: LEFT gains { kp: 100 kd: 15 } }";
+      "task { type: 'frame' foot: RIGHT } task { type: 'frame' foot: LEFT gains { kp: 100 kd: 15 } "
+      "}";
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     for (const Contacts& feet : {Contacts{true, true}, {true, false}, {false, true}}) {
       EXPECT_EQ(Torques(robot, TaskControllerText(), feet),
@@ -328,7 +329,8 @@ TEST(TaskList, TheStartIsHeld) {
       "task { type: 'frame' foot: RIGHT } task { type: 'frame' foot: LEFT } task { type: 'com' ";
   const Contacts both{true, true};
   const std::string plan = TaskControllerText() + list + "}";
-  const std::string start = TaskControllerText() + list + "reference: START gains { kp: 9 kd: 9 } }";
+  const std::string start =
+      TaskControllerText() + list + "reference: START gains { kp: 9 kd: 9 } }";
   EXPECT_NE(Torques(TestRobot::kMantis, plan, both), Torques(TestRobot::kMantis, plan, both, 0.05));
   EXPECT_EQ(Torques(TestRobot::kMantis, start, both),
             Torques(TestRobot::kMantis, start, both, 0.05));

@@ -11,8 +11,7 @@ using Eigen::Vector3d;
 class AngularMomentumTask : public Task {
  public:
   AngularMomentumTask(std::vector<int> rows, int num_velocities)
-      : rows_(std::move(rows)),
-        jacobian_(Eigen::MatrixXd::Zero(3, num_velocities)) {}
+      : rows_(std::move(rows)), jacobian_(Eigen::MatrixXd::Zero(3, num_velocities)) {}
 
   int num_rows() const override { return static_cast<int>(rows_.size()); }
   TargetParts needs() const override { return {.angular_momentum = true}; }

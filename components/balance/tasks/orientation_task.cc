@@ -28,8 +28,8 @@ class OrientationTask : public Task {
       const int axis = rows_[static_cast<size_t>(i)];
       rows->jacobian(i, 3 + axis) = 1;
       rows->bias_acceleration[i] = data.body_angular_bias[b][axis];
-      rows->acceleration[i] = PdAcceleration(gains(), target.angular_acceleration[axis], error[axis],
-                                             velocity_error[axis]);
+      rows->acceleration[i] = PdAcceleration(gains(), target.angular_acceleration[axis],
+                                             error[axis], velocity_error[axis]);
     }
   }
 
