@@ -11,17 +11,25 @@ double Cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// A corner that turns by less than this, relative to its edges' lengths, is on a line.
-constexpr double kStraight = 1e-12;
-// m, within which points count as on one line along y: far above rounding, far below a sole's
-// margin.
-constexpr double kAligned = 1e-9;
+// m: hulls are of points on a grid of this step, where the order of points and the turns between
+// them agree whatever rounding did to the points: far above rounding, far below a sole's margin.
+constexpr double kGrid = 1e-9;
+// Steps of the grid: a corner that stands out by no more is on a line.
+constexpr double kStraight = 2;
+
+struct GridPoint {
+  Eigen::Vector2d at;  // in steps
+  size_t index;        // of the point given
+};
 
 /// `next` goes on anticlockwise from the edge before.
-bool TurnsLeft(const Eigen::Vector2d& before, const Eigen::Vector2d& at,
-               const Eigen::Vector2d& next) {
-  const Eigen::Vector2d in = at - before, out = next - at;
-  return Cross(in, out) > kStraight * in.norm() * out.norm();
+bool TurnsLeft(const GridPoint& before, const GridPoint& corner, const GridPoint& next) {
+  return Cross(corner.at - before.at, next.at - corner.at) > 0;
+}
+
+bool IsStraight(const GridPoint& before, const GridPoint& corner, const GridPoint& next) {
+  const Eigen::Vector2d chord = next.at - before.at;
+  return Cross(corner.at - before.at, next.at - corner.at) <= kStraight * chord.norm();
 }
 
 Eigen::Vector2d NearestOnSegment(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
@@ -63,40 +71,46 @@ Eigen::Vector2d NearestOnBoundary(const ConvexPolygon& polygon, const Eigen::Vec
 }  // namespace
 
 ConvexPolygon ConvexHull(std::span<const Eigen::Vector2d> points) {
-  // Andrew's monotone chain. Order and turns are those of points whose x is a whole number of
-  // kAligned: on a line along y they then come in order along it, whatever rounding does to their x.
-  // Both must be of the same points: else the chain may cross itself.
-  struct Corner {
-    Eigen::Vector2d at, given;
-  };
   ConvexPolygon hull;
   const size_t n = std::min<size_t>(points.size(), ConvexPolygon::kMaxCorners);
-  std::array<Corner, ConvexPolygon::kMaxCorners> sorted;
+  std::array<GridPoint, ConvexPolygon::kMaxCorners> sorted;
   for (size_t i = 0; i < n; ++i) {
     if (!points[i].allFinite()) return hull;
-    sorted[i] = {{std::round(points[i].x() / kAligned) * kAligned, points[i].y()}, points[i]};
+    sorted[i] = {(points[i] / kGrid).array().round(), i};
   }
   const auto end = sorted.begin() + static_cast<std::ptrdiff_t>(n);
-  std::sort(sorted.begin(), end, [](const Corner& a, const Corner& b) {
+  std::sort(sorted.begin(), end, [](const GridPoint& a, const GridPoint& b) {
     if (a.at.x() != b.at.x()) return a.at.x() < b.at.x();
-    return a.at.y() < b.at.y() || (a.at.y() == b.at.y() && a.given.x() < b.given.x());
+    return a.at.y() < b.at.y() || (a.at.y() == b.at.y() && a.index < b.index);
   });
-  const auto same = [](const Corner& a, const Corner& b) { return a.at == b.at; };
-  const auto m = static_cast<size_t>(std::unique(sorted.begin(), end, same) - sorted.begin());
-  std::array<Corner, 2 * ConvexPolygon::kMaxCorners> chain;
+  const auto equal = [](const GridPoint& a, const GridPoint& b) { return a.at == b.at; };
+  const auto m = static_cast<size_t>(std::unique(sorted.begin(), end, equal) - sorted.begin());
+  // Andrew's monotone chain.
+  std::array<GridPoint, 2 * ConvexPolygon::kMaxCorners> chain;
   size_t count = 0;
-  const auto append = [&](const Corner& point, size_t first) {
-    while (count >= first + 2 && !TurnsLeft(chain[count - 2].at, chain[count - 1].at, point.at)) {
-      --count;
-    }
+  const auto append = [&](const GridPoint& point, size_t first) {
+    while (count >= first + 2 && !TurnsLeft(chain[count - 2], chain[count - 1], point)) --count;
     chain[count++] = point;
   };
   for (size_t i = 0; i < m; ++i) append(sorted[i], 0);
-  const size_t upper = count - 1;
-  for (size_t i = m - 1; m > 2 && i-- > 0;) append(sorted[i], upper);
-  if (m > 2) --count;  // the last is the first
+  if (m > 2) {
+    const size_t upper = count - 1;
+    for (size_t i = m - 1; i-- > 0;) append(sorted[i], upper);
+    --count;  // the last is the first
+  }
+  for (size_t i = 0; i < count && count > 2;) {
+    if (IsStraight(chain[(i + count - 1) % count], chain[i], chain[(i + 1) % count])) {
+      std::copy(chain.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                chain.begin() + static_cast<std::ptrdiff_t>(count),
+                chain.begin() + static_cast<std::ptrdiff_t>(i));
+      --count;
+      i = 0;
+    } else {
+      ++i;
+    }
+  }
+  for (size_t i = 0; i < count; ++i) hull.corner[i] = points[chain[i].index];
   hull.num_corners = static_cast<int>(count);
-  for (size_t i = 0; i < count; ++i) hull.corner[i] = chain[i].given;
   return hull;
 }
 

@@ -53,10 +53,12 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
     // Replaced in every tick.
     if (!double_support.has_half_width()) double_support.set_half_width(1);
   }
-  double_support_ = ReadLimits(double_support, "double_support");
-  single_support_ = ReadLimits(single_support, "single_support");
   model_ = LoadRobot(context);
-  sole_margin_ = ReadNotNegative(config.sole_margin(), "sole_margin", "must be m, 0 or more");
+  const double margin = HullMargin(*model_);
+  double_support_ = ReadLimits(WithinSoles(double_support, *model_, margin), "double_support");
+  single_support_ = ReadLimits(WithinSoles(single_support, *model_, margin), "single_support");
+  sole_margin_ = ReadNotNegative(config.has_sole_margin() ? config.sole_margin() : margin,
+                                 "sole_margin", "must be m, 0 or more");
   for (const robot::FootModel& foot : model_->feet()) {
     if (sole_margin_ >= 0.5 * std::min(foot.length, foot.width)) {
       throw ConfigError("sole_margin",

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "components/framework/configuration.h"
+#include "components/robot/posture.h"
 
 namespace poise {
 namespace {
@@ -81,15 +82,25 @@ Eigen::Vector3d GetVector3(const double (&array)[3]) {
   return Eigen::Map<const Eigen::Vector3d>(array);
 }
 
+double SoleMargin(const robot::RobotModel& model) {
+  constexpr double kShare = 1.0 / 15;  // of the half width: 5 mm of the paper's robot
+  return kShare * std::min(model.feet()[0].width, model.feet()[1].width) / 2;
+}
+
+double HullMargin(const robot::RobotModel& model) {
+  // With the share η the sole d/2 away draws the centre of pressure inwards by η d.
+  constexpr double kLeastShare = 0.025;  // eta_min, and a quarter more
+  return SoleMargin(model) + kLeastShare * robot::StandingSpacing(model);
+}
+
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
-                                double width_share) {
+                                double margin) {
   const robot::FootModel &right = model.feet()[0], &left = model.feet()[1];
-  constexpr double kLengthShare = 0.8;
   if (!config.has_half_length()) {
-    config.set_half_length(kLengthShare * std::min(right.length, left.length) / 2);
+    config.set_half_length(std::min(right.length, left.length) / 2 - margin);
   }
   if (!config.has_half_width()) {
-    config.set_half_width(width_share * std::min(right.width, left.width) / 2);
+    config.set_half_width(std::min(right.width, left.width) / 2 - margin);
   }
   return config;
 }

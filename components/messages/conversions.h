@@ -31,10 +31,15 @@ void SetMargins(const balance::ContactMargins& margins, contact_margins_t* messa
 void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]);
 Eigen::Vector3d GetVector3(const double (&array)[3]);
 
-/// `config`, with four fifths of the smaller sole's half length and `width_share` of its half width
-/// where it gives none.
+/// m, off the edges of a sole, that its own centre of pressure keeps: the sole rocks on its edge.
+double SoleMargin(const robot::RobotModel& model);
+/// m, off the edges of the soles' hull, that the centre of pressure of both keeps, so that it can
+/// be shared: near the outer edge the other sole still carries its least share.
+double HullMargin(const robot::RobotModel& model);
+/// `config`, with the smaller sole's half length and half width, each less `margin` (m), where it
+/// gives none.
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
-                                double width_share);
+                                double margin);
 
 /// Limits of a contact patch. Throws ConfigError "<field>.half_length" ...: missing, not positive
 /// or not finite.

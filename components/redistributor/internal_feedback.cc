@@ -8,11 +8,18 @@
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/framework/configuration.h"
+#include "components/robot/posture.h"
 
 namespace poise {
 namespace {
 
 constexpr double kMaxPeriod = 0.02;  // s, counted after a gap of the ticks
+
+double TwoDigits(double value) {
+  if (!(value > 0)) return 0;
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  return std::round(value / unit) * unit;
+}
 
 double ReadNotNegative(double value, const char* name) {
   if (!(value >= 0) || !std::isfinite(value)) {
@@ -26,6 +33,22 @@ balance::Matrix6d IntoO(const Eigen::Isometry3d& foot) {
 }
 
 }  // namespace
+
+WrenchFeedback WithRobotLimits(WrenchFeedback feedback, const robot::RobotModel& model) {
+  constexpr double kForceShare = 3.0 / 16;  // of the weight: what friction in the legs holds up
+  constexpr double kLever = 0.4;            // of the COM's height
+  constexpr double kEdgeShare = 0.2;        // of the smaller sole's half width
+  const double weight = model.total_mass() * robot::kGravity;
+  const double force = TwoDigits(kForceShare * weight);
+  if (!feedback.has_max_force()) feedback.set_max_force(force);
+  if (!feedback.has_max_moment()) {
+    feedback.set_max_moment(TwoDigits(kLever * robot::StandingHeight(model) * force));
+  }
+  if (!feedback.has_edge()) {
+    feedback.set_edge(kEdgeShare * std::min(model.feet()[0].width, model.feet()[1].width) / 2);
+  }
+  return feedback;
+}
 
 InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measured,
                                  const std::array<Eigen::Isometry3d, 2>& foot, double eta) {

@@ -7,6 +7,7 @@
 #include "components/balance/contact_dynamics.h"
 #include "components/framework/state_archive.h"
 #include "components/redistributor/redistributor.pb.h"
+#include "components/robot/robot_model.h"
 
 namespace poise {
 
@@ -22,11 +23,15 @@ InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measure
 Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
                                           const std::array<Eigen::Isometry3d, 2>& foot);
 
+/// `config`, with what it leaves to the robot: docs/reference/robots.md has the rules.
+WrenchFeedback WithRobotLimits(WrenchFeedback config, const robot::RobotModel& model);
+
 /// Proportional and integral, within limits; by time, whatever ticks are skipped.
 class InternalFeedback {
  public:
   InternalFeedback() = default;
-  /// Throws ConfigError "feedback.integral" ...: negative or not finite.
+  /// Of a configuration with limits. Throws ConfigError "feedback.integral" ...: negative or not
+  /// finite.
   explicit InternalFeedback(const WrenchFeedback& config);
 
   bool enabled() const { return enabled_; }

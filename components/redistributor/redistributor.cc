@@ -35,11 +35,11 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   redistribution_ = config.redistribution();
   transition_ = config.transition();
   model_ = LoadRobot(context);
-  // A foot that shares the load is kept further from its inner edge, towards which it would tip.
+  const double margin = SoleMargin(*model_);
   double_support_ =
-      ReadLimits(WithinSoles(config.double_support(), *model_, 2.0 / 3), "double_support");
+      ReadLimits(WithinSoles(config.double_support(), *model_, margin), "double_support");
   single_support_ =
-      ReadLimits(WithinSoles(config.single_support(), *model_, 0.8), "single_support");
+      ReadLimits(WithinSoles(config.single_support(), *model_, margin), "single_support");
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
   CheckRatio(eta_min_, "eta_min");
@@ -50,9 +50,10 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
     throw ConfigError("landed_share", "must be at least 0 and less than 0.5");
   }
   ratio_moves_ = RatioMoves(config);
-  feedback_ = InternalFeedback(config.feedback());
-  feedback_pause_ = config.feedback().pause();
-  feedback_edge_ = config.feedback().edge();
+  const WrenchFeedback feedback = WithRobotLimits(config.feedback(), *model_);
+  feedback_ = InternalFeedback(feedback);
+  feedback_pause_ = feedback.pause();
+  feedback_edge_ = feedback.edge();
   if (!(feedback_edge_ >= 0) || !std::isfinite(feedback_edge_)) {
     throw ConfigError("feedback.edge", "must be m, 0 or more");
   }

@@ -241,4 +241,13 @@ double StandingHeight(const RobotModel& model) {
   return data.com.z() - data.foot_pose[kRightFoot].translation().z();
 }
 
+double StandingSpacing(const RobotModel& model) {
+  if (model.stance().foot_spacing) return *model.stance().foot_spacing;
+  RobotData data(model);
+  ComputeKinematics(model, RobotState(model.num_joints()), &data);
+  ComputeFeet(model, &data);
+  return std::abs(data.foot_pose[kLeftFoot].translation().y() -
+                  data.foot_pose[kRightFoot].translation().y());
+}
+
 }  // namespace poise::robot

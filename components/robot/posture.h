@@ -25,5 +25,7 @@ RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
 
 /// m, of the COM above the soles in the robot's stance (RobotModel::stance).
 double StandingHeight(const RobotModel& model);
+/// m between the soles' centres in that stance.
+double StandingSpacing(const RobotModel& model);
 
 }  // namespace poise::robot

@@ -137,29 +137,37 @@ void InvariantEstimator::ReadSoles() {
     reading.position =
         kinematics_.imu_rotation().transpose() * (sole.position - kinematics_.imu_position());
     reading.rotation = kinematics_.imu_rotation().transpose() * sole.rotation;
-    Eigen::Matrix<double, 6, 6> noise = Eigen::Matrix<double, 6, 6>::Zero();
-    robot::Vector6d motion = robot::Vector6d::Zero(), windup = robot::Vector6d::Zero();
+    // In world axes: of position, of rotation by position, of rotation.
+    Matrix3d linear = Matrix3d::Zero(), mixed = linear, angular = linear;
+    const auto add_noise = [&](double variance, const Vector3d& shift, const Vector3d& turn) {
+      for (int i = 0; i < 3; ++i) {
+        const double by_shift = variance * shift[i], by_turn = variance * turn[i];
+        linear.col(i) += by_shift * shift;
+        mixed.col(i) += by_shift * turn;
+        angular.col(i) += by_turn * turn;
+      }
+    };
+    Vector3d speed = Vector3d::Zero(), rate = speed, lag = speed, lean = speed;
     for (const int j : kinematics_.joints(f)) {
       const robot::Vector6d column = kinematics_.RelativeColumn(f, j);
+      const Vector3d shift = base * column.head<3>(), turn = base * column.tail<3>();
       double variance = Square(encoder_noise_[j]);
       if (config_.gear_stiffness > 0) {
         // The same error for kRinging, of which white noise must be so much larger to tell as
         // little.
         variance += kRinging / period_ * Square(unrest_[j] / config_.gear_stiffness);
-        windup -= torque_[j] / config_.gear_stiffness * column;
+        const double windup = torque_[j] / config_.gear_stiffness;
+        lag -= windup * shift;
+        lean -= windup * turn;
       }
-      noise.noalias() += variance * column * column.transpose();
-      motion += velocity_filter_.value()[j] * column;
+      add_noise(variance, shift, turn);
+      speed += velocity_filter_.value()[j] * shift;
+      rate += velocity_filter_.value()[j] * turn;
     }
-    noise.noalias() += Square(config_.timing) * motion * motion.transpose();
+    add_noise(Square(config_.timing), speed, rate);
+    reading.noise << linear, mixed.transpose(), mixed, angular;
     reading.compliance = filter_.state().compliance;
-    for (int row = 0; row < 6; row += 3) {
-      reading.by_compliance.segment<3>(row) = base * windup.segment<3>(row);
-      for (int column = 0; column < 6; column += 3) {
-        reading.noise.block<3, 3>(row, column) =
-            base * noise.block<3, 3>(row, column) * base.transpose();
-      }
-    }
+    reading.by_compliance << lag, lean;
   }
 }
 
@@ -275,8 +283,9 @@ void InvariantEstimator::Propagate(double dt) {
   filter_.Propagate(imu, dt);
 
   const InvariantFilter::Covariance& c = filter_.covariance();
-  const bool finite =
-      filter_.state().position.allFinite() && filter_.state().velocity.allFinite() && c.allFinite();
+  // A sum of zeros, unless one of them is not finite.
+  const bool finite = filter_.state().position.allFinite() &&
+                      filter_.state().velocity.allFinite() && (0 * c).sum() == 0;
   const auto worst = [&](int row) { return c.diagonal().segment<3>(row).maxCoeff(); };
   if (!finite || worst(InvariantFilter::kRotation) > Square(kLostTilt) ||
       worst(InvariantFilter::kVelocity) > Square(kLostSpeed)) {
@@ -428,7 +437,7 @@ void InvariantEstimator::Publish() {
   const Vector3d force = s.rotation * (force_ - s.accelerometer_bias);
   const Vector3d acceleration = force - robot::kGravity * Vector3d::UnitZ();
 
-  const Matrix3d turned = Gamma(d * rate).zero * base;
+  const Matrix3d turned = RotationExp(d * rate) * base;
   state_.base_orientation = Quaterniond(turned).normalized();
   state_.base_angular_velocity = rate;
   state_.base_linear_velocity = velocity + d * acceleration;
@@ -438,28 +447,40 @@ void InvariantEstimator::Publish() {
   state_.joint_position = joint_position_ + d * state_.joint_velocity;
 
   // Errors of (orientation, velocity, position) by those of ξ's rotation, velocity, position and of
-  // both biases.
-  Eigen::Matrix<double, 9, 15> jacobian = Eigen::Matrix<double, 9, 15>::Zero();
+  // both biases: J P Jᵀ, J block by block.
   const Matrix3d& r = s.rotation;
-  jacobian.block<3, 3>(0, 0).setIdentity();
-  jacobian.block<3, 3>(0, 9) = -d * r;
-  jacobian.block<3, 3>(3, 0) = -Skew(velocity + d * force);
-  jacobian.block<3, 3>(3, 3).setIdentity();
-  jacobian.block<3, 3>(3, 9) = -Skew(lever) * r;
-  jacobian.block<3, 3>(3, 12) = -d * r;
-  jacobian.block<3, 3>(6, 0) = -Skew(position + d * velocity + 0.5 * d * d * force);
-  jacobian.block<3, 3>(6, 3) = d * Matrix3d::Identity();
-  jacobian.block<3, 3>(6, 6).setIdentity();
-  jacobian.block<3, 3>(6, 9) = -d * Skew(lever) * r;
-  jacobian.block<3, 3>(6, 12) = -0.5 * d * d * r;
+  const Matrix3d v_turn = -Skew(velocity + d * force);
+  const Matrix3d p_turn = -Skew(position + d * velocity + 0.5 * d * d * force);
+  const Matrix3d v_gyro = -Skew(lever) * r;
+  const auto times_jacobian_transposed = [&](const auto& m, auto* out) {
+    const auto times = [&m](int first, const Matrix3d& block, int row) {
+      return block(row, 0) * m.col(first) + block(row, 1) * m.col(first + 1) +
+             block(row, 2) * m.col(first + 2);
+    };
+    for (int i = 0; i < 3; ++i) {
+      out->col(i) = m.col(i) - d * times(9, r, i);
+      out->col(3 + i) =
+          m.col(3 + i) + times(0, v_turn, i) + times(9, v_gyro, i) - d * times(12, r, i);
+      out->col(6 + i) = m.col(6 + i) + d * m.col(3 + i) + times(0, p_turn, i) +
+                        d * times(9, v_gyro, i) - 0.5 * d * d * times(12, r, i);
+    }
+  };
+  // Rows are filled up to whole registers.
   const InvariantFilter::Covariance& p = filter_.covariance();
-  Eigen::Matrix<double, 15, 15> errors;
+  Eigen::Matrix<double, 16, 15> errors;
+  errors.row(15).setZero();
   errors.topLeftCorner<9, 9>() = p.topLeftCorner<9, 9>();
   errors.topRightCorner<9, 6>() = p.block<9, 6>(0, InvariantFilter::kGyroBias);
-  errors.bottomLeftCorner<6, 9>() = p.block<6, 9>(InvariantFilter::kGyroBias, 0);
-  errors.bottomRightCorner<6, 6>() =
-      p.block<6, 6>(InvariantFilter::kGyroBias, InvariantFilter::kGyroBias);
-  base_covariance_.noalias() = jacobian * errors * jacobian.transpose();
+  errors.block<6, 9>(9, 0) = p.block<6, 9>(InvariantFilter::kGyroBias, 0);
+  errors.block<6, 6>(9, 9) = p.block<6, 6>(InvariantFilter::kGyroBias, InvariantFilter::kGyroBias);
+  Eigen::Matrix<double, 16, 9> half;
+  times_jacobian_transposed(errors, &half);
+  Eigen::Matrix<double, 12, 15> half_t;
+  half_t.bottomRows<3>().setZero();
+  half_t.topRows<9>() = half.topRows<15>().transpose();
+  Eigen::Matrix<double, 12, 9> whole;
+  times_jacobian_transposed(half_t, &whole);
+  base_covariance_ = whole.topRows<9>();
 
   // The gyro's noise at the lever, and what may happen during the delay: a step like that between
   // the last two readings at an unknown instant of it.

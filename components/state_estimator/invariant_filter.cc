@@ -25,64 +25,81 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
   const Gamma gamma(dt * rate);
   state_.position = p + dt * v + 0.5 * dt * dt * gravity + dt * dt * (r * (gamma.two * force));
   state_.velocity = v + dt * gravity + dt * (r * (gamma.one * force));
+  // What rounding left of the corrections since the last step goes here, too.
   state_.rotation = Orthonormal(r * gamma.zero);
+  for (Matrix3d& rotation : state_.foot_rotation) rotation = Orthonormal(rotation);
 
-  // Φ is the identity but for the blocks below; P ← Φ P Φᵀ row by row, then column by column.
-  // Position and velocity need the rows of before and come first.
-  const Matrix3d fall = dt * Skew(gravity);
-  const Matrix3d half_fall = 0.5 * dt * fall;
-  const Matrix3d v_turn = -(dt * Skew(v) + half_fall) * r;
-  const Matrix3d p_turn = -(dt * Skew(p) + 0.5 * dt * dt * Skew(v)) * r;
-  const std::array<Matrix3d, 2> foot_turn = {-dt * Skew(state_.foot[0]) * r,
-                                             -dt * Skew(state_.foot[1]) * r};
+  // Φ = I + E: E has rows for what turns and moves (R, v, p, soles: kMoved of them), columns for R,
+  // v and the biases. With X = P Eᵀ, P ← P + X + Xᵀ + E X. The gyro's noise turns everything and
+  // the accelerometer's pushes as their biases do, held over the step: E N Eᵀ is added in passing.
+  const Vector3d fall(dt * gravity_, -dt * gravity_, 0);  // E(v, R), antisymmetric: y to x, x to y
+  const Matrix3d r_gyro = -dt * r;
+  const Matrix3d v_gyro = -(dt * Skew(v) + 0.5 * dt * dt * Skew(gravity)) * r;
+  const Matrix3d p_gyro = -(dt * Skew(p) + 0.5 * dt * dt * Skew(v)) * r;
+  const Matrix3d v_force = r_gyro, p_force = 0.5 * dt * r_gyro;
+  std::array<Matrix3d, 2> foot_gyro;
+  for (size_t f = 0; f < 2; ++f) {
+    foot_gyro[f].setZero();
+    if (holds_position_[f]) foot_gyro[f] = -dt * Skew(state_.foot[f]) * r;
+  }
+  constexpr int kMoved = kGyroBias, kRested = kSize - kMoved;
   Covariance& c = covariance_;
-  const auto rows = [&](int row) { return c.middleRows<3>(row); };
-  const auto columns = [&](int column) { return c.middleCols<3>(column); };
-  rows(kPosition).noalias() += dt * rows(kVelocity);
-  rows(kPosition).noalias() += half_fall * rows(kRotation);
-  rows(kPosition).noalias() += p_turn * rows(kGyroBias);
-  rows(kPosition).noalias() -= (0.5 * dt * dt * r) * rows(kAccelerometerBias);
-  rows(kVelocity).noalias() += fall * rows(kRotation);
-  rows(kVelocity).noalias() += v_turn * rows(kGyroBias);
-  rows(kVelocity).noalias() -= (dt * r) * rows(kAccelerometerBias);
-  rows(kRotation).noalias() -= (dt * r) * rows(kGyroBias);
-  columns(kPosition).noalias() += dt * columns(kVelocity);
-  columns(kPosition).noalias() += columns(kRotation) * half_fall.transpose();
-  columns(kPosition).noalias() += columns(kGyroBias) * p_turn.transpose();
-  columns(kPosition).noalias() -= columns(kAccelerometerBias) * (0.5 * dt * dt * r).transpose();
-  columns(kVelocity).noalias() += columns(kRotation) * fall.transpose();
-  columns(kVelocity).noalias() += columns(kGyroBias) * v_turn.transpose();
-  columns(kVelocity).noalias() -= columns(kAccelerometerBias) * (dt * r).transpose();
-  columns(kRotation).noalias() -= columns(kGyroBias) * (dt * r).transpose();
-  for (int foot = 0; foot < 2; ++foot) {
-    if (!holds_position(foot)) continue;
-    rows(FootRow(foot)).noalias() += foot_turn[static_cast<size_t>(foot)] * rows(kGyroBias);
-    columns(FootRow(foot)).noalias() +=
-        columns(kGyroBias) * foot_turn[static_cast<size_t>(foot)].transpose();
-  }
-
-  // Noise of the gyro turns everything, that of the accelerometer pushes; both hold over the step.
-  Eigen::Matrix<double, kSize, 3> turn = Eigen::Matrix<double, kSize, 3>::Zero(), push = turn;
-  turn.middleRows<3>(kRotation) = dt * r;
-  turn.middleRows<3>(kVelocity) = -v_turn;
-  turn.middleRows<3>(kPosition) = -p_turn;
-  for (int foot = 0; foot < 2; ++foot) {
-    if (holds_position(foot)) {
-      turn.middleRows<3>(FootRow(foot)) = -foot_turn[static_cast<size_t>(foot)];
+  const auto times = [](const auto& m, int first, const Matrix3d& block, int row) {
+    return block(row, 0) * m.col(first) + block(row, 1) * m.col(first + 1) +
+           block(row, 2) * m.col(first + 2);
+  };
+  // m Eᵀ.
+  const auto times_e_transposed = [&](const auto& m, auto* x) {
+    for (int i = 0; i < 3; ++i) {
+      x->col(kRotation + i) = times(m, kGyroBias, r_gyro, i);
+      x->col(kVelocity + i) =
+          times(m, kGyroBias, v_gyro, i) + times(m, kAccelerometerBias, v_force, i);
+      x->col(kPosition + i) = dt * m.col(kVelocity + i) + times(m, kGyroBias, p_gyro, i) +
+                              times(m, kAccelerometerBias, p_force, i);
+      for (size_t f = 0; f < 2; ++f) {
+        const int row = FootRow(static_cast<int>(f)) + i;
+        if (holds_position_[f]) {
+          x->col(row) = times(m, kGyroBias, foot_gyro[f], i);
+        } else {
+          x->col(row).setZero();
+        }
+      }
+      if (i == 2) continue;  // nothing falls sideways
+      x->col(kVelocity + i) += fall[i] * m.col(kRotation + 1 - i);
+      x->col(kPosition + i) += 0.5 * dt * fall[i] * m.col(kRotation + 1 - i);
     }
+  };
+  Eigen::Matrix<double, kSize, kMoved> x;
+  times_e_transposed(c, &x);
+  // Xᵀ, rows filled up to whole registers.
+  Eigen::Matrix<double, kMoved + 1, kSize> x_t;
+  x_t.row(kMoved).setZero();
+  x_t.topRows<kMoved>() = x.transpose();
+  for (int j = 0; j < kMoved; ++j) c.col(j).tail<kRested>() += x.col(j).tail<kRested>();
+  for (int j = kMoved; j < kSize; ++j) c.col(j).head<kMoved>() += x_t.col(j).head<kMoved>();
+  const auto add_noise = [&](int bias, int row, const Matrix3d& e, const Matrix3d& noise) {
+    x_t.block<3, 3>(row, bias).noalias() += e.lazyProduct(noise);
+  };
+  add_noise(kGyroBias, kRotation, r_gyro, imu.angular_velocity_noise);
+  add_noise(kGyroBias, kVelocity, v_gyro, imu.angular_velocity_noise);
+  add_noise(kGyroBias, kPosition, p_gyro, imu.angular_velocity_noise);
+  for (size_t f = 0; f < 2; ++f) {
+    add_noise(kGyroBias, FootRow(static_cast<int>(f)), foot_gyro[f], imu.angular_velocity_noise);
   }
-  push.middleRows<3>(kVelocity) = dt * r;
-  push.middleRows<3>(kPosition) = 0.5 * dt * dt * r;
-  constexpr int kTurned = kGyroBias;  // rows before it
-  const Eigen::Matrix<double, kTurned, 3> turned =
-      turn.topRows<kTurned>() * imu.angular_velocity_noise;
-  const Eigen::Matrix<double, kTurned, 3> pushed = push.topRows<kTurned>() * imu.acceleration_noise;
-  c.topLeftCorner<kTurned, kTurned>().noalias() += turned * turn.topRows<kTurned>().transpose();
-  c.topLeftCorner<kTurned, kTurned>().noalias() += pushed * push.topRows<kTurned>().transpose();
+  add_noise(kAccelerometerBias, kVelocity, v_force, imu.acceleration_noise);
+  add_noise(kAccelerometerBias, kPosition, p_force, imu.acceleration_noise);
+  // With Y = Xᵀ + half of what E makes of it, Y + Yᵀ is symmetric to the last bit.
+  Eigen::Matrix<double, kMoved + 1, kMoved> y;
+  times_e_transposed(x_t, &y);
+  y = x_t.leftCols<kMoved>() + 0.5 * y;
+  Eigen::Matrix<double, kMoved + 1, kMoved> y_t;
+  y_t.row(kMoved).setZero();
+  y_t.topRows<kMoved>() = y.topRows<kMoved>().transpose();
+  y += y_t;
+  for (int j = 0; j < kMoved; ++j) c.col(j).head<kMoved>() += y.col(j).head<kMoved>();
   c.diagonal().segment<3>(kGyroBias).array() += imu.gyro_bias_walk * imu.gyro_bias_walk * dt;
   c.diagonal().segment<3>(kAccelerometerBias).array() +=
       imu.accelerometer_bias_walk * imu.accelerometer_bias_walk * dt;
-  c = (0.5 * (c + c.transpose())).eval();
 }
 
 void InvariantFilter::Loosen(int foot, double position_variance, double rotation_variance) {
@@ -104,7 +121,9 @@ void InvariantFilter::Doubt(double rotation_variance, double velocity_variance,
 void InvariantFilter::Know(const Error& row, double deviation) {
   const Error spread = covariance_ * row;
   const double variance = row.dot(spread) + deviation * deviation;
-  if (variance > 0) covariance_ -= spread / variance * spread.transpose();
+  if (!(variance > 0)) return;
+  covariance_ -= spread / variance * spread.transpose();
+  covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
 }
 
 void InvariantFilter::CopyRows(int from, int to, const Vector3d& by_compliance,
@@ -115,6 +134,8 @@ void InvariantFilter::CopyRows(int from, int to, const Vector3d& by_compliance,
   c.middleCols<3>(to) =
       (c.middleCols<3>(from) + c.col(kCompliance) * by_compliance.transpose()).eval();
   c.block<3, 3>(to, to) += noise;
+  c.block<3, 3>(to, to) =
+      (0.5 * (c.block<3, 3>(to, to) + c.block<3, 3>(to, to).transpose())).eval();
 }
 
 void InvariantFilter::ClearRows(int row) {
@@ -128,8 +149,8 @@ Vector3d InvariantFilter::SeenPosition(const SoleReading& reading) const {
 }
 
 Matrix3d InvariantFilter::SeenRotation(const SoleReading& reading) const {
-  const Gamma turn((state_.compliance - reading.compliance) * reading.by_compliance.tail<3>());
-  return turn.zero * state_.rotation * reading.rotation;
+  return RotationExp((state_.compliance - reading.compliance) * reading.by_compliance.tail<3>()) *
+         state_.rotation * reading.rotation;
 }
 
 void InvariantFilter::HoldPosition(int foot, const SoleReading& reading) {
@@ -181,9 +202,14 @@ InvariantFilter::Innovation InvariantFilter::Test(int foot, const SoleReading& r
            cross * by_compliance.transpose() + by_compliance * cross.transpose() +
            c(kCompliance, kCompliance) * by_compliance * by_compliance.transpose();
   };
+  // zᵀ S⁻¹ z by S = L D Lᵀ; 0 when S is not positive definite.
   const auto squared = [](const Vector3d& z, const Matrix3d& s) {
-    const Eigen::LLT<Matrix3d> factors(s);
-    return factors.info() == Eigen::Success ? z.dot(factors.solve(z)) : 0.0;
+    const double l10 = s(1, 0) / s(0, 0), l20 = s(2, 0) / s(0, 0);
+    const double d1 = s(1, 1) - l10 * s(1, 0), e21 = s(2, 1) - l20 * s(1, 0), l21 = e21 / d1;
+    const double d2 = s(2, 2) - l20 * s(2, 0) - l21 * e21;
+    if (!(s(0, 0) > 0 && d1 > 0 && d2 > 0)) return 0.0;
+    const double y1 = z[1] - l10 * z[0], y2 = z[2] - l20 * z[0] - l21 * y1;
+    return z[0] * z[0] / s(0, 0) + y1 * y1 / d1 + y2 * y2 / d2;
   };
   Innovation result;
   if (holds_position(foot)) {
@@ -233,11 +259,25 @@ bool InvariantFilter::CorrectRows(const Eigen::Matrix<double, N, 1>& innovation,
                                   const Eigen::Matrix<double, N, N>& s) {
   const Eigen::LLT<Eigen::Matrix<double, N, N>> factors(s);
   if (factors.info() != Eigen::Success) return false;
-  const Eigen::Matrix<double, kSize, N> gain = factors.solve(ph.transpose()).transpose();
-  TakeOut(gain * innovation);
-  // Joseph's form (I − K H) P (I − K H)ᵀ + K N Kᵀ, multiplied out: symmetric for any gain.
-  const Covariance half = gain * ph.transpose() - 0.5 * (gain * s) * gain.transpose();
-  covariance_ -= half + half.transpose();
+  // With S = L Lᵀ and W = P Hᵀ L⁻ᵀ the gain is W L⁻¹, and P ← P − W Wᵀ: symmetric to the last bit.
+  const auto& l = factors.matrixLLT();
+  Eigen::Matrix<double, kSize, N> w;
+  Eigen::Matrix<double, N, 1> z = innovation;
+  for (int j = 0; j < N; ++j) {
+    Error column = ph.col(j);
+    for (int i = 0; i < j; ++i) {
+      column -= w.col(i) * l(j, i);
+      z[j] -= l(j, i) * z[i];
+    }
+    const double inverse = 1 / l(j, j);
+    w.col(j) = column * inverse;
+    z[j] *= inverse;
+  }
+  Error error = w.col(0) * z[0];
+  for (int j = 1; j < N; ++j) error += w.col(j) * z[j];
+  TakeOut(error);
+  // Factors of a product commute: both halves get the same bits.
+  for (int j = 0; j < kSize; ++j) covariance_.col(j) -= w.lazyProduct(w.row(j).transpose());
   return true;
 }
 
@@ -246,14 +286,14 @@ void InvariantFilter::TakeOut(const Error& error) {
   const auto vector = [&](const Vector3d& value, int row) -> Vector3d {
     return gamma.zero * value - gamma.one * error.segment<3>(row);
   };
-  state_.rotation = Orthonormal(gamma.zero * state_.rotation);
+  state_.rotation = gamma.zero * state_.rotation;
   state_.velocity = vector(state_.velocity, kVelocity);
   state_.position = vector(state_.position, kPosition);
   for (int foot = 0; foot < 2; ++foot) {
     const auto f = static_cast<size_t>(foot);
     state_.foot[f] = vector(state_.foot[f], FootRow(foot));
-    const Gamma turn(-error.segment<3>(FootRotationRow(foot)));
-    state_.foot_rotation[f] = Orthonormal(turn.zero * state_.foot_rotation[f]);
+    state_.foot_rotation[f] =
+        RotationExp(-error.segment<3>(FootRotationRow(foot))) * state_.foot_rotation[f];
   }
   state_.gyro_bias -= error.segment<3>(kGyroBias);
   state_.accelerometer_bias -= error.segment<3>(kAccelerometerBias);

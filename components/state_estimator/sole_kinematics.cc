@@ -58,16 +58,6 @@ void SoleKinematics::Update(const Eigen::Ref<const Eigen::VectorXd>& position,
   imu_velocity_ = data_.body_linear_velocity[b] + imu_angular_velocity_.cross(arm);
 }
 
-robot::Vector6d SoleKinematics::RelativeColumn(size_t foot, int joint) const {
-  const size_t j = static_cast<size_t>(joint);
-  const Vector3d& axis = data_.joint_axis[j];
-  const Vector3d& origin = data_.body_position[j + 1];  // of the joint's child
-  robot::Vector6d column;
-  // A joint below the IMU turns the observer: what it moves then moves the other way for it.
-  column << axis.cross(soles_[foot].position - origin), axis;
-  return sign_[foot][j] * column;
-}
-
 FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, double light_load,
                       double full_load) {
   FootWeights weights;

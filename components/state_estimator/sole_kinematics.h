@@ -37,7 +37,15 @@ class SoleKinematics {
   /// What rates of the joints (rad/s) make of a sole's motion relative to the IMU, in base axes:
   /// column of joint `joint` of the 6×n Jacobian, linear (of the sole's origin, for an observer who
   /// turns with the IMU) over angular. Zero for a joint between neither.
-  robot::Vector6d RelativeColumn(size_t foot, int joint) const;
+  robot::Vector6d RelativeColumn(size_t foot, int joint) const {
+    const auto j = static_cast<size_t>(joint);
+    const Eigen::Vector3d& axis = data_.joint_axis[j];
+    const Eigen::Vector3d& origin = data_.body_position[j + 1];  // of the joint's child
+    robot::Vector6d column;
+    // A joint below the IMU turns the observer: what it moves then moves the other way for it.
+    column << axis.cross(soles_[foot].position - origin), axis;
+    return sign_[foot][j] * column;
+  }
   /// Joints with a column that is not zero.
   const std::vector<int>& joints(size_t foot) const { return joints_[foot]; }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
@@ -17,50 +16,43 @@ namespace poise {
 std::string_view task_controller_proto_schema();  // generated
 namespace {
 
-// Rows that tasks and contacts determine, on one foot or two: COM and body, and each foot by its
-// contact or by its task.
-constexpr int kDeterminedRows = 18;
-
-PdGains ReadGains(bool present, const Gains& gains, const char* field, const char* why) {
-  if (!present) throw ConfigError(field, fmt::format("is missing; {}", why));
-  const auto check = [&](bool has, double value, const char* name) {
-    if (!has || !(value > 0) || !std::isfinite(value)) {
-      throw ConfigError(fmt::format("{}.{}", field, name), "must be a positive number");
-    }
-  };
-  check(gains.has_kp(), gains.kp(), "kp");
-  check(gains.has_kd(), gains.kd(), "kd");
-  return {gains.kp(), gains.kd()};
+/// Throws ConfigError when the tasks cannot be met on these feet, or leave motions to nobody.
+void CheckRows(const TaskList& tasks, const robot::RobotModel& model, const FeetInContact& feet,
+               const TaskControllerConfig& config) {
+  const char* support = feet[0] && feet[1] ? "on both feet"
+                        : feet[0]          ? "on the right foot"
+                                           : "on the left foot";
+  const int motions = model.num_velocities() - 6 * (feet[0] ? 1 : 0) - 6 * (feet[1] ? 1 : 0);
+  const TaskList::Rows rows = tasks.CountRows(feet);
+  if (rows.first > motions) {
+    throw ConfigError("task", fmt::format("asks for {} motions on its first level, and robot '{}' "
+                                          "has {} {}: put some on another level",
+                                          rows.first, model.name(), motions, support));
+  }
+  if (rows.all == 0) {
+    throw ConfigError("task", fmt::format("has none that does not rest {}: add one", support));
+  }
+  if (rows.all < motions && !config.has_posture()) {
+    throw ConfigError("posture", fmt::format("is missing; the tasks leave {} joint motions of "
+                                             "robot '{}' free {}: give kp and kd",
+                                             motions - rows.all, model.name(), support));
+  }
 }
 
 }  // namespace
 
 void TaskController::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<TaskControllerConfig>();
-  const PdGains com =
-      ReadGains(config.has_com(), config.com(), "com", "give kp and kd of the COM's position");
-  const PdGains orientation = ReadGains(config.has_orientation(), config.orientation(),
-                                        "orientation", "give kp and kd of the body's orientation");
-  const PdGains foot = ReadGains(config.has_foot(), config.foot(), "foot",
-                                 "give kp and kd of the pose of a foot out of contact");
-  if (config.has_posture()) posture_ = ReadGains(true, config.posture(), "posture", "");
   model_ = LoadRobot(context);
   const int num_joints = model_->num_joints();
-  const int free = model_->num_velocities() - kDeterminedRows;
-  if (free < 0) {
-    throw ConfigError(fmt::format("the tasks need {} joints, robot '{}' has {}", num_joints - free,
-                                  model_->name(), num_joints));
-  }
-  if (free > 0 && !config.has_posture()) {
-    throw ConfigError("posture", fmt::format("is missing; the tasks leave {} joint motions of "
-                                             "robot '{}' free: give kp and kd",
-                                             free, model_->name()));
+  tasks_.emplace(config, model_);
+  if (config.has_posture()) posture_ = ReadGains(config.posture(), "posture");
+  for (const FeetInContact& feet : {FeetInContact{true, true}, {true, false}, {false, true}}) {
+    CheckRows(*tasks_, *model_, feet, config);
   }
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
-  tasks_.emplace(*model_, com, orientation, foot);
-  task_dynamics_.emplace(num_joints, TaskStack::kMaxRows);
   state_ = robot::RobotState(num_joints);
   posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ =
       Eigen::VectorXd::Zero(num_joints);
@@ -75,6 +67,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 
 bool TaskController::Archive(StateArchive* archive) {
   archive->Show(in_contact_, started_, posture_reference_);
+  tasks_->Archive(archive);
   ArchiveMessage(&*task_torque_, archive);
   return true;
 }
@@ -87,24 +80,27 @@ void TaskController::Prepare() {
 
 int8_t TaskController::Control() {
   const support_plan_t& plan = *support_plan_;
-  const std::array<bool, 2> in_contact{plan.in_contact[0] != 0, plan.in_contact[1] != 0};
+  const FeetInContact in_contact{plan.in_contact[0] != 0, plan.in_contact[1] != 0};
   if (!state_valid_ || plan.status == support_plan_t::STATUS_INVALID_STATE) {
     return task_torque_t::STATUS_INVALID_STATE;
   }
   in_contact_ = in_contact;
   if (!whole_body_->Update(state_, in_contact)) return task_torque_t::STATUS_SINGULAR;
-  if (!started_) {
+  const balance::TaskState state{*model_, state_, whole_body_->data()};
+  if (!started_ || plan.gravity_compensation != 0) {
     started_ = true;
     posture_reference_ = state_.joint_position;
+    tasks_->Hold(state);
   }
   Eigen::Vector3d orientation_error = Eigen::Vector3d::Zero();
   if (plan.gravity_compensation != 0) {
     balance::GravityCompensation(whole_body_->contact(), torque_);
-    posture_reference_ = state_.joint_position;
   } else {
-    ReadReferences();
-    if (!ComputeTorque(in_contact)) return task_torque_t::STATUS_SINGULAR;
-    orientation_error = tasks_->body_orientation_error();
+    tasks_->Follow(plan);
+    if (!ComputeTorque(state, in_contact)) return task_torque_t::STATUS_SINGULAR;
+    const auto body = static_cast<size_t>(model_->body_task_body());
+    orientation_error = balance::OrientationError(GetMotion(plan.body_reference).rotation,
+                                                  state.data.body_rotation[body]);
   }
   if (!torque_.allFinite()) return task_torque_t::STATUS_SINGULAR;
   std::copy_n(torque_.data(), torque_.size(), task_torque_->torque.begin());
@@ -112,24 +108,13 @@ int8_t TaskController::Control() {
   return task_torque_t::STATUS_OK;
 }
 
-void TaskController::ReadReferences() {
-  const support_plan_t& plan = *support_plan_;
-  references_.com = GetMotion(plan.com_reference);
-  references_.body = GetMotion(plan.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    references_.foot[i] = GetMotion(plan.foot_reference[i]);
-    references_.foot_rotation[i] = GetMotion(plan.foot_rotation_reference[i]);
-  }
-}
-
-bool TaskController::ComputeTorque(const std::array<bool, 2>& in_contact) {
+bool TaskController::ComputeTorque(const balance::TaskState& state,
+                                   const FeetInContact& in_contact) {
   const balance::ContactDynamics& contact = whole_body_->contact();
-  tasks_->Update(*model_, whole_body_->data(), references_, in_contact);
-  if (!task_dynamics_->Compute(contact, tasks_->jacobian(), tasks_->bias_acceleration())) {
-    return false;
-  }
-  task_dynamics_->TaskTorque(tasks_->acceleration(), torque_);
-  if (kDeterminedRows < model_->num_velocities()) {
+  if (!tasks_->Compute(state, contact, in_contact)) return false;
+  const balance::TaskHierarchy& hierarchy = tasks_->hierarchy();
+  torque_ = hierarchy.torque();
+  if (hierarchy.num_free() > 0) {
     // (28): what the tasks leave free is held up against gravity and drawn to the posture of the
     // start, the joints' own inertia as weight.
     posture_acceleration_ = posture_.kp * (posture_reference_ - state_.joint_position) -
@@ -138,7 +123,7 @@ bool TaskController::ComputeTorque(const std::array<bool, 2>& in_contact) {
     const Eigen::Index k = posture_torque_.size();
     posture_torque_.noalias() +=
         whole_body_->data().mass_matrix.bottomRightCorner(k, k) * posture_acceleration_;
-    task_dynamics_->ProjectIntoNullSpace(posture_torque_);
+    hierarchy.ProjectIntoNullSpace(posture_torque_);
     torque_ += posture_torque_;
   }
   return true;

@@ -5,11 +5,10 @@
 #include <memory>
 #include <optional>
 
-#include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
-#include "components/task_controller/task_stack.h"
+#include "components/task_controller/task_list.h"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
 #include "poise/task_torque_t.hpp"
@@ -28,8 +27,7 @@ class TaskController : public Component {
   void Prepare();
   /// Fills the torque; STATUS_* of the message.
   int8_t Control();
-  void ReadReferences();
-  bool ComputeTorque(const std::array<bool, 2>& in_contact);
+  bool ComputeTorque(const balance::TaskState& state, const FeetInContact& in_contact);
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
@@ -37,14 +35,12 @@ class TaskController : public Component {
 
   std::shared_ptr<const robot::RobotModel> model_;
   std::shared_ptr<balance::WholeBody> whole_body_;
-  std::optional<TaskStack> tasks_;
-  std::optional<balance::TaskDynamics> task_dynamics_;
-  TaskReferences references_;
+  std::optional<TaskList> tasks_;
   robot::RobotState state_;
   bool state_valid_ = false;
-  std::array<bool, 2> in_contact_{true, true};  // of the last tick
+  FeetInContact in_contact_{true, true};  // of the last tick
   bool started_ = false;
-  PdGains posture_;
+  balance::TaskGains posture_;
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_;
 };

@@ -62,8 +62,8 @@ VectorXd Rate(const Task& task, const robot::RobotModel& model, const robot::Rob
 }
 
 std::vector<TaskSpec> AllTypes(const std::string& link) {
-  std::vector<TaskSpec> specs{Spec("com"), Spec("orientation"), Spec("frame"), Spec("frame"),
-                              Spec("joint_posture"), Spec("angular_momentum")};
+  std::vector<TaskSpec> specs{Spec("com"),   Spec("orientation"),   Spec("frame"),
+                              Spec("frame"), Spec("joint_posture"), Spec("angular_momentum")};
   specs[1].link = link;
   specs[2].link = link;
   specs[2].point = Vector3d(0.1, -0.2, 0.3);
@@ -107,13 +107,12 @@ TEST(Tasks, GainsActOnTheErrorAndItsRate) {
   const auto model = Humanoid();
   StateSampler sampler(model, 32);
   const robot::RobotState state = sampler.Draw();
-  for (TaskSpec spec : AllTypes("camera")) {
-    spec.gains.kd = 7;
-    if (spec.type != "angular_momentum") spec.gains.kp = 100;
+  for (const TaskSpec& spec : AllTypes("camera")) {
     const auto task = CreateTask(spec, *model);
+    const TaskGains gains{.kp = task->needs().angular_momentum ? 0.0 : 100.0, .kd = 7};
+    task->set_gains(gains);
     // 1 ms earlier at the same velocity: the target.
-    const robot::RobotState before =
-        After(state, VectorXd::Zero(model->num_velocities()), -1e-4);
+    const robot::RobotState before = After(state, VectorXd::Zero(model->num_velocities()), -1e-4);
     TaskTarget target;
     const robot::RobotData then = Evaluate(*model, before), now = Evaluate(*model, state);
     task->Hold({*model, before, then}, &target);
@@ -123,8 +122,7 @@ TEST(Tasks, GainsActOnTheErrorAndItsRate) {
     TaskRows rows{jacobian, bias, wanted};
     task->Write({*model, state, now}, target, &rows);
     const VectorXd rate = jacobian * Velocity(state);
-    EXPECT_LT((wanted + (spec.gains.kp * 1e-4 + spec.gains.kd) * rate).norm(),
-              2e-3 * (1 + rate.norm()))
+    EXPECT_LT((wanted + (gains.kp * 1e-4 + gains.kd) * rate).norm(), 2e-3 * (1 + rate.norm()))
         << spec.type;
   }
 }
@@ -221,10 +219,14 @@ TEST(Tasks, AWrongSpecificationIsRefusedByName) {
   spec.joints = {"left_knee", "tail"};
   EXPECT_EQ(refusal(spec), "joint: robot 'mantis' has no joint 'tail'");
   spec = Spec("angular_momentum");
-  spec.gains.kp = 1;
-  EXPECT_EQ(refusal(spec), "gains: kp must be 0, angular momentum has no position");
-  spec.gains.kp = -1;
-  EXPECT_EQ(refusal(spec), "gains: kp and kd must be numbers, 0 or more");
+  spec.foot = 1;
+  EXPECT_EQ(refusal(spec), "foot: this task has none");
+  spec = Spec("orientation");
+  spec.point.x() = 1;
+  EXPECT_EQ(refusal(spec), "point: this task has none");
+  spec = Spec("com");
+  spec.joints = {"left_knee"};
+  EXPECT_EQ(refusal(spec), "joint: this task has none");
 }
 
 }  // namespace

@@ -375,13 +375,14 @@ TEST(ContactWrenchMonitor, RefusesLimitsThatCannotBe) {
   const std::string single = "single_support { half_length: 0.1 half_width: 0.1 } ";
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 } half_width_beyond_soles: -1"),
             "half_width_beyond_soles");
-  EXPECT_EQ(field_of(single), "double_support.half_length");
+  EXPECT_EQ(field_of(single), "accepted");  // from the soles
   EXPECT_EQ(field_of("region: POLYGON"), "accepted");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: 0.075"), "sole_margin");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: -0.01"), "sole_margin");
   EXPECT_EQ(field_of("region: POLYGON half_width_beyond_soles: 0.02"), "half_width_beyond_soles");
   EXPECT_EQ(field_of("region: POLYGON double_support { friction: -1 }"), "double_support.friction");
-  EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "double_support.half_width");
+  EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "accepted");
+  EXPECT_EQ(field_of(single + "double_support { half_width: -1 }"), "double_support.half_width");
   EXPECT_EQ(field_of(single + "double_support { half_length: -0.1 half_width: 0.1 }"),
             "double_support.half_length");
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 half_width: nan }"),

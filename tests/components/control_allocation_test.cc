@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "tests/components/control_tick.h"
+#include "tests/test_seed.h"
 
 extern "C" void* __libc_malloc(size_t size);
 namespace {
@@ -45,6 +46,41 @@ INSTANTIATE_TEST_SUITE_P(All, ControlAllocation,
                                          Case{robot::TestRobot::kDyros, {true, false}},
                                          Case{robot::TestRobot::kMantis, {true, true}},
                                          Case{robot::TestRobot::kMantis, {true, false}}));
+
+// Five levels of every type, as legs alone and arms meet them.
+TEST(ControlAllocation, NoneWithAListOfTasks) {
+  for (const robot::TestRobot robot : {robot::TestRobot::kDyros, robot::TestRobot::kMantis}) {
+    const robot::RobotModel model = robot::LoadTestRobot(robot);
+    ControlContext context(robot);
+    Harness<TaskController> harness(
+        &context, TaskControllerText() +
+                      "task { type: 'com' } task { type: 'frame' foot: RIGHT }"
+                      "task { type: 'frame' foot: LEFT } task { type: 'orientation' level: 1 }"
+                      "task { type: 'angular_momentum' level: 2 gains { kd: 9 } }"
+                      "task { type: 'frame' axis: X level: 3 gains { kp: 9 kd: 6 } }"
+                      "task { type: 'joint_posture' level: 4 gains { kp: 9 kd: 6 } }");
+    const robot::RobotState standing = StandingState(model);
+    support_plan_t plan{};
+    MessageTraits<support_plan_t>::Resize(plan, std::array{2});
+    for (auto* turn : {&plan.body_reference, &plan.foot_rotation_reference[0],
+                       &plan.foot_rotation_reference[1]}) {
+      for (int i = 0; i < 3; ++i) turn->rotation[4 * i] = 1;
+    }
+    harness.Bind("support_plan", &plan);
+    std::mt19937 random{TestSeed(35)};
+    for (int tick = 0; tick < 200; ++tick) {
+      const robot_state_t state = StateMessage(model, Disturbed(standing, 0.05, 0.5, &random));
+      harness.Bind("robot_state", &state);
+      plan.in_contact[0] = tick % 3 != 0 ? 1 : 0;
+      plan.in_contact[1] = tick % 3 != 1 ? 1 : 0;
+      plan.gravity_compensation = tick % 7 == 6 ? 1 : 0;
+      const long before = allocations;
+      harness.Run(TickAt(tick));
+      ASSERT_EQ(allocations - before, 0) << "tick " << tick;
+      ASSERT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK) << tick;
+    }
+  }
+}
 
 TEST(ControlAllocation, TheCounterCounts) {
   const long before = allocations;

@@ -126,7 +126,7 @@ Eigen::VectorXd ToEigen(const std::vector<double>& values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
-std::string TaskConfig() {
+std::string TaskControllerText() {
   return "com { kp: 225 kd: 10 } orientation { kp: 150 kd: 20 } foot { kp: 100 kd: 15 } "
          "posture { kp: 80 kd: 12 }";
 }

@@ -118,7 +118,7 @@ struct Dynamics {
 Eigen::VectorXd ToEigen(const std::vector<double>& values);
 
 /// Configurations with the paper's gains and limits.
-std::string TaskConfig();
+std::string TaskControllerText();
 std::string MonitorConfig(bool balancing, double half_length = 0.13, double half_width = 0.07);
 std::string RedistributorText(const std::string& extra = "");
 

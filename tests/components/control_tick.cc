@@ -112,7 +112,7 @@ ControlTick::ControlTick(const std::string& robot_path, const Contacts& in_conta
       estimator_(&context_, estimator),
       planner_(&context_, std::string("phase { support: ") +
                               (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }"),
-      task_(&context_, TaskConfig()),
+      task_(&context_, TaskControllerText()),
       monitor_(&context_, MonitorConfig(true)),
       redistributor_(&context_, RedistributorText()),
       whole_body_(context_.shared()->Get<balance::WholeBody>(

@@ -81,6 +81,8 @@ TEST(DistributionError, IsZeroForAnyResultantSharedAsCommanded) {
 
 WrenchFeedback Config(double proportional, double integral) {
   WrenchFeedback config;
+  config.set_max_force(100);
+  config.set_max_moment(30);
   config.set_enabled(true);
   config.set_proportional(proportional);
   config.set_integral(integral);

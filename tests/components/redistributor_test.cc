@@ -9,8 +9,12 @@
 #include <cmath>
 #include <limits>
 
+#include "components/balance/distribution_ratio.h"
+#include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.h"
 #include "components/messages/conversions.h"
+#include "components/redistributor/internal_feedback.h"
+#include "components/redistributor/redistributor.pb.h"
 #include "components/step_planner/step_planner.h"
 #include "components/task_controller/task_controller.h"
 #include "tests/components/control_fixture.h"
@@ -29,7 +33,7 @@ class Chain {
       : model_(robot::LoadTestRobot(robot)),
         context_(robot),
         planner_(&context_, phases),
-        task_(&context_, TaskConfig()),
+        task_(&context_, TaskControllerText()),
         monitor_(&context_, monitor),
         redistributor_(&context_, redistributor) {
     planner_.Bind("robot_state", &state_);
@@ -576,6 +580,56 @@ TEST(Redistributor, RefusesRatiosThatCannotBe) {
   EXPECT_EQ(RefusedField("eta_max: nan"), "eta_max");
   EXPECT_EQ(RefusedField("eta_min: 0.6 eta_max: 0.4"), "eta_min");
   EXPECT_EQ(RefusedField("eta_min: 0 eta_max: 1"), "accepted");
+}
+
+// What is derived for the monitor and for the redistributor fits: wherever in the soles' hull the
+// monitor leaves the centre of pressure, some eta serves both feet.
+TEST(Redistributor, EveryPointOfTheDerivedRegionCanBeShared) {
+  for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
+    const robot::RobotModel model = robot::LoadTestRobot(robot);
+    const double margin = HullMargin(model);
+    const balance::ContactLimits limits =
+        ReadLimits(WithinSoles({}, model, SoleMargin(model)), "double_support");
+    const robot::RobotData data = robot::Evaluate(model, StandingState(model));
+    const balance::ContactGeometry geometry{{data.foot_pose[0], data.foot_pose[1]}, {true, true}};
+    Eigen::Isometry3d frame_o;
+    ASSERT_TRUE(balance::FrameO(geometry.sole, geometry.in_contact, &frame_o));
+    std::array<Eigen::Vector2d, 2> half;
+    std::array<Eigen::Isometry3d, 2> sole;
+    for (size_t i = 0; i < 2; ++i) {
+      const robot::FootModel& foot = model.feet()[i];
+      half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+      sole[i] = frame_o.inverse() * geometry.sole[i];
+    }
+    const balance::ConvexPolygon region = balance::SupportPolygon(frame_o, geometry, half);
+    ASSERT_GE(region.num_corners, 4);
+    for (const Eigen::Vector2d& cop : region.corners()) {
+      balance::Vector6d resultant = balance::Vector6d::Zero();
+      resultant[2] = -500;
+      resultant[3] = -500 * cop.y();
+      resultant[4] = 500 * cop.x();
+      ASSERT_LT((balance::CenterOfPressure(resultant) - cop).norm(), 1e-12);
+      const auto interval = balance::FeasibleRatio(resultant, sole, limits, 0.02, 0.98);
+      EXPECT_TRUE(interval.feasible)
+          << model.name() << ": " << cop.transpose() << ": " << interval.limiting_condition;
+    }
+  }
+}
+
+TEST(Redistributor, LimitsOfTheFeedbackAreThoseOfTheRobot) {
+  // The paper's robot has what the fields had by default before they were derived.
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  EXPECT_NEAR(SoleMargin(model), 0.005, 1e-12);
+  const balance::ContactLimits limits = ReadLimits(WithinSoles({}, model, 0.005), "");
+  EXPECT_NEAR(limits.half_length, 0.145, 1e-12);
+  EXPECT_NEAR(limits.half_width, 0.07, 1e-12);
+  const WrenchFeedback feedback = WithRobotLimits({}, model);
+  EXPECT_EQ(feedback.max_force(), 100);
+  EXPECT_EQ(feedback.max_moment(), 30);
+  EXPECT_NEAR(feedback.edge(), 0.015, 1e-12);
+  WrenchFeedback own;
+  own.set_max_force(7);
+  EXPECT_EQ(WithRobotLimits(own, model).max_force(), 7);
 }
 
 }  // namespace

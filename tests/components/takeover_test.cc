@@ -59,7 +59,7 @@ class Chain {
   explicit Chain(robot::TestRobot robot)
       : context_(robot),
         planner_(&context_, Phases(robot)),
-        task_(&context_, TaskConfig()),
+        task_(&context_, TaskControllerText()),
         monitor_(&context_, MonitorConfig(true, 0.05, 0.05) + " cop_feedback { share: 0.5 }"),
         redistributor_(&context_,
                        RedistributorText("feedback { enabled: true integral: 200 pause: 0.002 }")) {

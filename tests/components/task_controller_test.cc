@@ -75,7 +75,7 @@ Eigen::Vector3d Draw(double size, std::mt19937* random) {
 // asked for: k_p e + k_d ė + ẍ of the COM, of the body and of the free foot, turning too.
 TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
   const auto body = static_cast<size_t>(model_.body_task_body());
-  Harness<TaskController> harness(&context_, TaskConfig());
+  Harness<TaskController> harness(&context_, TaskControllerText());
   double worst = 0;
   for (int trial = 0; trial < 100; ++trial) {
     const robot::RobotState there = Disturbed(standing_, 0.05, 0.3, &random_);
@@ -147,7 +147,7 @@ TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
 }
 
 TEST_P(TaskControllerCase, GravityCompensationHoldsTheRobotStill) {
-  Harness<TaskController> harness(&context_, TaskConfig());
+  Harness<TaskController> harness(&context_, TaskControllerText());
   support_plan_t plan = HoldAt(model_, robot::Evaluate(model_, standing_), GetParam().in_contact);
   plan.gravity_compensation = 1;
   harness.Bind("support_plan", &plan);
@@ -167,7 +167,7 @@ TEST_P(TaskControllerCase, GravityCompensationHoldsTheRobotStill) {
 }
 
 TEST_P(TaskControllerCase, KeepsTheLastTorqueWhenTheStateIsUnusable) {
-  Harness<TaskController> harness(&context_, TaskConfig());
+  Harness<TaskController> harness(&context_, TaskControllerText());
   support_plan_t plan = HoldAt(model_, robot::Evaluate(model_, standing_), GetParam().in_contact);
   harness.Bind("support_plan", &plan);
   robot_state_t message = StateMessage(model_, standing_);
@@ -213,7 +213,7 @@ INSTANTIATE_TEST_SUITE_P(All, TaskControllerCase,
 TEST(TaskController, StraightKneesAreReportedAsSingular) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   ControlContext context(TestRobot::kDyros);
-  Harness<TaskController> harness(&context, TaskConfig());
+  Harness<TaskController> harness(&context, TaskControllerText());
   const support_plan_t plan =
       HoldAt(model, robot::Evaluate(model, StandingState(model)), {true, true});
   harness.Bind("support_plan", &plan);
@@ -242,7 +242,7 @@ TEST(TaskController, ARobotWithFreeJointsNeedsPostureGains) {
 TEST(TaskController, FreeJointsAreHeld) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kMantis);
   ControlContext context(TestRobot::kMantis);
-  Harness<TaskController> harness(&context, TaskConfig());
+  Harness<TaskController> harness(&context, TaskControllerText());
   const robot::RobotState standing = StandingState(model);
   const support_plan_t plan = HoldAt(model, robot::Evaluate(model, standing), {true, true});
   harness.Bind("support_plan", &plan);
@@ -260,7 +260,7 @@ TEST(TaskController, FreeJointsAreHeld) {
 TEST(TaskController, NormalisesTheOrientationItAccepts) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   ControlContext context(TestRobot::kDyros);
-  Harness<TaskController> harness(&context, TaskConfig());
+  Harness<TaskController> harness(&context, TaskControllerText());
   const support_plan_t plan =
       HoldAt(model, robot::Evaluate(model, StandingState(model)), {true, true});
   harness.Bind("support_plan", &plan);

@@ -1,7 +1,5 @@
 // The angular momentum about the COM. It has no position to return to: of the gains k_d alone
 // counts, by which an error decays (1/s).
-#include <stdexcept>
-
 #include "components/balance/tasks/centroidal_momentum.h"
 #include "components/balance/tasks/task.h"
 
@@ -12,12 +10,11 @@ using Eigen::Vector3d;
 
 class AngularMomentumTask : public Task {
  public:
-  AngularMomentumTask(const TaskGains& gains, std::vector<int> rows, int num_velocities)
-      : gains_(gains),
-        rows_(std::move(rows)),
-        jacobian_(Eigen::MatrixXd::Zero(3, num_velocities)) {}
+  AngularMomentumTask(std::vector<int> rows, int num_velocities)
+      : rows_(std::move(rows)), jacobian_(Eigen::MatrixXd::Zero(3, num_velocities)) {}
 
   int num_rows() const override { return static_cast<int>(rows_.size()); }
+  TargetParts needs() const override { return {.angular_momentum = true}; }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     Vector3d bias;
@@ -28,7 +25,7 @@ class AngularMomentumTask : public Task {
       rows->jacobian.row(i) = jacobian_.row(axis);
       rows->bias_acceleration[i] = bias[axis];
       rows->acceleration[i] =
-          PdAcceleration(gains_, target.angular_momentum_rate[axis], 0, error[axis]);
+          PdAcceleration(gains(), target.angular_momentum_rate[axis], 0, error[axis]);
     }
   }
 
@@ -38,7 +35,6 @@ class AngularMomentumTask : public Task {
   }
 
  private:
-  TaskGains gains_;
   std::vector<int> rows_;
   mutable Eigen::MatrixXd jacobian_;  // scratch, 3×n
 };
@@ -47,10 +43,9 @@ class AngularMomentumTask : public Task {
 
 std::unique_ptr<Task> MakeAngularMomentumTask(const TaskSpec& spec,
                                               const robot::RobotModel& model) {
-  if (spec.gains.kp != 0) {
-    throw std::invalid_argument("gains: kp must be 0, angular momentum has no position");
-  }
-  return std::make_unique<AngularMomentumTask>(spec.gains, SelectedRows(spec.axes, kTurnX, 3),
+  RefuseFrame(spec);
+  RefuseJoints(spec);
+  return std::make_unique<AngularMomentumTask>(SelectedRows(spec.axes, kTurnX, 3),
                                                model.num_velocities());
 }
 

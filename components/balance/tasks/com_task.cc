@@ -6,18 +6,19 @@ namespace {
 
 class ComTask : public Task {
  public:
-  ComTask(const TaskGains& gains, std::vector<int> rows) : gains_(gains), rows_(std::move(rows)) {}
+  explicit ComTask(std::vector<int> rows) : rows_(std::move(rows)) {}
 
   int num_rows() const override { return static_cast<int>(rows_.size()); }
+  TargetParts needs() const override { return {.position = true}; }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     const robot::RobotData& data = state.data;
+    CopySelected(rows_, data.com_jacobian, rows->jacobian);
     for (int i = 0; i < num_rows(); ++i) {
       const int axis = rows_[static_cast<size_t>(i)];
-      rows->jacobian.row(i) = data.com_jacobian.row(axis);
       rows->bias_acceleration[i] = data.com_bias_acceleration[axis];
       rows->acceleration[i] =
-          PdAcceleration(gains_, target.acceleration[axis], target.position[axis] - data.com[axis],
+          PdAcceleration(gains(), target.acceleration[axis], target.position[axis] - data.com[axis],
                          target.velocity[axis] - data.com_velocity[axis]);
     }
   }
@@ -29,14 +30,15 @@ class ComTask : public Task {
   }
 
  private:
-  TaskGains gains_;
   std::vector<int> rows_;
 };
 
 }  // namespace
 
 std::unique_ptr<Task> MakeComTask(const TaskSpec& spec, const robot::RobotModel&) {
-  return std::make_unique<ComTask>(spec.gains, SelectedRows(spec.axes, kX, 3));
+  RefuseFrame(spec);
+  RefuseJoints(spec);
+  return std::make_unique<ComTask>(SelectedRows(spec.axes, kX, 3));
 }
 
 }  // namespace poise::balance

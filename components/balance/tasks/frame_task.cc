@@ -1,4 +1,5 @@
-// The pose of a frame, or of a point of it: a free foot, a hand, a head.
+// The pose of a frame, or of a point of it: a free foot, a hand, a head. The soles' own motion is
+// part of a robot's data already.
 #include "components/balance/tasks/frame_kinematics.h"
 #include "components/balance/tasks/task.h"
 
@@ -7,17 +8,26 @@ namespace {
 
 class FrameTask : public Task {
  public:
-  FrameTask(const TaskGains& gains, robot::Frame frame, std::vector<int> rows, int num_velocities)
-      : gains_(gains),
-        frame_(std::move(frame)),
+  /// `sole`: the foot whose sole's centre the frame is, or −1.
+  FrameTask(robot::Frame frame, int sole, std::vector<int> rows, int num_velocities)
+      : frame_(std::move(frame)),
+        sole_(sole),
         rows_(std::move(rows)),
-        jacobian_(Eigen::MatrixXd::Zero(6, num_velocities)) {}
+        jacobian_(robot::Matrix6X::Zero(6, num_velocities)) {}
 
   int num_rows() const override { return static_cast<int>(rows_.size()); }
+  TargetParts needs() const override {
+    return {.position = rows_.front() < 3, .rotation = rows_.back() >= 3};
+  }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
-    const FrameMotion motion = ComputeFrameMotion(state.data, frame_);
-    FillFrameJacobian(state.model, state.data, frame_, jacobian_);
+    const FrameMotion motion = Motion(state);
+    if (sole_ >= 0) {
+      CopySelected(rows_, state.data.foot_jacobian[static_cast<size_t>(sole_)], rows->jacobian);
+    } else {
+      FillFrameJacobian(state.model, state.data, frame_, jacobian_);
+      CopySelected(rows_, jacobian_, rows->jacobian);
+    }
     robot::Vector6d error, velocity, acceleration;
     error << target.position - motion.pose.translation(),
         OrientationError(target.rotation, motion.pose.linear());
@@ -25,15 +35,14 @@ class FrameTask : public Task {
     acceleration << target.acceleration, target.angular_acceleration;
     for (int i = 0; i < num_rows(); ++i) {
       const int axis = rows_[static_cast<size_t>(i)];
-      rows->jacobian.row(i) = jacobian_.row(axis);
       rows->bias_acceleration[i] = motion.bias_acceleration[axis];
-      rows->acceleration[i] = PdAcceleration(gains_, acceleration[axis], error[axis],
+      rows->acceleration[i] = PdAcceleration(gains(), acceleration[axis], error[axis],
                                              velocity[axis] - motion.velocity[axis]);
     }
   }
 
   void Hold(const TaskState& state, TaskTarget* target) const override {
-    const FrameMotion motion = ComputeFrameMotion(state.data, frame_);
+    const FrameMotion motion = Motion(state);
     target->position = motion.pose.translation();
     target->rotation = motion.pose.linear();
     for (auto* rest : {&target->velocity, &target->acceleration, &target->angular_velocity,
@@ -43,17 +52,27 @@ class FrameTask : public Task {
   }
 
  private:
-  TaskGains gains_;
+  FrameMotion Motion(const TaskState& state) const {
+    if (sole_ < 0) return ComputeFrameMotion(state.data, frame_);
+    const auto i = static_cast<size_t>(sole_);
+    return {state.data.foot_pose[i], state.data.foot_velocity[i],
+            state.data.foot_bias_acceleration[i]};
+  }
+
   robot::Frame frame_;
+  int sole_;
   std::vector<int> rows_;
-  mutable Eigen::MatrixXd jacobian_;  // scratch; columns of joints that do not carry the frame stay 0
+  // Scratch; columns of joints that do not carry the frame stay 0.
+  mutable robot::Matrix6X jacobian_;
 };
 
 }  // namespace
 
 std::unique_ptr<Task> MakeFrameTask(const TaskSpec& spec, const robot::RobotModel& model) {
-  return std::make_unique<FrameTask>(spec.gains, TaskFrame(spec, model),
-                                     SelectedRows(spec.axes, kX, 6), model.num_velocities());
+  RefuseJoints(spec);
+  const int sole = spec.point.isZero(0) ? spec.foot : -1;
+  return std::make_unique<FrameTask>(TaskFrame(spec, model), sole, SelectedRows(spec.axes, kX, 6),
+                                     model.num_velocities());
 }
 
 }  // namespace poise::balance

@@ -10,10 +10,10 @@ namespace {
 
 class JointPostureTask : public Task {
  public:
-  JointPostureTask(const TaskGains& gains, std::vector<int> joints)
-      : gains_(gains), joints_(std::move(joints)) {}
+  explicit JointPostureTask(std::vector<int> joints) : joints_(std::move(joints)) {}
 
   int num_rows() const override { return static_cast<int>(joints_.size()); }
+  TargetParts needs() const override { return {.joints = true}; }
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     for (int i = 0; i < num_rows(); ++i) {
@@ -21,7 +21,7 @@ class JointPostureTask : public Task {
       rows->jacobian(i, 6 + joint) = 1;
       rows->bias_acceleration[i] = 0;
       rows->acceleration[i] = PdAcceleration(
-          gains_, 0, target.joint_position[joint] - state.state.joint_position[joint],
+          gains(), 0, target.joint_position[joint] - state.state.joint_position[joint],
           -state.state.joint_velocity[joint]);
     }
   }
@@ -31,7 +31,6 @@ class JointPostureTask : public Task {
   }
 
  private:
-  TaskGains gains_;
   std::vector<int> joints_;
 };
 
@@ -39,6 +38,7 @@ class JointPostureTask : public Task {
 
 std::unique_ptr<Task> MakeJointPostureTask(const TaskSpec& spec, const robot::RobotModel& model) {
   SelectedRows(spec.axes, 0, 0);
+  RefuseFrame(spec);
   std::vector<int> joints;
   for (const std::string& name : spec.joints) {
     joints.push_back(model.FindJoint(name));
@@ -48,7 +48,7 @@ std::unique_ptr<Task> MakeJointPostureTask(const TaskSpec& spec, const robot::Ro
     }
   }
   for (int j = 0; spec.joints.empty() && j < model.num_joints(); ++j) joints.push_back(j);
-  return std::make_unique<JointPostureTask>(spec.gains, std::move(joints));
+  return std::make_unique<JointPostureTask>(std::move(joints));
 }
 
 }  // namespace poise::balance

@@ -4,7 +4,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace poise::balance {
@@ -24,10 +23,6 @@ std::unique_ptr<Task> CreateTask(const TaskSpec& spec, const robot::RobotModel& 
     }
     throw std::invalid_argument(
         fmt::format("type: there is no task '{}': use one of {}", spec.type, names));
-  }
-  const auto valid = [](double gain) { return gain >= 0 && std::isfinite(gain); };
-  if (!valid(spec.gains.kp) || !valid(spec.gains.kd)) {
-    throw std::invalid_argument("gains: kp and kd must be numbers, 0 or more");
   }
   return type->make(spec, model);
 }
@@ -71,6 +66,20 @@ robot::Frame TaskFrame(const TaskSpec& spec, const robot::RobotModel& model) {
   if (!spec.point.allFinite()) throw std::invalid_argument("point: must be finite");
   frame.pose = frame.pose * Eigen::Translation3d(spec.point);
   return frame;
+}
+
+void RefuseFrame(const TaskSpec& spec) {
+  if (!spec.link.empty()) throw std::invalid_argument("link: this task has none");
+  if (spec.foot >= 0) throw std::invalid_argument("foot: this task has none");
+  RefusePoint(spec);
+}
+
+void RefusePoint(const TaskSpec& spec) {
+  if (!spec.point.isZero(0)) throw std::invalid_argument("point: this task has none");
+}
+
+void RefuseJoints(const TaskSpec& spec) {
+  if (!spec.joints.empty()) throw std::invalid_argument("joint: this task has none");
 }
 
 }  // namespace poise::balance

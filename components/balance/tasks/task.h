@@ -45,26 +45,42 @@ struct TaskState {
 
 /// Rows of ẍ = J q̈ + J̇ q̇ and the f* that ẍ shall be; a task fills its own.
 struct TaskRows {
-  Eigen::Ref<Eigen::MatrixXd> jacobian;           ///< J, t×n; zero when a task gets it
+  /// J, t×n; zero when a task gets it, or as the task itself left it.
+  Eigen::Ref<Eigen::MatrixXd> jacobian;
   Eigen::Ref<Eigen::VectorXd> bias_acceleration;  ///< J̇ q̇, t×1
   Eigen::Ref<Eigen::VectorXd> acceleration;       ///< f*, t×1: (25), the reference's fed forward
 };
 
-/// A kind of motion with its gains. Immutable after construction; no method allocates.
+/// Parts of a TaskTarget.
+struct TargetParts {
+  bool position = false, rotation = false;  ///< each with its rates
+  bool joints = false;
+  bool angular_momentum = false;
+};
+
+/// A kind of motion with its gains, which may be set between ticks. No method allocates.
 class Task {
  public:
   virtual ~Task() = default;
   virtual int num_rows() const = 0;
+  /// What it reads of a target.
+  virtual TargetParts needs() const = 0;
   /// Fills `rows`, which has num_rows() rows.
   virtual void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const = 0;
   /// The target at which the task, at this state, has no error and is at rest.
   virtual void Hold(const TaskState& state, TaskTarget* target) const = 0;
+
+  /// 0 until set.
+  void set_gains(const TaskGains& gains) { gains_ = gains; }
+  const TaskGains& gains() const { return gains_; }
+
+ private:
+  TaskGains gains_;
 };
 
-/// What a task is made of. Fields that its type has no use for must be left as they are.
+/// What a task is made of. A type refuses fields that it has no use for.
 struct TaskSpec {
   std::string type;  ///< as TaskTypes() names it
-  TaskGains gains;
   AxisSelection axes{};
   std::string link;  ///< URDF link; empty: the link of the body task
   int foot = -1;     ///< the sole of this foot in place of a link; right: 0
@@ -92,12 +108,29 @@ std::unique_ptr<Task> CreateTask(const TaskSpec& spec, const robot::RobotModel& 
 /// Smallest rotation vector from `actual` to `desired`, rad, in the axes both are given in.
 Eigen::Vector3d OrientationError(const Eigen::Matrix3d& desired, const Eigen::Matrix3d& actual);
 
+/// Copies the rows `selected` of `all`, which has as many as are known when compiling, to `to`.
+template <class All, class To>
+void CopySelected(const std::vector<int>& selected, const All& all, To&& to) {
+  if (static_cast<Eigen::Index>(selected.size()) == All::RowsAtCompileTime) {
+    to.template topRows<All::RowsAtCompileTime>() = all;
+    return;
+  }
+  for (size_t i = 0; i < selected.size(); ++i) {
+    to.row(static_cast<Eigen::Index>(i)) = all.row(selected[i]);
+  }
+}
+
 /// Rows that `axes` selects of those from `first` to first + count; all when none is selected.
 /// Throws std::invalid_argument for an axis outside of them.
 std::vector<int> SelectedRows(const AxisSelection& axes, int first, int count);
 
 /// Frame that `spec` names by link or foot, moved to its point. Throws std::invalid_argument.
 robot::Frame TaskFrame(const TaskSpec& spec, const robot::RobotModel& model);
+
+/// Throw std::invalid_argument for a link, foot or point, a point, or joints that are given.
+void RefuseFrame(const TaskSpec& spec);
+void RefusePoint(const TaskSpec& spec);
+void RefuseJoints(const TaskSpec& spec);
 
 /// f* of one axis: a_d + (k_p e + k_d ė).
 inline double PdAcceleration(const TaskGains& gains, double acceleration, double error,
