@@ -26,7 +26,7 @@ struct StructInfo {
 /// All that a set of .lcm files tells at run time. Generated, a function NAME_messages() a set.
 struct MessageSet {
   std::span<const MessageType> types;
-  std::span<const StructInfo> structs;        ///< of messages, and of their fields
+  std::span<const StructInfo> structs;       ///< of messages, and of their fields
   std::span<const char* const> definitions;  ///< the files' texts
 };
 

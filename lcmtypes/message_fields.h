@@ -49,8 +49,8 @@ struct MessageType {
   /// A message with its arrays sized, and its end.
   void* (*make)(std::span<const int32_t> counts);
   void (*destroy)(void* message);
-  /// Decodes into such a message; false when liblcm refuses it or a number in it is not finite. Does
-  /// not allocate when `data` has its counts.
+  /// Decodes into such a message; false when liblcm refuses it or a number in it is not finite.
+  /// Does not allocate when `data` has its counts.
   bool (*decode)(const uint8_t* data, int size, void* message);
 };
 

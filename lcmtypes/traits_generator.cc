@@ -237,7 +237,8 @@ void WriteHeader(const std::string& set, const std::vector<Message>& messages,
   out << "\nnamespace poise {\n\n";
   for (const Message& m : messages) WriteTraits(m, all, out);
   if (set == "poise") {
-    out << "// Calls f.template operator()<T>() for every message type of Poise's own with a header.\n"
+    out << "// Calls f.template operator()<T>() for every message type of Poise's own with a "
+           "header.\n"
         << "template <class F>\nvoid ForEachMessageType(F&& f) {\n";
     for (const Message& m : messages) {
       if (m.has_header) out << "  f.template operator()<" << m.lcm.name << ">();\n";
@@ -310,7 +311,8 @@ int Generate(const std::string& set, const std::string& output_dir,
   for (const auto& [name, lcm] : own) {
     if ((lcm.package == "poise") != (set == "poise")) {
       Fail(lcm, 1,
-           set == "poise" ? "package must be poise" : "package poise is Poise's own; choose another");
+           set == "poise" ? "package must be poise"
+                          : "package poise is Poise's own; choose another");
     }
     if (!all.emplace(name, lcm).second) Fail(lcm, lcm.line, name + " is there twice");
   }
@@ -345,7 +347,8 @@ int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   const auto import = std::find(arguments.begin(), arguments.end(), "--import");
   if (import - arguments.begin() < 3) {
-    std::cerr << "usage: poise_traits_generator NAME OUTPUT_DIR FILE.lcm ... [--import FILE.lcm ...]\n";
+    std::cerr
+        << "usage: poise_traits_generator NAME OUTPUT_DIR FILE.lcm ... [--import FILE.lcm ...]\n";
     return 2;
   }
   try {

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <set>
 
+#include "components/framework/configuration/suggest.h"
 #include "components/framework/run.h"
-#include "components/framework/suggest.h"
 #include "fmt/format.h"
 #include "logging/event_log_writer.h"
 #include "logging/log_survey.h"

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "components/framework/bus/packet_filter.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/channel_ticks.h"
 #include "logging/run_log_writer.h"

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "components/framework/bus/packet_filter.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"

@@ -41,11 +41,10 @@ std::function<bool(int64_t, std::span<const uint8_t>)> Keep(const std::string& t
     void Text(std::string_view, std::string_view) override {}
     bool finite = true;
   };
-  return [type = FindMessageType(type_name), series](int64_t tick,
-                                                     std::span<const uint8_t> data) {
+  return [type = FindMessageType(type_name), series](int64_t tick, std::span<const uint8_t> data) {
     Nothing values;
-    if (type == nullptr ||
-        !type->visit(data.data(), static_cast<int64_t>(data.size()), &values) || !values.finite) {
+    if (type == nullptr || !type->visit(data.data(), static_cast<int64_t>(data.size()), &values) ||
+        !values.finite) {
       return false;
     }
     series->Set(tick, {data.begin(), data.end()});

@@ -11,11 +11,11 @@
 
 #include "components/framework/graph.pb.h"
 #include "components/robot/robot_model.h"
+#include "lcmtypes/message_fields.h"
 #include "logging/channel_ticks.h"
 #include "logging/log_reader.h"
 #include "logging/run_info.h"
 #include "logging/tick_series.h"
-#include "lcmtypes/message_fields.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "components/framework/component.h"
-#include "components/framework/component_type.h"
 #include "components/framework/component_traits.h"
+#include "components/framework/component_type.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
 #include "poise/drive_feedback_t.hpp"

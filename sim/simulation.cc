@@ -301,8 +301,8 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     if (depth < -kContactMargin) continue;
     ++count;
     if (add) {
-      world_->AddContact({body, p, surface.normal, depth,
-                          surface.velocity * surface.normal.z(), terrain_.material(surface.block)});
+      world_->AddContact({body, p, surface.normal, depth, surface.velocity * surface.normal.z(),
+                          terrain_.material(surface.block)});
     }
   }
   return count;

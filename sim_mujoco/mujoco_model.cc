@@ -8,7 +8,7 @@
 #include <cstring>
 #include <mutex>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "sim/config_check.h"
 
 namespace poise {

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
 #include "sim/config_check.h"
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
 #include "components/framework/say_error.h"
 #include "components/robot/robot_model.h"

@@ -22,9 +22,9 @@ struct ConvexPolygon {
   }
 };
 
-/// Hull of at most kMaxCorners points (those beyond are left out), in m, from the one with the least
-/// x, and of those the least y, on. Points count as equal, and corners as straight, to some 1e-9 m.
-/// Empty when a coordinate is not finite.
+/// Hull of at most kMaxCorners points (those beyond are left out), in m, from the one with the
+/// least x, and of those the least y, on. Points count as equal, and corners as straight, to some
+/// 1e-9 m. Empty when a coordinate is not finite.
 ConvexPolygon ConvexHull(std::span<const Eigen::Vector2d> points);
 
 /// The rectangle |x| ≤ half.x, |y| ≤ half.y.

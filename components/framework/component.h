@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "components/framework/component_traits.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/ports.h"
 #include "components/framework/state_archive.h"
 

@@ -2,7 +2,7 @@
 
 #include <google/protobuf/descriptor.h>
 
-#include "components/framework/field_reference.h"
+#include "components/framework/configuration/field_reference.h"
 
 namespace poise {
 namespace {

@@ -43,8 +43,8 @@ struct ComponentType {
   std::vector<PortType> ports = {};
   /// Type of its configuration; nullptr: it has none.
   const google::protobuf::Descriptor* config = nullptr;
-  /// The configuration's schema with its comments, a serialised FileDescriptorSet: poise_proto_library
-  /// makes a function NAME_schema() that gives it.
+  /// The configuration's schema with its comments, a serialised FileDescriptorSet:
+  /// poise_proto_library makes a function NAME_schema() that gives it.
   std::string_view (*schema)() = nullptr;
 };
 

@@ -198,9 +198,9 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
       const Channel& channel = graph.channel(at);
       const std::string place = fmt::format("{}.{}[{}]", field, direction, k);
       if (channel.type() != port.type) {
-        problems->push_back({place, fmt::format("{}{} carries {}, but channel {} is {}", prefix,
-                                                port.name, port.type, channel.name(),
-                                                channel.type())});
+        problems->push_back(
+            {place, fmt::format("{}{} carries {}, but channel {} is {}", prefix, port.name,
+                                port.type, channel.name(), channel.type())});
       }
       if (!is_input || channel.external() == (port.kind == InputKind::kLatest)) continue;
       problems->push_back(
@@ -493,9 +493,8 @@ BoundGraph::BoundGraph(const RunSpec& spec, const ComponentRegistry& registry) {
   Problems problems;
   for (int i = 0; i < num_components(); ++i) {
     wirings.push_back(&component(i).wiring);
-    CheckDeclared(spec.graph(), i,
-                  registry.TypeNamed(TypeOf(spec.graph().component(i)))->ports, *wirings.back(),
-                  &problems);
+    CheckDeclared(spec.graph(), i, registry.TypeNamed(TypeOf(spec.graph().component(i)))->ports,
+                  *wirings.back(), &problems);
   }
   Throw(spec.graph(), std::move(problems));
   plan_ = PlanGraph(spec.graph(), wirings);

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 
@@ -92,9 +92,8 @@ const std::vector<ComponentType>& AddedComponents() { return Added(); }
 fs::path InstalledPrefix() {
   const fs::path folder = OwnFolder();  // PREFIX/lib, PREFIX/bin or PREFIX/lib/poise/bin
   std::error_code error;
-  for (const fs::path& prefix :
-       {folder.parent_path(), folder.parent_path().parent_path(),
-        folder.parent_path().parent_path().parent_path()}) {
+  for (const fs::path& prefix : {folder.parent_path(), folder.parent_path().parent_path(),
+                                 folder.parent_path().parent_path().parent_path()}) {
     if (fs::is_directory(prefix / "share" / "poise" / "scenarios", error)) return prefix;
   }
   return {};
@@ -148,10 +147,10 @@ std::string ModulesSearched() {
   for (const fs::path& folder : PoisePath()) {
     folders.push_back((folder / "lib" / "poise" / "modules").string());
   }
-  return folders.empty() ? "modules with others are looked for in the folders of POISE_PATH, which "
-                           "is not set"
-                         : fmt::format("modules with others are looked for in {}",
-                                       fmt::join(folders, ", "));
+  return folders.empty()
+             ? "modules with others are looked for in the folders of POISE_PATH, which "
+               "is not set"
+             : fmt::format("modules with others are looked for in {}", fmt::join(folders, ", "));
 }
 
 const std::vector<fs::path>& LoadedModules() { return Loaded(); }

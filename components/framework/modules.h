@@ -15,8 +15,8 @@ void AddComponent(ComponentType type);
 /// In the order in which they came.
 const std::vector<ComponentType>& AddedComponents();
 
-/// Folders with files of users' own, first those of $POISE_PATH (parted by colons), then where Poise
-/// itself is installed: lib/poise/modules holds modules, lib/poise/bin programs, share/poise
+/// Folders with files of users' own, first those of $POISE_PATH (parted by colons), then where
+/// Poise itself is installed: lib/poise/modules holds modules, lib/poise/bin programs, share/poise
 /// scenarios, graphs, robots, sweeps and drives, a folder each.
 std::vector<std::filesystem::path> PoisePath();
 

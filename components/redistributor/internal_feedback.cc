@@ -7,7 +7,7 @@
 #include "components/balance/contact_conditions.h"
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
 
 namespace poise {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "components/balance/contact_transition.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 namespace {

@@ -227,18 +227,18 @@ ComponentType StateEstimatorType() {
                 StateEstimatorConfig::ANCHORED_FEET);
   static_assert(int{estimator_status_t::METHOD_INVARIANT_EKF} ==
                 StateEstimatorConfig::INVARIANT_EKF);
-  return {"state_estimator",
-          "floating base and joint velocities from IMU, encoders and feet",
-          [] { return std::make_unique<StateEstimator>(); },
-          // What it knows of the drive train.
-          {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
-                     "state_estimator.invariant_ekf.gear_stiffness=0"},
-           .methods = {"state_estimator.method=ANCHORED_FEET",
-                       "state_estimator.method=INVARIANT_EKF"}},
-          {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
-           Writes<estimator_status_t>("estimator_status")},
-          StateEstimatorConfig::descriptor(),
-          state_estimator_proto_schema};
+  return {
+      "state_estimator",
+      "floating base and joint velocities from IMU, encoders and feet",
+      [] { return std::make_unique<StateEstimator>(); },
+      // What it knows of the drive train.
+      {.ideal = {"state_estimator.invariant_ekf.sensor_delay=0",
+                 "state_estimator.invariant_ekf.gear_stiffness=0"},
+       .methods = {"state_estimator.method=ANCHORED_FEET", "state_estimator.method=INVARIANT_EKF"}},
+      {Reads<robot_sensors_t>("robot_sensors"), Writes<robot_state_t>("robot_state"),
+       Writes<estimator_status_t>("estimator_status")},
+      StateEstimatorConfig::descriptor(),
+      state_estimator_proto_schema};
 }
 
 }  // namespace poise

@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 
 namespace poise {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/phase_graph.h"
 

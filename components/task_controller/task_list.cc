@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/messages/motion.h"
 
 namespace poise {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/suggest.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 

@@ -125,8 +125,7 @@ void SchemaBuilder::AddField(const std::string& type, const FieldInfo& info,
   }
   field->set_label(IsArray(info) ? Field::LABEL_REPEATED : Field::LABEL_OPTIONAL);
   SetType(info.type, field);
-  const bool number =
-      field->type() != Field::TYPE_MESSAGE && field->type() != Field::TYPE_STRING;
+  const bool number = field->type() != Field::TYPE_MESSAGE && field->type() != Field::TYPE_STRING;
   if (IsArray(info) && number) field->mutable_options()->set_packed(true);
 }
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/metrics/metric_groups.h"
 

@@ -18,8 +18,8 @@ struct Metric {
   bool needs_other_estimates = false;  ///< RunRecord::other_estimates
 };
 
-/// Makes a metric known, before the first table; called by a module's POISE_MODULE. Throws ConfigError
-/// when there is one of that name.
+/// Makes a metric known, before the first table; called by a module's POISE_MODULE. Throws
+/// ConfigError when there is one of that name.
 void AddMetric(Metric metric);
 /// All metrics, in the order in which they are listed: Poise's own, then added ones.
 std::span<const Metric> Metrics();

@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise::logging {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
 #include "components/framework/say_error.h"
 #include "fmt/format.h"

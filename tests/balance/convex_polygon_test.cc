@@ -66,7 +66,8 @@ TEST(ConvexHull, OfSolesAlignedNearlyIsTheirRectangle) {
 }
 
 // Soles of a standing robot: their corners along y are level to anything between rounding and a
-// micrometre. Once they crossed a hull of ten corners, and a robot that stood still was pushed down.
+// micrometre. Once they crossed a hull of ten corners, and a robot that stood still was pushed
+// down.
 TEST(ConvexHull, OfNearlyAlignedSolesCoversThemAndTurnsLeft) {
   std::mt19937_64 random(TestSeed(291));
   std::uniform_real_distribution<double> exponent(-18, -6), unit(-1, 1);

@@ -27,7 +27,7 @@
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.pb.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/timing.h"

@@ -8,7 +8,7 @@
 
 #include "components/balance/contact_conditions.h"
 #include "components/balance/distribution_ratio.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/messages/conversions.h"
 #include "components/redistributor/redistributor.h"
 #include "tests/components/control_fixture.h"

@@ -1,11 +1,11 @@
 // Groups that a message type gets at run time, against protobuf's own rules of text.
-#include "components/framework/added_fields.h"
+#include "components/framework/configuration/added_fields.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "components/framework/configuration.h"
-#include "components/framework/field_path.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
 #include "tests/framework/toy.pb.h"
 
 namespace poise {
@@ -64,8 +64,8 @@ TEST_F(AddedFieldsTest, HaveLinesAndPaths) {
   SetField(&config, "walker.kp", "8");
   EXPECT_EQ(Walker(config).kp(), 8);
   SetField(&config, "walker", "");
-  EXPECT_FALSE(config.GetReflection()->HasField(
-      config, FindField(*ToyConfig::descriptor(), "walker")));
+  EXPECT_FALSE(
+      config.GetReflection()->HasField(config, FindField(*ToyConfig::descriptor(), "walker")));
   try {
     SetField(&config, "walkr.kp", "1");
     FAIL();
@@ -76,13 +76,13 @@ TEST_F(AddedFieldsTest, HaveLinesAndPaths) {
 
 TEST_F(AddedFieldsTest, ErrorsStandInTheirLine) {
   ToyConfig config;
-  for (const auto& [text, where] : std::map<std::string, std::string>{
-           {"joints: 1\nwalker {\n  kd: 1\n  kx: 2\n}", "file:4:"},
-           {"walker { kp: }", "file:1:"},
-           {"walker {", "file:1:"},
-           {"gains { walker { kp: 1 } }", "file:1:"},
-           {"runner { kp: 1 }", "file:1:"},
-           {"\"unended\nwalker { kp: 1 }", "file:1:"}}) {
+  for (const auto& [text, where] :
+       std::map<std::string, std::string>{{"joints: 1\nwalker {\n  kd: 1\n  kx: 2\n}", "file:4:"},
+                                          {"walker { kp: }", "file:1:"},
+                                          {"walker {", "file:1:"},
+                                          {"gains { walker { kp: 1 } }", "file:1:"},
+                                          {"runner { kp: 1 }", "file:1:"},
+                                          {"\"unended\nwalker { kp: 1 }", "file:1:"}}) {
     try {
       ParseTextProto(text, "file", &config);
       ADD_FAILURE() << text;

@@ -1,11 +1,11 @@
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 
-#include "components/framework/field_path.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/field_path.h"
+#include "components/framework/configuration/suggest.h"
 #include "tests/framework/toy.pb.h"
 
 namespace poise {

@@ -7,7 +7,7 @@
 
 #include <fstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/process_runner.h"

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "components/framework/bus/channel_collector.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/framework/process_harness.h"
 #include "tests/framework/toy_components.h"
 

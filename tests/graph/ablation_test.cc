@@ -7,7 +7,7 @@
 
 #include <fstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "logging/replay/compare.h"
 #include "tests/graph/poise_program.h"
 

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "components/framework/bus/udp_bus.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "logging/replay/compare.h"
 #include "poise/health_t.hpp"

@@ -9,7 +9,7 @@
 
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/log_survey.h"

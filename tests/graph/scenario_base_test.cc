@@ -4,7 +4,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {

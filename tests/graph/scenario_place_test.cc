@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/graph/current_folder.h"
 #include "tests/graph/poise_program.h"
 

@@ -6,7 +6,7 @@
 
 #include <functional>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 namespace {

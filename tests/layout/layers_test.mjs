@@ -8,18 +8,19 @@ import {repositoryFiles, root} from '../docs/markdown.mjs';
 const files = repositoryFiles().filter((f) => !/^(tests|examples)\//.test(f));  // examples: users' own projects
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
-const BUS = ['lcmtypes', 'components/framework', 'components/framework/bus', 'components/framework/runners',
+const BUS = ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/framework/bus', 'components/framework/runners',
   'components/robot', 'components/balance', 'components/balance/tasks', 'components/messages'];
 /** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
 const BELOW = {
   'lcmtypes': [],
-  'components/framework': ['lcmtypes'],
-  'components/framework/bus': ['lcmtypes', 'components/framework'],
-  'components/framework/runners': ['lcmtypes', 'components/framework', 'components/framework/bus'],
+  'components/framework/configuration': [],
+  'components/framework': ['lcmtypes', 'components/framework/configuration'],
+  'components/framework/bus': ['lcmtypes', 'components/framework', 'components/framework/configuration'],
+  'components/framework/runners': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/framework/bus'],
   'components/robot': [],
   'components/balance': ['components/robot'],
   'components/balance/tasks': ['components/robot', 'components/balance'],
-  'components/messages': ['lcmtypes', 'components/framework', 'components/robot', 'components/balance'],
+  'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/balance'],
   'components': BUS,
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],

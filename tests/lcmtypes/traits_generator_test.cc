@@ -16,8 +16,8 @@ std::string Generate(const std::string& name, const std::string& text) {
   std::filesystem::create_directories(folder);
   const std::filesystem::path file = folder / (name + ".lcm");
   std::ofstream(file) << text;
-  const std::string command =
-      std::string(POISE_TRAITS_GENERATOR) + " poise " + folder.string() + " " + file.string() + " 2>&1";
+  const std::string command = std::string(POISE_TRAITS_GENERATOR) + " poise " + folder.string() +
+                              " " + file.string() + " 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   std::string output;
   std::array<char, 512> buffer;
@@ -88,9 +88,9 @@ std::string GenerateLab(const std::string& text) {
       std::filesystem::path(testing::TempDir()) / ("lab_" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "a_t.lcm") << text;
-  const std::string command = std::string(POISE_TRAITS_GENERATOR) + " lab " + folder.string() + " " +
-                              (folder / "a_t.lcm").string() + " --import " POISE_SOURCE_DIR
-                              "/lcmtypes/wrench_t.lcm 2>&1";
+  const std::string command = std::string(POISE_TRAITS_GENERATOR) + " lab " + folder.string() +
+                              " " + (folder / "a_t.lcm").string() +
+                              " --import " POISE_SOURCE_DIR "/lcmtypes/wrench_t.lcm 2>&1";
   FILE* pipe = popen(command.c_str(), "r");
   std::string output;
   std::array<char, 512> buffer;
@@ -117,9 +117,10 @@ TEST(TraitsGenerator, KeepsPoisesPackageToItself) {
   EXPECT_NE(GenerateLab("package poise;\nstruct a_t {\n int64_t run_id, tick, utime;\n}\n")
                 .find("a_t.lcm:1: package poise is Poise's own; choose another"),
             std::string::npos);
-  EXPECT_NE(GenerateLab("package lab;\nstruct a_t {\n int64_t run_id, tick, utime;\n wrench_t w;\n}\n")
-                .find("unknown type lab.wrench_t"),
-            std::string::npos);
+  EXPECT_NE(
+      GenerateLab("package lab;\nstruct a_t {\n int64_t run_id, tick, utime;\n wrench_t w;\n}\n")
+          .find("unknown type lab.wrench_t"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/logging/log_test_support.h"
 
 namespace poise::logging {

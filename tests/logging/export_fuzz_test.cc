@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <random>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/robot_model.h"
 #include "logging/export/log_export.h"
 #include "logging/export/signal_table.h"

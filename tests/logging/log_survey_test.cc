@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "logging/log_cut.h"
 #include "logging/run_record.h"
 #include "poise/emergency_stop_t.hpp"

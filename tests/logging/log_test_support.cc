@@ -7,7 +7,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "logging/run_log_writer.h"
 #include "poise/message_traits.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/robot_files.h"
 #include "tests/robot/robot_test_support.h"
 #include "tests/test_seed.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::robot {

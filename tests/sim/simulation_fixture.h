@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_files.h"
 #include "components/robot/robot_model.h"

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 namespace {

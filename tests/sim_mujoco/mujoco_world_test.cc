@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tests/sim/simulation_fixture.h"
 #include "tests/test_seed.h"
 

@@ -6,7 +6,7 @@
 
 #include <limits>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "sim_ode/sim_ode_type.h"
 #include "tests/sim/simulation_fixture.h"

@@ -12,7 +12,7 @@
 #include "components/framework/bus/channel_collector.h"
 #include "components/framework/bus/control_client.h"
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
 #include "poise/external_push_t.hpp"

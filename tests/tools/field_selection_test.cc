@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/health_t.hpp"
 #include "tests/logging/log_test_support.h"

@@ -11,7 +11,7 @@
 #include <fstream>
 #include <random>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "poise/health_t.hpp"
 #include "tests/logging/log_test_support.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/robot_files.h"
 
 namespace poise {

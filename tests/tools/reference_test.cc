@@ -6,13 +6,13 @@
 
 #include <regex>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.pb.h"
 #include "components/robot/robot.pb.h"
 #include "poise/message_traits.hpp"
-#include "tools/reference/schemas.h"
 #include "tools/reference/message_reference.h"
 #include "tools/reference/reference_text.h"
+#include "tools/reference/schemas.h"
 #include "tools/scenario/scenario.pb.h"
 #include "tools/sweep/sweep.pb.h"
 

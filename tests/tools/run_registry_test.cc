@@ -8,7 +8,7 @@
 
 #include <fstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "google/protobuf/text_format.h"
 #include "tests/logging/log_test_support.h"
 

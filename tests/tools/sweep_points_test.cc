@@ -7,7 +7,7 @@
 #include <limits>
 #include <set>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tools/sweep/sweep_expression.h"
 
 namespace poise {

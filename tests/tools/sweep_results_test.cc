@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "tools/sweep/sweep_session.h"
 #include "tools/sweep/sweep_table.h"
 

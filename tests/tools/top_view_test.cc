@@ -88,8 +88,8 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
 
 TEST_F(TopViewTest, ShowsAProcess) {
   EXPECT_THAT(Row("sim"),
-              ::testing::ElementsAre("sim", "running", "1520", "499.8", "256.5", "565.0",
-                                     "1278.4", "7", "11", "44", "22", "33", "55", "0.1"));
+              ::testing::ElementsAre("sim", "running", "1520", "499.8", "256.5", "565.0", "1278.4",
+                                     "7", "11", "44", "22", "33", "55", "0.1"));
 }
 
 TEST_F(TopViewTest, NamesTheProcessThatAComponentShares) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/text_table.h"

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <vector>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "poise/message_traits.hpp"

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/replay/bits.h"

@@ -16,7 +16,7 @@
 
 #include "components/framework/build_info.h"
 #include "components/framework/bus/udp_bus.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/commands/commands.h"

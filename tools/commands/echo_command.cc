@@ -8,8 +8,8 @@
 #include <set>
 
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/log_messages.h"
 #include "poise/health_t.hpp"

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/metrics/metrics.h"

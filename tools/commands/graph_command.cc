@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/commands/commands.h"

@@ -3,8 +3,8 @@
 #include <map>
 #include <memory>
 
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
@@ -166,7 +166,8 @@ int ListComponent(const std::string& name) {
   if (type->config == nullptr || type->schema == nullptr) return kExitOk;
   AddSchema(type->schema());
   const std::vector<std::string>& sections = type->traits.sections;
-  const std::string prefix = sections.size() > 1 ? "" : (sections.empty() ? name : sections[0]) + ".";
+  const std::string prefix =
+      sections.size() > 1 ? "" : (sections.empty() ? name : sections[0]) + ".";
   fmt::print("\n{}", FieldsAsText(FieldsOfType(type->config->full_name(), prefix), TextWidth()));
   return kExitOk;
 }

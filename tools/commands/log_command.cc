@@ -1,7 +1,7 @@
 #include <cmath>
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/export/log_export.h"
 #include "logging/log_cut.h"

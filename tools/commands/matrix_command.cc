@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/output_place.h"

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"

@@ -6,9 +6,9 @@
 #include <memory>
 #include <regex>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "components/framework/run.h"
-#include "components/framework/suggest.h"
 #include "fmt/format.h"
 #include "logging/log_messages.h"
 #include "logging/printable.h"

@@ -1,7 +1,7 @@
 // `poise sweep`: many runs of a scenario with varied fields.
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"

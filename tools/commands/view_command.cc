@@ -8,7 +8,7 @@
 #include <memory>
 #include <thread>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
@@ -182,7 +182,7 @@ int View(const ViewOptions& options) {
   }
   Scenario scenario;
   ParseScenario(record.info.scenario, (live.dir() / "run.lcm").string() + ": RUN_INFO.scenario",
-                 &scenario);
+                &scenario);
   StandBack();
   return Viewer(options, &live, record, scenario).Run();
 }

@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/signals.h"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {

@@ -11,7 +11,7 @@
 #include <set>
 #include <string_view>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 
 namespace poise {

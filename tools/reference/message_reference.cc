@@ -4,8 +4,8 @@
 #include <regex>
 #include <sstream>
 
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/reference/schemas.h"
 #include "tools/reference/message_reference.h"
+#include "tools/reference/schemas.h"
 
 namespace poise {
 

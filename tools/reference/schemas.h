@@ -3,13 +3,14 @@
 
 #include <vector>
 
-#include "components/framework/field_reference.h"
+#include "components/framework/configuration/field_reference.h"
 
 namespace poise {
 
 enum class Schema { kScenario, kRobot, kSweep, kGraph };
 
-/// All its fields: FieldsOfType. A scenario has the configurations of added components (modules), too.
+/// All its fields: FieldsOfType. A scenario has the configurations of added components (modules),
+/// too.
 std::vector<FieldEntry> FieldReference(Schema schema);
 
 }  // namespace poise

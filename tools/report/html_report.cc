@@ -14,7 +14,7 @@
 #include <span>
 #include <sstream>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"

@@ -4,7 +4,7 @@
 #include <csignal>
 
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 
 namespace poise {

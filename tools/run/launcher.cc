@@ -4,8 +4,8 @@
 #include <csignal>
 #include <cstring>
 
-#include "components/framework/modules.h"
 #include "components/framework/clock.h"
+#include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/component_main.h"
 #include "components/framework/runners/timing.h"

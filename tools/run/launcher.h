@@ -19,7 +19,7 @@
 namespace poise {
 
 struct LaunchFiles {
-  std::string run_dir;      ///< gets run.lcm, recorder.json and each process's output
+  std::string run_dir;  ///< gets run.lcm, recorder.json and each process's output
   std::string spec_file;
   std::string scenario_file;
 };

@@ -9,7 +9,7 @@
 #include <chrono>
 #include <thread>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/run/run_registry.h"

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <ctime>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"

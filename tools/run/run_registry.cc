@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.pb.h"
 #include "fmt/format.h"
 #include "logging/printable.h"

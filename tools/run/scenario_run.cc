@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
@@ -86,8 +86,7 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
   if (in_process) {
     return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
   }
-  const LaunchFiles files{dir.string(), (dir / kSpecFile).string(),
-                          (dir / kScenarioFile).string()};
+  const LaunchFiles files{dir.string(), (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
   return Launcher(spec, files, launch, &progress).Run();
 }
 

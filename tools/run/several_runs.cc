@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/text_table.h"

@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <set>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "components/framework/modules.h"
-#include "components/framework/suggest.h"
 #include "fmt/format.h"
 #include "tools/cli/text_table.h"
 

@@ -8,8 +8,8 @@
 
 namespace poise {
 
-/// Poise's own files: $POISE_DEPLOY_DIR, else share/poise where it is installed, else deploy/ of the
-/// source this program was built from.
+/// Poise's own files: $POISE_DEPLOY_DIR, else share/poise where it is installed, else deploy/ of
+/// the source this program was built from.
 std::filesystem::path DeployDir();
 
 /// Where files are looked for that are not beside the one that names them: share/poise of each
@@ -22,8 +22,8 @@ enum class BaseFiles { kRefused, kTaken };
 
 /// The file of a `kind` ("scenarios", "robots", ...) that `name` means, by the one rule for all of
 /// them: NAME or NAME.pbtxt beside the file that names it, in `beside` (for a name of the command
-/// line: the current folder), then in `kind` of each of DataFolders. A name that ends in .pbtxt means no other
-/// ending; an absolute one is looked for only there.
+/// line: the current folder), then in `kind` of each of DataFolders. A name that ends in .pbtxt
+/// means no other ending; an absolute one is looked for only there.
 std::optional<std::filesystem::path> LookForFile(const std::string& kind, const std::string& name,
                                                  const std::filesystem::path& beside,
                                                  BaseFiles bases = BaseFiles::kRefused);

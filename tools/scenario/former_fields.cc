@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 
 namespace poise {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"

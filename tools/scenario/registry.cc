@@ -1,7 +1,7 @@
 #include "tools/scenario/registry.h"
 
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
-#include "components/framework/added_fields.h"
+#include "components/framework/configuration/added_fields.h"
 #include "components/framework/modules.h"
 #include "components/redistributor/redistributor_type.h"
 #include "components/state_estimator/state_estimator_type.h"
@@ -18,9 +18,10 @@ namespace poise {
 const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
-    for (const ComponentType& type : {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(),
-                                      StateEstimatorType(), StepPlannerType(), TaskControllerType(),
-                                      ContactWrenchMonitorType(), RedistributorType()}) {
+    for (const ComponentType& type :
+         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), StateEstimatorType(),
+          StepPlannerType(), TaskControllerType(), ContactWrenchMonitorType(),
+          RedistributorType()}) {
       r.Add(type);
     }
     // A scenario holds the configuration of a component that it does not know, too.

@@ -6,8 +6,8 @@
 namespace poise {
 
 /// By type, each with its summary. The first call makes added components' configurations fields of
-/// Scenario: it comes after LoadModules and before a scenario is read. Throws ConfigError where a name
-/// is taken.
+/// Scenario: it comes after LoadModules and before a scenario is read. Throws ConfigError where a
+/// name is taken.
 const ComponentRegistry& Components();
 
 }  // namespace poise

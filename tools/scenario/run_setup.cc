@@ -10,11 +10,11 @@
 #include <filesystem>
 #include <random>
 
-#include "components/framework/added_fields.h"
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "components/framework/run.h"
-#include "components/framework/suggest.h"
 #include "components/robot/robot.pb.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"

@@ -6,8 +6,8 @@
 #include <charconv>
 #include <optional>
 
-#include "components/framework/added_fields.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"
@@ -27,8 +27,7 @@ int Count(const Message& message, std::string_view field) {
     const size_t dot = field.find('.');
     const std::string_view step = field.substr(0, dot);
     const size_t bracket = step.find('[');
-    const FieldDescriptor* descriptor =
-        FindField(*level->GetDescriptor(), step.substr(0, bracket));
+    const FieldDescriptor* descriptor = FindField(*level->GetDescriptor(), step.substr(0, bracket));
     if (descriptor == nullptr) return 0;
     const google::protobuf::Reflection& reflection = *level->GetReflection();
     const bool last = dot == std::string_view::npos;

@@ -6,10 +6,10 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "components/framework/added_fields.h"
-#include "components/framework/configuration.h"
-#include "components/framework/field_path.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_path.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "tools/reference/schemas.h"
@@ -458,8 +458,6 @@ std::string FormatChanges(const Scenario& scenario) {
   return text.empty() ? "" : text + "\n";
 }
 
-std::string ScenarioText(const Scenario& scenario) {
-  return TextOf(scenario);
-}
+std::string ScenarioText(const Scenario& scenario) { return TextOf(scenario); }
 
 }  // namespace poise

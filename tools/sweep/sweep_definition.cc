@@ -8,10 +8,10 @@
 #include <charconv>
 #include <filesystem>
 
-#include "components/framework/added_fields.h"
 #include "components/framework/build_info.h"
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {

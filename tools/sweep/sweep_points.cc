@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "sim/random.h"
 #include "tools/sweep/sweep_expression.h"

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/framework/runners/inline_runner.h"
 #include "components/robot/robot_model.h"
 #include "logging/metrics/events.h"

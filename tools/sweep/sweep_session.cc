@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "components/framework/clock.h"
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"

@@ -7,9 +7,9 @@
 #include <cstdio>
 
 #include "components/framework/build_info.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/component_description.h"
 #include "components/framework/modules.h"
-#include "components/framework/bus/udp_bus.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/process_runner.h"
 #include "components/framework/say_error.h"

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "components/step_planner/planner_config.h"
 
 namespace poise {

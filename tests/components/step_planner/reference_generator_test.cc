@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 #include "hw_bridge/ethercat/links/faulty_link.h"
 #include "hw_bridge/ethercat/links/memory_link.h"

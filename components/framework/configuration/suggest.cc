@@ -1,4 +1,4 @@
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/suggest.h"
 
 #include <algorithm>
 #include <numeric>

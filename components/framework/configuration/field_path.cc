@@ -1,5 +1,5 @@
 // Dotted paths into protobuf messages: LocateField, SetField and ResolvePath.
-#include "components/framework/field_path.h"
+#include "components/framework/configuration/field_path.h"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
@@ -12,9 +12,9 @@
 #include <optional>
 #include <vector>
 
-#include "components/framework/configuration.h"
-#include "components/framework/added_fields.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {

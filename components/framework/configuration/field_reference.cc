@@ -1,4 +1,4 @@
-#include "components/framework/field_reference.h"
+#include "components/framework/configuration/field_reference.h"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -7,8 +7,8 @@
 #include <array>
 #include <stdexcept>
 
-#include "components/framework/configuration.h"
-#include "components/framework/suggest.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {

@@ -1,4 +1,4 @@
-#include "components/framework/added_fields.h"
+#include "components/framework/configuration/added_fields.h"
 
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/io/tokenizer.h>
@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -62,8 +62,8 @@ class NoErrors final : public pb::io::ErrorCollector {
 void AddField(const pb::Descriptor& to, const std::string& name, const pb::Descriptor& group) {
   if (const pb::FieldDescriptor* const known = FindField(to, name)) {
     if (known->message_type() == &group && !known->is_repeated()) return;
-    throw ConfigError(fmt::format("'{}' is a field of {} already; choose another name", name,
-                                  to.full_name()));
+    throw ConfigError(
+        fmt::format("'{}' is a field of {} already; choose another name", name, to.full_name()));
   }
   Added& added = TheAdded();
   pb::FileDescriptorProto file;
@@ -132,9 +132,9 @@ std::string WithBrackets(std::string_view text, const pb::Descriptor& type) {
     for (; line < token.line; ++line) line_start = text.find('\n', line_start) + 1;
     if (token.text == "{" || token.text == "<") ++depth;
     if (token.text == "}" || token.text == ">") --depth;
-    const bool added =
-        depth == 0 && in_name && token.type == pb::io::Tokenizer::TYPE_IDENTIFIER &&
-        FindField(type, token.text) != nullptr && FindField(type, token.text)->is_extension();
+    const bool added = depth == 0 && in_name && token.type == pb::io::Tokenizer::TYPE_IDENTIFIER &&
+                       FindField(type, token.text) != nullptr &&
+                       FindField(type, token.text)->is_extension();
     in_name = token.text != ":" && token.text != "[";
     if (!added) continue;
     size_t at = line_start;

@@ -1,4 +1,4 @@
-#include "components/framework/configuration.h"
+#include "components/framework/configuration/configuration.h"
 
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
@@ -11,7 +11,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "components/framework/added_fields.h"
+#include "components/framework/configuration/added_fields.h"
 #include "fmt/format.h"
 
 namespace poise {
