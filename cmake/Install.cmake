@@ -11,6 +11,17 @@ set_target_properties(${_programs} PROPERTIES INSTALL_RPATH "$ORIGIN/../../../${
 install(TARGETS ${_programs} poise_traits_generator DESTINATION lib/poise/bin)
 install(TARGETS poise_shared DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
+# A module is told by its headers which Poise it is built against: they must be those of the library.
+install(CODE "
+  file(STRINGS ${PROJECT_BINARY_DIR}/poise_commit.h header REGEX POISE_COMMIT)
+  string(REGEX REPLACE \"^[^\\\"]*\\\"(.*)\\\"$\" \"\\\\1\" commit \"\${header}\")
+  execute_process(COMMAND $<TARGET_FILE:poise> --version OUTPUT_VARIABLE version)
+  string(FIND \"\${version}\" \"\${commit}\" at)
+  if(at EQUAL -1)
+    message(FATAL_ERROR \"The build is older than its sources' commit \${commit}: run cmake --build ${PROJECT_BINARY_DIR} first\")
+  endif()
+")
+
 # Headers as they are included, and the schemas that others' schemas may import.
 set(_headers include/poise)
 foreach(folder lcmtypes components sim sim_ode sim_mujoco hw_bridge logging)

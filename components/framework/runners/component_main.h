@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "components/framework/component_type.h"
+#include "components/framework/component_registry.h"
 
 namespace poise {
 
