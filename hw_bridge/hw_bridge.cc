@@ -7,7 +7,7 @@
 
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
-#include "hw_bridge/ethercat/socket_link.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
 #include "hw_bridge/hw_bridge_type.h"
 #include "hw_bridge/robot_thresholds.h"
 #include "hw_bridge/simulated_drive_bus.h"

@@ -1,6 +1,6 @@
 #include <csignal>
 
-#include "components/framework/component_main.h"
+#include "components/framework/runners/component_main.h"
 #include "hw_bridge/hw_bridge_type.h"
 
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/packet_filter.h"
 #include "components/framework/graph.pb.h"
-#include "components/framework/packet_filter.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {

@@ -1,6 +1,6 @@
 #include "logging/log_messages.h"
 
-#include "components/framework/packet_filter.h"
+#include "components/framework/bus/packet_filter.h"
 #include "logging/channel_ticks.h"
 
 namespace poise::logging {

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "components/framework/packet_filter.h"
+#include "components/framework/bus/packet_filter.h"
 #include "fmt/format.h"
 
 namespace poise::logging {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <set>
 
+#include "components/framework/bus/packet_filter.h"
 #include "components/framework/configuration.h"
-#include "components/framework/packet_filter.h"
 #include "fmt/format.h"
 #include "logging/channel_ticks.h"
 #include "logging/run_log_writer.h"

@@ -6,8 +6,8 @@
 #include <chrono>
 #include <cstring>
 
+#include "components/framework/bus/packet_filter.h"
 #include "components/framework/configuration.h"
-#include "components/framework/packet_filter.h"
 #include "components/framework/run.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"

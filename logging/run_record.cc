@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-#include "components/framework/packet_filter.h"
+#include "components/framework/bus/packet_filter.h"
 #include "components/framework/run.h"
 #include "components/robot/robot_files.h"
 #include "fmt/format.h"

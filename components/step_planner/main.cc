@@ -1,4 +1,4 @@
-#include "components/framework/component_main.h"
+#include "components/framework/runners/component_main.h"
 #include "components/step_planner/step_planner_type.h"
 
 int main(int argc, char** argv) {

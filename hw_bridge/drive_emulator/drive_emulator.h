@@ -8,10 +8,10 @@
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
 #include "hw_bridge/drive_emulator/drive_emulator.pb.h"
-#include "hw_bridge/ethercat/emulated_chain.h"
-#include "hw_bridge/ethercat/faulty_link.h"
-#include "hw_bridge/ethercat/memory_link.h"
-#include "hw_bridge/ethercat/socket_link.h"
+#include "hw_bridge/ethercat/emulator/emulated_chain.h"
+#include "hw_bridge/ethercat/links/faulty_link.h"
+#include "hw_bridge/ethercat/links/memory_link.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
 
 namespace poise {
 

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "hw_bridge/ethercat/frame.h"
-#include "hw_bridge/ethercat/link.h"
+#include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {
 

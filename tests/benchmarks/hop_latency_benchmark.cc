@@ -23,13 +23,13 @@
 #include <system_error>
 #include <vector>
 
+#include "components/framework/bus/packet_filter.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/configuration.h"
 #include "components/framework/graph.pb.h"
-#include "components/framework/packet_filter.h"
 #include "components/framework/run.h"
-#include "components/framework/timing.h"
-#include "components/framework/udp_bus.h"
+#include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
 #include "tools/cli/child_process.h"
@@ -247,9 +247,9 @@ int Run(const std::string& program, double seconds, int rounds) {
     RunSpec spec;
     {
       ChildProcess run("poise",
-                       {program, "run", "push_double_support", "--set",
-                        "sim.push=", "--realtime", "--no-log", "--no-reference", "--quiet",
-                        "--duration", fmt::format("{}", seconds + 3), "--out", folder.string()},
+                       {program, "run", "push_double_support", "--set", "sim.push=", "--realtime",
+                        "--no-log", "--no-reference", "--quiet", "--duration",
+                        fmt::format("{}", seconds + 3), "--out", folder.string()},
                        folder.string() + ".txt");
       const fs::path file = folder / "run_spec.pbtxt";
       usleep(2'000'000);  // until it runs

@@ -1,4 +1,4 @@
-#include "components/framework/inline_runner.h"
+#include "components/framework/runners/inline_runner.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

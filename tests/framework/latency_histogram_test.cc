@@ -1,4 +1,4 @@
-#include "components/framework/latency_histogram.h"
+#include "components/framework/runners/latency_histogram.h"
 
 #include <gtest/gtest.h>
 

@@ -6,12 +6,12 @@
 #include <map>
 #include <random>
 
-#include "components/framework/collected_channel.h"
+#include "components/framework/bus/collected_channel.h"
+#include "components/framework/bus/inbox.h"
+#include "components/framework/bus/service_filter.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/component.h"
-#include "components/framework/inbox.h"
 #include "components/framework/run.h"
-#include "components/framework/service_filter.h"
-#include "components/framework/udp_bus.h"
 #include "tests/test_seed.h"
 
 namespace poise {

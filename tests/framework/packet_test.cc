@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstring>
 
-#include "components/framework/collected_channel.h"
+#include "components/framework/bus/collected_channel.h"
+#include "components/framework/bus/inbox.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/component.h"
-#include "components/framework/inbox.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 
 namespace poise {
 namespace {

@@ -13,10 +13,10 @@
 #include <fstream>
 #include <set>
 
-#include "components/framework/channel_collector.h"
-#include "components/framework/control_client.h"
-#include "components/framework/inline_runner.h"
+#include "components/framework/bus/channel_collector.h"
+#include "components/framework/bus/control_client.h"
 #include "components/framework/run.h"
+#include "components/framework/runners/inline_runner.h"
 #include "tests/framework/toy_components.h"
 
 namespace poise {

@@ -7,7 +7,7 @@
 #include <csignal>
 #include <fstream>
 
-#include "components/framework/channel_collector.h"
+#include "components/framework/bus/channel_collector.h"
 #include "components/framework/configuration.h"
 #include "tests/framework/process_harness.h"
 #include "tests/framework/toy_components.h"

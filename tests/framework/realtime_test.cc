@@ -7,9 +7,9 @@
 #include <csignal>
 #include <optional>
 
-#include "components/framework/inbox.h"
-#include "components/framework/state_store.h"
-#include "components/framework/timing.h"
+#include "components/framework/bus/inbox.h"
+#include "components/framework/runners/state_store.h"
+#include "components/framework/runners/timing.h"
 #include "poise/external_push_t.hpp"
 #include "tests/framework/process_harness.h"
 #include "tests/framework/toy_components.h"

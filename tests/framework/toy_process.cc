@@ -1,5 +1,5 @@
 // The toy components as processes: toy_process TYPE --run FILE --component NAME.
-#include "components/framework/component_main.h"
+#include "components/framework/runners/component_main.h"
 #include "tests/framework/toy_components.h"
 
 int main(int argc, char** argv) {

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "components/framework/configuration.h"
-#include "logging/compare.h"
+#include "logging/replay/compare.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
@@ -68,10 +68,9 @@ TEST_F(AblationTest, AVariantIsTheScenarioWithItsFieldsSet) {
   EXPECT_TRUE(Equal(hard, Run("set", "mine", {"--set", "sim.push[0].peak=90", "--seed", "5"})));
   EXPECT_FALSE(Equal(hard, Run("plain", "mine")));
   // The command line has the last word.
-  EXPECT_TRUE(
-      Equal(Run("back", "mine",
-                {"--variant", "hard", "--set", "seed=1", "--set", "sim.push[0].peak=60"}),
-            Run("plain", "mine")));
+  EXPECT_TRUE(Equal(
+      Run("back", "mine", {"--variant", "hard", "--set", "seed=1", "--set", "sim.push[0].peak=60"}),
+      Run("plain", "mine")));
   const nlohmann::json summary = ReadSummary(hard);
   EXPECT_EQ(summary["variant"], "hard");
   ASSERT_EQ(summary["changes"].size(), 2u);
@@ -179,14 +178,13 @@ TEST_F(AblationTest, EachPartIsSwitchedOffByItsField) {
 
 TEST_F(AblationTest, AnIdealRobotIsTheModelWithoutNoise) {
   deploy_.Scenario("mine", kBase);
-  deploy_.Scenario(
-      "imperfect",
-      std::string(kBase) +
-          "sim { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
-          "  motor_change { joint: \"left_knee_pitch\" torque_constant: 0.9 }\n"
-          "  model_error { link: \"upper_body\" mass_scale: 1.02 }\n"
-          "  model_error { link: \"left_shank\" com_x: 0.005 } }\n"
-          "assumption { field: \"sim.drive_train.torque_lag\" kind: \"assumed\" }\n");
+  deploy_.Scenario("imperfect",
+                   std::string(kBase) +
+                       "sim { drive_train { torque_lag: 0.002 } rotor_inertia: false\n"
+                       "  motor_change { joint: \"left_knee_pitch\" torque_constant: 0.9 }\n"
+                       "  model_error { link: \"upper_body\" mass_scale: 1.02 }\n"
+                       "  model_error { link: \"left_shank\" com_x: 0.005 } }\n"
+                       "assumption { field: \"sim.drive_train.torque_lag\" kind: \"assumed\" }\n");
   const std::string ideal = Run("ideal", "mine", {"--ideal"});
   ExpectOutput("--ideal: ");
   // Nothing is left that depends on the seed, or on what the scenario says of imperfections.

@@ -1,8 +1,8 @@
 // The same scenario gives the same messages, bit for bit, however it runs.
 #include <gtest/gtest.h>
 
-#include "logging/compare.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
+#include "logging/replay/compare.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {

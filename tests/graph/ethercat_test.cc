@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "logging/compare.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
+#include "logging/replay/compare.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {

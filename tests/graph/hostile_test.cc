@@ -4,10 +4,10 @@
 #include <fstream>
 #include <random>
 
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
-#include "logging/compare.h"
+#include "logging/replay/compare.h"
 #include "poise/health_t.hpp"
 #include "poise/message_traits.hpp"
 #include "tests/graph/poise_program.h"

@@ -7,10 +7,10 @@
 #include <map>
 #include <random>
 
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 #include "fmt/format.h"
 #include "logging/log_survey.h"
 #include "tests/graph/poise_program.h"

@@ -8,9 +8,9 @@
 #include <map>
 #include <random>
 
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/run_log_writer.h"

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "components/robot/robot_files.h"
-#include "hw_bridge/ethercat/emulated_chain.h"
-#include "hw_bridge/ethercat/faulty_link.h"
-#include "hw_bridge/ethercat/memory_link.h"
+#include "hw_bridge/ethercat/emulator/emulated_chain.h"
+#include "hw_bridge/ethercat/links/faulty_link.h"
+#include "hw_bridge/ethercat/links/memory_link.h"
 #include "hw_bridge/hw_bridge.h"
 
 namespace poise {

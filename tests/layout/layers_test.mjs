@@ -8,11 +8,14 @@ import {repositoryFiles, root} from '../docs/markdown.mjs';
 const files = repositoryFiles().filter((f) => !f.startsWith('tests/'));
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
-const BUS = ['lcmtypes', 'components/framework', 'components/robot', 'components/balance', 'components/balance/tasks', 'components/messages'];
+const BUS = ['lcmtypes', 'components/framework', 'components/framework/bus', 'components/framework/runners',
+  'components/robot', 'components/balance', 'components/balance/tasks', 'components/messages'];
 /** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
 const BELOW = {
   'lcmtypes': [],
   'components/framework': ['lcmtypes'],
+  'components/framework/bus': ['lcmtypes', 'components/framework'],
+  'components/framework/runners': ['lcmtypes', 'components/framework', 'components/framework/bus'],
   'components/robot': [],
   'components/balance': ['components/robot'],
   'components/balance/tasks': ['components/robot', 'components/balance'],
@@ -20,10 +23,16 @@ const BELOW = {
   'components': BUS,
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
-  'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/drive_emulator'],
-  'hw_bridge/ethercat': [...BUS, 'hw_bridge'],
-  'hw_bridge/drive_emulator': [...BUS, 'hw_bridge', 'hw_bridge/ethercat'],
+  'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/drive_emulator'],
+  'hw_bridge/ethercat': [...BUS, 'hw_bridge', 'hw_bridge/ethercat/links'],
+  'hw_bridge/ethercat/links': [...BUS, 'hw_bridge/ethercat'],
+  'hw_bridge/ethercat/emulator': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links'],
+  'hw_bridge/drive_emulator': [...BUS, 'hw_bridge', 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/ethercat/emulator'],
   'logging': BUS,
+  'logging/recording': [...BUS, 'logging'],
+  'logging/metrics': [...BUS, 'logging'],
+  'logging/export': [...BUS, 'logging'],
+  'logging/replay': [...BUS, 'logging'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
 const TOOLS = ['cli', 'reference', 'scenario', 'robot', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
@@ -80,4 +89,14 @@ test('an include that points up or sideways is seen', () => {
 test('every folder of tools/ has its place in the order', () => {
   const folders = new Set(files.map((f) => /^tools\/(\w+)\//.exec(f)?.[1]).filter(Boolean));
   assert.deepEqual([...folders].sort(), [...TOOLS].sort());
+});
+
+test('no folder holds more than some thirty files', () => {
+  const counts = new Map();
+  for (const file of repositoryFiles()) {
+    const folder = file.includes('/') ? folderOf(file) : '.';
+    counts.set(folder, (counts.get(folder) ?? 0) + 1);
+  }
+  assert.ok(counts.size > 40, `${counts.size} folders found`);
+  assert.deepEqual([...counts].filter(([, count]) => count > 32), []);
 });

@@ -1,4 +1,4 @@
-#include "logging/analysis.h"
+#include "logging/metrics/analysis.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tests/logging/record_fixture.h"
 #include "tests/test_seed.h"
 

@@ -1,4 +1,4 @@
-#include "logging/bits.h"
+#include "logging/replay/bits.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "logging/component_replay.h"
 #include "logging/event_log_writer.h"
+#include "logging/replay/component_replay.h"
 #include "logging/run_record.h"
 #include "logging/tick_series.h"
 #include "poise/external_push_t.hpp"

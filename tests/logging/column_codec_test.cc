@@ -1,5 +1,5 @@
 // What a page's reader does is written out here once more, from docs/report-format.md.
-#include "logging/column_codec.h"
+#include "logging/export/column_codec.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>

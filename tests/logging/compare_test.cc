@@ -1,4 +1,4 @@
-#include "logging/compare.h"
+#include "logging/replay/compare.h"
 
 #include <gtest/gtest.h>
 

@@ -5,9 +5,9 @@
 #include <random>
 
 #include "components/robot/robot_model.h"
-#include "logging/compare.h"
-#include "logging/events.h"
-#include "logging/metrics.h"
+#include "logging/metrics/events.h"
+#include "logging/metrics/metrics.h"
+#include "logging/replay/compare.h"
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
 #include "poise/message_traits.hpp"
@@ -162,8 +162,8 @@ TEST_F(DamageTest, MessagesThatAreNotFiniteAreUnreadable) {
 
 TEST_F(DamageTest, HealthCountsUnderItsOwnNameOnly) {
   WriteRawLog(folder_.path("log"),
-              {RunInfoEvent(spec_), Health("HEALTH_SIM", "sim"),
-               Health("HEALTH_SIM", "\xFF\xFE"), Health("HEALTH_HW_BRIDGE", "sim")});
+              {RunInfoEvent(spec_), Health("HEALTH_SIM", "sim"), Health("HEALTH_SIM", "\xFF\xFE"),
+               Health("HEALTH_HW_BRIDGE", "sim")});
   const RunRecord run = ReadRun(folder_.path("log"));
   EXPECT_EQ(run.health.size(), 1u);
   EXPECT_EQ(run.health.count("sim"), 1u);

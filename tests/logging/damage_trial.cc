@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "components/framework/packet_filter.h"
+#include "components/framework/bus/packet_filter.h"
 #include "logging/log_reader.h"
 
 namespace poise::logging {

@@ -1,4 +1,4 @@
-#include "logging/events.h"
+#include "logging/metrics/events.h"
 
 #include <gmock/gmock.h>
 

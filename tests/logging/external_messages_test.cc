@@ -1,5 +1,5 @@
 // Operators' messages stand in the ticks in which the bridge acted on them.
-#include "logging/external_messages.h"
+#include "logging/replay/external_messages.h"
 
 #include <gtest/gtest.h>
 

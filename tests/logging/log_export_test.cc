@@ -1,4 +1,4 @@
-#include "logging/log_export.h"
+#include "logging/export/log_export.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "logging/event_log_writer.h"
-#include "logging/mcap_writer.h"
+#include "logging/export/mcap_writer.h"
 #include "poise/external_push_t.hpp"
 #include "poise/joint_command_t.hpp"
 #include "poise/message_traits.hpp"

@@ -1,4 +1,4 @@
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 
 namespace poise::logging {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <filesystem>
 
+#include "logging/export/log_export.h"
 #include "logging/log_cut.h"
-#include "logging/log_export.h"
 #include "logging/log_messages.h"
 #include "logging/log_survey.h"
 #include "logging/run_log_writer.h"

@@ -1,4 +1,4 @@
-#include "logging/signal_table.h"
+#include "logging/export/signal_table.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

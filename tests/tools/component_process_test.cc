@@ -8,9 +8,9 @@
 #include <fstream>
 #include <map>
 
-#include "components/framework/channel_collector.h"
+#include "components/framework/bus/channel_collector.h"
+#include "components/framework/bus/control_client.h"
 #include "components/framework/clock.h"
-#include "components/framework/control_client.h"
 #include "components/framework/graph.h"
 #include "components/framework/run.h"
 #include "poise/robot_sensors_t.hpp"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "components/framework/inline_runner.h"
+#include "components/framework/runners/inline_runner.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "poise/joint_command_t.hpp"

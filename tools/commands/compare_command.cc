@@ -1,9 +1,9 @@
 #include <memory>
 
 #include "fmt/format.h"
-#include "logging/compare.h"
 #include "logging/log_messages.h"
 #include "logging/printable.h"
+#include "logging/replay/compare.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
 

@@ -15,9 +15,9 @@
 #include <thread>
 
 #include "components/framework/build_info.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 #include "fmt/format.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"

@@ -5,7 +5,7 @@
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/run/estimates.h"

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/configuration.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "poise/bridge_status_t.hpp"

@@ -6,7 +6,7 @@
 #include "components/framework/configuration.h"
 #include "components/robot/robot.pb.h"
 #include "fmt/format.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "logging/printable.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/plain_streams.h"

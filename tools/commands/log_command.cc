@@ -3,8 +3,8 @@
 
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
+#include "logging/export/log_export.h"
 #include "logging/log_cut.h"
-#include "logging/log_export.h"
 #include "logging/log_survey.h"
 #include "logging/printable.h"
 #include "logging/run_info.h"

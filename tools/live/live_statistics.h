@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/control_client.h"
+#include "components/framework/bus/control_client.h"
 #include "components/framework/graph.pb.h"
 #include "poise/bridge_status_t.hpp"
 

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "components/framework/run.h"
-#include "logging/signal_table.h"
+#include "logging/export/signal_table.h"
 #include "tools/live/field_selection.h"
 
 namespace poise {

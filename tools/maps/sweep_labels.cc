@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fmt/format.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tools/reference/field_reference.h"
 #include "tools/sweep/sweep_points.h"
 

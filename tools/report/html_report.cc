@@ -16,10 +16,10 @@
 
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
-#include "logging/column_codec.h"
-#include "logging/events.h"
+#include "logging/export/column_codec.h"
+#include "logging/export/signal_table.h"
+#include "logging/metrics/events.h"
 #include "logging/partial_file.h"
-#include "logging/signal_table.h"
 #include "tools/robot/robot_json.h"
 
 namespace poise {

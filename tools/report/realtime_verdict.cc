@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "components/framework/timing.h"
+#include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 
 namespace poise {

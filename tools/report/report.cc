@@ -6,7 +6,7 @@
 
 #include "components/framework/configuration.h"
 #include "fmt/format.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/realtime_verdict.h"
 #include "tools/scenario/scenario_loading.h"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "logging/events.h"
-#include "logging/metrics.h"
+#include "logging/metrics/events.h"
+#include "logging/metrics/metrics.h"
 #include "logging/run_record.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/run_outcome.h"

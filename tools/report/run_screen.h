@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "logging/events.h"
+#include "logging/metrics/events.h"
 #include "logging/run_record.h"
 #include "tools/report/report.h"
 #include "tools/scenario/scenario.pb.h"

@@ -5,8 +5,8 @@
 
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
-#include "logging/contact_history.h"
-#include "logging/metrics.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {

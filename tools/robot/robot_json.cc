@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "components/robot/urdf_tree.h"
-#include "logging/analysis.h"
+#include "logging/metrics/analysis.h"
 
 namespace poise {
 namespace {

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "components/framework/bus/packet_filter.h"
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/graph.pb.h"
-#include "components/framework/packet_filter.h"
 #include "components/framework/run.h"
-#include "components/framework/udp_bus.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {

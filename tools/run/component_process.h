@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/state_store.h"
+#include "components/framework/runners/state_store.h"
 #include "tools/cli/child_process.h"
 
 namespace poise {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "components/framework/graph.pb.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "logging/run_record.h"
 
 namespace poise {

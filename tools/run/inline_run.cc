@@ -4,10 +4,10 @@
 #include <ctime>
 
 #include "components/framework/clock.h"
-#include "components/framework/inline_runner.h"
 #include "components/framework/run.h"
+#include "components/framework/runners/inline_runner.h"
 #include "fmt/format.h"
-#include "logging/inline_recorder.h"
+#include "logging/recording/inline_recorder.h"
 #include "tools/cli/signals.h"
 #include "tools/scenario/registry.h"
 

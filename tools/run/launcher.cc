@@ -6,7 +6,7 @@
 
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
-#include "components/framework/timing.h"
+#include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
 

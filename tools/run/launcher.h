@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/control_client.h"
+#include "components/framework/bus/control_client.h"
 #include "components/framework/graph.pb.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/progress.h"

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "components/framework/packet_filter.h"
-#include "components/framework/service_filter.h"
-#include "components/framework/udp_bus.h"
+#include "components/framework/bus/packet_filter.h"
+#include "components/framework/bus/service_filter.h"
+#include "components/framework/bus/udp_bus.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {

@@ -12,7 +12,7 @@
 #include "components/framework/field_path.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tools/reference/field_reference.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/former_fields.h"

@@ -12,7 +12,7 @@
 #include "components/framework/configuration.h"
 #include "components/framework/suggest.h"
 #include "fmt/format.h"
-#include "logging/metrics.h"
+#include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/library_versions.h"

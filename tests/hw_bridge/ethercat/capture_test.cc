@@ -9,7 +9,7 @@
 #include <sstream>
 #include <vector>
 
-#include "hw_bridge/ethercat/pcap.h"
+#include "hw_bridge/ethercat/links/pcap.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
 
 namespace poise::ethercat {

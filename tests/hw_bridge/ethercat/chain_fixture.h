@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "components/framework/configuration.h"
-#include "hw_bridge/ethercat/emulated_chain.h"
-#include "hw_bridge/ethercat/faulty_link.h"
+#include "hw_bridge/ethercat/emulator/emulated_chain.h"
+#include "hw_bridge/ethercat/links/faulty_link.h"
+#include "hw_bridge/ethercat/links/memory_link.h"
 #include "hw_bridge/ethercat/master.h"
-#include "hw_bridge/ethercat/memory_link.h"
 
 namespace poise::ethercat {
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "hw_bridge/ethercat/socket_link.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
 
 namespace poise::ethercat {

@@ -1,0 +1,80 @@
+// Runs a whole graph inside one process, in memory.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "components/framework/bus/packet_filter.h"
+#include "components/framework/graph.h"
+#include "components/framework/runners/latency_histogram.h"
+
+namespace poise {
+
+/// Runs the stages of all components in the plan's order; messages pass by reference.
+/// Deterministic: it gives the numbers that the graph of processes gives. Not thread-safe.
+class InlineRunner {
+ public:
+  /// Called after each stage for each of its outputs, in their order. `channel` is an index in the
+  /// graph.
+  using Tap = std::function<void(int channel, const OutputPort& output, const Tick& tick)>;
+
+  /// Makes, configures and checks all components. Throws GraphError or ConfigError.
+  InlineRunner(const RunSpec& spec, const ComponentRegistry& registry);
+  ~InlineRunner();
+
+  void set_tap(Tap tap) { tap_ = std::move(tap); }
+
+  /// Runs one tick, all stages. False when the run has ended (before or in this tick).
+  bool Step();
+  /// Runs up to `ticks` ticks; ends early when the run ends or `*stop` becomes true. Returns the
+  /// ticks run.
+  int64_t Run(int64_t ticks, const std::atomic<bool>* stop = nullptr);
+
+  /// Shows an encoded message of an external channel to its readers from the next stage on. False
+  /// when it was refused.
+  bool Inject(const std::string& channel, std::span<const uint8_t> data);
+
+  int64_t ticks_completed() const { return next_tick_; }
+  /// True once a component has finished or failed, or num_ticks of the run are done.
+  bool ended() const { return ended_; }
+  bool failed() const { return failed_; }
+  const std::string& end_detail() const { return end_detail_; }
+
+  const GraphPlan& plan() const { return graph_.plan(); }
+  BoundGraph& graph() { return graph_; }
+  /// Time in a component's stages, outputs' tap not counted.
+  const LatencyHistogram& latency(int component) const;
+  /// Time of whole ticks.
+  const LatencyHistogram& tick_latency() const { return tick_latency_; }
+
+ private:
+  struct BoundStage;
+  struct Delayed;
+  struct External;
+
+  /// False when an output is not finite: the tick ends there.
+  bool RunStage(BoundStage& stage, const Tick& tick);
+
+  int64_t run_id_ = 0;
+  double period_ = 0;
+  int64_t lead_ = 0;
+  int64_t num_ticks_ = 0;
+  BoundGraph graph_;
+  Tap tap_;
+  std::vector<BoundStage> stages_;
+  std::vector<Delayed> delayed_;
+  std::vector<External> external_;
+  std::vector<LatencyHistogram> latency_;
+  LatencyHistogram tick_latency_;
+  int64_t next_tick_ = 0;
+  bool ended_ = false;
+  bool failed_ = false;
+  std::string end_detail_;
+};
+
+}  // namespace poise

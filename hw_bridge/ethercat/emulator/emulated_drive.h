@@ -1,0 +1,83 @@
+// EmulatedDrive: a servo drive of CiA 402 behind its object dictionary.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "hw_bridge/ethercat/cia402.h"
+#include "hw_bridge/ethercat/emulator/emulator.pb.h"
+#include "hw_bridge/ethercat/emulator/object_dictionary.h"
+
+namespace poise::ethercat {
+
+/// What a drive's motor turns: takes torque, gives the shaft's motion.
+class MotorLoad {
+ public:
+  virtual ~MotorLoad() = default;
+  /// N·m at the motor shaft, held until the next call.
+  virtual void SetTorque(double torque) = 0;
+  virtual double position() const = 0;  ///< rad, of the motor shaft
+  virtual double velocity() const = 0;  ///< rad/s
+};
+
+/// Error codes of 603F that the emulation gives (CiA 402, annex).
+inline constexpr uint16_t kErrorOverCurrent = 0x2310;
+inline constexpr uint16_t kErrorCommunication = 0x8130;  ///< life guard
+inline constexpr uint16_t kErrorFeedback = 0x7300;
+
+/// Its state follows the controlword, each transition after a delay. In operation enabled and
+/// cyclic synchronous torque the torque follows 6071 within 6072, the peak, I²t and the slew; in
+/// every other state it is zero, at once.
+class EmulatedDrive {
+ public:
+  /// `load` and `dictionary` must outlive this.
+  EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary* dictionary, MotorLoad* load);
+
+  /// Lets time pass, in ns since the start. `outputs_valid`: the slave is in OP.
+  void AdvanceTo(int64_t now, bool outputs_valid);
+
+  /// Trips the drive: fault reaction, then fault. `error`: for 603F.
+  void TriggerFault(uint16_t error);
+  /// Safe torque off: no torque while it is active, and no way out of switch on disabled.
+  void SetSto(bool active) { sto_ = active; }
+  /// The position sensor keeps showing what it shows now.
+  void FreezeEncoder(bool frozen) { frozen_ = frozen; }
+
+  DriveState state() const { return state_; }
+  double torque_per_mille() const { return torque_; }
+  /// The greatest magnitude since the start.
+  double greatest_torque_per_mille() const { return greatest_torque_; }
+  /// A fault's code, once for each fault.
+  std::optional<uint16_t> TakeEmergency();
+
+ private:
+  void UpdateState(int64_t now, bool outputs_valid);
+  void Follow(uint16_t controlword, bool reset_edge, int64_t now);
+  void Enter(DriveState state);
+  void Schedule(DriveState state, int64_t now);
+  void UpdateTorque(double elapsed_ms);
+  double TorqueLimit(double elapsed_ms);
+  void Report();
+
+  EmulatedDriveConfig config_;
+  MotorLoad* load_;
+  using Object = ObjectDictionary::Object;
+  Object *controlword_, *statusword_, *mode_, *mode_display_, *target_torque_, *max_torque_,
+      *torque_object_, *position_, *velocity_, *error_code_;
+
+  DriveState state_ = DriveState::kNotReadyToSwitchOn;
+  std::optional<DriveState> next_;  // entered at next_time_
+  int64_t next_time_ = 0;           // ns
+  int64_t mode_wanted_at_ = 0;      // ns
+  int64_t now_ = 0;                 // ns
+  uint16_t last_controlword_ = 0;
+  bool sto_ = false, frozen_ = false;
+  bool limited_ = false;  // an internal limit holds the torque back
+  double torque_ = 0;     // per mille
+  double greatest_torque_ = 0;
+  double heat_ = 0;  // I²t: share of what the motor bears above its rating, 0 to 1
+  bool overheated_ = false;
+  std::optional<uint16_t> emergency_;
+};
+
+}  // namespace poise::ethercat

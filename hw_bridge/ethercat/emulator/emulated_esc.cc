@@ -1,0 +1,377 @@
+#include "hw_bridge/ethercat/emulator/emulated_esc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+namespace poise::ethercat {
+namespace {
+
+constexpr size_t kRegisters = 0x1000;
+
+bool Overlap(size_t a, size_t a_size, size_t b, size_t b_size) {
+  return a < b + b_size && b < a + a_size;
+}
+
+/// Which registers the master may write.
+const std::array<bool, kRegisters>& Writable() {
+  static const std::array<bool, kRegisters> table = [] {
+    std::array<bool, kRegisters> result{};
+    const auto allow = [&](size_t first, size_t count) {
+      std::fill_n(result.begin() + static_cast<std::ptrdiff_t>(first), count, true);
+    };
+    allow(reg::kStationAddress, 2);
+    allow(reg::kDlControl, 4);
+    allow(reg::kAlControl, 2);
+    allow(reg::kWatchdogDivider, 2);
+    allow(reg::kWatchdogPdi, 2);
+    allow(reg::kWatchdogProcessData, 2);
+    allow(reg::kEepromConfig, 1);
+    allow(reg::kEepromControl, 14);
+    allow(reg::kFmmu, kNumFmmus * kFmmuSize);
+    for (int i = 0; i < kNumSyncManagers; ++i) {
+      const size_t base = reg::kSyncManager + static_cast<size_t>(i) * kSyncManagerSize;
+      allow(base, 5);      // start, length, control
+      allow(base + 6, 1);  // activate
+    }
+    allow(reg::kDcReceiveTime, 4);
+    allow(reg::kDcSystemTime, 8);
+    allow(reg::kDcOffset, 12);
+    allow(reg::kDcSpeedStart, 2);
+    allow(reg::kDcCyclicUnit, 2);
+    allow(reg::kDcStart, 24);
+    return result;
+  }();
+  return table;
+}
+
+}  // namespace
+
+EmulatedEsc::EmulatedEsc(const Options& options) : options_(options) {
+  memory_[reg::kType] = 0x11;  // an ET1100's kind
+  memory_[reg::kFmmuCount] = kNumFmmus;
+  memory_[reg::kSyncManagerCount] = kNumSyncManagers;
+  memory_[reg::kRamSize] = 8;
+  memory_[reg::kPortDescriptor] = 0x0F;  // ports 0 and 1 are MII
+  memory_[reg::kFeatures] = 0x0C;        // distributed clocks, 64 bits
+  // Links on the open ports, communication there, loops closed elsewhere.
+  Put<uint16_t>(memory_, reg::kDlStatus, options.last ? 0x5611 : 0x5A31);
+  Put<uint16_t>(memory_, reg::kWatchdogDivider, 2498);
+  Put<uint16_t>(memory_, reg::kWatchdogPdi, 1000);
+  Put<uint16_t>(memory_, reg::kWatchdogProcessData, 1000);
+  memory_[reg::kWatchdogStatus] = 1;
+  Put<uint16_t>(memory_, reg::kEepromControl, kEeprom8Bytes);
+  Put<uint16_t>(memory_, reg::kDcSpeedStart, 0x1000);
+  SetAlStatus(static_cast<uint8_t>(AlState::kInit), AlStatusCode::kNone);
+  local_ = static_cast<double>(options.clock_start);
+}
+
+uint8_t& EmulatedEsc::SyncByte(int index, size_t offset) {
+  return memory_[reg::kSyncManager + static_cast<size_t>(index) * kSyncManagerSize + offset];
+}
+
+EmulatedEsc::SyncManagerSettings EmulatedEsc::sync_manager(int index) const {
+  const size_t base = reg::kSyncManager + static_cast<size_t>(index) * kSyncManagerSize;
+  return {.start = Get<uint16_t>(memory_, base),
+          .length = Get<uint16_t>(memory_, base + 2),
+          .control = memory_[base + 4],
+          .active = (memory_[base + 6] & kSmEnable) != 0};
+}
+
+void EmulatedEsc::SetSyncManagerDisabled(int index, bool disabled) {
+  uint8_t& pdi = SyncByte(index, 7);
+  pdi = static_cast<uint8_t>((pdi & ~kSmPdiDisable) | (disabled ? kSmPdiDisable : 0));
+}
+
+EmulatedEsc::Rule EmulatedEsc::SyncManagerRule(size_t address, size_t size, bool write,
+                                               int* manager) const {
+  if (address < kRegisters) return Rule::kFree;  // they guard the process data RAM alone
+  for (int i = 0; i < kNumSyncManagers; ++i) {
+    const SyncManagerSettings sync = sync_manager(i);
+    if (!sync.active || sync.length == 0 || !Overlap(address, size, sync.start, sync.length)) {
+      continue;
+    }
+    const size_t base = reg::kSyncManager + static_cast<size_t>(i) * kSyncManagerSize;
+    const bool masters = (sync.control & kSmMasterWrites) != 0;
+    if ((memory_[base + 7] & kSmPdiDisable) != 0 || masters != write || address != sync.start ||
+        size > sync.length) {
+      return Rule::kRefused;
+    }
+    if ((sync.control & kSmModeMask) == kSmModeMailbox) {
+      const bool full = (memory_[base + 5] & kSmStatusFull) != 0;
+      if (full == write) return Rule::kRefused;
+    }
+    *manager = i;
+    return Rule::kBuffer;
+  }
+  return Rule::kFree;
+}
+
+bool EmulatedEsc::Read(uint16_t address, std::span<uint8_t> data, int64_t now) {
+  AdvanceTo(now);
+  if (data.empty() || address + data.size() > kMemory) return false;
+  int manager = -1;
+  const Rule rule = SyncManagerRule(address, data.size(), false, &manager);
+  if (rule == Rule::kRefused) return false;
+  if (address < kRegisters) {
+    UpdateEeprom();
+    Put<int64_t>(memory_, reg::kDcSystemTime, SystemTime());
+  }
+  std::copy_n(memory_.begin() + address, data.size(), data.begin());
+  if (rule == Rule::kBuffer) {
+    const SyncManagerSettings sync = sync_manager(manager);
+    const bool mailbox = (sync.control & kSmModeMask) == kSmModeMailbox;
+    if (mailbox && data.size() == sync.length) {
+      SyncByte(manager, 5) &= static_cast<uint8_t>(~kSmStatusFull);
+    }
+  }
+  return true;
+}
+
+bool EmulatedEsc::Write(uint16_t address, std::span<const uint8_t> data, int64_t now) {
+  AdvanceTo(now);
+  if (data.empty() || address + data.size() > kMemory) return false;
+  if (address < kRegisters) return WriteRegisters(address, data);
+  int manager = -1;
+  const Rule rule = SyncManagerRule(address, data.size(), true, &manager);
+  if (rule == Rule::kRefused) return false;
+  std::copy(data.begin(), data.end(), memory_.begin() + address);
+  if (rule != Rule::kBuffer) return true;
+  const SyncManagerSettings sync = sync_manager(manager);
+  if (data.size() != sync.length) return true;  // the buffer is complete with its last byte
+  if ((sync.control & kSmModeMask) == kSmModeMailbox) {
+    SyncByte(manager, 5) |= kSmStatusFull;
+    mailbox_written_ = mailbox_written_ || manager == kMailboxOut;
+  } else if (manager == kProcessOut) {
+    outputs_written_ = true;
+    if ((sync.control & kSmWatchdog) != 0) {
+      watchdog_triggered_ = now;
+      watchdog_running_ = true;
+      watchdog_expired_ = false;
+      memory_[reg::kWatchdogStatus] = 1;
+    }
+  }
+  return true;
+}
+
+bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) {
+  bool any = false;
+  for (size_t i = 0; i < data.size() && address + i < kRegisters; ++i) {
+    const size_t at = address + i;
+    if (!Writable()[at]) continue;
+    const bool sync_setting = at >= reg::kSyncManager &&
+                              at < reg::kSyncManager + kNumSyncManagers * kSyncManagerSize &&
+                              (at - reg::kSyncManager) % kSyncManagerSize < 5;
+    // An active sync manager's area does not move.
+    if (sync_setting &&
+        sync_manager(static_cast<int>((at - reg::kSyncManager) / kSyncManagerSize)).active) {
+      continue;
+    }
+    any = true;
+    // The system time is no memory: a write is a comparison.
+    if (at >= reg::kDcReceiveTime && at < reg::kDcOffset) continue;
+    memory_[at] = data[i];
+  }
+  if (any) AfterWrite(address, data.size(), data);
+  return any;
+}
+
+void EmulatedEsc::AfterWrite(size_t address, size_t size, std::span<const uint8_t> data) {
+  const auto touches = [&](size_t first, size_t count) {
+    return Overlap(address, size, first, count);
+  };
+  if (touches(reg::kAlControl, 1)) al_control_ = Get<uint16_t>(memory_, reg::kAlControl);
+  if (touches(reg::kEepromControl, 2)) {
+    const auto command = Get<uint16_t>(memory_, reg::kEepromControl);
+    uint16_t status = kEeprom8Bytes;
+    if ((command & 0x0700) == kEepromReadCommand) {
+      status |= kEepromBusy;
+      eeprom_ready_ = now_ + options_.eeprom_time;
+    } else if ((command & 0x0700) != 0) {
+      status |= 0x2000;  // command error: nothing but reading is known
+    }
+    Put<uint16_t>(memory_, reg::kEepromControl, status);
+  }
+  for (int i = 0; i < kNumSyncManagers; ++i) {
+    const size_t base = reg::kSyncManager + static_cast<size_t>(i) * kSyncManagerSize;
+    if (!touches(base + 6, 1)) continue;
+    if (!sync_manager(i).active) {
+      memory_[base + 5] = 0;
+      memory_[base + 7] &= static_cast<uint8_t>(~kSmPdiDisable);
+    }
+    if (i == kMailboxIn && ((memory_[base + 6] ^ memory_[base + 7]) & kSmRepeatRequest) != 0) {
+      repeat_requested_ = true;
+    }
+  }
+  if (address == reg::kDcSystemTime && size >= 4) CompareSystemTime(data);
+  if (touches(reg::kDcSpeedStart, 2)) rate_ = adjustment_ = 0;
+  if (touches(reg::kDcActivation, 1)) StartSync0();
+}
+
+EmulatedEsc::Access EmulatedEsc::Logical(uint32_t address, std::span<uint8_t> data, bool read,
+                                         bool write, int64_t now) {
+  Access access;
+  const uint64_t end = uint64_t{address} + data.size();
+  for (int i = 0; i < kNumFmmus; ++i) {
+    const size_t base = reg::kFmmu + static_cast<size_t>(i) * kFmmuSize;
+    const uint64_t start = Get<uint32_t>(memory_, base);
+    const uint64_t length = Get<uint16_t>(memory_, base + 4);
+    const bool whole_bytes =
+        memory_[base + 6] == 0 && memory_[base + 7] == 7 && memory_[base + 10] == 0;
+    if ((memory_[base + 12] & 1) == 0 || !whole_bytes || length == 0) continue;
+    const uint64_t first = std::max<uint64_t>(start, address);
+    const uint64_t last = std::min(start + length, end);
+    if (first >= last) continue;
+    const uint64_t physical = Get<uint16_t>(memory_, base + 8) + (first - start);
+    if (physical >= kMemory) continue;
+    const std::span<uint8_t> part = data.subspan(first - address, last - first);
+    const uint8_t type = memory_[base + 11];
+    if (write && (type & kFmmuWrite) != 0) {
+      access.written = Write(static_cast<uint16_t>(physical), part, now) || access.written;
+    }
+    if (read && (type & kFmmuRead) != 0) {
+      access.read = Read(static_cast<uint16_t>(physical), part, now) || access.read;
+    }
+  }
+  return access;
+}
+
+void EmulatedEsc::AdvanceTo(int64_t now) {
+  if (now > now_) {
+    const double step = static_cast<double>(now - now_);
+    local_ += step * (1 + options_.clock_error * 1e-6);
+    adjustment_ += step * rate_;
+    now_ = now;
+  }
+  UpdateEeprom();
+  UpdateWatchdog();
+  if (next_sync0_ && SystemTime() >= *next_sync0_) {
+    const uint64_t cycle = sync0_cycle();
+    const uint64_t passed =
+        static_cast<uint64_t>(SystemTime()) - static_cast<uint64_t>(*next_sync0_);
+    sync0_pulsed_ = true;
+    if (cycle > 0) {
+      *next_sync0_ =
+          static_cast<int64_t>(static_cast<uint64_t>(*next_sync0_) + (passed / cycle + 1) * cycle);
+    } else {
+      next_sync0_.reset();  // a single pulse
+    }
+  }
+}
+
+void EmulatedEsc::UpdateEeprom() {
+  if (!eeprom_ready_ || now_ < *eeprom_ready_) return;
+  eeprom_ready_.reset();
+  const auto word = Get<uint32_t>(memory_, reg::kEepromAddress);
+  for (size_t i = 0; i < 4; ++i) {
+    const uint64_t at = uint64_t{word} + i;
+    Put<uint16_t>(memory_, reg::kEepromData + 2 * i,
+                  at < options_.eeprom.size() ? options_.eeprom[at] : uint16_t{0xFFFF});
+  }
+  Put<uint16_t>(memory_, reg::kEepromControl, kEeprom8Bytes);
+}
+
+void EmulatedEsc::UpdateWatchdog() {
+  const int64_t unit = (int64_t{Get<uint16_t>(memory_, reg::kWatchdogDivider)} + 2) * 40;
+  const int64_t time = unit * Get<uint16_t>(memory_, reg::kWatchdogProcessData);
+  if (!watchdog_running_ || time == 0 || now_ - watchdog_triggered_ <= time) return;
+  watchdog_running_ = false;
+  watchdog_expired_ = true;
+  memory_[reg::kWatchdogStatus] = 0;
+  uint8_t& count = memory_[reg::kWatchdogCounter];
+  if (count < 0xFF) ++count;
+}
+
+void EmulatedEsc::LatchReceiveTimes(int64_t port0, int64_t port1) {
+  AdvanceTo(port0);
+  const double rate = 1 + options_.clock_error * 1e-6;
+  const auto local = static_cast<int64_t>(std::llround(local_));
+  const auto back =
+      static_cast<int64_t>(std::llround(local_ + static_cast<double>(port1 - port0) * rate));
+  Put<uint32_t>(memory_, reg::kDcReceiveTime, static_cast<uint32_t>(local));
+  Put<uint32_t>(memory_, reg::kDcReceiveTime + 4,
+                options_.last ? uint32_t{0} : static_cast<uint32_t>(back));
+  Put<int64_t>(memory_, reg::kDcReceiveTimeUnit, local);
+}
+
+int64_t EmulatedEsc::SystemTime() const {
+  // Modulo 2^64: the master may have written any offset.
+  return static_cast<int64_t>(static_cast<uint64_t>(std::llround(local_ + adjustment_)) +
+                              Get<uint64_t>(memory_, reg::kDcOffset));
+}
+
+void EmulatedEsc::CompareSystemTime(std::span<const uint8_t> data) {
+  // The lower half decides, as in an ESC: clocks that far apart were set up by the offset.
+  const auto received = Get<uint32_t>(data, 0) + Get<uint32_t>(memory_, reg::kDcDelay);
+  const auto difference = static_cast<int32_t>(static_cast<uint32_t>(SystemTime()) - received);
+  const int64_t magnitude = std::min<int64_t>(std::abs(int64_t{difference}), 0x7FFFFFFF);
+  Put<uint32_t>(memory_, reg::kDcDifference,
+                static_cast<uint32_t>(magnitude) | (difference < 0 ? 0x80000000U : 0U));
+  // A proportional-integral loop; an ESC filters more, over more frames.
+  const double elapsed = std::max(1e3, static_cast<double>(now_ - compared_));
+  compared_ = now_;
+  adjustment_ -= 0.25 * difference;
+  rate_ = std::clamp(rate_ - 0.02 * difference / elapsed, -1e-3, 1e-3);
+}
+
+bool EmulatedEsc::sync0_enabled() const { return (memory_[reg::kDcActivation] & 0x03) == 0x03; }
+
+void EmulatedEsc::StartSync0() {
+  next_sync0_.reset();
+  if (!sync0_enabled()) return;
+  const auto start = Get<int64_t>(memory_, reg::kDcStart);
+  // A start in the past never comes.
+  if (start > SystemTime()) next_sync0_ = start;
+}
+
+bool EmulatedEsc::TakeSync0() { return std::exchange(sync0_pulsed_, false); }
+
+std::optional<uint16_t> EmulatedEsc::TakeAlControl() {
+  return std::exchange(al_control_, std::nullopt);
+}
+
+void EmulatedEsc::SetAlStatus(uint8_t status, AlStatusCode code) {
+  Put<uint16_t>(memory_, reg::kAlStatus, status);
+  Put<uint16_t>(memory_, reg::kAlStatusCode, static_cast<uint16_t>(code));
+}
+
+std::span<const uint8_t> EmulatedEsc::Buffer(int index) const {
+  const SyncManagerSettings sync = sync_manager(index);
+  if (!sync.active || sync.start < kRegisters || sync.start + size_t{sync.length} > kMemory) {
+    return {};
+  }
+  return std::span(memory_).subspan(sync.start, sync.length);
+}
+
+std::span<const uint8_t> EmulatedEsc::TakeMailbox() {
+  if (!std::exchange(mailbox_written_, false)) return {};
+  SyncByte(kMailboxOut, 5) &= static_cast<uint8_t>(~kSmStatusFull);
+  return Buffer(kMailboxOut);
+}
+
+std::span<uint8_t> EmulatedEsc::BeginMailboxReply() {
+  const std::span<const uint8_t> buffer = Buffer(kMailboxIn);
+  if (buffer.empty() || (SyncByte(kMailboxIn, 5) & kSmStatusFull) != 0) return {};
+  return std::span(memory_).subspan(sync_manager(kMailboxIn).start, buffer.size());
+}
+
+void EmulatedEsc::EndMailboxReply() { SyncByte(kMailboxIn, 5) |= kSmStatusFull; }
+
+bool EmulatedEsc::TakeRepeatRequest() { return std::exchange(repeat_requested_, false); }
+
+void EmulatedEsc::AcknowledgeRepeat() {
+  uint8_t& pdi = SyncByte(kMailboxIn, 7);
+  pdi = static_cast<uint8_t>((pdi & ~kSmRepeatRequest) |
+                             (SyncByte(kMailboxIn, 6) & kSmRepeatRequest));
+}
+
+std::span<uint8_t> EmulatedEsc::process_inputs() {
+  const std::span<const uint8_t> buffer = Buffer(kProcessIn);
+  if (buffer.empty()) return {};
+  return std::span(memory_).subspan(sync_manager(kProcessIn).start, buffer.size());
+}
+
+bool EmulatedEsc::TakeOutputsWritten() { return std::exchange(outputs_written_, false); }
+
+}  // namespace poise::ethercat

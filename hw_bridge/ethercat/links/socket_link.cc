@@ -1,0 +1,192 @@
+#include "hw_bridge/ethercat/links/socket_link.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <linux/if_packet.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+
+#include "components/framework/clock.h"
+
+namespace poise::ethercat {
+namespace {
+
+constexpr uint8_t kLocallyAdministered = 0x02;
+
+sockaddr_in Address(const UdpLink::Endpoint& endpoint) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(endpoint.port);
+  if (inet_pton(AF_INET, endpoint.address.c_str(), &address.sin_addr) != 1) {
+    throw EthercatError(
+        fmt::format("EtherCAT over UDP: \"{}\" is no IPv4 address; give four numbers with dots",
+                    endpoint.address));
+  }
+  return address;
+}
+
+}  // namespace
+
+SocketLink::~SocketLink() {
+  if (socket_ >= 0) close(socket_);
+}
+
+int64_t SocketLink::Now() const { return NowNanoseconds(); }
+
+bool SocketLink::WaitReadable(int64_t deadline) const {
+  while (true) {
+    const int64_t left = std::max<int64_t>(deadline - Now(), 0);
+    const timespec wait{.tv_sec = left / kSecond, .tv_nsec = left % kSecond};
+    pollfd descriptor{.fd = socket_, .events = POLLIN, .revents = 0};
+    const int ready = ppoll(&descriptor, 1, &wait, nullptr);
+    if (ready >= 0) return ready > 0;
+    if (errno != EINTR || left == 0) return false;
+  }
+}
+
+std::unique_ptr<UdpLink> UdpLink::Connect(const Endpoint& peer) {
+  return std::unique_ptr<UdpLink>(new UdpLink(peer, false));
+}
+
+std::unique_ptr<UdpLink> UdpLink::Listen(const Endpoint& local) {
+  return std::unique_ptr<UdpLink>(new UdpLink(local, true));
+}
+
+UdpLink::UdpLink(const Endpoint& endpoint, bool listen) : listen_(listen) {
+  const sockaddr_in address = Address(endpoint);
+  socket_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const auto* raw = reinterpret_cast<const sockaddr*>(&address);
+  const int result = socket_ < 0 ? -1
+                     : listen    ? bind(socket_, raw, sizeof(address))
+                                 : connect(socket_, raw, sizeof(address));
+  if (result != 0) {
+    const int error = errno;
+    if (socket_ >= 0) close(socket_);
+    throw EthercatError(fmt::format("EtherCAT over UDP: cannot {} {}:{}: {}{}",
+                                    listen ? "listen at" : "reach", endpoint.address, endpoint.port,
+                                    std::strerror(error),
+                                    error == EADDRINUSE ? "; give another port" : ""));
+  }
+  sockaddr_in local{};
+  socklen_t size = sizeof(local);
+  getsockname(socket_, reinterpret_cast<sockaddr*>(&local), &size);
+  local_port_ = ntohs(local.sin_port);
+}
+
+bool UdpLink::Send(std::span<const uint8_t> frame) {
+  if (listen_ && !peer_known_) return false;
+  const ssize_t sent = sendto(socket_, frame.data(), frame.size(), MSG_NOSIGNAL,
+                              listen_ ? reinterpret_cast<const sockaddr*>(&peer_) : nullptr,
+                              listen_ ? sizeof(peer_) : 0);
+  const bool complete = sent == static_cast<ssize_t>(frame.size());
+  if (!complete) ++send_errors_;
+  return complete;
+}
+
+size_t UdpLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
+  while (WaitReadable(deadline)) {
+    sockaddr_in from{};
+    socklen_t size = sizeof(from);
+    const ssize_t received =
+        recvfrom(socket_, frame.data(), frame.size(), 0, reinterpret_cast<sockaddr*>(&from), &size);
+    // An error here is what an earlier datagram met (nobody listens yet), or an empty datagram.
+    if (received <= 0) continue;
+    peer_ = from;
+    peer_known_ = true;
+    return static_cast<size_t>(received);
+  }
+  return 0;
+}
+
+RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
+  const auto fail = [&](std::string_view problem) {
+    if (socket_ >= 0) close(socket_);
+    socket_ = -1;
+    throw EthercatError(fmt::format("EtherCAT on interface \"{}\": {}", interface, problem));
+  };
+  socket_ = socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(kEtherType));
+  if (socket_ < 0) {
+    fail(fmt::format("{}; run as root or with CAP_NET_RAW, or use EtherCAT over UDP",
+                     std::strerror(errno)));
+  }
+  ifreq request{};
+  if (interface.empty() || interface.size() >= sizeof(request.ifr_name)) {
+    fail("no such interface; `ip link` lists them");
+  }
+  interface.copy(request.ifr_name, sizeof(request.ifr_name) - 1);
+  if (ioctl(socket_, SIOCGIFINDEX, &request) != 0) fail("no such interface; `ip link` lists them");
+  const int index = request.ifr_ifindex;
+  if (ioctl(socket_, SIOCGIFFLAGS, &request) != 0 || (request.ifr_flags & IFF_UP) == 0) {
+    fail(fmt::format("is down; `ip link set {} up`", interface));
+  }
+  sockaddr_ll address{};
+  address.sll_family = AF_PACKET;
+  address.sll_protocol = htons(kEtherType);
+  address.sll_ifindex = index;
+  if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+    fail(std::strerror(errno));
+  }
+  if (ioctl(socket_, SIOCGIFHWADDR, &request) != 0) fail(std::strerror(errno));
+  std::fill_n(out_.begin(), 6, uint8_t{0xFF});  // to all
+  std::memcpy(&out_[6], request.ifr_hwaddr.sa_data, 6);
+  out_[6] = static_cast<uint8_t>(side == Side::kSlaves ? out_[6] | kLocallyAdministered
+                                                       : out_[6] & ~kLocallyAdministered);
+  out_[12] = kEtherType >> 8;
+  out_[13] = kEtherType & 0xFF;
+}
+
+bool RawLink::Send(std::span<const uint8_t> frame) {
+  if (frame.size() > kMaxFrame) return false;
+  std::copy(frame.begin(), frame.end(), out_.begin() + kEthernetHeader);
+  size_t size = kEthernetHeader + frame.size();
+  if (size < kMinEthernet) {
+    std::fill(out_.begin() + static_cast<std::ptrdiff_t>(size), out_.begin() + kMinEthernet,
+              uint8_t{0});
+    size = kMinEthernet;
+  }
+  const bool complete =
+      send(socket_, out_.data(), size, MSG_NOSIGNAL) == static_cast<ssize_t>(size);
+  if (!complete) ++send_errors_;
+  return complete;
+}
+
+size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
+  while (WaitReadable(deadline)) {
+    sockaddr_ll from{};
+    socklen_t from_size = sizeof(from);
+    const ssize_t received = recvfrom(socket_, in_.data(), in_.size(), 0,
+                                      reinterpret_cast<sockaddr*>(&from), &from_size);
+    if (received <= static_cast<ssize_t>(kEthernetHeader)) continue;
+    if (from.sll_pkttype == PACKET_OUTGOING) continue;
+    const bool passed_a_slave = (in_[6] & kLocallyAdministered) != 0;
+    if (passed_a_slave != (side_ == Side::kMaster)) continue;
+    const size_t size = std::min(static_cast<size_t>(received) - kEthernetHeader, frame.size());
+    std::copy_n(in_.begin() + kEthernetHeader, size, frame.begin());
+    return size;
+  }
+  return 0;
+}
+
+std::unique_ptr<Link> OpenLink(const LinkConfig& config) {
+  if (config.has_udp() == config.has_interface()) {
+    throw EthercatError("EtherCAT configuration: link: give either udp or interface");
+  }
+  if (config.has_interface()) {
+    return std::make_unique<RawLink>(config.interface(), RawLink::Side::kMaster);
+  }
+  if (config.udp().port() == 0 || config.udp().port() > 0xFFFF) {
+    throw EthercatError("EtherCAT configuration: link.udp.port must be between 1 and 65535");
+  }
+  return UdpLink::Connect(
+      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
+}
+
+}  // namespace poise::ethercat

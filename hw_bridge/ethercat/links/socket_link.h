@@ -1,0 +1,83 @@
+// Links over sockets: raw Ethernet and EtherCAT over UDP.
+#pragma once
+
+#include <netinet/in.h>
+
+#include <array>
+#include <memory>
+#include <string>
+
+#include "hw_bridge/ethercat/ethercat.pb.h"
+#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/link.h"
+
+namespace poise::ethercat {
+
+/// Common to both: an owned socket and the monotonic clock.
+class SocketLink : public Link {
+ public:
+  ~SocketLink() override;
+  int64_t Now() const override;
+  /// Readable when a frame has come.
+  int fd() const { return socket_; }
+  int64_t send_errors() const { return send_errors_; }
+
+ protected:
+  /// Waits until the socket is readable or the deadline has passed.
+  bool WaitReadable(int64_t deadline) const;
+
+  int socket_ = -1;
+  int64_t send_errors_ = 0;
+};
+
+/// EtherCAT over UDP (ETG.1000.4, 5.2.3), IPv4. Needs no privileges.
+class UdpLink final : public SocketLink {
+ public:
+  struct Endpoint {
+    std::string address = "127.0.0.1";  ///< numeric IPv4
+    uint16_t port = kUdpPort;
+  };
+  /// Master's side: sends to `peer`, takes frames from it alone. Throws EthercatError.
+  static std::unique_ptr<UdpLink> Connect(const Endpoint& peer);
+  /// Slaves' side: answers whoever sent last. Port 0: any free one. Throws EthercatError.
+  static std::unique_ptr<UdpLink> Listen(const Endpoint& local);
+
+  uint16_t local_port() const { return local_port_; }
+  bool Send(std::span<const uint8_t> frame) override;
+  size_t Receive(std::span<uint8_t> frame, int64_t deadline) override;
+
+ private:
+  explicit UdpLink(const Endpoint& endpoint, bool listen);
+
+  sockaddr_in peer_{};
+  bool peer_known_ = false;
+  bool listen_;
+  uint16_t local_port_ = 0;
+};
+
+/// Ethernet frames of type 0x88A4 on one network interface (AF_PACKET; needs CAP_NET_RAW).
+class RawLink final : public SocketLink {
+ public:
+  /// A slave's side sets the locally administered bit of the source address, as an ESC does to the
+  /// frames that pass it; a master's side takes only such frames when `master` is true.
+  enum class Side { kMaster, kSlaves };
+  /// Throws EthercatError: no such interface, interface down, no privilege.
+  RawLink(const std::string& interface, Side side);
+
+  bool Send(std::span<const uint8_t> frame) override;
+  size_t Receive(std::span<uint8_t> frame, int64_t deadline) override;
+
+ private:
+  static constexpr size_t kEthernetHeader = 14;
+  static constexpr size_t kMinEthernet = 60;  // without the checksum
+
+  Side side_;
+  std::array<uint8_t, kEthernetHeader + kMaxFrame> out_{};
+  std::array<uint8_t, kEthernetHeader + kMaxFrame + 1> in_{};
+};
+
+/// The master's side of the configured link. Throws EthercatError: not exactly one kind is set, or
+/// it cannot be opened.
+std::unique_ptr<Link> OpenLink(const LinkConfig& config);
+
+}  // namespace poise::ethercat

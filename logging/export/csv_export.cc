@@ -1,0 +1,334 @@
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+
+#include "components/framework/bus/packet_filter.h"
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "lcmtypes/field_table.h"
+#include "logging/export/log_export.h"
+#include "logging/log_messages.h"
+#include "logging/partial_file.h"
+
+namespace poise::logging {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr char kUnitsFile[] = "columns.json";
+constexpr size_t kMostChannels = 64;  // of a table whose graph is not known: damage makes up names
+
+/// A field of a row; in quotes when a separator stands in it.
+void AppendText(std::string_view text, std::string* row) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) {
+    row->append(text);
+    return;
+  }
+  row->push_back('"');
+  for (const char c : text) row->append(c == '"' ? 2 : 1, c);
+  row->push_back('"');
+}
+
+/// Values and names of a message's fields; counts and header are left out.
+class Row final : public ScalarVisitor {
+ public:
+  explicit Row(const MessageType& type, std::string* to)
+      : skip_(type.count_names.size() + 3), to_(to) {}
+
+  void Integer(std::string_view, int64_t value) override {
+    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  }
+  void Real(std::string_view, double value) override {
+    if (Begin()) fmt::format_to(std::back_inserter(*to_), "{}", value);
+  }
+  void Text(std::string_view, std::string_view value) override {
+    if (Begin()) AppendText(value, to_);
+  }
+
+ private:
+  /// Writes the separator; true when the value is to follow.
+  bool Begin() {
+    if (seen_++ < skip_) return false;
+    to_->push_back(',');
+    return true;
+  }
+
+  size_t skip_;
+  std::string* to_;
+  size_t seen_ = 0;
+};
+
+/// Paths of a message's fields, counts and header left out.
+class Paths final : public ScalarVisitor {
+ public:
+  explicit Paths(const MessageType& type) : skip_(type.count_names.size() + 3) {}
+  void Integer(std::string_view path, int64_t) override { Add(path); }
+  void Real(std::string_view path, double) override { Add(path); }
+  void Text(std::string_view path, std::string_view) override { Add(path); }
+  const std::vector<std::string>& paths() const { return paths_; }
+
+ private:
+  void Add(std::string_view path) {
+    if (seen_++ >= skip_) paths_.emplace_back(path);
+  }
+
+  size_t skip_;
+  size_t seen_ = 0;
+  std::vector<std::string> paths_;
+};
+
+/// One file, there when Close has checked what is written.
+class File {
+ public:
+  explicit File(const std::string& path)
+      : path_(path), file_(path), out_(file_.part(), std::ios::binary) {
+    if (!out_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
+  void Write(const std::string& text) {
+    out_.write(text.data(), static_cast<std::streamsize>(text.size()));
+    NoteError();
+  }
+  void Close() {
+    out_.close();
+    NoteError();
+    if (!out_) throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(error_)));
+    file_.Keep();
+  }
+
+ private:
+  /// Later calls change errno.
+  void NoteError() {
+    if (!out_ && error_ == 0) error_ = errno;
+  }
+
+  std::string path_;
+  PartialFile file_;
+  std::ofstream out_;
+  int error_ = 0;  // errno of the first failure
+};
+
+/// What a channel's columns depend on.
+struct Shape {
+  const MessageType* type = nullptr;
+  std::vector<uint8_t> counts;  // as encoded
+
+  Shape(const MessageType* t, std::span<const uint8_t> data)
+      : type(t), counts(data.begin() + 8, data.begin() + t->run_id_offset) {}
+  bool operator==(const Shape&) const = default;
+};
+
+void AppendValues(const MessageType& type, std::span<const uint8_t> data, std::string* to) {
+  Row row(type, to);
+  type.visit(data.data(), static_cast<int64_t>(data.size()), &row);
+}
+
+/// Appends the columns' names, each after `prefix`, and adds their units to `units`; returns how
+/// many they are.
+size_t AppendNames(const MessageType& type, std::span<const uint8_t> data,
+                   const ElementNames& elements, const std::string& prefix, std::string* to,
+                   Json* units) {
+  Paths paths(type);
+  type.visit(data.data(), static_cast<int64_t>(data.size()), &paths);
+  for (const std::string& path : paths.paths()) {
+    const std::string name = prefix + elements.Label(type.name, path);
+    to->append(",").append(name);
+    (*units)[name] = UnitOf(type.name, path);
+  }
+  return paths.paths().size();
+}
+
+Json TimeUnits() { return {{"time", "s"}, {"tick", ""}}; }
+
+void WriteUnits(const Json& units, File* file) {
+  file->Write(units.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+/// us from the run's start to the scenario's time 0; 0 when the run is not known.
+int64_t LeadTime(const LogMessages& messages) {
+  if (!messages.run_known()) return 0;
+  const RunSpec& spec = messages.spec();
+  return MakeTick(spec.lead_ticks(), spec.tick_period()).utime;
+}
+
+std::string TimeAndTick(int64_t utime, int64_t tick) {
+  return fmt::format("{:.6f},{}", static_cast<double>(utime) * 1e-6, tick);
+}
+
+/// Damage may put anything into a channel's name, a path too.
+bool IsFileName(std::string_view name) {
+  return name.find_first_not_of(
+             "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-") ==
+         std::string_view::npos;
+}
+
+/// The results by channel, in the order in which the channels first come.
+class Results {
+ public:
+  ExportedChannel& of(std::string_view channel) {
+    const auto found = std::find_if(channels_.begin(), channels_.end(),
+                                    [&](const auto& c) { return c.channel == channel; });
+    if (found != channels_.end()) return *found;
+    channels_.push_back({std::string(channel), "", 0, 0});
+    return channels_.back();
+  }
+  std::vector<ExportedChannel> take() { return std::move(channels_); }
+
+ private:
+  std::vector<ExportedChannel> channels_;
+};
+
+}  // namespace
+
+std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder) {
+  LogMessages messages(log, LogMessages::Run::kIfKnown);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw LogError(fmt::format("{}: cannot be made: {}", folder, error.message()));
+  struct Table {
+    Table(const std::string& path, Shape s) : file(path), shape(std::move(s)) {}
+    File file;
+    Shape shape;
+  };
+  const int64_t lead = LeadTime(messages);
+  std::map<std::string, Table, std::less<>> tables;
+  Json units = Json::object();
+  File units_file((fs::path(folder) / kUnitsFile).string());
+  Results results;
+  LogEvent event;
+  std::string row;
+  while (messages.reader().Next(&event)) {
+    if (event.channel == kRunInfoChannel) continue;
+    ExportedChannel& result = results.of(event.channel);
+    const MessageType* const type = messages.TypeOf(event);
+    if (type == nullptr || !IsFileName(event.channel)) {
+      ++result.refused;
+      continue;
+    }
+    auto table = tables.find(event.channel);
+    if (table == tables.end()) {
+      const std::string name(event.channel);
+      table = tables
+                  .try_emplace(name, (fs::path(folder) / (name + ".csv")).string(),
+                               Shape(type, event.data))
+                  .first;
+      result.type = type->name;
+      row = "time,tick";
+      Json& columns = units[name] = TimeUnits();
+      AppendNames(*type, event.data, messages.names(), "", &row, &columns);
+      table->second.file.Write(row + "\n");
+    }
+    if (table->second.shape != Shape(type, event.data)) {
+      ++result.refused;
+      continue;
+    }
+    row = TimeAndTick(ReadInt64(event.data.data() + type->run_id_offset + 16) - lead,
+                      LogMessages::Tick(*type, event));
+    AppendValues(*type, event.data, &row);
+    row.push_back('\n');
+    table->second.file.Write(row);
+    ++result.messages;
+  }
+  // A table of another run among these would pass for one of this run.
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() != ".csv" || tables.contains(entry.path().stem().string()))
+      continue;
+    throw LogError(fmt::format(
+        "{}: is no channel of this log and would stand among its tables; remove it or choose "
+        "another folder",
+        entry.path().string()));
+  }
+  if (error) throw LogError(fmt::format("{}: cannot be read: {}", folder, error.message()));
+  for (auto& [name, table] : tables) table.file.Close();
+  WriteUnits(units, &units_file);
+  units_file.Close();
+  return results.take();
+}
+
+std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file) {
+  LogMessages messages(log, LogMessages::Run::kIfKnown);
+  struct Column {
+    std::optional<Shape> shape;
+    std::string names;
+    size_t width = 0;
+  };
+  std::vector<ExportedChannel> results;
+  Json units = TimeUnits();
+  std::vector<Column> columns;
+  std::map<std::string, size_t, std::less<>> index;
+  const auto add = [&](const std::string& channel, const std::string& type) {
+    index[channel] = results.size();
+    results.push_back({channel, type, 0, 0});
+    columns.emplace_back();
+  };
+  for (const Channel& channel : messages.spec().graph().channel()) {
+    if (!channel.external()) add(channel.name(), channel.type());
+  }
+  std::map<int64_t, std::vector<std::span<const uint8_t>>> ticks;  // spans into the reader's file
+  LogEvent event;
+  while (messages.reader().Next(&event)) {
+    const MessageType* const type = messages.TypeOf(event);
+    auto found = index.find(event.channel);
+    if (found == index.end()) {
+      // Without a graph: whatever is no service of the run.
+      if (messages.run_known() || type == nullptr || type->has_strings ||
+          !IsFileName(event.channel) || columns.size() == kMostChannels) {
+        continue;
+      }
+      add(std::string(event.channel), type->name);
+      found = index.find(event.channel);
+    }
+    ExportedChannel& result = results[found->second];
+    Column& column = columns[found->second];
+    if (type == nullptr || (column.shape && *column.shape != Shape(type, event.data))) {
+      ++result.refused;
+      continue;
+    }
+    if (!column.shape) {
+      column.shape.emplace(type, event.data);
+      column.width = AppendNames(*type, event.data, messages.names(),
+                                 std::string(event.channel) + ".", &column.names, &units);
+    }
+    auto& cells = ticks[LogMessages::Tick(*type, event)];
+    cells.resize(columns.size());
+    std::span<const uint8_t>& cell = cells[found->second];
+    ++(cell.empty() ? result.messages : result.refused);
+    if (cell.empty()) cell = event.data;
+  }
+  const int64_t lead = LeadTime(messages);
+  File out(file);
+  std::string row = "time,tick";
+  for (const Column& column : columns) row += column.names;
+  out.Write(row + "\n");
+  for (const auto& [tick, cells] : ticks) {
+    row.clear();
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].empty()) continue;
+      const int offset = columns[i].shape->type->run_id_offset;
+      row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16) - lead, tick);
+      break;
+    }
+    for (size_t i = 0; i < columns.size(); ++i) {
+      if (i >= cells.size() || cells[i].empty()) {
+        row.append(columns[i].width, ',');
+      } else {
+        AppendValues(*columns[i].shape->type, cells[i], &row);
+      }
+    }
+    out.Write(row + "\n");
+  }
+  File units_file(fs::path(file).replace_extension(kUnitsFile).string());
+  WriteUnits(units, &units_file);
+  out.Close();
+  units_file.Close();
+  return results;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,207 @@
+#include "logging/metrics/analysis.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_conditions.h"
+#include "components/messages/conversions.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr double kWrenchTolerance = 1e-6;  // N, N·m
+constexpr double kCopTolerance = 1e-9;     // m
+
+Eigen::Quaterniond Rotation(const double (&q)[4]) {
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+}
+
+bool InContact(const support_plan_t& plan, int foot) {
+  return plan.in_contact[static_cast<size_t>(foot)] != 0;
+}
+
+Answer Fold(const RunRecord& run, const std::function<Answer(int64_t)>& value,
+            const std::function<double(double, double)>& join) {
+  Answer result;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (const Answer v = value(tick)) result = result ? join(*result, *v) : *v;
+  }
+  return result;
+}
+
+}  // namespace
+
+Answer Maximum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, [](double a, double b) { return std::max(a, b); });
+}
+
+Answer Minimum(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  return Fold(run, value, [](double a, double b) { return std::min(a, b); });
+}
+
+Answer RootMeanSquare(const RunRecord& run, const std::function<Answer(int64_t)>& value) {
+  int64_t count = 0;
+  const Answer sum = Fold(
+      run,
+      [&](int64_t tick) -> Answer {
+        const Answer v = value(tick);
+        if (!v) return {};
+        ++count;
+        return *v * *v;
+      },
+      [](double a, double b) { return a + b; });
+  if (!sum) return {};
+  return std::sqrt(*sum / static_cast<double>(count));
+}
+
+Answer CountTicks(const RunRecord& run, const std::function<std::optional<bool>(int64_t)>& holds) {
+  return Fold(
+      run,
+      [&](int64_t tick) -> Answer {
+        const std::optional<bool> h = holds(tick);
+        if (!h) return {};
+        return *h ? 1.0 : 0.0;
+      },
+      [](double a, double b) { return a + b; });
+}
+
+std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
+  if (run.balance.empty()) return {};
+  BalancingIntervals result;
+  bool before = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const balance_torque_t* balance = run.balance.at(tick);
+    const bool on = balance != nullptr && (balance->active_x != 0 || balance->active_y != 0);
+    if (on && !before && result.activations++ == 0) result.first = run.time(tick);
+    if (on) {
+      result.last = run.time(tick);
+      result.active += run.spec.tick_period();
+    }
+    before = on;
+  }
+  return result;
+}
+
+std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  const support_plan_t* plan = run.plan.at(tick - 1);
+  const balance_torque_t* balance = run.balance.at(tick - 1);
+  if (sensors == nullptr || plan == nullptr || balance == nullptr) return {};
+  const Eigen::Isometry3d frame = GetPose(balance->frame_o);
+  balance::Vector6d resultant = balance::Vector6d::Zero();
+  for (int foot = 0; foot < plan->num_feet; ++foot) {
+    if (!InContact(*plan, foot)) continue;
+    const auto f = static_cast<size_t>(foot);
+    resultant += balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) *
+                 GetWrench(sensors->foot_wrench[f]);
+  }
+  if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
+  return balance::CenterOfPressure(resultant);
+}
+
+std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
+                                                       int64_t tick) {
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  const support_plan_t* plan = run.plan.at(tick - 1);
+  const joint_command_t* command = run.command.at(tick - 1);
+  if (sensors == nullptr || plan == nullptr || command == nullptr) return {};
+  if (!InContact(*plan, foot)) return {};
+  const auto f = static_cast<size_t>(foot);
+  return GetWrench(sensors->foot_wrench[f]) - GetWrench(command->foot_wrench[f]);
+}
+
+Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {
+  const joint_command_t* command = run.command.at(tick);
+  const auto f = static_cast<size_t>(foot);
+  if (command == nullptr || command->in_contact[f] == 0) return {};
+  const contact_margins_t& m = command->margins[f];
+  const std::array<double, 5> margins = {m.normal, m.friction, m.yaw, m.roll, m.pitch};
+  return margins[static_cast<size_t>(margin)];
+}
+
+balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance) {
+  std::array<Eigen::Vector2d, std::extent_v<decltype(balance.corner_x)>> corner;
+  const auto count =
+      static_cast<size_t>(std::clamp<int>(balance.num_corners, 0, static_cast<int>(corner.size())));
+  for (size_t i = 0; i < count; ++i) corner[i] = {balance.corner_x[i], balance.corner_y[i]};
+  return balance::ConvexHull({corner.data(), count});
+}
+
+std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
+  const joint_command_t* command = run.command.at(tick);
+  const balance_torque_t* balance = run.balance.at(tick);
+  if (command == nullptr || balance == nullptr) return {};
+  for (int foot = 0; foot < command->num_feet; ++foot) {
+    if (command->conditions_met[static_cast<size_t>(foot)] == 0) return true;
+    for (int margin = 0; margin < 5; ++margin) {
+      const Answer m = FootMargin(run, foot, margin, tick);
+      if (m && !(*m >= -kWrenchTolerance)) return true;
+    }
+  }
+  if (balance->region == balance_torque_t::REGION_POLYGON) {
+    const Eigen::Vector2d cop(balance->cop[0], balance->cop[1]);
+    return !(balance::SignedDistance(AcceptableRegion(*balance), cop) >= -kCopTolerance);
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!(std::abs(balance->cop[axis]) <= balance->cop_limit[axis] + kCopTolerance)) return true;
+  }
+  return false;
+}
+
+double JointTorqueLimit(const RunRecord& run, size_t joint) {
+  const robot::MotorModel& motor = run.robot.motors()[joint];
+  return std::min(run.robot.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
+}
+
+EstimatorError BaseError(const robot_state_t& estimate, const ground_truth_t& truth) {
+  EstimatorError error;
+  error.position = (GetVector3(estimate.base_position) - GetVector3(truth.base_position)).norm();
+  error.velocity =
+      (GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity)).norm();
+  const Eigen::Quaterniond estimated = Rotation(estimate.base_orientation);
+  const Eigen::Quaterniond actual = Rotation(truth.base_orientation);
+  // The world's vertical seen from the base.
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d a = estimated.conjugate() * up;
+  const Eigen::Vector3d b = actual.conjugate() * up;
+  error.tilt = std::atan2(a.cross(b).norm(), a.dot(b));
+  error.rotation = estimated.angularDistance(actual);
+  return error;
+}
+
+Eigen::Matrix<double, 9, 1> BaseErrorVector(const robot_state_t& estimate,
+                                            const ground_truth_t& truth) {
+  Eigen::Quaterniond turn =
+      Rotation(estimate.base_orientation) * Rotation(truth.base_orientation).conjugate();
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+  const Eigen::AngleAxisd rotation(turn);
+  Eigen::Matrix<double, 9, 1> error;
+  error << rotation.angle() * rotation.axis(),
+      GetVector3(estimate.base_linear_velocity) - GetVector3(truth.base_linear_velocity),
+      GetVector3(estimate.base_position) - GetVector3(truth.base_position);
+  return error;
+}
+
+Answer Nees(const robot_state_t& estimate, const estimator_status_t& status,
+            const ground_truth_t& truth, NeesPart part) {
+  if (status.has_covariance == 0) return {};
+  Eigen::Matrix<double, 9, 9> covariance;
+  size_t next = 0;
+  for (int row = 0; row < 9; ++row) {
+    for (int column = row; column < 9; ++column) {
+      covariance(row, column) = covariance(column, row) = status.covariance[next++];
+    }
+  }
+  const std::vector<int> rows = part == NeesPart::kAll ? std::vector<int>{0, 1, 2, 3, 4, 5, 6, 7, 8}
+                                                       : std::vector<int>{0, 1, 3, 4, 5};
+  const Eigen::VectorXd e = BaseErrorVector(estimate, truth)(rows);
+  const Eigen::LLT<Eigen::MatrixXd> factors(covariance(rows, rows));
+  if (factors.info() != Eigen::Success) return {};
+  return e.dot(factors.solve(e));
+}
+
+double NeesBound(NeesPart part) { return part == NeesPart::kAll ? 16.918978 : 11.070498; }
+
+}  // namespace poise::logging

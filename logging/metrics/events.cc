@@ -1,0 +1,466 @@
+#include "logging/metrics/events.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/metrics/analysis.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/schedule_plan.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr double kShortestLoss = 0.01;  // s; shorter is the foot's rattle, and the sensor's noise
+
+// A push that comes back sooner is the same push, s.
+constexpr double kPushGap = 0.05;
+
+/// Rounded to what one decimal shows, and never "-0.0".
+double Tenths(double value) {
+  const double tenths = std::round(10 * value) / 10;
+  return tenths == 0 ? 0 : tenths;
+}
+
+class EventList {
+ public:
+  explicit EventList(const RunRecord& run) : run_(run) {}
+
+  void Add(int64_t tick, std::string name, std::string detail) {
+    events_.push_back({{run_.time(tick), std::move(name), std::move(detail)}, false});
+  }
+  /// The end of something; of one tick's events it comes first.
+  void AddEndOf(const Interval& interval, std::string name, const std::string& what) {
+    if (!interval.end) return;
+    std::string detail =
+        fmt::format("{}, after {:.3f} s", what, run_.duration(*interval.end - interval.begin));
+    events_.push_back({{run_.time(*interval.end), std::move(name), std::move(detail)}, true});
+  }
+  /// `begin` and `end` name the events; `what` tells of the first tick, and the end adds how long
+  /// it was.
+  void AddIntervals(const std::vector<Interval>& intervals, const char* begin, const char* end,
+                    const std::function<std::string(int64_t tick)>& what) {
+    for (const Interval& interval : intervals) {
+      const std::string text = what(interval.begin);
+      Add(interval.begin, begin, text);
+      AddEndOf(interval, end, text);
+    }
+  }
+  std::vector<Event> Sorted() && {
+    std::stable_sort(events_.begin(), events_.end(), [](const Entry& a, const Entry& b) {
+      return a.event.time < b.event.time || (a.event.time == b.event.time && a.ends && !b.ends);
+    });
+    std::vector<Event> sorted;
+    for (Entry& entry : events_) sorted.push_back(std::move(entry.event));
+    return sorted;
+  }
+
+ private:
+  struct Entry {
+    Event event;
+    bool ends;
+  };
+  const RunRecord& run_;
+  std::vector<Entry> events_;
+};
+
+/// What the phase before came to, where that is not its planned end; else empty.
+std::string OutcomeText(int8_t outcome) {
+  switch (outcome) {
+    case support_plan_t::OUTCOME_NO_SURFACE:
+      return ": no surface was found";
+    case support_plan_t::OUTCOME_CONTACT_LOST:
+      return ": a contact was lost";
+    case support_plan_t::OUTCOME_TIMEOUT:
+      return ": the phase before had waited for too long";
+    default:
+      return "";
+  }
+}
+
+void AddPhases(const RunRecord& run, EventList* events) {
+  const std::optional<SchedulePlan> schedule = ReadSchedulePlan(run);
+  std::optional<int32_t> phase;
+  double last_time = 0;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    // A phase may follow itself: then its time begins anew.
+    const bool began = plan->phase != phase || plan->phase_time < last_time;
+    last_time = plan->phase_time;
+    if (!began) continue;
+    phase = plan->phase;
+    const auto i = static_cast<size_t>(*phase);
+    const bool named = schedule && i < schedule->phases.size() && !schedule->phases[i].name.empty();
+    events->Add(tick, "phase_began",
+                (named ? fmt::format("phase {}, {}", *phase, schedule->phases[i].name)
+                       : fmt::format("phase {}", *phase)) +
+                    OutcomeText(plan->began_by));
+  }
+}
+
+void AddSupport(const RunRecord& run, EventList* events) {
+  for (const SupportChange& change : SupportChanges(run)) {
+    events->Add(change.tick, "support_changed",
+                fmt::format("{} to {}; largest torque step {:.3g} N·m in {}",
+                            SupportName(run, change.before), SupportName(run, change.after),
+                            change.torque_step, run.robot.joints()[change.joint].name));
+  }
+}
+
+void AddTransitions(const RunRecord& run, EventList* events) {
+  for (const auto& [kind, begin, end] :
+       {std::tuple{support_plan_t::TRANSITION_UNLOADING, "unloading_begins", "unloading_ends"},
+        std::tuple{support_plan_t::TRANSITION_LOADING, "loading_begins", "loading_ends"}}) {
+    for (size_t foot = 0; foot < 2; ++foot) {
+      const auto holds = [&, wanted = kind](int64_t tick) -> std::optional<bool> {
+        const support_plan_t* plan = run.plan.at(tick);
+        if (plan == nullptr) return {};
+        return plan->transition == wanted && plan->transition_foot == static_cast<int>(foot);
+      };
+      events->AddIntervals(Intervals(run, holds), begin, end,
+                           [&](int64_t) { return FootName(run, foot); });
+    }
+  }
+}
+
+void AddWaiting(const RunRecord& run, EventList* events) {
+  for (const auto& [reason, text] :
+       {std::pair{support_plan_t::WAITING_COM, "for the COM to come above the stance sole"},
+        std::pair{support_plan_t::WAITING_CONTACT, "for the measured load to confirm the contact"},
+        std::pair{support_plan_t::WAITING_NO_SURFACE, "no surface was found"}}) {
+    const auto holds = [&, wanted = reason](int64_t tick) -> std::optional<bool> {
+      const support_plan_t* plan = run.plan.at(tick);
+      if (plan == nullptr) return {};
+      return plan->waiting_for == wanted;
+    };
+    events->AddIntervals(Intervals(run, holds), "waiting_begins", "waiting_ends",
+                         [&, why = text](int64_t) { return std::string(why); });
+  }
+}
+
+void AddFeet(const RunRecord& run, bool ended, EventList* events) {
+  const support_plan_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    for (size_t foot = 0; before != nullptr && foot < 2; ++foot) {
+      const int8_t is = plan->foot_state[foot];
+      if (is == before->foot_state[foot]) continue;
+      const double height =
+          kMilli * (plan->foot_pose[foot].position[2] - plan->foot_pose[1 - foot].position[2]);
+      if (is == support_plan_t::FOOT_SEARCHING) {
+        events->Add(tick, "searching",
+                    fmt::format("{} without contact {:.1f} mm above the other sole",
+                                FootName(run, foot), height));
+      } else if (is == support_plan_t::FOOT_RETRACTED) {
+        events->Add(tick, "no_surface",
+                    fmt::format("{} found no surface down to {:.1f} mm above the other sole; "
+                                "retracted",
+                                FootName(run, foot), height));
+      }
+    }
+    before = plan;
+  }
+  for (const TouchDown& touch : TouchDowns(run)) {
+    const std::string foot = FootName(run, touch.foot);
+    events->Add(touch.tick, "touch_down",
+                fmt::format("{}, {:.1f} mm above the other sole", foot, kMilli * touch.height));
+    if (touch.timing != Timing::kEarly && touch.timing != Timing::kLate) continue;
+    const bool early = touch.timing == Timing::kEarly;
+    events->Add(touch.tick, early ? "contact_early" : "contact_late",
+                fmt::format("{}, {:.1f} mm {} the end of its reference", foot,
+                            kMilli * std::abs(*touch.above_end), early ? "above" : "below"));
+  }
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto lost = [&](int64_t tick) -> std::optional<bool> {
+      if (run.command.at(tick - 1) == nullptr || run.sensors.at(tick) == nullptr) return {};
+      return ContactLost(run, foot, tick).value_or(false);
+    };
+    std::vector<Interval> intervals = Intervals(run, lost);
+    std::erase_if(intervals, [&](const Interval& i) {
+      if (!i.end && ended) return false;
+      return run.duration(i.end.value_or(run.num_ticks) - i.begin) < kShortestLoss;
+    });
+    events->AddIntervals(intervals, "contact_lost", "contact_regained", [&](int64_t tick) {
+      const double load = -run.command.at(tick - 1)->foot_wrench[foot].force[2];
+      return fmt::format("{}, which was to carry {:.0f} N", FootName(run, foot), load);
+    });
+  }
+}
+
+void AddBalancing(const RunRecord& run, EventList* events) {
+  for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
+    const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
+      const balance_torque_t* balance = run.balance.at(tick);
+      if (balance == nullptr) return {};
+      return (a == 0 ? balance->active_x : balance->active_y) != 0;
+    };
+    const std::vector<Interval> intervals = Intervals(run, on);
+    for (const Interval& interval : intervals) {
+      const balance_torque_t* balance = run.balance.at(interval.begin);
+      events->Add(interval.begin, "balancing_on",
+                  fmt::format("{}: CoP of the task torque {:.1f} mm, limit {:.1f} mm", name,
+                              kMilli * balance->cop_task[axis], kMilli * balance->cop_limit[axis]));
+      events->AddEndOf(interval, "balancing_off", name);
+    }
+  }
+  const auto not_achieved = [&](int64_t tick) -> std::optional<bool> {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    return balance->status == balance_torque_t::STATUS_NOT_ACHIEVED;
+  };
+  events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
+                       "cop_not_achieved_ends", [&](int64_t tick) {
+                         const balance_torque_t& balance = *run.balance.at(tick);
+                         return fmt::format(
+                             "CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
+                             Tenths(kMilli * balance.cop[0]), Tenths(kMilli * balance.cop[1]),
+                             kMilli * balance.cop_limit[0], kMilli * balance.cop_limit[1]);
+                       });
+  const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
+    const joint_command_t* command = run.command.at(tick);
+    if (command == nullptr) return {};
+    return command->eta_feasible == 0;
+  };
+  events->AddIntervals(Intervals(run, infeasible), "eta_infeasible_begins", "eta_infeasible_ends",
+                       [&](int64_t tick) {
+                         return fmt::format("no ratio meets all conditions; eta {:.3f}",
+                                            run.command.at(tick)->eta);
+                       });
+}
+
+void AddCapturePoint(const RunRecord& run, EventList* events) {
+  const auto needed = [&](int64_t tick) -> std::optional<bool> {
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) return {};
+    return plan->step_needed != 0;
+  };
+  const std::vector<Interval> intervals = Intervals(run, needed);
+  for (const Interval& interval : intervals) {
+    const support_plan_t& plan = *run.plan.at(interval.begin);
+    events->Add(interval.begin, "step_needed",
+                fmt::format("a foot at ({:.2f}, {:.2f}) m within {:.2f} s; capture point {:.1f} mm "
+                            "beyond the soles",
+                            plan.step_position[0], plan.step_position[1], plan.step_time,
+                            -kMilli * plan.capture_margin));
+    events->AddEndOf(interval, "step_needed_ends", "capture point inside the soles again");
+  }
+}
+
+void AddBridge(const RunRecord& run, EventList* events) {
+  const ElementNames names(run.robot);
+  const bridge_status_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bridge_status_t* bridge = run.bridge.at(tick);
+    if (bridge == nullptr) continue;
+    if (before != nullptr && bridge->state != before->state) {
+      const std::string reason = BridgeReasonText(*bridge, names);
+      events->Add(tick, "bridge_state",
+                  fmt::format("{} to {}{}", BridgeStateName(before->state),
+                              BridgeStateName(bridge->state), reason.empty() ? "" : ": " + reason));
+    }
+    before = bridge;
+  }
+}
+
+Answer PushForce(const RunRecord& run, int64_t tick) {
+  const external_push_t* push = run.push.at(tick);
+  if (push == nullptr) return {};
+  return GetVector3(push->force).norm();
+}
+
+/// N, below which a reading is noise: the sensor's deviation from the record itself, by the median
+/// difference between neighbouring samples, which a push does not touch.
+double PushThreshold(const RunRecord& run) {
+  constexpr double kDeviations = 6;  // of a norm of three: beyond it once in 10^7 samples
+  // Of the norm of three normal variables of deviation 1, and of a difference of two.
+  const double median_of_difference = 1.5382 * std::sqrt(2.0);
+  std::vector<double> differences;
+  for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
+    const external_push_t* before = run.push.at(tick - 1);
+    const external_push_t* now = run.push.at(tick);
+    if (before == nullptr || now == nullptr) continue;
+    differences.push_back((GetVector3(now->force) - GetVector3(before->force)).norm());
+  }
+  if (differences.empty()) return 0;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return kDeviations * *middle / median_of_difference;
+}
+
+void AddPush(const RunRecord& run, bool ended, EventList* events) {
+  const double threshold = PushThreshold(run);
+  const auto pushed = [&](int64_t tick) -> std::optional<bool> {
+    const Answer force = PushForce(run, tick);
+    if (!force) return {};
+    return *force > threshold;
+  };
+  const auto gap = static_cast<int64_t>(std::ceil(kPushGap / run.spec.tick_period()));
+  for (const Interval& interval : Intervals(run, pushed, gap)) {
+    int64_t peak = interval.begin;
+    for (int64_t tick = peak; tick < interval.end.value_or(run.num_ticks); ++tick) {
+      if (PushForce(run, tick).value_or(0) > *PushForce(run, peak)) peak = tick;
+    }
+    const Eigen::Vector3d force = GetVector3(run.push.at(peak)->force);
+    events->Add(interval.begin, "push_begins", fmt::format("above {:.2g} N", threshold));
+    if (!interval.end && !ended) continue;
+    events->Add(peak, "push_peak",
+                fmt::format("{:.1f} N, ({:.1f}, {:.1f}, {:.1f})", force.norm(), Tenths(force.x()),
+                            Tenths(force.y()), Tenths(force.z())));
+    events->AddEndOf(interval, "push_ends", fmt::format("peak {:.1f} N", force.norm()));
+  }
+}
+
+void AddCrane(const RunRecord& run, EventList* events) {
+  double most = 0;
+  bool held = false;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (truth == nullptr) continue;
+    if (held && truth->crane_share == 0) {
+      events->Add(tick, "crane_let_go",
+                  fmt::format("it carried {:.0f} N at most, {:.3f} s after the start", most,
+                              run.duration(tick)));
+      return;
+    }
+    if (!held && truth->crane_share == 0) return;  // no crane
+    held = true;
+    most = std::max(most, GetVector3(truth->crane_force).norm());
+  }
+}
+
+void AddEnd(const RunRecord& run, bool ended, EventList* events) {
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (truth == nullptr || truth->fallen == 0) continue;
+    events->Add(tick, "fall", fmt::format("true COM {:.3f} m high", truth->com_position[2]));
+    break;
+  }
+  if (!ended) return;
+  if (run.spec.has_cut()) {
+    events->Add(run.num_ticks, "log_ends", "a part of a longer log");
+    return;
+  }
+  const int64_t planned = run.spec.num_ticks();
+  events->Add(run.num_ticks, "run_ended",
+              planned > run.num_ticks ? fmt::format("{:.3f} s before its planned end",
+                                                    run.duration(planned - run.num_ticks))
+              : planned > 0           ? "planned end"
+                                      : "no end was planned");
+}
+
+}  // namespace
+
+std::string BridgeStateName(int8_t state) {
+  switch (state) {
+    case bridge_status_t::STATE_INIT:
+      return "init";
+    case bridge_status_t::STATE_RUNNING:
+      return "running";
+    case bridge_status_t::STATE_DAMPING:
+      return "damping";
+    case bridge_status_t::STATE_STOPPING:
+      return "stopping";
+    case bridge_status_t::STATE_ENABLING:
+      return "enabling";
+    case bridge_status_t::STATE_HOLDING:
+      return "holding";
+    case bridge_status_t::STATE_STOPPED:
+      return "stopped";
+    case bridge_status_t::STATE_ESTOP:
+      return "emergency stop";
+    default:
+      return fmt::format("state {}", state);
+  }
+}
+
+std::string BridgeReasonName(int8_t reason) {
+  switch (reason) {
+    case bridge_status_t::REASON_NONE:
+      return "";
+    case bridge_status_t::REASON_NO_COMMAND:
+      return "no command";
+    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
+      return "command not finite";
+    case bridge_status_t::REASON_COMMAND_STALE:
+      return "command stale";
+    case bridge_status_t::REASON_COMMAND_SEQUENCE:
+      return "command out of sequence";
+    case bridge_status_t::REASON_COMMAND_SIZE:
+      return "command of wrong size";
+    case bridge_status_t::REASON_COMMAND_RUN:
+      return "command of another run";
+    case bridge_status_t::REASON_OPERATOR:
+      return "operator";
+    case bridge_status_t::REASON_DRIVE_FAULT:
+      return "drive fault";
+    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
+      return "feedback not finite";
+    case bridge_status_t::REASON_DRIVE_NOT_ENABLED:
+      return "drive not enabled";
+    case bridge_status_t::REASON_START_POSITION:
+      return "joint out of its range at the start";
+    case bridge_status_t::REASON_START_VELOCITY:
+      return "joint moving at the start";
+    case bridge_status_t::REASON_JOINT_POSITION:
+      return "joint beyond its range";
+    case bridge_status_t::REASON_JOINT_VELOCITY:
+      return "joint too fast";
+    case bridge_status_t::REASON_BODY_TILT:
+      return "body tilted";
+    case bridge_status_t::REASON_BUS_INPUTS:
+      return "inputs of the bus incomplete";
+    case bridge_status_t::REASON_BUS_LINK:
+      return "bus link lost";
+    case bridge_status_t::REASON_CYCLE_OVERRUN:
+      return "cycle overruns";
+    case bridge_status_t::REASON_ENCODER_FROZEN:
+      return "encoder frozen";
+    case bridge_status_t::REASON_ENCODER_JUMP:
+      return "encoder jump";
+    case bridge_status_t::REASON_TORQUE_IMPLAUSIBLE:
+      return "torque implausible";
+    case bridge_status_t::REASON_DRIVE_STO:
+      return "safe torque off";
+    case bridge_status_t::REASON_SIGNAL:
+      return "signal";
+    case bridge_status_t::REASON_SHUTDOWN:
+      return "shutdown";
+    default:
+      return fmt::format("reason {}", reason);
+  }
+}
+
+std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names) {
+  const std::string reason = BridgeReasonName(bridge.reason);
+  if (reason.empty() || bridge.reason_joint < 0) return reason;
+  return fmt::format("{} ({})", reason, names.Joint(bridge.reason_joint));
+}
+
+std::vector<Event> Events(const RunRecord& run, bool ended) {
+  EventList events(run);
+  AddPhases(run, &events);
+  AddSupport(run, &events);
+  AddTransitions(run, &events);
+  AddWaiting(run, &events);
+  AddFeet(run, ended, &events);
+  AddBalancing(run, &events);
+  AddCapturePoint(run, &events);
+  AddBridge(run, &events);
+  AddPush(run, ended, &events);
+  AddCrane(run, &events);
+  AddEnd(run, ended, &events);
+  std::vector<Event> sorted = std::move(events).Sorted();
+  if (run.spec.cut().first_tick() > 0) {
+    const double first = run.time(run.spec.cut().first_tick());
+    for (Event& event : sorted) {
+      if (event.time > first) break;
+      event.detail += "; or earlier, where the log does not reach";
+    }
+  }
+  return sorted;
+}
+
+}  // namespace poise::logging

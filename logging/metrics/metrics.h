@@ -1,0 +1,26 @@
+// The figures that a run's table can show, by name.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "logging/metrics/analysis.h"
+
+namespace poise::logging {
+
+struct Metric {
+  std::string name;  ///< as in Check.metric
+  std::string unit;  ///< empty: a number
+  std::string description;
+  std::function<Answer(const RunRecord& run)> compute;
+  bool needs_other_estimates = false;  ///< RunRecord::other_estimates
+};
+
+/// All metrics, in the order in which they are listed.
+std::span<const Metric> Metrics();
+/// nullptr when there is none of that name.
+const Metric* FindMetric(std::string_view name);
+
+}  // namespace poise::logging

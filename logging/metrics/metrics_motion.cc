@@ -1,0 +1,152 @@
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+Answer ComMotion(const RunRecord& run) {
+  std::optional<Eigen::Vector3d> start;
+  return Scaled(Maximum(run,
+                        [&](int64_t t) -> Answer {
+                          const ground_truth_t* truth = run.truth.at(t);
+                          if (truth == nullptr) return {};
+                          const Eigen::Vector3d com = GetVector3(truth->com_position);
+                          if (!start) start = com;
+                          return (com - *start).norm();
+                        }),
+                kMilli);
+}
+
+Answer ComDifference(const RunRecord& run) {
+  if (!run.reference) return {};
+  return Scaled(
+      Maximum(run,
+              [&](int64_t t) -> Answer {
+                const ground_truth_t* here = run.truth.at(t);
+                const ground_truth_t* there =
+                    run.reference->truth.at(run.reference->TickOf(run, t));
+                if (here == nullptr || there == nullptr) return {};
+                return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
+              }),
+      kMilli);
+}
+
+/// Largest error of the body's orientation about x in the first or last time on both feet.
+Answer BodyRotationOnBothFeet(const RunRecord& run, bool first) {
+  const auto both = [&](int64_t t) -> std::optional<bool> {
+    if (t < run.first_tick) return false;
+    const support_plan_t* plan = run.plan.at(t);
+    if (plan == nullptr) return {};
+    return plan->in_contact[0] != 0 && plan->in_contact[1] != 0;
+  };
+  const std::vector<Interval> intervals = Intervals(run, both);
+  if (intervals.empty() || (!first && intervals.size() < 2)) return {};
+  const Interval& interval = first ? intervals.front() : intervals.back();
+  return Scaled(Maximum(run,
+                        [&](int64_t t) -> Answer {
+                          const task_torque_t* task = run.task.at(t);
+                          if (task == nullptr || t < interval.begin ||
+                              t >= interval.end.value_or(run.num_ticks)) {
+                            return {};
+                          }
+                          return std::abs(task->body_orientation_error[0]);
+                        }),
+                kMilli);
+}
+
+}  // namespace
+
+void AddMotion(MetricList* list) {
+  for (int axis = 0; axis < 3; ++axis) {
+    list->push_back(
+        {fmt::format("com_error_max_{}", kAxis[axis]), "mm",
+         fmt::format("largest distance of the estimated COM from its reference, {}", kAxis[axis]),
+         [axis](const RunRecord& run) {
+           return Scaled(Maximum(run,
+                                 [&](int64_t t) -> Answer {
+                                   const support_plan_t* plan = run.plan.at(t);
+                                   if (plan == nullptr) return {};
+                                   return std::abs(plan->com_position[axis] -
+                                                   plan->com_reference.position[axis]);
+                                 }),
+                         kMilli);
+         }});
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    list->push_back(
+        {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
+         fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
+         [axis](const RunRecord& run) {
+           return Scaled(Maximum(run,
+                                 [&](int64_t t) -> Answer {
+                                   const support_plan_t* plan = run.plan.at(t);
+                                   const ground_truth_t* truth = run.truth.at(t);
+                                   if (plan == nullptr || truth == nullptr) return {};
+                                   return std::abs(truth->com_position[axis] -
+                                                   plan->com_reference.position[axis]);
+                                 }),
+                         kMilli);
+         }});
+  }
+  list->push_back(
+      {"com_error_end", "mm", "distance of the true COM from its reference at the end",
+       [](const RunRecord& run) -> Answer {
+         const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+         const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
+         if (plan == nullptr || truth == nullptr) return {};
+         return kMilli *
+                (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
+       }});
+  list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
+                   [](const RunRecord& run) {
+                     return Scaled(Maximum(run,
+                                           [&](int64_t t) -> Answer {
+                                             const task_torque_t* task = run.task.at(t);
+                                             if (task == nullptr) return {};
+                                             return GetVector3(task->body_orientation_error).norm();
+                                           }),
+                                   kMilli);
+                   }});
+  list->push_back({"com_motion_max", "mm",
+                   "largest distance of the true COM from where it was when the window began",
+                   ComMotion});
+  list->push_back({"com_motion_reference_max", "mm",
+                   "largest distance of the true COM from where it was when the window began, "
+                   "reference run",
+                   [](const RunRecord& run) { return OfReference(run, ComMotion); }});
+  list->push_back({"com_difference_max", "mm",
+                   "largest distance of the true COM from the reference run's at the same tick",
+                   ComDifference});
+  list->push_back({"body_rotation_x_max_first_double", "mrad",
+                   "largest body orientation error about x, first time on both feet",
+                   [](const RunRecord& run) { return BodyRotationOnBothFeet(run, true); }});
+  list->push_back({"body_rotation_x_max_last_double", "mrad",
+                   "largest body orientation error about x, last time on both feet (of several)",
+                   [](const RunRecord& run) { return BodyRotationOnBothFeet(run, false); }});
+  for (int foot = 0; foot < 2; ++foot) {
+    for (int axis = 0; axis < 3; ++axis) {
+      list->push_back(
+          {fmt::format("{}_foot_error_max_{}", kFoot[foot], kAxis[axis]), "mm",
+           fmt::format("largest distance of the {} foot from its reference while off the ground, "
+                       "{}",
+                       kFoot[foot], kAxis[axis]),
+           [foot, axis](const RunRecord& run) {
+             return Scaled(Maximum(run,
+                                   [&](int64_t t) -> Answer {
+                                     const auto f = static_cast<size_t>(foot);
+                                     const support_plan_t* plan = run.plan.at(t);
+                                     if (plan == nullptr || plan->in_contact[f] != 0) return {};
+                                     return std::abs(plan->foot_pose[f].position[axis] -
+                                                     plan->foot_reference[f].position[axis]);
+                                   }),
+                           kMilli);
+           }});
+    }
+  }
+}
+
+}  // namespace poise::logging

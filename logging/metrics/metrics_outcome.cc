@@ -1,0 +1,111 @@
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+
+void AddOutcome(MetricList* list) {
+  const auto duration = [](const RunRecord& run) { return Answer(run.time(run.num_ticks)); };
+  list->push_back({"duration_reached", "s", "simulated time of the run", duration});
+  list->push_back({"duration_reached_reference", "s", "simulated time of the reference run",
+                   [=](const RunRecord& run) { return OfReference(run, duration); }});
+  list->push_back({"fallen", "", "ticks in which the robot lay fallen (ground truth)",
+                   [](const RunRecord& run) {
+                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
+                       const ground_truth_t* truth = run.truth.at(t);
+                       if (truth == nullptr) return {};
+                       return truth->fallen != 0;
+                     });
+                   }});
+  const auto count_all = [&](const char* name, const char* text, auto holds) {
+    list->push_back({name, "", text, [holds](const RunRecord& run) -> Answer {
+                       Answer count;
+                       for (int64_t t = 0; t < run.num_ticks; ++t) {
+                         const std::optional<bool> held = holds(run, t);
+                         if (held) count = count.value_or(0) + (*held ? 1 : 0);
+                       }
+                       return count;
+                     }});
+  };
+  count_all("task_not_ok_ticks", "ticks of the whole run without a task torque",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const task_torque_t* task = run.task.at(t);
+              if (task == nullptr) return {};
+              return task->status != task_torque_t::STATUS_OK;
+            });
+  count_all("balance_not_ok_ticks",
+            "ticks of the whole run without balance torque for want of state or task torque",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const balance_torque_t* balance = run.balance.at(t);
+              if (balance == nullptr) return {};
+              return balance->status == balance_torque_t::STATUS_SINGULAR ||
+                     balance->status == balance_torque_t::STATUS_INVALID_STATE ||
+                     balance->status == balance_torque_t::STATUS_HELD;
+            });
+  count_all("command_not_ok_ticks", "ticks of the whole run with a command of invalid input",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const joint_command_t* command = run.command.at(t);
+              if (command == nullptr) return {};
+              return command->status == joint_command_t::STATUS_INVALID_INPUT;
+            });
+  count_all("waiting_ticks", "ticks of the whole run in which the schedule was held back",
+            [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+              const support_plan_t* plan = run.plan.at(t);
+              if (plan == nullptr) return {};
+              return plan->status == support_plan_t::STATUS_WAITING;
+            });
+  list->push_back({"waiting_time", "s", "time of the whole run in which the schedule was held back",
+                   [](const RunRecord& run) {
+                     return Scaled(FindMetric("waiting_ticks")->compute(run),
+                                   run.spec.tick_period());
+                   }});
+  list->push_back({"last_phase", "", "index of the scenario's phase at the end, from 0",
+                   [](const RunRecord& run) -> Answer {
+                     const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+                     if (plan == nullptr) return {};
+                     return plan->phase;
+                   }});
+  list->push_back({"real_time_factor", "", "simulated time over wall time (informs only)",
+                   [](const RunRecord& run) { return run.real_time_factor; }});
+}
+
+void AddLog(MetricList* list) {
+  const auto add = [&](const char* name, const char* text, int64_t ChannelCompleteness::*field) {
+    list->push_back({name, "", text, [field](const RunRecord& run) -> Answer {
+                       int64_t sum = 0;
+                       for (const ChannelCompleteness& channel : run.channels) {
+                         sum += channel.*field;
+                       }
+                       return static_cast<double>(sum);
+                     }});
+  };
+  add("log_messages", "messages of the graph's channels in the log",
+      &ChannelCompleteness::messages);
+  add("log_missing", "messages that the log lacks", &ChannelCompleteness::missing);
+  add("log_duplicate", "messages that the log holds twice", &ChannelCompleteness::duplicate);
+  add("log_out_of_order", "messages in the log before an earlier one",
+      &ChannelCompleteness::out_of_order);
+  list->push_back(
+      {"log_defects", "",
+       "messages missing (in real time components skip ticks: not counted there), twice, "
+       "out of order or unreadable, and damaged places",
+       [](const RunRecord& run) -> Answer {
+         int64_t sum = run.damages;
+         for (const ChannelCompleteness& c : run.channels) {
+           sum += (run.spec.realtime() ? 0 : c.missing) + c.duplicate + c.out_of_order + c.refused;
+         }
+         return static_cast<double>(sum);
+       }});
+  const auto health = [&](const char* name, const char* text, int64_t health_t::*field) {
+    list->push_back({name, "", text, [field](const RunRecord& run) -> Answer {
+                       if (run.health.empty()) return {};
+                       int64_t sum = 0;
+                       for (const auto& [component, health] : run.health) sum += health.*field;
+                       return static_cast<double>(sum);
+                     }});
+  };
+  health("packets_refused", "packets that the processes refused", &health_t::messages_refused);
+  health("gaps", "messages that the processes had to ask for again", &health_t::gaps);
+  health("messages_dropped", "messages dropped on purpose", &health_t::messages_dropped);
+  health("publish_errors", "messages that could not be sent", &health_t::publish_errors);
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,236 @@
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+// Of the robot's weight: a load whose centre of pressure stands out of a sensor noise of 1 N.
+constexpr double kReadableShare = 0.01;
+// Figure 17 shows half a second after the switch; what moves before it is not its doing.
+constexpr double kBeforeSwitch = 0.05, kAfterSwitch = 0.5;  // s
+
+/// m, of a sole; empty without ground truth.
+Answer TrueHeight(const RunRecord& run, size_t foot, int64_t tick) {
+  const ground_truth_t* truth = run.truth.at(tick);
+  if (truth == nullptr) return {};
+  return truth->foot_pose[foot].position[2];
+}
+
+/// mm, from lowest to highest, of the foot that stops being a support, about that tick.
+Answer LiftMotion(const RunRecord& run) {
+  const auto before = std::llround(kBeforeSwitch / run.spec.tick_period());
+  const auto after = std::llround(kAfterSwitch / run.spec.tick_period());
+  Answer largest;
+  for (const SupportChange& change : SupportChanges(run)) {
+    if (change.tick < run.first_tick) continue;
+    for (size_t foot = 0; foot < 2; ++foot) {
+      if (!change.lifted(foot)) continue;
+      Answer low, high;
+      for (int64_t t = change.tick - before; t <= change.tick + after; ++t) {
+        const Answer z = TrueHeight(run, foot, t);
+        if (!z) continue;
+        low = std::min(low.value_or(*z), *z);
+        high = std::max(high.value_or(*z), *z);
+      }
+      if (low) largest = std::max(largest.value_or(0), kMilli * (*high - *low));
+    }
+  }
+  return largest;
+}
+
+/// First tick at which `foot` stands again after it was off the ground: its contact confirmed, or,
+/// where nothing confirms, a support.
+std::optional<int64_t> FirstStand(const RunRecord& run, size_t foot) {
+  for (const TouchDown& touch : TouchDowns(run)) {
+    if (touch.foot == foot && touch.tick >= run.first_tick) return touch.tick;
+  }
+  for (const SupportChange& change : SupportChanges(run)) {
+    if (change.tick >= run.first_tick && !change.before[foot] && change.after[foot]) {
+      return change.tick;
+    }
+  }
+  return {};
+}
+
+/// mm, by which a foot that was set down went lower until it was lifted again.
+Answer Sink(const RunRecord& run, size_t foot) {
+  const std::optional<int64_t> stand = FirstStand(run, foot);
+  if (!stand) return {};
+  int64_t end = run.num_ticks;
+  for (const SupportChange& change : SupportChanges(run)) {
+    if (change.tick > *stand && change.lifted(foot)) {
+      end = change.tick;
+      break;
+    }
+  }
+  const Answer start = TrueHeight(run, foot, *stand);
+  if (!start) return {};
+  double lowest = *start;
+  for (int64_t t = *stand; t < end; ++t) {
+    lowest = std::min(lowest, TrueHeight(run, foot, t).value_or(lowest));
+  }
+  return kMilli * (*start - lowest);
+}
+
+/// Roll (32) or pitch (33) of a sole: where its margin and its moment stand.
+struct Edge {
+  const char* name;
+  int margin;
+  size_t moment;
+};
+constexpr Edge kEdges[] = {{"roll", 3, 0}, {"pitch", 4, 1}};
+
+/// m, half of the sole's width or length on one foot [0] and on both [1], as the command's own
+/// margins have it: margin = half |F_z| - |M|, at the tick of the largest load.
+std::array<Answer, 2> SoleHalf(const RunRecord& run, size_t foot, const Edge& edge) {
+  std::array<Answer, 2> half;
+  std::array<double, 2> largest{};
+  for (int64_t t = 0; t < run.num_ticks; ++t) {
+    const Answer margin = FootMargin(run, static_cast<int>(foot), edge.margin, t);
+    if (!margin) continue;
+    const joint_command_t& command = *run.command.at(t);
+    const size_t support = command.in_contact[0] != 0 && command.in_contact[1] != 0 ? 1 : 0;
+    const double load = std::abs(command.foot_wrench[foot].force[2]);
+    if (load <= largest[support]) continue;
+    largest[support] = load;
+    half[support] = (*margin + std::abs(command.foot_wrench[foot].moment[edge.moment])) / load;
+  }
+  return half;
+}
+
+/// True when the reading at a tick breaks the condition; empty out of contact or unloaded.
+std::function<std::optional<bool>(int64_t)> MeasuredViolation(const RunRecord& run, size_t foot,
+                                                              const Edge& edge) {
+  return [&run, foot, edge, half = SoleHalf(run, foot, edge)](int64_t t) -> std::optional<bool> {
+    const joint_command_t* command = run.command.at(t - 1);
+    const robot_sensors_t* sensors = run.sensors.at(t);
+    if (command == nullptr || sensors == nullptr || command->in_contact[foot] == 0) return {};
+    const Answer limit = half[command->in_contact[0] != 0 && command->in_contact[1] != 0 ? 1 : 0];
+    const wrench_t& wrench = sensors->foot_wrench[foot];
+    const double load = -wrench.force[2];
+    if (!limit || load < kReadableShare * run.robot.total_mass() * robot::kGravity) return {};
+    return std::abs(wrench.moment[edge.moment]) > load * *limit;
+  };
+}
+
+void AddViolations(MetricList* list) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    for (const Edge& edge : kEdges) {
+      list->push_back(
+          {fmt::format("{}_foot_{}_violation_measured", kFoot[foot], edge.name), "s",
+           fmt::format("time in which the measured wrench of the loaded {} foot breaks ({})",
+                       kFoot[foot], 29 + edge.margin),
+           [foot, edge](const RunRecord& run) {
+             return Scaled(CountTicks(run, MeasuredViolation(run, foot, edge)),
+                           run.spec.tick_period());
+           }});
+      list->push_back(
+          {fmt::format("{}_foot_{}_violation_after_contact", kFoot[foot], edge.name), "s",
+           fmt::format("time in which the measured wrench of the loaded {} foot breaks ({}) after "
+                       "it was set down",
+                       kFoot[foot], 29 + edge.margin),
+           [foot, edge](const RunRecord& run) -> Answer {
+             const std::optional<int64_t> stand = FirstStand(run, foot);
+             if (!stand) return {};
+             const auto violated = MeasuredViolation(run, foot, edge);
+             return Scaled(CountTicks(run,
+                                      [&](int64_t t) -> std::optional<bool> {
+                                        if (t < *stand) return {};
+                                        return violated(t);
+                                      }),
+                           run.spec.tick_period());
+           }});
+      list->push_back(
+          {fmt::format("{}_foot_{}_violation_first", kFoot[foot], edge.name), "s",
+           fmt::format("first time at which the measured wrench of the loaded {} foot breaks ({})",
+                       kFoot[foot], 29 + edge.margin),
+           [foot, edge](const RunRecord& run) -> Answer {
+             const auto violated = MeasuredViolation(run, foot, edge);
+             return Minimum(run, [&](int64_t t) -> Answer {
+               if (!violated(t).value_or(false)) return {};
+               return run.time(t);
+             });
+           }});
+    }
+  }
+}
+
+void AddTouchDowns(MetricList* list) {
+  list->push_back({"touch_down", "s",
+                   "first time that the measured load of a foot that came down lasted",
+                   [](const RunRecord& run) -> Answer {
+                     for (const TouchDown& touch : TouchDowns(run)) {
+                       if (touch.tick >= run.first_tick) return run.time(touch.tick);
+                     }
+                     return {};
+                   }});
+  const auto count = [&](const char* name, const char* text, Timing timing) {
+    list->push_back({name, "", text, [timing](const RunRecord& run) -> Answer {
+                       if (run.plan.empty()) return {};
+                       int found = 0;
+                       for (const TouchDown& touch : TouchDowns(run)) {
+                         if (touch.tick < run.first_tick) continue;
+                         if (touch.timing == Timing::kUnknown) return {};
+                         found += touch.timing == timing ? 1 : 0;
+                       }
+                       return found;
+                     }});
+  };
+  count("early_contacts", "feet that touched down above the end of the foot's reference",
+        Timing::kEarly);
+  count("late_contacts", "feet that touched down below the end of the foot's reference",
+        Timing::kLate);
+  list->push_back({"no_surface_stops", "", "times that a foot found no surface and was retracted",
+                   [](const RunRecord& run) -> Answer {
+                     if (run.plan.empty()) return {};
+                     int stops = 0;
+                     for (int foot = 0; foot < 2; ++foot) {
+                       const auto retracted =
+                           [&, f = static_cast<size_t>(foot)](int64_t t) -> std::optional<bool> {
+                         const support_plan_t* plan = run.plan.at(t);
+                         if (plan == nullptr) return {};
+                         return plan->foot_state[f] == support_plan_t::FOOT_RETRACTED;
+                       };
+                       for (const Interval& stop : Intervals(run, retracted)) {
+                         stops += stop.begin >= run.first_tick ? 1 : 0;
+                       }
+                     }
+                     return stops;
+                   }});
+  list->push_back({"contact_lost_ticks", "",
+                   "ticks in which a foot that was to be loaded read no more than noise",
+                   [](const RunRecord& run) {
+                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
+                       const auto right = ContactLost(run, 0, t), left = ContactLost(run, 1, t);
+                       if (!right && !left) return {};
+                       return right.value_or(false) || left.value_or(false);
+                     });
+                   }});
+}
+
+}  // namespace
+
+void AddTransitions(MetricList* list) {
+  const std::string lift = fmt::format(
+      "largest vertical motion, peak to peak, of the foot that stops being a support, from {} s "
+      "before to {} s after (ground truth)",
+      kBeforeSwitch, kAfterSwitch);
+  list->push_back({"foot_lift_motion_z", "mm", lift, LiftMotion});
+  list->push_back({"foot_lift_motion_z_reference", "mm", lift + ", reference run",
+                   [](const RunRecord& run) { return OfReference(run, LiftMotion); }});
+  for (size_t foot = 0; foot < 2; ++foot) {
+    list->push_back(
+        {fmt::format("{}_foot_sink", kFoot[foot]), "mm",
+         fmt::format("how far the {} foot sinks after it was set down (ground truth)", kFoot[foot]),
+         [foot](const RunRecord& run) { return Sink(run, foot); }});
+  }
+  AddTouchDowns(list);
+  AddViolations(list);
+}
+
+}  // namespace poise::logging

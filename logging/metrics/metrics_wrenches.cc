@@ -1,0 +1,192 @@
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+/// Root of the mean square of measured less computed wrenches of `feet`, `square` of each.
+Answer WrenchErrorRms(const RunRecord& run, std::initializer_list<int> feet,
+                      const std::function<double(const balance::Vector6d&)>& square) {
+  MeanSquare mean;
+  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+    for (const int foot : feet) {
+      if (const auto e = WrenchError(run, foot, t)) mean.Add(square(*e));
+    }
+  }
+  return mean.Root();
+}
+
+/// The force errors of both feet in the world's axes, and the ratio they were computed for.
+struct ForceErrors {
+  Eigen::Vector3d right, left;
+  double eta;
+};
+
+std::optional<ForceErrors> BothForceErrors(const RunRecord& run, int64_t tick) {
+  const auto right = WrenchError(run, 0, tick), left = WrenchError(run, 1, tick);
+  if (!right || !left) return {};
+  const support_plan_t& plan = *run.plan.at(tick - 1);
+  return ForceErrors{GetPose(plan.foot_pose[0]).linear() * right->head<3>(),
+                     GetPose(plan.foot_pose[1]).linear() * left->head<3>(),
+                     run.command.at(tick - 1)->eta};
+}
+
+/// With e = measured less computed and E = e_r + e_l: e_r = eta E + i, e_l = (1 - eta) E - i.
+void AddInternalError(MetricList* list) {
+  const auto add = [&](const char* name, const char* text, auto square) {
+    list->push_back({name, "N", text, [square](const RunRecord& run) {
+                       MeanSquare mean;
+                       for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+                         if (const auto e = BothForceErrors(run, t)) mean.Add(square(*e));
+                       }
+                       return mean.Root();
+                     }});
+  };
+  add("foot_force_error_internal_rms",
+      "the same while on both feet, of the part with opposite signs that moves nothing, RMS",
+      [](const ForceErrors& e) { return ((1 - e.eta) * e.right - e.eta * e.left).squaredNorm(); });
+  add("foot_force_error_resultant_rms",
+      "the same while on both feet, of a foot's share of the resultant's error, RMS",
+      [](const ForceErrors& e) {
+        return 0.5 * (e.eta * e.eta + (1 - e.eta) * (1 - e.eta)) * (e.right + e.left).squaredNorm();
+      });
+}
+
+void AddFootErrors(MetricList* list) {
+  const auto add = [&](const char* name, const char* unit, const char* text, auto square) {
+    for (int foot = 0; foot < 2; ++foot) {
+      list->push_back(
+          {fmt::format("{}_foot_{}_error_rms", kFoot[foot], name), unit,
+           fmt::format("measured less computed {} of the {} foot, RMS", text, kFoot[foot]),
+           [foot, square](const RunRecord& run) { return WrenchErrorRms(run, {foot}, square); }});
+    }
+  };
+  using W = balance::Vector6d;
+  add("force_z", "N", "F_z", [](const W& e) { return e[2] * e[2]; });
+  add("force_xy", "N", "(F_x, F_y)", [](const W& e) { return e.head<2>().squaredNorm(); });
+  add("moment_xy", "N·m", "(M_x, M_y)", [](const W& e) { return e.segment<2>(3).squaredNorm(); });
+  add("moment_z", "N·m", "M_z", [](const W& e) { return e[5] * e[5]; });
+}
+
+/// N, 0 - F_z (never minus zero) of a foot in contact: computed at `tick`, or read there for the
+/// command before.
+Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) {
+  const joint_command_t* command = run.command.at(measured ? tick - 1 : tick);
+  if (command == nullptr || command->in_contact[foot] == 0) return {};
+  if (!measured) return 0.0 - command->foot_wrench[foot].force[2];
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  if (sensors == nullptr) return {};
+  return 0.0 - sensors->foot_wrench[foot].force[2];
+}
+
+void AddFootLoads(MetricList* list) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    for (const bool measured : {false, true}) {
+      const char* kind = measured ? "measured" : "computed";
+      const auto load = [foot, measured](const RunRecord& run) {
+        return [&run, foot, measured](int64_t t) { return FootLoad(run, foot, measured, t); };
+      };
+      list->push_back({fmt::format("{}_foot_load_{}_min", kFoot[foot], kind), "N",
+                       fmt::format("smallest {} load of the {} foot in contact", kind, kFoot[foot]),
+                       [load](const RunRecord& run) { return Minimum(run, load(run)); }});
+      list->push_back({fmt::format("{}_foot_load_{}_max", kFoot[foot], kind), "N",
+                       fmt::format("largest {} load of the {} foot in contact", kind, kFoot[foot]),
+                       [load](const RunRecord& run) { return Maximum(run, load(run)); }});
+    }
+  }
+}
+
+void AddTangential(MetricList* list) {
+  const auto add = [&](const char* name, const char* unit, const char* text, auto size) {
+    list->push_back({name, unit, text, [size](const RunRecord& run) {
+                       return Maximum(run, [&](int64_t t) -> Answer {
+                         const joint_command_t* command = run.command.at(t);
+                         Answer largest;
+                         for (size_t foot = 0; command != nullptr && foot < 2; ++foot) {
+                           if (command->in_contact[foot] == 0) continue;
+                           const double value = size(command->foot_wrench[foot]);
+                           largest = std::max(largest.value_or(0), value);
+                         }
+                         return largest;
+                       });
+                     }});
+  };
+  add("foot_tangential_force_computed_max", "N", "largest computed (F_x, F_y) of a foot",
+      [](const wrench_t& w) { return std::hypot(w.force[0], w.force[1]); });
+  add("foot_yaw_moment_computed_max", "N·m", "largest computed M_z of a foot",
+      [](const wrench_t& w) { return std::abs(w.moment[2]); });
+}
+
+/// Largest less smallest ratio while both feet are in contact.
+Answer RatioSpan(const RunRecord& run) {
+  const auto ratio = [&](int64_t t) -> Answer {
+    const joint_command_t* command = run.command.at(t);
+    if (command == nullptr || command->in_contact[0] == 0 || command->in_contact[1] == 0) return {};
+    return command->eta;
+  };
+  const Answer lowest = Minimum(run, ratio), highest = Maximum(run, ratio);
+  if (!lowest || !highest) return {};
+  return *highest - *lowest;
+}
+
+}  // namespace
+
+void AddWrenches(MetricList* list) {
+  list->push_back({"violated_ticks", "", "ticks in which a computed wrench breaks a condition",
+                   [](const RunRecord& run) {
+                     return CountTicks(run, [&](int64_t t) { return Violated(run, t); });
+                   }});
+  list->push_back({"eta_infeasible_ticks", "", "ticks in which no ratio eta met all conditions",
+                   [](const RunRecord& run) {
+                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
+                       const joint_command_t* command = run.command.at(t);
+                       if (command == nullptr) return {};
+                       return command->eta_feasible == 0;
+                     });
+                   }});
+  const auto eta = [](const RunRecord& run) {
+    return [&run](int64_t t) -> Answer {
+      const joint_command_t* command = run.command.at(t);
+      if (command == nullptr) return {};
+      return command->eta;
+    };
+  };
+  list->push_back({"eta_lowest", "", "smallest ratio eta, (61)",
+                   [eta](const RunRecord& run) { return Minimum(run, eta(run)); }});
+  list->push_back({"eta_highest", "", "largest ratio eta, (61)",
+                   [eta](const RunRecord& run) { return Maximum(run, eta(run)); }});
+  list->push_back(
+      {"eta_span", "", "largest less smallest ratio eta while on both feet", RatioSpan});
+  constexpr const char* kMargin[] = {"normal", "friction", "yaw", "roll", "pitch"};
+  for (int foot = 0; foot < 2; ++foot) {
+    for (int margin = 0; margin < 5; ++margin) {
+      list->push_back(
+          {fmt::format("{}_foot_{}_margin", kFoot[foot], kMargin[margin]), margin < 2 ? "N" : "N·m",
+           fmt::format("smallest margin of the {} foot's computed wrench, ({})", kFoot[foot],
+                       29 + margin),
+           [foot, margin](const RunRecord& run) {
+             return Minimum(run, [&](int64_t t) { return FootMargin(run, foot, margin, t); });
+           }});
+    }
+  }
+  const auto error = [&](const char* name, const char* unit, const char* text, int first) {
+    list->push_back({name, unit, text, [first](const RunRecord& run) {
+                       return WrenchErrorRms(run, {0, 1}, [first](const balance::Vector6d& e) {
+                         return e.segment<3>(first).squaredNorm();
+                       });
+                     }});
+  };
+  error("foot_force_error_rms", "N", "measured less computed foot force, RMS", 0);
+  error("foot_moment_error_rms", "N·m", "measured less computed foot moment, RMS", 3);
+  AddInternalError(list);
+  AddFootErrors(list);
+  AddFootLoads(list);
+  AddTangential(list);
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,48 @@
+#include "logging/recording/inline_recorder.h"
+
+#include <algorithm>
+
+#include "components/framework/run.h"
+
+namespace poise::logging {
+
+InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec,
+                               const std::string& scenario, InlineRunner* runner)
+    : writer_(path, spec, MakeRunInfo(spec, scenario)), runner_(runner) {
+  runner->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
+    const auto size = static_cast<size_t>(output.encoded_size());
+    if (buffer_.size() < size) buffer_.resize(size);
+    output.Encode(buffer_.data(), static_cast<int>(size));
+    writer_.AddMessage(channel, tick.index, {buffer_.data(), size});
+  });
+}
+
+health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component) {
+  const int64_t ticks = runner.ticks_completed();
+  health_t health{};
+  health.run_id = spec.run_id();
+  health.component = spec.graph().component(component).name();
+  health.tick = ticks - 1;
+  health.utime = ticks > 0 ? MakeTick(ticks - 1, spec.tick_period()).utime : 0;
+  health.state = runner.failed() ? health_t::STATE_FAILED : health_t::STATE_FINISHED;
+  health.detail = runner.end_detail();
+  health.ticks_completed = ticks;
+  const LatencyHistogram& latency = runner.latency(component);
+  health.latency_median = latency.median();
+  health.latency_p99 = latency.p99();
+  health.latency_max = latency.max();
+  std::ranges::copy(latency.HalfOctaves(), health.latency_count);
+  return health;
+}
+
+void InlineRecorder::Close(const RunSpec& spec) {
+  for (int i = 0; i < spec.graph().component_size(); ++i) {
+    const health_t health = FinalHealth(spec, *runner_, i);
+    std::vector<uint8_t> bytes(static_cast<size_t>(health.getEncodedSize()));
+    health.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    writer_.AddHealth(HealthChannel(health.component), bytes);
+  }
+  writer_.Close();
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,36 @@
+// Records a graph that runs inside this process.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "components/framework/runners/inline_runner.h"
+#include "logging/run_log_writer.h"
+#include "poise/health_t.hpp"
+
+namespace poise::logging {
+
+/// The health of a component (an index in the graph) as it stands.
+health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component);
+
+/// Taps an InlineRunner and writes the log that the recorder's process would write of the same run,
+/// apart from health. Both must outlive the last Step of the runner.
+class InlineRecorder {
+ public:
+  /// Installs itself as the runner's tap. `spec` must hold the channels' counts. Throws LogError.
+  InlineRecorder(const std::string& path, const RunSpec& spec, const std::string& scenario,
+                 InlineRunner* runner);
+
+  /// Writes the components' health as it stands, and closes. Throws LogError.
+  void Close(const RunSpec& spec);
+  const RunLogWriter& writer() const { return writer_; }
+  void Flush() { writer_.Flush(); }
+
+ private:
+  RunLogWriter writer_;
+  InlineRunner* runner_;
+  std::vector<uint8_t> buffer_;
+};
+
+}  // namespace poise::logging

@@ -1,0 +1,110 @@
+#include "logging/recording/recorder.h"
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "components/framework/bus/channel_collector.h"
+#include "components/framework/bus/udp_bus.h"
+#include "components/framework/clock.h"
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "logging/run_log_writer.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr int64_t kFlushInterval = 50'000'000;  // ns
+constexpr int kSpin = 50;                       // ms
+constexpr int kLastSpins = 20;                  // each takes a batch of every channel
+
+void WriteReport(const std::string& path, const RunSpec& spec, const RecorderReport& report,
+                 const ChannelCollector& collector) {
+  nlohmann::ordered_json json;
+  json["run_id"] = spec.run_id();
+  json["complete"] = report.complete;
+  json["ticks"] = report.ticks;
+  json["events"] = report.events;
+  json["missing"] = report.missing;
+  json["requested"] = report.requested;
+  json["duplicates"] = report.duplicates;
+  json["refused"] = report.refused;
+  json["mirror_errors"] = report.mirror_errors;
+  for (int i = 0; i < spec.graph().channel_size(); ++i) {
+    const ChannelCollector::ChannelStatistics& s = collector.statistics(i);
+    json["channels"].push_back({{"name", spec.graph().channel(i).name()},
+                                {"delivered", s.delivered},
+                                {"requested", s.requested},
+                                {"skipped", s.skipped},
+                                {"duplicates", s.duplicates},
+                                {"refused", s.refused}});
+  }
+  std::ofstream out(path);
+  out << json.dump(2) << "\n";
+  if (!out.flush()) {
+    throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
+}
+
+}  // namespace
+
+RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
+  RecorderReport report;
+  RunLogWriter writer(options.log_path, spec, MakeRunInfo(spec, options.scenario));
+  std::optional<BusSender> mirror;
+  if (options.mirror) mirror.emplace(MirrorUrl(spec));
+  std::vector<std::string> names;
+  for (const Channel& channel : spec.graph().channel()) names.push_back(channel.name());
+  const auto send = [&](const char* channel, std::span<const uint8_t> data) {
+    if (mirror && !mirror->Send(channel, data.data(), data.size())) ++report.mirror_errors;
+  };
+
+  ChannelCollector::Callbacks callbacks;
+  callbacks.message = [&](int channel, int64_t tick, std::span<const uint8_t> data) {
+    writer.AddMessage(channel, tick, data);
+    send(names[static_cast<size_t>(channel)].c_str(), data);
+  };
+  callbacks.skipped = [&](int channel, int64_t tick) { writer.Skip(channel, tick); };
+  callbacks.service = [&](std::string_view channel, std::span<const uint8_t> data) {
+    if (!channel.starts_with("HEALTH_")) return;
+    writer.AddHealth(channel, data);
+    send(std::string(channel).c_str(), data);
+  };
+  ChannelCollector collector(spec, "recorder", std::move(callbacks));
+
+  int64_t next_flush = 0;
+  try {
+    while (!collector.stopped() && (options.stop == nullptr || *options.stop == 0)) {
+      collector.Spin(kSpin);
+      const int64_t now = NowNanoseconds();
+      if (now >= next_flush) {
+        writer.Flush();
+        next_flush = now + kFlushInterval;
+      }
+    }
+    // What came before the stop still waits in the channels' sockets.
+    for (int i = 0; i < kLastSpins; ++i) collector.Spin(0);
+    writer.Close();
+  } catch (const LogError& error) {
+    // What this process prints may go to the same full disk.
+    collector.Fail(error.what());
+    throw;
+  }
+
+  report.complete = collector.complete();
+  report.ticks = writer.complete_ticks();
+  report.events = writer.events();
+  report.missing = writer.missing();
+  for (int i = 0; i < spec.graph().channel_size(); ++i) {
+    const ChannelCollector::ChannelStatistics& s = collector.statistics(i);
+    report.requested += s.requested;
+    report.duplicates += s.duplicates;
+    report.refused += s.refused;
+  }
+  if (!options.report_path.empty()) WriteReport(options.report_path, spec, report, collector);
+  return report;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,62 @@
+#include <sys/prctl.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+
+#include "components/framework/build_info.h"
+#include "components/framework/configuration.h"
+#include "components/framework/say_error.h"
+#include "fmt/format.h"
+#include "logging/recording/recorder.h"
+
+namespace {
+
+volatile std::sig_atomic_t stop_asked = 0;
+
+void OnSignal(int) { stop_asked = 1; }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  struct sigaction action {};
+  action.sa_handler = OnSignal;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error that is told
+
+  CLI::App app{"Records a Poise run as an LCM event log. Usually started by `poise run`.",
+               "recorder"};
+  app.set_version_flag("--version", poise::VersionText("recorder"));
+  std::string run_file;
+  std::string scenario_file;
+  poise::logging::RecorderOptions options;
+  options.stop = &stop_asked;
+  app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
+  app.add_option("--log", options.log_path, "event log to write")->required();
+  app.add_option("--report", options.report_path, "counters at the end, as JSON");
+  app.add_option("--scenario", scenario_file, "scenario text to keep in the log");
+  app.add_flag("--mirror,!--no-mirror", options.mirror, "send everything to the run's public URL");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    poise::SayError(fmt::format("recorder: {}; see recorder --help", error.what()));
+    return 2;
+  }
+  try {
+    poise::RunSpec spec;
+    poise::ReadTextProto(run_file, &spec);
+    if (!scenario_file.empty()) options.scenario = poise::ReadFile(scenario_file);
+    poise::logging::Record(spec, options);
+    return 0;
+  } catch (const poise::ConfigError& error) {
+    poise::SayError(fmt::format("recorder: {}", error.what()));
+    return 2;
+  } catch (const std::exception& error) {
+    poise::SayError(fmt::format("recorder: {}", error.what()));
+    return 1;
+  }
+}

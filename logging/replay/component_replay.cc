@@ -1,0 +1,328 @@
+#include "logging/replay/component_replay.h"
+
+#include <algorithm>
+#include <memory>
+#include <set>
+
+#include "components/framework/bus/owned_message.h"
+#include "components/framework/clock.h"
+#include "components/framework/graph.h"
+#include "components/framework/run.h"
+#include "fmt/format.h"
+#include "logging/replay/message_difference.h"
+#include "logging/run_record.h"
+
+namespace poise::logging {
+namespace {
+
+/// "foot_wrench.force" of "foot_wrench[1].force[2]".
+std::string WithoutIndexes(const std::string& path) {
+  std::string field;
+  bool index = false;
+  for (const char c : path) {
+    index = index || c == '[';
+    if (!index) field.push_back(c);
+    index = index && c != ']';
+  }
+  return field;
+}
+
+void AddDifferences(const MessageType& type, std::span<const uint8_t> logged,
+                    std::span<const uint8_t> replayed, int64_t tick, ReplayedChannel* channel) {
+  const auto scalars = DifferingScalars(type, logged, replayed);
+  if (!scalars) throw LogError(fmt::format("{}: tick {}: not decodable", channel->channel, tick));
+  if (channel->differing++ == 0) {
+    channel->first_differing_tick = tick;
+    channel->first_field = scalars->front().path;
+  }
+  for (const ScalarDifference& scalar : *scalars) {
+    const std::string name = WithoutIndexes(scalar.path);
+    const auto same = [&](const FieldDifference& field) { return field.field == name; };
+    auto field = std::find_if(channel->fields.begin(), channel->fields.end(), same);
+    if (field == channel->fields.end()) {
+      channel->fields.push_back({name, tick, -1, 0, {}, 0, -1, {}, {}});
+      field = channel->fields.end() - 1;
+    }
+    field->ticks += field->last_tick != tick ? 1 : 0;
+    field->last_tick = tick;
+    if (scalar.size > field->largest) {
+      field->largest = scalar.size;
+      field->largest_path = scalar.path;
+      field->largest_tick = tick;
+      field->logged = scalar.first;
+      field->replayed = scalar.second;
+    }
+  }
+}
+
+}  // namespace
+
+bool ReplayedComponent::equal() const {
+  return std::all_of(outputs.begin(), outputs.end(),
+                     [](const ReplayedChannel& output) { return output.differing == 0; });
+}
+
+LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
+  std::map<std::string, size_t, std::less<>> index;
+  for (const Channel& channel : spec().graph().channel()) {
+    index[channel.name()] = lanes_.size();
+    lanes_.push_back(
+        {ChannelTicks(spec(), channel, messages_.reader().file_size()), &ChannelType(channel), {}});
+  }
+  external_.resize(lanes_.size());
+  LogEvent event;
+  int64_t newest = -1;
+  while (messages_.reader().Next(&event)) {
+    const auto found = index.find(event.channel);
+    if (found == index.end()) continue;
+    const auto i = static_cast<int>(found->second);
+    Lane& lane = lanes_[found->second];
+    if (spec().graph().channel(i).external()) {
+      if (messages_.TypeOf(event) == lane.type) {
+        external_[found->second].push_back({newest + 1, false, event.data});
+      }
+      continue;
+    }
+    const std::optional<int64_t> tick = lane.ticks.Check(event.data);
+    if (!tick) continue;
+    lane.ticks.Take(*tick);
+    newest = std::max(newest, *tick);
+    lane.by_tick.Set(*tick, event.data);
+  }
+}
+
+/// A component with its ports' places in the log.
+class ReplayedStages {
+ public:
+  ReplayedStages(const LogReplay& log, const RunSpec& spec, int index,
+                 const ComponentRegistry& registry)
+      : log_(log), spec_(spec), instance_(spec.graph().component(index)) {
+    const ComponentFactory* const factory = registry.Find(poise::TypeOf(instance_));
+    if (factory == nullptr) {
+      Fail(fmt::format("this program has no component type '{}'", poise::TypeOf(instance_)));
+    }
+    component_ = ConfigureComponent(spec, index, *factory, &shared_);
+    CheckWiring(spec.graph(), index, component_.wiring);
+    for (const Stage& stage : component_.wiring.stages()) Bind(stage);
+    CheckLog();
+  }
+
+  ReplayedComponent Run() {
+    ReplayedComponent result;
+    result.name = component_.name;
+    result.ticks = end_;
+    for (const BoundStage& stage : stages_) {
+      for (const Output& output : stage.outputs) {
+        result.outputs.emplace_back().channel = spec_.graph().channel(output.channel).name();
+      }
+    }
+    const int64_t start = NowNanoseconds();
+    for (int64_t t = 0; t < end_; ++t) {
+      const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
+      size_t first_output = 0;
+      for (BoundStage& stage : stages_) {
+        if (t < stage.end) RunStage(&stage, tick, first_output, &result);
+        first_output += stage.outputs.size();
+      }
+    }
+    result.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
+    return result;
+  }
+
+ private:
+  struct Input {
+    InputPort* port;
+    int channel;
+    OwnedMessage message;
+    std::vector<ExternalMessage> external;  // of kLatest
+    size_t next_external = 0;
+    bool present = false;
+  };
+  struct Output {
+    OutputPort* port;
+    int channel;
+  };
+  struct BoundStage {
+    const Stage* stage;
+    std::vector<Input> inputs;
+    std::vector<Output> outputs;
+    int64_t end = 0;  // first tick that is not replayed
+  };
+
+  [[noreturn]] void Fail(const std::string& problem) const {
+    throw LogError(
+        fmt::format("{}: {} cannot be replayed: {}", log_.path_, instance_.name(), problem));
+  }
+
+  /// Index of the channel at the component's port; CheckWiring has found it.
+  int ChannelOf(const google::protobuf::RepeatedPtrField<Connection>& connections,
+                const std::string& port) const {
+    const auto& channels = spec_.graph().channel();
+    for (const Connection& connection : connections) {
+      if (connection.port() != port) continue;
+      for (int i = 0; i < channels.size(); ++i) {
+        if (channels[i].name() == connection.channel()) return i;
+      }
+    }
+    Fail(fmt::format("port {} has no channel in the log's graph", port));
+  }
+
+  void Bind(const Stage& stage) {
+    BoundStage bound{&stage, {}, {}, 0};
+    for (InputPort* port : stage.inputs) {
+      const int channel = ChannelOf(instance_.input(), port->name());
+      CheckSize(channel, port->encoded_size());
+      bound.inputs.push_back({port, channel, OwnedMessage(port), External(port, channel)});
+    }
+    for (OutputPort* port : stage.outputs) {
+      const int channel = ChannelOf(instance_.output(), port->name());
+      CheckSize(channel, port->encoded_size());
+      bound.outputs.push_back({port, channel});
+      end_ = std::max(end_, lane(channel).ticks.newest() + 1);
+    }
+    stages_.push_back(std::move(bound));
+  }
+
+  /// The messages of an external channel, placed in the ticks that the component itself tells.
+  std::vector<ExternalMessage> External(const InputPort* port, int channel) const {
+    if (port->kind() != InputKind::kLatest) return {};
+    std::vector<ExternalMessage> messages = log_.external_[static_cast<size_t>(channel)];
+    if (lane(channel).type != FindMessageType("emergency_stop_t")) return messages;
+    for (const OutputPort* output : component_.wiring.outputs()) {
+      const int status = ChannelOf(instance_.output(), output->name());
+      if (lane(status).type == FindMessageType("bridge_status_t")) {
+        PlaceEmergencyStops(lane(status).by_tick, &messages);
+      }
+    }
+    return messages;
+  }
+
+  void CheckSize(int channel, int size) const {
+    const Channel& c = spec_.graph().channel(channel);
+    const std::vector<int32_t> counts(c.count().begin(), c.count().end());
+    if (lane(channel).type->encoded_size(counts) != size) {
+      Fail(fmt::format("{}: its messages do not have the counts of the log's robot", c.name()));
+    }
+  }
+
+  /// What the log lacks, all of it in one error.
+  void CheckLog() {
+    std::vector<std::string> lacking;
+    if (end_ == 0) lacking.push_back("the log holds no message of its outputs");
+    std::set<int> named;
+    for (BoundStage& stage : stages_) {
+      // The recording may have ended inside the last tick.
+      const auto has_last = [&](int channel) { return lane(channel).ticks.newest() >= end_ - 1; };
+      bool last = true;
+      for (const Output& output : stage.outputs) last = last && has_last(output.channel);
+      for (const Input& input : stage.inputs) {
+        const bool same_tick = input.port->kind() == InputKind::kSameTick;
+        if (stage.outputs.empty() && same_tick) last = last && has_last(input.channel);
+      }
+      stage.end = last ? end_ : end_ - 1;
+      for (const Output& output : stage.outputs) {
+        if (named.insert(output.channel).second) {
+          AddMissing(output.channel, stage.end, "to compare with", &lacking);
+        }
+      }
+      for (const Input& input : stage.inputs) {
+        if (input.port->kind() == InputKind::kLatest) continue;
+        const bool previous = input.port->kind() == InputKind::kPreviousTick;
+        if (named.insert(input.channel).second) {
+          AddMissing(input.channel, previous ? stage.end - 1 : stage.end, "to feed it", &lacking);
+        }
+      }
+    }
+    if (lacking.empty()) return;
+    std::string text;
+    for (const std::string& line : lacking) text += (text.empty() ? "" : "; ") + line;
+    const bool cut = spec_.cut().first_tick() > 0 || !spec_.cut().channel().empty();
+    Fail(text + (cut ? "; it is cut from a longer log, which may have it" : ""));
+  }
+
+  void AddMissing(int channel, int64_t end, const char* purpose,
+                  std::vector<std::string>* lacking) const {
+    const std::vector<TickRange> missing = lane(channel).ticks.Missing(0, end);
+    if (missing.empty()) return;
+    const int64_t refused = lane(channel).ticks.refused();
+    lacking->push_back(fmt::format(
+        "the log lacks {} of tick {} to {}{}, {}{}", spec_.graph().channel(channel).name(),
+        missing.front().first, missing.front().last,
+        missing.size() > 1 ? fmt::format(" and {} more ranges", missing.size() - 1) : "", purpose,
+        refused > 0 ? fmt::format(" ({} messages of it are refused: poise log check)", refused)
+                    : ""));
+  }
+
+  /// Shows an input the message it had in the run.
+  void Show(Input* input, int64_t tick, ReplayedComponent* result) {
+    const InputKind kind = input->port->kind();
+    if (kind == InputKind::kLatest) {
+      while (input->next_external < input->external.size() &&
+             input->external[input->next_external].tick <= tick) {
+        const ExternalMessage& message = input->external[input->next_external++];
+        ++result->external_messages;
+        result->unplaced_messages += message.certain ? 0 : 1;
+        input->present = Decode(input, message.data) || input->present;
+      }
+    } else {
+      const int64_t wanted = kind == InputKind::kPreviousTick ? tick - 1 : tick;
+      input->present = wanted >= 0;
+      if (input->present && !Decode(input, Logged(input->channel, wanted))) {
+        Fail(fmt::format("{} of tick {} is not finite",
+                         spec_.graph().channel(input->channel).name(), wanted));
+      }
+    }
+    input->port->Bind(input->present ? input->message.get() : nullptr);
+  }
+
+  static bool Decode(Input* input, std::span<const uint8_t> data) {
+    return static_cast<int>(data.size()) == input->port->encoded_size() &&
+           input->port->Decode(data.data(), static_cast<int>(data.size()), input->message.get());
+  }
+
+  void RunStage(BoundStage* stage, const Tick& tick, size_t first_output,
+                ReplayedComponent* result) {
+    for (Input& input : stage->inputs) Show(&input, tick.index, result);
+    for (const Output& output : stage->outputs) {
+      output.port->Stamp(spec_.run_id(), tick.index, tick.utime);
+    }
+    stage->stage->run(tick);
+    for (const Input& input : stage->inputs) input.port->Bind(nullptr);
+    for (size_t i = 0; i < stage->outputs.size(); ++i) {
+      const Output& output = stage->outputs[i];
+      const auto size = static_cast<size_t>(output.port->encoded_size());
+      buffer_.resize(size);
+      output.port->Encode(buffer_.data(), static_cast<int>(size));
+      ReplayedChannel& channel = result->outputs[first_output + i];
+      const std::span<const uint8_t> logged = Logged(output.channel, tick.index);
+      ++channel.ticks;
+      if (!SameBits(*lane(output.channel).type, logged, buffer_)) {
+        AddDifferences(*lane(output.channel).type, logged, buffer_, tick.index, &channel);
+      }
+    }
+  }
+
+  const LogReplay::Lane& lane(int channel) const {
+    return log_.lanes_[static_cast<size_t>(channel)];
+  }
+  std::span<const uint8_t> Logged(int channel, int64_t tick) const {
+    const std::span<const uint8_t>* const data = lane(channel).by_tick.at(tick);
+    return data == nullptr ? std::span<const uint8_t>() : *data;
+  }
+
+  const LogReplay& log_;
+  const RunSpec& spec_;
+  const ComponentInstance& instance_;
+  SharedObjects shared_;  // of its own, as in a process
+  ConfiguredComponent component_;
+  std::vector<BoundStage> stages_;
+  int64_t end_ = 0;
+  std::vector<uint8_t> buffer_;
+};
+
+ReplayedComponent LogReplay::Replay(const RunSpec& spec, int index,
+                                    const ComponentRegistry& registry) const {
+  return ReplayedStages(*this, spec, index, registry).Run();
+}
+
+}  // namespace poise::logging
