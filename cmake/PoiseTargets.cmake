@@ -103,7 +103,7 @@ function(poise_program name)
 endfunction()
 
 # poise_proto_library(name PROTOS ... DEPS ...): C++ of .proto files of this folder, included by their path from the
-# top ("components/robot/robot.pb.h"). Generated code is not held to our warnings.
+# top ("components/robot_files/robot.pb.h"). Generated code is not held to our warnings.
 function(poise_proto_library name)
   cmake_parse_arguments(A "" "" "PROTOS;DEPS" ${ARGN})
   set(sources)

@@ -8,7 +8,7 @@
 
 #include "components/framework/configuration.h"
 #include "components/framework/graph.pb.h"
-#include "components/robot/robot.pb.h"
+#include "components/robot_files/robot.pb.h"
 #include "poise/message_traits.hpp"
 #include "tools/reference/field_reference.h"
 #include "tools/reference/message_reference.h"

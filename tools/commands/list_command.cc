@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "components/framework/configuration.h"
-#include "components/robot/robot.pb.h"
+#include "components/robot_files/robot.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"
