@@ -149,6 +149,8 @@ struct RobotParts {
 /// components/robot_files makes it of a URDF and a Robot file.
 class RobotModel {
  public:
+  /// Of nothing, to be assigned to.
+  RobotModel() = default;
   explicit RobotModel(RobotParts parts);
 
   const std::string& name() const { return parts_.name; }
