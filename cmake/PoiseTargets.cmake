@@ -150,7 +150,7 @@ file(GLOB_RECURSE POISE_ALL_PROTOS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/compo
      ${PROJECT_SOURCE_DIR}/hw_bridge/*.proto ${PROJECT_SOURCE_DIR}/tools/*.proto ${PROJECT_SOURCE_DIR}/tests/*.proto)
 
 # poise_proto_library(name PROTOS ... DEPS ...): C++ of .proto files of this folder, included by their path from the
-# top ("components/robot/robot.pb.h"), and std::string_view poise::NAME_schema(), the schema with its comments. Generated code
+# top ("components/robot_files/robot.pb.h"), and std::string_view poise::NAME_schema(), the schema with its comments. Generated code
 # is not held to our warnings.
 function(poise_proto_library name)
   cmake_parse_arguments(A "" "" "PROTOS;DEPS" ${ARGN})

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <exception>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
 

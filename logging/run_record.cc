@@ -6,7 +6,7 @@
 
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/run.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
 

@@ -5,7 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "components/balance/contact_conditions.h"
-#include "components/balance/contact_limits.pb.h"
+#include "components/messages/contact_limits.pb.h"
 #include "components/robot/robot_model.h"
 #include "poise/contact_margins_t.hpp"
 #include "poise/pose_t.hpp"

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise {
 

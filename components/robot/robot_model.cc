@@ -4,49 +4,52 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace poise::robot {
 
+RobotModel::RobotModel(RobotParts parts) : parts_(std::move(parts)) { BuildTree(); }
+
 void RobotModel::BuildTree() {
   tree_ = KinematicTree();
-  for (const Body& body : bodies_) {
+  for (const Body& body : parts_.bodies) {
     tree_.bodies.push_back({body.parent, body.mass, body.mass, body.com, body.inertia});
     std::vector<int> support;
     for (int b = static_cast<int>(tree_.bodies.size()) - 1; b > 0;
-         b = bodies_[static_cast<size_t>(b)].parent) {
-      support.push_back(bodies_[static_cast<size_t>(b)].joint);
+         b = parts_.bodies[static_cast<size_t>(b)].parent) {
+      support.push_back(parts_.bodies[static_cast<size_t>(b)].joint);
     }
     tree_.supporting_joints.push_back(std::move(support));
   }
-  for (size_t b = bodies_.size() - 1; b > 0; --b) {
-    tree_.bodies[static_cast<size_t>(bodies_[b].parent)].subtree_mass +=
+  for (size_t b = parts_.bodies.size() - 1; b > 0; --b) {
+    tree_.bodies[static_cast<size_t>(parts_.bodies[b].parent)].subtree_mass +=
         tree_.bodies[b].subtree_mass;
   }
   total_mass_ = tree_.bodies[0].subtree_mass;
-  for (size_t j = 0; j < joints_.size(); ++j) {
-    const Joint& joint = joints_[j];
+  for (size_t j = 0; j < parts_.joints.size(); ++j) {
+    const Joint& joint = parts_.joints[j];
     const Eigen::Matrix3d origin = joint.origin.linear();
     const Eigen::Vector3d& a = joint.axis;
     Eigen::Matrix3d cross;
     cross << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
     const Eigen::Matrix3d projection = a * a.transpose();
     // Rodrigues: R = a aᵀ + (1 - a aᵀ) cos q + [a]ₓ sin q.
-    tree_.joints.push_back({origin * projection,
-                            origin * (Eigen::Matrix3d::Identity() - projection), origin * cross,
-                            joint.origin.translation(), origin * a, motors_[j].reflected_inertia});
+    tree_.joints.push_back(
+        {origin * projection, origin * (Eigen::Matrix3d::Identity() - projection), origin * cross,
+         joint.origin.translation(), origin * a, parts_.motors[j].reflected_inertia});
   }
 }
 
 const Frame* RobotModel::FindFrame(std::string_view name) const {
-  const auto frame = std::find_if(frames_.begin(), frames_.end(),
+  const auto frame = std::find_if(parts_.frames.begin(), parts_.frames.end(),
                                   [&](const Frame& other) { return other.name == name; });
-  return frame == frames_.end() ? nullptr : &*frame;
+  return frame == parts_.frames.end() ? nullptr : &*frame;
 }
 
 int RobotModel::FindJoint(std::string_view name) const {
-  const auto joint = std::find_if(joints_.begin(), joints_.end(),
+  const auto joint = std::find_if(parts_.joints.begin(), parts_.joints.end(),
                                   [&](const Joint& other) { return other.name == name; });
-  return joint == joints_.end() ? -1 : static_cast<int>(joint - joints_.begin());
+  return joint == parts_.joints.end() ? -1 : static_cast<int>(joint - parts_.joints.begin());
 }
 
 RobotModel RobotModel::WithModelError(std::string_view body, double mass_scale,
@@ -59,11 +62,11 @@ RobotModel RobotModel::WithModelError(std::string_view body, double mass_scale,
     throw RobotError(fmt::format("model error of '{}': COM shift must be finite", body));
   }
   RobotModel copy = *this;
-  const auto changed = std::find_if(copy.bodies_.begin(), copy.bodies_.end(),
+  const auto changed = std::find_if(copy.parts_.bodies.begin(), copy.parts_.bodies.end(),
                                     [&](const Body& other) { return other.name == body; });
-  if (changed == copy.bodies_.end()) {
+  if (changed == copy.parts_.bodies.end()) {
     std::string names;
-    for (const Body& other : bodies_) names += (names.empty() ? "" : ", ") + other.name;
+    for (const Body& other : parts_.bodies) names += (names.empty() ? "" : ", ") + other.name;
     throw RobotError(fmt::format("model error: no moving body '{}': use one of {}", body, names));
   }
   changed->mass *= mass_scale;

@@ -10,8 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "components/robot/robot.pb.h"
-
 namespace poise::robot {
 
 /// A URDF or robot description that cannot work. what() is one line naming the link, joint or field
@@ -80,7 +78,7 @@ struct StanceModel {
   std::optional<double> foot_spacing;  ///< m between the soles' centres in y
 };
 
-/// DriveTrain of robot.proto.
+/// What lies between a joint's motor and its link, and between its readings and the controller.
 struct DriveTrainModel {
   double torque_lag = 0;          ///< s
   double current_resolution = 0;  ///< A
@@ -131,33 +129,46 @@ struct KinematicTree {
   std::vector<std::vector<int>> supporting_joints;  ///< by body, nearest first
 };
 
-/// Immutable after Load. Joints are in depth-first order of the URDF tree; nothing may assume more
-/// than that.
+/// What a robot is made of. Parents come before their children; a motor for each joint; two feet,
+/// right first; indices within range.
+struct RobotParts {
+  std::string name;
+  std::vector<Body> bodies;
+  std::vector<Joint> joints;
+  std::vector<MotorModel> motors;  ///< by joint index
+  std::vector<FootModel> feet;
+  std::vector<Frame> frames;  ///< every link of the URDF, in order of the names
+  ImuModel imu;
+  StanceModel stance;
+  DriveTrainModel drive_train;
+  int body_task_body = 0;                    ///< body whose orientation the body task controls
+  double force_noise = 0, moment_noise = 0;  ///< N, N·m, of the feet's sensors
+};
+
+/// Immutable. Joints are in depth-first order of the URDF tree; nothing may assume more than that.
+/// components/robot_files makes it of a URDF and a Robot file.
 class RobotModel {
  public:
-  /// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia,
-  /// a joint type that cannot be controlled, a joint without motor, not exactly two feet, fewer
-  /// than six joints from base to a foot. Visual and collision elements are not looked at, so no
-  /// mesh is ever missed. Warnings go to `warnings` when given.
-  static RobotModel Load(const Robot& description, std::string_view urdf_xml,
-                         std::vector<std::string>* warnings = nullptr);
+  /// Of nothing, to be assigned to.
+  RobotModel() = default;
+  explicit RobotModel(RobotParts parts);
 
-  const std::string& name() const { return name_; }
-  int num_joints() const { return static_cast<int>(joints_.size()); }
+  const std::string& name() const { return parts_.name; }
+  int num_joints() const { return static_cast<int>(parts_.joints.size()); }
   int num_velocities() const { return num_joints() + 6; }
-  const std::vector<Body>& bodies() const { return bodies_; }
-  const std::vector<Joint>& joints() const { return joints_; }
-  const std::vector<MotorModel>& motors() const { return motors_; }  ///< by joint index
-  const std::vector<FootModel>& feet() const { return feet_; }       ///< right first
-  const ImuModel& imu() const { return imu_; }
-  const StanceModel& stance() const { return stance_; }
-  const DriveTrainModel& drive_train() const { return drive_train_; }
+  const std::vector<Body>& bodies() const { return parts_.bodies; }
+  const std::vector<Joint>& joints() const { return parts_.joints; }
+  const std::vector<MotorModel>& motors() const { return parts_.motors; }  ///< by joint index
+  const std::vector<FootModel>& feet() const { return parts_.feet; }       ///< right first
+  const ImuModel& imu() const { return parts_.imu; }
+  const StanceModel& stance() const { return parts_.stance; }
+  const DriveTrainModel& drive_train() const { return parts_.drive_train; }
   int body_task_body() const {
-    return body_task_body_;
+    return parts_.body_task_body;
   }  ///< body whose orientation the body task controls
   double total_mass() const { return total_mass_; }
-  double force_noise() const { return force_noise_; }
-  double moment_noise() const { return moment_noise_; }
+  double force_noise() const { return parts_.force_noise; }
+  double moment_noise() const { return parts_.moment_noise; }
   const KinematicTree& tree() const { return tree_; }
   /// Joints between the base and `body`, nearest to the body first: the columns its Jacobian may
   /// fill.
@@ -165,7 +176,7 @@ class RobotModel {
     return tree_.supporting_joints[static_cast<size_t>(body)];
   }
   /// Every link of the URDF, in order of the names.
-  const std::vector<Frame>& frames() const { return frames_; }
+  const std::vector<Frame>& frames() const { return parts_.frames; }
   /// A link by its URDF name; null when there is none.
   const Frame* FindFrame(std::string_view name) const;
   /// Index of a joint by name, -1 when there is none.
@@ -178,18 +189,9 @@ class RobotModel {
  private:
   void BuildTree();
 
-  std::string name_;
-  std::vector<Body> bodies_;
-  std::vector<Joint> joints_;
-  std::vector<MotorModel> motors_;
-  std::vector<FootModel> feet_;
-  std::vector<Frame> frames_;
-  ImuModel imu_;
-  StanceModel stance_;
-  DriveTrainModel drive_train_;
-  int body_task_body_ = 0;
+  RobotParts parts_;
   KinematicTree tree_;
-  double total_mass_ = 0, force_noise_ = 0, moment_noise_ = 0;
+  double total_mass_ = 0;
 };
 
 }  // namespace poise::robot

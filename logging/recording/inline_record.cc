@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "logging/recording/inline_recorder.h"
 
 namespace poise::logging {

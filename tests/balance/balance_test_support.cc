@@ -1,6 +1,6 @@
 #include "tests/balance/balance_test_support.h"
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "tests/test_seed.h"
 
 namespace poise::balance {

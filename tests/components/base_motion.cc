@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "components/robot/posture.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise {
 namespace {

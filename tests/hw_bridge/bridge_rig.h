@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 #include "hw_bridge/ethercat/links/faulty_link.h"
 #include "hw_bridge/ethercat/links/memory_link.h"

@@ -13,7 +13,7 @@
 #include <sstream>
 #include <thread>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "hw_bridge/hw_bridge.h"
 
 namespace poise {

@@ -20,7 +20,7 @@ RobotThresholds Of(const std::function<void(Robot*)>& edit) {
   ReadTextProto(folder + "dyros_legs.pbtxt", &description);
   edit(&description);
   return DeriveThresholds(
-      robot::RobotModel::Load(description, ReadFile(folder + "dyros_legs.urdf")));
+      robot::MakeRobot(description, ReadFile(folder + "dyros_legs.urdf")));
 }
 
 // docs/reference/robots.md has the same figures; recorded runs hold their bits.

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "tests/robot/robot_test_support.h"
 #include "tests/test_seed.h"
 

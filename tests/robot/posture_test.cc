@@ -140,14 +140,14 @@ TEST(StandingHeight, IsTheStancesOwnOrWhatItsJointsGive) {
   Robot description;
   ReadTextProto(RobotPath(TestRobot::kDyros), &description);
   const std::string urdf = ReadWhole(UrdfPath(TestRobot::kDyros));
-  EXPECT_EQ(StandingHeight(RobotModel::Load(description, urdf)), 0.75);
+  EXPECT_EQ(StandingHeight(MakeRobot(description, urdf)), 0.75);
   description.mutable_stance()->clear_com_height();
-  const RobotModel model = RobotModel::Load(description, urdf);
+  const RobotModel model = MakeRobot(description, urdf);
   // Both legs bent by 0.3, 0.6, 0.3 rad: thigh and shank of 0.36 m each lower the hips by this
   // much.
   const double lowered = 0.72 * (1 - std::cos(0.3));
   description.mutable_stance()->clear_joint();
-  const double straight = StandingHeight(RobotModel::Load(description, urdf));
+  const double straight = StandingHeight(MakeRobot(description, urdf));
   const double share = model.bodies()[0].mass / model.total_mass();
   const double bent = StandingHeight(model);
   EXPECT_LT(bent, straight - share * lowered) << "the body and parts of the legs are lower";

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "components/robot/dynamics.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise::robot {
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "tests/sim/engine.h"
 #include "tests/sim/simulation_fixture.h"
 #include "tests/test_seed.h"
@@ -270,7 +270,7 @@ TEST(Joints, TurnsAreCounted) {
     motor.set_coulomb_friction(0);
     motor.set_static_friction(0);
   }
-  const robot::RobotModel model = robot::RobotModel::Load(description, urdf);
+  const robot::RobotModel model = robot::MakeRobot(description, urdf);
   EngineSimulation simulation(model, StandingConfig("step: 0.0005"), kTick, 1);
   robot::RobotState state = Lifted(simulation, 30);
   const int yaw = model.FindJoint("right_hip_yaw");

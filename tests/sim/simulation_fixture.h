@@ -8,7 +8,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "components/robot/robot_model.h"
 #include "sim/simulation.h"
 #include "sim/start_posture.h"
@@ -26,7 +26,7 @@ inline robot::RobotModel EditedRobot(const std::function<void(Robot*)>& edit) {
   ReadTextProto(RobotFolder() + "dyros_legs.pbtxt", &description);
   description.clear_drive_train();
   edit(&description);
-  return robot::RobotModel::Load(description, ReadFile(RobotFolder() + "dyros_legs.urdf"));
+  return robot::MakeRobot(description, ReadFile(RobotFolder() + "dyros_legs.urdf"));
 }
 
 inline robot::RobotModel PaperRobot() {

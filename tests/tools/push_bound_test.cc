@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise {
 namespace {

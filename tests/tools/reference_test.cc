@@ -8,7 +8,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.pb.h"
-#include "components/robot/robot.pb.h"
+#include "components/robot_files/robot.pb.h"
 #include "poise/message_traits.hpp"
 #include "tools/reference/message_reference.h"
 #include "tools/reference/reference_text.h"

@@ -5,7 +5,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
-#include "components/robot/robot.pb.h"
+#include "components/robot_files/robot.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"

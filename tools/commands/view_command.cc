@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "tools/cli/cli_checks.h"

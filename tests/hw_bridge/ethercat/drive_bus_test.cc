@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/units.h"
 #include "tests/framework/toy_components.h"

@@ -1,4 +1,4 @@
-#include "components/robot/robot_files.h"
+#include "components/robot_files/robot_files.h"
 
 #include <fmt/format.h>
 #include <google/protobuf/io/tokenizer.h>
@@ -60,7 +60,7 @@ RobotModel LoadRobotFiles(const std::string& robot_path, std::vector<std::string
       (std::filesystem::path(robot_path).parent_path() / robot.urdf()).string();
   const std::string urdf = ReadText(urdf_path);
   try {
-    return RobotModel::Load(robot, urdf, warnings);
+    return MakeRobot(robot, urdf, warnings);
   } catch (const RobotError& error) {
     const bool of_urdf = std::string_view(error.what()).starts_with("URDF");
     throw RobotError((of_urdf ? urdf_path : robot_path) + ": " + error.what());
@@ -69,7 +69,7 @@ RobotModel LoadRobotFiles(const std::string& robot_path, std::vector<std::string
 
 RobotModel LoadRobotTexts(std::string_view robot_text, std::string_view urdf_xml,
                           std::vector<std::string>* warnings) {
-  return RobotModel::Load(ParseRobot(robot_text), urdf_xml, warnings);
+  return MakeRobot(ParseRobot(robot_text), urdf_xml, warnings);
 }
 
 }  // namespace poise::robot

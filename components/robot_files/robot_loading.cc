@@ -1,11 +1,12 @@
-// RobotModel::Load: the URDF's tree and the Robot file brought together, and checked against each
+// MakeRobot: the URDF's tree and the Robot file brought together, and checked against each
 // other.
 #include <fmt/format.h>
 
 #include <cmath>
+#include <utility>
 
-#include "components/robot/robot_model.h"
 #include "components/robot/urdf_tree.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise::robot {
 namespace {
@@ -226,40 +227,38 @@ DriveTrainModel LoadDriveTrain(const DriveTrain& drive) {
 
 }  // namespace
 
-RobotModel RobotModel::Load(const Robot& description, std::string_view urdf_xml,
-                            std::vector<std::string>* warnings) {
+RobotModel MakeRobot(const Robot& description, std::string_view urdf_xml,
+                     std::vector<std::string>* warnings) {
   UrdfTree tree = LoadUrdfTree(urdf_xml, warnings);
-  RobotModel model;
-  model.name_ = description.name().empty() ? tree.name : description.name();
-  model.motors_ = LoadMotors(description, tree);
-  model.feet_ = LoadFeet(description, tree);
+  RobotParts parts;
+  parts.name = description.name().empty() ? tree.name : description.name();
+  parts.motors = LoadMotors(description, tree);
+  parts.feet = LoadFeet(description, tree);
 
   const Imu& imu = description.imu();
   const UrdfTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
-  model.imu_.body = imu_place.body;
-  model.imu_.pose = imu_place.pose * ToIsometry(imu.pose(), "imu.pose");
-  model.imu_.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");
-  model.imu_.gyro_bias = NotNegative(imu.gyro_bias(), "imu.gyro_bias");
-  model.imu_.accelerometer_noise =
-      NotNegative(imu.accelerometer_noise(), "imu.accelerometer_noise");
-  model.imu_.accelerometer_bias = NotNegative(imu.accelerometer_bias(), "imu.accelerometer_bias");
-  model.force_noise_ = NotNegative(description.force_noise(), "force_noise");
-  model.moment_noise_ = NotNegative(description.moment_noise(), "moment_noise");
-  model.body_task_body_ =
+  parts.imu.body = imu_place.body;
+  parts.imu.pose = imu_place.pose * ToIsometry(imu.pose(), "imu.pose");
+  parts.imu.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");
+  parts.imu.gyro_bias = NotNegative(imu.gyro_bias(), "imu.gyro_bias");
+  parts.imu.accelerometer_noise = NotNegative(imu.accelerometer_noise(), "imu.accelerometer_noise");
+  parts.imu.accelerometer_bias = NotNegative(imu.accelerometer_bias(), "imu.accelerometer_bias");
+  parts.force_noise = NotNegative(description.force_noise(), "force_noise");
+  parts.moment_noise = NotNegative(description.moment_noise(), "moment_noise");
+  parts.body_task_body =
       FindLink(tree, description.has_body_link() ? description.body_link() : tree.root_link,
                "body_link")
           .body;
 
-  model.stance_ = LoadStance(description.stance(), tree);
-  model.drive_train_ = LoadDriveTrain(description.drive_train());
+  parts.stance = LoadStance(description.stance(), tree);
+  parts.drive_train = LoadDriveTrain(description.drive_train());
 
   for (const auto& [link, place] : tree.links) {
-    model.frames_.push_back({link, place.body, place.pose});
+    parts.frames.push_back({link, place.body, place.pose});
   }
-  model.bodies_ = std::move(tree.bodies);
-  model.joints_ = std::move(tree.joints);
-  model.BuildTree();
-  return model;
+  parts.bodies = std::move(tree.bodies);
+  parts.joints = std::move(tree.joints);
+  return RobotModel(std::move(parts));
 }
 
 }  // namespace poise::robot

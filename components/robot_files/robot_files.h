@@ -6,8 +6,16 @@
 #include <vector>
 
 #include "components/robot/robot_model.h"
+#include "components/robot_files/robot.pb.h"
 
 namespace poise::robot {
+
+/// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia, a
+/// joint type that cannot be controlled, a joint without motor, not exactly two feet, fewer than
+/// six joints from base to a foot. Visual and collision elements are not looked at, so no mesh is
+/// ever missed. Warnings go to `warnings` when given.
+RobotModel MakeRobot(const Robot& description, std::string_view urdf_xml,
+                     std::vector<std::string>* warnings = nullptr);
 
 /// Reads the Robot file and, relative to it, its URDF. Throws RobotError, one line that begins with
 /// the file at fault.
