@@ -372,7 +372,7 @@ void HwBridge::Sense(const Tick& tick) {
   robot_sensors_t& sensors = *robot_sensors_;
   const std::vector<robot::MotorModel>& motors = model_->motors();
   for (size_t j = 0; j < motors.size(); ++j) {
-    sensors.joint_position[j] = JointPosition(motors[j], feedback->position_counts[j]);
+    sensors.joint_position[j] = JointPositionOf(motors[j], feedback->position_counts[j]);
     sensors.joint_torque[j] = JointTorque(motors[j], feedback->current[j]);
   }
   std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),

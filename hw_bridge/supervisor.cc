@@ -155,7 +155,7 @@ void Supervisor::CountLateness(double lateness) {
 }
 
 double Supervisor::Position(size_t joint) const {
-  return JointPosition(config_.motors[joint], monitor_.counts()[joint]);
+  return JointPositionOf(config_.motors[joint], monitor_.counts()[joint]);
 }
 
 /// Motors at rest where they can be: else the reason says which is not.

@@ -26,7 +26,7 @@ inline double CountsPerRadian(const robot::MotorModel& motor) {
 }
 
 /// Joint position, rad, of multi-turn counts at the motor shaft (zero at the joint's zero).
-inline double JointPosition(const robot::MotorModel& motor, int64_t counts) {
+inline double JointPositionOf(const robot::MotorModel& motor, int64_t counts) {
   return static_cast<double>(counts) / CountsPerRadian(motor);
 }
 

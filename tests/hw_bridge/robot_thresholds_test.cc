@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/robot_files/robot_files.h"
 
 namespace poise {
 namespace {

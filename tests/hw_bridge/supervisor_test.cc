@@ -24,7 +24,7 @@ TEST(Units, FiftyMotorTurnsAreOneJointTurn) {
   const robot::MotorModel motor = ThreeJoints().motors[0];
   EXPECT_EQ(EncoderCounts(motor, 2 * std::numbers::pi), 50 * 8192);
   EXPECT_EQ(EncoderCounts(motor, -std::numbers::pi / 2), -50 * 8192 / 4);
-  EXPECT_NEAR(JointPosition(motor, 50 * 8192 / 8), std::numbers::pi / 4, 1e-15);
+  EXPECT_NEAR(JointPositionOf(motor, 50 * 8192 / 8), std::numbers::pi / 4, 1e-15);
 }
 
 TEST(Units, CountsAreRoundedToTheNearest) {

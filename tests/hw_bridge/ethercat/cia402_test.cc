@@ -288,7 +288,7 @@ TEST(DriveScale, ConvertsAsEquation54) {
   EXPECT_EQ(reversed.LimitPerMille(30), 2000);
   EXPECT_EQ(reversed.JointCounts(1000), 0);
   // One turn of the motor is 1/50 turn of the joint, the other way.
-  EXPECT_DOUBLE_EQ(JointPosition(PaperMotor(), reversed.JointCounts(1000 + 8192)),
+  EXPECT_DOUBLE_EQ(JointPositionOf(PaperMotor(), reversed.JointCounts(1000 + 8192)),
                    -2 * std::numbers::pi / 50);
 }
 
