@@ -22,11 +22,6 @@ std::vector<ComponentType>& Added() {
   return added;
 }
 
-std::vector<fs::path>& Loaded() {
-  static std::vector<fs::path> loaded;
-  return loaded;
-}
-
 /// The folder of the library or program that holds this function.
 fs::path OwnFolder() {
   Dl_info info{};
@@ -74,7 +69,6 @@ void Load(const fs::path& file) {
   if (!MessageProblems().empty()) {
     throw ConfigError(fmt::format("{}: {}", file.string(), MessageProblems().front()));
   }
-  Loaded().push_back(file);
 }
 
 }  // namespace
@@ -152,7 +146,5 @@ std::string ModulesSearched() {
                "is not set"
              : fmt::format("modules with others are looked for in {}", fmt::join(folders, ", "));
 }
-
-const std::vector<fs::path>& LoadedModules() { return Loaded(); }
 
 }  // namespace poise

@@ -32,7 +32,5 @@ std::filesystem::path FindProgram(const std::string& name);
 void LoadModules();
 /// "modules with others are looked for in ...": where, for an error that something is not known.
 std::string ModulesSearched();
-/// Their files.
-const std::vector<std::filesystem::path>& LoadedModules();
 
 }  // namespace poise
