@@ -295,6 +295,7 @@ test('joints are found by name, and are named with units in the file', async () 
   await page.click('text=JOINT_COMMAND.torque[right_knee_pitch]');
   const panel = page.locator('.panel').first();
   assert.equal(await panel.locator('h3').innerText(), 'JOINT_COMMAND.torque[right_knee_pitch]');
+  await panel.locator('.legend', {hasText: 'N·m'}).waitFor();  // the column is unpacked after the panel is there
   assert.match(await panel.locator('.legend').innerText(), /torque\[right_knee_pitch\]\s+-?[\d.]+ (m|µ)?N·m/);
   const download = page.waitForEvent('download');
   await panel.getByRole('button', {name: 'CSV'}).click();
