@@ -30,6 +30,7 @@ const ScheduleState& PhaseSchedule::Advance(const ScheduleInput& input) {
     }
   }
   AdvanceTransition(input);
+  time_ = time;
   if (hindrance != WaitingFor::kNothing) state_.waiting_for = hindrance;
   return state_;
 }
@@ -57,6 +58,14 @@ bool PhaseSchedule::BeginByOutcome(const ScheduleInput& input) {
   }
   if (input.no_surface && begin(NO_SURFACE, 0)) return true;
   return phase().has_timeout() && held_ >= phase().timeout() - kTimeTolerance && begin(TIMEOUT, 0);
+}
+
+void PhaseSchedule::Hold(double time) {
+  const double delay = std::max(0.0, time - time_);
+  time_ = time;
+  origin_ += delay;
+  if (transition_began_) transition_start_ += delay;
+  state_.phase_began = false;
 }
 
 void PhaseSchedule::Postpone(double delay) {

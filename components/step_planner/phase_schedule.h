@@ -58,6 +58,9 @@ class PhaseSchedule {
   /// DONE that leads somewhere counts.
   const ScheduleState& Advance(const ScheduleInput& input);
 
+  /// In place of Advance while another planner acts: all that is later comes later.
+  void Hold(double time);
+
   const Phase& phase() const { return config_.phase(state_.phase); }
   /// The phase that follows when this one is done; kNone: none.
   int next() const { return graph_.Follower(state_.phase, DONE); }
@@ -66,7 +69,7 @@ class PhaseSchedule {
   bool BeforeTouchDown() const;
   const ScheduleState& state() const { return state_; }
   void Archive(StateArchive* archive) {
-    archive->Show(state_, began_, transition_began_, transition_start_, origin_, held_);
+    archive->Show(state_, began_, transition_began_, transition_start_, origin_, held_, time_);
   }
 
  private:
@@ -89,6 +92,7 @@ class PhaseSchedule {
   double transition_start_ = 0;
   double origin_ = 0;  // s, from where the phase's times count
   double held_ = 0;    // s, by which waiting has moved it
+  double time_ = 0;    // s, of the last call
 };
 
 }  // namespace poise

@@ -9,6 +9,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/phase_graph.h"
+#include "components/step_planner/recovery_config.h"
 
 namespace poise {
 namespace {
@@ -231,6 +232,7 @@ void CheckStepPlannerConfig(const StepPlannerConfig& config) {
   CheckContact(config.contact());
   CheckStep(config.step());
   CheckHipStrategyConfig(config.hip_strategy());
+  CheckRecoveryConfig(config.recovery());
   for (int i = 0; i < config.phase_size(); ++i) {
     const Phase& phase = config.phase(i);
     if (phase.has_duration()) CheckNotNegative(phase.duration(), Field(i) + ".duration");

@@ -64,6 +64,15 @@ void ReferencePoint::Schedule(const Eigen::Vector3d& target, double start, doubl
   pending_ = true;
 }
 
+void ReferencePoint::Lead(const PointMotion& from, const Eigen::Vector3d& target, double start,
+                          double duration) {
+  move_.Begin(from, target, start, duration);
+  pending_ = false;
+  target_ = target;
+  start_ = start;
+  duration_ = duration;
+}
+
 PointMotion ReferencePoint::At(double time) {
   if (pending_ && time >= start_) {
     move_.Begin(move_.At(start_), target_, start_, duration_);
@@ -228,6 +237,14 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
   }
   references_.body = body_turn_.At(time);
   return references_;
+}
+
+void ReferenceGenerator::Anchor(const EstimatedPose& estimate, const PointMotion& com,
+                                const Eigen::Vector3d& com_target, double time, double duration) {
+  com_.Lead(com, com_target, time, duration);
+  for (size_t i = 0; i < 2; ++i) {
+    HoldFoot(i, estimate.sole[i].translation(), estimate.sole[i].linear());
+  }
 }
 
 void ReferenceGenerator::HoldFoot(size_t foot, const Eigen::Vector3d& position,

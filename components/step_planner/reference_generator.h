@@ -42,6 +42,8 @@ class ReferencePoint {
   void Hold(const Eigen::Vector3d& position);
   /// Replaces a move that has not begun yet.
   void Schedule(const Eigen::Vector3d& target, double start, double duration);
+  /// From any motion to rest at `target`, in place of what was under way.
+  void Lead(const PointMotion& from, const Eigen::Vector3d& target, double start, double duration);
   /// `time` must not decrease from call to call.
   PointMotion At(double time);
   /// Goes on with the move under way at the share `rate` of its speed, for the `period` s until
@@ -108,6 +110,10 @@ class ReferenceGenerator {
   const References& Update(double time, const Eigen::Vector3d& com);
   /// From here on the free foot rests there; its moves under way and to come are dropped.
   void HoldFoot(size_t foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
+  /// COM and body come to rest here, from their present motion, in `duration` s; the feet's moves
+  /// under way are dropped. After another planner has led them.
+  void Anchor(const EstimatedPose& estimate, const PointMotion& com,
+              const Eigen::Vector3d& com_target, double time, double duration);
   const ReferencePoint& foot(size_t index) const { return foot_[index]; }
   void Archive(StateArchive* archive);
 

@@ -11,6 +11,7 @@
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
 #include "components/step_planner/planner_config.h"
+#include "components/step_planner/recovery_config.h"
 #include "components/step_planner/step_planner_type.h"
 
 namespace poise {
@@ -61,6 +62,9 @@ int8_t FootCode(Landing::State state) {
 // The paper's distance of the limits from the edges of its sole, m.
 constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 
+// s in which the COM's reference comes to rest between the feet after a recovery.
+constexpr double kSettleTime = 0.5;
+
 double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
   if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
   if (!(value > 0 && value <= 0.5 * sole)) {
@@ -87,6 +91,8 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   step_ = StepDetector(step.beyond(), step.persistence());
   step_reach_ = step.reach();
   angular_momentum_ = step.angular_momentum();
+  recovers_ = config.recovery().enabled();
+  if (recovers_) recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_);
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());
 
@@ -132,7 +138,8 @@ bool StepPlanner::Archive(StateArchive* archive) {
   for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
   step_.Archive(archive);
   references_.Archive(archive);
-  archive->Show(in_contact_, last_controlled_);
+  archive->Show(in_contact_, last_controlled_, stands_otherwise_);
+  recovery_.Archive(archive);
   ArchiveMessage(&*support_plan_, archive);
   return true;
 }
@@ -144,15 +151,19 @@ int8_t StepPlanner::Plan(double time) {
     return support_plan_t::STATUS_INVALID_STATE;
   }
   whole_body_->UpdateDynamics(state_);
-  const ScheduleState& schedule = schedule_->Advance(Observe(time, load));
-  if (schedule.phase_began) BeginPhase(time);
+  const ScheduleInput observed = Observe(time, load);
+  if (recovers_ && Recover(time, load)) {
+    schedule_->Hold(time);
+  } else if (schedule_->Advance(observed).phase_began) {
+    BeginPhase(time);
+  }
   const Capture capture = ComputeCapture();
   UpdateReferences(time, capture);
   ReportPhase(time);
   ReportFeet();
   ReportReferences();
   ReportCapture(time, capture);
-  return schedule.waiting() ? support_plan_t::STATUS_WAITING : support_plan_t::STATUS_OK;
+  return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING : support_plan_t::STATUS_OK;
 }
 
 ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& load) {
@@ -166,6 +177,44 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
     input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
   }
   return input;
+}
+
+bool StepPlanner::Recover(double time, const std::array<double, 2>& load) {
+  const robot::RobotData& data = whole_body_->data();
+  const bool was_active = recovery_.active();
+  stepping::StepInput input;
+  input.time = time;
+  input.com = data.com;
+  input.com_velocity = data.com_velocity;
+  input.sole = {data.foot_pose[0], data.foot_pose[1]};
+  input.load = load;
+  input.in_contact = in_contact_;
+  input.com_height = references_.com.position.z();
+  input.step_needed = support_plan_->step_needed != 0;
+  input.allowed = last_controlled_;
+  for (size_t i = 0; i < 2; ++i) {
+    if (in_contact_[i]) continue;
+    input.free_foot = references_.foot[i];
+    input.free_rotation = references_.foot_rotation[i].rotation;
+  }
+  if (recovery_.Update(input)) {
+    in_contact_ = recovery_.output().in_contact;
+    for (ContactLoss& loss : contact_loss_) loss.Reset();
+    return true;
+  }
+  if (was_active) EndRecovery(time);
+  return stands_otherwise_;
+}
+
+void StepPlanner::EndRecovery(double time) {
+  in_contact_ = recovery_.output().in_contact;
+  stands_otherwise_ = ContactsOf(schedule_->phase().support()) != in_contact_;
+  const EstimatedPose estimate = Estimate();
+  Eigen::Vector3d rest = 0.5 * (estimate.sole[0].translation() + estimate.sole[1].translation());
+  PointMotion com = recovery_.output().com;
+  com.acceleration.setZero();
+  rest.z() = com.position.z();
+  generator_->Anchor(estimate, com, rest, time, kSettleTime);
 }
 
 void StepPlanner::BeginPhase(double time) {
@@ -211,6 +260,17 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   const robot::RobotData& data = whole_body_->data();
   references_ = generator_->Update(time, data.com);
   if (schedule_->phase().gravity_compensation()) return;
+  if (recovery_.active()) {
+    const stepping::StepOutput& step = recovery_.output();
+    references_.com = step.com;
+    for (size_t i = 0; i < 2; ++i) {
+      if (in_contact_[i]) continue;
+      references_.foot[i] = step.swing;
+      references_.foot_rotation[i] = step.swing_rotation;
+    }
+    if (hip_strategy_->enabled()) TiltBody(time, capture);
+    return;
+  }
   const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
   for (size_t i = 0; i < 2; ++i) {
     if (in_contact_[i]) continue;
@@ -329,18 +389,32 @@ void StepPlanner::ReportPhase(double time) {
   out.transition = TransitionCode(schedule.transition);
   out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
   out.transition_progress = schedule.progress;
+  if (!Held()) return;
+  out.waiting_for = support_plan_t::WAITING_NONE;
+  const stepping::StepOutput& step = recovery_.output();
+  const int kind = recovery_.active() ? step.transition : 0;
+  out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
+                   : kind > 0 ? support_plan_t::TRANSITION_LOADING
+                              : support_plan_t::TRANSITION_NONE;
+  out.transition_foot = static_cast<int8_t>(kind == 0 ? -1 : step.foot);
+  out.transition_progress = kind == 0 ? 0 : step.progress;
 }
 
 void StepPlanner::ReportFeet() {
   support_plan_t& out = *support_plan_;
   const int next = schedule_->next();
   const std::array<bool, 2> then =
-      next == PhaseGraph::kNone ? in_contact_ : ContactsOf(schedule_->phase(next).support());
+      recovery_.active()                           ? std::array{true, true}
+      : next == PhaseGraph::kNone || Held() ? in_contact_
+                                            : ContactsOf(schedule_->phase(next).support());
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = in_contact_[i] ? 1 : 0;
     out.next_in_contact[i] = then[i] ? 1 : 0;
     out.foot_state[i] =
-        in_contact_[i] ? support_plan_t::FOOT_SUPPORT : FootCode(landing_[i].state());
+        in_contact_[i]       ? support_plan_t::FOOT_SUPPORT
+        : recovery_.active() ? (recovery_.output().searching ? support_plan_t::FOOT_SEARCHING
+                                                             : support_plan_t::FOOT_SWING)
+                             : FootCode(landing_[i].state());
     SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
   }
 }

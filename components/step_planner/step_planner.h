@@ -16,6 +16,7 @@
 #include "components/step_planner/phase_schedule.h"
 #include "components/step_planner/reference_generator.h"
 #include "components/step_planner/step_detector.h"
+#include "components/step_planner/stepping/recovery.h"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
 
@@ -41,6 +42,12 @@ class StepPlanner : public Component {
   int8_t Plan(double time);
   /// What the robot says to the schedule.
   ScheduleInput Observe(double time, const std::array<double, 2>& load);
+  /// The recovery's tick; false: it does not act, and the schedule goes on.
+  bool Recover(double time, const std::array<double, 2>& load);
+  /// References from where the recovery has left the robot.
+  void EndRecovery(double time);
+  /// The schedule is held, by a recovery or because the robot stands otherwise than it says.
+  bool Held() const { return recovery_.active() || stands_otherwise_; }
   /// Contacts, references and landings of a phase's first tick.
   void BeginPhase(double time);
   Capture ComputeCapture() const;
@@ -75,6 +82,9 @@ class StepPlanner : public Component {
   std::vector<Landing> landing_;               // by foot
   std::vector<ContactLoss> contact_loss_;      // by foot
   StepDetector step_;
+  bool recovers_ = false;  // steps are made
+  stepping::Recovery recovery_;
+  bool stands_otherwise_ = false;  // on both feet after a recovery, where the phase is on one
   double step_reach_ = 0;          // m
   bool angular_momentum_ = false;  // counts in the capture point that asks for a step
   References references_;

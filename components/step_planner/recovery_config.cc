@@ -1,0 +1,130 @@
+#include "components/step_planner/recovery_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/robot/dynamics.h"
+#include "components/robot/posture.h"
+
+namespace poise {
+namespace {
+
+/// m/s² that the hips' joints can give a sole with `share` of their effort: of the leg's joints the
+/// two that swing it furthest, each with the inertia of all that it carries about its own axis.
+double SwingAcceleration(const robot::RobotModel& model, double share) {
+  robot::RobotState state(model.num_joints());
+  state.joint_position = model.stance().joint_position;
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t f = 0; f < 2; ++f) {
+    // By direction, ahead and sideways, the best joint.
+    for (const int axis : {0, 1}) {
+      double best = 0;
+      for (const int j : model.supporting_joints(model.feet()[f].body)) {
+        const double arm = std::abs(data.foot_jacobian[f](axis, 6 + j));
+        const double inertia = data.mass_matrix(6 + j, 6 + j);
+        const double effort = model.joints()[static_cast<size_t>(j)].effort;
+        // The hip's: a joint near the foot moves little but the foot itself.
+        if (arm >= 0.5 * robot::StandingHeight(model)) {
+          best = std::max(best, share * effort / inertia * arm);
+        }
+      }
+      if (best > 0) least = std::min(least, best);
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+void CheckRecoveryConfig(const RecoveryConfig& config) {
+  const auto check = [](bool holds, const char* name, const char* must) {
+    if (!holds) throw ConfigError(std::string("recovery.") + name, must);
+  };
+  const auto not_negative = [&](double value, const char* name) {
+    check(value >= 0 && std::isfinite(value), name, "must be a number, 0 or more");
+  };
+  const auto positive = [&](double value, const char* name) {
+    check(value > 0 && std::isfinite(value), name, "must be a number above 0");
+  };
+  not_negative(config.sure(), "sure");
+  not_negative(config.reserve(), "reserve");
+  not_negative(config.beyond(), "beyond");
+  not_negative(config.again_after(), "again_after");
+  check(config.max_steps() >= 1, "max_steps", "must be 1 or more");
+  positive(config.unload(), "unload");
+  positive(config.load(), "load");
+  not_negative(config.edge(), "edge");
+  not_negative(config.overshoot(), "overshoot");
+  not_negative(config.enough(), "enough");
+  positive(config.clearance(), "clearance");
+  positive(config.touch_speed(), "touch_speed");
+  positive(config.freeze(), "freeze");
+  positive(config.least_swing(), "least_swing");
+  check(config.swing_effort() > 0 && config.swing_effort() <= 1, "swing_effort",
+        "must be a share above 0, at most 1");
+  not_negative(config.touch_duration(), "touch_duration");
+  positive(config.lower(), "lower");
+  not_negative(config.joint_reserve(), "joint_reserve");
+  not_negative(config.gap(), "gap");
+  positive(config.gain(), "gain");
+  positive(config.height_rate(), "height_rate");
+  positive(config.rest_distance(), "rest_distance");
+  positive(config.rest_speed(), "rest_speed");
+  positive(config.rest_time(), "rest_time");
+}
+
+stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
+                                const robot::RobotModel& model) {
+  for (const robot::FootModel& foot : model.feet()) {
+    if (config.edge() < 0.5 * std::min(foot.length, foot.width)) continue;
+    throw ConfigError("recovery.edge",
+                      fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
+                                  config.edge(), foot.name, foot.length, foot.width));
+  }
+  const stepping::Reach reach(model, robot::StandingHeight(model), config.lower(),
+                              config.joint_reserve(), config.gap());
+  if (reach.empty()) {
+    throw ConfigError("recovery.lower",
+                      fmt::format("is {} m; robot '{}' cannot stand {} m lower than {} m with "
+                                  "joint_reserve {} rad: change one of them",
+                                  config.lower(), model.name(), config.lower(),
+                                  robot::StandingHeight(model), config.joint_reserve()));
+  }
+  stepping::StepLimits limits;
+  limits.edge = config.edge();
+  limits.acceleration = SwingAcceleration(model, config.swing_effort());
+  limits.least_swing = config.least_swing();
+  limits.unload = config.unload();
+  limits.beyond = config.overshoot();
+  limits.enough = config.enough();
+  limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+
+  stepping::RecoverySpec spec;
+  spec.sure = config.sure();
+  spec.reserve = config.reserve();
+  spec.beyond = config.beyond();
+  spec.again_after = config.again_after();
+  spec.max_steps = config.max_steps();
+  spec.load = config.load();
+  spec.swing = {config.clearance(), config.touch_speed(), config.freeze()};
+  spec.touch_load = contact.touch_load();
+  spec.touch_duration = config.touch_duration();
+  spec.search_depth = contact.search_depth();
+  spec.gain = config.gain();
+  spec.height_rate = config.height_rate();
+  spec.rest_distance = config.rest_distance();
+  spec.rest_speed = config.rest_speed();
+  spec.rest_time = config.rest_time();
+  return {stepping::StepChoice(model, reach, limits), spec};
+}
+
+}  // namespace poise

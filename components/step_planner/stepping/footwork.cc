@@ -1,0 +1,86 @@
+#include "components/step_planner/stepping/footwork.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace poise::stepping {
+namespace {
+
+// Share of gravity by which the COM's height may be accelerated: the soles stay loaded.
+constexpr double kHeightShare = 0.25;
+constexpr double kLeastHeight = 0.1;  // m, of the COM above the ground: below, it has fallen
+
+}  // namespace
+
+void StepOutput::Archive(StateArchive* archive) {
+  archive->Show(in_contact, transition, progress, foot);
+  com.Archive(archive);
+  swing.Archive(archive);
+  swing_rotation.Archive(archive);
+  archive->Show(searching, cop);
+}
+
+double Yaw(const Eigen::Isometry3d& pose) {
+  return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
+}
+
+StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact) {
+  StepState state;
+  state.in_contact = in_contact;
+  double ground = 0, feet = 0;
+  Eigen::Vector2d heading = Eigen::Vector2d::Zero();
+  for (size_t i = 0; i < 2; ++i) {
+    state.sole[i] = input.sole[i].translation().head<2>();
+    state.sole_yaw[i] = Yaw(input.sole[i]);
+    if (!in_contact[i]) continue;
+    ground += input.sole[i].translation().z();
+    heading += input.sole[i].linear().col(0).head<2>();
+    feet += 1;
+  }
+  state.yaw = std::atan2(heading.y(), heading.x());
+  const double height = std::max(input.com.z() - ground / std::max(feet, 1.0), kLeastHeight);
+  state.pendulum = {input.com.head<2>(), input.com_velocity.head<2>(),
+                    std::sqrt(robot::kGravity / height)};
+  return state;
+}
+
+void HeightLead::Follow(double wanted, double period) {
+  const double most = kHeightShare * robot::kGravity;
+  point_.acceleration =
+      std::clamp(rate_ * rate_ * (wanted - point_.position) - 2 * rate_ * point_.velocity, -most,
+                 most);
+  point_.velocity += period * point_.acceleration;
+  point_.position += period * point_.velocity;
+}
+
+PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
+                      const Eigen::Vector2d& cop) {
+  const double rate = (robot::kGravity + height.acceleration) /
+                      std::max(input.com.z() - ground, kLeastHeight);
+  const Eigen::Vector2d acceleration = rate * (input.com.head<2>() - cop);
+  PointMotion com;
+  com.position << input.com.head<2>(), height.position;
+  com.velocity << input.com_velocity.head<2>(), height.velocity;
+  com.acceleration << acceleration, height.acceleration;
+  return com;
+}
+
+bool TouchTimer::Update(double time, double load) {
+  if (!(load > load_)) {
+    since_ = -1;
+    return false;
+  }
+  if (since_ < 0) since_ = time;
+  return time >= since_ + duration_ - kTimeTolerance;
+}
+
+void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,
+                 StepOutput* output) {
+  const double last = swing.end() + depth / spec.touch_speed;
+  output->swing = swing.At(std::min(time, last));
+  if (time > last) output->swing.velocity.setZero();
+  output->swing_rotation = swing.RotationAt(time);
+  output->searching = time > swing.end();
+}
+
+}  // namespace poise::stepping

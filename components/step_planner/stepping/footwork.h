@@ -1,0 +1,94 @@
+// What every planner of steps does in a tick: sees the robot as a pendulum on its soles, leads the
+// COM by a centre of pressure, feels a foot land.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/messages/motion.h"
+#include "components/step_planner/stepping/step_choice.h"
+#include "components/step_planner/stepping/swing.h"
+
+namespace poise::stepping {
+
+/// Times are compared to this, s: far below a tick, far above rounding.
+inline constexpr double kTimeTolerance = 1e-9;
+
+/// The robot in one tick; world axes, feet right first.
+struct StepInput {
+  double time = 0;  ///< s, not decreasing
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();
+  Eigen::Vector3d com_velocity = Eigen::Vector3d::Zero();
+  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
+                                        Eigen::Isometry3d::Identity()};
+  std::array<double, 2> load{0, 0};            ///< N
+  std::array<bool, 2> in_contact{true, true};  ///< of the plan; while no step is under way
+  PointMotion free_foot;                       ///< reference of a foot in the air; likewise
+  Eigen::Matrix3d free_rotation = Eigen::Matrix3d::Identity();
+  double com_height = 0;     ///< m, world, of the COM's reference; likewise
+  bool step_needed = false;  ///< the capture point has stayed beyond the soles
+  bool allowed = true;       ///< a first step may begin
+};
+
+/// What the plan takes over while steps are made.
+struct StepOutput {
+  std::array<bool, 2> in_contact{true, true};
+  int transition = 0;  ///< −1: `foot` is unloaded, 1: loaded, 0: neither
+  double progress = 0;
+  int foot = -1;  ///< that steps, or last did
+  PointMotion com;
+  PointMotion swing;
+  RotationMotion swing_rotation;
+  bool searching = false;  ///< below where the ground was expected
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, asked for
+
+  void Archive(StateArchive* archive);
+};
+
+/// rad, of a frame's x axis about the vertical.
+double Yaw(const Eigen::Isometry3d& pose);
+
+/// The pendulum above the soles in contact.
+StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact);
+
+/// The COM's height, led without haste to where the legs want it.
+class HeightLead {
+ public:
+  /// `rate`, 1/s: critically damped, two such poles.
+  explicit HeightLead(double rate = 1) : rate_(rate) {}
+  void Begin(double height) { point_ = {height, 0, 0}; }
+  void Follow(double wanted, double period);
+  const Quintic::Point& point() const { return point_; }
+  void Archive(StateArchive* archive) { archive->Show(point_); }
+
+ private:
+  double rate_;
+  Quintic::Point point_;
+};
+
+/// The COM's reference that asks for this centre of pressure: position and velocity are the COM's
+/// own in x and y, so that their PD adds nothing, with the pendulum's acceleration
+/// (g + z̈)/(z − ground) (c − p).
+PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
+                      const Eigen::Vector2d& cop);
+
+/// A load that lasts.
+class TouchTimer {
+ public:
+  explicit TouchTimer(double load = 0, double duration = 0) : load_(load), duration_(duration) {}
+  void Reset() { since_ = -1; }
+  bool Update(double time, double load);
+  void Archive(StateArchive* archive) { archive->Show(since_); }
+
+ private:
+  double load_, duration_;  // N, s
+  double since_ = -1;       // s; negative: no load
+};
+
+/// The swing's motion into `output`; below the foothold it ends `depth`, m, deeper.
+void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,
+                 StepOutput* output);
+
+}  // namespace poise::stepping

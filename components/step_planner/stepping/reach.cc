@@ -1,0 +1,238 @@
+#include "components/step_planner/stepping/reach.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "components/robot/dynamics.h"
+#include "components/robot/posture.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int kDirections = 12;    // corners of a leg's polygon
+constexpr double kStride = 0.05;   // m, of the search along a direction
+constexpr double kFinest = 0.004;  // m, to which the edge is found
+constexpr double kFarthest = 2;    // m: no leg is longer
+// Share of the way to the edge that counts as reached: a straight leg moves the sole no more.
+constexpr double kOfStraight = 0.97;
+constexpr int kMaxIterations = 15;
+constexpr double kTolerance = 1e-6;  // m, rad
+constexpr double kDamping = 1e-8;
+constexpr double kMaxTurn = 0.3;  // rad, of a joint in one iteration
+
+/// One leg by Newton's method; body and other leg stay.
+class Leg {
+ public:
+  Leg(const robot::RobotModel& model, const robot::RobotState& standing, int foot, double reserve)
+      : model_(model), data_(model), state_(standing), foot_(static_cast<size_t>(foot)) {
+    const auto joints = model.supporting_joints(model.feet()[foot_].body);
+    joints_.assign(joints.begin(), joints.end());
+    reserve_ = reserve;
+    Evaluate();
+    level_ = data_.foot_pose[foot_].linear();
+  }
+
+  Vector3d sole() const { return data_.foot_pose[foot_].translation(); }
+  /// Of the COM, m, world.
+  Vector3d Com() {
+    Vector3d sum = Vector3d::Zero();
+    for (size_t b = 0; b < model_.bodies().size(); ++b) {
+      const robot::Body& body = model_.bodies()[b];
+      sum += body.mass * (data_.base_position + data_.body_position[b] +
+                          data_.body_rotation[b] * body.com);
+    }
+    return sum / model_.total_mass();
+  }
+  /// False, and the leg as it was, when the sole cannot stand level at `target`, m, world.
+  bool Reach(const Vector3d& target) {
+    const Eigen::VectorXd before = state_.joint_position;
+    const bool reached = Solve(target) && WithinLimits();
+    if (!reached) {
+      state_.joint_position = before;
+      Evaluate();
+    }
+    return reached;
+  }
+
+ private:
+  void Evaluate() {
+    robot::ComputeKinematics(model_, state_, &data_);
+    robot::ComputeFeet(model_, &data_);
+  }
+  bool Solve(const Vector3d& target) {
+    const auto k = static_cast<Eigen::Index>(joints_.size());
+    Eigen::MatrixXd jacobian(6, k);
+    for (int i = 0; i < kMaxIterations; ++i) {
+      const Eigen::AngleAxisd turn(level_ * data_.foot_pose[foot_].linear().transpose());
+      robot::Vector6d error;
+      error << target - sole(), turn.angle() * turn.axis();
+      if (error.lpNorm<Eigen::Infinity>() < kTolerance) return true;
+      for (Eigen::Index j = 0; j < k; ++j) {
+        jacobian.col(j) = data_.foot_jacobian[foot_].col(6 + joints_[static_cast<size_t>(j)]);
+      }
+      Eigen::Matrix<double, 6, 6> gram = jacobian * jacobian.transpose();
+      gram.diagonal().array() += kDamping;
+      Eigen::VectorXd step = jacobian.transpose() * gram.ldlt().solve(error);
+      const double largest = step.lpNorm<Eigen::Infinity>();
+      if (!std::isfinite(largest)) return false;
+      if (largest > kMaxTurn) step *= kMaxTurn / largest;
+      for (Eigen::Index j = 0; j < k; ++j) {
+        state_.joint_position[joints_[static_cast<size_t>(j)]] += step[j];
+      }
+      Evaluate();
+    }
+    return false;
+  }
+  bool WithinLimits() const {
+    for (const int j : joints_) {
+      const robot::Joint& joint = model_.joints()[static_cast<size_t>(j)];
+      const double q = state_.joint_position[j];
+      if (q < joint.lower + reserve_ || q > joint.upper - reserve_) return false;
+    }
+    return true;
+  }
+
+  const robot::RobotModel& model_;
+  robot::RobotData data_;
+  robot::RobotState state_;
+  size_t foot_;
+  std::vector<int> joints_;
+  double reserve_ = 0;
+  Eigen::Matrix3d level_;
+};
+
+/// Of `foot` from the COM, from the stance outwards; empty when the stance cannot be held.
+balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, int foot,
+                                  double reserve) {
+  const double spacing = robot::StandingSpacing(model);
+  robot::PostureGoal goal;
+  for (size_t i = 0; i < 2; ++i) {
+    goal.foot[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing : 0.5 * spacing, 0) *
+                   Eigen::Isometry3d::Identity();
+  }
+  goal.com_height = height;
+  goal.nominal = model.stance().joint_position;
+  robot::RobotState standing;
+  try {
+    standing = robot::SolvePosture(model, goal);
+  } catch (const robot::RobotError&) {
+    return {};
+  }
+  std::array<Vector2d, kDirections> edge;
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kDirections;
+    const Vector3d direction(std::cos(angle), std::sin(angle), 0);
+    Leg leg(model, standing, foot, reserve);
+    const Vector3d start = leg.sole();
+    double reached = 0, stride = kStride;
+    while (stride > kFinest && reached < kFarthest) {
+      if (leg.Reach(start + (reached + stride) * direction)) {
+        reached += stride;
+      } else {
+        stride *= 0.5;
+      }
+    }
+    edge[static_cast<size_t>(i)] =
+        (start + kOfStraight * (leg.sole() - start) - leg.Com()).head<2>();
+  }
+  return balance::ConvexHull(edge);
+}
+
+Eigen::Rotation2Dd Turn(double yaw) { return Eigen::Rotation2Dd(yaw); }
+
+}  // namespace
+
+balance::ConvexPolygon SoleOutline(const robot::FootModel& foot, double margin) {
+  return balance::Rectangle({0.5 * foot.length - margin, 0.5 * foot.width - margin});
+}
+
+balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin, const Vector2d& centre,
+                              double yaw) {
+  balance::ConvexPolygon sole = SoleOutline(foot, margin);
+  const Eigen::Matrix2d turn = Turn(yaw).toRotationMatrix();
+  for (Vector2d& corner : sole.mutable_corners()) corner = centre + turn * corner;
+  return sole;
+}
+
+balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::ConvexPolygon& b) {
+  std::array<Vector2d, balance::ConvexPolygon::kMaxCorners> points;
+  size_t count = 0;
+  for (const balance::ConvexPolygon* polygon : {&a, &b}) {
+    for (const Vector2d& corner : polygon->corners()) {
+      if (count < points.size()) points[count++] = corner;
+    }
+  }
+  return balance::ConvexHull({points.data(), count});
+}
+
+balance::ConvexPolygon Clip(const balance::ConvexPolygon& polygon, const Vector2d& normal,
+                            double offset) {
+  balance::ConvexPolygon part;
+  const auto append = [&](const Vector2d& point) {
+    if (part.num_corners < balance::ConvexPolygon::kMaxCorners) {
+      part.corner[static_cast<size_t>(part.num_corners++)] = point;
+    }
+  };
+  if (polygon.num_corners == 0) return part;
+  Vector2d last = polygon.corners().back();
+  double last_depth = normal.dot(last) - offset;
+  for (const Vector2d& corner : polygon.corners()) {
+    const double depth = normal.dot(corner) - offset;
+    if ((depth >= 0) != (last_depth >= 0)) {
+      append(last + (corner - last) * (last_depth / (last_depth - depth)));
+    }
+    if (depth >= 0) append(corner);
+    last = corner;
+    last_depth = depth;
+  }
+  return part;
+}
+
+Reach::Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
+             double gap)
+    : lower_(lower) {
+  for (int foot = 0; foot < 2; ++foot) {
+    auto& leg = leg_[static_cast<size_t>(foot)];
+    leg[0] = LegPolygon(model, height, foot, joint_reserve);
+    leg[1] = LegPolygon(model, height - lower, foot, joint_reserve);
+  }
+  least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
+}
+
+balance::ConvexPolygon Reach::Leg(int foot, double share) const {
+  const auto& leg = leg_[static_cast<size_t>(foot)];
+  share = std::clamp(share, 0.0, 1.0);
+  // Between two convex sets that are cut along the same directions.
+  if (leg[0].num_corners != leg[1].num_corners) return leg[share < 1 ? 0 : 1];
+  balance::ConvexPolygon between = leg[0];
+  for (size_t i = 0; i < between.corners().size(); ++i) {
+    between.corner[i] += share * (leg[1].corner[i] - leg[0].corner[i]);
+  }
+  return between;
+}
+
+double Reach::LowerShare(const std::array<Vector2d, 2>& offset) const {
+  double share = 0;
+  for (size_t i = 0; i < 2; ++i) {
+    const double high = balance::SignedDistance(leg_[i][0], offset[i]);
+    if (high >= 0) continue;
+    const double low = balance::SignedDistance(leg_[i][1], offset[i]);
+    share = std::max(share, low > 0 ? -high / (low - high) : 1 - low);
+  }
+  return share;
+}
+
+balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com) const {
+  balance::ConvexPolygon reached = leg_[static_cast<size_t>(foot)][1];
+  for (Vector2d& corner : reached.mutable_corners()) corner += com;
+  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  return Clip(reached, {0, side}, least_spacing_);
+}
+
+}  // namespace poise::stepping

@@ -1,0 +1,53 @@
+// Where a robot can put its feet: polygons of its legs, by inverse kinematics.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "components/balance/convex_polygon.h"
+#include "components/robot/robot_model.h"
+
+namespace poise::stepping {
+
+/// Outline of a foot's sole in its own frame, `margin` (m) off its edges.
+balance::ConvexPolygon SoleOutline(const robot::FootModel& foot, double margin);
+/// The same placed at `centre`, turned by `yaw`, rad.
+balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,
+                              const Eigen::Vector2d& centre, double yaw);
+/// Hull of two polygons; of the corners beyond what a polygon holds the last are left out.
+balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::ConvexPolygon& b);
+/// The part of `polygon` where normal · x ≥ offset.
+balance::ConvexPolygon Clip(const balance::ConvexPolygon& polygon, const Eigen::Vector2d& normal,
+                            double offset);
+
+/// The legs' reach for an upright body with level soles. All in axes of the body's heading, x ahead,
+/// y to the left, m.
+class Reach {
+ public:
+  /// Nothing is reached.
+  Reach() = default;
+  /// At two heights of the COM above the soles: standing, and `lower` m below. A leg's joints keep
+  /// `joint_reserve`, rad, off their limits, and a straight knee as far off. `gap`, m: between the
+  /// soles, sideways. Never throws; a robot that cannot stand there has no reach.
+  Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
+        double gap);
+
+  bool empty() const { return leg_[0][0].num_corners < 3 || leg_[1][0].num_corners < 3; }
+  /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lower`, 0 to 1.
+  balance::ConvexPolygon Leg(int foot, double share) const;
+  /// Least share of `lower` with which the soles stand at `offset` from the COM by foot; above 1,
+  /// and by how many m, when even the lowest does not do.
+  double LowerShare(const std::array<Eigen::Vector2d, 2>& offset) const;
+  /// Sole centre of `foot`, the other's at the origin and the COM at `com`, both lowered all the
+  /// way: the leg's reach, and beside the other sole, so that the legs do not cross.
+  balance::ConvexPolygon Footholds(int foot, const Eigen::Vector2d& com) const;
+  double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
+  double lower() const { return lower_; }                  ///< m
+
+ private:
+  // By foot, by height: standing, lowered.
+  std::array<std::array<balance::ConvexPolygon, 2>, 2> leg_;
+  double least_spacing_ = 0, lower_ = 0;
+};
+
+}  // namespace poise::stepping

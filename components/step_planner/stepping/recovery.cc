@@ -1,0 +1,242 @@
+#include "components/step_planner/stepping/recovery.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_transition.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kMaxPeriod = 0.02;  // s, counted at most for a tick after a gap
+// Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
+constexpr double kLeastProgress = 0.5;
+
+}  // namespace
+
+balance::ConvexPolygon Recovery::Soles(const StepState& state, double edge) const {
+  balance::ConvexPolygon soles;
+  for (int i = 0; i < 2; ++i) {
+    const auto foot = static_cast<size_t>(i);
+    if (!state.in_contact[foot]) continue;
+    soles = HullOf(soles,
+                   SoleAt(choice_.foot(i), edge, state.sole[foot], state.sole_yaw[foot]));
+  }
+  return soles;
+}
+
+double Recovery::Beyond(const StepState& state) const {
+  return -balance::SignedDistance(Soles(state, 0), state.pendulum.capture_point());
+}
+
+bool Recovery::Update(const StepInput& input) {
+  const double time = input.time;
+  StepState state = Observe(input, active() ? in_contact_ : input.in_contact);
+  const double beyond = Beyond(state);
+  if (!(beyond > 0)) {
+    beyond_since_ = -1;
+  } else if (beyond_since_ < 0) {
+    beyond_since_ = time;
+  }
+  switch (stage_) {
+    case Stage::kIdle: {
+      const StepReason need = NeedOfFirstStep(input, state, beyond);
+      if (need == StepReason::kNone) break;
+      const size_t stance = state.in_contact[0] ? 0 : 1;
+      standing_height_ = input.com_height - input.sole[stance].translation().z();
+      height_.Begin(input.com_height);
+      steps_now_ = 0;
+      in_contact_ = input.in_contact;
+      output_.cop = balance::NearestPoint(Soles(state, choice_.limits().edge),
+                                          state.pendulum.capture_point());
+      BeginStep(input, state, need);
+      break;
+    }
+    case Stage::kUnloading:
+      if (time >= since_ + choice_.limits().unload - kTimeTolerance) LiftOff(input);
+      break;
+    case Stage::kSwinging:
+      if (swing_.Progress(time) < kLeastProgress) {
+        touch_.Reset();
+      } else if (touch_.Update(time, input.load[static_cast<size_t>(plan_.foot)])) {
+        Land(input);
+      }
+      break;
+    case Stage::kLoading:
+      if (time >= since_ + spec_.load - kTimeTolerance) {
+        stage_ = Stage::kCatching;
+        since_ = moving_since_ = time;
+      }
+      break;
+    case Stage::kCatching:
+      if (beyond_since_ >= 0 && time >= beyond_since_ + spec_.again_after - kTimeTolerance &&
+          steps_now_ < spec_.max_steps) {
+        BeginStep(input, state, StepReason::kAgain);
+      } else if (AtRest(input, state)) {
+        stage_ = Stage::kIdle;
+      }
+      break;
+  }
+  if (stage_ == Stage::kIdle) {
+    time_ = time;
+    return false;
+  }
+  state.in_contact = in_contact_;
+  Swings(input, state);
+  LeadCom(input, state);
+  output_.in_contact = in_contact_;
+  output_.foot = plan_.foot;
+  output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
+  const double ramp = stage_ == Stage::kUnloading ? choice_.limits().unload : spec_.load;
+  output_.progress =
+      output_.transition == 0 ? 0 : std::clamp((time - since_) / ramp, 0.0, 1.0);
+  time_ = time;
+  return true;
+}
+
+StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& state,
+                                     double beyond) {
+  if (!input.allowed || !(beyond > 0) || spec_.max_steps < 1) return StepReason::kNone;
+  if (input.step_needed) return StepReason::kPersistent;
+  if (beyond > spec_.sure) return StepReason::kSure;
+  if (beyond < spec_.beyond) return StepReason::kNone;
+  const StepPlan plan = choice_.Choose(state);
+  return plan.foot >= 0 && plan.margin >= 0 && plan.margin < spec_.reserve ? StepReason::kDeadline
+                                                                          : StepReason::kNone;
+}
+
+void Recovery::BeginStep(const StepInput& input, const StepState& state, StepReason reason) {
+  const StepPlan plan = choice_.Choose(state);
+  if (plan.foot < 0) return;
+  plan_ = plan;
+  reason_ = reason;
+  ++num_steps_;
+  ++steps_now_;
+  since_ = input.time;
+  touch_down_ = input.time + plan.time;
+  cop_from_ = output_.cop;
+  stage_ = Stage::kUnloading;
+  if (!in_contact_[static_cast<size_t>(plan.foot)]) {
+    const Vector2d sole = plan.foothold;
+    const double ground = input.sole[static_cast<size_t>(1 - plan.foot)].translation().z();
+    swing_.Begin(input.free_foot, input.free_rotation, {sole.x(), sole.y(), ground},
+                 Eigen::AngleAxisd(plan.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
+                 touch_down_, spec_.swing);
+    stage_ = Stage::kSwinging;
+    touch_.Reset();
+  }
+}
+
+void Recovery::LiftOff(const StepInput& input) {
+  const auto foot = static_cast<size_t>(plan_.foot);
+  in_contact_[foot] = false;
+  const Eigen::Isometry3d& sole = input.sole[foot];
+  const double ground = input.sole[1 - foot].translation().z();
+  swing_.Begin({.position = sole.translation()}, sole.linear(),
+               {plan_.foothold.x(), plan_.foothold.y(), ground},
+               Eigen::AngleAxisd(plan_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
+               touch_down_, spec_.swing);
+  stage_ = Stage::kSwinging;
+  since_ = input.time;
+  cop_from_ = output_.cop;
+  touch_.Reset();
+}
+
+void Recovery::Land(const StepInput& input) {
+  in_contact_[static_cast<size_t>(plan_.foot)] = true;
+  stage_ = Stage::kLoading;
+  since_ = input.time;
+  cop_from_ = output_.cop;
+}
+
+void Recovery::Swings(const StepInput& input, const StepState& state) {
+  output_.searching = false;
+  if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
+  const double left = touch_down_ - input.time;
+  if (left > spec_.swing.freeze) {
+    plan_ = choice_.At(state, plan_.foot, left);
+    if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
+  }
+  if (stage_ == Stage::kSwinging) {
+    FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
+  }
+}
+
+Vector2d Recovery::Goal(const StepState& state) const {
+  return 0.5 * (state.sole[0] + state.sole[1]);
+}
+
+Vector2d Recovery::CatchingPoint(const StepState& state) const {
+  const Vector2d point = state.pendulum.capture_point();
+  return balance::NearestPoint(Soles(state, choice_.limits().edge), point + spec_.gain * (point - Goal(state)));
+}
+
+bool Recovery::AtRest(const StepInput& input, const StepState& state) {
+  const bool rests = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance &&
+                     input.com_velocity.norm() < spec_.rest_speed;
+  if (!rests) moving_since_ = input.time;
+  return input.time >= moving_since_ + spec_.rest_time - kTimeTolerance;
+}
+
+double Recovery::LowerShare(const StepState& state) const {
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
+  std::array<Vector2d, 2> offset;
+  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+  // Where both soles and the COM will be.
+  const Vector2d com = steps ? plan_.com : state.pendulum.com;
+  for (size_t i = 0; i < 2; ++i) {
+    const bool swings = steps && static_cast<int>(i) == plan_.foot;
+    offset[i] = turn * ((swings ? plan_.foothold : state.sole[i]) - com);
+  }
+  return std::min(choice_.reach().LowerShare(offset), 1.0);
+}
+
+void Recovery::LeadCom(const StepInput& input, const StepState& state) {
+  const double period = std::clamp(input.time - time_, 0.0, kMaxPeriod);
+  // The height, critically damped.
+  const size_t stance = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging
+                            ? static_cast<size_t>(1 - plan_.foot)
+                            : static_cast<size_t>(plan_.foot);
+  const double ground = input.sole[stance].translation().z();
+  const double wanted =
+      ground + standing_height_ - LowerShare(state) * choice_.reach().lower();
+  height_.Follow(wanted, period);
+
+  double share = 1;
+  Vector2d cop = output_.cop;
+  switch (stage_) {
+    case Stage::kUnloading:
+    case Stage::kSwinging:
+      cop = choice_.BrakingPoint(state, 1 - plan_.foot);
+      if (stage_ == Stage::kUnloading) share = (input.time - since_) / choice_.limits().unload;
+      break;
+    case Stage::kLoading:
+    case Stage::kCatching:
+      cop = CatchingPoint(state);
+      if (stage_ == Stage::kLoading) share = (input.time - since_) / spec_.load;
+      break;
+    case Stage::kIdle:
+      break;
+  }
+  share = balance::SmoothStep(share);
+  cop = cop_from_ + share * (cop - cop_from_);
+  output_.cop = cop;
+  output_.com = LeadByCop(input, height_.point(), ground, cop);
+}
+
+void Recovery::Archive(StateArchive* archive) {
+  archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
+  archive->Show(plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop, plan_.capture_point,
+                plan_.com, plan_.margin);
+  swing_.Archive(archive);
+  touch_.Archive(archive);
+  height_.Archive(archive);
+  archive->Show(time_, since_, touch_down_, beyond_since_, moving_since_, cop_from_,
+                standing_height_);
+  output_.Archive(archive);
+}
+
+}  // namespace poise::stepping

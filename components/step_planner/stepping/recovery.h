@@ -1,0 +1,99 @@
+// Steps that catch a push: when, which foot, where, and how the COM is led meanwhile.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/step_planner/stepping/footwork.h"
+#include "components/step_planner/stepping/step_choice.h"
+#include "components/step_planner/stepping/swing.h"
+
+namespace poise::stepping {
+
+/// Numbers of the configuration, in m, s, N.
+struct RecoverySpec {
+  double sure = 0;         ///< m beyond the soles from which no other strategy helps
+  double reserve = 0;      ///< m of margin below which a step may not wait any longer
+  double beyond = 0;       ///< m beyond the soles from which it may not wait below `reserve`
+  double again_after = 0;  ///< s beyond the soles of a step until the next one begins
+  int max_steps = 0;
+  double load = 0;  ///< s of the ramp that loads a landed foot
+  SwingSpec swing;
+  double touch_load = 0, touch_duration = 0;  ///< N, s
+  double search_depth = 0;                    ///< m below the foothold
+  double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
+  double height_rate = 0;    ///< 1/s, with which the COM's height follows what the legs ask for
+  double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+};
+
+enum class Stage { kIdle, kUnloading, kSwinging, kLoading, kCatching };
+/// Why a step was made.
+enum class StepReason {
+  kNone,
+  kPersistent,  ///< the capture point stayed beyond the soles
+  kSure,        ///< so far beyond that nothing else can bring it back
+  kDeadline,    ///< waiting longer would leave the reach
+  kAgain,       ///< the step before did not catch it
+};
+
+/// Pure function of its calls; never allocates.
+class Recovery {
+ public:
+  Recovery() = default;
+  Recovery(const StepChoice& choice, const RecoverySpec& spec)
+      : choice_(choice),
+        spec_(spec),
+        touch_(spec.touch_load, spec.touch_duration),
+        height_(spec.height_rate) {}
+
+  /// Once a tick. False: idle, `output` is not to be used.
+  bool Update(const StepInput& input);
+  const StepOutput& output() const { return output_; }
+  bool active() const { return stage_ != Stage::kIdle; }
+  Stage stage() const { return stage_; }
+  StepReason reason() const { return reason_; }
+  int num_steps() const { return num_steps_; }  ///< since the start
+  const StepPlan& plan() const { return plan_; }  ///< of the step under way
+  double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
+  void Archive(StateArchive* archive);
+
+ private:
+  /// Hull of the soles in contact, `edge` m off their edges.
+  balance::ConvexPolygon Soles(const StepState& state, double edge) const;
+  /// m that the capture point is beyond the soles in contact; negative inside.
+  double Beyond(const StepState& state) const;
+  StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double beyond);
+  void BeginStep(const StepInput& input, const StepState& state, StepReason reason);
+  void LiftOff(const StepInput& input);
+  /// The foothold where the capture point now says, and the foot on its way there.
+  void Swings(const StepInput& input, const StepState& state);
+  void Land(const StepInput& input);
+  bool AtRest(const StepInput& input, const StepState& state);
+  /// Where the centre of pressure shall be on both soles.
+  Eigen::Vector2d CatchingPoint(const StepState& state) const;
+  Eigen::Vector2d Goal(const StepState& state) const;
+  void LeadCom(const StepInput& input, const StepState& state);
+  double LowerShare(const StepState& state) const;
+
+  StepChoice choice_;
+  RecoverySpec spec_;
+  Stage stage_ = Stage::kIdle;
+  StepReason reason_ = StepReason::kNone;
+  int num_steps_ = 0, steps_now_ = 0;
+  std::array<bool, 2> in_contact_{true, true};
+  StepPlan plan_;
+  Swing swing_;
+  double time_ = 0, since_ = 0;    // s, last tick; when the stage began
+  double touch_down_ = 0;          // s
+  TouchTimer touch_;
+  double beyond_since_ = -1;       // s; negative: inside
+  double moving_since_ = 0;        // s, last time not at rest
+  Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
+  double standing_height_ = 0;     // m, above the soles, before the first step
+  HeightLead height_;              // m, world, of the COM's reference
+  StepOutput output_;
+};
+
+}  // namespace poise::stepping

@@ -1,0 +1,79 @@
+// Which foot to put where, and how soon, so that the capture point is caught.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "components/balance/convex_polygon.h"
+#include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/pendulum.h"
+#include "components/step_planner/stepping/reach.h"
+
+namespace poise::stepping {
+
+struct StepLimits {
+  double edge = 0;          ///< m, that a centre of pressure keeps off a sole's edge
+  double acceleration = 1;  ///< m/s², of a swing foot, greatest
+  double least_swing = 0;   ///< s
+  double unload = 0;        ///< s, from the decision until a loaded foot leaves the ground
+  double beyond = 0;        ///< m beyond the capture point that a sole's centre comes down
+  double enough = 0;        ///< m, of the capture point inside the new support, that is enough
+  double spacing = 0;       ///< m, sideways between the soles' centres, when nothing asks for more
+};
+
+/// The robot as a step sees it: in any horizontal axes, heading of the body along `yaw`.
+struct StepState {
+  Pendulum pendulum;
+  std::array<Eigen::Vector2d, 2> sole{Eigen::Vector2d::Zero(),
+                                      Eigen::Vector2d::Zero()};  ///< centres, m, right first
+  std::array<double, 2> sole_yaw{0, 0};                          ///< rad
+  std::array<bool, 2> in_contact{true, true};
+  double yaw = 0;  ///< rad
+};
+
+struct StepPlan {
+  int foot = -1;      ///< that swings; −1: none can
+  double time = 0;    ///< s from now until it touches down
+  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();  ///< sole centre
+  double yaw = 0;                                      ///< rad, of the sole
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();       ///< centre of pressure until then
+  Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
+  Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
+  /// m, of the capture point at touch-down inside the soles less `edge`; negative: outside, another
+  /// step must follow.
+  double margin = 0;
+};
+
+/// Least time of a quintic over `distance`, m, whose acceleration stays below `acceleration`, m/s².
+double SwingTime(double distance, double acceleration);
+
+/// Pure functions of model, reach and limits.
+class StepChoice {
+ public:
+  StepChoice() = default;
+  StepChoice(const robot::RobotModel& model, const Reach& reach, const StepLimits& limits)
+      : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {}
+
+  /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
+  /// sooner; none when standing still does as well. A foot that is not in contact swings at once, from `swing_from` if it is in the air.
+  StepPlan Choose(const StepState& state) const;
+  /// The step of `foot`, whose least time is iterated from the swing that it takes.
+  StepPlan Plan(const StepState& state, int foot) const;
+  /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
+  /// stance sole's point nearest to the capture point.
+  StepPlan At(const StepState& state, int foot, double time) const;
+  /// The step catches the capture point, or comes nearer to it than the soles where they are.
+  bool Helps(const StepState& state, const StepPlan& plan) const;
+  /// The stance sole's point nearest to the capture point, less `edge`.
+  Eigen::Vector2d BrakingPoint(const StepState& state, int stance) const;
+  const StepLimits& limits() const { return limits_; }
+  const Reach& reach() const { return reach_; }
+  const robot::FootModel& foot(int index) const { return feet_[static_cast<size_t>(index)]; }
+
+ private:
+  std::array<robot::FootModel, 2> feet_;
+  Reach reach_;
+  StepLimits limits_;
+};
+
+}  // namespace poise::stepping

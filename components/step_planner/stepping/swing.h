@@ -1,0 +1,68 @@
+// The swing foot's way to a foothold that may still move.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/messages/motion.h"
+
+namespace poise::stepping {
+
+/// Quintic in time between two motions of a coordinate; straight on with the last velocity after.
+class Quintic {
+ public:
+  struct Point {
+    double position = 0, velocity = 0, acceleration = 0;
+  };
+  /// From `from` at `start` to `to` at start + duration, s, > 0.
+  void Begin(const Point& from, const Point& to, double start, double duration);
+  Point At(double time) const;
+  void Archive(StateArchive* archive) { archive->Show(coefficient_, start_, duration_); }
+
+ private:
+  std::array<double, 6> coefficient_{};  // of powers of (time − start) / duration
+  double start_ = 0, duration_ = 1;
+};
+
+struct SwingSpec {
+  double clearance = 0;    ///< m that the sole rises above the higher of its two ends
+  double touch_speed = 0;  ///< m/s, downward, with which it meets the ground
+  double freeze = 0;       ///< s before the end, from when on the foothold stays
+};
+
+/// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,
+/// velocity and acceleration whatever the foothold does: each new one begins from the motion so far.
+/// After `end` it goes on downward with touch_speed, for the ground is not where it was expected.
+class Swing {
+ public:
+  /// From the motion `from`, turned by `rotation`, to rest (but for touch_speed) at `foothold`, m,
+  /// world, `level` its sole's rotation there, at `end`, s. A foot that is higher than it has to be
+  /// goes no higher.
+  void Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
+             const Eigen::Vector3d& foothold, const Eigen::Matrix3d& level, double time, double end,
+             const SwingSpec& spec);
+  /// Another foothold, in x and y, and time; no effect within `freeze` of the end.
+  void Move(const Eigen::Vector2d& foothold, double time, double end);
+  PointMotion At(double time) const;
+  RotationMotion RotationAt(double time) const;
+  double start() const { return start_; }
+  double end() const { return end_; }
+  /// Share of the time that has passed, 0 to 1.
+  double Progress(double time) const;
+  bool frozen(double time) const { return time > end_ - spec_.freeze; }
+  const Eigen::Vector3d& foothold() const { return foothold_; }
+  void Archive(StateArchive* archive);
+
+ private:
+  SwingSpec spec_;
+  Quintic x_, y_, rise_, fall_;
+  Eigen::Vector3d foothold_ = Eigen::Vector3d::Zero();
+  double start_ = 0, apex_ = 0, end_ = 0;  // s
+  double apex_height_ = 0;                 // m
+  Eigen::Matrix3d from_rotation_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  // rad, rotation vector to `level`
+};
+
+}  // namespace poise::stepping

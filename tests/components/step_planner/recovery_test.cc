@@ -1,0 +1,345 @@
+// Recovery steps in a world of their own: a point mass above massless legs that obeys the pendulum's
+// equations, whose feet go where the swing says and are loaded where the ground is.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "components/robot/posture.h"
+#include "components/step_planner/stepping/pendulum.h"
+#include "components/step_planner/stepping/recovery.h"
+#include "tests/robot/robot_test_support.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using robot::TestRobot;
+
+constexpr double kPeriod = 0.002;  // s
+
+StepLimits Limits(const robot::RobotModel& model, const Reach& reach) {
+  StepLimits limits;
+  limits.edge = 0.01;
+  limits.acceleration = 25;
+  limits.least_swing = 0.2;
+  limits.unload = 0.04;
+  limits.beyond = 0.04;
+  limits.enough = 0.04;
+  limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+  return limits;
+}
+
+RecoverySpec Spec() {
+  RecoverySpec spec;
+  spec.sure = 0.03;
+  spec.reserve = 0.03;
+  spec.beyond = 0.02;
+  spec.again_after = 0.03;
+  spec.max_steps = 5;
+  spec.load = 0.06;
+  spec.swing = {0.05, 0.25, 0.05};
+  spec.touch_load = 10;
+  spec.touch_duration = 0.006;
+  spec.search_depth = 0.06;
+  spec.gain = 1;
+  spec.height_rate = 8;
+  spec.rest_distance = 0.03;
+  spec.rest_speed = 0.06;
+  spec.rest_time = 0.3;
+  return spec;
+}
+
+class World {
+ public:
+  World(TestRobot robot, double ground_there = 0)
+      : model_(robot::LoadTestRobot(robot)),
+        height_(robot::StandingHeight(model_)),
+        spacing_(robot::StandingSpacing(model_)),
+        reach_(model_, height_, 0.08 * height_, 0.1, 0.02),
+        ground_there_(ground_there) {
+    StepChoice choice(model_, reach_, Limits(model_, reach_));
+    recovery_ = Recovery(choice, Spec());
+    com_ = {0, 0, height_};
+    for (size_t i = 0; i < 2; ++i) {
+      sole_[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing_ : 0.5 * spacing_, 0) *
+                 Eigen::Isometry3d::Identity();
+    }
+  }
+
+  /// Stands on the right foot, the left one `z` m up.
+  void LiftLeft(double z) {
+    com_.y() = sole_[0].translation().y();
+    sole_[1].translation().z() = z;
+    in_contact_ = {true, false};
+  }
+  void Push(const Vector2d& impulse) { velocity_.head<2>() += impulse / model_.total_mass(); }
+
+  void Tick() {
+    StepInput input;
+    input.time = time_;
+    input.com = com_;
+    input.com_velocity = velocity_;
+    input.sole = sole_;
+    for (size_t i = 0; i < 2; ++i) input.load[i] = Loaded(i) ? 200 : 0;
+    input.in_contact = in_contact_;
+    input.free_foot = {.position = sole_[1].translation()};
+    input.com_height = height_;
+    const Stage before = recovery_.stage();
+    const bool active = recovery_.Update(input);
+    Vector3d acceleration;
+    if (active) {
+      const StepOutput& output = recovery_.output();
+      Check(before, output);
+      in_contact_ = output.in_contact;
+      for (size_t i = 0; i < 2; ++i) {
+        if (in_contact_[i]) continue;
+        sole_[i].translation() = output.swing.position;
+        sole_[i].linear() = output.swing_rotation.rotation;
+        // The ground stops it.
+        double& z = sole_[i].translation().z();
+        if (recovery_.stage() == Stage::kSwinging && output.swing.velocity.z() < 0) {
+          z = std::max(z, ground_there_);
+        }
+      }
+      acceleration = output.com.acceleration;
+      // The height is followed exactly.
+      com_.z() = output.com.position.z();
+      velocity_.z() = output.com.velocity.z();
+    } else {
+      // Standing: the centre of pressure as near to the capture point as the soles allow.
+      const double w = Frequency();
+      const Vector2d point = com_.head<2>() + velocity_.head<2>() / w;
+      const Vector2d goal = 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
+      const Vector2d middle = in_contact_[1] ? goal : Vector2d(sole_[0].translation().head<2>());
+      acceleration.head<2>() =
+          w * w *
+          (com_.head<2>() - balance::NearestPoint(Soles(0.01), 2 * point - middle));
+    }
+    time_ += kPeriod;
+    for (int i = 0; i < 2; ++i) {
+      com_[i] += kPeriod * velocity_[i] + 0.5 * kPeriod * kPeriod * acceleration[i];
+      velocity_[i] += kPeriod * acceleration[i];
+    }
+  }
+  /// False: the robot fell, its COM farther from its soles than a leg is long.
+  bool Run(double duration) {
+    for (const double end = time_ + duration; time_ < end;) {
+      Tick();
+      const double far = -balance::SignedDistance(Soles(0), com_.head<2>());
+      if (!(far < height_)) return false;
+    }
+    return true;
+  }
+  bool Rests() const {
+    const Vector2d point = com_.head<2>() + velocity_.head<2>() / Frequency();
+    return !recovery_.active() && balance::SignedDistance(Soles(0), point) > 0 &&
+           velocity_.norm() < 0.1;
+  }
+
+  double Frequency() const { return std::sqrt(robot::kGravity / com_.z()); }
+  double mass() const { return model_.total_mass(); }
+  double height() const { return height_; }
+  Recovery& recovery() { return recovery_; }
+  const robot::RobotModel& model() const { return model_; }
+  double largest_jump() const { return largest_jump_; }
+  double touched() const { return touched_; }
+  double decided() const { return decided_; }
+  double time() const { return time_; }
+
+ private:
+  balance::ConvexPolygon Soles(double edge) const {
+    balance::ConvexPolygon soles;
+    for (size_t i = 0; i < 2; ++i) {
+      if (!in_contact_[i]) continue;
+      soles = HullOf(soles, SoleAt(model_.feet()[i], edge, sole_[i].translation().head<2>(), 0));
+    }
+    return soles;
+  }
+  bool Loaded(size_t foot) const {
+    return in_contact_[foot] || sole_[foot].translation().z() <= ground_there_;
+  }
+  void Check(Stage before, const StepOutput& output) {
+    const Stage now = recovery_.stage();
+    EXPECT_TRUE(output.in_contact[0] || output.in_contact[1]);
+    EXPECT_EQ(output.in_contact[0] && output.in_contact[1], now != Stage::kSwinging);
+    EXPECT_GE(output.progress, 0);
+    EXPECT_LE(output.progress, 1);
+    if (now == Stage::kSwinging) {
+      // On the stance sole.
+      const auto stance = static_cast<size_t>(1 - output.foot);
+      EXPECT_TRUE(output.in_contact[stance]);
+      EXPECT_GE(balance::SignedDistance(
+                    SoleAt(model_.feet()[stance], 0, sole_[stance].translation().head<2>(), 0),
+                    output.cop),
+                0);
+    }
+    // The centre of pressure asked for goes, it does not jump; but for a foot that swings at once.
+    if (before != Stage::kIdle) {
+      largest_jump_ = std::max(largest_jump_, (output.cop - last_cop_).norm());
+    } else {
+      decided_ = time_;
+    }
+    if (before == Stage::kSwinging && now == Stage::kLoading && touched_ < 0) touched_ = time_;
+    last_cop_ = output.cop;
+  }
+
+  robot::RobotModel model_;
+  double height_, spacing_;
+  Reach reach_;
+  double ground_there_;
+  Recovery recovery_;
+  double time_ = 0;
+  Vector3d com_, velocity_ = Vector3d::Zero();
+  std::array<Eigen::Isometry3d, 2> sole_;
+  std::array<bool, 2> in_contact_{true, true};
+  Vector2d last_cop_ = Vector2d::Zero();
+  double largest_jump_ = 0, touched_ = -1, decided_ = -1;
+};
+
+Vector2d Direction(double degrees) {
+  return {std::cos(degrees * M_PI / 180), std::sin(degrees * M_PI / 180)};
+}
+
+// m from the middle to the edge of both soles, less the reserve, along a direction: by bisection.
+double EdgeDistance(const World& world, const Vector2d& direction, double edge) {
+  const double spacing = robot::StandingSpacing(world.model());
+  const balance::ConvexPolygon soles =
+      HullOf(SoleAt(world.model().feet()[0], edge, {0, -0.5 * spacing}, 0),
+             SoleAt(world.model().feet()[1], edge, {0, 0.5 * spacing}, 0));
+  double low = 0, high = 2;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (balance::SignedDistance(soles, middle * direction) > 0 ? low : high) = middle;
+  }
+  return low;
+}
+
+class RecoveryCase : public testing::TestWithParam<TestRobot> {};
+
+TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
+  for (double degrees = 0; degrees < 360; degrees += 30) {
+    World world(GetParam());
+    const Vector2d direction = Direction(degrees);
+    world.Push(0.97 * world.mass() * world.Frequency() *
+               EdgeDistance(world, direction, 0.01) * direction);
+    EXPECT_TRUE(world.Run(4)) << degrees;
+    EXPECT_EQ(world.recovery().num_steps(), 0) << degrees;
+  }
+}
+
+// Ahead and behind a step catches nearly what the closed form allows with the time that the step
+// took and as far as the legs reach, and no more.
+TEST_P(RecoveryCase, OneStepCatchesWhatTheClosedFormSays) {
+  for (const double degrees : {0.0, 180.0}) {
+    const Vector2d direction = Direction(degrees);
+    double largest = 0, time = 0;
+    const World still(GetParam());
+    const double scale = still.mass() * still.Frequency();
+    for (double impulse = 0.1 * scale; impulse < 0.6 * scale; impulse += 0.01 * scale) {
+      World world(GetParam());
+      world.Push(impulse * direction);
+      if (!world.Run(6) || world.recovery().num_steps() > 1) break;
+      EXPECT_TRUE(world.Rests()) << impulse;
+      if (world.recovery().num_steps() == 1) time = world.touched();
+      largest = impulse;
+    }
+    ASSERT_GT(time, 0);
+    const double rest = EdgeDistance(still, direction, 0);
+    EXPECT_GT(largest, 1.05 * scale * rest) << "no more than without a step";
+    // No leg reaches farther from an edge to the next one than it is long.
+    EXPECT_LT(largest, LargestImpulse(still.mass(), still.Frequency(), rest, still.height(), time, 1));
+  }
+}
+
+TEST_P(RecoveryCase, AHarderPushTakesMoreSteps) {
+  int last = 0;
+  const World still(GetParam());
+  const double rest = EdgeDistance(still, {1, 0}, 0);
+  for (const double share : {0.9, 1.15, 1.6}) {
+    World world(GetParam());
+    world.Push({share * still.mass() * still.Frequency() * rest, 0});
+    if (!world.Run(6)) break;
+    EXPECT_GE(world.recovery().num_steps(), last) << share;
+    EXPECT_TRUE(world.Rests()) << share;
+    last = world.recovery().num_steps();
+  }
+  EXPECT_GE(last, 1);
+}
+
+TEST_P(RecoveryCase, TheFootInTheAirStepsAtOnce) {
+  World world(GetParam());
+  world.LiftLeft(0.05);
+  // To the left, where the free foot is.
+  world.Push({0, 1.5 * world.mass() * world.Frequency() * 0.5 * world.model().feet()[0].width});
+  EXPECT_TRUE(world.Run(5));
+  EXPECT_GE(world.recovery().num_steps(), 1);
+  EXPECT_EQ(world.recovery().output().in_contact, (std::array{true, true}));
+  EXPECT_TRUE(world.Rests());
+}
+
+// The ground is 3 cm higher or 4 cm lower than the stance sole: the load says where it is.
+TEST_P(RecoveryCase, LandsWhereTheGroundIs) {
+  const World still(GetParam());
+  const double push = 1.15 * still.mass() * still.Frequency() * EdgeDistance(still, {1, 0}, 0);
+  std::vector<double> touched;
+  for (const double ground : {0.03, 0.0, -0.04}) {
+    World world(GetParam(), ground);
+    world.Push({push, 0});
+    // Standing, the soles are on the level.
+    world.Run(5);
+    ASSERT_GT(world.touched(), 0) << ground;
+    touched.push_back(world.touched());
+  }
+  EXPECT_LT(touched[0], touched[1]);
+  // At the speed with which it comes down, 0.25 m/s.
+  EXPECT_NEAR(touched[2] - touched[1], 0.04 / 0.25, 0.01);
+}
+
+TEST_P(RecoveryCase, TheCentreOfPressureDoesNotJump) {
+  World world(GetParam());
+  world.Push({1.2 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
+  EXPECT_TRUE(world.Run(4));
+  EXPECT_GE(world.recovery().num_steps(), 1);
+  // 0.4 m in the shortest ramp's steepest part: 1.875 · 0.4 m · 2 ms / 0.04 s.
+  EXPECT_LT(world.largest_jump(), 0.0375);
+}
+
+// Whoever takes over in mid-step goes on with the same bits.
+TEST_P(RecoveryCase, TheArchiveIsAllOfItsState) {
+  for (int at = 20; at < 600; at += 45) {
+    World one(GetParam()), other(GetParam());
+    for (World* world : {&one, &other}) {
+      world->Push({1.2 * world->mass() * world->Frequency() * EdgeDistance(*world, {1, 0}, 0), 1});
+      for (int tick = 0; tick < at; ++tick) world->Tick();
+    }
+    StateArchive measure;
+    one.recovery().Archive(&measure);
+    std::vector<uint8_t> bytes(measure.size());
+    StateArchive save = StateArchive::Saving(bytes);
+    one.recovery().Archive(&save);
+    ASSERT_TRUE(save.ok());
+    World still(GetParam());
+    other.recovery() = still.recovery();
+    StateArchive restore = StateArchive::Restoring(bytes);
+    other.recovery().Archive(&restore);
+    ASSERT_TRUE(restore.ok());
+    for (int tick = 0; tick < 300; ++tick) {
+      one.Tick();
+      other.Tick();
+      ASSERT_EQ(one.recovery().stage(), other.recovery().stage()) << at << ' ' << tick;
+      ASSERT_EQ(one.recovery().output().com.acceleration, other.recovery().output().com.acceleration)
+          << at << ' ' << tick;
+      ASSERT_EQ(one.recovery().output().swing.position, other.recovery().output().swing.position)
+          << at << ' ' << tick;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, RecoveryCase,
+                         testing::Values(TestRobot::kDyros, TestRobot::kMantis));
+
+}  // namespace
+}  // namespace poise::stepping
