@@ -163,7 +163,8 @@ int8_t StepPlanner::Plan(double time) {
   ReportFeet();
   ReportReferences();
   ReportCapture(time, capture);
-  return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING : support_plan_t::STATUS_OK;
+  return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
+                                                 : support_plan_t::STATUS_OK;
 }
 
 ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& load) {
@@ -403,18 +404,18 @@ void StepPlanner::ReportPhase(double time) {
 void StepPlanner::ReportFeet() {
   support_plan_t& out = *support_plan_;
   const int next = schedule_->next();
-  const std::array<bool, 2> then =
-      recovery_.active()                           ? std::array{true, true}
-      : next == PhaseGraph::kNone || Held() ? in_contact_
-                                            : ContactsOf(schedule_->phase(next).support());
+  const std::array<bool, 2> then = recovery_.active() ? std::array{true, true}
+                                   : next == PhaseGraph::kNone || Held()
+                                       ? in_contact_
+                                       : ContactsOf(schedule_->phase(next).support());
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = in_contact_[i] ? 1 : 0;
     out.next_in_contact[i] = then[i] ? 1 : 0;
-    out.foot_state[i] =
-        in_contact_[i]       ? support_plan_t::FOOT_SUPPORT
-        : recovery_.active() ? (recovery_.output().searching ? support_plan_t::FOOT_SEARCHING
-                                                             : support_plan_t::FOOT_SWING)
-                             : FootCode(landing_[i].state());
+    out.foot_state[i] = in_contact_[i] ? support_plan_t::FOOT_SUPPORT
+                        : recovery_.active()
+                            ? (recovery_.output().searching ? support_plan_t::FOOT_SEARCHING
+                                                            : support_plan_t::FOOT_SWING)
+                            : FootCode(landing_[i].state());
     SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
   }
 }

@@ -46,17 +46,16 @@ StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact)
 
 void HeightLead::Follow(double wanted, double period) {
   const double most = kHeightShare * robot::kGravity;
-  point_.acceleration =
-      std::clamp(rate_ * rate_ * (wanted - point_.position) - 2 * rate_ * point_.velocity, -most,
-                 most);
+  point_.acceleration = std::clamp(
+      rate_ * rate_ * (wanted - point_.position) - 2 * rate_ * point_.velocity, -most, most);
   point_.velocity += period * point_.acceleration;
   point_.position += period * point_.velocity;
 }
 
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
                       const Eigen::Vector2d& cop) {
-  const double rate = (robot::kGravity + height.acceleration) /
-                      std::max(input.com.z() - ground, kLeastHeight);
+  const double rate =
+      (robot::kGravity + height.acceleration) / std::max(input.com.z() - ground, kLeastHeight);
   const Eigen::Vector2d acceleration = rate * (input.com.head<2>() - cop);
   PointMotion com;
   com.position << input.com.head<2>(), height.position;

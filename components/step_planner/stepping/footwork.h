@@ -41,7 +41,7 @@ struct StepOutput {
   PointMotion com;
   PointMotion swing;
   RotationMotion swing_rotation;
-  bool searching = false;  ///< below where the ground was expected
+  bool searching = false;                         ///< below where the ground was expected
   Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, asked for
 
   void Archive(StateArchive* archive);

@@ -44,8 +44,8 @@ class Leg {
     Vector3d sum = Vector3d::Zero();
     for (size_t b = 0; b < model_.bodies().size(); ++b) {
       const robot::Body& body = model_.bodies()[b];
-      sum += body.mass * (data_.base_position + data_.body_position[b] +
-                          data_.body_rotation[b] * body.com);
+      sum += body.mass *
+             (data_.base_position + data_.body_position[b] + data_.body_rotation[b] * body.com);
     }
     return sum / model_.total_mass();
   }

@@ -20,8 +20,8 @@ balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::Co
 balance::ConvexPolygon Clip(const balance::ConvexPolygon& polygon, const Eigen::Vector2d& normal,
                             double offset);
 
-/// The legs' reach for an upright body with level soles. All in axes of the body's heading, x ahead,
-/// y to the left, m.
+/// The legs' reach for an upright body with level soles. All in axes of the body's heading, x
+/// ahead, y to the left, m.
 class Reach {
  public:
   /// Nothing is reached.

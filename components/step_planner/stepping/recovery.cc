@@ -22,8 +22,7 @@ balance::ConvexPolygon Recovery::Soles(const StepState& state, double edge) cons
   for (int i = 0; i < 2; ++i) {
     const auto foot = static_cast<size_t>(i);
     if (!state.in_contact[foot]) continue;
-    soles = HullOf(soles,
-                   SoleAt(choice_.foot(i), edge, state.sole[foot], state.sole_yaw[foot]));
+    soles = HullOf(soles, SoleAt(choice_.foot(i), edge, state.sole[foot], state.sole_yaw[foot]));
   }
   return soles;
 }
@@ -91,8 +90,7 @@ bool Recovery::Update(const StepInput& input) {
   output_.foot = plan_.foot;
   output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
   const double ramp = stage_ == Stage::kUnloading ? choice_.limits().unload : spec_.load;
-  output_.progress =
-      output_.transition == 0 ? 0 : std::clamp((time - since_) / ramp, 0.0, 1.0);
+  output_.progress = output_.transition == 0 ? 0 : std::clamp((time - since_) / ramp, 0.0, 1.0);
   time_ = time;
   return true;
 }
@@ -105,7 +103,7 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
   if (beyond < spec_.beyond) return StepReason::kNone;
   const StepPlan plan = choice_.Choose(state);
   return plan.foot >= 0 && plan.margin >= 0 && plan.margin < spec_.reserve ? StepReason::kDeadline
-                                                                          : StepReason::kNone;
+                                                                           : StepReason::kNone;
 }
 
 void Recovery::BeginStep(const StepInput& input, const StepState& state, StepReason reason) {
@@ -171,7 +169,8 @@ Vector2d Recovery::Goal(const StepState& state) const {
 
 Vector2d Recovery::CatchingPoint(const StepState& state) const {
   const Vector2d point = state.pendulum.capture_point();
-  return balance::NearestPoint(Soles(state, choice_.limits().edge), point + spec_.gain * (point - Goal(state)));
+  return balance::NearestPoint(Soles(state, choice_.limits().edge),
+                               point + spec_.gain * (point - Goal(state)));
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
@@ -201,8 +200,7 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
                             ? static_cast<size_t>(1 - plan_.foot)
                             : static_cast<size_t>(plan_.foot);
   const double ground = input.sole[stance].translation().z();
-  const double wanted =
-      ground + standing_height_ - LowerShare(state) * choice_.reach().lower();
+  const double wanted = ground + standing_height_ - LowerShare(state) * choice_.reach().lower();
   height_.Follow(wanted, period);
 
   double share = 1;

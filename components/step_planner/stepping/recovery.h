@@ -23,8 +23,8 @@ struct RecoverySpec {
   SwingSpec swing;
   double touch_load = 0, touch_duration = 0;  ///< N, s
   double search_depth = 0;                    ///< m below the foothold
-  double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
-  double height_rate = 0;    ///< 1/s, with which the COM's height follows what the legs ask for
+  double gain = 0;         ///< of the capture point's error in the centre of pressure, > 0
+  double height_rate = 0;  ///< 1/s, with which the COM's height follows what the legs ask for
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
 };
 
@@ -54,8 +54,8 @@ class Recovery {
   bool active() const { return stage_ != Stage::kIdle; }
   Stage stage() const { return stage_; }
   StepReason reason() const { return reason_; }
-  int num_steps() const { return num_steps_; }  ///< since the start
-  const StepPlan& plan() const { return plan_; }  ///< of the step under way
+  int num_steps() const { return num_steps_; }       ///< since the start
+  const StepPlan& plan() const { return plan_; }     ///< of the step under way
   double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
   void Archive(StateArchive* archive);
 
@@ -85,14 +85,14 @@ class Recovery {
   std::array<bool, 2> in_contact_{true, true};
   StepPlan plan_;
   Swing swing_;
-  double time_ = 0, since_ = 0;    // s, last tick; when the stage began
-  double touch_down_ = 0;          // s
+  double time_ = 0, since_ = 0;  // s, last tick; when the stage began
+  double touch_down_ = 0;        // s
   TouchTimer touch_;
-  double beyond_since_ = -1;       // s; negative: inside
-  double moving_since_ = 0;        // s, last time not at rest
+  double beyond_since_ = -1;                            // s; negative: inside
+  double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
-  double standing_height_ = 0;     // m, above the soles, before the first step
-  HeightLead height_;              // m, world, of the COM's reference
+  double standing_height_ = 0;                          // m, above the soles, before the first step
+  HeightLead height_;                                   // m, world, of the COM's reference
   StepOutput output_;
 };
 

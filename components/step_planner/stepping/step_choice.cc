@@ -27,9 +27,8 @@ double SwingTime(double distance, double acceleration) {
 
 Vector2d StepChoice::BrakingPoint(const StepState& state, int stance) const {
   const auto i = static_cast<size_t>(stance);
-  return balance::NearestPoint(
-      SoleAt(feet_[i], limits_.edge, state.sole[i], state.sole_yaw[i]),
-      state.pendulum.capture_point());
+  return balance::NearestPoint(SoleAt(feet_[i], limits_.edge, state.sole[i], state.sole_yaw[i]),
+                               state.pendulum.capture_point());
 }
 
 StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
@@ -41,8 +40,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
   plan.time = time;
   plan.yaw = state.yaw;
   plan.cop = BrakingPoint(state, stance);
-  plan.capture_point =
-      CapturePointAfter(state.pendulum.capture_point(), plan.cop, w, time);
+  plan.capture_point = CapturePointAfter(state.pendulum.capture_point(), plan.cop, w, time);
   plan.com = After(state.pendulum, plan.cop, time).com;
 
   // From here on in axes of the heading, from the stance sole.
@@ -70,8 +68,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
              SoleAt(feet_[static_cast<size_t>(foot)], limits_.edge, plan.foothold, plan.yaw));
   plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
-  const double follows =
-      balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-local(plan.com)));
+  const double follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-local(plan.com)));
   plan.margin = std::min(plan.margin, plan.margin + follows);
   return plan;
 }

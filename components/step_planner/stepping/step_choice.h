@@ -32,11 +32,11 @@ struct StepState {
 };
 
 struct StepPlan {
-  int foot = -1;      ///< that swings; −1: none can
-  double time = 0;    ///< s from now until it touches down
-  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();  ///< sole centre
-  double yaw = 0;                                      ///< rad, of the sole
-  Eigen::Vector2d cop = Eigen::Vector2d::Zero();       ///< centre of pressure until then
+  int foot = -1;                                            ///< that swings; −1: none can
+  double time = 0;                                          ///< s from now until it touches down
+  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();       ///< sole centre
+  double yaw = 0;                                           ///< rad, of the sole
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();            ///< centre of pressure until then
   Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
   Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
   /// m, of the capture point at touch-down inside the soles less `edge`; negative: outside, another
@@ -55,7 +55,8 @@ class StepChoice {
       : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {}
 
   /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
-  /// sooner; none when standing still does as well. A foot that is not in contact swings at once, from `swing_from` if it is in the air.
+  /// sooner; none when standing still does as well. A foot that is not in contact swings at once,
+  /// from `swing_from` if it is in the air.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes.
   StepPlan Plan(const StepState& state, int foot) const;

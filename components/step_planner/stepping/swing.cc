@@ -32,10 +32,10 @@ Quintic::Point Quintic::At(double time) const {
   const double late = std::max(0.0, time - start_ - duration_);
   const double s = std::clamp((time - start_) / duration_, 0.0, 1.0);
   Point point;
-  point.velocity = (c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + s * 5 * c[5])))) /
-                   duration_;
-  point.position = c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5])))) +
-                   late * point.velocity;
+  point.velocity =
+      (c[1] + s * (2 * c[2] + s * (3 * c[3] + s * (4 * c[4] + s * 5 * c[5])))) / duration_;
+  point.position =
+      c[0] + s * (c[1] + s * (c[2] + s * (c[3] + s * (c[4] + s * c[5])))) + late * point.velocity;
   if (late > 0) return point;
   point.acceleration =
       (2 * c[2] + s * (6 * c[3] + s * (12 * c[4] + s * 20 * c[5]))) / (duration_ * duration_);
@@ -58,8 +58,8 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
   y_.Begin(point(1), {foothold.y()}, start_, duration);
   const double least = std::max(from.position.z(), foothold.z()) + spec.clearance;
   // A foot in the air already does not have to rise as far.
-  apex_height_ = std::max(foothold.z() + spec.clearance,
-                          std::min(least, from.position.z() + spec.clearance));
+  apex_height_ =
+      std::max(foothold.z() + spec.clearance, std::min(least, from.position.z() + spec.clearance));
   rise_.Begin(point(2), {apex_height_}, start_, apex_ - start_);
   fall_.Begin({apex_height_}, {foothold.z(), -spec.touch_speed}, apex_, end_ - apex_);
   from_rotation_ = rotation;

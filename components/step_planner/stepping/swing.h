@@ -33,8 +33,9 @@ struct SwingSpec {
 };
 
 /// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,
-/// velocity and acceleration whatever the foothold does: each new one begins from the motion so far.
-/// After `end` it goes on downward with touch_speed, for the ground is not where it was expected.
+/// velocity and acceleration whatever the foothold does: each new one begins from the motion so
+/// far. After `end` it goes on downward with touch_speed, for the ground is not where it was
+/// expected.
 class Swing {
  public:
   /// From the motion `from`, turned by `rotation`, to rest (but for touch_speed) at `foothold`, m,

@@ -1,5 +1,7 @@
-// Recovery steps in a world of their own: a point mass above massless legs that obeys the pendulum's
-// equations, whose feet go where the swing says and are loaded where the ground is.
+// Recovery steps in a world of their own: a point mass above massless legs that obeys the
+// pendulum's equations, whose feet go where the swing says and are loaded where the ground is.
+#include "components/step_planner/stepping/recovery.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 
 #include "components/robot/posture.h"
 #include "components/step_planner/stepping/pendulum.h"
-#include "components/step_planner/stepping/recovery.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::stepping {
@@ -115,8 +116,7 @@ class World {
       const Vector2d goal = 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
       const Vector2d middle = in_contact_[1] ? goal : Vector2d(sole_[0].translation().head<2>());
       acceleration.head<2>() =
-          w * w *
-          (com_.head<2>() - balance::NearestPoint(Soles(0.01), 2 * point - middle));
+          w * w * (com_.head<2>() - balance::NearestPoint(Soles(0.01), 2 * point - middle));
     }
     time_ += kPeriod;
     for (int i = 0; i < 2; ++i) {
@@ -223,8 +223,8 @@ TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
   for (double degrees = 0; degrees < 360; degrees += 30) {
     World world(GetParam());
     const Vector2d direction = Direction(degrees);
-    world.Push(0.97 * world.mass() * world.Frequency() *
-               EdgeDistance(world, direction, 0.01) * direction);
+    world.Push(0.97 * world.mass() * world.Frequency() * EdgeDistance(world, direction, 0.01) *
+               direction);
     EXPECT_TRUE(world.Run(4)) << degrees;
     EXPECT_EQ(world.recovery().num_steps(), 0) << degrees;
   }
@@ -250,7 +250,8 @@ TEST_P(RecoveryCase, OneStepCatchesWhatTheClosedFormSays) {
     const double rest = EdgeDistance(still, direction, 0);
     EXPECT_GT(largest, 1.05 * scale * rest) << "no more than without a step";
     // No leg reaches farther from an edge to the next one than it is long.
-    EXPECT_LT(largest, LargestImpulse(still.mass(), still.Frequency(), rest, still.height(), time, 1));
+    EXPECT_LT(largest,
+              LargestImpulse(still.mass(), still.Frequency(), rest, still.height(), time, 1));
   }
 }
 
@@ -330,7 +331,8 @@ TEST_P(RecoveryCase, TheArchiveIsAllOfItsState) {
       one.Tick();
       other.Tick();
       ASSERT_EQ(one.recovery().stage(), other.recovery().stage()) << at << ' ' << tick;
-      ASSERT_EQ(one.recovery().output().com.acceleration, other.recovery().output().com.acceleration)
+      ASSERT_EQ(one.recovery().output().com.acceleration,
+                other.recovery().output().com.acceleration)
           << at << ' ' << tick;
       ASSERT_EQ(one.recovery().output().swing.position, other.recovery().output().swing.position)
           << at << ' ' << tick;

@@ -53,10 +53,10 @@ TEST(Pendulum, IsWhatIntegrationGives) {
     const Pendulum end = After(start, cop, time);
     EXPECT_LT((end.com - com).norm(), 1e-9);
     EXPECT_LT((end.velocity - velocity).norm(), 1e-9);
-    EXPECT_LT((CapturePointAfter(start.capture_point(), cop, start.frequency, time) -
-               end.capture_point())
-                  .norm(),
-              1e-9);
+    EXPECT_LT(
+        (CapturePointAfter(start.capture_point(), cop, start.frequency, time) - end.capture_point())
+            .norm(),
+        1e-9);
   }
 }
 
@@ -98,17 +98,17 @@ TEST(Swing, IsSmoothWhereverTheFootholdGoes) {
     for (int i = 1; i * dt < 0.45; ++i) {
       const double time = i * dt;
       if (i % 50 == 0) {
-        swing.Move((start + Vector3d(0.3, 0.1, 0)).head<2>() +
-                       0.05 * Vector2d(any(random), any(random)),
-                   time, 0.4 + 0.02 * any(random));
+        swing.Move(
+            (start + Vector3d(0.3, 0.1, 0)).head<2>() + 0.05 * Vector2d(any(random), any(random)),
+            time, 0.4 + 0.02 * any(random));
       }
       const PointMotion now = swing.At(time);
       // The derivatives are those of the position, and none jumps: bounded by the next one's size.
       EXPECT_LT((now.position - last.position - 0.5 * dt * (now.velocity + last.velocity)).norm(),
                 1e-8);
-      EXPECT_LT((now.velocity - last.velocity - 0.5 * dt * (now.acceleration + last.acceleration))
-                    .norm(),
-                2e-5);
+      EXPECT_LT(
+          (now.velocity - last.velocity - 0.5 * dt * (now.acceleration + last.acceleration)).norm(),
+          2e-5);
       highest = std::max(highest, now.position.z());
       last = now;
     }
@@ -130,12 +130,12 @@ TEST(Swing, TheTurnEndsLevel) {
   EXPECT_LT((swing.RotationAt(1.4).rotation - Eigen::Matrix3d::Identity()).norm(), 1e-12);
   const double dt = 1e-5;
   for (double time = 1.01; time < 1.4; time += 0.013) {
-    const Eigen::Matrix3d change = swing.RotationAt(time + dt).rotation *
-                                   swing.RotationAt(time - dt).rotation.transpose();
+    const Eigen::Matrix3d change =
+        swing.RotationAt(time + dt).rotation * swing.RotationAt(time - dt).rotation.transpose();
     const Eigen::AngleAxisd turn(change);
-    EXPECT_LT((turn.angle() / (2 * dt) * turn.axis() - swing.RotationAt(time).angular_velocity)
-                  .norm(),
-              1e-5);
+    EXPECT_LT(
+        (turn.angle() / (2 * dt) * turn.axis() - swing.RotationAt(time).angular_velocity).norm(),
+        1e-5);
   }
 }
 
@@ -151,8 +151,8 @@ TEST(Reach, ClipsAsEachPointSays) {
     const balance::ConvexPolygon part = Clip(hull, normal, offset);
     for (int i = 0; i < 100; ++i) {
       const Vector2d point(any(random), any(random));
-      const double inside = std::min(balance::SignedDistance(hull, point),
-                                     normal.dot(point) - offset);
+      const double inside =
+          std::min(balance::SignedDistance(hull, point), normal.dot(point) - offset);
       if (std::abs(inside) < 1e-6) continue;
       EXPECT_EQ(part.num_corners > 2 && balance::SignedDistance(part, point) > 0, inside > 0);
     }
@@ -241,8 +241,7 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
       EXPECT_GE(plan.time, limits.unload + limits.least_swing - 1e-12);
       EXPECT_GE(plan.time, limits.unload + swing - 5e-3);
       const auto stance = static_cast<size_t>(1 - foot);
-      const balance::ConvexPolygon footholds =
-          reach.Footholds(foot, plan.com - state.sole[stance]);
+      const balance::ConvexPolygon footholds = reach.Footholds(foot, plan.com - state.sole[stance]);
       if (footholds.num_corners < 3) continue;
       double best = -1;
       for (double x = -1; x < 1; x += 0.02) {
@@ -263,8 +262,7 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
   EXPECT_GT(possible, 20);
 }
 
-INSTANTIATE_TEST_SUITE_P(Robots, ReachCase,
-                         testing::Values(TestRobot::kDyros, TestRobot::kMantis));
+INSTANTIATE_TEST_SUITE_P(Robots, ReachCase, testing::Values(TestRobot::kDyros, TestRobot::kMantis));
 
 }  // namespace
 }  // namespace poise::stepping
