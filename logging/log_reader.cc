@@ -25,6 +25,7 @@ constexpr int32_t kMaxData = 1 << 28;
 // Magics looked at in one record: more are no chance, and a hostile log must not take a time that
 // grows with the square of its size.
 constexpr int kMaxMagics = 64;
+constexpr size_t kHeldBytes = 16 << 20;  // of the file, behind the place of reading
 constexpr uint8_t kMagicBytes[] = {0xED, 0xA1, 0xDA, 0x01};
 
 bool MagicAt(const uint8_t* data) { return static_cast<uint32_t>(ReadInt32(data)) == kMagic; }
@@ -141,11 +142,20 @@ bool LogReader::Next(LogEvent* event) {
   if (!found) return false;
   position_ = end;
   number_ = event->number;
+  if (position_ - released_ >= 2 * kHeldBytes) LetGo();
   return true;
+}
+
+void LogReader::LetGo() {
+  // Who still looks there finds it again: the system reads the file once more.
+  const size_t until = (position_ - kHeldBytes) & ~(kHeldBytes - 1);
+  madvise(const_cast<uint8_t*>(data_) + released_, until - released_, MADV_DONTNEED);
+  released_ = until;
 }
 
 void LogReader::Rewind() {
   position_ = 0;
+  released_ = 0;
   number_ = -1;
   damage_.clear();
 }

@@ -3,6 +3,7 @@
 
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"
@@ -22,6 +23,7 @@ struct ReportOptions {
   bool no_html = false;
   bool full = false;
   bool force = false;
+  double page_size = kPageSize;  // MB
 };
 
 ReportedRun ReadReportedRun(const std::string& run) {
@@ -81,7 +83,7 @@ int Report(const ReportOptions& options) {
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
-    WriteHtmlReport(html, runs);
+    WriteHtmlReport(html, runs, options.page_size);
     fmt::print("\nThe run, step by step: {}\n", FileAddress(html));
   }
   for (const CheckResult& check : run.checks) {
@@ -100,7 +102,15 @@ void AddReportCommand(CLI::App* app, Command* command) {
   report->add_option("overlay", options->overlay, "a second run, drawn over the first in the page");
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
-  report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  CLI::Option* no_html =
+      report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report
+      ->add_option("--page-size", options->page_size,
+                   "MB that the page's numbers may take: of a run too long for that it shows every "
+                   "tick at its ends and events, elsewhere rows with least and largest values")
+      ->check(Within("a size of 0.1 to 1000 MB", [](double mb) { return mb >= 0.1 && mb <= 1000; }))
+      ->capture_default_str()
+      ->excludes(no_html);
   report->add_flag("--force", options->force, "replace the file of --html");
   report->add_flag("--full", options->full, "every figure, the events and the assumptions");
   report->callback([options, command] { *command = [options] { return Report(*options); }; });

@@ -149,7 +149,7 @@ export class SceneView {
       this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
       this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
     ]);
-    this.setRow(this.run.meta.live ? this.run.numTicks - 1 : 0);
+    this.setRow(this.run.meta.live ? this.run.numRows - 1 : 0);
     this.look('free');
   }
 
