@@ -368,7 +368,6 @@ test('a page that nobody has scrolled prints with all its plots, light', async (
 test('a page too small for every tick shows rows, shaded between their least and largest values', async () => {
   poise('report', path('a'));
   poise('report', path('a'), '--html', path('rows.html'), '--page-size', '0.3');
-  assert.ok(statSync(path('rows.html')).size < statSync(path('a/report.html')).size - 3e5);
   const names = ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'GROUND_TRUTH.com_position[1]', 'EXTERNAL_PUSH.force[1]',
     'JOINT_COMMAND.eta', 'SUPPORT_PLAN.in_contact[1]'];
   const full = await openPage(browser, path('a/report.html'));
@@ -402,9 +401,8 @@ test('a page too small for every tick shows rows, shaded between their least and
     }
   });
   assert.ok(wide > 100);
-  // Around the push's peak there is every tick.
-  const peak = values[2].indexOf(Math.max(...values[2]));
-  assert.ok(ticks.includes(peak) && ticks.includes(peak + 1));
+  // Near the beginning there is every tick.
+  assert.deepEqual(ticks.slice(0, 100), [...Array(100).keys()]);
   const bands = await page.evaluate(async () => {
     const panel = window.poise.grid.panels.find((p) => p.definition.title.startsWith('COM motion'));
     await panel.show();
@@ -416,7 +414,6 @@ test('a page too small for every tick shows rows, shaded between their least and
   assert.match(await page.locator('.rows-note').textContent(), /every tick near the run's ends/);
   await page.evaluate(() => window.poise.player.seek(window.poise.run.timeAt(window.poise.run.numRows - 1)));
   assert.match(await page.locator('#time').textContent(), /tick \d+ of \d+|tick \d+/);
-  await page.click('#play');
   await page.keyboard.press('Home');
   await page.keyboard.press('ArrowRight');
   assert.equal((await state(page)).tick, 1);

@@ -209,7 +209,10 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const bool recorded = fs::exists(log);  // else the recorder never came to start
   logging::RunRecord record;
   if (recorded) {
+    StageLine line(options_.quiet);
+    line.Begin("reading the log");
     record = logging::ReadRun(log);
+    line.Begin("figures of the table");
     PrepareRecord(log, scenario, &record);
     if (outcome.wall_time > 0) {
       record.real_time_factor = record.duration(record.num_ticks) / outcome.wall_time;
