@@ -22,10 +22,10 @@ FootSensors::FootSensors(const robot::RobotModel& model, const SimConfig& config
       fault.foot[f] = !in.has_foot() || in.foot() == model.feet()[f].name;
     }
     if (!fault.foot[0] && !fault.foot[1]) {
-      throw ConfigError(field + ".foot",
-                        fmt::format("robot '{}' has no foot '{}'; it has '{}' and '{}'",
-                                    model.name(), in.foot(), model.feet()[0].name,
-                                    model.feet()[1].name));
+      throw ConfigError(
+          field + ".foot",
+          fmt::format("robot '{}' has no foot '{}'; it has '{}' and '{}'", model.name(), in.foot(),
+                      model.feet()[0].name, model.feet()[1].name));
     }
     fault.start = in.start();
     fault.end = in.has_end() ? in.end() : std::numeric_limits<double>::infinity();

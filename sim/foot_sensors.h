@@ -13,8 +13,8 @@ namespace poise {
 
 class FootSensors {
  public:
-  /// Throws ConfigError (paths inside SimConfig): no such foot, a number that is not finite, a fault
-  /// that ends before it starts.
+  /// Throws ConfigError (paths inside SimConfig): no such foot, a number that is not finite, a
+  /// fault that ends before it starts.
   FootSensors(const robot::RobotModel& model, const SimConfig& config);
 
   /// Makes of right readings at `time`, s, what the sensors report. Once a tick. Does not allocate.

@@ -24,8 +24,8 @@ class FootSensorCheck {
 
   explicit FootSensorCheck(const FootSensorCheckSettings& settings) : settings_(settings) {}
 
-  /// Once a tick, `dt` s after the last: what the sensor says of itself (kOk, kAbsent or kInvalid) and
-  /// what it reads.
+  /// Once a tick, `dt` s after the last: what the sensor says of itself (kOk, kAbsent or kInvalid)
+  /// and what it reads.
   void Read(State said, const Wrench& measured, double dt);
   /// Compares with what is observed, `dt` s after the last comparison. `noise`: standard deviations
   /// of the reading.
@@ -44,7 +44,7 @@ class FootSensorCheck {
   FootSensorCheckSettings settings_;
   State state_ = State::kOk, said_ = State::kOk;
   Wrench measured_ = Wrench::Zero();
-  double same_time_ = 0;                  // s, for which not a bit has changed
+  double same_time_ = 0;                    // s, for which not a bit has changed
   double wrong_time_ = 0, right_time_ = 0;  // s, for which it has disagreed, agreed
   double difference_ = 0;
 };

@@ -6,9 +6,9 @@
 #include "components/framework/run.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
-#include "poise/drive_feedback_t.hpp"
 #include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/state_estimator_type.h"
+#include "poise/drive_feedback_t.hpp"
 
 namespace poise {
 
@@ -112,15 +112,16 @@ FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
   const FootSensorCheckConfig& check = config.foot_sensor_check();
   const char* const observer = "wrench_observer";
   FootWrenchSettings out;
-  out.observer = {.cutoff = read(observer, "cutoff", in.cutoff()),
-                  .friction_error = read(observer, "friction_error", in.friction_error()),
-                  .torque_error = read(observer, "torque_error", in.torque_error()),
-                  .mass_error = read(observer, "mass_error", in.mass_error()),
-                  .com_error = read(observer, "com_error", in.com_error()),
-                  .acceleration_error =
-                      read(observer, "acceleration_error", in.acceleration_error()),
-                  .push_gate = read(observer, "push_gate", in.push_gate()),
-                  .latency = read(observer, "latency", in.latency())};
+  out.observer = {
+      .cutoff = read(observer, "cutoff", in.cutoff()),
+      .friction_error = read(observer, "friction_error", in.friction_error()),
+      .friction_stiffness = read(observer, "friction_stiffness", in.friction_stiffness()),
+      .torque_error = read(observer, "torque_error", in.torque_error()),
+      .mass_error = read(observer, "mass_error", in.mass_error()),
+      .com_error = read(observer, "com_error", in.com_error()),
+      .acceleration_error = read(observer, "acceleration_error", in.acceleration_error()),
+      .push_gate = read(observer, "push_gate", in.push_gate()),
+      .latency = read(observer, "latency", in.latency())};
   if (in.check_every() < 1) {
     throw ConfigError("wrench_observer.check_every", "must be at least 1");
   }
@@ -134,6 +135,25 @@ FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
                .frozen_time = read(group, "frozen_time", check.frozen_time()),
                .recover_time = read(group, "recover_time", check.recover_time())};
   return out;
+}
+
+CalibratorSettings ReadCalibratorSettings(const StateEstimatorConfig& config) {
+  const CalibrationConfig& in = config.calibration();
+  const auto read = [](const char* name, double value) {
+    if (std::isfinite(value) && value > 0) return value;
+    throw ConfigError(std::string("calibration.") + name, "must be a finite number above 0");
+  };
+  return {.enabled = in.enabled(),
+          .max_mass = read("max_mass", in.max_mass()),
+          .max_shift = read("max_shift", in.max_shift()),
+          .walk = read("walk", in.walk()),
+          .force_error = read("force_error", in.force_error()),
+          .moment_error = read("moment_error", in.moment_error()),
+          .still_rate = read("still_rate", in.still_rate()),
+          .still_acceleration = read("still_acceleration", in.still_acceleration()),
+          .gate = read("gate", in.gate()),
+          .apply_time = read("apply_time", in.apply_time()),
+          .cutoff = config.wrench_observer().cutoff()};
 }
 
 FootReading ReadFoot(const robot_sensors_t& sensors, size_t foot) {
@@ -163,6 +183,8 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   const InvariantEstimatorConfig invariant = ReadInvariantConfig(config, model->drive_train());
   wrenches_ = std::make_unique<FootWrenches>(model, ReadFootWrenchSettings(config));
+  calibrator_ =
+      std::make_unique<Calibrator>(model, ReadCalibratorSettings(config), context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
@@ -183,6 +205,7 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
 bool StateEstimator::Archive(StateArchive* archive) {
   archive->Show(last_time_);
   wrenches_->Archive(archive);
+  calibrator_->Archive(archive);
   if (anchored_) anchored_->Archive(archive);
   if (invariant_) invariant_->Archive(archive);
   return true;
@@ -205,6 +228,12 @@ void StateEstimator::Estimate(const Tick& tick) {
     sensors.foot_load[f] = -wrenches_->wrench(f)[2];
     sensors.foot_cop[f] = CenterOfPressure(wrenches_->wrench(f));
   }
+  if (calibrator_->enabled()) {
+    calibrator_->Track({wrenches_->wrench(0), wrenches_->wrench(1)}, dt);
+    if (wrenches_->observed()) {
+      calibrator_->Update(wrenches_->observer(), wrenches_->measured(0) && wrenches_->measured(1));
+    }
+  }
   if (invariant_) {
     invariant_->Update(sensors, dt);
     PublishInvariant();
@@ -213,6 +242,7 @@ void StateEstimator::Estimate(const Tick& tick) {
     PublishAnchored();
   }
   PublishWrenches();
+  if (calibrator_->enabled()) PublishCalibration();
 }
 
 // What the estimator knows of the IMU's errors by now.
@@ -225,6 +255,8 @@ ObserverCorrection StateEstimator::Correction() const {
     correction.gyro_bias = anchored_->gyro_bias();
     correction.accelerometer_bias = anchored_->accelerometer_bias();
   }
+  correction.load_mass = calibrator_->load()[0];
+  correction.load_moment = calibrator_->load().tail<3>();
   return correction;
 }
 
@@ -249,6 +281,29 @@ void StateEstimator::PublishWrenches() {
   for (int row = 0; row < 12; ++row) {
     for (int column = row; column < 12; ++column) {
       status.observed_covariance[next++] = observer.covariance()(row, column);
+    }
+  }
+}
+
+// The IMU's tilt is what its accelerometer's bias looks like: standing tells only both together.
+void StateEstimator::PublishCalibration() {
+  const Calibrator::Load& load = calibrator_->load();
+  robot_state_->load_mass = load[0];
+  SetVector3(load.tail<3>(), robot_state_->load_moment);
+  estimator_status_t& status = *estimator_status_;
+  status.calibration = calibrator_->running() ? estimator_status_t::CALIBRATION_RUNNING
+                                              : estimator_status_t::CALIBRATION_WAITING;
+  status.load_mass = calibrator_->estimate()[0];
+  SetVector3(calibrator_->estimate().tail<3>(), status.load_moment);
+  // Turned by (roll, pitch) an IMU at rest reads (−g pitch, g roll, g).
+  const Vector3d bias = Correction().accelerometer_bias;
+  status.imu_tilt[0] = bias.y() / robot::kGravity;
+  status.imu_tilt[1] = -bias.x() / robot::kGravity;
+  const Eigen::Matrix4d& covariance = calibrator_->covariance();
+  size_t next = 0;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column, ++next) {
+      status.calibration_covariance[next] = column < 4 ? covariance(row, column) : 0;
     }
   }
 }

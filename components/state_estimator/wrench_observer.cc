@@ -20,8 +20,8 @@ constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxTorque
 constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts anew
 // Before any row: no foot carries more, shares of the weight, and of the weight at a metre.
 constexpr double kPriorForce = 2, kPriorMoment = 0.3;
-// rad/s, beyond which a joint slips rather than sticks.
-constexpr double kSlipSpeed = 0.02;
+// (N·m)², of a joint's row at least: what encoder steps leave of its acceleration.
+constexpr double kLeastVariance = 0.01;
 // s, over which the wrenches' rate of change is averaged.
 constexpr double kRateTime = 0.02;
 
@@ -54,13 +54,20 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     leg_joints_.push_back(j);
     supports_.push_back(supports);
   }
+  bristle_ = bristle_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
+  for (size_t k = 0; k < leg_joints_.size(); ++k) {
+    bristle_error_[static_cast<Eigen::Index>(k)] =
+        model_->motors()[static_cast<size_t>(leg_joints_[k])].static_friction / std::sqrt(3.0);
+  }
   sole_position_.fill(Vector3d::Zero());
   sole_rotation_.fill(Matrix3d::Identity());
 }
 
 void WrenchObserver::Track(const BaseSensors& sensors, double dt) {
   const Eigen::Index n = model_->num_joints();
-  const auto within = [](const auto& v, double limit) { return v.cwiseMin(limit).cwiseMax(-limit); };
+  const auto within = [](const auto& v, double limit) {
+    return v.cwiseMin(limit).cwiseMax(-limit);
+  };
   input_.head(n) = within(sensors.joint_position, kMaxPosition);
   input_.segment<3>(n) = within(sensors.angular_velocity, kMaxRate);
   input_.segment<3>(n + 3) = within(sensors.acceleration, kMaxForce);
@@ -73,11 +80,28 @@ void WrenchObserver::Track(const BaseSensors& sensors, double dt) {
   since_ += dt;
   if (started_ && dt <= kLongestStep) {
     filter_.Step(input_, dt);
+    TrackFriction(dt);
   } else {
     filter_.Reset(input_);
     observed_ = false;
   }
   started_ = true;
+}
+
+// Dahl's model: dF = σ (1 − F sgn(dq) / F_c) dq, exactly over a step of one direction.
+void WrenchObserver::TrackFriction(double dt) {
+  const Eigen::Index n = model_->num_joints();
+  for (size_t k = 0; k < leg_joints_.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const double limit = model_->motors()[static_cast<size_t>(leg_joints_[k])].coulomb_friction;
+    if (!(limit > 0)) continue;
+    const double way = dt * filter_.rate().head(n)[leg_joints_[k]];
+    const double end = std::copysign(limit, way);
+    const double keep = std::exp(-settings_.friction_stiffness * std::abs(way) / limit);
+    bristle_[i] = end + keep * (bristle_[i] - end);
+    const double error = settings_.friction_error * limit;
+    bristle_error_[i] = error + keep * (bristle_error_[i] - error);
+  }
 }
 
 // Base and joints from the readings, whatever body carries the IMU. The IMU's angular acceleration
@@ -139,8 +163,7 @@ void WrenchObserver::InverseDynamics() {
     const auto p = static_cast<size_t>(tree.bodies[b].parent);
     angular_[b] =
         angular_[p] + data_.joint_axis[b - 1] * curvature_[static_cast<Eigen::Index>(b) - 1];
-    linear_[b] =
-        linear_[p] + angular_[p].cross(data_.body_position[b] - data_.body_position[p]);
+    linear_[b] = linear_[p] + angular_[p].cross(data_.body_position[b] - data_.body_position[p]);
   }
   for (size_t b = 0; b < tree.bodies.size(); ++b) {
     const robot::KinematicTree::BodyMass& body = tree.bodies[b];
@@ -152,9 +175,8 @@ void WrenchObserver::InverseDynamics() {
     const Vector3d linear = linear_[b] + data_.body_linear_bias[b];
     const Vector3d turned = rotation.transpose() * w;
     force_[b] = body.mass * (linear + alpha.cross(arm) + w.cross(w.cross(arm)));
-    moment_[b] = com.cross(force_[b]) +
-                 rotation * (body.inertia * (rotation.transpose() * alpha) +
-                             turned.cross(body.inertia * turned));
+    moment_[b] = com.cross(force_[b]) + rotation * (body.inertia * (rotation.transpose() * alpha) +
+                                                    turned.cross(body.inertia * turned));
     com_ += body.mass * com;
   }
 }
@@ -163,14 +185,13 @@ void WrenchObserver::AddJointRows() {
   const robot::KinematicTree& tree = model_->tree();
   for (size_t b = tree.bodies.size() - 1; b > 0; --b) {
     const auto j = static_cast<Eigen::Index>(b) - 1;
-    joint_torque_[j] = data_.joint_axis[b - 1].dot(
-                           moment_[b] - data_.body_position[b].cross(force_[b])) +
-                       tree.joints[b - 1].reflected_inertia * curvature_[j];
+    joint_torque_[j] =
+        data_.joint_axis[b - 1].dot(moment_[b] - data_.body_position[b].cross(force_[b])) +
+        tree.joints[b - 1].reflected_inertia * curvature_[j];
     const auto p = static_cast<size_t>(tree.bodies[b].parent);
     force_[p] += force_[b];
     moment_[p] += moment_[b];
   }
-  base_wrench_ << force_[0], moment_[0];
 
   const double weight = model_->total_mass() * robot::kGravity;
   Covariance information = Covariance::Zero();
@@ -182,16 +203,14 @@ void WrenchObserver::AddJointRows() {
     const Eigen::Index joint = leg_joints_[k];
     const auto j = static_cast<size_t>(joint);
     const robot::MotorModel& motor = model_->motors()[j];
-    const double speed = state_.joint_velocity[joint], torque = filter_.value()[6 + state_.joint_position.size() + joint];
-    // A joint that slips is braked by about what the file says; one that sticks by anything up to
-    // break-away.
-    const double slip = 1 - std::exp(-Square(speed / kSlipSpeed));
-    const double friction = slip * std::copysign(motor.coulomb_friction, speed) +
-                            motor.viscous_friction * speed;
-    const double stuck = (1 - slip) * motor.static_friction / std::sqrt(3.0);
-    const double variance = Square(stuck) + Square(settings_.friction_error * friction) +
+    const double speed = state_.joint_velocity[joint],
+                 torque = filter_.value()[6 + state_.joint_position.size() + joint];
+    const double held = bristle_[static_cast<Eigen::Index>(k)];
+    const double friction = held + motor.viscous_friction * speed;
+    const double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
+                            Square(settings_.friction_error * motor.viscous_friction * speed) +
                             Square(settings_.torque_error * torque) +
-                            Square(settings_.mass_error * joint_torque_[joint]) + 0.01;
+                            Square(settings_.mass_error * joint_torque_[joint]) + kLeastVariance;
     const double known = torque - friction - joint_torque_[joint];
     std::array<robot::Vector6d, 2> row;
     for (size_t f = 0; f < 2; ++f) {
@@ -228,7 +247,7 @@ bool WrenchObserver::AddBaseRows() {
     sum.block<3, 3>(3, at + 3) = r;
   }
   robot::Vector6d base;
-  base << -base_wrench_.head<3>(), -base_wrench_.tail<3>() + com.cross(base_wrench_.head<3>());
+  base << -force_[0], -moment_[0] + com.cross(force_[0]);
   const double size = base_force_.norm();
   robot::Vector6d noise;
   for (int i = 0; i < 3; ++i) {
@@ -266,8 +285,10 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction) {
     sole_rotation_[f] = data_.body_rotation[b] * foot.sole.linear();
   }
   InverseDynamics();
-  AddLoad(correction);
   AddJointRows();
+  base_wrench_ << force_[0], moment_[0];
+  // What the base carries, it carries alone: no joint's row knows of it.
+  AddLoad(correction);
   if (!AddBaseRows()) return false;
   if (observed_ && since_ > 0) {
     const double share = std::min(since_ / kRateTime, 1.0);
@@ -286,7 +307,8 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction) {
 
 void WrenchObserver::Archive(StateArchive* archive) {
   filter_.Archive(archive);
-  archive->Show(input_, wrenches_, rate_, push_excess_, since_, torque_known_, started_, observed_);
+  archive->Show(input_, bristle_, bristle_error_, wrenches_, rate_, push_excess_, since_,
+                torque_known_, started_, observed_);
   archive->Show(covariance_);
 }
 

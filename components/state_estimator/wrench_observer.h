@@ -1,13 +1,14 @@
 // WrenchObserver: the feet's wrenches from joint torques, IMU, encoders and the model, with their
 // covariance: a momentum observer.
 //
-// The generalised momentum p = A v obeys p' = τ − friction + (C' v − g) + Jᵀ w: what moves it and is
-// not known comes from the ground. All readings pass one low-pass, whose derivatives of the joints'
-// positions and of the gyro are those of p; so all rows are of the same instant, and no reading is
-// differentiated without being filtered. In the base's frame the accelerometer holds both the
-// base's acceleration and gravity: neither orientation nor velocity of the base enters. The legs'
-// joint rows tell each foot's wrench, as far as friction lets them; the six rows of the base tell the sum
-// of both, unless something pushes the robot, which shows as a disagreement and takes their weight.
+// The generalised momentum p = A v obeys p' = τ − friction + (C' v − g) + Jᵀ w: what moves it and
+// is not known comes from the ground. All readings pass one low-pass, whose derivatives of the
+// joints' positions and of the gyro are those of p; so all rows are of the same instant, and no
+// reading is differentiated without being filtered. In the base's frame the accelerometer holds
+// both the base's acceleration and gravity: neither orientation nor velocity of the base enters.
+// The legs' joint rows tell each foot's wrench, as far as friction lets them; the six rows of the
+// base tell the sum of both, unless something pushes the robot, which shows as a disagreement and
+// takes their weight.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +26,7 @@ namespace poise {
 /// See WrenchObserverConfig in state_estimator.proto for what each means.
 struct WrenchObserverSettings {
   double cutoff = 40;
-  double friction_error = 0.5, torque_error = 0.02;
+  double friction_error = 0.3, friction_stiffness = 1e4, torque_error = 0.02;
   double mass_error = 0.02, com_error = 0.006, acceleration_error = 0.03;
   double push_gate = 25;
   double latency = 0.01;
@@ -48,11 +49,11 @@ class WrenchObserver {
   WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
                  const WrenchObserverSettings& settings);
 
-  /// Takes the readings of a tick, `dt` s after the last. The first are taken to be those of a robot
-  /// at rest. Allocates nothing, as Observe.
+  /// Takes the readings of a tick, `dt` s after the last. The first are taken to be those of a
+  /// robot at rest. Allocates nothing, as Observe.
   void Track(const BaseSensors& sensors, double dt);
-  /// Finds the wrenches from what has been read. False, and nothing changes, when it holds no finite
-  /// number.
+  /// Finds the wrenches from what has been read. False, and nothing changes, when it holds no
+  /// finite number.
   bool Observe(const ObserverCorrection& correction);
 
   /// Robot on environment, each in its sole's frame, N and N·m.
@@ -63,10 +64,11 @@ class WrenchObserver {
   /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
   /// of freedom when nothing but the feet touches the robot.
   double push_excess() const { return push_excess_; }
-  /// Of the last Observe, in the base frame: specific force of the base's origin (acceleration less
-  /// gravity, m/s²), and the force and moment about the base's origin that the model asks of the
-  /// ground (N, N·m).
+  /// Of the last Observe, in the base frame, without the load: specific force of the base's origin
+  /// (acceleration less gravity, m/s²), and the force and moment about the base's origin that the
+  /// model asks of the ground (N, N·m).
   const Eigen::Vector3d& specific_force() const { return base_force_; }
+  const Eigen::Vector3d& base_turn() const { return base_acceleration_; }  ///< rad/s²
   const robot::Vector6d& base_wrench() const { return base_wrench_; }
   const robot::RobotData& data() const { return data_; }
   /// m from the base's origin, and rotation: the sole in the base frame.
@@ -78,6 +80,7 @@ class WrenchObserver {
   void ReadMotion(const ObserverCorrection& correction);
   void AddLoad(const ObserverCorrection& correction);
   void InverseDynamics();
+  void TrackFriction(double dt);
   void AddJointRows();
   bool AddBaseRows();
 
@@ -101,6 +104,10 @@ class WrenchObserver {
   std::array<Eigen::Matrix3d, 2> sole_rotation_;
   Wrenches wrenches_ = Wrenches::Zero(), rate_ = Wrenches::Zero(), estimate_ = Wrenches::Zero();
   Covariance covariance_ = Covariance::Identity(), spread_ = Covariance::Identity();
+  // By leg joint, N·m: what friction holds, which a joint that has slipped one way goes on doing
+  // when it sticks, until it is bent back; and its standard deviation, before it has slipped for
+  // the first time anything up to break-away.
+  Eigen::VectorXd bristle_, bristle_error_;
   double push_excess_ = 0;
   double since_ = 0;  // s, since the last Observe
   bool torque_known_ = false, started_ = false, observed_ = false;

@@ -9,7 +9,7 @@ namespace poise::logging {
 namespace {
 
 // Share of the weight from which on a foot has a centre of pressure worth comparing.
-constexpr double kCopShare = 0.1;
+constexpr double kCopShare = 0.25;
 // A touch-down by the true load: as ContactConfirmation's defaults have it.
 constexpr double kTrueTouchLoad = 10, kTrueTouchTime = 0.02;  // N, s
 constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
@@ -95,15 +95,88 @@ std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick
   return begin + lasts;
 }
 
+// s: what the calibration is asked for at, and how long its figures are averaged.
+constexpr double kCalibrated = 2, kAveraged = 0.2;
+
+/// Mean of what `value` gives in the kAveraged before `time`, s; empty when the run is shorter.
+Answer MeanBefore(const RunRecord& run, double time, const std::function<Answer(int64_t)>& value) {
+  double sum = 0;
+  int64_t count = 0;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (run.time(tick) > time || run.time(tick) < time - kAveraged) continue;
+    if (const Answer v = value(tick)) {
+      sum += *v;
+      ++count;
+    }
+  }
+  if (count == 0 || run.time(run.num_ticks) < time) return {};
+  return sum / static_cast<double>(count);
+}
+
+void AddCalibration(MetricList* list) {
+  const auto mass = [](const RunRecord& run, int64_t tick) -> Answer {
+    const robot_state_t* state = run.state.at(tick);
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (state == nullptr || truth == nullptr) return {};
+    double force = 0;
+    for (size_t f = 0; f < 2; ++f) {
+      force +=
+          (GetPose(truth->foot_pose[f]).linear() * GetVector3(truth->foot_wrench[f].force)).z();
+    }
+    const double carried = -force / robot::kGravity;
+    return 100 * (run.robot.total_mass() + state->load_mass - carried) / carried;
+  };
+  const auto com = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
+    const support_plan_t* plan = run.plan.at(tick);
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (plan == nullptr || truth == nullptr) return {};
+    return kMilli * (plan->com_position[axis] - truth->com_position[axis]);
+  };
+  const auto tilt = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
+    const estimator_status_t* status = run.estimator.at(tick);
+    if (status == nullptr || status->calibration == estimator_status_t::CALIBRATION_OFF) return {};
+    return kMilli * status->imu_tilt[axis];
+  };
+  for (const bool end : {false, true}) {
+    const std::string when = end ? "end" : "2s";
+    const std::string text = end ? "at the end" : "after 2 s";
+    const auto time = [end](const RunRecord& run) {
+      return end ? run.time(run.num_ticks) : kCalibrated;
+    };
+    list->push_back({"mass_error_" + when, "%",
+                     "mass that the controller believes in less what the ground carries, " + text,
+                     [=](const RunRecord& run) {
+                       return MeanBefore(run, time(run), [&](int64_t t) { return mass(run, t); });
+                     }});
+    for (int axis = 0; axis < 3; ++axis) {
+      list->push_back({fmt::format("com_estimate_error_{}_{}", kAxis[axis], when), "mm",
+                       fmt::format("estimated less true COM, {}, {}", kAxis[axis], text),
+                       [=](const RunRecord& run) {
+                         return MeanBefore(run, time(run),
+                                           [&](int64_t t) { return com(run, t, axis); });
+                       }});
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      list->push_back({fmt::format("imu_tilt_{}_{}", kAxis[axis], when), "mrad",
+                       fmt::format("tilt of the IMU about its {}, as found, {}", kAxis[axis], text),
+                       [=](const RunRecord& run) {
+                         return MeanBefore(run, time(run),
+                                           [&](int64_t t) { return tilt(run, t, axis); });
+                       }});
+    }
+  }
+}
+
 }  // namespace
 
 void AddObserver(MetricList* list) {
+  AddCalibration(list);
   AddObserverErrors(list, "force", "%", "foot force, share of the weight",
                     OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
                       return 100 * (c.observed - c.truth).head<3>().norm() / WeightOf(run);
                     }));
   AddObserverErrors(
-      list, "cop", "mm", "centre of pressure in the sole, of feet with a tenth of the weight",
+      list, "cop", "mm", "centre of pressure in the sole, of feet with a quarter of the weight",
       OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
         if (-c.truth[2] < kCopShare * WeightOf(run) || !(c.observed[2] < 0)) return {};
         const auto cop = [](const Wrench& w) { return Eigen::Vector2d(-w[4] / w[2], w[3] / w[2]); };
