@@ -353,6 +353,7 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
     std::copy(std::begin(drive_feedback_->imu_acceleration),
               std::end(drive_feedback_->imu_acceleration), feedback_.imu_acceleration);
     feedback_.foot_wrench = drive_feedback_->foot_wrench;
+    feedback_.foot_sensor = drive_feedback_->foot_sensor;
   }
   return &feedback_;
 }
@@ -373,17 +374,33 @@ void HwBridge::Sense(const Tick& tick) {
   const std::vector<robot::MotorModel>& motors = model_->motors();
   for (size_t j = 0; j < motors.size(); ++j) {
     sensors.joint_position[j] = JointPositionOf(motors[j], feedback->position_counts[j]);
-    sensors.joint_torque[j] = JointTorque(motors[j], feedback->current[j]);
+    // What was ordered a cycle ago, where the drive does not say what flows.
+    const double ordered = command_.enabled[j] != 0 ? command_.current[j] : 0;
+    sensors.joint_torque[j] =
+        JointTorque(motors[j], motors[j].current_sensor ? feedback->current[j] : ordered);
   }
   std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),
             sensors.imu_angular_velocity);
   std::copy(std::begin(feedback->imu_acceleration), std::end(feedback->imu_acceleration),
             sensors.imu_acceleration);
+  ReadFootSensors(*feedback);
+}
+
+void HwBridge::ReadFootSensors(const drive_feedback_t& feedback) {
+  robot_sensors_t& sensors = *robot_sensors_;
   for (size_t f = 0; f < sensors.foot_wrench.size(); ++f) {
+    int8_t& state = sensors.foot_sensor[f];
+    state = feedback.foot_sensor[f];
+    if (!model_->feet()[f].force_sensor) state = drive_feedback_t::SENSOR_ABSENT;
+    if (state == drive_feedback_t::SENSOR_OK && !Plausible(feedback.foot_wrench[f])) {
+      state = drive_feedback_t::SENSOR_INVALID;
+    }
+    sensors.foot_wrench[f] = wrench_t{};
+    if (state != drive_feedback_t::SENSOR_OK) continue;
     for (int i = 0; i < 3; ++i) {
       // The sensor reports the environment on the robot.
-      sensors.foot_wrench[f].force[i] = -feedback->foot_wrench[f].force[i];
-      sensors.foot_wrench[f].moment[i] = -feedback->foot_wrench[f].moment[i];
+      sensors.foot_wrench[f].force[i] = -feedback.foot_wrench[f].force[i];
+      sensors.foot_wrench[f].moment[i] = -feedback.foot_wrench[f].moment[i];
     }
   }
 }

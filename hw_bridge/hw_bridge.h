@@ -47,6 +47,7 @@ class HwBridge : public Component {
   class Ethercat;
 
   void Sense(const Tick& tick);
+  void ReadFootSensors(const drive_feedback_t& feedback);
   void Actuate(const Tick& tick);
   /// Feedback of this cycle with all sensors that have come; nullptr when the drives' has not.
   const drive_feedback_t* ReadFeedback();

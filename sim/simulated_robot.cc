@@ -60,6 +60,14 @@ void Apply(const Motor& change, const std::string& field, MotorModel* motor) {
 
 RobotModel WithModelErrors(const RobotModel& model, const SimConfig& config) {
   RobotModel result = model;
+  RequireFinite(config.imu_roll(), "imu_roll");
+  RequireFinite(config.imu_pitch(), "imu_pitch");
+  if (config.imu_roll() != 0 || config.imu_pitch() != 0) {
+    const Eigen::Matrix3d turn = (Eigen::AngleAxisd(config.imu_pitch(), Eigen::Vector3d::UnitY()) *
+                                  Eigen::AngleAxisd(config.imu_roll(), Eigen::Vector3d::UnitX()))
+                                     .toRotationMatrix();
+    result = result.WithImuTurned(turn);
+  }
   for (int i = 0; i < config.model_error_size(); ++i) {
     const ModelError& error = config.model_error(i);
     const std::string field = "model_error[" + std::to_string(i) + "]";

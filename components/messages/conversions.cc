@@ -30,12 +30,15 @@ bool ReadState(const robot_state_t& message, robot::RobotState* state) {
               state->joint_position.data());
   std::copy_n(message.joint_velocity.begin(), state->joint_velocity.size(),
               state->joint_velocity.data());
+  state->load_mass = message.load_mass;
+  state->load_moment = GetVector3(message.load_moment);
   const bool unit = std::abs(state->base_orientation.norm() - 1.0) < 1e-6;
   // Dynamics ask for more than a message's rounding leaves.
   if (unit) state->base_orientation.normalize();
   return unit && state->base_position.allFinite() && state->base_linear_velocity.allFinite() &&
          state->base_angular_velocity.allFinite() && state->joint_position.allFinite() &&
-         state->joint_velocity.allFinite();
+         state->joint_velocity.allFinite() && std::isfinite(state->load_mass) &&
+         state->load_moment.allFinite();
 }
 
 void SetPose(const Eigen::Isometry3d& pose, pose_t* message) {

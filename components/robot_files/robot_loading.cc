@@ -68,6 +68,7 @@ MotorModel ToMotor(const Motor& motor, const std::string& field) {
         fmt::format("{}.encoder_counts is {}: it must be above 0", field, motor.encoder_counts()));
   }
   result.encoder_counts = motor.encoder_counts();
+  result.current_sensor = motor.current_sensor();
   result.coulomb_friction = NotNegative(motor.coulomb_friction(), field + ".coulomb_friction");
   result.viscous_friction = NotNegative(motor.viscous_friction(), field + ".viscous_friction");
   result.static_friction = motor.has_static_friction()
@@ -134,6 +135,7 @@ FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& fi
   result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
   result.length = Positive(foot.length(), field + ".length");
   result.width = Positive(foot.width(), field + ".width");
+  result.force_sensor = foot.force_sensor();
   int joints = 0;
   for (int b = place.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++joints;
   if (joints < kContactDimension) {

@@ -23,4 +23,13 @@ void LowPass::Step(const Eigen::VectorXd& input, double dt) {
   rate_ = next_rate_;
 }
 
+void LowPass::Curvature(const Eigen::VectorXd& input, Eigen::VectorXd* curvature) const {
+  *curvature = omega_ * omega_ * (input - value_) - std::numbers::sqrt2 * omega_ * rate_;
+}
+
+void LowPass::Reset(const Eigen::VectorXd& input) {
+  value_ = input;
+  rate_.setZero();
+}
+
 }  // namespace poise

@@ -17,6 +17,12 @@ class LowPass {
   /// One step of `dt` s with `input`; the output is value().
   void Step(const Eigen::VectorXd& input, double dt);
   const Eigen::VectorXd& value() const { return value_; }
+  /// The output's first derivative, 1/s of the signals.
+  const Eigen::VectorXd& rate() const { return rate_; }
+  /// Its second derivative, 1/s², with the `input` of the last step; `curvature` sized.
+  void Curvature(const Eigen::VectorXd& input, Eigen::VectorXd* curvature) const;
+  /// At rest at `input`.
+  void Reset(const Eigen::VectorXd& input);
   void Archive(StateArchive* archive) { archive->Show(value_, rate_); }
 
  private:

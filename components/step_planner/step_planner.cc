@@ -159,8 +159,11 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
   ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
   const int ramped = schedule_->state().transition_foot;
   for (size_t i = 0; i < 2; ++i) {
-    landing_[i].Measure(time, load[i]);
-    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i));
+    const bool observed = robot_state_->foot_wrench_source[i] == robot_state_t::SOURCE_OBSERVER;
+    const double deviation = observed ? robot_state_->foot_wrench_deviation[i].force[2] : 0;
+    landing_[i].Measure(time, load[i], deviation);
+    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i),
+                            deviation);
     input.foot_confirmed[i] = landing_[i].confirmed();
     input.contact_lost[i] = contact_loss_[i].lost();
     input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
@@ -374,7 +377,7 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
   if (soles.num_corners == 0) return;
   balance::CapturePoint counts = capture.pendulum;
   if (angular_momentum_) {
-    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / model_->total_mass();
+    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / whole_body_->data().total_mass;
     balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
                                  &counts);
   }

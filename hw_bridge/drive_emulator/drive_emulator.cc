@@ -303,6 +303,7 @@ void DriveEmulator::Sense(const Tick& tick) {
     std::copy(std::begin(drive_feedback_->imu_acceleration),
               std::end(drive_feedback_->imu_acceleration), message.imu_acceleration);
     message.foot_wrench = drive_feedback_->foot_wrench;
+    message.foot_sensor = drive_feedback_->foot_sensor;
   } else {
     sensor_feedback_.Withhold();
   }

@@ -190,6 +190,36 @@ void AddFeet(const RunRecord& run, bool ended, EventList* events) {
   }
 }
 
+const char* SensorFaultText(int8_t state) {
+  switch (state) {
+    case estimator_status_t::SENSOR_INVALID:
+      return "gives no valid reading";
+    case estimator_status_t::SENSOR_DEAD:
+      return "reads zero";
+    case estimator_status_t::SENSOR_FROZEN:
+      return "reads the same all the time";
+    case estimator_status_t::SENSOR_BIASED:
+      return "differs from what the joints' torques show";
+    default:
+      return nullptr;
+  }
+}
+
+void AddFootSensors(const RunRecord& run, EventList* events) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto broken = [&](int64_t tick) -> std::optional<bool> {
+      const estimator_status_t* status = run.estimator.at(tick);
+      if (status == nullptr) return {};
+      return SensorFaultText(status->foot_sensor[foot]) != nullptr;
+    };
+    events->AddIntervals(
+        Intervals(run, broken), "foot_sensor_fault", "foot_sensor_back", [&](int64_t tick) {
+          return fmt::format("{}: its sensor {}; its wrench is observed", FootName(run, foot),
+                             SensorFaultText(run.estimator.at(tick)->foot_sensor[foot]));
+        });
+  }
+}
+
 void AddBalancing(const RunRecord& run, EventList* events) {
   for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
     const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
@@ -446,6 +476,7 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddTransitions(run, &events);
   AddWaiting(run, &events);
   AddFeet(run, ended, &events);
+  AddFootSensors(run, &events);
   AddBalancing(run, &events);
   AddCapturePoint(run, &events);
   AddBridge(run, &events);

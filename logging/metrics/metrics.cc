@@ -22,6 +22,7 @@ MetricList MakeMetrics() {
   AddTransitions(&list);
   AddSensors(&list);
   AddEstimator(&list);
+  AddObserver(&list);
   AddLog(&list);
   return list;
 }
