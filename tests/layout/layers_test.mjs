@@ -38,7 +38,7 @@ const BELOW = {
   'logging/replay': [...BUS, 'logging'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
-const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
+const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
 /** Folders that one file may name although it is not below them: where all processes are listed. */
 const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
 

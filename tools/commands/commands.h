@@ -28,6 +28,7 @@ void AddCompareCommand(CLI::App* app, Command* command);
 void AddReplayCommand(CLI::App* app, Command* command);
 void AddEstimatorsCommand(CLI::App* app, Command* command);
 void AddLogCommand(CLI::App* app, Command* command);
+void AddRobotCommand(CLI::App* app, Command* command);
 void AddNewCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);
 void AddListCommand(CLI::App* app, Command* command);

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "components/robot/urdf_tree.h"
 #include "logging/metrics/analysis.h"
 
 namespace poise {
@@ -72,7 +71,7 @@ std::optional<Json> Shape(const TiXmlElement& visual) {
   return Json{{"shape", kind}, {"radius", radius}, {"length", length}};
 }
 
-Json Visuals(const robot::UrdfTree& tree, std::string_view urdf) {
+Json Visuals(const robot::RobotModel& model, std::string_view urdf) {
   Json visuals = Json::array();
   TiXmlDocument document;
   document.Parse(std::string(urdf).c_str(), nullptr, TIXML_ENCODING_UTF8);
@@ -81,16 +80,16 @@ Json Visuals(const robot::UrdfTree& tree, std::string_view urdf) {
   for (const TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr;
        link = link->NextSiblingElement("link")) {
     const char* const name = link->Attribute("name");
-    const auto place = name ? tree.links.find(name) : tree.links.end();
-    if (place == tree.links.end()) continue;
+    const robot::Frame* const place = name ? model.FindFrame(name) : nullptr;
+    if (place == nullptr) continue;
     for (const TiXmlElement* visual = link->FirstChildElement("visual"); visual != nullptr;
          visual = visual->NextSiblingElement("visual")) {
       try {
         std::optional<Json> shape = Shape(*visual);
         if (!shape) continue;
-        const Eigen::Isometry3d pose = place->second.pose * Origin(*visual);
+        const Eigen::Isometry3d pose = place->pose * Origin(*visual);
         if (!pose.matrix().allFinite()) continue;
-        (*shape)["body"] = place->second.body;
+        (*shape)["body"] = place->body;
         (*shape)["pose"] = PoseJson(pose);
         visuals.push_back(std::move(*shape));
       } catch (const urdf::ParseError&) {
@@ -134,7 +133,7 @@ Json RobotJson(const logging::RunRecord& run) {
                             {"length", foot.length},
                             {"width", foot.width}});
   }
-  json["visuals"] = Visuals(robot::LoadUrdfTree(run.info.urdf, nullptr), run.info.urdf);
+  json["visuals"] = Visuals(model, run.info.urdf);
   return json;
 }
 

@@ -227,15 +227,9 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   }
   Robot robot;
   ReadTextProto(loaded.robot_file, &robot);
-  if (!robot.has_urdf()) {
-    throw ConfigError(
-        fmt::format("{}: urdf: is missing; name the robot's URDF, relative to this "
-                    "file",
-                    loaded.robot_file));
-  }
   robot::LoadRobotFiles(loaded.robot_file, warnings);
   AddResource(&spec, "robot", loaded.robot_file);
-  AddResource(&spec, "urdf", fs::path(loaded.robot_file).parent_path() / robot.urdf());
+  AddResource(&spec, "urdf", robot::MakerFile(robot, loaded.robot_file));
   spec.set_realtime(changes.realtime);
   if (changes.priority) spec.mutable_realtime_options()->set_priority(*changes.priority);
   if (changes.cpu) spec.mutable_realtime_options()->set_cpu(*changes.cpu);

@@ -392,6 +392,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   if (changes.ideal) ApplyIdeal(&loaded);
   if (!changes.variant.empty()) ApplyVariant(changes.variant, &loaded);
   if (!changes.world.empty()) ApplyChange({"engine=" + changes.world, "--world"}, &loaded);
+  if (!changes.robot.empty()) ApplyChange({"robot=" + changes.robot, "--robot"}, &loaded);
   for (const std::string& set : changes.set) ApplyChange({set, kSetFlag}, &loaded);
   if (changes.duration) {
     ApplyChange({fmt::format("duration={}", *changes.duration), "--duration"}, &loaded);
