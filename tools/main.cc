@@ -76,6 +76,7 @@ int main(int argc, char** argv) {
   poise::AddLogCommand(&app, &command);
   poise::AddNewCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);
+  poise::AddRobotCommand(&app, &command);
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);

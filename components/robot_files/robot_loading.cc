@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "components/robot/sole.h"
 #include "components/robot/urdf_tree.h"
 #include "components/robot_files/robot_files.h"
 
@@ -125,6 +126,28 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const UrdfTree& tre
   return motors;
 }
 
+void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
+  if (foot.vertex_size() == 0) {
+    result->length = Positive(foot.length(), field + ".length");
+    result->width = Positive(foot.width(), field + ".width");
+    return;
+  }
+  if (foot.has_length() || foot.has_width()) {
+    throw RobotError(field + " has both vertex and length or width: remove one of the two");
+  }
+  for (const SoleVertex& vertex : foot.vertex()) {
+    result->vertices.emplace_back(vertex.x(), vertex.y());
+  }
+  if (const std::string problem = SoleProblem(result->vertices); !problem.empty()) {
+    throw RobotError(fmt::format("{}.vertex{}{}", field, problem.front() == '[' ? "" : " ", problem));
+  }
+  const Eigen::Map<const Eigen::Matrix2Xd> corners(result->vertices.front().data(), 2,
+                                                   foot.vertex_size());
+  const Eigen::Vector2d extent = corners.rowwise().maxCoeff() - corners.rowwise().minCoeff();
+  result->length = extent.x();
+  result->width = extent.y();
+}
+
 FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& field) {
   FootModel result;
   result.name = foot.name();
@@ -132,8 +155,7 @@ FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& fi
   const UrdfTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
   result.body = place.body;
   result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
-  result.length = Positive(foot.length(), field + ".length");
-  result.width = Positive(foot.width(), field + ".width");
+  LoadSole(foot, field, &result);
   int joints = 0;
   for (int b = place.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++joints;
   if (joints < kContactDimension) {

@@ -30,6 +30,7 @@ void AddEstimatorsCommand(CLI::App* app, Command* command);
 void AddLogCommand(CLI::App* app, Command* command);
 void AddNewCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);
+void AddRobotCommand(CLI::App* app, Command* command);
 void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);

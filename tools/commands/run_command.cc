@@ -113,6 +113,11 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "a robot without joint friction, sensor noise, drive train and model error");
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
+  run->add_option_function<std::string>(
+         "--robot",
+         [options](const std::string& name) { options->changes.set.push_back("robot=" + name); },
+         "another robot than the scenario's: a name (poise robot list) or a .pbtxt file")
+      ->type_name("NAME");
   run->add_option("--world", options->changes.world,
                   "engine of the simulated robot: ode or mujoco; default: the scenario's");
   run->add_option("--set", options->changes.set,

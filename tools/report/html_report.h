@@ -9,6 +9,7 @@
 
 #include "logging/run_record.h"
 #include "tools/report/report.h"
+#include "tools/robot/robot_check.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -29,6 +30,9 @@ nlohmann::ordered_json PageRunJson(const logging::RunRecord& record, const Scena
 /// template is not built, `file` cannot be written or is a log; LogError for a log that is gone. A
 /// page that is not finished leaves `file` as it was.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
+
+/// Writes the page of a robot that was checked. Throws ConfigError likewise.
+void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in
 /// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not
