@@ -74,9 +74,9 @@ int main(int argc, char** argv) {
   poise::AddReplayCommand(&app, &command);
   poise::AddEstimatorsCommand(&app, &command);
   poise::AddLogCommand(&app, &command);
-  poise::AddRobotCommand(&app, &command);
   poise::AddNewCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);
+  poise::AddRobotCommand(&app, &command);
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
@@ -11,6 +12,7 @@
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
+#include "components/robot/sole.h"
 
 namespace poise {
 
@@ -19,6 +21,9 @@ namespace {
 
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
 constexpr double kCopTolerance = 1e-6;
+
+// Room in the message.
+constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
   return balance::SignedDistance(region, cop) >= -kCopTolerance;
@@ -60,13 +65,14 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   sole_margin_ = ReadNotNegative(config.has_sole_margin() ? config.sole_margin() : margin,
                                  "sole_margin", "must be m, 0 or more");
   for (const robot::FootModel& foot : model_->feet()) {
-    if (sole_margin_ >= 0.5 * std::min(foot.length, foot.width)) {
+    if (sole_margin_ >= robot::InnerRadius(foot)) {
       throw ConfigError("sole_margin",
                         fmt::format("is {} m and leaves nothing of the {} foot's "
                                     "sole, {} x {} m",
                                     sole_margin_, foot.name, foot.length, foot.width));
     }
   }
+  CutSoles();
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -151,7 +157,7 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   }
   const balance::ContactLimits limits = Limits(in_contact);
   balance::ConvexPolygon region = polygon_
-                                      ? Soles(frame_o, sole_margin_)
+                                      ? Soles(frame_o)
                                       : balance::Rectangle({limits.half_length, limits.half_width});
   if (cop_feedback_ > 0) {
     UpdateCopError(frame_o, in_contact, tick);
@@ -201,14 +207,24 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
-balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o,
-                                                   double margin) const {
-  std::array<Eigen::Vector2d, 2> half;
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
-    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+void ContactWrenchMonitor::CutSoles() {
+  for (size_t f = 0; f < 2; ++f) sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
+  shared_sole_ = sole_;
+  if (model_->feet()[0].rectangular() && model_->feet()[1].rectangular()) return;
+  // The shares of (62)–(67) have one centre of pressure, each in its own sole's frame: of soles that
+  // mirror each other both can have what is common to them.
+  for (size_t f = 0; f < 2; ++f) {
+    for (const balance::HalfPlane& edge : balance::EdgesOf(sole_[1 - f]).planes()) {
+      shared_sole_[f] = balance::Clip(shared_sole_[f], edge);
+    }
   }
-  return balance::SupportPolygon(frame_o, whole_body_->geometry(), half);
+}
+
+balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
+  const balance::ContactGeometry& geometry = whole_body_->geometry();
+  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  return balance::WithFewerCorners(
+      balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {

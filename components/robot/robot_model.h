@@ -52,12 +52,19 @@ struct MotorModel {
   double torque_per_ampere() const { return gear_ratio * torque_constant; }
 };
 
+/// What a sole is computed with, in arrays of a fixed size.
+inline constexpr int kMaxSoleVertices = 16;
+
+/// A flat sole: a rectangle about its frame's origin, or a convex polygon with the origin inside
+/// (components/robot/sole.h).
 struct FootModel {
   std::string name;
   int body = -1;
   Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();  ///< sole frame in the body frame
-  double length = 0, width = 0;                            ///< m
-  bool force_sensor = true;  ///< whether the foot has a six-axis sensor
+  double length = 0, width = 0;                            ///< m, of a polygon its extent
+  std::vector<Eigen::Vector2d> vertices;  ///< m, sole frame, anticlockwise; none for a rectangle
+  bool force_sensor = true;               ///< whether the foot has a six-axis sensor
+  bool rectangular() const { return vertices.empty(); }
 };
 
 /// A link of the URDF, one that is fixed to a body or the body's own.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "components/robot/link_tree.h"
+#include "components/robot/sole.h"
 #include "components/robot/urdf_source.h"
 #include "components/robot_files/mjcf_source.h"
 #include "components/robot_files/robot_files.h"
@@ -127,18 +128,26 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tre
   return motors;
 }
 
-// m, of the box around the sole's vertices; 0 without any.
-Eigen::Vector2d PolygonSize(const Foot& foot, const std::string& field) {
-  if (foot.vertex().empty()) return Eigen::Vector2d::Zero();
-  Eigen::AlignedBox2d box;
-  for (const SoleVertex& vertex : foot.vertex()) {
-    const Eigen::Vector2d point(vertex.x(), vertex.y());
-    if (!point.allFinite()) {
-      throw RobotError(field + ".vertex: a number is not finite: correct it");
-    }
-    box.extend(point);
+void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
+  if (foot.vertex_size() == 0) {
+    result->length = Positive(foot.length(), field + ".length");
+    result->width = Positive(foot.width(), field + ".width");
+    return;
   }
-  return box.sizes();
+  if (foot.has_length() || foot.has_width()) {
+    throw RobotError(field + " has both vertex and length or width: remove one of the two");
+  }
+  for (const SoleVertex& vertex : foot.vertex()) {
+    result->vertices.emplace_back(vertex.x(), vertex.y());
+  }
+  if (const std::string problem = SoleProblem(result->vertices); !problem.empty()) {
+    throw RobotError(fmt::format("{}.vertex{}{}", field, problem.front() == '[' ? "" : " ", problem));
+  }
+  const Eigen::Map<const Eigen::Matrix2Xd> corners(result->vertices.front().data(), 2,
+                                                   foot.vertex_size());
+  const Eigen::Vector2d extent = corners.rowwise().maxCoeff() - corners.rowwise().minCoeff();
+  result->length = extent.x();
+  result->width = extent.y();
 }
 
 FootModel LoadFoot(const Foot& foot, const LinkTree& tree, const std::string& field) {
@@ -148,9 +157,7 @@ FootModel LoadFoot(const Foot& foot, const LinkTree& tree, const std::string& fi
   const LinkTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
   result.body = place.body;
   result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
-  const Eigen::Vector2d size = PolygonSize(foot, field);
-  result.length = Positive(foot.has_length() ? foot.length() : size.x(), field + ".length");
-  result.width = Positive(foot.has_width() ? foot.width() : size.y(), field + ".width");
+  LoadSole(foot, field, &result);
   result.force_sensor = foot.force_sensor();
   int joints = 0;
   for (int b = place.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++joints;

@@ -10,6 +10,7 @@
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
+#include "components/robot/sole.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/step_planner_type.h"
 
@@ -70,6 +71,18 @@ double ReadStanceHalf(bool given, double value, double sole, double reserve, con
   return value;
 }
 
+balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const Eigen::Vector2d& half,
+                                  const StepPlannerConfig& config) {
+  if (foot.rectangular()) return balance::Rectangle(half);
+  balance::ConvexPolygon sole =
+      balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
+  for (const double sign : {1.0, -1.0}) {
+    if (config.has_stance_half_length()) sole = balance::Clip(sole, {{sign, 0}, half.x()});
+    if (config.has_stance_half_width()) sole = balance::Clip(sole, {{0, sign}, half.y()});
+  }
+  return sole;
+}
+
 }  // namespace
 
 void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
@@ -109,15 +122,18 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
   const HipStrategyConfig& hip = config.hip_strategy();
   for (size_t i = 0; i < 2; ++i) {
     const robot::FootModel& foot = model_->feet()[i];
-    if (hip.start() >= 0.5 * std::min(foot.length, foot.width)) {
+    if (hip.start() >= robot::InnerRadius(foot)) {
       throw ConfigError("hip_strategy.start",
                         fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                     hip.start(), foot.name, foot.length, foot.width));
     }
-    stance_half_[i] = {ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
+    const Eigen::Vector2d half(ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
                                       foot.length, kLengthReserve, "stance_half_length"),
                        ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(),
-                                      foot.width, kWidthReserve, "stance_half_width")};
+                                      foot.width, kWidthReserve, "stance_half_width"));
+    sole_[i] = balance::SolePolygon(foot, 0);
+    tilt_sole_[i] = balance::SolePolygon(foot, hip.start());
+    stance_sole_[i] = StanceSole(foot, half, config);
   }
   hip_strategy_.emplace(hip);
   joint_reserve_ = hip.joint_reserve();
@@ -231,7 +247,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
 void StepPlanner::TiltBody(double time, const Capture& capture) {
   HipInput input{.time = time, .near_joint_limit = NearJointLimit()};
   if (capture.known) {
-    const balance::ConvexPolygon region = Soles(capture.frame_o, hip_strategy_->start());
+    const balance::ConvexPolygon region = Soles(capture.frame_o, tilt_sole_);
     if (region.num_corners > 0) {
       const Eigen::Vector2d& point = capture.pendulum.position;
       const Eigen::Vector2d out = point - balance::NearestPoint(region, point);
@@ -278,13 +294,9 @@ balance::ContactGeometry StepPlanner::Geometry() const {
   return {{data.foot_pose[0], data.foot_pose[1]}, in_contact_};
 }
 
-balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o, double margin) const {
-  std::array<Eigen::Vector2d, 2> half;
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
-    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
-  }
-  return balance::SupportPolygon(frame_o, Geometry(), half);
+balance::ConvexPolygon StepPlanner::Soles(
+    const Eigen::Isometry3d& frame_o, const std::array<balance::ConvexPolygon, 2>& sole) const {
+  return balance::SupportPolygon(frame_o, Geometry(), sole);
 }
 
 std::array<bool, 2> StepPlanner::ComOverFoot() const {
@@ -299,7 +311,7 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
     offset += std::sqrt(offset.z() / robot::kGravity) * data.com_velocity;
     offset.z() -= offset.dot(normal) / normal.z();
     const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
-    over[i] = std::abs(at.x()) <= stance_half_[i].x() && std::abs(at.y()) <= stance_half_[i].y();
+    over[i] = balance::Contains(stance_sole_[i], at);
   }
   return over;
 }
@@ -373,7 +385,7 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
   support_plan_t& out = *support_plan_;
   const robot::RobotData& data = whole_body_->data();
   const Eigen::Isometry3d& frame_o = capture.frame_o;
-  const balance::ConvexPolygon soles = Soles(frame_o, 0);
+  const balance::ConvexPolygon soles = Soles(frame_o, sole_);
   if (soles.num_corners == 0) return;
   balance::CapturePoint counts = capture.pendulum;
   if (angular_momentum_) {

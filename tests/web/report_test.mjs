@@ -52,7 +52,7 @@ const soles = (page, time) => page.evaluate((t) => {
   player.seek(t);
   scene.scene.updateMatrixWorld(true);
   return run.robot.feet.map((foot, f) => {
-    const sole = scene.robotView.groups[foot.body].children.find((c) => c.children[0]?.geometry?.parameters.width === foot.length);
+    const sole = scene.robotView.groups[foot.body].children.find((c) => c.children[0]?.geometry?.type === 'ExtrudeGeometry');
     return [sole.matrixWorld.elements.slice(12, 15), scene.samples.pose(`sole${f}`, player.tick).position];
   });
 }, time);

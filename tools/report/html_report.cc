@@ -295,6 +295,28 @@ void WritePage(std::ostream* out, const std::function<void()>& write) {
   *out << std::string_view(page).substr(mark + kDataMark.size());
 }
 
+/// What `write` writes, or `file` as it was. Throws ConfigError; `flag` names the file.
+void WriteFile(const fs::path& file, const char* flag,
+               const std::function<void(std::ostream* out)>& write) {
+  std::optional<logging::PartialFile> partial;
+  try {
+    partial.emplace(file.string());
+  } catch (const logging::LogError& error) {
+    throw ConfigError(fmt::format("{}; name another file with {}", error.what(), flag));
+  }
+  PageFile page;
+  page.open(partial->part(), std::ios::out | std::ios::binary);
+  std::ostream out(&page);
+  write(&out);
+  out.flush();
+  if (!out || page.close() == nullptr) {
+    const int problem = page.problem() != 0 ? page.problem() : errno;
+    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with {}",
+                                  file.string(), std::strerror(problem), flag));
+  }
+  partial->Keep();
+}
+
 }  // namespace
 
 Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
@@ -312,26 +334,31 @@ void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs,
     throw ConfigError(
         fmt::format("{}: is the log itself; name another file with --html", file.string()));
   }
-  std::optional<logging::PartialFile> partial;
-  try {
-    partial.emplace(file.string());
-  } catch (const logging::LogError& error) {
-    throw ConfigError(fmt::format("{}; name another file with --html", error.what()));
-  }
-  PageFile page;
-  page.open(partial->part(), std::ios::out | std::ios::binary);
-  std::ostream out(&page);
-  WritePage(&out, [&] {
-    const double share = megabytes / static_cast<double>(runs.size());
-    for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, share, &out);
+  WriteFile(file, "--html", [&](std::ostream* out) {
+    WritePage(out, [&] {
+      const double share = megabytes / static_cast<double>(runs.size());
+      for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, share, out);
+    });
   });
-  out.flush();
-  if (!out || page.close() == nullptr) {
-    const int problem = page.problem() != 0 ? page.problem() : errno;
-    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with --html",
-                                  file.string(), std::strerror(problem)));
-  }
-  partial->Keep();
+}
+
+void WriteRobotPage(const fs::path& file, const RobotCheck& check) {
+  const robot::RobotState& stance = check.stance;
+  const Eigen::Vector3d& at = stance.base_position;
+  const Eigen::Quaterniond& turn = stance.base_orientation;
+  Json json;
+  json["robot"] = RobotJson(check.model, check.urdf);
+  json["stance"]["base"] = {{"position", {at.x(), at.y(), at.z()}},
+                            {"orientation", {turn.w(), turn.x(), turn.y(), turn.z()}}};
+  json["stance"]["joints"] = std::vector<double>(stance.joint_position.begin(),
+                                                 stance.joint_position.end());
+  json["check"] = RobotCheckJson(check);
+  WriteFile(file, "--page", [&](std::ostream* out) {
+    WritePage(out, [&] {
+      *out << "<script type=\"application/json\" class=\"poise-robot\">" << ScriptText(json)
+           << "</script>\n";
+    });
+  });
 }
 
 std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario, Json channels,

@@ -9,6 +9,7 @@
 
 #include "logging/run_record.h"
 #include "tools/report/report.h"
+#include "tools/robot/robot_check.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -33,6 +34,9 @@ inline constexpr double kPageSize = 30;  // MB: opens in seconds, goes by mail
 /// for a log that is gone. A page that is not finished leaves `file` as it was.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs,
                      double megabytes = kPageSize);
+
+/// Writes the page of a robot that was checked. Throws ConfigError likewise.
+void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in
 /// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not

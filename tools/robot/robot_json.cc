@@ -9,7 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "logging/metrics/analysis.h"
+#include "components/balance/support_polygon.h"
+#include "tools/robot/robot_check.h"
 
 namespace poise {
 namespace {
@@ -103,7 +104,10 @@ Json Visuals(const robot::RobotModel& model, std::string_view urdf) {
 }  // namespace
 
 Json RobotJson(const logging::RunRecord& run) {
-  const robot::RobotModel& model = run.robot;
+  return RobotJson(run.robot, run.info.urdf);
+}
+
+Json RobotJson(const robot::RobotModel& model, std::string_view urdf) {
   Json json;
   json["name"] = model.name();
   json["mass"] = model.total_mass();
@@ -123,17 +127,20 @@ Json RobotJson(const logging::RunRecord& run) {
     json["joints"].push_back({{"name", joint.name},
                               {"lower", joint.lower},
                               {"upper", joint.upper},
-                              {"torque_limit", logging::JointTorqueLimit(run, i)}});
+                              {"torque_limit", TorqueLimit(model, i)}});
   }
   json["feet"] = Json::array();
   for (const robot::FootModel& foot : model.feet()) {
+    Json corners = Json::array();
+    for (const Eigen::Vector2d& corner : balance::SolePolygon(foot, 0).corners()) {
+      corners.push_back({corner.x(), corner.y()});
+    }
     json["feet"].push_back({{"name", foot.name},
                             {"body", foot.body},
                             {"sole", PoseJson(foot.sole)},
-                            {"length", foot.length},
-                            {"width", foot.width}});
+                            {"corners", std::move(corners)}});
   }
-  json["visuals"] = Visuals(model, run.info.urdf);
+  json["visuals"] = Visuals(model, urdf);
   return json;
 }
 

@@ -8,6 +8,7 @@ import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
+import {robotPage} from './robot_page.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
@@ -96,6 +97,11 @@ function rowsNote(run) {
 }
 
 async function start() {
+  const robot = document.querySelector('script.poise-robot');
+  if (robot) {
+    robotPage(JSON.parse(robot.textContent));
+    return;
+  }
   const [run, overlay] = embeddedRuns(document);
   if (!run) throw new Error('this page holds no run: write one with poise report');
   for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
