@@ -116,6 +116,10 @@ class ContactDynamics {
   void ReduceTorque(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> reduced) const;
   /// u (r×1) to the least Γ (k×1) that has it, V L u.
   void ExpandTorque(const VectorRef& reduced, Eigen::Ref<Eigen::VectorXd> torque) const;
+  /// u (r×1) with which the joints that are no leg's accelerate by `joint_acceleration` (k×1, of which
+  /// the legs' entries count for nothing), whatever the legs do: their coordinates are the last ones,
+  /// u_o = L_ooᵀ q̈_o + (L⁻¹ Vᵀ h)_o. The legs' become zero.
+  void HoldOthers(const VectorRef& joint_acceleration, Eigen::Ref<Eigen::VectorXd> reduced) const;
   /// J (t×n) and J̇ q̇ (t×1) of task rows to Tᵀ (r×t) and their load (t×1). Rows that the contacts
   /// hold become zero.
   void ReduceRows(const MatrixRef& jacobian, const VectorRef& bias_acceleration,

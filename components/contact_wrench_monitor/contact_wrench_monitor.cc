@@ -6,6 +6,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
@@ -24,6 +25,8 @@ constexpr double kCopTolerance = 1e-6;
 
 // Room in the message.
 constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>;
+// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must remain.
+constexpr int kMostKept = 3;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
   return balance::SignedDistance(region, cop) >= -kCopTolerance;
@@ -81,7 +84,17 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   const int num_joints = model_->num_joints();
   com_height_.emplace(num_joints, 1);
-  balance_control_.emplace(num_joints, 1);
+  all_joints_ = config.movers() == ContactWrenchMonitorConfig::ALL_JOINTS;
+  if (config.joint_limits()) {
+    limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
+  }
+  const int most_rows = std::min(1 + kMostKept, num_joints);
+  protected_.emplace(num_joints, most_rows);
+  protected_jacobian_ = Eigen::MatrixXd::Zero(most_rows, model_->num_velocities());
+  protected_bias_ = Eigen::VectorXd::Zero(most_rows);
+  task_acceleration_ = acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
+  other_torque_ = Eigen::VectorXd::Zero(num_joints);
+  balance_control_.emplace(num_joints, most_rows);
   state_ = robot::RobotState(num_joints);
   height_jacobian_ = Eigen::MatrixXd::Zero(1, model_->num_velocities());
   height_bias_ = Eigen::VectorXd::Zero(1);
@@ -165,12 +178,9 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   }
   if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
   balance::BalanceResult result;
-  const auto compute = [&](const auto& bounds) {
-    return balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds,
-                                     balancing_, torque_, &result);
-  };
-  const balance::BalanceStatus status =
-      polygon_ || cop_feedback_ > 0 ? compute(region) : compute(limits);
+  const balance::BalanceStatus status = polygon_ || cop_feedback_ > 0
+                                            ? Move(geometry, region, &result)
+                                            : Move(geometry, limits, &result);
   if (status == balance::BalanceStatus::kSingular || !torque_.allFinite()) {
     return balance_torque_t::STATUS_SINGULAR;
   }
@@ -180,6 +190,89 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, region);
   return achieved || !balancing_ ? balance_torque_t::STATUS_OK
                                  : balance_torque_t::STATUS_NOT_ACHIEVED;
+}
+
+template <class Bounds>
+balance::BalanceStatus ContactWrenchMonitor::Move(const balance::ContactGeometry& geometry,
+                                                  const Bounds& bounds,
+                                                  balance::BalanceResult* result) {
+  const balance::BalanceStatus status =
+      balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds, balancing_,
+                                torque_, result, balance::Movers::kLegs);
+  if (!balancing_ || !(result->active_x || result->active_y)) return status;
+  if (status == balance::BalanceStatus::kOk && limits_) KeepLimits(geometry, bounds, result);
+  if (all_joints_) MoveOthers(geometry, bounds, result);
+  return status;
+}
+
+template <class Bounds>
+void ContactWrenchMonitor::MoveOthers(const balance::ContactGeometry& geometry,
+                                      const Bounds& bounds, balance::BalanceResult* result) {
+  const balance::ContactDynamics& contact = whole_body_->contact();
+  std::copy(task_torque_->torque.begin(), task_torque_->torque.end(), other_torque_.data());
+  balance::BalanceResult other;
+  if (balance_control_->Compute(contact, *com_height_, geometry, bounds, true, other_torque_,
+                                &other) != balance::BalanceStatus::kOk) {
+    return;
+  }
+  double share = 1;
+  if (limits_) {
+    contact.Acceleration(torque_, task_acceleration_);
+    contact.Acceleration(other_torque_, acceleration_);
+    for (int j = 0; j < model_->num_joints(); ++j) {
+      const double from = task_acceleration_[6 + j], change = acceleration_[6 + j] - from;
+      const balance::AccelerationRange range =
+          limits_->Accelerations(j, state_.joint_position[j], state_.joint_velocity[j]);
+      const double room = change > 0 ? range.upper - from : range.lower - from;
+      // A joint beyond its range already, by the tasks, takes part in nothing that makes it worse.
+      if (share * std::abs(change) > std::max(0.0, change > 0 ? room : -room)) {
+        share = std::max(0.0, room / change);
+      }
+    }
+  }
+  torque_ += share * (other_torque_ - torque_);
+  result->resultant += share * (other.resultant - result->resultant);
+  result->cop = balance::CenterOfPressure(result->resultant);
+}
+
+template <class Bounds>
+bool ContactWrenchMonitor::KeepLimits(const balance::ContactGeometry& geometry,
+                                      const Bounds& bounds, balance::BalanceResult* result) {
+  const balance::ContactDynamics& contact = whole_body_->contact();
+  Eigen::Index rows = 0;
+  for (const int j : contact.legs()) {
+    const double position = state_.joint_position[j], velocity = state_.joint_velocity[j];
+    if (!limits_->Near(j, position, velocity)) continue;
+    if (rows == 0) {
+      std::copy(task_torque_->torque.begin(), task_torque_->torque.end(), other_torque_.data());
+      contact.Acceleration(torque_, acceleration_);
+      contact.Acceleration(other_torque_, task_acceleration_);
+      protected_jacobian_.setZero();
+      protected_bias_.setZero();
+      protected_jacobian_.row(0) = height_jacobian_.row(0);
+      protected_bias_[0] = height_bias_[0];
+      rows = 1;
+    }
+    const balance::AccelerationRange range = limits_->Accelerations(j, position, velocity);
+    const double most = limits_->range(j).acceleration, now = acceleration_[6 + j];
+    const double before = task_acceleration_[6 + j];
+    const bool above = range.upper < most && now > range.upper && now > before;
+    const bool below = range.lower > -most && now < range.lower && now < before;
+    if ((!above && !below) || rows >= protected_jacobian_.rows()) continue;
+    protected_jacobian_(rows++, 6 + j) = 1;
+  }
+  if (rows < 2 || !protected_->Compute(contact, protected_jacobian_.topRows(rows),
+                                       protected_bias_.head(rows))) {
+    return false;
+  }
+  balance::BalanceResult kept;
+  if (balance_control_->Compute(contact, *protected_, geometry, bounds, true, other_torque_, &kept,
+                                balance::Movers::kLegs) != balance::BalanceStatus::kOk) {
+    return false;
+  }
+  torque_ = other_torque_;
+  *result = kept;
+  return true;
 }
 
 void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
