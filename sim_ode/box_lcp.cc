@@ -13,9 +13,8 @@ constexpr double kTolerance = 1e-11;
 constexpr int kBlockMoves = 5;    // of block pivoting that may fail to help
 constexpr int kMostMoves = 1000;  // of one row
 
-// The factorisation runs down columns, which a compiler turns into vectors: at 24 rows it takes a
-// third of the time of Eigen's (benchmarks/world_step_benchmark). L is written over the lower
-// triangle, with 1 / L_kk on its diagonal. False when A is not positive definite.
+// Runs down columns, which a compiler turns into vectors. L is written over the lower triangle,
+// with 1 / L_kk on its diagonal. False when A is not positive definite.
 bool Factor(double* a, Index n, Index stride) {
   for (Index k = 0; k < n; ++k) {
     double* const column = a + k * stride;

@@ -302,8 +302,9 @@ TEST_F(ReplayTest, OnlyALogThatComesOutTheSameIsPacked) {
   EXPECT_TRUE(std::filesystem::exists(changed));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "changed.packed"));
   std::filesystem::remove(changed);
+  torque = 0;
   const std::string cut = Changed([&](const logging::LogEvent& event, auto*) {
-    return event.channel != "JOINT_COMMAND" || ++torque != 300;
+    return event.channel != "JOINT_COMMAND" || ++torque != 50;
   });
   EXPECT_EQ(RunPoise({"log", "pack", cut}).exit_code, 1);
   // A packed log that is damaged, anywhere, gives an error or the log.

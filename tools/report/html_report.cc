@@ -32,10 +32,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kDataMark = "<!--POISE-RUN-DATA-->";
 
-// What a megabyte of page holds, fitted to runs of 12 joints: numbers take about 1.1 bytes where
-// each tick is there, and about 5 with their bounds.
-constexpr double kNumbersPerMegabyte = 0.75e6;       // ticks times signals: each tick is there
-constexpr double kBoundNumbersPerMegabyte = 0.17e6;  // rows times signals, else
+// What a megabyte of page holds, fitted to runs of 12 joints: numbers take about 1.5 bytes where
+// each tick is there, and about 4 with their bounds.
+constexpr double kNumbersPerMegabyte = 0.65e6;      // ticks times signals: each tick is there
+constexpr double kBoundNumbersPerMegabyte = 0.2e6;  // rows times signals, else
 constexpr int64_t kLeastRows = 500;
 
 // Around which events every tick is shown, the first ones first.
