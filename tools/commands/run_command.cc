@@ -13,13 +13,18 @@ namespace {
 
 struct RunArguments {
   std::vector<std::string> scenarios = {"push_double_support"};
-  std::string out;
+  std::string out, robot;
   RunOptions options;
   bool no_reference = false;
 };
 
 int Run(RunArguments arguments) {
-  arguments.options.changes.reference = !arguments.no_reference;
+  RunChanges& changes = arguments.options.changes;
+  changes.reference = !arguments.no_reference;
+  // First, so that what else is set can name its joints and links.
+  if (!arguments.robot.empty()) {
+    changes.set.insert(changes.set.begin(), "robot=" + arguments.robot);
+  }
   const std::string& capture = arguments.options.changes.capture;
   if (!capture.empty()) CheckFileFree("--capture", capture, arguments.options.force);
   const std::vector<std::string>& names = arguments.scenarios;
@@ -113,10 +118,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "a robot without joint friction, sensor noise, drive train and model error");
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
-  run->add_option_function<std::string>(
-         "--robot",
-         [options](const std::string& name) { options->changes.set.push_back("robot=" + name); },
-         "another robot than the scenario's: a name (poise robot list) or a .pbtxt file")
+  run->add_option("--robot", arguments->robot,
+                  "another robot than the scenario's: a name (poise robot list) or a .pbtxt file")
       ->type_name("NAME");
   run->add_option("--world", options->changes.world,
                   "engine of the simulated robot: ode or mujoco; default: the scenario's");
