@@ -122,8 +122,8 @@ TEST(PolygonSole, FewerCornersStayInsideAndCostTheLeast) {
   }
 }
 
-/// Forces at three corners, pressing only, that have the wrench's F_z, M_x and M_y. A force inside a
-/// convex polygon is the sum of such at three of its corners (Carathéodory).
+/// Forces at three corners, pressing only, that have the wrench's F_z, M_x and M_y. A force inside
+/// a convex polygon is the sum of such at three of its corners (Carathéodory).
 bool CornersCanPress(const std::vector<Vector2d>& corners, const Vector6d& wrench) {
   for (size_t i = 0; i < corners.size(); ++i) {
     for (size_t j = i + 1; j < corners.size(); ++j) {
@@ -236,8 +236,7 @@ TEST(PolygonSole, RatiosAreThoseThatASearchFinds) {
     const std::array<std::vector<Vector2d>, 2> corners{RandomSole(5 + trial % 8, &random),
                                                        RandomSole(4 + trial % 12, &random)};
     const SoleLimits limits{Limits(Foot(corners[0])), Limits(Foot(corners[1]))};
-    const RatioInterval interval =
-        FeasibleRatio(stand.resultant, stand.foot, limits, 0.02, 0.98);
+    const RatioInterval interval = FeasibleRatio(stand.resultant, stand.foot, limits, 0.02, 0.98);
     double least = HUGE_VAL, first = 2, last = -1;
     constexpr int kSteps = 960;
     for (int i = 0; i <= kSteps; ++i) {

@@ -23,7 +23,7 @@ using Eigen::Vector3d;
 
 constexpr double kTolerance = 1e-9;
 
-std::string Folder() { return std::string(POISE_SOURCE_DIR) + "/deploy/robots/heron/heron"; }
+std::string Folder() { return POISE_SOURCE_DIR "/deploy/robots/heron/heron"; }
 
 struct ModelDeleter {
   void operator()(mjModel* model) const { mj_deleteModel(model); }
@@ -90,8 +90,8 @@ void ExpectSameBodies(const mjModel& one, const mjModel& other) {
                  mj_id2name(&other, mjOBJ_BODY, other.body_parentid[b]));
     if (name == "pelvis") continue;  // stands on its feet in the MJCF file
     EXPECT_LT((Vector(one.body_pos + 3 * a) - Vector(other.body_pos + 3 * b)).norm(), kTolerance);
-    EXPECT_LT(
-        (Rotation(one.body_quat + 4 * a) - Rotation(other.body_quat + 4 * b)).norm(), kTolerance);
+    EXPECT_LT((Rotation(one.body_quat + 4 * a) - Rotation(other.body_quat + 4 * b)).norm(),
+              kTolerance);
   }
 }
 
@@ -140,7 +140,8 @@ TEST(Heron, ImuIsAtTheSite) {
   ASSERT_GE(site, 0);
   EXPECT_STREQ(mj_id2name(mjcf.get(), mjOBJ_BODY, mjcf->site_bodyid[site]),
                model.bodies()[static_cast<size_t>(model.imu().body)].name.c_str());
-  EXPECT_LT((Vector(mjcf->site_pos + 3 * site) - model.imu().pose.translation()).norm(), kTolerance);
+  EXPECT_LT((Vector(mjcf->site_pos + 3 * site) - model.imu().pose.translation()).norm(),
+            kTolerance);
 }
 
 // Every corner of a sole is one of the foot's boxes at their lowest, and none of these is outside.
@@ -157,8 +158,8 @@ TEST(Heron, SolesAreWhatTheFeetStandOn) {
       const Vector3d half = Vector(mjcf->geom_size + 3 * g);
       for (const double x : {-half.x(), half.x()}) {
         for (const double y : {-half.y(), half.y()}) {
-          const Vector3d corner = foot.sole.inverse() * (Vector(mjcf->geom_pos + 3 * g) +
-                                                         Vector3d(x, y, -half.z()));
+          const Vector3d corner =
+              foot.sole.inverse() * (Vector(mjcf->geom_pos + 3 * g) + Vector3d(x, y, -half.z()));
           EXPECT_GT(corner.z(), -kTolerance) << "below the sole";
           if (corner.z() < kTolerance) low.push_back(corner.head<2>());
         }
@@ -167,9 +168,9 @@ TEST(Heron, SolesAreWhatTheFeetStandOn) {
     ASSERT_GE(low.size(), 8u);
     ASSERT_GE(foot.vertices.size(), 5u) << "no rectangle";
     for (const Eigen::Vector2d& vertex : foot.vertices) {
-      EXPECT_TRUE(std::ranges::any_of(
-          low, [&](const auto& corner) { return (corner - vertex).norm() < kTolerance; }))
-          << vertex.transpose();
+      EXPECT_TRUE(std::ranges::any_of(low, [&](const auto& corner) {
+        return (corner - vertex).norm() < kTolerance;
+      })) << vertex.transpose();
     }
     for (const Eigen::Vector2d& corner : low) {
       for (size_t i = 0; i < foot.vertices.size(); ++i) {

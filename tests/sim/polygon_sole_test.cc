@@ -13,7 +13,8 @@ namespace {
 using Eigen::Vector2d;
 using std::numbers::pi;
 
-/// The rigid robot on regular polygons of `n` corners at the distance `radius` (m), the first ahead.
+/// The rigid robot on regular polygons of `n` corners at the distance `radius` (m), the first
+/// ahead.
 robot::RobotModel OnPolygons(int n, double radius) {
   return EditedRobot([&](Robot* description) {
     for (Motor& motor : *description->mutable_motor()) {
@@ -75,8 +76,7 @@ TEST(PolygonSole, TiltsAsTheSpringsAtItsCorners) {
     const SimulationTruth truth = Settled(model, kStiffness, kAhead);
     const double weight = model.total_mass() * robot::kGravity;
     const double height = truth.com.z() - truth.foot_pose[0].translation().z();
-    const double expected =
-        weight * kAhead / (kStiffness * kRadius * kRadius - weight * height);
+    const double expected = weight * kAhead / (kStiffness * kRadius * kRadius - weight * height);
     const double tilt = std::asin(-truth.foot_pose[0].linear()(2, 0));
     EXPECT_NEAR(tilt, expected, 0.03 * expected) << n;
   }

@@ -97,9 +97,9 @@ TEST(RobotCheck, TorqueOnBothFeetIsThatOfVirtualWork) {
     moment += model.bodies()[b].mass * robot::kGravity * (com.x() - knee.x());
   }
   // Horizontal forces of the ground, which cancel between the feet, do not turn about an axis in y.
-  const double knees = check.loads[joint].double_support +
-                       check.loads[static_cast<size_t>(model.FindJoint("left_knee_pitch"))]
-                           .double_support;
+  const double knees =
+      check.loads[joint].double_support +
+      check.loads[static_cast<size_t>(model.FindJoint("left_knee_pitch"))].double_support;
   EXPECT_NEAR(knees, std::abs(moment), 1e-6);
 }
 
@@ -115,8 +115,8 @@ TEST(RobotCheck, SolesHaveTheirAreas) {
 
 TEST(RobotCheck, ReachIsWithinTheLegsLength) {
   for (const RobotCheck* check : {&Paper(), &Heron()}) {
-    for (const double reach : {check->reach.forward, check->reach.back, check->reach.outward,
-                               check->reach.up}) {
+    for (const double reach :
+         {check->reach.forward, check->reach.back, check->reach.outward, check->reach.up}) {
       EXPECT_GT(reach, 0.05);
       EXPECT_LT(reach, 1.2);
     }

@@ -23,7 +23,7 @@ struct CheckOptions {
   bool json = false;
 };
 
-int Check(const CheckOptions& options) {
+int CheckOneRobot(const CheckOptions& options) {
   const RobotCheck check = CheckRobot(FindFile("robots", options.robot, fs::current_path()));
   if (options.json) {
     KeepUnicode();
@@ -38,13 +38,12 @@ int Check(const CheckOptions& options) {
   return check.ok() ? kExitOk : kExitFailed;
 }
 
-int List() {
+int ListRobots() {
   std::vector<TableRow> rows{{"robot", "joints", "mass", "soles"}};
   bool good = true;
   for (const std::string& name : ListNames("robots")) {
     try {
-      const robot::RobotModel model =
-          robot::LoadRobotFiles(InstalledFile("robots", name).string());
+      const robot::RobotModel model = robot::LoadRobotFiles(InstalledFile("robots", name).string());
       const bool rectangles = model.feet()[0].rectangular() && model.feet()[1].rectangular();
       rows.push_back({name, std::to_string(model.num_joints()),
                       FormatNumber(model.total_mass(), "kg"),
@@ -67,12 +66,14 @@ void AddRobotCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<CheckOptions>();
   CLI::App* check = robot->add_subcommand(
       "check", "what a robot is and can do, and what is wrong with its files; takes seconds");
-  check->add_option("robot", options->robot, "a name (poise robot list) or a .pbtxt file")->required();
+  check->add_option("robot", options->robot, "a name (poise robot list) or a .pbtxt file")
+      ->required();
   check->add_flag("--json", options->json, "everything in SI units, for programs");
-  check->add_option("--page", options->page, "write the robot in 3D to this file")->type_name("FILE");
-  check->callback([options, command] { *command = [options] { return Check(*options); }; });
+  check->add_option("--page", options->page, "write the robot in 3D to this file")
+      ->type_name("FILE");
+  check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
   CLI::App* list = robot->add_subcommand("list", "the robots that there are");
-  list->callback([command] { *command = List; });
+  list->callback([command] { *command = ListRobots; });
 }
 
 }  // namespace poise

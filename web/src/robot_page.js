@@ -100,7 +100,7 @@ class StillView {
 /** The soles from above, forwards up, to one scale. */
 function solesPicture(soles) {
   const scale = 900, pad = 8;  // pixels a metre
-  return element('div', {class: 'toolbar'}, ...[...soles].reverse().map((sole) => {
+  return element('div', {class: 'soles'}, ...[...soles].reverse().map((sole) => {
     const reach = (k) => Math.max(...sole.corners.map((c) => Math.abs(c[k])));
     const [height, width] = [2 * reach(0) * scale + 2 * pad, 2 * reach(1) * scale + 2 * pad];
     const points = sole.corners.map(([x, y]) => [width / 2 - y * scale, height / 2 - x * scale]);
@@ -151,7 +151,7 @@ export function robotPage(data) {
   const still = new StillView(document.getElementById('scene'), data);
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: true,
     change: (e) => still.show(name, e.target.checked)}), label);
-  document.getElementById('scene-place').prepend(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
+  still.host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
     element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes')));
   document.getElementById('side').append(element('h2', {}, 'Soles, from above'), solesPicture(check.soles),
     ...(good ? [] : [element('h2', {}, 'Defects'), element('ul', {}, ...check.defects.map((d) => element('li', {}, d)))]));
