@@ -14,12 +14,13 @@ void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
 }
 
 void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covariance,
-                              const Wrench& noise, double dt) {
+                              const Wrench& noise, double least_force, double dt) {
   if (said_ != State::kOk || !settings_.enabled) return;
   Covariance total = covariance;
   total.diagonal() += noise.cwiseAbs2();
   const Wrench gap = measured_ - observed;
-  const double difference = gap.dot(total.llt().solve(gap));
+  const double difference =
+      gap.head<3>().norm() < least_force ? 0 : gap.dot(total.llt().solve(gap));
   if (!(difference >= 0)) return;  // not a covariance
   difference_ = difference;
   // What does not change by a bit has no noise: a little disagreement is then enough.

@@ -28,9 +28,9 @@ class FootSensorCheck {
   /// and what it reads.
   void Read(State said, const Wrench& measured, double dt);
   /// Compares with what is observed, `dt` s after the last comparison. `noise`: standard deviations
-  /// of the reading.
+  /// of the reading. Forces that differ by less than `least_force`, N, agree.
   void Compare(const Wrench& observed, const Covariance& covariance, const Wrench& noise,
-               double dt);
+               double least_force, double dt);
 
   State state() const { return state_; }
   bool good() const { return state_ == State::kOk; }

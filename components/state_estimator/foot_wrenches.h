@@ -49,6 +49,7 @@ class FootWrenches {
 
   WrenchObserver observer_;
   int check_every_;
+  double push_gate_, least_force_;
   robot::Vector6d noise_;
   std::array<FootSensorCheck, 2> check_;
   std::array<robot::Vector6d, 2> wrench_, deviation_;
