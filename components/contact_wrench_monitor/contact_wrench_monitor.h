@@ -56,9 +56,9 @@ class ContactWrenchMonitor : public Component {
   std::optional<balance::BalanceControl> balance_control_;
   bool balancing_ = true;
   balance::ContactLimits double_support_, single_support_;
-  std::optional<double> beyond_soles_;               // m
-  bool polygon_ = false;                             // the region is the soles' hull
-  double sole_margin_ = 0;                           // m
+  std::optional<double> beyond_soles_;  // m
+  bool polygon_ = false;                // the region is the soles' hull
+  double sole_margin_ = 0;              // m
   // Less sole_margin_, m, sole frames: alone on the ground, and with the other foot.
   std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
