@@ -149,8 +149,8 @@ double Select(const RatioInterval& interval, const Vector6d& resultant,
   const Bounds bounds = MomentBounds(resultant, position, rotation, limits);
   // Side by side the soles lack as much at any η: noise alone would tell the best, and η, with the
   // joints' torques, jump from end to end. Of what is as good, the nearest to η*.
-  const double lacking = LeastViolation(bounds, eta_min, eta_max) +
-                         kIndifference * resultant.head<3>().norm();
+  const double lacking =
+      LeastViolation(bounds, eta_min, eta_max) + kIndifference * resultant.head<3>().norm();
   double lower = eta_min, upper = eta_max;
   for (const Bound& bound : bounds) {
     if (bound.a == 0) continue;

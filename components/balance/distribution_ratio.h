@@ -30,8 +30,8 @@ struct RatioInterval {
 using SoleLimits = std::array<ContactLimits, 2>;
 
 /// Bounds of η from |a η + b| < |c| for M_x, M_y, M_z, (70)–(79), intersected with [eta_min,
-/// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot`: soles in
-/// O; each foot's conditions hold in its own sole frame, however it is turned or tilted.
+/// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot`: soles
+/// in O; each foot's conditions hold in its own sole frame, however it is turned or tilted.
 RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
                             const SoleLimits& limits, double eta_min, double eta_max);
 /// The same for soles of the same limits.

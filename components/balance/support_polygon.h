@@ -20,11 +20,11 @@ ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin);
 ///
 /// With soles less a margin it is the polygon of the soles with that margin inside, and every
 /// centre of pressure in it can be shared so that each foot's own stays inside its smaller sole:
-/// the shares of (62)–(67) move both feet's centres of pressure by the same vector, and a sole swept
-/// from one foot to the other is their hull when both have one shape and are parallel. Of soles
-/// that mirror each other somewhat less can be shared. A sole higher or lower than the plane (feet
-/// at different heights) reaches somewhat farther than its projection, as forces are nearer to the
-/// vertical than the plane's normal is.
+/// the shares of (62)–(67) move both feet's centres of pressure by the same vector, and a sole
+/// swept from one foot to the other is their hull when both have one shape and are parallel. Of
+/// soles that mirror each other somewhat less can be shared. A sole higher or lower than the plane
+/// (feet at different heights) reaches somewhat farther than its projection, as forces are nearer
+/// to the vertical than the plane's normal is.
 ConvexPolygon SupportPolygon(const Eigen::Isometry3d& frame_o, const ContactGeometry& geometry,
                              const std::array<ConvexPolygon, 2>& sole);
 

@@ -169,9 +169,8 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
     return balance_torque_t::STATUS_SINGULAR;
   }
   const balance::ContactLimits limits = Limits(in_contact);
-  balance::ConvexPolygon region = polygon_
-                                      ? Soles(frame_o)
-                                      : balance::Rectangle({limits.half_length, limits.half_width});
+  balance::ConvexPolygon region =
+      polygon_ ? Soles(frame_o) : balance::Rectangle({limits.half_length, limits.half_width});
   if (cop_feedback_ > 0) {
     UpdateCopError(frame_o, in_contact, tick);
     for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
@@ -304,8 +303,8 @@ void ContactWrenchMonitor::CutSoles() {
   for (size_t f = 0; f < 2; ++f) sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
   shared_sole_ = sole_;
   if (model_->feet()[0].rectangular() && model_->feet()[1].rectangular()) return;
-  // The shares of (62)–(67) have one centre of pressure, each in its own sole's frame: of soles that
-  // mirror each other both can have what is common to them.
+  // The shares of (62)–(67) have one centre of pressure, each in its own sole's frame: of soles
+  // that mirror each other both can have what is common to them.
   for (size_t f = 0; f < 2; ++f) {
     for (const balance::HalfPlane& edge : balance::EdgesOf(sole_[1 - f]).planes()) {
       shared_sole_[f] = balance::Clip(shared_sole_[f], edge);

@@ -76,9 +76,9 @@ class ContactWrenchMonitor : public Component {
   Eigen::MatrixXd protected_jacobian_;
   Eigen::VectorXd protected_bias_, task_acceleration_, acceleration_, other_torque_;
   balance::ContactLimits double_support_, single_support_;
-  std::optional<double> beyond_soles_;               // m
-  bool polygon_ = false;                             // the region is the soles' hull
-  double sole_margin_ = 0;                           // m
+  std::optional<double> beyond_soles_;  // m
+  bool polygon_ = false;                // the region is the soles' hull
+  double sole_margin_ = 0;              // m
   // Less sole_margin_, m, sole frames: alone on the ground, and with the other foot.
   std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s

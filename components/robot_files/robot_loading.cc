@@ -141,7 +141,8 @@ void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
     result->vertices.emplace_back(vertex.x(), vertex.y());
   }
   if (const std::string problem = SoleProblem(result->vertices); !problem.empty()) {
-    throw RobotError(fmt::format("{}.vertex{}{}", field, problem.front() == '[' ? "" : " ", problem));
+    throw RobotError(
+        fmt::format("{}.vertex{}{}", field, problem.front() == '[' ? "" : " ", problem));
   }
   const Eigen::Map<const Eigen::Matrix2Xd> corners(result->vertices.front().data(), 2,
                                                    foot.vertex_size());

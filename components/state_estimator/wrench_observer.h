@@ -26,7 +26,7 @@ namespace poise {
 /// See WrenchObserverConfig in state_estimator.proto for what each means.
 struct WrenchObserverSettings {
   double cutoff = 40;
-  double friction_error = 0.3, friction_stiffness = 1e4, torque_error = 0.02;
+  double friction_error = 0.5, friction_stiffness = 1e4, torque_error = 0.02;
   double mass_error = 0.02, com_error = 0.006, acceleration_error = 0.03;
   double push_gate = 25;
   double latency = 0.01;

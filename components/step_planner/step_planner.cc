@@ -127,10 +127,11 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
                         fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                     hip.start(), foot.name, foot.length, foot.width));
     }
-    const Eigen::Vector2d half(ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
-                                      foot.length, kLengthReserve, "stance_half_length"),
-                       ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(),
-                                      foot.width, kWidthReserve, "stance_half_width"));
+    const Eigen::Vector2d half(
+        ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(), foot.length,
+                       kLengthReserve, "stance_half_length"),
+        ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(), foot.width,
+                       kWidthReserve, "stance_half_width"));
     sole_[i] = balance::SolePolygon(foot, 0);
     tilt_sole_[i] = balance::SolePolygon(foot, hip.start());
     stance_sole_[i] = StanceSole(foot, half, config);
@@ -294,8 +295,8 @@ balance::ContactGeometry StepPlanner::Geometry() const {
   return {{data.foot_pose[0], data.foot_pose[1]}, in_contact_};
 }
 
-balance::ConvexPolygon StepPlanner::Soles(
-    const Eigen::Isometry3d& frame_o, const std::array<balance::ConvexPolygon, 2>& sole) const {
+balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o,
+                                          const std::array<balance::ConvexPolygon, 2>& sole) const {
   return balance::SupportPolygon(frame_o, Geometry(), sole);
 }
 

@@ -176,10 +176,10 @@ void FindDefects(RobotCheck* check) {
     const double position = check->stance.joint_position[static_cast<Eigen::Index>(j)];
     const double worst = std::max(load.double_support, load.single_support);
     if (worst > load.limit) {
-      check->defects.push_back(
-          fmt::format("joint {} needs {:.3g} N·m to stand and may give {:.3g}: correct effort, gear, "
-                      "torque_constant or peak_current",
-                      joint.name, worst, load.limit));
+      check->defects.push_back(fmt::format(
+          "joint {} needs {:.3g} N·m to stand and may give {:.3g}: correct effort, gear, "
+          "torque_constant or peak_current",
+          joint.name, worst, load.limit));
     } else if (load.double_support > load.rated) {
       check->defects.push_back(
           fmt::format("joint {} needs {:.3g} N·m to stand on both feet, more than its motor bears "
@@ -188,14 +188,14 @@ void FindDefects(RobotCheck* check) {
     }
     const double room = std::min(position - joint.lower, joint.upper - position);
     if (room < kAtLimit && joint.upper > joint.lower) {
-      check->defects.push_back(fmt::format(
-          "joint {} stands {:.3g} rad from the end of its range: give another stance", joint.name,
-          std::max(room, 0.0)));
+      check->defects.push_back(
+          fmt::format("joint {} stands {:.3g} rad from the end of its range: give another stance",
+                      joint.name, std::max(room, 0.0)));
     }
     if (!(joint.velocity_limit > 0)) {
-      check->defects.push_back(fmt::format(
-          "joint {} has a velocity limit of {} rad/s: give the URDF's limit a velocity", joint.name,
-          joint.velocity_limit));
+      check->defects.push_back(
+          fmt::format("joint {} has a velocity limit of {} rad/s: give the URDF's limit a velocity",
+                      joint.name, joint.velocity_limit));
     }
   }
   if (!check->stands_on_one_foot) {
@@ -225,18 +225,19 @@ std::string FormatLoads(const RobotCheck& check, int columns) {
                     FormatNumber(load.rated), FormatNumber(load.limit)});
   }
   std::string text = FormatColumns(rows, columns);
-  if (left_out > 0) text += fmt::format("{} joints need less than a tenth of their limit\n", left_out);
+  if (left_out > 0)
+    text += fmt::format("{} joints need less than a tenth of their limit\n", left_out);
   return text;
 }
 
 std::string FormatPushes(const RobotCheck& check, int columns) {
   std::vector<TableRow> rows{{"largest push m ω d, N·s", "both feet", "right foot", "left foot"}};
-  constexpr std::array kNames = {"forwards", "front left", "to the left", "back left",
+  constexpr std::array kNames = {"forwards",  "front left", "to the left",  "back left",
                                  "backwards", "back right", "to the right", "front right"};
   for (size_t i = 0; i < check.pushes.size(); i += 2) {  // JSON has those between
     const PushLimit& push = check.pushes[i];
-    rows.push_back({kNames[i / 2], fmt::format("{:.1f}", push.both), fmt::format("{:.1f}", push.right),
-                    fmt::format("{:.1f}", push.left)});
+    rows.push_back({kNames[i / 2], fmt::format("{:.1f}", push.both),
+                    fmt::format("{:.1f}", push.right), fmt::format("{:.1f}", push.left)});
   }
   return FormatColumns(rows, columns);
 }
@@ -263,8 +264,7 @@ RobotCheck CheckRobot(const std::filesystem::path& file) {
   const robot::RobotData data = Evaluate(check.model, check.stance);
   check.com_height = data.com.z() - data.foot_pose[0].translation().z();
   check.frequency = std::sqrt(robot::kGravity / check.com_height);
-  check.foot_spacing =
-      data.foot_pose[1].translation().y() - data.foot_pose[0].translation().y();
+  check.foot_spacing = data.foot_pose[1].translation().y() - data.foot_pose[0].translation().y();
   FindSoles(&check);
   FindLoads(&check);
   check.reach = {ReachAlong(check, Vector3d::UnitX()), ReachAlong(check, -Vector3d::UnitX()),
@@ -302,9 +302,9 @@ std::string FormatRobotCheck(const RobotCheck& check, int columns) {
                              FormatNumber(1e3 * drive.sensor_delay)));
   text += "\n\n" + FormatLoads(check, columns) + "\n" + FormatPushes(check, columns) + "\n";
   if (check.ok()) return text + Toned("no defect was found", Tone::kGood) + "\n";
-  text += Toned(fmt::format("{} defect{}", check.defects.size(),
-                            check.defects.size() == 1 ? "" : "s"),
-                Tone::kBad);
+  text +=
+      Toned(fmt::format("{} defect{}", check.defects.size(), check.defects.size() == 1 ? "" : "s"),
+            Tone::kBad);
   for (const std::string& defect : check.defects) {
     text += "\n" + Wrapped("  - " + defect, columns, 4);
   }

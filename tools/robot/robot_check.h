@@ -22,14 +22,15 @@ struct JointLoad {
   double limit = 0;           ///< TorqueLimit
   double rated = 0;           ///< at the motor's rated current
   double double_support = 0;  ///< in the stance
-  double single_support = 0;  ///< on one foot, the COM above its sole's origin: the worse of the two
+  double single_support =
+      0;  ///< on one foot, the COM above its sole's origin: the worse of the two
 };
 
 struct SoleFacts {
   std::string foot;
   std::vector<Eigen::Vector2d> corners = {};  ///< m, sole frame, anticlockwise
-  double area = 0;                       ///< m²
-  double inner_radius = 0;               ///< m, robot::InnerRadius
+  double area = 0;                            ///< m²
+  double inner_radius = 0;                    ///< m, robot::InnerRadius
 };
 
 /// How far the left foot can be put from where it stands, m, the COM midway between the feet at the
@@ -38,8 +39,8 @@ struct StepReach {
   double forward = 0, back = 0, outward = 0, up = 0;
 };
 
-/// The linear inverted pendulum's largest impulse m ω d, N·s, d the distance from the COM at rest to
-/// the edge of the soles in contact along the push.
+/// The linear inverted pendulum's largest impulse m ω d, N·s, d the distance from the COM at rest
+/// to the edge of the soles in contact along the push.
 struct PushLimit {
   double direction = 0;                  ///< rad, 0 forwards, π/2 to the left
   double both = 0, right = 0, left = 0;  ///< by the feet in contact
@@ -47,22 +48,22 @@ struct PushLimit {
 
 struct RobotCheck {
   robot::RobotModel model;
-  std::string file, urdf;  ///< the robot's text file, and what the file that it names holds
-  double com_height = 0;   ///< m above the soles, in the stance
-  double frequency = 0;    ///< rad/s, ω = √(g / com_height)
+  std::string file, urdf;   ///< the robot's text file, and what the file that it names holds
+  double com_height = 0;    ///< m above the soles, in the stance
+  double frequency = 0;     ///< rad/s, ω = √(g / com_height)
   double foot_spacing = 0;  ///< m
   std::vector<SoleFacts> soles;
-  std::vector<JointLoad> loads;  ///< by joint
+  std::vector<JointLoad> loads;     ///< by joint
   bool stands_on_one_foot = false;  ///< a posture above one foot was found, for either foot
   StepReach reach;
-  std::vector<PushLimit> pushes;        ///< 16 directions
-  robot::RobotState stance;             ///< of the page
-  std::vector<std::string> defects;     ///< what was found wrong, each with what to do
+  std::vector<PushLimit> pushes;     ///< 16 directions
+  robot::RobotState stance;          ///< of the page
+  std::vector<std::string> defects;  ///< what was found wrong, each with what to do
   bool ok() const { return defects.empty(); }
 };
 
-/// Reads and checks a robot; a second or two. Throws robot::RobotError, ConfigError: files that make
-/// no robot, a stance out of reach.
+/// Reads and checks a robot; a second or two. Throws robot::RobotError, ConfigError: files that
+/// make no robot, a stance out of reach.
 RobotCheck CheckRobot(const std::filesystem::path& file);
 
 /// For a terminal of `columns`.
