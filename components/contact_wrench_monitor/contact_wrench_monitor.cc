@@ -21,7 +21,8 @@ namespace {
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
 constexpr double kCopTolerance = 1e-6;
 
-// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must remain.
+// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must
+// remain.
 constexpr int kMostKept = 3;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
