@@ -71,9 +71,12 @@ RobotModel WithModelErrors(const RobotModel& model, const SimConfig& config) {
   for (int i = 0; i < config.model_error_size(); ++i) {
     const ModelError& error = config.model_error(i);
     const std::string field = "model_error[" + std::to_string(i) + "]";
-    FindBody(model, error.link(), field + ".link");
+    const std::string link = error.has_link()
+                                 ? error.link()
+                                 : model.bodies()[static_cast<size_t>(model.body_task_body())].name;
+    FindBody(model, link, field + ".link");
     try {
-      result = result.WithModelError(error.link(), error.mass_scale(),
+      result = result.WithModelError(link, error.mass_scale(),
                                      {error.com_x(), error.com_y(), error.com_z()});
     } catch (const robot::RobotError& refused) {
       throw ConfigError(field, refused.what());
@@ -101,6 +104,8 @@ std::vector<MotorModel> SimulatedMotors(const RobotModel& model, const SimConfig
       Apply(change, field, &motors[static_cast<size_t>(joint)]);
     }
   }
+  RequirePositive(config.rotor_inertia_scale(), "rotor_inertia_scale");
+  for (MotorModel& motor : motors) motor.reflected_inertia *= config.rotor_inertia_scale();
   return motors;
 }
 
@@ -111,7 +116,8 @@ DriveTrain SimulatedDriveTrain(const RobotModel& model, const SimConfig& config)
     result.set_torque_lag(drive.torque_lag);
     result.set_current_resolution(drive.current_resolution);
     result.set_backlash(drive.backlash);
-    result.set_gear_stiffness(drive.gear_stiffness);
+    RequirePositive(config.gear_stiffness_scale(), "gear_stiffness_scale");
+    result.set_gear_stiffness(config.gear_stiffness_scale() * drive.gear_stiffness);
     result.set_gear_damping(drive.gear_damping);
     result.set_link_encoder(drive.link_encoder);
     result.set_sensor_delay(drive.sensor_delay);

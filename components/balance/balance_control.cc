@@ -42,8 +42,7 @@ Vector6d BaseWrench(const ReducedDynamics& reduced, const VectorRef& torque) {
   acceleration.others = net.others;
   ToReduced<S, Loop>(reduced, net.legs, &z, &acceleration.others);
   SolveReducedTransposed<S, Loop>(reduced, &z, &acceleration.others);
-  acceleration.legs =
-      Eigen::Map<const StackVector<S>>(reduced.bias.joint_acceleration.data(), s);
+  acceleration.legs = Eigen::Map<const StackVector<S>>(reduced.bias.joint_acceleration.data(), s);
   if constexpr (Loop) {
     AddProduct<1>(acceleration.legs, View<S, R>(reduced.rotation, s, r, 6), z);
   } else {
@@ -54,8 +53,7 @@ Vector6d BaseWrench(const ReducedDynamics& reduced, const VectorRef& torque) {
 
 }  // namespace
 
-BalanceControl::BalanceControl(int num_joints, int max_protected_rows)
-    : num_joints_(num_joints) {
+BalanceControl::BalanceControl(int num_joints, int max_protected_rows) : num_joints_(num_joints) {
   if (num_joints < 1 || num_joints > kMaxJoints || max_protected_rows < 1 ||
       max_protected_rows > num_joints) {
     throw std::invalid_argument("BalanceControl: 1 to 128 joints, 1 to that many protected rows");
@@ -96,8 +94,8 @@ template <class Nearest>
 BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
                                           const TaskDynamics& protected_task,
                                           const ContactGeometry& geometry, bool enabled,
-                                          Eigen::Ref<Eigen::VectorXd> torque,
-                                          BalanceResult* result, Movers movers) {
+                                          Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                                          Movers movers) {
   const ReducedDynamics& reduced = contact.reduced();
   *result = BalanceResult{};
   const int feet = geometry.in_contact[0] + geometry.in_contact[1];

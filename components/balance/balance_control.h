@@ -70,8 +70,8 @@ class BalanceControl {
   template <class Nearest>
   BalanceStatus ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
                             const TaskDynamics& protected_task, const ContactGeometry& geometry,
-                            bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
-                            BalanceResult* result, Movers movers);
+                            bool enabled, Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                            Movers movers);
 
   int num_joints_;
   Eigen::MatrixXd moment_;      // r_s×2, (42) in reduced coordinates, transposed

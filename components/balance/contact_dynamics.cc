@@ -485,10 +485,10 @@ void ContactDynamics::ReduceRows(const MatrixRef& jacobian, const VectorRef& bia
     const auto phi_t = View<S, 6>(reduced_.phi_t, s, 6);
     StackVector<R> bias(r), row(r);  // L⁻¹ Vᵀ h
     OthersVector others_bias = reduced_.bias.others_torque;
-    ToReduced<S, Loop>(reduced_,
-                       StackVector<S>(Eigen::Map<const StackVector<S>>(
-                           reduced_.bias.joint_torque.data(), s)),
-                       &bias, &others_bias);
+    ToReduced<S, Loop>(
+        reduced_,
+        StackVector<S>(Eigen::Map<const StackVector<S>>(reduced_.bias.joint_torque.data(), s)),
+        &bias, &others_bias);
     StackVector<Dynamic> given(reduced_.num_joints);
     SplitVector<S> joints;
     for (Index i = 0; i < t; ++i) {

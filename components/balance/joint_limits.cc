@@ -10,7 +10,8 @@ namespace poise::balance {
 namespace {
 
 /// The largest acceleration that, held over `h`, leaves `room` (rad) above position and viable
-/// velocity: (v + h a)² ≤ 2 A (room − h v − h² a / 2) when the joint then still goes towards the limit.
+/// velocity: (v + h a)² ≤ 2 A (room − h v − h² a / 2) when the joint then still goes towards the
+/// limit.
 double Largest(double room, double velocity, double most_velocity, double most, double h) {
   double a = std::min(most, (most_velocity - velocity) / h);
   // q + h v + h² a / 2 ≤ limit
@@ -27,14 +28,13 @@ double Largest(double room, double velocity, double most_velocity, double most, 
 AccelerationRange ViableAccelerations(const JointRange& range, double position, double velocity,
                                       double horizon) {
   AccelerationRange result;
-  result.upper = Largest(range.upper - position, velocity, range.velocity, range.acceleration,
-                         horizon);
-  result.lower = -Largest(position - range.lower, -velocity, range.velocity, range.acceleration,
-                          horizon);
+  result.upper =
+      Largest(range.upper - position, velocity, range.velocity, range.acceleration, horizon);
+  result.lower =
+      -Largest(position - range.lower, -velocity, range.velocity, range.acceleration, horizon);
   if (result.lower > result.upper) {
     // Between two limits too near to each other, or too fast for either: to rest.
-    const double stop =
-        std::clamp(-velocity / horizon, -range.acceleration, range.acceleration);
+    const double stop = std::clamp(-velocity / horizon, -range.acceleration, range.acceleration);
     result.lower = result.upper = stop;
   }
   return result;

@@ -1,9 +1,9 @@
 // Accelerations that keep a joint within its limits of position and velocity.
 //
-// Decré, Smits, Bruyninckx, De Schutter: Extending iTaSC to support inequality constraints, ICRA 2009;
-// Del Prete: Joint position and velocity bounds in discrete-time acceleration/torque control, RA-L 2018.
-// A state is viable when the joint can still be stopped before its limit. Held over the horizon, an
-// acceleration within the range leads to viable states only.
+// Decré, Smits, Bruyninckx, De Schutter: Extending iTaSC to support inequality constraints, ICRA
+// 2009; Del Prete: Joint position and velocity bounds in discrete-time acceleration/torque control,
+// RA-L 2018. A state is viable when the joint can still be stopped before its limit. Held over the
+// horizon, an acceleration within the range leads to viable states only.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,14 +24,14 @@ struct AccelerationRange {
   double lower = 0, upper = 0;  ///< rad/s², lower ≤ upper
 };
 
-/// For a horizon (s, > 0). Never beyond ±range.acceleration. From a state that is not viable any more: to
-/// stop as hard as that.
+/// For a horizon (s, > 0). Never beyond ±range.acceleration. From a state that is not viable any
+/// more: to stop as hard as that.
 AccelerationRange ViableAccelerations(const JointRange& range, double position, double velocity,
                                       double horizon);
 
-/// The ranges of a robot's joints. A share of what the URDF gives is kept in reserve: what the velocity
-/// filter and the drive lag behind. The acceleration is that of half the joint's torque limit against
-/// its own inertia in the stance, at most kHardest.
+/// The ranges of a robot's joints. A share of what the URDF gives is kept in reserve: what the
+/// velocity filter and the drive lag behind. The acceleration is that of half the joint's torque
+/// limit against its own inertia in the stance, at most kHardest.
 class JointLimits {
  public:
   JointLimits(const robot::RobotModel& model, double horizon);

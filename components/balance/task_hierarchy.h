@@ -5,7 +5,8 @@
 // primitives, IJHR 2005, with the contact-consistent dynamics of section 3: the paper's (28) for
 // any number of levels. In the reduced coordinates of ContactDynamics, where ẍ_i = T_i u − load_i
 // and the dynamically consistent projections are orthogonal ones, level i adds
-//   u_i = u_{i−1} + (T_i N_{i−1})⁺ (f*_i + load_i − T_i u_{i−1}),  N_i = N_{i−1} − (T_i N_{i−1})⁺ T_i N_{i−1}.
+//   u_i = u_{i−1} + (T_i N_{i−1})⁺ (f*_i + load_i − T_i u_{i−1}),  N_i = N_{i−1} − (T_i N_{i−1})⁺
+//   T_i N_{i−1}.
 #pragma once
 
 #include <Eigen/Core>
@@ -40,8 +41,8 @@ class TaskHierarchy {
   /// than kFading of is followed the less the less is left of it, so that torques stay bounded.
   /// `contact` must outlive the use of the results.
   ///
-  /// With `others` (k×1, rad/s²) the joints that are no leg's come before all levels: they accelerate
-  /// just so, and the levels have the legs alone. The legs' entries count for nothing.
+  /// With `others` (k×1, rad/s²) the joints that are no leg's come before all levels: they
+  /// accelerate just so, and the levels have the legs alone. The legs' entries count for nothing.
   bool Compute(const ContactDynamics& contact, const MatrixRef& jacobian,
                const VectorRef& bias_acceleration, const VectorRef& acceleration,
                std::span<const int> level_rows, const Eigen::VectorXd* others = nullptr);

@@ -25,7 +25,8 @@ constexpr double kCopTolerance = 1e-6;
 
 // Room in the message.
 constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>;
-// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must remain.
+// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must
+// remain.
 constexpr int kMostKept = 3;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {

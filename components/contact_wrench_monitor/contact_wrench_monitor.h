@@ -35,17 +35,18 @@ class ContactWrenchMonitor : public Component {
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
   int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
-  /// BalanceControl by the configured movers, within the joints' limits; torque_ on entry the task torque.
+  /// BalanceControl by the configured movers, within the joints' limits; torque_ on entry the task
+  /// torque.
   template <class Bounds>
   balance::BalanceStatus Move(const balance::ContactGeometry& geometry, const Bounds& bounds,
                               balance::BalanceResult* result);
-  /// Mixes what all joints do with what the legs alone do, both of which bring the centre of pressure to
-  /// its bound, so that no joint goes beyond a limit.
+  /// Mixes what all joints do with what the legs alone do, both of which bring the centre of
+  /// pressure to its bound, so that no joint goes beyond a limit.
   template <class Bounds>
   void MoveOthers(const balance::ContactGeometry& geometry, const Bounds& bounds,
                   balance::BalanceResult* result);
-  /// Leg joints that torque_ would drive beyond a limit, and the task torque less so, keep the task torque's
-  /// acceleration; false when there is none or they cannot.
+  /// Leg joints that torque_ would drive beyond a limit, and the task torque less so, keep the task
+  /// torque's acceleration; false when there is none or they cannot.
   template <class Bounds>
   bool KeepLimits(const balance::ContactGeometry& geometry, const Bounds& bounds,
                   balance::BalanceResult* result);
@@ -70,8 +71,8 @@ class ContactWrenchMonitor : public Component {
   std::optional<balance::TaskDynamics> com_height_;
   std::optional<balance::BalanceControl> balance_control_;
   bool balancing_ = true;
-  bool all_joints_ = false;  // move, not the legs alone
-  std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
+  bool all_joints_ = false;                         // move, not the legs alone
+  std::optional<balance::JointLimits> limits_;      // none: they do not enter the control
   std::optional<balance::TaskDynamics> protected_;  // the COM's height and joints at their limits
   Eigen::MatrixXd protected_jacobian_;
   Eigen::VectorXd protected_bias_, task_acceleration_, acceleration_, other_torque_;

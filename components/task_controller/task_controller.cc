@@ -22,7 +22,8 @@ int NumOthers(const robot::RobotModel& model) {
                           static_cast<int>(balance::MakeContactDynamics(model).legs().size()));
 }
 
-/// Throws ConfigError when the tasks cannot be met on these feet. `others`: joints that are not theirs.
+/// Throws ConfigError when the tasks cannot be met on these feet. `others`: joints that are not
+/// theirs.
 void CheckRows(const TaskList& tasks, const robot::RobotModel& model, const FeetInContact& feet,
                int others) {
   const char* support = feet[0] && feet[1] ? "on both feet"

@@ -35,8 +35,8 @@ class TaskController : public Component {
   void ComputePosture();
   bool ComputeTasks(const balance::TaskState& state, const FeetInContact& in_contact,
                     std::span<const TaskList::ForcedJoint> forced);
-  /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that does
-  /// not; added to `forced_`. False when there is none.
+  /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that
+  /// does not; added to `forced_`. False when there is none.
   bool FindLimits();
 
   Input<robot_state_t> robot_state_;

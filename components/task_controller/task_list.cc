@@ -168,9 +168,8 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   const balance::TargetParts needed = entry.task->needs();
   CheckReference(needed, task, entry.reference, field);
   const bool has_position = needed.position || needed.rotation || needed.joints;
-  entry.task->set_gains(task.has_gains()
-                            ? ReadGains(task.gains(), field + ".gains", has_position)
-                            : GainsOf(needed, entry.reference, task.type(), gains));
+  entry.task->set_gains(task.has_gains() ? ReadGains(task.gains(), field + ".gains", has_position)
+                                         : GainsOf(needed, entry.reference, task.type(), gains));
   for (const int foot : {0, 1}) {
     const auto own = static_cast<TaskConfig::Foot>(foot);
     entry.rests[static_cast<size_t>(foot)] =

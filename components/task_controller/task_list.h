@@ -47,12 +47,12 @@ class TaskList {
   void Hold(const balance::TaskState& state);
   /// Takes over the references of a plan.
   void Follow(const support_plan_t& plan);
-  /// [linear; angular], m/s and rad/s: how much faster the base of the next states moves than the tasks
-  /// are to see it.
+  /// [linear; angular], m/s and rad/s: how much faster the base of the next states moves than the
+  /// tasks are to see it.
   void set_base_velocity_lag(const balance::Vector6d& lag) { base_lag_ = lag; }
   /// The hierarchy's torque at `state`, for which `contact` was computed. False when no task is
-  /// active, or as TaskHierarchy::Compute says, which gets `others`. `forced` come before all levels:
-  /// joints that must accelerate so (rad/s²), at most kMostForced. Never allocates.
+  /// active, or as TaskHierarchy::Compute says, which gets `others`. `forced` come before all
+  /// levels: joints that must accelerate so (rad/s²), at most kMostForced. Never allocates.
   struct ForcedJoint {
     int joint = -1;
     double acceleration = 0;

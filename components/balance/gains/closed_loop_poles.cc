@@ -17,10 +17,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeastLag = 0.02;     // of a tick: a loop without lag would need a direct path
-constexpr double kLeastRotor = 1e-3;   // of a joint's own inertia, behind a gear that gives
-constexpr double kStep = 1e-6;         // rad, m, of the difference quotients
-constexpr double kForgotten = 1e-3;    // |z|, gone in a tick: delays and filters
+constexpr double kLeastLag = 0.02;    // of a tick: a loop without lag would need a direct path
+constexpr double kLeastRotor = 1e-3;  // of a joint's own inertia, behind a gear that gives
+constexpr double kStep = 1e-6;        // rad, m, of the difference quotients
+constexpr double kForgotten = 1e-3;   // |z|, gone in a tick: delays and filters
 
 /// e^A by scaling, Taylor's series and squaring.
 MatrixXd Exponential(const MatrixXd& a) {
@@ -41,9 +41,8 @@ robot::RobotState Moved(const robot::RobotState& at, const VectorXd& step) {
   state.base_position += step.head<3>();
   const Eigen::Vector3d turn = step.segment<3>(3);
   if (turn.norm() > 0) {
-    state.base_orientation =
-        Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())) *
-        state.base_orientation;
+    state.base_orientation = Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())) *
+                             state.base_orientation;
   }
   state.joint_position += step.tail(step.size() - 6);
   return state;
@@ -103,9 +102,8 @@ class StandingLaw {
       tasks_[i]->Write(state, targets_[i], &out);
       row += t;
     }
-    const VectorXd posture =
-        posture_.kp * (stance_.joint_position - estimate.joint_position) -
-        posture_.kd * estimate.joint_velocity;
+    const VectorXd posture = posture_.kp * (stance_.joint_position - estimate.joint_position) -
+                             posture_.kd * estimate.joint_velocity;
     const int level[] = {static_cast<int>(rows)};
     const bool others = body_.contact().reduced().num_others() > 0;
     if (!hierarchy_.Compute(body_.contact(), jacobian, bias, wanted, level,
@@ -136,13 +134,15 @@ class StandingLaw {
   TaskHierarchy hierarchy_;
 };
 
-/// ẋ = A x + B u; what the sensors read of x: [encoders; base pose; its velocity; its acceleration].
+/// ẋ = A x + B u; what the sensors read of x: [encoders; base pose; its velocity; its
+/// acceleration].
 struct Plant {
   MatrixXd a, b, sensors;
   VectorXd wrench;
 };
 
-/// Standing on contacts that hold: links move by N z, rotors by θ, u is the torque that is asked for.
+/// Standing on contacts that hold: links move by N z, rotors by θ, u is the torque that is asked
+/// for.
 Plant MakePlant(const std::shared_ptr<const robot::RobotModel>& model,
                 const robot::RobotState& stance, const std::array<bool, 2>& in_contact,
                 StandingLaw* law, double period, const LoopChange& change) {
@@ -155,8 +155,8 @@ Plant MakePlant(const std::shared_ptr<const robot::RobotModel>& model,
   const MatrixXd contact = body.contact().contact_jacobian();
   const MatrixXd null =
       Eigen::FullPivHouseholderQR<MatrixXd>(contact.transpose()).matrixQ();  // n×n
-  const MatrixXd motions = null.rightCols(n - m);                           // N
-  const MatrixXd joints = motions.bottomRows(k);                            // S N
+  const MatrixXd motions = null.rightCols(n - m);                            // N
+  const MatrixXd joints = motions.bottomRows(k);                             // S N
 
   // The stiffness of gravity and of the contacts' forces on it.
   MatrixXd force(n, n - m);
@@ -356,7 +356,8 @@ class Loop {
     const Plant plant = MakePlant(model_, stance_, in_contact_, &law_, period_, change);
     const double delay = model_->drive_train().sensor_delay;
     const TickMap map(plant, change.feedback * by_position_, change.feedback * by_velocity_,
-                      gains_.velocity_cutoff, gains_.base_velocity_cutoff, delay + change.extra_delay, delay, period_);
+                      gains_.velocity_cutoff, gains_.base_velocity_cutoff,
+                      delay + change.extra_delay, delay, period_);
     return Eigen::EigenSolver<MatrixXd>(map.Matrix(), false).eigenvalues();
   }
 
@@ -412,9 +413,8 @@ ClosedLoopPoles ComputeClosedLoopPoles(const robot::RobotModel& model, const Sta
     mode.damping = std::abs(mode.s) > 0 ? -mode.s.real() / std::abs(mode.s) : 0;
     result.modes.push_back(mode);
   }
-  std::ranges::sort(result.modes, [](const auto& a, const auto& b) {
-    return std::abs(a.z) > std::abs(b.z);
-  });
+  std::ranges::sort(result.modes,
+                    [](const auto& a, const auto& b) { return std::abs(a.z) > std::abs(b.z); });
   return result;
 }
 

@@ -9,10 +9,10 @@
 namespace poise::balance {
 namespace {
 
-constexpr double kStiffness = 2.75;  // times ω: stiffer than the fall that it stops
-constexpr double kDamping = 0.7;     // of the COM and the body
-constexpr double kPhase = 1.0 / 3;   // rad at k_d that the loop's delay may cost
-constexpr double kHorizon = 3;       // of the loop's delay: with a third it would ring
+constexpr double kStiffness = 2.75;     // times ω: stiffer than the fall that it stops
+constexpr double kDamping = 0.7;        // of the COM and the body
+constexpr double kPhase = 1.0 / 3;      // rad at k_d that the loop's delay may cost
+constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
 constexpr double kVelocityCutoff = 20;  // Hz
 
 }  // namespace
