@@ -223,7 +223,8 @@ TEST(Stance, TheSrdfBesideTheFileGivesIt) {
          "<joint name='right_ankle_pitch_joint' value='-0.5'/></group_state></robot>";
   const RobotImport imported = ImportRobot(options);
   for (const JointPosition& joint : imported.robot.stance().joint()) {
-    if (joint.joint() == "left_knee_joint") EXPECT_NEAR(joint.position(), 1, 0.05);
+    if (joint.joint() != "left_knee_joint") continue;
+    EXPECT_NEAR(joint.position(), 1, 0.05);
   }
   options.stance = "sitting_on_the_moon";
   EXPECT_THROW(ImportRobot(options), std::runtime_error);
