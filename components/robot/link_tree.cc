@@ -102,14 +102,16 @@ class TreeBuilder {
            name);
     }
     if (source.kind != JointKind::kRevolute && !continuous) {
-      Fail("joint '{}' is {}: only revolute and continuous joints are controlled, make it fixed or "
-           "lock it in the robot's text: lock {{ joint: \"{}\" }}",
-           name, TypeName(source.kind), name);
+      Fail(
+          "joint '{}' is {}: only revolute and continuous joints are controlled, make it fixed or "
+          "lock it in the robot's text: lock {{ joint: \"{}\" }}",
+          name, TypeName(source.kind), name);
     }
     if (source.mimic) {
-      Fail("joint '{}' mimics joint '{}': coupled joints are not supported, lock it in the robot's "
-           "text: lock {{ joint: \"{}\" }}",
-           name, source.mimic->joint, name);
+      Fail(
+          "joint '{}' mimics joint '{}': coupled joints are not supported, lock it in the robot's "
+          "text: lock {{ joint: \"{}\" }}",
+          name, source.mimic->joint, name);
     }
     Joint joint;
     joint.name = name;
@@ -121,9 +123,10 @@ class TreeBuilder {
     }
     joint.axis = source.axis / norm;
     if (!source.has_limits) {
-      Fail("joint '{}' has no limits: add <limit{} effort=\"...\" velocity=\"...\"/>, or a limit in "
-           "the robot's text",
-           name, continuous ? "" : " lower=\"...\" upper=\"...\"");
+      Fail(
+          "joint '{}' has no limits: add <limit{} effort=\"...\" velocity=\"...\"/>, or a limit in "
+          "the robot's text",
+          name, continuous ? "" : " lower=\"...\" upper=\"...\"");
     }
     joint.lower = continuous ? -std::numeric_limits<double>::infinity() : source.lower;
     joint.upper = continuous ? std::numeric_limits<double>::infinity() : source.upper;
@@ -150,9 +153,10 @@ class TreeBuilder {
           body->joint < 0
               ? "the floating base"
               : "moved by joint '" + tree_->joints[static_cast<size_t>(body->joint)].name + "'";
-      Fail("link '{}' ({}) with the links fixed to it: {}: give it a physical <inertial>, or let "
-           "`poise robot import` write a repair",
-           body->name, moved_by, why);
+      Fail(
+          "link '{}' ({}) with the links fixed to it: {}: give it a physical <inertial>, or let "
+          "`poise robot import` write a repair",
+          body->name, moved_by, why);
     }
     body->mass = merged.mass;
     body->com = merged.com;

@@ -1,4 +1,5 @@
-// Links to moving bodies: links fixed to each other merged, joints in depth-first order of the text.
+// Links to moving bodies: links fixed to each other merged, joints in depth-first order of the
+// text.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -27,9 +28,9 @@ struct LinkTree {
   std::set<std::string> fixed_joints;  ///< locked ones among them
 };
 
-/// Throws RobotError naming link or joint: joints that move and are neither revolute nor continuous,
-/// or mimic another, unless locked; missing or empty limits, zero axis, non-physical inertia.
-/// Precondition: links and joints form one tree from `root`, names are unique.
+/// Throws RobotError naming link or joint: joints that move and are neither revolute nor
+/// continuous, or mimic another, unless locked; missing or empty limits, zero axis, non-physical
+/// inertia. Precondition: links and joints form one tree from `root`, names are unique.
 LinkTree BuildLinkTree(const RobotSource& source);
 
 /// Turns a body's frame about its origin: `facing` is the new frame in the old one. The robot stays

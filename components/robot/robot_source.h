@@ -30,7 +30,7 @@ struct SourceJoint {
   JointKind kind = JointKind::kFixed;
   std::string parent, child;  ///< links
   Eigen::Isometry3d origin =
-      Eigen::Isometry3d::Identity();  ///< child link in the parent link at position 0
+      Eigen::Isometry3d::Identity();                ///< child link in the parent link at position 0
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< in the child link, any length
   bool has_limits = false;                          ///< the four below are given
   double lower = 0, upper = 0;                      ///< rad or m

@@ -53,15 +53,16 @@ std::string Attribute(const TiXmlElement& element, const char* name) {
 
 void ParseXml(std::string_view xml, const char* format, TiXmlDocument* document) {
   if (xml.size() > kMaxBytes) {
-    throw RobotError(
-        fmt::format("{0} has {1} bytes, more than {2}: is it a {0}?", format, xml.size(), kMaxBytes));
+    throw RobotError(fmt::format("{0} has {1} bytes, more than {2}: is it a {0}?", format,
+                                 xml.size(), kMaxBytes));
   }
   if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
-    throw RobotError(fmt::format("{} has a NUL byte at offset {}: is it a text file?", format, nul));
+    throw RobotError(
+        fmt::format("{} has a NUL byte at offset {}: is it a text file?", format, nul));
   }
   if (Nesting(xml) > kMaxNesting) {
-    throw RobotError(fmt::format("{} nests elements more than {} deep: is an element not closed?", format,
-                                 kMaxNesting));
+    throw RobotError(fmt::format("{} nests elements more than {} deep: is an element not closed?",
+                                 format, kMaxNesting));
   }
   document->Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document->Error()) {

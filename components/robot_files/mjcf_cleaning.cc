@@ -36,7 +36,8 @@ const std::map<std::string_view, Names> kNumbers = {
 };
 // Those whose value is one of a few words.
 const std::map<std::string_view, Names> kWords = {
-    {"type", {"hinge", "slide", "ball", "free", "box", "sphere", "cylinder", "capsule", "ellipsoid"}},
+    {"type",
+     {"hinge", "slide", "ball", "free", "box", "sphere", "cylinder", "capsule", "ellipsoid"}},
     {"limited", {"true", "false", "auto"}},
     {"ctrllimited", {"true", "false", "auto"}},
     {"forcelimited", {"true", "false", "auto"}},
@@ -255,7 +256,8 @@ class Cleaner {
         for (const TiXmlAttribute* a = e->FirstAttribute(); a; a = a->Next()) {
           known[a->Name()] = OneLine(a->Value());
         }
-        if (e->Attribute("actuatorfrcrange")) force_range_[name] = Exactly<2>(*e, "actuatorfrcrange");
+        if (e->Attribute("actuatorfrcrange"))
+          force_range_[name] = Exactly<2>(*e, "actuatorfrcrange");
         *xml += fmt::format("<{}{}/>", kind, Kept(*e, kind));
       } else if (kind == "site" || Has(kActuators, kind)) {
         *xml += kind == "site" ? fmt::format("<site{}/>", Kept(*e, "site"))
@@ -272,7 +274,8 @@ class Cleaner {
     return child_class.empty() ? main_ : child_class;
   }
 
-  std::string Resolved(const TiXmlElement& element, const char* name, const std::string& child_class,
+  std::string Resolved(const TiXmlElement& element, const char* name,
+                       const std::string& child_class,
                        std::map<std::string, std::string> DefaultClass::*kind) const {
     if (element.Attribute(name)) return Attribute(element, name);
     for (auto c = classes_.find(ClassOf(element, child_class)); c != classes_.end();
@@ -328,8 +331,8 @@ class Cleaner {
 
   // Elements that would put bodies where the reader sees none.
   void CheckStructure(const TiXmlElement& element) const {
-    static const Names kUnknown = {"frame", "replicate", "attach", "composite", "flexcomp",
-                                   "include"};
+    static const Names kUnknown = {"frame",     "replicate", "attach",
+                                   "composite", "flexcomp",  "include"};
     if (Has(kUnknown, element.ValueStr())) {
       Fail(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
            Shown(element.Value()));
@@ -347,7 +350,8 @@ class Cleaner {
   }
 
   void Count(const TiXmlElement& element) {
-    if (++elements_ > kMaxElements) Fail(element, "more than {} elements: simplify it", kMaxElements);
+    if (++elements_ > kMaxElements)
+      Fail(element, "more than {} elements: simplify it", kMaxElements);
   }
 
   void Body(const TiXmlElement& element, int parent, std::string child_class, std::string* xml) {
@@ -420,7 +424,8 @@ class Cleaner {
            owner.name, result_.joints[static_cast<size_t>(owner.joint)].name, joint.name);
     }
     if (body == 0) {
-      Fail(element, "joint '{}' holds the root body '{}' to the world: a robot that balances floats",
+      Fail(element,
+           "joint '{}' holds the root body '{}' to the world: a robot that balances floats",
            joint.name, owner.name);
     }
     owner.joint = static_cast<int>(index);
@@ -508,8 +513,8 @@ class Cleaner {
       const std::string& kind = e->ValueStr();
       const int joint = JointIndex(Attribute(*e, "joint"));
       if (!Has(kActuators, kind) || joint < 0) {
-        Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out", Shown(e->Value()),
-             Attribute(*e, "name"));
+        Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out",
+             Shown(e->Value()), Attribute(*e, "name"));
         continue;
       }
       // Of whatever kind: gear and ranges are the same attributes of all.

@@ -16,11 +16,11 @@ namespace poise::robot {
 
 struct CleanBody {
   std::string name;
-  int parent = -1;                           ///< body; -1: the root
-  int joint = -1;                            ///< of the joints below
-  bool has_inertial = false;                 ///< the numbers below are the file's
-  double mass = 0;                           ///< kg
-  std::array<double, 3> diagonal = {};       ///< kg·m², in the inertial frame
+  int parent = -1;                            ///< body; -1: the root
+  int joint = -1;                             ///< of the joints below
+  bool has_inertial = false;                  ///< the numbers below are the file's
+  double mass = 0;                            ///< kg
+  std::array<double, 3> diagonal = {};        ///< kg·m², in the inertial frame
   std::optional<std::array<double, 6>> full;  ///< kg·m², in the body's axes, as MJCF orders them
 };
 

@@ -46,8 +46,8 @@ class Assembler {
     result_.sensors = clean_.sensors;
     result_.keys = clean_.keys;
     const int root = Id(mjOBJ_BODY, 'b', 0);
-    result_.root_orientation = Quaterniond(ToPose(m_.body_pos + 3 * root, m_.body_quat + 4 * root)
-                                               .linear());
+    result_.root_orientation =
+        Quaterniond(ToPose(m_.body_pos + 3 * root, m_.body_quat + 4 * root).linear());
     for (size_t b = 0; b < clean_.bodies.size(); ++b) Body(b);
     for (size_t s = 0; s < clean_.sites.size(); ++s) Site(s);
     for (size_t g = 0; g < clean_.geoms.size(); ++g) Geom(g);
@@ -121,8 +121,7 @@ class Assembler {
     joint->origin.translate(place);
     anchor->translation() = -place;
     // The file's posture is that of position `ref`, ours that of 0.
-    const double reference =
-        joint->kind == JointKind::kFloating ? 0 : m_.qpos0[m_.jnt_qposadr[id]];
+    const double reference = joint->kind == JointKind::kFloating ? 0 : m_.qpos0[m_.jnt_qposadr[id]];
     if (type == mjJNT_HINGE && reference != 0) {
       joint->origin.rotate(Eigen::AngleAxisd(-reference, joint->axis));
     } else if (type == mjJNT_SLIDE) {
@@ -132,7 +131,8 @@ class Assembler {
     joint->lower = m_.jnt_range[2 * id];
     joint->upper = m_.jnt_range[2 * id + 1];
     if (clean.force_range) {
-      joint->effort = std::max(std::abs((*clean.force_range)[0]), std::abs((*clean.force_range)[1]));
+      joint->effort =
+          std::max(std::abs((*clean.force_range)[0]), std::abs((*clean.force_range)[1]));
     }
     const int dof = m_.jnt_dofadr[id];
     joint->damping = m_.dof_damping[dof];
@@ -184,8 +184,8 @@ class Assembler {
   void Actuator(size_t index) {
     const CleanActuator& clean = clean_.actuators[index];
     const int id = Id(mjOBJ_ACTUATOR, 'a', index);
-    SourceJoint& joint = *result_.source.FindJoint(
-        clean_.joints[static_cast<size_t>(clean.joint)].name);
+    SourceJoint& joint =
+        *result_.source.FindJoint(clean_.joints[static_cast<size_t>(clean.joint)].name);
     result_.actuated.insert(joint.name);
     const double gear = std::abs(m_.actuator_gear[6 * id]);
     const auto limit = [&](const mjtNum* range) {

@@ -36,10 +36,10 @@ struct MjcfDocument {
   Eigen::Quaterniond root_orientation = Eigen::Quaterniond::Identity();
 };
 
-/// Reads the one robot of the file: the body with a free joint, or else the first with joints. MuJoCo
-/// resolves defaults, angles and orientations; masses are the file's own numbers, whatever they are.
-/// Meshes are not read. What is left out goes to `warnings`, by name. Throws RobotError with line and
-/// element.
+/// Reads the one robot of the file: the body with a free joint, or else the first with joints.
+/// MuJoCo resolves defaults, angles and orientations; masses are the file's own numbers, whatever
+/// they are. Meshes are not read. What is left out goes to `warnings`, by name. Throws RobotError
+/// with line and element.
 MjcfDocument ReadMjcf(std::string_view xml, std::vector<std::string>* warnings);
 
 }  // namespace poise::robot

@@ -12,7 +12,8 @@ namespace {
 void ThrowError(const char* text) { throw std::runtime_error(text); }
 void IgnoreWarning(const char*) {}
 
-// The global handlers are a simulator's where one runs in this process: it finds them as it left them.
+// The global handlers are a simulator's where one runs in this process: it finds them as it left
+// them.
 class ErrorHandlers {
  public:
   ErrorHandlers() : error_(mju_user_error), warning_(mju_user_warning) {

@@ -13,8 +13,8 @@ struct FreeMujocoModel {
 };
 using MujocoModel = std::unique_ptr<mjModel, FreeMujocoModel>;
 
-/// Compiles MJCF that names no files. Null with a `problem`, one line or more, when MuJoCo refuses it.
-/// One call at a time runs in a process.
+/// Compiles MJCF that names no files. Null with a `problem`, one line or more, when MuJoCo refuses
+/// it. One call at a time runs in a process.
 MujocoModel CompileMjcf(const std::string& xml, std::string* problem);
 
 }  // namespace poise::robot

@@ -52,8 +52,7 @@ std::string MakerFile(const Robot& description, const std::string& robot_path) {
                                          "that of the MJCF file, relative to this file"
                                        : ": urdf and mjcf are both given: leave one out"));
   }
-  const std::string& name =
-      description.urdf().empty() ? description.mjcf() : description.urdf();
+  const std::string& name = description.urdf().empty() ? description.mjcf() : description.urdf();
   const std::filesystem::path path = std::filesystem::path(robot_path).parent_path() / name;
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {

@@ -11,20 +11,21 @@
 
 namespace poise::robot {
 
-/// `maker_text` is MJCF where the description has `mjcf`, else URDF. Throws RobotError: unreadable file, closed loop, no such link or joint, non-physical inertia, a
-/// joint type that cannot be controlled, a joint without motor, not exactly two feet, fewer than
-/// six joints from base to a foot. Visual and collision elements are not looked at, so no mesh is
-/// ever missed. Warnings go to `warnings` when given.
+/// `maker_text` is MJCF where the description has `mjcf`, else URDF. Throws RobotError: unreadable
+/// file, closed loop, no such link or joint, non-physical inertia, a joint type that cannot be
+/// controlled, a joint without motor, not exactly two feet, fewer than six joints from base to a
+/// foot. Visual and collision elements are not looked at, so no mesh is ever missed. Warnings go to
+/// `warnings` when given.
 RobotModel MakeRobot(const Robot& description, std::string_view maker_text,
                      std::vector<std::string>* warnings = nullptr);
 
-/// The first half of it: the maker's links merged to bodies, after the description's repairs, locks, limits
-/// and facings. Throws RobotError.
+/// The first half of it: the maker's links merged to bodies, after the description's repairs,
+/// locks, limits and facings. Throws RobotError.
 LinkTree MakeTree(const Robot& description, std::string_view maker_text,
                   std::vector<std::string>* warnings = nullptr);
 
-/// The maker's file that a Robot file names: urdf or mjcf, relative to it. Throws RobotError: it names none
-/// or both, or there is no such file, and then says where to get it and where to put it.
+/// The maker's file that a Robot file names: urdf or mjcf, relative to it. Throws RobotError: it
+/// names none or both, or there is no such file, and then says where to get it and where to put it.
 std::string MakerFile(const Robot& description, const std::string& robot_path);
 
 /// Reads the Robot file and the maker's. Throws RobotError, one line that begins with the file at

@@ -33,8 +33,8 @@ LinkTree::LinkPlace FindLink(const LinkTree& tree, const std::string& link,
   if (link.empty()) throw RobotError(field + " is missing: name a link of the file");
   const auto place = tree.links.find(link);
   if (place == tree.links.end()) {
-    throw RobotError(
-        fmt::format("{}: the {} has no link '{}': name one of its links", field, tree.format, link));
+    throw RobotError(fmt::format("{}: the {} has no link '{}': name one of its links", field,
+                                 tree.format, link));
   }
   return place->second;
 }
@@ -107,8 +107,8 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tre
       size_t j = 0;
       while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
       if (j == tree.joints.size()) {
-        throw RobotError(
-            fmt::format("{}: the {} has no joint '{}': correct the name", field, tree.format, name));
+        throw RobotError(fmt::format("{}: the {} has no joint '{}': correct the name", field,
+                                     tree.format, name));
       }
       if (motor_of[j] >= 0) {
         throw RobotError(fmt::format("{}: joint '{}' already has motor[{}]: remove one", field,
@@ -120,9 +120,10 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tre
   }
   for (size_t j = 0; j < tree.joints.size(); ++j) {
     if (motor_of[j] < 0) {
-      throw RobotError(fmt::format(
-          "joint '{}' of the {} has no motor: add it to a motor, lock it here or make it fixed there",
-          tree.joints[j].name, tree.format));
+      throw RobotError(
+          fmt::format("joint '{}' of the {} has no motor: add it to a motor, lock it here or make "
+                      "it fixed there",
+                      tree.joints[j].name, tree.format));
     }
   }
   return motors;
@@ -218,8 +219,8 @@ StanceModel LoadStance(const Stance& stance, const LinkTree& tree) {
     size_t j = 0;
     while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
     if (j == tree.joints.size()) {
-      throw RobotError(
-          fmt::format("{}: the {} has no joint '{}' that moves: correct the name", field, tree.format, name));
+      throw RobotError(fmt::format("{}: the {} has no joint '{}' that moves: correct the name",
+                                   field, tree.format, name));
     }
     const double position = stance.joint(i).position();
     if (!std::isfinite(position)) {
@@ -264,7 +265,8 @@ SourceJoint& JointOf(RobotSource* source, const std::string& field, const std::s
 }
 
 double Finite(double value, const std::string& field) {
-  if (!std::isfinite(value)) throw RobotError(fmt::format("{} is {}: it must be finite", field, value));
+  if (!std::isfinite(value))
+    throw RobotError(fmt::format("{} is {}: it must be finite", field, value));
   return value;
 }
 
@@ -286,7 +288,8 @@ void ApplyRepair(const Repair& repair, const std::string& field, RobotSource* so
     mass.inertia -= rotor * axis * axis.transpose();
     return;
   }
-  throw RobotError(fmt::format("{}.rotor: no joint moves link '{}': remove it", field, repair.link()));
+  throw RobotError(
+      fmt::format("{}.rotor: no joint moves link '{}': remove it", field, repair.link()));
 }
 
 // What the Robot file says of the maker's: repairs, limits, joints that stand still.

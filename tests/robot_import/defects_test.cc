@@ -43,20 +43,22 @@ TEST(Defects, HiddenRotorIsTakenOutOfTheLinkAndGivenToTheMotor) {
   EXPECT_THAT(Defects(imported), HasSubstr("link 'right_shin' hides a rotor"));
   EXPECT_THAT(Defects(imported), HasSubstr("link 'left_shin' hides a rotor"));
   const Motor& motor = MotorOf(imported.robot, "left_knee_joint");
-  // The link's own moment about the axis can be anything from 0.026 to 0.034: half of that is unknown.
+  // The link's own moment about the axis can be anything from 0.026 to 0.034: half of that is
+  // unknown.
   const double reflected = motor.rotor_inertia() * motor.gear_ratio() * motor.gear_ratio();
   EXPECT_NEAR(reflected, changes.shin_rotor, kShinInertia[2]);
   // The joint feels what the maker's file says.
   const auto inertia_at_knee = [](const robot::RobotModel& model) {
     const int knee = model.FindJoint("left_knee_joint");
-    return robot::Evaluate(model, robot::RobotState(model.num_joints())).mass_matrix(6 + knee, 6 + knee);
+    return robot::Evaluate(model, robot::RobotState(model.num_joints()))
+        .mass_matrix(6 + knee, 6 + knee);
   };
   const robot::RobotModel with = robot::MakeRobot(imported.robot, maker);
   const RobotImport plain = ImportText("plain", SimpleBiped());
   Robot without = plain.robot;
   for (Motor& m : *without.mutable_motor()) m.set_rotor_inertia(0);
-  EXPECT_NEAR(inertia_at_knee(with), inertia_at_knee(robot::MakeRobot(without, SimpleBiped())) + 0.4,
-              1e-6);
+  EXPECT_NEAR(inertia_at_knee(with),
+              inertia_at_knee(robot::MakeRobot(without, SimpleBiped())) + 0.4, 1e-6);
 }
 
 TEST(Defects, NoRotorIsSeenWhereThereIsNone) {
@@ -102,8 +104,9 @@ TEST(Defects, AllAreListedAtOnce) {
     text.replace(at, from.size(), to);
   };
   // A point with noise, whose mirror image has an inertia; a broken one; no torque; no range.
-  replace("<mass value='3'/><inertia ixx='0.03' ixy='0' ixz='0' iyy='0.029' iyz='0' izz='0.004'/>",
-          "<mass value='3'/><inertia ixx='1e-20' ixy='0' ixz='2e-20' iyy='-1e-20' iyz='0' izz='0'/>");
+  replace(
+      "<mass value='3'/><inertia ixx='0.03' ixy='0' ixz='0' iyy='0.029' iyz='0' izz='0.004'/>",
+      "<mass value='3'/><inertia ixx='1e-20' ixy='0' ixz='2e-20' iyy='-1e-20' iyz='0' izz='0'/>");
   replace("<mass value='20'/><inertia ixx='0.3' ixy='0' ixz='0' iyy='0.25'",
           "<mass value='20'/><inertia ixx='0.9' ixy='0' ixz='0' iyy='0.25'");
   replace("effort='100' velocity='10'", "effort='0' velocity='10'");
@@ -122,12 +125,14 @@ TEST(Defects, CoupledPrismaticAndFingerJointsAreLockedWhereTheyStand) {
   Biped changes;
   const auto link = [](const std::string& name) {
     return "<link name='" + name +
-           "'><inertial><origin xyz='0 0 0.1'/><mass value='0.5'/><inertia ixx='0.001' ixy='0' ixz='0' "
+           "'><inertial><origin xyz='0 0 0.1'/><mass value='0.5'/><inertia ixx='0.001' ixy='0' "
+           "ixz='0' "
            "iyy='0.001' iyz='0' izz='0.001'/></inertial></link>";
   };
   const auto joint = [](const std::string& name, const char* type, const std::string& child,
                         const std::string& more) {
-    return "<joint name='" + name + "' type='" + type + "'><parent link='base'/><child link='" + child +
+    return "<joint name='" + name + "' type='" + type + "'><parent link='base'/><child link='" +
+           child +
            "'/><origin xyz='0 0 0.3'/><axis xyz='0 1 0'/><limit lower='0.1' upper='0.5' effort='9' "
            "velocity='9'/>" +
            more + "</joint>";
@@ -217,9 +222,11 @@ TEST(Stance, TheSrdfBesideTheFileGivesIt) {
   options.file = WriteMaker("srdf", SimpleBiped());
   std::ofstream(options.file.parent_path() / "any.srdf")
       << "<robot name='biped'><group_state name='half_sitting' group='all'>"
-         "<joint name='left_hip_pitch_joint' value='-0.5'/><joint name='left_knee_joint' value='1'/>"
+         "<joint name='left_hip_pitch_joint' value='-0.5'/><joint name='left_knee_joint' "
+         "value='1'/>"
          "<joint name='left_ankle_pitch_joint' value='-0.5'/>"
-         "<joint name='right_hip_pitch_joint' value='-0.5'/><joint name='right_knee_joint' value='1'/>"
+         "<joint name='right_hip_pitch_joint' value='-0.5'/><joint name='right_knee_joint' "
+         "value='1'/>"
          "<joint name='right_ankle_pitch_joint' value='-0.5'/></group_state></robot>";
   const RobotImport imported = ImportRobot(options);
   for (const JointPosition& joint : imported.robot.stance().joint()) {

@@ -16,34 +16,73 @@ namespace {
 
 constexpr int kFiles = 500;  // of each run; POISE_DAMAGED_FILES asks for more
 
-constexpr std::array kTokens = {
-    "nan", "-inf", "1e308", "1e999", "0", "-1", "1e-320", "", " ", "\"", "<", ">", "/>", "</body>",
-    "<body>", "<joint ", "<joint type=\"ball\"/>", "<geom type=\"box\"/>", "<inertial/>", "<freejoint/>",
-    "<default class=\"x\">", "</default>", "&#0;", "&", "<!--", "<![CDATA[", "%s%n", "\xff\xfe", "fixed",
-    "prismatic", "mesh", "true", "99999999999999999999", "1,5", "class=\"main\"", "childclass=\"x\"",
-    "<equality><joint joint1=\"x\"/></equality>", "<keyframe><key qpos=\"1\"/></keyframe>",
-    "<mimic joint=\"x\"/>", "fromto=\"0 0 0 0 0 0\"", "euler=\"1 2\"", "quat=\"0 0 0 0\""};
+constexpr std::array kTokens = {"nan",
+                                "-inf",
+                                "1e308",
+                                "1e999",
+                                "0",
+                                "-1",
+                                "1e-320",
+                                "",
+                                " ",
+                                "\"",
+                                "<",
+                                ">",
+                                "/>",
+                                "</body>",
+                                "<body>",
+                                "<joint ",
+                                "<joint type=\"ball\"/>",
+                                "<geom type=\"box\"/>",
+                                "<inertial/>",
+                                "<freejoint/>",
+                                "<default class=\"x\">",
+                                "</default>",
+                                "&#0;",
+                                "&",
+                                "<!--",
+                                "<![CDATA[",
+                                "%s%n",
+                                "\xff\xfe",
+                                "fixed",
+                                "prismatic",
+                                "mesh",
+                                "true",
+                                "99999999999999999999",
+                                "1,5",
+                                "class=\"main\"",
+                                "childclass=\"x\"",
+                                "<equality><joint joint1=\"x\"/></equality>",
+                                "<keyframe><key qpos=\"1\"/></keyframe>",
+                                "<mimic joint=\"x\"/>",
+                                "fromto=\"0 0 0 0 0 0\"",
+                                "euler=\"1 2\"",
+                                "quat=\"0 0 0 0\""};
 
 // The same biped as MJCF, with what such files have besides.
 std::string BipedMjcf() {
   std::string text =
-      "<mujoco model='biped'><compiler angle='radian'/><default><joint armature='0.02' damping='0.1'/>"
+      "<mujoco model='biped'><compiler angle='radian'/><default><joint armature='0.02' "
+      "damping='0.1'/>"
       "<default class='leg'><joint range='-2 2' actuatorfrcrange='-100 100'/><geom contype='1'/>"
       "</default></default><worldbody><body name='base' pos='0 0 1'><freejoint/>"
-      "<inertial pos='0 0 0.1' mass='20' diaginertia='0.3 0.25 0.2'/><site name='imu' pos='0 0 0.1'/>";
+      "<inertial pos='0 0 0.1' mass='20' diaginertia='0.3 0.25 0.2'/><site name='imu' pos='0 0 "
+      "0.1'/>";
   for (const auto& [s, y] : {std::pair{"left", 0.1}, std::pair{"right", -0.1}}) {
     const std::string side = s;
     const auto body = [&](const std::string& name, const std::string& at, const std::string& axis) {
-      return "<body name='" + side + name + "' pos='" + at + "' childclass='leg'><inertial pos='0 0 -0.1' "
-             "mass='2' diaginertia='0.02 0.02 0.01'/><joint name='" + side + name + "_joint' axis='" +
-             axis + "'/>";
+      return "<body name='" + side + name + "' pos='" + at +
+             "' childclass='leg'><inertial pos='0 0 -0.1' "
+             "mass='2' diaginertia='0.02 0.02 0.01'/><joint name='" +
+             side + name + "_joint' axis='" + axis + "'/>";
     };
-    text += body("_hip_yaw", "0 " + std::to_string(y) + " -0.1", "0 0 1") +
-            body("_hip_roll", "0 0 0", "1 0 0") + body("_thigh", "0 0 0", "0 1 0") +
-            body("_shin", "0 0 -0.4", "0 1 0") + body("_ankle", "0 0 -0.4", "0 1 0") +
-            body("_foot", "0 0 0", "1 0 0") +
-            "<geom type='box' size='0.12 0.05 0.01' pos='0.06 0 -0.07'/></body></body></body></body>"
-            "</body></body>";
+    text +=
+        body("_hip_yaw", "0 " + std::to_string(y) + " -0.1", "0 0 1") +
+        body("_hip_roll", "0 0 0", "1 0 0") + body("_thigh", "0 0 0", "0 1 0") +
+        body("_shin", "0 0 -0.4", "0 1 0") + body("_ankle", "0 0 -0.4", "0 1 0") +
+        body("_foot", "0 0 0", "1 0 0") +
+        "<geom type='box' size='0.12 0.05 0.01' pos='0.06 0 -0.07'/></body></body></body></body>"
+        "</body></body>";
   }
   text += "</body></worldbody><actuator>";
   for (const char* side : {"left", "right"}) {
@@ -55,7 +94,9 @@ std::string BipedMjcf() {
 }
 
 std::string Damaged(std::string text, std::mt19937* random) {
-  const auto below = [&](size_t n) { return std::uniform_int_distribution<size_t>(0, n - 1)(*random); };
+  const auto below = [&](size_t n) {
+    return std::uniform_int_distribution<size_t>(0, n - 1)(*random);
+  };
   for (size_t edits = 1 + below(3); edits > 0 && !text.empty(); --edits) {
     const size_t at = below(text.size());
     const size_t length = std::min(text.size() - at, below(1 + (below(4) == 0 ? 400 : 8)));

@@ -12,10 +12,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string Link(const std::string& name, double mass, const std::string& com, double ixx, double iyy,
-                 double izz, const std::string& more = "") {
+std::string Link(const std::string& name, double mass, const std::string& com, double ixx,
+                 double iyy, double izz, const std::string& more = "") {
   return fmt::format(
-      "<link name='{}'><inertial><origin xyz='{}'/><mass value='{}'/><inertia ixx='{}' ixy='0' ixz='0' "
+      "<link name='{}'><inertial><origin xyz='{}'/><mass value='{}'/><inertia ixx='{}' ixy='0' "
+      "ixz='0' "
       "iyy='{}' iyz='0' izz='{}'/></inertial>{}</link>\n",
       name, com, mass, ixx, iyy, izz, more);
 }
@@ -33,9 +34,10 @@ std::string Joint(const std::string& name, const std::string& parent, const std:
 std::string SimpleBiped(const Biped& changes) {
   std::string text = "<robot name='biped'>\n";
   if (!changes.base_rpy.empty()) {
-    text += "<link name='root'/><joint name='turn' type='fixed'><parent link='root'/><child "
-            "link='base'/><origin rpy='" +
-            changes.base_rpy + "'/></joint>\n";
+    text +=
+        "<link name='root'/><joint name='turn' type='fixed'><parent link='root'/><child "
+        "link='base'/><origin rpy='" +
+        changes.base_rpy + "'/></joint>\n";
   }
   text += Link("base", 20, "0 0 0.1", 0.3, 0.25, 0.2);
   for (const auto& [side, y] : {std::pair{"left", 0.1}, std::pair{"right", -0.1}}) {
@@ -51,14 +53,17 @@ std::string SimpleBiped(const Biped& changes) {
         "</collision>";
     if (changes.ankle_roll) text += Link(s + "_ankle", 0.5, "0 0 0", 0.001, 0.001, 0.001);
     text += Link(s + foot, 1, "0.03 0 -0.05", 0.002, 0.004, 0.005, box);
-    text += Joint(s + "_hip_yaw_joint", "base", s + "_hip_yaw", fmt::format("0 {} -0.1", y), "0 0 1",
-                  -0.6, 0.6);
-    text += Joint(s + "_hip_roll_joint", s + "_hip_yaw", s + "_hip_roll", "0 0 0", "1 0 0", -0.5, 0.5);
+    text += Joint(s + "_hip_yaw_joint", "base", s + "_hip_yaw", fmt::format("0 {} -0.1", y),
+                  "0 0 1", -0.6, 0.6);
+    text +=
+        Joint(s + "_hip_roll_joint", s + "_hip_yaw", s + "_hip_roll", "0 0 0", "1 0 0", -0.5, 0.5);
     text += Joint(s + "_hip_pitch_joint", s + "_hip_roll", s + "_thigh", "0 0 0", "0 1 0", -2, 1);
     text += Joint(s + "_knee_joint", s + "_thigh", s + "_shin", "0 0 -0.4", "0 1 0", 0, 2.2);
-    text += Joint(s + "_ankle_pitch_joint", s + "_shin", s + "_ankle", "0 0 -0.4", "0 1 0", -1.2, 0.8);
+    text +=
+        Joint(s + "_ankle_pitch_joint", s + "_shin", s + "_ankle", "0 0 -0.4", "0 1 0", -1.2, 0.8);
     if (changes.ankle_roll) {
-      text += Joint(s + "_ankle_roll_joint", s + "_ankle", s + "_foot", "0 0 0", "1 0 0", -0.5, 0.5);
+      text +=
+          Joint(s + "_ankle_roll_joint", s + "_ankle", s + "_foot", "0 0 0", "1 0 0", -0.5, 0.5);
     }
   }
   return text + changes.more_links + "</robot>\n";

@@ -1,5 +1,5 @@
-// MuJoCo reads the makers' files with its own parser: the same mass matrix, bias, centre of mass and
-// Jacobians. Where a file's inertia is none, both take the repair.
+// MuJoCo reads the makers' files with its own parser: the same mass matrix, bias, centre of mass
+// and Jacobians. Where a file's inertia is none, both take the repair.
 #include <gtest/gtest.h>
 #include <mujoco/mujoco.h>
 
@@ -62,15 +62,16 @@ TEST_P(MakersDynamics, AreThoseOfMujoco) {
     const int body = mj_name2id(m.get(), mjOBJ_BODY, repair.link().c_str());
     ASSERT_GE(body, 0);
     // The file's own numbers less the rotor, or the text's.
-    const std::regex inertia("name=\"" + repair.link() +
-                             "\">[^]*?ixx=\"([^\"]*)\"[^]*?ixy=\"([^\"]*)\"[^]*?ixz=\"([^\"]*)\"[^]*?"
-                             "iyy=\"([^\"]*)\"[^]*?iyz=\"([^\"]*)\"[^]*?izz=\"([^\"]*)\"");
+    const std::regex inertia(
+        "name=\"" + repair.link() +
+        "\">[^]*?ixx=\"([^\"]*)\"[^]*?ixy=\"([^\"]*)\"[^]*?ixz=\"([^\"]*)\"[^]*?"
+        "iyy=\"([^\"]*)\"[^]*?iyz=\"([^\"]*)\"[^]*?izz=\"([^\"]*)\"");
     std::smatch found;
     ASSERT_TRUE(std::regex_search(text, found, inertia)) << repair.link();
     const auto number = [&](size_t i) { return std::stod(found[i]); };
     Matrix3d matrix;
-    matrix << number(1), number(2), number(3), number(2), number(4), number(5), number(3), number(5),
-        number(6);
+    matrix << number(1), number(2), number(3), number(2), number(4), number(5), number(3),
+        number(5), number(6);
     if (repair.has_inertia()) {
       const Inertia& i = repair.inertia();
       matrix << i.ixx(), i.ixy(), i.ixz(), i.ixy(), i.iyy(), i.iyz(), i.ixz(), i.iyz(), i.izz();
@@ -90,7 +91,8 @@ TEST_P(MakersDynamics, AreThoseOfMujoco) {
   ASSERT_EQ(m->nv, model.num_velocities());
   std::vector<int> position, velocity;
   for (int j = 0; j < model.num_joints(); ++j) {
-    const int id = mj_name2id(m.get(), mjOBJ_JOINT, model.joints()[static_cast<size_t>(j)].name.c_str());
+    const int id =
+        mj_name2id(m.get(), mjOBJ_JOINT, model.joints()[static_cast<size_t>(j)].name.c_str());
     position.push_back(m->jnt_qposadr[id]);
     velocity.push_back(m->jnt_dofadr[id]);
     m->dof_armature[velocity.back()] = model.motors()[static_cast<size_t>(j)].reflected_inertia;
@@ -107,8 +109,13 @@ TEST_P(MakersDynamics, AreThoseOfMujoco) {
     t.topLeftCorner<3, 3>().setIdentity();
     t.block<3, 3>(3, 3) = state.base_orientation.toRotationMatrix().transpose();
     const Eigen::Quaterniond& q = state.base_orientation;
-    const double base[7] = {state.base_position.x(), state.base_position.y(), state.base_position.z(),
-                            q.w(), q.x(), q.y(), q.z()};
+    const double base[7] = {state.base_position.x(),
+                            state.base_position.y(),
+                            state.base_position.z(),
+                            q.w(),
+                            q.x(),
+                            q.y(),
+                            q.z()};
     std::copy_n(base, 7, d->qpos);
     for (int j = 0; j < model.num_joints(); ++j) {
       t(velocity[static_cast<size_t>(j)], 6 + j) = 1;
@@ -119,7 +126,8 @@ TEST_P(MakersDynamics, AreThoseOfMujoco) {
     RowMajor mass(m->nv, m->nv), com(3, m->nv);
     mj_fullM(m.get(), mass.data(), d->qM);
     const MatrixXd expected = t.transpose() * mass * t;
-    EXPECT_LE((data.mass_matrix - expected).cwiseAbs().maxCoeff(), 1e-7 * expected.cwiseAbs().maxCoeff());
+    EXPECT_LE((data.mass_matrix - expected).cwiseAbs().maxCoeff(),
+              1e-7 * expected.cwiseAbs().maxCoeff());
     const VectorXd force = t.transpose() * VectorXd::Map(d->qfrc_bias, m->nv);
     EXPECT_LE((data.bias + data.gravity - force).cwiseAbs().maxCoeff(),
               1e-6 * force.cwiseAbs().maxCoeff());
@@ -127,8 +135,9 @@ TEST_P(MakersDynamics, AreThoseOfMujoco) {
     mj_jacSubtreeCom(m.get(), d.get(), com.data(), root);
     EXPECT_LE((data.com_jacobian - com * t).cwiseAbs().maxCoeff(), 1e-9);
     for (size_t f = 0; f < 2; ++f) {
-      const int body = mj_name2id(
-          m.get(), mjOBJ_BODY, model.bodies()[static_cast<size_t>(model.feet()[f].body)].name.c_str());
+      const int body =
+          mj_name2id(m.get(), mjOBJ_BODY,
+                     model.bodies()[static_cast<size_t>(model.feet()[f].body)].name.c_str());
       RowMajor linear(3, m->nv), angular(3, m->nv);
       const Vector3d point = data.foot_pose[f].translation();
       mj_jac(m.get(), d.get(), linear.data(), angular.data(), point.data(), body);

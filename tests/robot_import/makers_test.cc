@@ -19,8 +19,8 @@ RobotImport Import(const std::filesystem::path& file) {
 struct Maker {
   const char* file;
   int joints;
-  double mass;          // kg, the sum of the file's own
-  double sole, width;   // m, of the collision shapes; 0: the file shows none
+  double mass;         // kg, the sum of the file's own
+  double sole, width;  // m, of the collision shapes; 0: the file shows none
 };
 
 class Makers : public testing::TestWithParam<Maker> {
@@ -58,8 +58,9 @@ TEST_P(Makers, AreImportedInOneAttempt) {
     EXPECT_TRUE(data.foot_pose[f].isApprox(goal.foot[f], 1e-8));
     // The knees are in front of the line from hip to foot: it faces forward.
     const auto& knee = data.body_position[static_cast<size_t>(
-        model.bodies()[static_cast<size_t>(
-                           model.bodies()[static_cast<size_t>(model.feet()[f].body)].parent)]
+        model
+            .bodies()[static_cast<size_t>(
+                model.bodies()[static_cast<size_t>(model.feet()[f].body)].parent)]
             .parent)];
     EXPECT_GT(knee.x() + data.base_position.x(), data.foot_pose[f].translation().x() - 0.02);
   }
@@ -70,20 +71,19 @@ TEST_P(Makers, AreImportedInOneAttempt) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Files, Makers,
-    testing::Values(Maker{"g1_29dof_rev_1_0.urdf", 29, 33.341, 0.17, 0.06},
-                    Maker{"g1_29dof_rev_1_0.xml", 29, 33.341, 0.17, 0.06},
-                    Maker{"talos_reduced_box.urdf", 30, 90.272, 0.21, 0.13},
-                    Maker{"icub_reduced.urdf", 29, 28.34687, 0, 0},
-                    Maker{"dyros_tocabi.urdf", 33, 95.62195, 0.3, 0.17}),
-    [](const auto& test) {
-      std::string name = test.param.file;
-      for (char& c : name) {
-        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-      }
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Files, Makers,
+                         testing::Values(Maker{"g1_29dof_rev_1_0.urdf", 29, 33.341, 0.17, 0.06},
+                                         Maker{"g1_29dof_rev_1_0.xml", 29, 33.341, 0.17, 0.06},
+                                         Maker{"talos_reduced_box.urdf", 30, 90.272, 0.21, 0.13},
+                                         Maker{"icub_reduced.urdf", 29, 28.34687, 0, 0},
+                                         Maker{"dyros_tocabi.urdf", 33, 95.62195, 0.3, 0.17}),
+                         [](const auto& test) {
+                           std::string name = test.param.file;
+                           for (char& c : name) {
+                             if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                           }
+                           return name;
+                         });
 
 TEST(MakersFiles, G1IsTheSameRobotFromUrdfAndMjcf) {
   const auto folder = MakersFolder();

@@ -1,12 +1,12 @@
-// MJCF as files are written: classes, ranges, armature, sites, keyframes, equalities, newer attributes.
-#include "components/robot_files/mjcf_source.h"
-
+// MJCF as files are written: classes, ranges, armature, sites, keyframes, equalities, newer
+// attributes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "components/robot/robot_model.h"
+#include "components/robot_files/mjcf_source.h"
 
 namespace poise::robot {
 namespace {
@@ -128,12 +128,14 @@ TEST(Mjcf, IsRefusedByLineAndName) {
       return error.what();
     }
   };
-  EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 nan 0\"")), HasSubstr("line 25: axis of <joint>"));
+  EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 nan 0\"")),
+              HasSubstr("line 25: axis of <joint>"));
   EXPECT_THAT(problem(With("childclass=\"big\"", "childclass=\"huge\"")), HasSubstr("'huge'"));
   EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><frame/>")), HasSubstr("<frame>"));
   EXPECT_THAT(problem(With("<body name=\"fore\"", "<body name=\"upper\"")), HasSubstr("'upper'"));
   EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 0 0\"")), HasSubstr("MuJoCo refuses it"));
-  EXPECT_THAT(problem(With("<joint name=\"wrist\"", "<joint name=\"second\" axis=\"0 0 1\"/><joint "
+  EXPECT_THAT(problem(With("<joint name=\"wrist\"",
+                           "<joint name=\"second\" axis=\"0 0 1\"/><joint "
                            "name=\"wrist\"")),
               HasSubstr("two joints, 'second' and 'wrist'"));
   EXPECT_THAT(problem("<mujoco><worldbody/></mujoco>"), HasSubstr("where is the robot"));

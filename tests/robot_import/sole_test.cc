@@ -84,13 +84,15 @@ TEST(Sole, OfAnUprightCylinderIsItsRimAndOfALyingOneNone) {
   EXPECT_GE(Area(disc.polygon), 0.029);
   for (const Vector2d& p : disc.polygon) EXPECT_LE(p.norm(), 0.1 + 1e-9);
   FootShape lying = Shape(Kind::kCapsule, {0, 0, 0}, {0.05, 0.2, 0});
-  lying.pose.linear() = Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitY()).toRotationMatrix();
+  lying.pose.linear() =
+      Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitY()).toRotationMatrix();
   EXPECT_TRUE(FindSole(std::vector{lying}, kDown, kForward).polygon.empty());
 }
 
 TEST(Sole, OfAMesh) {
   // A wedge whose lower face is a pentagon.
-  const std::vector<Vector2d> face = {{-0.1, -0.04}, {0.08, -0.05}, {0.12, 0}, {0.08, 0.05}, {-0.1, 0.04}};
+  const std::vector<Vector2d> face = {
+      {-0.1, -0.04}, {0.08, -0.05}, {0.12, 0}, {0.08, 0.05}, {-0.1, 0.04}};
   const auto file = WriteMaker("mesh", "").parent_path() / "foot.stl";
   std::ofstream stl(file);
   stl << "solid foot\n";

@@ -40,8 +40,8 @@ void CopyFile(const fs::path& from, const fs::path& to) {
   if (fs::equivalent(from, to, error)) return;
   fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
   if (error) {
-    throw ConfigError(fmt::format("{}: cannot be copied to {}: {}", from.string(), to.string(),
-                                  error.message()));
+    throw ConfigError(
+        fmt::format("{}: cannot be copied to {}: {}", from.string(), to.string(), error.message()));
   }
 }
 
@@ -76,8 +76,10 @@ int ImportIt(ImportArguments arguments) {
     for (const Defect& d : imported.defects) rows.push_back({d.what, d.done});
     fmt::print("\n{}", FormatColumns(std::move(rows)));
   }
-  fmt::print("\n{}: the text; {} lies beside it, untouched\n  to see it stand:  poise run stand --robot {}\n",
-             text.string(), options.file.filename().string(), folder.string());
+  fmt::print(
+      "\n{}: the text; {} lies beside it, untouched\n  to see it stand:  poise run stand --robot "
+      "{}\n",
+      text.string(), options.file.filename().string(), folder.string());
   return kExitOk;
 }
 
@@ -89,7 +91,8 @@ void AddRobotImport(CLI::App* robot, Command* command) {
   CLI::App* import = robot->add_subcommand(
       "import", "write a folder with a maker's URDF or MJCF file and the text that Poise needs");
   import->footer(
-      "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit code: "
+      "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit "
+      "code: "
       "0 written, 2 the file cannot be used, or the robot cannot balance.");
   import->add_option("file", options->file, "URDF (xacro expanded) or MJCF")->required();
   import->add_option("--to", arguments->to,
@@ -105,15 +108,18 @@ void AddRobotImport(CLI::App* robot, Command* command) {
   import->add_option("--sole", arguments->sole, "length and width, m, in place of what shapes show")
       ->expected(2)
       ->type_name("LENGTH WIDTH")
-      ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2; }));
-  import->add_option("--imu", options->imu, "link or site that carries it");
-  import->add_option("--body", options->body, "link whose orientation is controlled");
-  import->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
-      ->allow_extra_args(false)
-      ->take_all();
-  import->add_flag("--force", arguments->force, "replace a text that is there");
+      ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2;
+}));
+import->add_option("--imu", options->imu, "link or site that carries it");
+import->add_option("--body", options->body, "link whose orientation is controlled");
+import->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
+    ->allow_extra_args(false)
+    ->take_all();
+import->add_flag("--force", arguments->force, "replace a text that is there");
   import->callback(
-      [arguments, command] { *command = [arguments] { return ImportIt(*arguments); }; });
-}
+      [arguments, command] { *command = [arguments] { return ImportIt(*arguments);
+  };  // namespace poise
+  });
+  }
 
-}  // namespace poise
+  }  // namespace poise

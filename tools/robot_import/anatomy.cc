@@ -48,11 +48,12 @@ void CheckLeg(const robot::LinkTree& tree, const Leg& leg) {
   for (const int j : leg.joints) {
     names += (names.empty() ? "" : ", ") + tree.joints[static_cast<size_t>(j)].name;
   }
-  throw robot::RobotError(fmt::format(
-      "{}: the leg to '{}' has {} joints ({}): its foot cannot make a six-dimensional contact, a leg "
-      "that balances needs six",
-      tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
-      names.empty() ? "none" : names));
+  throw robot::RobotError(
+      fmt::format("{}: the leg to '{}' has {} joints ({}): its foot cannot make a six-dimensional "
+                  "contact, a leg "
+                  "that balances needs six",
+                  tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
+                  names.empty() ? "none" : names));
 }
 
 }  // namespace
@@ -73,14 +74,15 @@ int SideOfName(const std::string& name) {
   for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   const auto has = [&](const char* word) { return lower.find(word) != std::string::npos; };
   if (has("left") != has("right")) return has("left") ? 1 : -1;
-  // A letter that stands alone between separators, or a capital before a word: L_Foot, leg_l, LAnkle.
+  // A letter that stands alone between separators, or a capital before a word: L_Foot, leg_l,
+  // LAnkle.
   for (size_t i = 0; i < lower.size(); ++i) {
     if (lower[i] != 'l' && lower[i] != 'r') continue;
     const bool begins = i == 0 || !std::isalpha(static_cast<unsigned char>(lower[i - 1]));
-    const bool ends =
-        i + 1 == lower.size() || !std::isalpha(static_cast<unsigned char>(lower[i + 1])) ||
-        (std::isupper(static_cast<unsigned char>(name[i])) && i == 0 &&
-         std::isupper(static_cast<unsigned char>(name[i + 1])));
+    const bool ends = i + 1 == lower.size() ||
+                      !std::isalpha(static_cast<unsigned char>(lower[i + 1])) ||
+                      (std::isupper(static_cast<unsigned char>(name[i])) && i == 0 &&
+                       std::isupper(static_cast<unsigned char>(name[i + 1])));
     if (begins && ends) return lower[i] == 'l' ? 1 : -1;
   }
   return 0;
@@ -105,9 +107,10 @@ Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Isometry3d>& 
     if (feet[f].empty()) continue;
     const auto place = tree.links.find(feet[f]);
     if (place == tree.links.end()) {
-      throw robot::RobotError(fmt::format("{}: there is no link '{}' that could be a foot: correct "
-                                          "the name",
-                                          tree.format, feet[f]));
+      throw robot::RobotError(
+          fmt::format("{}: there is no link '{}' that could be a foot: correct "
+                      "the name",
+                      tree.format, feet[f]));
     }
     legs[f] = {place->second.body, PathTo(tree, place->second.body)};
   }
@@ -127,7 +130,8 @@ Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Isometry3d>& 
     }
     if (legs[f].body < 0) {
       throw robot::RobotError(
-          tree.format + ": there are no two legs that part at the base: Poise balances on two feet");
+          tree.format +
+          ": there are no two legs that part at the base: Poise balances on two feet");
     }
   }
   for (const Leg& leg : legs) CheckLeg(tree, leg);

@@ -32,10 +32,10 @@ struct Anatomy {
 std::vector<Eigen::Isometry3d> BodyPoses(const robot::LinkTree& tree,
                                          const Eigen::VectorXd& joint_position);
 
-/// Legs are the two branches that reach lowest. `up` is a unit vector of the root link, `low` how far
-/// each body reaches below its frame's origin along -up in `poses` (m), `feet` two links to be taken
-/// instead, or empty ones. Throws robot::RobotError: no two legs, or fewer than six joints in one, by
-/// name.
+/// Legs are the two branches that reach lowest. `up` is a unit vector of the root link, `low` how
+/// far each body reaches below its frame's origin along -up in `poses` (m), `feet` two links to be
+/// taken instead, or empty ones. Throws robot::RobotError: no two legs, or fewer than six joints in
+/// one, by name.
 Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Eigen::Isometry3d>& poses,
                     const Eigen::Vector3d& up, const std::vector<double>& low,
                     const std::array<std::string, 2>& feet);

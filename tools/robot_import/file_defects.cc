@@ -69,7 +69,8 @@ class Repairer {
   void Locks(const std::vector<std::string>& wanted) {
     for (const std::string& name : wanted) {
       SourceJoint* const joint = source_.FindJoint(name);
-      if (joint == nullptr) throw ConfigError(fmt::format("--lock {}: the file has no such joint", name));
+      if (joint == nullptr)
+        throw ConfigError(fmt::format("--lock {}: the file has no such joint", name));
       Lock(joint, 0, "", "");
     }
     std::map<std::string, int> followers;
@@ -85,15 +86,18 @@ class Repairer {
             joint.kind == JointKind::kFloating ? "floating" : "a ball or planar joint"));
       }
       if (joint.mimic) {
-        const double at = joint.mimic->offset + joint.mimic->multiplier * RestOf(joint.mimic->joint);
+        const double at =
+            joint.mimic->offset + joint.mimic->multiplier * RestOf(joint.mimic->joint);
         Lock(&joint, at, fmt::format("joint '{}' mimics '{}'", joint.name, joint.mimic->joint),
              "locked where it stands then");
       } else if (joint.kind == JointKind::kPrismatic) {
-        Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' is prismatic", joint.name), "locked");
+        Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' is prismatic", joint.name),
+             "locked");
       } else if (followers.contains(joint.name) || IsFinger(joint.name)) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' moves a finger", joint.name),
              "locked: it takes no part in balance");
-      } else if (maker_.is_mjcf && !maker_.actuated.empty() && !maker_.actuated.contains(joint.name)) {
+      } else if (maker_.is_mjcf && !maker_.actuated.empty() &&
+                 !maker_.actuated.contains(joint.name)) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' has no actuator", joint.name),
              "locked");
       }
@@ -184,7 +188,8 @@ class Repairer {
 
   bool IsLeg(const std::string& name) const {
     std::string lower;
-    for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char c : name)
+      lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     for (const char* word : {"hip", "knee", "ankle", "leg"}) {
       if (lower.find(word) != std::string::npos) return true;
     }
@@ -208,7 +213,9 @@ class Repairer {
   }
 
   void SetInertia(SourceLink* link, const Matrix3d& inertia) {
-    const auto digits = [](double x) { return std::strtod(fmt::format("{:.10g}", x).c_str(), nullptr); };
+    const auto digits = [](double x) {
+      return std::strtod(fmt::format("{:.10g}", x).c_str(), nullptr);
+    };
     Inertia* const i = RepairOf(link->name)->mutable_inertia();
     i->Clear();
     const auto set = [&](double value, auto setter) {
@@ -265,7 +272,8 @@ class Repairer {
           done += "; the rest moved to the nearest physical one";
         }
         rotor_[joint->name] = rotor;
-        Tell(fmt::format("link '{}' hides a rotor of {:.3g} kg m^2 in its inertia", link->name, rotor),
+        Tell(fmt::format("link '{}' hides a rotor of {:.3g} kg m^2 in its inertia", link->name,
+                         rotor),
              done);
         return;
       }
@@ -326,8 +334,8 @@ class Repairer {
       SetInertia(heaviest, SphereInertia(kDummyMass));
       return;
     }
-    const std::string what = fmt::format("link '{}' has {:.3g} kg and no inertia", heaviest->name,
-                                         heaviest->mass.mass);
+    const std::string what =
+        fmt::format("link '{}' has {:.3g} kg and no inertia", heaviest->name, heaviest->mass.mass);
     if (const SourceLink* const twin = Twin(*heaviest)) {
       SetInertia(heaviest, Mirrored(*twin, *heaviest));
       Tell(what, "that of its mirror image '" + twin->name + "'");
@@ -344,9 +352,8 @@ class Repairer {
     for (const SourceLink& other : source_.links) {
       if (SideOfName(other.name) != -side || other.name.size() < 3) continue;
       if (!SameBesideSide(link.name, other.name)) continue;
-      const bool same =
-          std::abs(other.mass.mass - link.mass.mass) <= kMirror * link.mass.mass &&
-          (other.mass.com.cwiseAbs() - link.mass.com.cwiseAbs()).norm() < 1e-3;
+      const bool same = std::abs(other.mass.mass - link.mass.mass) <= kMirror * link.mass.mass &&
+                        (other.mass.com.cwiseAbs() - link.mass.com.cwiseAbs()).norm() < 1e-3;
       if (same && !IsPoint(other.mass) && robot::WhyImpossible(other.mass).empty()) return &other;
     }
     return nullptr;

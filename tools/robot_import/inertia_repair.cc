@@ -13,8 +13,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kDensity = 1000;  // kg/m³: machines are near that of water
-// Of the trace, that a repaired inertia keeps from the edge of what is possible: rounding to the ten
-// digits of a text must not cross it.
+// Of the trace, that a repaired inertia keeps from the edge of what is possible: rounding to the
+// ten digits of a text must not cross it.
 constexpr double kInside = 1e-9;
 // Of the moment about the axis, that the products of inertia with the axis may be at most.
 constexpr double kAcross = 0.2;

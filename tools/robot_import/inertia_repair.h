@@ -6,10 +6,10 @@
 
 namespace poise {
 
-/// kg·m², of a rotor about the unit vector `axis` whose reflected inertia is part of `inertia`: what is
-/// above the middle of what the link's own moment about the axis can be, given the two across it (the
-/// middle is the larger of them, the range is the smaller to either side). Nothing when the inertia
-/// obeys the triangle inequality or its excess does not lie along the axis.
+/// kg·m², of a rotor about the unit vector `axis` whose reflected inertia is part of `inertia`:
+/// what is above the middle of what the link's own moment about the axis can be, given the two
+/// across it (the middle is the larger of them, the range is the smaller to either side). Nothing
+/// when the inertia obeys the triangle inequality or its excess does not lie along the axis.
 std::optional<double> HiddenRotor(const Eigen::Matrix3d& inertia, const Eigen::Vector3d& axis);
 
 /// The physical inertia with the same principal axes whose moments are nearest (least squares).

@@ -68,8 +68,7 @@ void AddShape(const TiXmlElement& element, const std::string& link, bool collide
     shape.kind = SourceShape::Kind::kSphere;
     shape.size = Vector3d(radius, 0, 0);
   } else if (kind == "cylinder" || kind == "capsule") {
-    shape.kind =
-        kind == "cylinder" ? SourceShape::Kind::kCylinder : SourceShape::Kind::kCapsule;
+    shape.kind = kind == "cylinder" ? SourceShape::Kind::kCylinder : SourceShape::Kind::kCapsule;
     shape.size = Vector3d(radius, NumberOf(*solid, "length"), 0);
   } else if (kind == "mesh") {
     shape.kind = SourceShape::Kind::kMesh;
@@ -96,7 +95,8 @@ void ReadExtensions(MakerFile* maker) {
     if (kind == "link") {
       const std::string link = Attribute(*e, "name");
       for (const char* what : {"collision", "visual"}) {
-        for (const TiXmlElement* s = e->FirstChildElement(what); s; s = s->NextSiblingElement(what)) {
+        for (const TiXmlElement* s = e->FirstChildElement(what); s;
+             s = s->NextSiblingElement(what)) {
           AddShape(*s, link, std::string_view(what) == "collision", &maker->shapes);
         }
       }

@@ -19,7 +19,8 @@ struct MakerFile {
   bool is_mjcf = false;
   robot::RobotSource source;
   std::vector<robot::SourceShape> shapes;
-  /// kind: "imu", "gyro", "accelerometer", "force", "torque", "force_torque"; site: a link or a joint
+  /// kind: "imu", "gyro", "accelerometer", "force", "torque", "force_torque"; site: a link or a
+  /// joint
   std::vector<robot::MjcfSensor> sensors;
   std::vector<robot::MjcfKey> postures;  ///< keyframes, group states of the SRDF
   std::string postures_from;             ///< "keyframe", or the SRDF's file name
@@ -34,8 +35,8 @@ struct MakerFile {
 /// ConfigError and robot::RobotError.
 MakerFile ReadMakerFile(const std::filesystem::path& path, const std::filesystem::path& srdf);
 
-/// The file of a mesh as the maker's file names it ("package://P/x.stl", "file:///x.stl", a relative
-/// path): beside the maker's file or above it. Empty when there is none.
+/// The file of a mesh as the maker's file names it ("package://P/x.stl", "file:///x.stl", a
+/// relative path): beside the maker's file or above it. Empty when there is none.
 std::filesystem::path FindMesh(const MakerFile& maker, const std::string& name);
 
 }  // namespace poise

@@ -11,8 +11,8 @@ std::vector<Eigen::Vector3d> MeshPoints(const std::filesystem::path& file,
                                         const Eigen::Vector3d& scale, std::string* problem) {
   std::vector<Eigen::Vector3d> points;
   Assimp::Importer importer;
-  const aiScene* const scene =
-      importer.ReadFile(file.string(), aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices);
+  const aiScene* const scene = importer.ReadFile(
+      file.string(), aiProcess_JoinIdenticalVertices | aiProcess_PreTransformVertices);
   if (scene == nullptr) {
     *problem = importer.GetErrorString();
     return points;

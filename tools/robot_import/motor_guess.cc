@@ -12,25 +12,25 @@
 namespace poise {
 namespace {
 
-// A motor turns about as fast as this at its joint's largest velocity: 22.5 for the knee of a G1, whose
-// gear is 22.5, and 50 for the paper's robot, whose gear is 50.
+// A motor turns about as fast as this at its joint's largest velocity: 22.5 for the knee of a G1,
+// whose gear is 22.5, and 50 for the paper's robot, whose gear is 50.
 constexpr double kMotorVelocity = 450;  // rad/s
 constexpr double kMostGear = 160;
-// From rest to its largest velocity, with its largest torque and no load, a drive takes about this long:
-// 3.6 to 5.3 ms for those of a G1, 6 ms for the paper's robot.
+// From rest to its largest velocity, with its largest torque and no load, a drive takes about this
+// long: 3.6 to 5.3 ms for those of a G1, 6 ms for the paper's robot.
 constexpr double kSpinUp = 0.005;  // s
-// Share of the torque that Coulomb friction takes, and viscous friction at 1 rad/s: 1.3 % and 0.33 %
-// for the paper's robot, less for gears of small ratio.
+// Share of the torque that Coulomb friction takes, and viscous friction at 1 rad/s: 1.3 % and 0.33
+// % for the paper's robot, less for gears of small ratio.
 constexpr double kCoulombShare = 0.01;
 constexpr double kViscousShare = 0.003;
 constexpr double kPeakCurrent = 30, kRatedCurrent = 15;  // A, as the paper's robot
 constexpr int kEncoderCounts = 16384;                    // 14 bits
-// rad/s: where all joints share a velocity above this, nobody measured it; what is derived from it then
-// is derived from a servo drive's usual one.
+// rad/s: where all joints share a velocity above this, nobody measured it; what is derived from it
+// then is derived from a servo drive's usual one.
 constexpr double kPlaceholderVelocity = 40, kUsualVelocity = 15;
 // Of the paper's robot's harmonic drives, over their 150 N·m.
 constexpr double kStiffnessShare = 7e4 / 150, kDampingShare = 8.0 / 150;
-constexpr size_t kMostLegJoints = 14;  // of a robot without arms: its motors may be equal
+constexpr size_t kMostLegJoints = 14;   // of a robot without arms: its motors may be equal
 constexpr double kEffortPerMass = 2.5;  // N·m/kg: 2.7 (the paper's robot) to 4.2 (G1) at the knee
 
 double Digits(double value, int digits) {
@@ -39,7 +39,9 @@ double Digits(double value, int digits) {
 
 }  // namespace
 
-double GuessedEffort(double mass, bool leg) { return Digits(kEffortPerMass * mass * (leg ? 1 : 0.25), 2); }
+double GuessedEffort(double mass, bool leg) {
+  return Digits(kEffortPerMass * mass * (leg ? 1 : 0.25), 2);
+}
 
 MotorSources AddMotors(const robot::LinkTree& tree, const MakerFile& maker,
                        const std::map<std::string, double>& rotor, Robot* robot) {
@@ -54,7 +56,8 @@ MotorSources AddMotors(const robot::LinkTree& tree, const MakerFile& maker,
       velocities.size() == 1 && *velocities.begin() > kPlaceholderVelocity;
   std::map<std::tuple<double, double, double, double, double>, int> known;
   for (const robot::Joint& joint : tree.joints) {
-    const auto source = std::ranges::find(maker.source.joints, joint.name, &robot::SourceJoint::name);
+    const auto source =
+        std::ranges::find(maker.source.joints, joint.name, &robot::SourceJoint::name);
     const double velocity = sources.velocity_placeholder ? kUsualVelocity : joint.velocity_limit;
     const double gear = Digits(std::clamp(kMotorVelocity / velocity, 1.0, kMostGear), 3);
     double inertia = joint.effort * kSpinUp / velocity;
@@ -72,9 +75,9 @@ MotorSources AddMotors(const robot::LinkTree& tree, const MakerFile& maker,
       coulomb = kCoulombShare * joint.effort;
       viscous = kViscousShare * joint.effort;
     }
-    const auto key = std::make_tuple(gear, joint.effort, Digits(inertia, 4),
-                                     Digits(std::max(0.0, coulomb), 3),
-                                     Digits(std::max(0.0, viscous), 3));
+    const auto key =
+        std::make_tuple(gear, joint.effort, Digits(inertia, 4), Digits(std::max(0.0, coulomb), 3),
+                        Digits(std::max(0.0, viscous), 3));
     const auto [entry, is_new] = known.emplace(key, robot->motor_size());
     Motor* const motor = is_new ? robot->add_motor() : robot->mutable_motor(entry->second);
     motor->add_joint(joint.name);

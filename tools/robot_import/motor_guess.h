@@ -17,8 +17,8 @@ struct MotorSources {
   bool friction = false, damping = false, armature = false;  ///< the file has some
 };
 
-/// Motors of all joints of the tree, equal ones together. `rotor`: kg·m² at the joint, those that were
-/// hidden in links.
+/// Motors of all joints of the tree, equal ones together. `rotor`: kg·m² at the joint, those that
+/// were hidden in links.
 MotorSources AddMotors(const robot::LinkTree& tree, const MakerFile& maker,
                        const std::map<std::string, double>& rotor, Robot* robot);
 

@@ -26,15 +26,16 @@ using robot::LinkTree;
 using robot::RobotError;
 
 constexpr double kSameTurn = 1e-4;  // rad: a frame that is off by less counts as upright
-// Of the leg from hip to sole, the length that a sole is taken to have where nothing shows it: G1 has 0.26,
-// Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length: 0.35, 0.62, 0.57, 0.5.
+// Of the leg from hip to sole, the length that a sole is taken to have where nothing shows it: G1
+// has 0.26, Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length: 0.35, 0.62,
+// 0.57, 0.5.
 constexpr double kSoleOfLeg = 0.28, kWidthOfSole = 0.45;
 constexpr double kStraight = 0.01;   // rad: a joint that is nearer to zero is left there
 constexpr double kRectangle = 5e-4;  // m: a polygon that differs by less is one
 // Of common sensors, where the file has none: those of the paper's robot.
-constexpr double kGyroNoise = 2e-4, kGyroBias = 7.5e-6;            // rad/s
+constexpr double kGyroNoise = 2e-4, kGyroBias = 7.5e-6;                   // rad/s
 constexpr double kAccelerometerNoise = 1.7e-2, kAccelerometerBias = 0.1;  // m/s²
-constexpr double kForceNoise = 1, kMomentNoise = 0.05;             // N, N·m
+constexpr double kForceNoise = 1, kMomentNoise = 0.05;                    // N, N·m
 
 std::string Lower(std::string text) {
   for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -192,15 +193,16 @@ class Import {
     if (!anatomy_.facing.isIdentity(kSameTurn)) {
       const double yaw = std::atan2(anatomy_.facing(1, 0), anatomy_.facing(0, 0));
       result_.defects.push_back(
-          {fmt::format("the root link '{}' does not face along its x axis (turned by {:.4g} degrees "
-                       "about z)",
-                       tree.root_link, yaw * 180 / std::numbers::pi),
+          {fmt::format(
+               "the root link '{}' does not face along its x axis (turned by {:.4g} degrees "
+               "about z)",
+               tree.root_link, yaw * 180 / std::numbers::pi),
            "facing: its frame is turned, x forward, z up"});
       AddFacing(tree.root_link, anatomy_.facing);
     }
-    Say("forward", fmt::format("({:.3g}, {:.3g}, {:.3g}) of {}", anatomy_.facing(0, 0) + 0.0,
-                               anatomy_.facing(1, 0) + 0.0, anatomy_.facing(2, 0) + 0.0,
-                               tree.root_link),
+    Say("forward",
+        fmt::format("({:.3g}, {:.3g}, {:.3g}) of {}", anatomy_.facing(0, 0) + 0.0,
+                    anatomy_.facing(1, 0) + 0.0, anatomy_.facing(2, 0) + 0.0, tree.root_link),
         anatomy_.forward_from, anatomy_.forward);
   }
 
@@ -239,8 +241,9 @@ class Import {
       if (sole.polygon.empty()) {
         sureness = Sureness::kGuess;
         frame = SoleFrame(tree, leg.body);
-        from = missing_.empty() ? "share of the leg's length" : "mesh not found (" + *missing_.begin() +
-                                                                    "); share of the leg's length";
+        from = missing_.empty()
+                   ? "share of the leg's length"
+                   : "mesh not found (" + *missing_.begin() + "); share of the leg's length";
         sole = GuessedSole(tree, poses, leg, frame, down, forward);
       }
       if (options_.sole) {
@@ -290,7 +293,8 @@ class Import {
     const double length =
         kSoleOfLeg *
         (poses[static_cast<size_t>(leg.body)] * place - poses[hip].translation()).norm();
-    SetRectangle(std::round(length * 1e3) / 1e3, std::round(kWidthOfSole * length * 1e3) / 1e3, &sole);
+    SetRectangle(std::round(length * 1e3) / 1e3, std::round(kWidthOfSole * length * 1e3) / 1e3,
+                 &sole);
     return sole;
   }
 
@@ -300,8 +304,10 @@ class Import {
     int most = 0;
     for (const auto& [link, place] : tree.links) {
       if (place.body != body) continue;
-      const auto count = static_cast<int>(std::ranges::count_if(
-          maker_.shapes, [&, &name = link](const auto& s) { return s.link == name && s.collides; }));
+      const auto count =
+          static_cast<int>(std::ranges::count_if(maker_.shapes, [&, &name = link](const auto& s) {
+            return s.link == name && s.collides;
+          }));
       if (count > most) most = count, best = link;
     }
     return best;
@@ -379,7 +385,8 @@ class Import {
       const auto place = tree.links.find(link);
       if (!options_.imu.empty() || place == tree.links.end()) return;
       size_t depth = 0;
-      for (int b = place->second.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++depth;
+      for (int b = place->second.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent)
+        ++depth;
       if (depth >= nearest) return;
       nearest = depth;
       best = link;
@@ -435,9 +442,12 @@ class Import {
         "torques and velocities of the file; gears, currents and encoders by class",
         Sureness::kGuess);
     Say("rotor inertia",
-        fmt::format("{} from links, the rest {}", rotor_.size(), sources.armature ? "armature" : "by class"),
+        fmt::format("{} from links, the rest {}", rotor_.size(),
+                    sources.armature ? "armature" : "by class"),
         sources.armature || !rotor_.empty() ? "the file" : "5 ms from rest to full velocity",
-        sources.armature ? Sureness::kSure : rotor_.empty() ? Sureness::kGuess : Sureness::kLikely);
+        sources.armature ? Sureness::kSure
+        : rotor_.empty() ? Sureness::kGuess
+                         : Sureness::kLikely);
     Say("friction", sources.friction || sources.damping ? "as given, else by class" : "by class",
         sources.friction || sources.damping ? "the file" : "1 % of the torque, 0.3 % at 1 rad/s",
         sources.friction || sources.damping ? Sureness::kLikely : Sureness::kGuess);
@@ -450,8 +460,9 @@ class Import {
     }
     if (sources.velocity_placeholder) {
       result_.defects.push_back(
-          {fmt::format("all joints have one velocity limit, {:g} rad/s, which no such drive reaches",
-                       tree.joints[0].velocity_limit),
+          {fmt::format(
+               "all joints have one velocity limit, {:g} rad/s, which no such drive reaches",
+               tree.joints[0].velocity_limit),
            "kept; gears and rotors are guessed from 15 rad/s"});
     }
   }
@@ -485,8 +496,9 @@ class Import {
       joint->set_joint(model.joints()[static_cast<size_t>(j)].name);
       joint->set_position(stance.joint_position[j]);
     }
-    Say("stance", fmt::format("COM {:.3f} m high, feet {:.3f} m apart", stance.com_height,
-                              stance.foot_spacing),
+    Say("stance",
+        fmt::format("COM {:.3f} m high, feet {:.3f} m apart", stance.com_height,
+                    stance.foot_spacing),
         from, sureness);
   }
 

@@ -1,4 +1,5 @@
-// From a maker's file to a Robot text: what was found, how sure it is, what was wrong with the file.
+// From a maker's file to a Robot text: what was found, how sure it is, what was wrong with the
+// file.
 #pragma once
 
 #include <array>
@@ -15,11 +16,11 @@ namespace poise {
 /// What the command line says in place of a guess; empty: guess.
 struct ImportOptions {
   std::filesystem::path file, srdf;
-  std::string name;                 ///< of the robot
-  std::array<std::string, 2> foot;  ///< links, right first
-  std::string imu, body;            ///< links
-  std::vector<std::string> lock;    ///< joints
-  std::string stance;               ///< a keyframe's or group state's name
+  std::string name;                           ///< of the robot
+  std::array<std::string, 2> foot;            ///< links, right first
+  std::string imu, body;                      ///< links
+  std::vector<std::string> lock;              ///< joints
+  std::string stance;                         ///< a keyframe's or group state's name
   std::optional<std::array<double, 2>> sole;  ///< m, length and width
 };
 
@@ -39,8 +40,8 @@ struct RobotImport {
   std::vector<Defect> defects;
 };
 
-/// Throws ConfigError and robot::RobotError: a file that is none, or a robot that cannot balance, by
-/// name. What comes back loads.
+/// Throws ConfigError and robot::RobotError: a file that is none, or a robot that cannot balance,
+/// by name. What comes back loads.
 RobotImport ImportRobot(const ImportOptions& options);
 
 /// The text of the Robot file, with comments that tell guesses.

@@ -78,7 +78,8 @@ std::string RobotText(const RobotImport& imported) {
   const Robot& robot = imported.robot;
   std::string text =
       "# proto-file: components/robot_files/robot.proto\n# proto-message: poise.Robot\n"
-      "# Written by `poise robot import`: sure is what the maker's file says, a guess is worth a look.\n";
+      "# Written by `poise robot import`: sure is what the maker's file says, a guess is worth a "
+      "look.\n";
   const auto field = [&](const char* name, const std::string& value) {
     text += fmt::format("{}: \"{}\"\n", name, value);
   };
@@ -87,7 +88,8 @@ std::string RobotText(const RobotImport& imported) {
   if (robot.has_mjcf()) field("mjcf", robot.mjcf());
   if (robot.has_source()) field("source", robot.source());
   field("body_link", robot.body_link());
-  if (robot.facing_size() > 0) text += Heading("Frames that do not face forward: " + Told(imported, "forward"));
+  if (robot.facing_size() > 0)
+    text += Heading("Frames that do not face forward: " + Told(imported, "forward"));
   for (const Facing& facing : robot.facing()) text += Block("facing", facing);
   if (robot.repair_size() > 0) text += Heading("What the file says wrongly of masses");
   for (const Repair& repair : robot.repair()) text += Block("repair", repair);
@@ -95,15 +97,15 @@ std::string RobotText(const RobotImport& imported) {
   for (const Lock& lock : robot.lock()) text += Block("lock", lock);
   if (robot.limit_size() > 0) text += Heading("Limits that the file does not give: guesses");
   for (const JointLimit& limit : robot.limit()) text += Block("limit", limit);
-  text += Heading("Soles: " + Told(imported, "right sole") + "; force sensors: " +
-                  Told(imported, "right force sensor"));
+  text += Heading("Soles: " + Told(imported, "right sole") +
+                  "; force sensors: " + Told(imported, "right force sensor"));
   for (const Foot& foot : robot.foot()) text += Block("foot", foot);
   text += fmt::format("force_noise: {:g}\nmoment_noise: {:g}\n", robot.force_noise(),
                       robot.moment_noise());
   text += Heading("IMU: " + Told(imported, "IMU"));
   text += Block("imu", robot.imu());
-  text += Heading("Motors: " + Told(imported, "motors") + "; rotors: " + Told(imported, "rotor inertia") +
-                  "; friction: " + Told(imported, "friction"));
+  text += Heading("Motors: " + Told(imported, "motors") + "; rotors: " +
+                  Told(imported, "rotor inertia") + "; friction: " + Told(imported, "friction"));
   for (const Motor& motor : robot.motor()) text += Block("motor", motor);
   text += Heading("Drive train: " + Told(imported, "drive train"));
   text += Block("drive_train", robot.drive_train());

@@ -15,15 +15,15 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Kind = robot::SourceShape::Kind;
 
-constexpr int kCircle = 24;              // points of a cylinder's rim
+constexpr int kCircle = 24;  // points of a cylinder's rim
 // m: what lies this much above the lowest point still touches: first while the face is sought, then
 // what rubber and rounding even out.
 constexpr std::array kBands = {0.012, 0.006, 0.002, 0.002};
-constexpr double kMostTilt = 0.5;        // rad
-constexpr double kLeastArea = 4e-4;      // m²
-constexpr double kLeastSpread = 0.005;   // m, of points that define a plane, across
+constexpr double kMostTilt = 0.5;       // rad
+constexpr double kLeastArea = 4e-4;     // m²
+constexpr double kLeastSpread = 0.005;  // m, of points that define a plane, across
 constexpr size_t kMostVertices = 12;
-constexpr double kSamePoint = 1e-6;      // m
+constexpr double kSamePoint = 1e-6;  // m
 
 /// Convex hull, counter-clockwise (Andrew's monotone chain); points on an edge are left out.
 std::vector<Vector2d> Hull(std::vector<Vector2d> points) {
@@ -38,8 +38,7 @@ std::vector<Vector2d> Hull(std::vector<Vector2d> points) {
   for (int side = 0; side < 2; ++side) {
     const size_t begin = hull.size();
     for (const Vector2d& point : points) {
-      while (hull.size() >= begin + 2 &&
-             !turns_left(hull[hull.size() - 2], hull.back(), point)) {
+      while (hull.size() >= begin + 2 && !turns_left(hull[hull.size() - 2], hull.back(), point)) {
         hull.pop_back();
       }
       if (hull.size() > begin && (hull.back() - point).norm() < kSamePoint) continue;
@@ -116,8 +115,8 @@ std::vector<Vector3d> LowPoints(std::span<const FootShape> shapes, const Vector3
       case Kind::kCylinder: {
         for (int i = 0; i < kCircle; ++i) {
           const double angle = 2 * std::numbers::pi * i / kCircle;
-          const Vector3d rim = shape.pose.linear() *
-                               Vector3d(radius * std::cos(angle), radius * std::sin(angle), 0);
+          const Vector3d rim =
+              shape.pose.linear() * Vector3d(radius * std::cos(angle), radius * std::sin(angle), 0);
           points.push_back(centre + half + rim);
           points.push_back(centre - half + rim);
         }

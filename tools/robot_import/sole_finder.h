@@ -27,8 +27,8 @@ struct FoundSole {
 std::vector<Eigen::Vector3d> LowPoints(std::span<const FootShape> shapes,
                                        const Eigen::Vector3d& down);
 
-/// The face on which the foot rests when set down about as `down` says (it may tilt up to 30°), with
-/// x along `forward`. An empty polygon when the lowest points span no area.
+/// The face on which the foot rests when set down about as `down` says (it may tilt up to 30°),
+/// with x along `forward`. An empty polygon when the lowest points span no area.
 FoundSole FindSole(std::span<const FootShape> shapes, const Eigen::Vector3d& down,
                    const Eigen::Vector3d& forward);
 

@@ -15,15 +15,13 @@ using robot::RobotModel;
 
 // rad, between thigh and shank: far enough from the straight leg, where no torque lifts the COM.
 constexpr std::array kBends = {0.6, 0.5, 0.7, 0.4, 0.8, 0.9};
-constexpr double kLateral = 0.7;      // cosine: a joint about the lateral axis
-constexpr double kLimitShare = 0.1;   // of its range, that a joint keeps from its limits
-constexpr double kMostMargin = 0.15;  // rad, at most
-constexpr double kRounding = 1e4;     // steps in a metre that a text has
+constexpr double kLateral = 0.7;        // cosine: a joint about the lateral axis
+constexpr double kLimitShare = 0.1;     // of its range, that a joint keeps from its limits
+constexpr double kMostMargin = 0.15;    // rad, at most
+constexpr double kRounding = 1e4;       // steps in a metre that a text has
 constexpr double kJointRounding = 1e3;  // in a radian
 
-double Rounded(double value, double steps = kRounding) {
-  return std::round(value * steps) / steps;
-}
+double Rounded(double value, double steps = kRounding) { return std::round(value * steps) / steps; }
 
 robot::RobotData Kinematics(const RobotModel& model, const Eigen::VectorXd& joints) {
   robot::RobotState state(model.num_joints());
@@ -110,9 +108,8 @@ FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
     robot::PostureGoal goal;
     goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
     const robot::RobotData data = Kinematics(model, goal.nominal);
-    goal.com_height =
-        Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
-                                      data.foot_pose[1].translation().z()));
+    goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
+                                                    data.foot_pose[1].translation().z()));
     for (size_t f = 0; f < 2; ++f) {
       goal.foot[f] = Eigen::Isometry3d(
           Eigen::Translation3d(0, f == robot::kRightFoot ? -spacing / 2 : spacing / 2, 0));

@@ -18,14 +18,14 @@ struct FoundStance {
 /// Each joint at `wanted` or, where that is too near to a limit, away from it.
 Eigen::VectorXd WithinLimits(const robot::RobotModel& model, Eigen::VectorXd wanted);
 
-/// `nominal` with the legs' knees bent by `bend` rad in all, hips and ankles turned so that the foot
-/// stays below the hip and level. Legs without a knee about the lateral axis stay as they are.
+/// `nominal` with the legs' knees bent by `bend` rad in all, hips and ankles turned so that the
+/// foot stays below the hip and level. Legs without a knee about the lateral axis stay as they are.
 Eigen::VectorXd WithBentKnees(const robot::RobotModel& model, const Anatomy& anatomy, double bend,
                               Eigen::VectorXd nominal);
 
-/// The nearest posture to `nominal` with both soles level, the COM above the middle between them, all
-/// within the joint limits. Tries less and more bend than the usual one when `bend_knees`. Throws
-/// RobotError saying what is out of reach.
+/// The nearest posture to `nominal` with both soles level, the COM above the middle between them,
+/// all within the joint limits. Tries less and more bend than the usual one when `bend_knees`.
+/// Throws RobotError saying what is out of reach.
 FoundStance FindStance(const robot::RobotModel& model, const Anatomy& anatomy,
                        const Eigen::VectorXd& nominal, bool bend_knees);
 

@@ -291,7 +291,8 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
                     const std::string& name) {
   const bool set =
       std::any_of(loaded.changes.begin(), loaded.changes.end(), [&](const FieldChange& change) {
-        return (change.by == kSetFlag || change.by == kRobotFlag) && PathOf(loaded, change) == field;
+        return (change.by == kSetFlag || change.by == kRobotFlag) &&
+               PathOf(loaded, change) == field;
       });
   try {
     return FindFile(kind, name, set ? fs::current_path() : loaded.files.FolderOf(field)).string();
