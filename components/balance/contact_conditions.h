@@ -18,7 +18,7 @@ struct ContactLimits {
   double half_length = 0;     ///< l_x/2, m, (33), (37)
   double half_width = 0;      ///< l_y/2, m, (32), (38)
   /// Any convex patch: where there are edges, they stand in place of half_length and half_width.
-  HalfPlanes edges;
+  HalfPlanes edges = {};
 };
 
 /// Distance from each condition, positive inside.
