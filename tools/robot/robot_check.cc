@@ -168,6 +168,28 @@ void FindPushes(RobotCheck* check) {
   }
 }
 
+void FindLoops(RobotCheck* check) {
+  const RobotModel& model = check->model;
+  check->gains = balance::GainsByRule(model, kCheckedTick);
+  const auto add = [&](const char* support, const std::array<bool, 2>& in_contact) {
+    const auto poles =
+        balance::ComputeClosedLoopPoles(model, check->gains, in_contact, kCheckedTick);
+    LoopFacts facts{.support = support, .stable = poles.stable()};
+    facts.gain_margin = balance::GainMargin(model, check->gains, in_contact, kCheckedTick);
+    facts.delay_margin = balance::DelayMargin(model, check->gains, in_contact, kCheckedTick);
+    facts.least_damping = 1;
+    if (!poles.modes.empty()) facts.slowest = -poles.modes.front().s.real();
+    for (const auto& mode : poles.modes) {
+      if (mode.damping >= facts.least_damping) continue;
+      facts.least_damping = mode.damping;
+      facts.frequency = mode.frequency;
+    }
+    check->loops.push_back(facts);
+  };
+  add("both feet", {true, true});
+  if (check->stands_on_one_foot) add("right foot", {true, false});
+}
+
 void FindDefects(RobotCheck* check) {
   const RobotModel& model = check->model;
   for (size_t j = 0; j < model.joints().size(); ++j) {
@@ -197,6 +219,13 @@ void FindDefects(RobotCheck* check) {
           fmt::format("joint {} has a velocity limit of {} rad/s: give the URDF's limit a velocity",
                       joint.name, joint.velocity_limit));
     }
+  }
+  for (const LoopFacts& loop : check->loops) {
+    if (loop.stable) continue;
+    check->defects.push_back(
+        fmt::format("on {} no gain of the rule holds it: gears or rotors ring at {:.0f} Hz; correct "
+                    "gear_stiffness, gear_damping, rotor_inertia or sensor_delay",
+                    loop.support, loop.frequency));
   }
   if (!check->stands_on_one_foot) {
     check->defects.push_back(
@@ -228,6 +257,20 @@ std::string FormatLoads(const RobotCheck& check, int columns) {
   if (left_out > 0)
     text += fmt::format("{} joints need less than a tenth of their limit\n", left_out);
   return text;
+}
+
+std::string FormatLoops(const RobotCheck& check, int columns) {
+  std::vector<TableRow> rows{
+      {"closed loop", "stable", "gain margin", "delay margin", "slowest", "least damped"}};
+  for (const LoopFacts& loop : check.loops) {
+    rows.push_back({loop.support, TableCell(loop.stable ? "yes" : "no",
+                                            loop.stable ? Tone::kPlain : Tone::kBad),
+                    fmt::format("{:.2f}", loop.gain_margin),
+                    fmt::format("{} ticks", loop.delay_margin),
+                    fmt::format("{:.2g} 1/s", loop.slowest),
+                    fmt::format("{:.2g} at {:.1f} Hz", loop.least_damping, loop.frequency)});
+  }
+  return FormatColumns(rows, columns);
 }
 
 std::string FormatPushes(const RobotCheck& check, int columns) {
@@ -270,6 +313,11 @@ RobotCheck CheckRobot(const std::filesystem::path& file) {
   check.reach = {ReachAlong(check, Vector3d::UnitX()), ReachAlong(check, -Vector3d::UnitX()),
                  ReachAlong(check, Vector3d::UnitY()), ReachAlong(check, Vector3d::UnitZ())};
   FindPushes(&check);
+  try {
+    FindLoops(&check);
+  } catch (const robot::RobotError& error) {
+    check.defects.push_back(fmt::format("the closed loop: {}", error.what()));
+  }
   FindDefects(&check);
   return check;
 }
@@ -300,7 +348,10 @@ std::string FormatRobotCheck(const RobotCheck& check, int columns) {
                                  ? fmt::format("gears of {:.3g} N·m/rad", drive.gear_stiffness)
                                  : "rigid gears",
                              FormatNumber(1e3 * drive.sensor_delay)));
-  text += "\n\n" + FormatLoads(check, columns) + "\n" + FormatPushes(check, columns) + "\n";
+  line("gains", fmt::format("by rule: COM {:.3g} 1/s², {:.3g} 1/s", check.gains.com.kp,
+                            check.gains.com.kd));
+  text += "\n\n" + FormatLoads(check, columns) + "\n" + FormatPushes(check, columns) + "\n" +
+          FormatLoops(check, columns) + "\n";
   if (check.ok()) return text + Toned("no defect was found", Tone::kGood) + "\n";
   text +=
       Toned(fmt::format("{} defect{}", check.defects.size(), check.defects.size() == 1 ? "" : "s"),
@@ -350,6 +401,17 @@ Json RobotCheckJson(const RobotCheck& check) {
                             {"double_support", push.both},
                             {"right_foot", push.right},
                             {"left_foot", push.left}});
+  }
+  json["gains"] = {{"com_kp", check.gains.com.kp}, {"com_kd", check.gains.com.kd}};
+  json["closed_loop"] = Json::array();
+  for (const LoopFacts& loop : check.loops) {
+    json["closed_loop"].push_back({{"support", loop.support},
+                                   {"stable", loop.stable},
+                                   {"gain_margin", loop.gain_margin},
+                                   {"delay_margin", loop.delay_margin},
+                                   {"slowest", loop.slowest},
+                                   {"least_damping", loop.least_damping},
+                                   {"least_damped_frequency", loop.frequency}});
   }
   json["defects"] = check.defects;
   return json;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/robot/robot_model.h"
 
 namespace poise {
@@ -46,6 +47,17 @@ struct PushLimit {
   double both = 0, right = 0, left = 0;  ///< by the feet in contact
 };
 
+/// The standing robot under its controller with the gains of the rule, on both feet or on the right.
+struct LoopFacts {
+  std::string support;
+  bool stable = false;
+  double gain_margin = 0;    ///< largest factor on the feedback with which it stands, 4 at most
+  int delay_margin = 0;      ///< ticks beyond the robot's own delay, 5 at most
+  double slowest = 0;        ///< 1/s, decay of the slowest mode
+  double least_damping = 0;  ///< of the modes that oscillate
+  double frequency = 0;      ///< Hz, of that mode
+};
+
 struct RobotCheck {
   robot::RobotModel model;
   std::string file, urdf;   ///< the robot's text file, and what the file that it names holds
@@ -57,12 +69,17 @@ struct RobotCheck {
   bool stands_on_one_foot = false;  ///< a posture above one foot was found, for either foot
   StepReach reach;
   std::vector<PushLimit> pushes;     ///< 16 directions
+  balance::StandingGains gains;      ///< by the rule, at kCheckedTick
+  std::vector<LoopFacts> loops;      ///< those supports in which it can stand
   robot::RobotState stance;          ///< of the page
   std::vector<std::string> defects;  ///< what was found wrong, each with what to do
   bool ok() const { return defects.empty(); }
 };
 
-/// Reads and checks a robot; a second or two. Throws robot::RobotError, ConfigError: files that
+/// s, of the scenarios' 500 Hz.
+inline constexpr double kCheckedTick = 0.002;
+
+/// Reads and checks a robot; some seconds. Throws robot::RobotError, ConfigError: files that
 /// make no robot, a stance out of reach.
 RobotCheck CheckRobot(const std::filesystem::path& file);
 
