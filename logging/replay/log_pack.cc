@@ -93,7 +93,13 @@ class RemadeLog {
       : run_(run), path_(std::move(path)), sink_(std::move(sink)) {}
 
   void Make(const ComponentRegistry& registry, const OnTick& on_tick) {
-    InlineRunner runner(run_.spec, registry);
+    std::optional<InlineRunner> made;
+    try {
+      made.emplace(run_.spec, registry);
+    } catch (const ConfigError& error) {  // of what the log says of the run
+      throw LogError(fmt::format("{}: cannot be made again: {}", path_, error.what()));
+    }
+    InlineRunner& runner = *made;
     struct Lane {
       std::string name;
       int utime_offset = 0;
