@@ -115,6 +115,8 @@ void ScenarioRun::PrintHeading() const {
                                         options_.launch.log ? " and the recorder" : ", no log"),
       spec.seed(), PoiseVersion(),
       *PoiseCommit() == '\0' ? "" : fmt::format(" ({})", PoiseCommit()));
+  const std::string engine = FormatEngine(scenario, spec.graph());
+  if (!engine.empty()) text += engine + "\n";
   if (!options_.in_process) {
     text += fmt::format("run {}; listen at {}\n", spec.run_id(), MirrorUrl(spec));
   }
