@@ -78,6 +78,7 @@ int main(int argc, char** argv) {
   poise::AddGraphCommand(&app, &command);
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
+  poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);

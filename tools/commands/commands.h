@@ -32,6 +32,7 @@ void AddNewCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);
 void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
+void AddDrivesCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
