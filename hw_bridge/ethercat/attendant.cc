@@ -13,7 +13,7 @@ namespace {
 // Between two rounds over all slaves: errors are to be seen while someone looks on, not sooner.
 constexpr int64_t kRound = 20 * kMillisecond;
 constexpr int64_t kLookAgain = 2 * kMillisecond;  // at a slave that is not in OP
-constexpr int kAttempts = 3;  // frames for a datagram
+constexpr int kAttempts = 3;                      // frames for a datagram
 
 }  // namespace
 
@@ -27,7 +27,7 @@ Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockP
       lockstep_(lockstep),
       say_(std::move(say)),
       transactions_(&slot_, timeouts.state, kAttempts),
-      complained_(slaves.size(), false),
+      complaints_(slaves.size()),
       left_at_(slaves.size(), -1) {
   for (const SlaveAccess& slave : slaves) {
     slaves_.push_back(slave.Through(&transactions_));
@@ -67,8 +67,8 @@ SlaveDiagnosis Attendant::diagnosis(size_t slave) const {
 }
 
 void Attendant::Complain(size_t slave, const std::string& line) {
-  if (complained_[slave]) return;  // once, until it is back
-  complained_[slave] = true;
+  if (complaints_[slave] == line) return;  // once, until it is back
+  complaints_[slave] = line;
   if (say_) say_(line);
 }
 
@@ -102,14 +102,14 @@ void Attendant::LookAt(size_t slave, int turn) {
 bool Attendant::NoteState(size_t slave) {
   Cell& cell = cells_[slave];
   std::array<uint8_t, 6> bytes{};
-  const auto counter = transactions_.Execute(Command::kFprd, slaves_[slave].station(),
-                                             reg::kAlStatus, bytes, 1);
+  const auto counter =
+      transactions_.Execute(Command::kFprd, slaves_[slave].station(), reg::kAlStatus, bytes, 1);
   cell.online = counter && *counter == 1;
   if (cell.online) cell.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
   const bool operational = cell.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
   if (operational) {
     left_at_[slave] = -1;
-    complained_[slave] = false;
+    complaints_[slave].clear();
   } else if (left_at_[slave] < 0) {
     left_at_[slave] = slot_.Now();
   }
@@ -197,10 +197,14 @@ void Attendant::StartClock(size_t slave) {
   // The reference itself takes the time from one that has kept it.
   for (size_t other = 0; other < slaves_.size(); ++other) {
     const size_t from = (clocks_.reference + other) % slaves_.size();
-    if (from == slave || !clocks_.has_clock[from] || !cells_[from].online) continue;
-    JoinClock(&transactions_, &slaves_[from], &access,
-              clocks_.delays[slave] - clocks_.delays[from]);
-    break;
+    if (from == slave || !clocks_.has_clock[from]) continue;
+    try {
+      JoinClock(&transactions_, &slaves_[from], &access,
+                clocks_.delays[slave] - clocks_.delays[from]);
+      break;
+    } catch (const EthercatError& error) {
+      Complain(from, error.what());  // it has no time to give; another may
+    }
   }
   StartSync0(&access, config_->cycle(), config_->sync0_shift());
 }

@@ -31,9 +31,9 @@ struct SlaveDiagnosis {
 /// How clocks are kept, for slaves that come back.
 struct ClockPlan {
   bool running = false;
-  size_t reference = 0;               ///< slave whose time is everybody's
-  std::vector<bool> has_clock;        ///< by slave
-  std::vector<int32_t> delays;        ///< ns, by slave
+  size_t reference = 0;         ///< slave whose time is everybody's
+  std::vector<bool> has_clock;  ///< by slave
+  std::vector<int32_t> delays;  ///< ns, by slave
 };
 
 /// Runs in a thread of its own, whose datagrams go in the cycle's frames. Everything it does can
@@ -89,8 +89,8 @@ class Attendant {
   Transactions transactions_;
   std::vector<SlaveAccess> slaves_;
   std::deque<Cell> cells_;
-  std::vector<bool> complained_;
-  std::vector<int64_t> left_at_;  // ns, when a slave was first seen outside OP; -1: in OP
+  std::vector<std::string> complaints_;  // the last line of each slave
+  std::vector<int64_t> left_at_;         // ns, when a slave was first seen outside OP; -1: in OP
   std::atomic<bool> trouble_{false}, ended_{false};
   std::atomic<int64_t> recoveries_{0};
   std::thread thread_;

@@ -9,8 +9,8 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr size_t kInitiate = 8;          // command, index, subindex and four bytes
-constexpr size_t kLeastSegment = 7;      // bytes of data in the shortest segment
+constexpr size_t kInitiate = 8;      // command, index, subindex and four bytes
+constexpr size_t kLeastSegment = 7;  // bytes of data in the shortest segment
 constexpr uint8_t kExpeditedBit = 0x02, kSizeBit = 0x01, kCompleteBit = 0x10;
 constexpr uint8_t kToggleBit = 0x10, kLastBit = 0x01;
 // Command specifiers, the upper three bits, mean one thing in a request, another in a response.
@@ -61,9 +61,8 @@ uint8_t CommandByte(const Sdo& sdo) {
       byte |= static_cast<uint8_t>((kLeastSegment - sdo.data.size()) << 1);
     }
   } else if (Initiates(sdo.command)) {
-    byte |= sdo.size > 0
-                ? static_cast<uint8_t>(kExpeditedBit | kSizeBit | (4 - sdo.size) << 2)
-                : kSizeBit;
+    byte |= sdo.size > 0 ? static_cast<uint8_t>(kExpeditedBit | kSizeBit | (4 - sdo.size) << 2)
+                         : kSizeBit;
   }
   const bool whole = Initiates(sdo.command) || sdo.command == SdoCommand::kUploadRequest ||
                      sdo.command == SdoCommand::kDownloadResponse;

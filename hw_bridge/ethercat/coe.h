@@ -56,8 +56,8 @@ enum class CoeService : uint8_t {
 
 enum class SdoCommand {
   kUploadRequest,
-  kUploadResponse,    ///< expedited, or the first part of a normal or segmented transfer
-  kDownloadRequest,   ///< likewise
+  kUploadResponse,   ///< expedited, or the first part of a normal or segmented transfer
+  kDownloadRequest,  ///< likewise
   kDownloadResponse,
   kUploadSegmentRequest,
   kUploadSegmentResponse,
@@ -76,11 +76,11 @@ struct ObjectAddress {
 struct Sdo {
   SdoCommand command = SdoCommand::kOther;
   ObjectAddress object = {};  ///< not of segments
-  bool complete = false;  ///< complete access: the whole object, from this subindex (0 or 1)
-  uint32_t value = 0;     ///< expedited: data of `size` bytes; or the abort code
-  uint8_t size = 0;       ///< of expedited data, 1 to 4; 0: `data` holds what there is
-  uint32_t total = 0;     ///< of a normal transfer: bytes of the whole object
-  bool toggle = false, last = false;  ///< of segments
+  bool complete = false;      ///< complete access: the whole object, from this subindex (0 or 1)
+  uint32_t value = 0;         ///< expedited: data of `size` bytes; or the abort code
+  uint8_t size = 0;           ///< of expedited data, 1 to 4; 0: `data` holds what there is
+  uint32_t total = 0;         ///< of a normal transfer: bytes of the whole object
+  bool toggle = false, last = false;   ///< of segments
   std::span<const uint8_t> data = {};  ///< of a normal transfer's first part, or of a segment
 };
 
@@ -110,7 +110,7 @@ enum class InfoOpcode : uint8_t {
 };
 struct SdoInfo {
   InfoOpcode opcode = InfoOpcode::kError;
-  bool incomplete = false;        ///< more fragments follow
+  bool incomplete = false;  ///< more fragments follow
   uint16_t fragments_left = 0;
   std::span<const uint8_t> data = {};  ///< what follows the four-byte information header
 };

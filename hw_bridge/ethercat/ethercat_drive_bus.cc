@@ -149,11 +149,10 @@ void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet)
   for (int i = 0; i < config.other_size(); ++i) {
     const auto slave = static_cast<size_t>(config.drive_size() + i);
     for (const SensorReading& reading : config.other(i).reading()) {
-      const auto place =
-          master_.image().FindInput(slave, static_cast<uint16_t>(reading.index()),
-                                    static_cast<uint8_t>(reading.subindex()));
-      const bool of_foot = reading.quantity() == SensorReading::FORCE ||
-                           reading.quantity() == SensorReading::MOMENT;
+      const auto place = master_.image().FindInput(slave, static_cast<uint16_t>(reading.index()),
+                                                   static_cast<uint8_t>(reading.subindex()));
+      const bool of_foot =
+          reading.quantity() == SensorReading::FORCE || reading.quantity() == SensorReading::MOMENT;
       if (!place || reading.axis() > 2 || (of_foot && reading.foot() >= num_feet) ||
           (reading.is_float() && place->bits != 32)) {
         throw EthercatError(fmt::format(

@@ -23,8 +23,8 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
 /// Target and greatest torque (6071, 6072) are zero until every drive that is to be enabled is, in
 /// cyclic synchronous torque; drives of faulted or disabled joints get none, and a quick stop when
 /// they are enabled. Receive gives counts, currents and states, of sensors what other slaves of the
-/// bus read, and nullptr in a cycle whose inputs are not whole. In it DRIVE_FAULT stands for a fault, STO, a mode that is not the
-/// one commanded, and a chain that is not in OP.
+/// bus read, and nullptr in a cycle whose inputs are not whole. In it DRIVE_FAULT stands for a
+/// fault, STO, a mode that is not the one commanded, and a chain that is not in OP.
 class EthercatDriveBus final : public DriveBus {
  public:
   /// `link` must outlive this. Throws EthercatError.

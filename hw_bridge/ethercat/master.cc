@@ -81,8 +81,7 @@ void Master::PlaceSlaves() {
                       other.name(), other.position(), count));
     }
     taken[other.position()] = true;
-    positions_[static_cast<size_t>(config_.drive_size() + i)] =
-        static_cast<int>(other.position());
+    positions_[static_cast<size_t>(config_.drive_size() + i)] = static_cast<int>(other.position());
   }
   for (size_t i = 0, at = 0; i < num_drives(); ++i, ++at) {
     while (taken[at]) ++at;
@@ -129,8 +128,8 @@ void Master::CheckCount() {
         "emulator running, the address right?");
   }
   if (static_cast<size_t>(*found) == num_slaves()) return;
-  const auto missing = static_cast<int>(
-      std::find(positions_.begin(), positions_.end(), *found) - positions_.begin());
+  const auto missing = static_cast<int>(std::find(positions_.begin(), positions_.end(), *found) -
+                                        positions_.begin());
   throw EthercatError(fmt::format(
       "the EtherCAT bus has {} slaves, the configuration {} drives{} (the first without a slave: "
       "{}); check cables and power, or the list of drives",
@@ -203,8 +202,8 @@ void Master::FindWiring() {
           slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
     }
   }
-  wiring_ = FindTopology(
-      ports, [&names](int position) { return names[static_cast<size_t>(position)]; });
+  wiring_ =
+      FindTopology(ports, [&names](int position) { return names[static_cast<size_t>(position)]; });
 }
 
 void Master::FindPositions() {
@@ -243,21 +242,17 @@ void Master::FindPositions() {
   for (size_t at = 0; at < num_slaves(); ++at) {
     SlaveAccess here(&transactions_, timeouts_, static_cast<int>(at),
                      static_cast<uint16_t>(kFirstStation + at));
-    std::string numbers;
-    for (size_t i = 0; i < num_slaves() && numbers.empty(); ++i) {
-      const auto found = read(here, wanted[i].what);
-      if (places[i] < 0 && found == wanted[i].number) {
-        places[i] = static_cast<int>(at);
-        numbers = "found";
-      }
+    bool known = false;
+    for (size_t i = 0; i < num_slaves() && !known; ++i) {
+      if (places[i] >= 0 || read(here, wanted[i].what) != wanted[i].number) continue;
+      places[i] = static_cast<int>(at);
+      known = true;
     }
-    if (numbers.empty()) {
-      const auto found = read(here, wanted[0].what);
-      throw EthercatError(
-          fmt::format("{}: its {} is {}, which no slave of the configuration has (or one that was "
-                      "found before)",
-                      here.Describe(), wanted[0].what, found ? std::to_string(*found) : "not given"));
-    }
+    if (known) continue;
+    const auto found = read(here, wanted[0].what);
+    throw EthercatError(fmt::format(
+        "{}: its {} is {}, which no slave of the configuration has (or one that was found before)",
+        here.Describe(), wanted[0].what, found ? std::to_string(*found) : "not given"));
   }
   positions_ = places;
   for (size_t i = 0; i < num_slaves(); ++i) {
@@ -298,8 +293,8 @@ void Master::SetUpDistributedClocks() {
 void Master::AwaitClocks() {
   const auto compensate = [this] {
     std::array<uint8_t, 8> time{};
-    const auto counter = transactions_.Execute(
-        Command::kFrmw, slaves_[clocks_.reference].station(), reg::kDcSystemTime, time);
+    const auto counter = transactions_.Execute(Command::kFrmw, slaves_[clocks_.reference].station(),
+                                               reg::kDcSystemTime, time);
     if (!counter) throw EthercatError("distributed clocks: no frame came back");
   };
   for (uint32_t i = 0; i < config_.drift_frames(); ++i) compensate();
@@ -323,12 +318,12 @@ void Master::AwaitClocks() {
 CycleResult Master::Pace() {
   Link* link = transactions_.link();
   if (next_cycle_ + int64_t{config_.cycle()} < link->Now()) next_cycle_ = link->Now();
-  static_cast<void>(Send());
-  const CycleResult result = Receive(link->Now() + Milliseconds(config_.frame_timeout()));
-  next_cycle_ += config_.cycle();
+  // What is asked of slaves meanwhile is asked within the cycle, after its frame.
   std::array<uint8_t, 1> ignored;
   while (link->Receive(ignored, next_cycle_) != 0) ++transactions_.mutable_counts()->unexpected;
-  return result;
+  next_cycle_ += config_.cycle();
+  static_cast<void>(Send());
+  return Receive(link->Now() + Milliseconds(config_.frame_timeout()));
 }
 
 void Master::GoOperational() {

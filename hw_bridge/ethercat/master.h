@@ -72,8 +72,8 @@ class Master {
   /// of earlier cycles are counted and dropped.
   CycleResult Receive(int64_t deadline);
 
-  /// Of the slave's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis; not while
-  /// an attendant speaks with it.
+  /// Of the slave's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis; not
+  /// while an attendant speaks with it.
   SlaveAccess& slave(size_t slave) { return slaves_[slave]; }
   /// A slave's place in the chain, 0 the first.
   int position(size_t slave) const { return positions_[slave]; }
@@ -95,7 +95,7 @@ class Master {
   void SetUpDistributedClocks();
   void AwaitClocks();
   void GoOperational();
-  /// Exchanges process data once and lets the rest of a cycle pass.
+  /// Exchanges process data at the next cycle's time.
   CycleResult Pace();
   bool Take(const FrameReader& reader, CycleResult* result);
   bool TakeAcyclic(FrameReader* reader);
@@ -108,8 +108,8 @@ class Master {
   Timeouts timeouts_;
   std::vector<SlaveAccess> slaves_;
   std::vector<Identity> identities_;
-  std::vector<int> positions_;       // by slave
-  std::vector<SlavePlace> wiring_;   // by position
+  std::vector<int> positions_;      // by slave
+  std::vector<SlavePlace> wiring_;  // by position
   ClockPlan clocks_;
   std::unique_ptr<Attendant> attendant_;
   std::vector<DriveOutputs> outputs_;
@@ -121,11 +121,11 @@ class Master {
   std::array<uint8_t, kMaxFrame> received_{};
   Exchange exchange_ = Exchange::kReadWrite;
   uint8_t cyclic_index_ = 0;
-  bool awaited_ = false;  // sent and not yet returned
+  bool awaited_ = false;             // sent and not yet returned
   std::optional<Datagram> acyclic_;  // the attendant's, in the frame under way
   bool operational_ = false;
-  bool trouble_ = false;  // the last frame was lost, or not all slaves were in OP
-  int64_t next_cycle_ = 0;              // ns, of Pace()
+  bool trouble_ = false;                   // the last frame was lost, or not all slaves were in OP
+  int64_t next_cycle_ = 0;                 // ns, of Pace()
   int64_t system_time_ = 0, seen_at_ = 0;  // ns: the reference clock's, and the link's time then
   int64_t short_working_counters_ = 0;
 };

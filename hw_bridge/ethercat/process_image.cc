@@ -71,12 +71,12 @@ ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile,
     if (object.index() > 0xFFFF || object.subindex() > 0xFF || object.bits() == 0 ||
         object.bits() > kMostBits || !aligned ||
         (standard != 0 && static_cast<int>(object.bits()) != standard)) {
-      throw EthercatError(fmt::format(
-          "drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
-          profile.name(), object.index(), object.subindex(), object.bits(),
-          !aligned        ? "; it must begin with a byte"
-          : standard != 0 ? fmt::format("; CiA 402 gives it {}", standard)
-                          : "; give 1 to 64 bits"));
+      throw EthercatError(
+          fmt::format("drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
+                      profile.name(), object.index(), object.subindex(), object.bits(),
+                      !aligned        ? "; it must begin with a byte"
+                      : standard != 0 ? fmt::format("; CiA 402 gives it {}", standard)
+                                      : "; give 1 to 64 bits"));
     }
     const auto own = static_cast<uint16_t>(pdo);
     if (direction.pdos.empty() || direction.pdos.back() != own) direction.pdos.push_back(own);
@@ -241,11 +241,11 @@ void ProcessImage::ConfigureDirection(const Direction& direction, uint16_t assig
   for (const uint16_t pdo : direction.pdos) access->Download({assign, ++count}, pdo, 2);
   access->Download({assign, 0}, count, 1);
   if (!Mapped(direction, assign, access)) {
-    throw EthercatError(fmt::format(
-        "{}: {} the mapping of PDO {:04X}{}", access->Describe(),
-        fixed ? "its own mapping is another than" : "accepts", direction.pdos.front(),
-        fixed ? " in the configuration; `poise drives scan` writes what it has"
-              : " but does not keep it; does the drive allow that PDO to be mapped?"));
+    throw EthercatError(
+        fmt::format("{}: {} the mapping of PDO {:04X}{}", access->Describe(),
+                    fixed ? "its own mapping is another than" : "accepts", direction.pdos.front(),
+                    fixed ? " in the configuration; `poise drives scan` writes what it has"
+                          : " but does not keep it; does the drive allow that PDO to be mapped?"));
   }
 }
 

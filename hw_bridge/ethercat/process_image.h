@@ -80,8 +80,8 @@ class ProcessImage {
   bool Sends(size_t slave, uint16_t index) const;
   bool Reports(size_t slave, uint16_t index) const;
 
-  /// Precondition of all: `image` has size() bytes. Objects that are not mapped are left out; a mode
-  /// that is not reported is the one that was asked for.
+  /// Precondition of all: `image` has size() bytes. Objects that are not mapped are left out; a
+  /// mode that is not reported is the one that was asked for.
   void Put(size_t slave, const DriveOutputs& outputs, std::span<uint8_t> image) const;
   DriveInputs Get(size_t slave, std::span<const uint8_t> image) const;
 

@@ -15,8 +15,8 @@ inline constexpr uint16_t kPortDescriptor = 0x0007;
 inline constexpr uint16_t kFeatures = 0x0008;  ///< bit 2: distributed clocks, bit 3: 64 bits wide
 inline constexpr uint16_t kStationAddress = 0x0010;
 inline constexpr uint16_t kStationAlias = 0x0012;
-inline constexpr uint16_t kDlControl = 0x0100;   ///< bit 0: frames of other types are destroyed
-inline constexpr uint16_t kLoopControl = 0x0101;  ///< two bits a port, 0: automatic
+inline constexpr uint16_t kDlControl = 0x0100;     ///< bit 0: frames of other types are destroyed
+inline constexpr uint16_t kLoopControl = 0x0101;   ///< two bits a port, 0: automatic
 inline constexpr uint16_t kAliasControl = 0x0103;  ///< bit 0: the station alias is an address too
 inline constexpr uint16_t kDlStatus = 0x0110;
 inline constexpr uint16_t kAlControl = 0x0120;
@@ -26,7 +26,7 @@ inline constexpr uint16_t kEventMask = 0x0200;      ///< of the event bits in ea
 inline constexpr uint16_t kReceiveErrors = 0x0300;  ///< a port: invalid frames, physical errors
 inline constexpr uint16_t kForwardedErrors = 0x0308;
 inline constexpr uint16_t kUnitErrors = 0x030C, kPdiErrors = 0x030D;
-inline constexpr uint16_t kLostLinks = 0x0310;  ///< a byte a port
+inline constexpr uint16_t kLostLinks = 0x0310;        ///< a byte a port
 inline constexpr uint16_t kWatchdogDivider = 0x0400;  ///< of 25 MHz, minus 2
 inline constexpr uint16_t kWatchdogPdi = 0x0410;
 inline constexpr uint16_t kWatchdogProcessData = 0x0420;  ///< units of the divider
@@ -102,7 +102,7 @@ inline constexpr uint16_t kCategoryEnd = 0xFFFF;
 enum class AlState : uint8_t { kInit = 1, kPreOp = 2, kBoot = 3, kSafeOp = 4, kOp = 8 };
 inline constexpr uint8_t kAlStateMask = 0x0F;
 inline constexpr uint8_t kAlIdentification = 0x20;  ///< request and answer of the identification
-inline constexpr uint8_t kAlError = 0x10;  ///< in the status; in the control: acknowledge
+inline constexpr uint8_t kAlError = 0x10;           ///< in the status; in the control: acknowledge
 
 /// AL status codes that a drive gives (ETG.1000.6, table 11).
 enum class AlStatusCode : uint16_t {

@@ -145,9 +145,9 @@ bool SlaveAccess::TryRequest(AlState state, int64_t deadline) {
   const auto wanted = static_cast<uint8_t>(state);
   // INIT may be asked for along with the acknowledgement; anything else waits for its effect.
   const bool at_once = !status.error || state == AlState::kInit;
-  const auto control = static_cast<uint8_t>(
-      at_once ? wanted | (status.error ? kAlError : 0)
-              : static_cast<uint8_t>(status.state) | kAlError);
+  const auto control =
+      static_cast<uint8_t>(at_once ? wanted | (status.error ? kAlError : 0)
+                                   : static_cast<uint8_t>(status.state) | kAlError);
   if (at_once) {
     acknowledged_ = false;
     if (WriteAlControl(control)) return true;

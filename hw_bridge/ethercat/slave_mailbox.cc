@@ -8,10 +8,10 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr size_t kExpedited = 4;          // bytes at most
+constexpr size_t kExpedited = 4;           // bytes at most
 constexpr size_t kMostObject = 64 * 1024;  // bytes that a slave may announce of one object
-constexpr size_t kInitiateBytes = 16;     // headers and the first eight bytes of a normal transfer
-constexpr size_t kSegmentBytes = 9;       // headers and command of a segment
+constexpr size_t kInitiateBytes = 16;      // headers and the first eight bytes of a normal transfer
+constexpr size_t kSegmentBytes = 9;        // headers and command of a segment
 constexpr size_t kLeastMailbox = kSdoMessage;
 
 std::string Text(ObjectAddress object) {
@@ -80,8 +80,8 @@ uint32_t SlaveAccess::Upload(ObjectAddress object, uint8_t* size) {
 }
 
 std::vector<uint8_t> SlaveAccess::UploadBytes(ObjectAddress object, bool complete) {
-  const std::string what = fmt::format("reading {}{}", ethercat::Text(object),
-                                       complete ? " with complete access" : "");
+  const std::string what =
+      fmt::format("reading {}{}", ethercat::Text(object), complete ? " with complete access" : "");
   const Sdo first = Exchange(
       {.command = SdoCommand::kUploadRequest, .object = object, .complete = complete}, what);
   std::vector<uint8_t> bytes;
@@ -95,9 +95,8 @@ std::vector<uint8_t> SlaveAccess::UploadBytes(ObjectAddress object, bool complet
   bytes.assign(first.data.begin(), first.data.end());
   bool toggle = false, last = false;
   while (bytes.size() < total && !last) {
-    const Sdo part =
-        Exchange({.command = SdoCommand::kUploadSegmentRequest, .object = object, .toggle = toggle},
-                 what);
+    const Sdo part = Exchange(
+        {.command = SdoCommand::kUploadSegmentRequest, .object = object, .toggle = toggle}, what);
     if (part.toggle != toggle) Fail(what + ": a segment came twice (toggle bit not changed)");
     bytes.insert(bytes.end(), part.data.begin(), part.data.end());
     last = part.last;
@@ -118,10 +117,9 @@ void SlaveAccess::Download(ObjectAddress object, uint32_t value, uint8_t size) {
 
 void SlaveAccess::DownloadBytes(ObjectAddress object, std::span<const uint8_t> data,
                                 bool complete) {
-  const std::string what = fmt::format("writing {}{}", ethercat::Text(object),
-                                       complete ? " with complete access" : "");
-  Sdo request{
-      .command = SdoCommand::kDownloadRequest, .object = object, .complete = complete};
+  const std::string what =
+      fmt::format("writing {}{}", ethercat::Text(object), complete ? " with complete access" : "");
+  Sdo request{.command = SdoCommand::kDownloadRequest, .object = object, .complete = complete};
   if (data.size() <= kExpedited) {
     request.size = static_cast<uint8_t>(data.size());
     request.value = static_cast<uint32_t>(GetSized(data, 0, data.size()));
@@ -181,8 +179,8 @@ std::optional<CoeMessage> SlaveAccess::TakeReceived(const std::string& what) {
   if (message->counter != 0 && message->counter == received_counter_) return std::nullopt;
   received_counter_ = message->counter;
   if (message->type == MailboxType::kError) {
-    const auto detail = static_cast<uint16_t>(
-        message->payload.size() < 4 ? 0 : Get<uint16_t>(message->payload, 2));
+    const auto detail =
+        static_cast<uint16_t>(message->payload.size() < 4 ? 0 : Get<uint16_t>(message->payload, 2));
     Fail(fmt::format("{}: mailbox error 0x{:04X} ({})", what, detail, MailboxErrorText(detail)));
   }
   if (message->type != MailboxType::kCoe) return std::nullopt;

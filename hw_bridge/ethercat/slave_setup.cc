@@ -37,9 +37,10 @@ std::vector<uint8_t> BytesOf(const SdoValue& value) {
   const int64_t range = int64_t{1} << (8 * size);
   const int64_t least = is_signed ? -range / 2 : 0, most = is_signed ? range / 2 - 1 : range - 1;
   if (!value.has_value() || value.value() < least || value.value() > most) {
-    throw EthercatError(fmt::format("EtherCAT configuration: sdo {:04X}:{:02X}: value must be "
-                                    "between {} and {} for its type",
-                                    value.index(), value.subindex(), least, most));
+    throw EthercatError(
+        fmt::format("EtherCAT configuration: sdo {:04X}:{:02X}: value must be "
+                    "between {} and {} for its type",
+                    value.index(), value.subindex(), least, most));
   }
   std::vector<uint8_t> bytes(size);
   PutSized(bytes, 0, static_cast<uint64_t>(value.value()), size);

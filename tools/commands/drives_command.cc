@@ -8,6 +8,7 @@
 #include "hw_bridge/ethercat/emulator/rotor_chain.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/commands/drives_scan.h"
@@ -38,8 +39,8 @@ ethercat::LinkConfig ParseLink(const std::string& text) {
     return link;
   }
   if (text != "udp" && !text.starts_with("udp:")) {
-    throw ConfigError(fmt::format(
-        "--link {}: must be udp, udp:PORT, udp:ADDRESS:PORT, or raw:INTERFACE", text));
+    throw ConfigError(
+        fmt::format("--link {}: must be udp, udp:PORT, udp:ADDRESS:PORT, or raw:INTERFACE", text));
   }
   link.mutable_udp();
   if (text == "udp") return link;
@@ -62,8 +63,8 @@ std::unique_ptr<ethercat::SocketLink> OpenSlaves(const ethercat::LinkConfig& con
     return std::make_unique<ethercat::RawLink>(config.interface(),
                                                ethercat::RawLink::Side::kSlaves);
   }
-  return ethercat::UdpLink::Listen({.address = config.udp().address(),
-                                    .port = static_cast<uint16_t>(config.udp().port())});
+  return ethercat::UdpLink::Listen(
+      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
 }
 
 ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
@@ -99,8 +100,8 @@ void Show(ethercat::RotorChain* drives, int64_t frames, double seconds) {
     torque = std::max(torque, std::abs(drives->rotor(i).torque()));
     speed = std::max(speed, std::abs(drives->rotor(i).velocity()));
   }
-  fmt::print("{:6.0f} s  {:6} frames/s  {}  torque at most {:.3f} N·m, speed {:.1f} rad/s\n", seconds,
-             frames, states, torque, speed);
+  fmt::print("{:6.0f} s  {:6} frames/s  {}  torque at most {:.3f} N·m, speed {:.1f} rad/s\n",
+             seconds, frames, states, torque, speed);
   std::fflush(stdout);
 }
 
@@ -112,9 +113,8 @@ int Emulate(const DrivesOptions& options) {
              options.link);
   std::fflush(stdout);
   const int64_t start = link->Now();
-  const auto end = options.duration > 0
-                       ? start + static_cast<int64_t>(options.duration * 1e9)
-                       : INT64_MAX;
+  const auto end =
+      options.duration > 0 ? start + static_cast<int64_t>(options.duration * 1e9) : INT64_MAX;
   std::array<uint8_t, ethercat::kMaxFrame> frame{};
   int64_t shown = start, frames = 0;
   while (StopSignal() == 0 && link->Now() < end) {

@@ -20,9 +20,8 @@ namespace reg = ethercat::reg;
 constexpr uint16_t kFirstStation = 1001;
 constexpr int64_t kFrameTimeout = 20 * kMillisecond;
 constexpr int kAttempts = 3;
-constexpr ethercat::Timeouts kTimeouts = {.eeprom = 200 * kMillisecond,
-                                          .mailbox = 1000 * kMillisecond,
-                                          .state = 5000 * kMillisecond};
+constexpr ethercat::Timeouts kTimeouts = {
+    .eeprom = 200 * kMillisecond, .mailbox = 1000 * kMillisecond, .state = 5000 * kMillisecond};
 
 /// The object's value; nullopt: the slave has none.
 std::optional<uint32_t> UploadIfThere(SlaveAccess* slave, ethercat::ObjectAddress address) {
@@ -85,12 +84,10 @@ std::string ProfileText(const ScannedSlave& slave, const std::string& indent) {
                            const std::vector<uint16_t>& pdos) {
     for (size_t i = 0; i < mapping.size(); ++i) {
       const uint32_t subindex = mapping[i] >> 8 & 0xFF;
-      text += fmt::format("{}  {} {{ index: 0x{:04X}{} bits: {}{} }}\n", indent, field,
-                          mapping[i] >> 16,
-                          subindex != 0 ? fmt::format(" subindex: {}", subindex) : "",
-                          mapping[i] & 0xFF,
-                          i == 0 || pdos[i] != pdos[i - 1] ? fmt::format(" pdo: 0x{:04X}", pdos[i])
-                                                           : "");
+      text += fmt::format(
+          "{}  {} {{ index: 0x{:04X}{} bits: {}{} }}\n", indent, field, mapping[i] >> 16,
+          subindex != 0 ? fmt::format(" subindex: {}", subindex) : "", mapping[i] & 0xFF,
+          i == 0 || pdos[i] != pdos[i - 1] ? fmt::format(" pdo: 0x{:04X}", pdos[i]) : "");
     }
   };
   entries("rx", slave.rx, slave.rx_pdo);
@@ -122,17 +119,15 @@ std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
     const auto station = static_cast<uint16_t>(kFirstStation + i);
     std::array<uint8_t, 2> bytes{};
     ethercat::Put<uint16_t>(bytes, 0, station);
-    static_cast<void>(transactions.Execute(ethercat::Command::kApwr,
-                                           ethercat::AutoIncrementAddress(i), reg::kStationAddress,
-                                           bytes));
+    static_cast<void>(transactions.Execute(
+        ethercat::Command::kApwr, ethercat::AutoIncrementAddress(i), reg::kStationAddress, bytes));
     SlaveAccess& slave = slaves.emplace_back(&transactions, kTimeouts, i, station);
     slave.AwaitInit();
     ethercat::SlavePorts& own = ports.emplace_back();
     own.dl_status = slave.Read<uint16_t>(reg::kDlStatus);
     own.has_times = ethercat::HasClock(&slave);
     for (size_t port = 0; own.has_times && port < own.times.size(); ++port) {
-      own.times[port] =
-          slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
+      own.times[port] = slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
     }
   }
   const auto places = ethercat::FindTopology(
@@ -149,17 +144,17 @@ std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
 std::string ConfigurationOf(const std::vector<ScannedSlave>& slaves) {
   std::string text =
       "# proto-message: poise.ethercat.MasterConfig (hw_bridge/ethercat/ethercat.proto)\n"
-      "# Written by poise drives scan: what is on the chain. Name the joints, and see which of the\n"
+      "# Written by poise drives scan: what is on the chain. Name the joints, and see which of "
+      "the\n"
       "# mappings carry what the bridge needs (6040 6071; 6041 6064 6077).\n";
   for (size_t i = 0; i < slaves.size(); ++i) {
     const ScannedSlave& slave = slaves[i];
-    text += fmt::format("\n# {}: {}, serial {}, revision 0x{:08X}{}{}\n", i,
-                        slave.name.empty() ? "no name" : slave.name, slave.identity.serial,
-                        slave.identity.revision,
-                        slave.parent < 0 ? ""
-                                         : fmt::format(", at port {} of slave {}",
-                                                       slave.parent_port, slave.parent),
-                        slave.is_drive ? "" : ", no drive with cyclic synchronous torque");
+    text += fmt::format(
+        "\n# {}: {}, serial {}, revision 0x{:08X}{}{}\n", i,
+        slave.name.empty() ? "no name" : slave.name, slave.identity.serial, slave.identity.revision,
+        slave.parent < 0 ? ""
+                         : fmt::format(", at port {} of slave {}", slave.parent_port, slave.parent),
+        slave.is_drive ? "" : ", no drive with cyclic synchronous torque");
     std::string fields;
     if (slave.identity.serial != 0) fields += fmt::format("  serial: {}\n", slave.identity.serial);
     if (slave.identification) {

@@ -8,10 +8,10 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr size_t kExpedited = 4;        // bytes at most
-constexpr size_t kMostObject = 4096;    // bytes of an object that the master may announce
-constexpr size_t kInitiateBytes = 16;   // headers and the first eight bytes of a normal transfer
-constexpr size_t kSegmentBytes = 9;     // headers and command of a segment
+constexpr size_t kExpedited = 4;       // bytes at most
+constexpr size_t kMostObject = 4096;   // bytes of an object that the master may announce
+constexpr size_t kInitiateBytes = 16;  // headers and the first eight bytes of a normal transfer
+constexpr size_t kSegmentBytes = 9;    // headers and command of a segment
 constexpr uint8_t kCodeVariable = 7, kCodeRecord = 9;
 
 }  // namespace
@@ -79,9 +79,8 @@ void CoeServer::BeginUpload(const Sdo& sdo) {
     abort = objects_->ReadComplete(sdo.object, &data_);
   }
   if (abort != SdoAbort::kNone) return Abort(sdo.object, abort);
-  Sdo answer{.command = SdoCommand::kUploadResponse,
-             .object = sdo.object,
-             .complete = sdo.complete};
+  Sdo answer{
+      .command = SdoCommand::kUploadResponse, .object = sdo.object, .complete = sdo.complete};
   if (data_.size() <= kExpedited && !data_.empty()) {
     answer.size = static_cast<uint8_t>(data_.size());
     answer.value = static_cast<uint32_t>(GetSized(data_, 0, data_.size()));

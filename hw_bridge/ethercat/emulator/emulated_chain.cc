@@ -31,10 +31,11 @@ EmulatedChain::EmulatedChain(const EmulatedChainConfig& config, std::span<MotorL
     const bool swapped = parent < i && config_.drive(static_cast<int>(parent)).swapped();
     const size_t port = swapped && drive.port() == 1 ? 0 : drive.port();
     if (parent >= i || port >= kNumPorts || behind_[parent][port] >= 0) {
-      throw EthercatError(fmt::format(
-          "emulated slave {}: it cannot hang at port {} of slave {}: that is none before it, or the "
-          "port is taken",
-          i, port, parent));
+      throw EthercatError(
+          fmt::format("emulated slave {}: it cannot hang at port {} of slave {}: that is none "
+                      "before it, or the "
+                      "port is taken",
+                      i, port, parent));
     }
     behind_[parent][port] = static_cast<int>(i);
   }

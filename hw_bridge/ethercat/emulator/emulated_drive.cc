@@ -61,8 +61,8 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
     dictionary->Add({0x60C2, 2}, 1, kRw, 0xFD)->is_signed = true;
     dictionary->SetName(0x60C2, "Interpolation time period");
   }
-  for (Object* object : {mode_, mode_display_, target_torque_, torque_object_, position_,
-                         velocity_}) {
+  for (Object* object :
+       {mode_, mode_display_, target_torque_, torque_object_, position_, velocity_}) {
     object->is_signed = true;
   }
   Schedule(DriveState::kSwitchOnDisabled, 0);

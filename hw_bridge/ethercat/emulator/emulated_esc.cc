@@ -70,7 +70,7 @@ EmulatedEsc::EmulatedEsc(const Options& options) : options_(options) {
   memory_[reg::kFmmuCount] = kNumFmmus;
   memory_[reg::kSyncManagerCount] = kNumSyncManagers;
   memory_[reg::kRamSize] = 8;
-  memory_[reg::kPortDescriptor] = 0xFF;                        // all ports are MII
+  memory_[reg::kPortDescriptor] = 0xFF;                       // all ports are MII
   memory_[reg::kFeatures] = options.has_clock ? 0x0C : 0x00;  // distributed clocks, 64 bits
   Put<uint16_t>(memory_, reg::kStationAlias, options.alias);
   memory_[reg::kDlControl] = 1;  // frames of other types are destroyed

@@ -40,8 +40,7 @@ std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
   }
   add(kOutputsStart, 0, kSmProcessOut, 3);
   add(kInputsStart, 0, kSmProcessIn, 4);
-  words.insert(words.end(),
-               {sii::kCategorySyncManagers, static_cast<uint16_t>(managers.size())});
+  words.insert(words.end(), {sii::kCategorySyncManagers, static_cast<uint16_t>(managers.size())});
   words.insert(words.end(), managers.begin(), managers.end());
   words.push_back(sii::kCategoryEnd);
   return words;
@@ -121,7 +120,7 @@ void EmulatedSlave::AddCommonObjects() {
   name(0x1C00, "Sync manager type");
   // Sync manager parameters (ETG.1020): synchronised by SYNC0, cycle as SYNC0 has it.
   for (const uint16_t index : {uint16_t{0x1C32}, uint16_t{0x1C33}}) {
-    constexpr uint32_t kDcSync0 = 2, kSupported = 0x0006;  // SM event and SYNC0
+    constexpr uint32_t kDcSync0 = 2, kSupported = 0x0006;          // SM event and SYNC0
     constexpr uint32_t kCycle = 2'000'000, kLeastCycle = 125'000;  // ns
     objects_.Add({index, 0}, 1, kReadOnly, 0x20);
     objects_.Add({index, 1}, 2, kRw, kDcSync0);
@@ -144,11 +143,10 @@ void EmulatedSlave::AddAssignment(uint16_t assign, const std::vector<uint16_t>& 
                                   const std::vector<uint16_t>& allowed) {
   constexpr uint8_t kRw = ObjectDictionary::kWritable;
   objects_.SetName(assign, assign == object::kRxAssign ? "RxPDO assign" : "TxPDO assign");
-  objects_.Add({assign, 0}, 1, kRw, static_cast<uint32_t>(assigned.size()),
-               [this](uint32_t count) {
-                 if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-                 return count <= kMostAssigned ? SdoAbort::kNone : SdoAbort::kValueRange;
-               });
+  objects_.Add({assign, 0}, 1, kRw, static_cast<uint32_t>(assigned.size()), [this](uint32_t count) {
+    if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
+    return count <= kMostAssigned ? SdoAbort::kNone : SdoAbort::kValueRange;
+  });
   for (uint8_t i = 1; i <= kMostAssigned; ++i) {
     const uint32_t pdo = i <= assigned.size() ? assigned[i - 1U] : 0U;
     objects_.Add({assign, i}, 2, kRw, pdo, [=, this](uint32_t value) {
@@ -234,8 +232,7 @@ EmulatedSlave::ProcessData EmulatedSlave::FindMapped(uint16_t assign) {
   ProcessData data;
   const uint32_t pdos = objects_.Find({assign, 0})->value;
   for (uint32_t p = 1; p <= pdos; ++p) {
-    const auto pdo =
-        static_cast<uint16_t>(objects_.Find({assign, static_cast<uint8_t>(p)})->value);
+    const auto pdo = static_cast<uint16_t>(objects_.Find({assign, static_cast<uint8_t>(p)})->value);
     const Object* count = objects_.Find({pdo, 0});
     for (uint32_t i = 1; count != nullptr && i <= count->value; ++i) {
       const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
@@ -396,8 +393,7 @@ void EmulatedSlave::AnswerMailbox() {
   if (!request_) {
     const std::span<const uint8_t> bytes = esc_.TakeMailbox();
     const std::optional<MailboxMessage> message = DecodeMailbox(bytes);
-    const bool repeated =
-        message && message->counter != 0 && message->counter == request_counter_;
+    const bool repeated = message && message->counter != 0 && message->counter == request_counter_;
     if (message && !repeated) {
       request_counter_ = message->counter;
       reply_at_ = now_ + Nanoseconds(config_.mailbox_time() * 1e-3);

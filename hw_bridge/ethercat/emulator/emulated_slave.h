@@ -1,5 +1,5 @@
-// EmulatedSlave: slave controller, AL state machine, CoE mailbox and process data of one drive, or of
-// another slave.
+// EmulatedSlave: slave controller, AL state machine, CoE mailbox and process data of one drive, or
+// of another slave.
 #pragma once
 
 #include <array>
@@ -89,7 +89,7 @@ class EmulatedSlave {
   std::optional<int64_t> control_seen_at_;  // ns, of AL control that is not yet looked at
 
   ProcessData outputs_, inputs_;  // as mapped when SAFE-OP was entered
-  bool outputs_pending_ = false;           // written, to be applied at SYNC0
+  bool outputs_pending_ = false;  // written, to be applied at SYNC0
 
   std::optional<std::vector<uint8_t>> request_;  // a CoE payload, answered at reply_at_
   int64_t reply_at_ = 0;

@@ -132,8 +132,7 @@ SdoAbort ObjectDictionary::WriteComplete(ObjectAddress address, std::span<const 
     if (object == nullptr) return SdoAbort::kLengthTooHigh;
     const size_t size = object->size > 0 ? object->size : data.size() - at;
     if (data.size() - at < size) return SdoAbort::kLengthTooLow;
-    const SdoAbort abort =
-        Write({address.index, static_cast<uint8_t>(i)}, data.subspan(at, size));
+    const SdoAbort abort = Write({address.index, static_cast<uint8_t>(i)}, data.subspan(at, size));
     if (abort != SdoAbort::kNone) return abort;
     at += size;
   }

@@ -1,5 +1,5 @@
-// CoE to the letter: the slave's answers as bytes of ETG.1000.6, and the master against a slave that
-// answers with such bytes, written here by hand.
+// CoE to the letter: the slave's answers as bytes of ETG.1000.6, and the master against a slave
+// that answers with such bytes, written here by hand.
 #include <gmock/gmock.h>
 
 #include <functional>
@@ -18,12 +18,9 @@ using Bytes = std::vector<uint8_t>;
 /// A mailbox message of CoE: its header (ETG.1000.4: length, address, channel and priority, type 3
 /// and counter), then `coe`.
 Bytes Message(uint8_t counter, const Bytes& coe) {
-  Bytes bytes = {static_cast<uint8_t>(coe.size()),
-                 static_cast<uint8_t>(coe.size() >> 8),
-                 0,
-                 0,
-                 0,
-                 static_cast<uint8_t>(0x03 | counter << 4)};
+  Bytes bytes = {
+      static_cast<uint8_t>(coe.size()),         static_cast<uint8_t>(coe.size() >> 8), 0, 0, 0,
+      static_cast<uint8_t>(0x03 | counter << 4)};
   bytes.insert(bytes.end(), coe.begin(), coe.end());
   return bytes;
 }
@@ -131,9 +128,9 @@ TEST_F(CoeSlave, DownloadsInSegments) {
 // Complete access (bit 4): subindex 0 as two bytes, then the others without gaps.
 TEST_F(CoeSlave, UploadsCompletely) {
   const Bytes answer = Ask({0x00, 0x20, 0x50, 0x18, 0x10, 0x00, 0, 0, 0, 0});
-  EXPECT_THAT(answer, ElementsAreArray({0x00, 0x30, 0x51, 0x18, 0x10, 0x00, 0x12, 0, 0, 0,  //
-                                        0x04, 0x00,                                        //
-                                        0x9A, 0x00, 0x00, 0x00, 0x24, 0x09, 0x03, 0x00,    //
+  EXPECT_THAT(answer, ElementsAreArray({0x00, 0x30, 0x51, 0x18, 0x10, 0x00, 0x12, 0,    0, 0,  //
+                                        0x04, 0x00,                                            //
+                                        0x9A, 0x00, 0x00, 0x00, 0x24, 0x09, 0x03, 0x00,        //
                                         0x20, 0x04, 0x01, 0x00, 0x64, 0x00, 0x00, 0x00}));
   // From subindex 1; from 2 there is no such thing.
   EXPECT_EQ(Ask({0x00, 0x20, 0x50, 0x18, 0x10, 0x01, 0, 0, 0, 0}).size(), 10U + 16U);
@@ -161,13 +158,13 @@ TEST_F(CoeSlave, HasWhatMastersLookFor) {
   };
   // ETG.1000.6 and ETG.1020: error register, synchronisation by SYNC0 (2) and its cycle; CiA 402:
   // slow down on the quick stop ramp (2), 2 x 10^-3 s.
-  const Row rows[] = {{0x1001, 0, 0x4F, 0},    {0x1C32, 0, 0x4F, 0x20}, {0x1C32, 1, 0x4B, 2},
-                      {0x1C33, 2, 0x43, 2'000'000}, {0x605A, 0, 0x4B, 2},    {0x60C2, 1, 0x4F, 2},
+  const Row rows[] = {{0x1001, 0, 0x4F, 0},    {0x1C32, 0, 0x4F, 0x20},
+                      {0x1C32, 1, 0x4B, 2},    {0x1C33, 2, 0x43, 2'000'000},
+                      {0x605A, 0, 0x4B, 2},    {0x60C2, 1, 0x4F, 2},
                       {0x60C2, 2, 0x4F, 0xFD}, {0x6087, 0, 0x43, 3'000'000}};
   for (const Row& row : rows) {
-    const Bytes answer =
-        Ask({0x00, 0x20, 0x40, static_cast<uint8_t>(row.index),
-             static_cast<uint8_t>(row.index >> 8), row.subindex, 0, 0, 0, 0});
+    const Bytes answer = Ask({0x00, 0x20, 0x40, static_cast<uint8_t>(row.index),
+                              static_cast<uint8_t>(row.index >> 8), row.subindex, 0, 0, 0, 0});
     EXPECT_EQ(answer[2], row.command) << std::hex << row.index;
     EXPECT_EQ(Get<uint32_t>(answer, 6), row.value) << std::hex << row.index;
   }
@@ -274,8 +271,8 @@ struct ScriptedAccess {
   explicit ScriptedAccess(ScriptedSlave::Script script)
       : link(std::move(script)),
         transactions(&link, kMillisecond, 3),
-        slave(&transactions,
-              {.eeprom = kSecond, .mailbox = 50 * kMillisecond, .state = kSecond}, 0, 1001) {
+        slave(&transactions, {.eeprom = kSecond, .mailbox = 50 * kMillisecond, .state = kSecond}, 0,
+              1001) {
     EXPECT_TRUE(slave.SetUpMailbox());
   }
   ScriptedSlave link;

@@ -49,13 +49,13 @@ class LinkCut : public ::testing::TestWithParam<double> {};
 TEST_P(LinkCut, LeadsTheDrivesBackToOp) {
   AttendedBench bench(12);
   bench.Run();
-  bench.chain->CutAfter(0);
+  bench.faulty->set_faults({.lost_out = 1});
   bench.Cycles(GetParam());
   for (size_t i = 0; i < 12; ++i) {
     EXPECT_EQ(bench.loads[i].torque_, 0) << i;  // their watchdogs
     EXPECT_EQ(bench.chain->slave(i).al_state(), AlState::kSafeOp);
   }
-  bench.chain->CutAfter(12);
+  bench.faulty->set_faults({});
   const int cycles = bench.CyclesUntilWhole();
   EXPECT_GE(cycles, 0);
   EXPECT_LT(cycles, 500) << "a second";

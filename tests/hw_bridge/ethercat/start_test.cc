@@ -1,4 +1,5 @@
-// What a master does to the registers of its slaves on the way to OP and back, as the wire shows it.
+// What a master does to the registers of its slaves on the way to OP and back, as the wire shows
+// it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +27,10 @@ class WatchLink final : public Link {
   bool Send(std::span<const uint8_t> frame) override {
     FrameReader reader(frame);
     while (const auto datagram = reader.Next()) {
-      sent.push_back({Now(), datagram->command, datagram->adp, datagram->ado,
+      sent.push_back({Now(),
+                      datagram->command,
+                      datagram->adp,
+                      datagram->ado,
                       {datagram->data.begin(), datagram->data.end()}});
     }
     return link_->Send(frame);
@@ -55,6 +59,10 @@ struct WatchedBench : Bench {
     Bench::Build();
     watch = std::make_unique<WatchLink>(link.get());
     master = std::make_unique<Master>(watch.get(), master_config);
+  }
+  void Start() {
+    Build();
+    master->Start();
   }
   std::unique_ptr<WatchLink> watch;
 };
@@ -208,16 +216,14 @@ TEST(EthercatStart, WaitsUntilTheClocksSayThatTheyAgree) {
     drive.set_clock_start(1'000'000 * i);
   }
   bench.Start();
-  const auto start = std::find_if(bench.watch->sent.begin(), bench.watch->sent.end(),
-                                  [](const auto& each) {
-                                    return each.ado == reg::kDcActivation &&
-                                           !each.data.empty() && each.data[0] == 3;
-                                  });
-  const auto asked = std::find_if(bench.watch->sent.begin(), bench.watch->sent.end(),
-                                  [](const auto& each) {
-                                    return each.ado == reg::kDcDifference &&
-                                           each.command == Command::kFprd;
-                                  });
+  const auto start =
+      std::find_if(bench.watch->sent.begin(), bench.watch->sent.end(), [](const auto& each) {
+        return each.ado == reg::kDcActivation && !each.data.empty() && each.data[0] == 3;
+      });
+  const auto asked =
+      std::find_if(bench.watch->sent.begin(), bench.watch->sent.end(), [](const auto& each) {
+        return each.ado == reg::kDcDifference && each.command == Command::kFprd;
+      });
   ASSERT_TRUE(start != bench.watch->sent.end());
   EXPECT_LT(asked->time, start->time);
   for (size_t i = 1; i < 3; ++i) {

@@ -70,9 +70,9 @@ TEST(Topology, NamesWhatCannotBe) {
                      {.dl_status = Open({0, 1}), .has_times = true, .times = {40, 20, 0, 0}}}),
               AllOf(HasSubstr("slave 2"), HasSubstr("swapped")));
   // The same without clocks: its place in the chain does not fit its ports.
-  EXPECT_THAT(error({{.dl_status = Open({0, 1})}, {.dl_status = Open({0})},
-                     {.dl_status = Open({0, 1})}}),
-              AllOf(HasSubstr("slave 2"), HasSubstr("no slave before it has an open port")));
+  EXPECT_THAT(
+      error({{.dl_status = Open({0, 1})}, {.dl_status = Open({0})}, {.dl_status = Open({0, 1})}}),
+      AllOf(HasSubstr("slave 2"), HasSubstr("no slave before it has an open port")));
   EXPECT_THAT(error({{.dl_status = Open({0, 1, 2})}, {.dl_status = Open({0})}}),
               AllOf(HasSubstr("slave 0"), HasSubstr("port 2 is open, but no slave answers")));
 }
@@ -198,7 +198,8 @@ TEST(EthercatWiring, RunsADriveWhosePdosLackMaxTorqueAndMode) {
   EXPECT_NEAR(without.loads[0].torque_, 2 * 1.5, 1e-9);
 }
 
-// The drive texts of deploy/drives, each with a drive that has what the text says and lacks the rest.
+// The drive texts of deploy/drives, each with a drive that has what the text says and lacks the
+// rest.
 TEST(EthercatWiring, RunsTheDrivesOfTheDriveTexts) {
   for (const std::string name : {"elmo_gold", "maxon_epos4", "synapticon_somanet"}) {
     Bench bench(2);
@@ -296,7 +297,8 @@ TEST(EthercatWiring, RunsSlavesThatAreNoDrives) {
   forces.set_name("six axes");
   forces.set_vendor_id(0x732);
   forces.set_product_code(0x26483052);
-  Map(forces.mutable_tx(), {{0x6000, 1, 32, 0x1A00}, {0x6000, 2, 32, 0x1A00}, {0x6010, 0, 32, 0x1A01}});
+  Map(forces.mutable_tx(),
+      {{0x6000, 1, 32, 0x1A00}, {0x6000, 2, 32, 0x1A00}, {0x6010, 0, 32, 0x1A01}});
 
   const EmulatedChainConfig drives = bench.chain_config;
   bench.chain_config.clear_drive();
