@@ -112,7 +112,9 @@ TEST(EthercatWiring, RefusesADriveWhoseCablesAreSwapped) {
       EXPECT_THAT(error, HasSubstr("swapped")) << swapped << clocks;
       for (const TestLoad& load : bench.loads) EXPECT_EQ(load.torque_, 0);
       // It answers after those behind it.
-      if (clocks) EXPECT_THAT(error, HasSubstr("slave 3"));
+      if (clocks) {
+        EXPECT_THAT(error, HasSubstr("slave 3"));
+      }
     }
   }
 }
