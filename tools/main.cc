@@ -79,6 +79,7 @@ int main(int argc, char** argv) {
   poise::AddRobotCommand(&app, &command);
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
+  poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);

@@ -278,6 +278,9 @@ void DriveEmulator::Apply(Trouble* trouble, bool active) {
     case DriveTrouble::STO:
       slave.drive().SetSto(active);
       break;
+    case DriveTrouble::RESTART:
+      active ? chain_->PowerOff(trouble->slave) : chain_->PowerOn(trouble->slave);
+      break;
     case DriveTrouble::FROZEN_ENCODER:
       slave.drive().FreezeEncoder(active);
       break;

@@ -100,8 +100,9 @@ class BridgeRig {
                   {"urdf", ReadText("robots/dyros/dyros_legs.urdf")}};
     ComponentContext context;
     context.name = "hw_bridge";
-    context.config_text = "ethercat { link { udp {} } master { drift_frames: 200 profile {" +
-                          ReadText("drives/elmo_gold.pbtxt") + "} } } " + config_;
+    context.config_text =
+        "ethercat { link { udp {} } attend: false master { drift_frames: 200 profile {" +
+        ReadText("drives/elmo_gold.pbtxt") + "} } } " + config_;
     context.tick_period = 0.002;
     context.resources = &resources_;
     context.shared = &shared_;

@@ -35,6 +35,7 @@ void AddRobotCommand(CLI::App* app, Command* command);
 void AddRobotImport(CLI::App* robot, Command* command);
 void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
+void AddDrivesCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
