@@ -19,7 +19,6 @@ namespace {
 
 using ethercat::EthercatError;
 using ethercat::kMillisecond;
-using ethercat::kSecond;
 
 struct DrivesOptions {
   std::string link = "udp";
@@ -126,7 +125,7 @@ int Emulate(const DrivesOptions& options) {
     } else if (drives.HandleFrame(bytes, now)) {
       static_cast<void>(link->Send(bytes));
     }
-    if (link->Now() - shown < kSecond) continue;
+    if (link->Now() - shown < ethercat::kSecond) continue;
     shown = link->Now();
     Show(&drives, drives.chain().frames() - frames, static_cast<double>(now) * 1e-9);
     frames = drives.chain().frames();
