@@ -167,7 +167,7 @@ TEST(Defects, FiveJointsInALegAreRefusedByName) {
     FAIL();
   } catch (const robot::RobotError& error) {
     EXPECT_THAT(error.what(), HasSubstr("5 joints"));
-    EXPECT_THAT(error.what(), HasSubstr("right_knee_joint"));
+    EXPECT_THAT(error.what(), HasSubstr("left_knee_joint"));
     EXPECT_THAT(error.what(), HasSubstr("needs six"));
   }
 }

@@ -70,9 +70,10 @@ std::string BipedMjcf() {
       "0.1'/>";
   for (const auto& [s, y] : {std::pair{"left", 0.1}, std::pair{"right", -0.1}}) {
     const std::string side = s;
+    // Masses lie above the sole, 0.08 m below the ankle: the foot alone reaches lowest.
     const auto body = [&](const std::string& name, const std::string& at, const std::string& axis) {
       return "<body name='" + side + name + "' pos='" + at +
-             "' childclass='leg'><inertial pos='0 0 -0.1' "
+             "' childclass='leg'><inertial pos='0 0 -0.05' "
              "mass='2' diaginertia='0.02 0.02 0.01'/><joint name='" +
              side + name + "_joint' axis='" + axis + "'/>";
     };

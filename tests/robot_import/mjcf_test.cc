@@ -129,7 +129,7 @@ TEST(Mjcf, IsRefusedByLineAndName) {
     }
   };
   EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 nan 0\"")),
-              HasSubstr("line 25: axis of <joint>"));
+              HasSubstr("line 23: axis of <joint>"));
   EXPECT_THAT(problem(With("childclass=\"big\"", "childclass=\"huge\"")), HasSubstr("'huge'"));
   EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><frame/>")), HasSubstr("<frame>"));
   EXPECT_THAT(problem(With("<body name=\"fore\"", "<body name=\"upper\"")), HasSubstr("'upper'"));

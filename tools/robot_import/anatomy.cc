@@ -50,8 +50,8 @@ void CheckLeg(const robot::LinkTree& tree, const Leg& leg) {
   }
   throw robot::RobotError(
       fmt::format("{}: the leg to '{}' has {} joints ({}): its foot cannot make a six-dimensional "
-                  "contact, a leg "
-                  "that balances needs six",
+                  "contact, a leg that balances needs six; if another link is the foot, name both "
+                  "with --right-foot and --left-foot",
                   tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
                   names.empty() ? "none" : names));
 }

@@ -89,6 +89,37 @@ Vector3d PlaneNormal(const std::vector<Vector3d>& points, const Vector3d& down) 
   return normal.dot(down) < 0 ? Vector3d(-normal) : normal;
 }
 
+/// What is down after the foot, which touches with a corner or an edge, has rolled over it by the
+/// least angle that lets another point touch; zero where there is none.
+Vector3d Rolled(const std::vector<Vector3d>& points, const std::vector<Vector3d>& touching,
+                const Vector3d& down) {
+  Vector3d pivot = touching.front();
+  for (const Vector3d& p : touching) {
+    if (p.dot(down) > pivot.dot(down)) pivot = p;
+  }
+  Vector3d along = Vector3d::Zero();  // the edge: to the touching point that is farthest away
+  for (const Vector3d& p : touching) {
+    if ((p - pivot).norm() > along.norm()) along = p - pivot;
+  }
+  const bool edge = along.norm() > 2 * kLeastSpread;
+  along.normalize();
+  Vector3d rolled = Vector3d::Zero();
+  double least = std::numbers::pi / 2;
+  for (const Vector3d& p : points) {
+    const Vector3d reach = p - pivot;
+    Vector3d across = reach - reach.dot(down) * down;
+    if (edge) across -= across.dot(along) * along;
+    if (across.norm() < 2 * kLeastSpread) continue;
+    const double angle = std::atan2(-reach.dot(down), across.norm());
+    if (angle >= least) continue;
+    least = angle;
+    const Vector3d axis = edge ? along : Vector3d(across.cross(down).normalized());
+    const Vector3d normal = axis.cross(reach).normalized();
+    rolled = normal.dot(down) < 0 ? Vector3d(-normal) : normal;
+  }
+  return rolled;
+}
+
 }  // namespace
 
 std::vector<Vector3d> LowPoints(std::span<const FootShape> shapes, const Vector3d& down) {
@@ -147,7 +178,8 @@ FoundSole FindSole(std::span<const FootShape> shapes, const Vector3d& down,
       if (p.dot(normal) > lowest - band) touching.push_back(p);
     }
     if (touching.empty()) return {};
-    const Vector3d better = PlaneNormal(touching, normal);
+    Vector3d better = PlaneNormal(touching, normal);
+    if (better.isZero()) better = Rolled(points, touching, normal);
     if (better.isZero() || better.dot(down.normalized()) < std::cos(kMostTilt)) continue;
     normal = better;
   }
