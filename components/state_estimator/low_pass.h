@@ -19,15 +19,17 @@ class LowPass {
   const Eigen::VectorXd& value() const { return value_; }
   /// The output's first derivative, 1/s of the signals.
   const Eigen::VectorXd& rate() const { return rate_; }
-  /// Its second derivative, 1/s², with the `input` of the last step; `curvature` sized.
-  void Curvature(const Eigen::VectorXd& input, Eigen::VectorXd* curvature) const;
+  /// Its second derivative, 1/s², the mean over the last step: at the step's end alone the input,
+  /// held over the step, would be too old by half of it, an error of −ω² dt/2 times rate(). Of the
+  /// last Step of this process: not archived.
+  const Eigen::VectorXd& curvature() const { return curvature_; }
   /// At rest at `input`.
   void Reset(const Eigen::VectorXd& input);
   void Archive(StateArchive* archive) { archive->Show(value_, rate_); }
 
  private:
   double omega_;
-  Eigen::VectorXd value_, rate_, next_rate_;
+  Eigen::VectorXd value_, rate_, next_rate_, curvature_;
 };
 
 }  // namespace poise

@@ -35,7 +35,6 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
       settings_(settings),
       filter_(2 * model_->num_joints() + 6, settings.cutoff),
       input_(Eigen::VectorXd::Zero(2 * model_->num_joints() + 6)),
-      curvature_(input_),
       state_(model_->num_joints()),
       data_(*model_),
       linear_(model_->bodies().size(), Vector3d::Zero()),
@@ -108,7 +107,6 @@ void WrenchObserver::TrackFriction(double dt) {
 // is its gyro's rate of change, in its own axes and in those of an observer at rest.
 void WrenchObserver::ReadMotion(const ObserverCorrection& correction) {
   const Eigen::Index n = model_->num_joints();
-  filter_.Curvature(input_, &curvature_);
   state_.joint_position = filter_.value().head(n);
   state_.joint_velocity = filter_.rate().head(n);
   const robot::ImuModel& imu = model_->imu();
@@ -135,7 +133,7 @@ void WrenchObserver::ReadMotion(const ObserverCorrection& correction) {
       (data_.body_linear_bias[b] + data_.body_angular_bias[b].cross(arm) + w.cross(w.cross(arm)));
   for (const int joint : model_->supporting_joints(imu.body)) {
     const auto j = static_cast<size_t>(joint);
-    const Vector3d spin = data_.joint_axis[j] * curvature_[joint];
+    const Vector3d spin = data_.joint_axis[j] * filter_.curvature()[joint];
     turn -= spin;
     push -= spin.cross(point - data_.body_position[j + 1]);
   }
@@ -161,8 +159,8 @@ void WrenchObserver::InverseDynamics() {
   angular_[0] = base_acceleration_;
   for (size_t b = 1; b < tree.bodies.size(); ++b) {
     const auto p = static_cast<size_t>(tree.bodies[b].parent);
-    angular_[b] =
-        angular_[p] + data_.joint_axis[b - 1] * curvature_[static_cast<Eigen::Index>(b) - 1];
+    angular_[b] = angular_[p] +
+                  data_.joint_axis[b - 1] * filter_.curvature()[static_cast<Eigen::Index>(b) - 1];
     linear_[b] = linear_[p] + angular_[p].cross(data_.body_position[b] - data_.body_position[p]);
   }
   for (size_t b = 0; b < tree.bodies.size(); ++b) {
@@ -187,7 +185,7 @@ void WrenchObserver::AddJointRows() {
     const auto j = static_cast<Eigen::Index>(b) - 1;
     joint_torque_[j] =
         data_.joint_axis[b - 1].dot(moment_[b] - data_.body_position[b].cross(force_[b])) +
-        tree.joints[b - 1].reflected_inertia * curvature_[j];
+        tree.joints[b - 1].reflected_inertia * filter_.curvature()[j];
     const auto p = static_cast<size_t>(tree.bodies[b].parent);
     force_[p] += force_[b];
     moment_[p] += moment_[b];

@@ -89,7 +89,7 @@ class WrenchObserver {
   std::vector<int> leg_joints_;
   std::vector<std::array<bool, 2>> supports_;  // by leg joint: of which feet
   LowPass filter_;                             // positions, gyro, accelerometer, torques
-  Eigen::VectorXd input_, curvature_;
+  Eigen::VectorXd input_;
   robot::RobotState state_;  // of the filter, base at the origin
   robot::RobotData data_;
   Eigen::Vector3d base_force_ = Eigen::Vector3d::Zero();         // m/s²
