@@ -38,7 +38,9 @@ double PitchBetween(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.z() * b.x() - a.x() * b.z(), a.x() * b.x() + a.z() * b.z());
 }
 
-void BendLeg(const RobotModel& model, const Leg& leg, double bend, Eigen::VectorXd* joints) {
+void BendLeg(const RobotModel& model, const Anatomy& anatomy, size_t foot, double bend,
+             Eigen::VectorXd* joints) {
+  const Leg& leg = anatomy.leg[foot];
   const robot::RobotData data = Kinematics(model, *joints);
   struct Pitch {
     int joint;
@@ -77,7 +79,9 @@ void BendLeg(const RobotModel& model, const Leg& leg, double bend, Eigen::Vector
   const double lean = PitchBetween(folded, Vector3d(0, 0, -1));
   (*joints)[knee.joint] += knee.sign * turn;
   (*joints)[hip.joint] += hip.sign * lean;
-  (*joints)[ankle.joint] -= ankle.sign * (turn + lean);
+  // The sole ends level, also where a limit kept the leg from its zero.
+  const Vector3d toe = data.foot_pose[foot].linear().col(0);
+  (*joints)[ankle.joint] -= ankle.sign * (turn + lean + std::atan2(-toe.z(), toe.x()));
 }
 
 }  // namespace
@@ -94,7 +98,7 @@ Eigen::VectorXd WithinLimits(const RobotModel& model, Eigen::VectorXd wanted) {
 
 Eigen::VectorXd WithBentKnees(const RobotModel& model, const Anatomy& anatomy, double bend,
                               Eigen::VectorXd nominal) {
-  for (const Leg& leg : anatomy.leg) BendLeg(model, leg, bend, &nominal);
+  for (size_t f = 0; f < 2; ++f) BendLeg(model, anatomy, f, bend, &nominal);
   return WithinLimits(model, nominal);
 }
 
