@@ -17,9 +17,6 @@
 namespace poise {
 namespace {
 
-using ethercat::EthercatError;
-using ethercat::kMillisecond;
-
 struct DrivesOptions {
   std::string link = "udp";
   int count = 12;
@@ -85,7 +82,7 @@ ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
   return chain;
 }
 
-void Show(ethercat::RotorChain* drives, int64_t frames, double seconds) {
+void ShowDrives(ethercat::RotorChain* drives, int64_t frames, double seconds) {
   std::string states;
   double torque = 0, speed = 0;
   for (size_t i = 0; i < drives->chain().size(); ++i) {
@@ -117,7 +114,7 @@ int Emulate(const DrivesOptions& options) {
   std::array<uint8_t, ethercat::kMaxFrame> frame{};
   int64_t shown = start, frames = 0;
   while (StopSignal() == 0 && link->Now() < end) {
-    const size_t size = link->Receive(frame, link->Now() + kMillisecond);
+    const size_t size = link->Receive(frame, link->Now() + ethercat::kMillisecond);
     const int64_t now = link->Now() - start;
     const std::span<uint8_t> bytes = std::span(frame).first(size);
     if (size == 0) {
@@ -127,7 +124,7 @@ int Emulate(const DrivesOptions& options) {
     }
     if (link->Now() - shown < ethercat::kSecond) continue;
     shown = link->Now();
-    Show(&drives, drives.chain().frames() - frames, static_cast<double>(now) * 1e-9);
+    ShowDrives(&drives, drives.chain().frames() - frames, static_cast<double>(now) * 1e-9);
     frames = drives.chain().frames();
   }
   return kExitOk;

@@ -11,20 +11,16 @@
 namespace poise {
 namespace {
 
-using ethercat::EthercatError;
-using ethercat::kMillisecond;
-using ethercat::SlaveAccess;
-namespace object = ethercat::object;
-namespace reg = ethercat::reg;
-
 constexpr uint16_t kFirstStation = 1001;
-constexpr int64_t kFrameTimeout = 20 * kMillisecond;
+constexpr int64_t kFrameTimeout = 20 * ethercat::kMillisecond;
 constexpr int kAttempts = 3;
-constexpr ethercat::Timeouts kTimeouts = {
-    .eeprom = 200 * kMillisecond, .mailbox = 1000 * kMillisecond, .state = 5000 * kMillisecond};
+constexpr ethercat::Timeouts kTimeouts = {.eeprom = 200 * ethercat::kMillisecond,
+                                          .mailbox = 1000 * ethercat::kMillisecond,
+                                          .state = 5000 * ethercat::kMillisecond};
 
 /// The object's value; nullopt: the slave has none.
-std::optional<uint32_t> UploadIfThere(SlaveAccess* slave, ethercat::ObjectAddress address) {
+std::optional<uint32_t> UploadIfThere(ethercat::SlaveAccess* slave,
+                                      ethercat::ObjectAddress address) {
   try {
     return slave->Upload(address);
   } catch (const ethercat::SdoAbortError&) {
@@ -32,7 +28,7 @@ std::optional<uint32_t> UploadIfThere(SlaveAccess* slave, ethercat::ObjectAddres
   }
 }
 
-void ReadMapping(SlaveAccess* slave, uint16_t assign, std::vector<uint32_t>* entries,
+void ReadMapping(ethercat::SlaveAccess* slave, uint16_t assign, std::vector<uint32_t>* entries,
                  std::vector<uint16_t>* pdos) {
   const uint32_t count = UploadIfThere(slave, {assign, 0}).value_or(0);
   for (uint32_t i = 1; i <= count; ++i) {
@@ -45,10 +41,10 @@ void ReadMapping(SlaveAccess* slave, uint16_t assign, std::vector<uint32_t>* ent
   }
 }
 
-ScannedSlave ReadSlave(SlaveAccess* slave) {
+ScannedSlave ReadSlave(ethercat::SlaveAccess* slave) {
   ScannedSlave found;
   found.identity = slave->ReadIdentity();
-  found.alias = slave->Read<uint16_t>(reg::kStationAlias);
+  found.alias = slave->Read<uint16_t>(ethercat::reg::kStationAlias);
   found.identification = slave->ReadIdentification();
   if (!slave->SetUpMailbox()) return found;
   slave->ReleaseEeprom();
@@ -63,12 +59,12 @@ ScannedSlave ReadSlave(SlaveAccess* slave) {
   } catch (const ethercat::SdoAbortError&) {
     found.name.clear();  // a slave need not have one
   }
-  const uint32_t modes = UploadIfThere(slave, {object::kSupportedModes, 0}).value_or(0);
+  const uint32_t modes = UploadIfThere(slave, {ethercat::object::kSupportedModes, 0}).value_or(0);
   found.is_drive = (modes >> (ethercat::kModeCyclicTorque - 1) & 1) != 0;
-  found.rated_torque = UploadIfThere(slave, {object::kRatedTorque, 0});
-  found.rated_current = UploadIfThere(slave, {object::kRatedCurrent, 0});
-  ReadMapping(slave, object::kRxAssign, &found.rx, &found.rx_pdo);
-  ReadMapping(slave, object::kTxAssign, &found.tx, &found.tx_pdo);
+  found.rated_torque = UploadIfThere(slave, {ethercat::object::kRatedTorque, 0});
+  found.rated_current = UploadIfThere(slave, {ethercat::object::kRatedCurrent, 0});
+  ReadMapping(slave, ethercat::object::kRxAssign, &found.rx, &found.rx_pdo);
+  ReadMapping(slave, ethercat::object::kTxAssign, &found.tx, &found.tx_pdo);
   slave->ChangeState(ethercat::AlState::kInit);
   return found;
 }
@@ -100,34 +96,40 @@ std::string ProfileText(const ScannedSlave& slave, const std::string& indent) {
 std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
   ethercat::Transactions transactions(link, kFrameTimeout, kAttempts);
   std::array<uint8_t, 2> status{};
-  const auto count = transactions.Execute(ethercat::Command::kBrd, 0, reg::kAlStatus, status);
+  const auto count =
+      transactions.Execute(ethercat::Command::kBrd, 0, ethercat::reg::kAlStatus, status);
   if (!count || *count == 0) {
-    throw EthercatError(
+    throw ethercat::EthercatError(
         "no slave answers; is the cable in, the chain powered, the link the right one?");
   }
   std::array<uint8_t, 2> init{};
   ethercat::Put<uint16_t>(init, 0,
                           static_cast<uint16_t>(ethercat::AlState::kInit) | ethercat::kAlError);
-  static_cast<void>(transactions.Execute(ethercat::Command::kBwr, 0, reg::kAlControl, init));
+  static_cast<void>(
+      transactions.Execute(ethercat::Command::kBwr, 0, ethercat::reg::kAlControl, init));
   std::array<uint8_t, ethercat::kNumSyncManagers * ethercat::kSyncManagerSize> zeros{};
-  static_cast<void>(transactions.Execute(ethercat::Command::kBwr, 0, reg::kSyncManager, zeros));
+  static_cast<void>(
+      transactions.Execute(ethercat::Command::kBwr, 0, ethercat::reg::kSyncManager, zeros));
   std::array<uint8_t, 4> latch{};
-  static_cast<void>(transactions.Execute(ethercat::Command::kBwr, 0, reg::kDcReceiveTime, latch));
-  std::vector<SlaveAccess> slaves;
+  static_cast<void>(
+      transactions.Execute(ethercat::Command::kBwr, 0, ethercat::reg::kDcReceiveTime, latch));
+  std::vector<ethercat::SlaveAccess> slaves;
   std::vector<ethercat::SlavePorts> ports;
   for (int i = 0; i < *count; ++i) {
     const auto station = static_cast<uint16_t>(kFirstStation + i);
     std::array<uint8_t, 2> bytes{};
     ethercat::Put<uint16_t>(bytes, 0, station);
-    static_cast<void>(transactions.Execute(
-        ethercat::Command::kApwr, ethercat::AutoIncrementAddress(i), reg::kStationAddress, bytes));
-    SlaveAccess& slave = slaves.emplace_back(&transactions, kTimeouts, i, station);
+    static_cast<void>(transactions.Execute(ethercat::Command::kApwr,
+                                           ethercat::AutoIncrementAddress(i),
+                                           ethercat::reg::kStationAddress, bytes));
+    ethercat::SlaveAccess& slave = slaves.emplace_back(&transactions, kTimeouts, i, station);
     slave.AwaitInit();
     ethercat::SlavePorts& own = ports.emplace_back();
-    own.dl_status = slave.Read<uint16_t>(reg::kDlStatus);
+    own.dl_status = slave.Read<uint16_t>(ethercat::reg::kDlStatus);
     own.has_times = ethercat::HasClock(&slave);
     for (size_t port = 0; own.has_times && port < own.times.size(); ++port) {
-      own.times[port] = slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
+      own.times[port] =
+          slave.Read<uint32_t>(static_cast<uint16_t>(ethercat::reg::kDcReceiveTime + 4 * port));
     }
   }
   const auto places = ethercat::FindTopology(
