@@ -447,7 +447,13 @@ void HwBridge::Actuate(const Tick& tick) {
   drive_command_->current = command_.current;
   drive_command_->enabled = command_.enabled;
   if (!bus_) return;
-  if (bus_->num_slaves() > 0) bus_->Diagnose(&*bus_status_);
+  if (bus_->num_slaves() > 0) {
+    bus_->Diagnose(&*bus_status_);
+    // In lockstep the emulated clocks follow the wall's time, which differs from run to run.
+    if (simulated_time_) {
+      std::fill_n(bus_status_->clock_difference.begin(), bus_status_->num_slaves, 0);
+    }
+  }
   bus_->Send(command_);
   if (supervisor_->TakeReset()) bus_->RequestFaultReset();
 }
