@@ -53,6 +53,7 @@ TEST_F(WorldsTest, HasEveryCheckOfEveryEngine) {
 }
 
 TEST_F(WorldsTest, ASweepIsComparedRunByRun) {
+  std::filesystem::create_directories(deploy_ / "deploy/sweeps");
   std::ofstream(deploy_ / "deploy/sweeps/forces.pbtxt")
       << "scenario: \"pushed\"\n"
          "vary { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n";
