@@ -6,6 +6,7 @@
 #include <string>
 
 #include "poise/bridge_status_t.hpp"
+#include "poise/bus_status_t.hpp"
 #include "poise/drive_command_t.hpp"
 #include "poise/drive_feedback_t.hpp"
 
@@ -27,6 +28,11 @@ struct BusHealth {
 struct DriveReport {
   int8_t state = bridge_status_t::DRIVE_UNKNOWN;  ///< DRIVE_*, CiA 402
   bool sto = false;                               ///< its safe torque off is active
+};
+
+/// Sensors of the robot that a bus reads by itself, in its feedback.
+struct SensorsOfBus {
+  bool imu = false, feet = false;
 };
 
 /// Start, Idle until the first cycle, Receive and Send once a cycle, Idle after the last, Stop.
@@ -54,12 +60,17 @@ class DriveBus {
   /// Sends currents and enables for this cycle (sizes as in the feedback).
   virtual void Send(const drive_command_t& command) = 0;
 
+  virtual SensorsOfBus sensors() const { return {}; }
   /// By joint, as last received; empty: the feedback's drive_status is all there is.
   virtual std::span<const DriveReport> reports() const { return {}; }
   virtual const BusHealth& health() const = 0;
   /// Resets faults of all drives, which are commanded disabled, by one edge, and forgets bad
   /// cycles.
   virtual void RequestFaultReset() {}
+  /// Slaves of the bus whose state Diagnose writes; 0: a bus without any.
+  virtual int num_slaves() const { return 0; }
+  /// What each slave shows of itself. Precondition: `status` is sized for num_slaves().
+  virtual void Diagnose(bus_status_t* status) const { static_cast<void>(status); }
   /// ns by which the next cycle should start later (negative: earlier) than a period after this
   /// one.
   virtual int64_t cycle_correction() const { return 0; }

@@ -22,6 +22,10 @@ bool AllPlausible(const Range& values) {
 
 }  // namespace
 
+bool Plausible(const wrench_t& wrench) {
+  return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
+}
+
 FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
                                  std::span<const robot::MotorModel> motors)
     : config_(config),
@@ -41,7 +45,8 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
   const Problem unusable{bridge_status_t::REASON_FEEDBACK_NOT_FINITE, -1};
   if (feedback.position_counts.size() != n || feedback.current.size() != n ||
       feedback.drive_status.size() != n ||
-      feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet)) {
+      feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet) ||
+      feedback.foot_sensor.size() != static_cast<size_t>(config_.num_feet)) {
     return unusable;
   }
   if (const int joint = FindJump(feedback); joint >= 0) {
@@ -50,12 +55,9 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
   for (size_t j = 0; j < n; ++j) {
     if (!Plausible(feedback.current[j])) return {unusable.reason, static_cast<int>(j)};
   }
+  // A foot's sensor may fail: the robot stands without it (HwBridge::Sense).
   const bool rest = AllPlausible(feedback.imu_angular_velocity) &&
-                    AllPlausible(feedback.imu_acceleration) &&
-                    std::all_of(feedback.foot_wrench.begin(), feedback.foot_wrench.end(),
-                                [](const wrench_t& wrench) {
-                                  return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
-                                });
+                    AllPlausible(feedback.imu_acceleration);
   return rest ? Problem{} : unusable;
 }
 
@@ -88,7 +90,8 @@ FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feed
       return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
     }
     const bool differs =
-        enabled_[j] != 0 && std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
+        motors_[j].current_sensor && enabled_[j] != 0 &&
+        std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
                                 config_.torque_error;
     error_cycles_[j] = differs ? std::min(error_cycles_[j] + 1, config_.torque_error_cycles) : 0;
     if (differs && error_cycles_[j] >= config_.torque_error_cycles) {

@@ -30,6 +30,9 @@ struct FeedbackMonitorConfig {
   double torque_error = std::numeric_limits<double>::infinity();
 };
 
+/// Whether a sensor of a robot can read this: false for what is no number, or beyond all reason.
+bool Plausible(const wrench_t& wrench);
+
 /// Never allocates after construction, never throws.
 class FeedbackMonitor {
  public:

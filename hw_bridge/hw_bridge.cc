@@ -245,11 +245,18 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
   wiring->AddOutput(&drive_command_, "drive_command", {n});
   wiring->AddOutput(&bridge_status_, "bridge_status", {n});
+  const ethercat::MasterConfig& master = config.ethercat().master();
+  const int drives = master.drive_size() > 0 ? master.drive_size() : n;
+  if (config.has_ethercat()) {
+    wiring->AddOutput(&bus_status_, "bus_status", {drives + master.other_size()});
+  }
   wiring->AddStage(
       "sense", {&drive_feedback_}, {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
       config.sense_deadline());
+  std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
+  if (config.has_ethercat()) acts.push_back(&bus_status_);
   wiring->AddStage(
-      "actuate", {&joint_command_, &emergency_stop_}, {&drive_command_, &bridge_status_},
+      "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
       [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
 
   supervisor_ =
@@ -347,12 +354,24 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
   feedback_.position_counts = drives->position_counts;
   feedback_.current = drives->current;
   feedback_.drive_status = drives->drive_status;
-  if (drive_feedback_.present()) {
-    std::copy(std::begin(drive_feedback_->imu_angular_velocity),
-              std::end(drive_feedback_->imu_angular_velocity), feedback_.imu_angular_velocity);
-    std::copy(std::begin(drive_feedback_->imu_acceleration),
-              std::end(drive_feedback_->imu_acceleration), feedback_.imu_acceleration);
+  // Sensors from the bus where it has them, else from the port.
+  const auto take_imu = [this](const drive_feedback_t& from) {
+    std::copy(std::begin(from.imu_angular_velocity), std::end(from.imu_angular_velocity),
+              feedback_.imu_angular_velocity);
+    std::copy(std::begin(from.imu_acceleration), std::end(from.imu_acceleration),
+              feedback_.imu_acceleration);
+  };
+  const SensorsOfBus own = bus_->sensors();
+  if (own.imu) {
+    take_imu(*drives);
+  } else if (drive_feedback_.present()) {
+    take_imu(*drive_feedback_);
+  }
+  if (own.feet) {
+    feedback_.foot_wrench = drives->foot_wrench;
+  } else if (drive_feedback_.present()) {
     feedback_.foot_wrench = drive_feedback_->foot_wrench;
+    feedback_.foot_sensor = drive_feedback_->foot_sensor;
   }
   return &feedback_;
 }
@@ -361,7 +380,9 @@ void HwBridge::Sense(const Tick& tick) {
   supervisor_->CountLateness(tick.lateness);
   const drive_feedback_t* feedback = ReadFeedback();
   // In lockstep readers wait for the message, which then keeps the readings of the cycle before.
-  if (!drive_feedback_.present() || (feedback == nullptr && !simulated_time_)) {
+  const SensorsOfBus own = bus_ ? bus_->sensors() : SensorsOfBus{};
+  const bool sensed = drive_feedback_.present() || (own.imu && own.feet);
+  if (!sensed || (feedback == nullptr && !simulated_time_)) {
     robot_sensors_.Withhold();
   }
   if (bus_) supervisor_->ReadBus(bus_->health());
@@ -373,17 +394,33 @@ void HwBridge::Sense(const Tick& tick) {
   const std::vector<robot::MotorModel>& motors = model_->motors();
   for (size_t j = 0; j < motors.size(); ++j) {
     sensors.joint_position[j] = JointPositionOf(motors[j], feedback->position_counts[j]);
-    sensors.joint_torque[j] = JointTorque(motors[j], feedback->current[j]);
+    // What was ordered a cycle ago, where the drive does not say what flows.
+    const double ordered = command_.enabled[j] != 0 ? command_.current[j] : 0;
+    sensors.joint_torque[j] =
+        JointTorque(motors[j], motors[j].current_sensor ? feedback->current[j] : ordered);
   }
   std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),
             sensors.imu_angular_velocity);
   std::copy(std::begin(feedback->imu_acceleration), std::end(feedback->imu_acceleration),
             sensors.imu_acceleration);
+  ReadFootSensors(*feedback);
+}
+
+void HwBridge::ReadFootSensors(const drive_feedback_t& feedback) {
+  robot_sensors_t& sensors = *robot_sensors_;
   for (size_t f = 0; f < sensors.foot_wrench.size(); ++f) {
+    int8_t& state = sensors.foot_sensor[f];
+    state = feedback.foot_sensor[f];
+    if (!model_->feet()[f].force_sensor) state = drive_feedback_t::SENSOR_ABSENT;
+    if (state == drive_feedback_t::SENSOR_OK && !Plausible(feedback.foot_wrench[f])) {
+      state = drive_feedback_t::SENSOR_INVALID;
+    }
+    sensors.foot_wrench[f] = wrench_t{};
+    if (state != drive_feedback_t::SENSOR_OK) continue;
     for (int i = 0; i < 3; ++i) {
       // The sensor reports the environment on the robot.
-      sensors.foot_wrench[f].force[i] = -feedback->foot_wrench[f].force[i];
-      sensors.foot_wrench[f].moment[i] = -feedback->foot_wrench[f].moment[i];
+      sensors.foot_wrench[f].force[i] = -feedback.foot_wrench[f].force[i];
+      sensors.foot_wrench[f].moment[i] = -feedback.foot_wrench[f].moment[i];
     }
   }
 }
@@ -410,6 +447,13 @@ void HwBridge::Actuate(const Tick& tick) {
   drive_command_->current = command_.current;
   drive_command_->enabled = command_.enabled;
   if (!bus_) return;
+  if (bus_->num_slaves() > 0) {
+    bus_->Diagnose(&*bus_status_);
+    // In lockstep the emulated clocks follow the wall's time, which differs from run to run.
+    if (simulated_time_) {
+      std::fill_n(bus_status_->clock_difference.begin(), bus_status_->num_slaves, 0);
+    }
+  }
   bus_->Send(command_);
   if (supervisor_->TakeReset()) bus_->RequestFaultReset();
 }
@@ -428,10 +472,8 @@ ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
                           .simulated_time = "hw_bridge.ethercat.simulated_time",
                           .profile = "hw_bridge.ethercat.master.profile",
                           .capture = "hw_bridge.ethercat.capture"}},
-          {Reads<drive_feedback_t>("drive_feedback"), Reads<joint_command_t>("joint_command"),
-           Reads<emergency_stop_t>("emergency_stop", InputKind::kLatest),
-           Writes<robot_sensors_t>("robot_sensors"), Writes<drive_command_t>("drive_command"),
-           Writes<bridge_status_t>("bridge_status")},
+          // With EtherCAT there is one more, bus_status: known once it is configured.
+          {},
           HwBridgeConfig::descriptor(),
           hw_bridge_proto_schema};
 }

@@ -24,7 +24,8 @@ using LinkOpener =
 /// Stage "sense": drive_feedback → robot_sensors, in SI units, wrenches turned into robot on
 /// environment. Stage "actuate": joint_command, emergency_stop (latest) → drive_command,
 /// bridge_status. With EtherCAT, counts, currents and states of the drives come from its frames and
-/// drive_feedback gives the other sensors; drive_command is then what the frames order.
+/// drive_feedback gives the sensors that the bus has not; drive_command is then what the frames
+/// order, and bus_status what each slave shows of itself.
 class HwBridge : public Component {
  public:
   /// `stop_signal`: not 0 asks for an emergency stop, which takes it back to 0; may be nullptr.
@@ -47,6 +48,7 @@ class HwBridge : public Component {
   class Ethercat;
 
   void Sense(const Tick& tick);
+  void ReadFootSensors(const drive_feedback_t& feedback);
   void Actuate(const Tick& tick);
   /// Feedback of this cycle with all sensors that have come; nullptr when the drives' has not.
   const drive_feedback_t* ReadFeedback();
@@ -62,6 +64,7 @@ class HwBridge : public Component {
   Output<robot_sensors_t> robot_sensors_;
   Output<drive_command_t> drive_command_;
   Output<bridge_status_t> bridge_status_;
+  Output<bus_status_t> bus_status_;  // with EtherCAT
 
   volatile std::sig_atomic_t* stop_signal_;
   LinkOpener open_link_;

@@ -7,6 +7,19 @@
 #include "fmt/format.h"
 
 namespace poise::logging {
+namespace {
+
+constexpr uint32_t kEventLogMagic = 0xEDA1DA01u;
+
+/// Big endian.
+template <class Word>
+void Append(Word word, std::vector<uint8_t>* to) {
+  for (int shift = 8 * static_cast<int>(sizeof word) - 8; shift >= 0; shift -= 8) {
+    to->push_back(static_cast<uint8_t>(word >> shift));
+  }
+}
+
+}  // namespace
 
 EventLogWriter::EventLogWriter(const std::string& path)
     : path_(path), log_(lcm_eventlog_create(path.c_str(), "w")) {
@@ -14,14 +27,15 @@ EventLogWriter::EventLogWriter(const std::string& path)
 }
 
 void EventLogWriter::Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
-  channel_ = channel;
-  lcm_eventlog_event_t event{};
-  event.timestamp = utime;
-  event.channellen = static_cast<int32_t>(channel_.size());
-  event.datalen = static_cast<int32_t>(data.size());
-  event.channel = channel_.data();
-  event.data = const_cast<uint8_t*>(data.data());  // liblcm only reads it
-  if (lcm_eventlog_write_event(log_.get(), &event) != 0) {
+  record_.clear();
+  Append(kEventLogMagic, &record_);
+  Append(static_cast<uint64_t>(events_), &record_);
+  Append(static_cast<uint64_t>(utime), &record_);
+  Append(static_cast<uint32_t>(channel.size()), &record_);
+  Append(static_cast<uint32_t>(data.size()), &record_);
+  record_.insert(record_.end(), channel.begin(), channel.end());
+  record_.insert(record_.end(), data.begin(), data.end());
+  if (std::fwrite(record_.data(), 1, record_.size(), log_->f) != record_.size()) {
     throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
   }
   ++events_;

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace poise::logging {
 
@@ -18,7 +19,8 @@ class LogError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One log, written through liblcm; events are numbered from 0.
+/// One log in LCM's format; events are numbered from 0. A record is put together here: liblcm's own
+/// function writes it in eight pieces.
 class EventLogWriter {
  public:
   /// Replaces a file of that name. Throws LogError.
@@ -37,7 +39,7 @@ class EventLogWriter {
     void operator()(lcm_eventlog_t* log) const { lcm_eventlog_destroy(log); }
   };
   std::string path_;
-  std::string channel_;
+  std::vector<uint8_t> record_;
   std::unique_ptr<lcm_eventlog_t, CloseLog> log_;
   int64_t events_ = 0;
 };

@@ -33,8 +33,9 @@ struct LogDamage {
 /// True when the file begins as an event log does.
 bool IsEventLog(const std::string& path);
 
-/// Events in the order of the file. Lengths are checked against the file before they are used; what
-/// is no record is skipped up to the next one and counted.
+/// Events in the order of the file, of which the part last read takes memory. Lengths are checked
+/// against the file before they are used; what is no record is skipped up to the next one and
+/// counted.
 class LogReader {
  public:
   /// Throws LogError.
@@ -53,13 +54,17 @@ class LogReader {
   int64_t skipped_bytes() const;
   const std::vector<LogDamage>& damage() const { return damage_; }
   uint64_t file_size() const { return size_; }
+  /// The file's bytes, which events' data are a part of; nullptr for an empty file.
+  const uint8_t* bytes() const { return data_; }
 
  private:
   bool ParseAt(size_t position, LogEvent* event, size_t* end) const;
+  void LetGo();
 
   const uint8_t* data_ = nullptr;
   size_t size_ = 0;
   size_t position_ = 0;
+  size_t released_ = 0;  // pages before it were let go
   int64_t number_ = -1;  // of the last event
   std::vector<LogDamage> damage_;
 };

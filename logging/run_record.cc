@@ -13,52 +13,96 @@
 namespace poise::logging {
 namespace {
 
+using Add = std::function<bool(int64_t tick, std::span<const uint8_t> data)>;
+
 struct Lane {
   ChannelTicks ticks;
-  std::function<bool(int64_t tick, std::span<const uint8_t> data)> add;
+  Add add;
 };
 
-template <class T>
-std::function<bool(int64_t, std::span<const uint8_t>)> AddTo(Series<T>* series) {
-  return [series](int64_t tick, std::span<const uint8_t> data) {
-    T message;
-    if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &message) ||
-        !MessageTraits<T>::AllFinite(message)) {
-      return false;
-    }
-    series->Set(tick, std::move(message));
-    return true;
-  };
-}
+/// Where a record's messages go: into memory, or noted where they stand in the log.
+class Store {
+ public:
+  /// `log`: nullptr for memory. `begin`: what the reader's first byte is.
+  Store(std::shared_ptr<PagedFile> log, const uint8_t* begin)
+      : log_(std::move(log)), begin_(begin) {}
 
-/// Keeps what no series holds: as it is, if it can be read.
-std::function<bool(int64_t, std::span<const uint8_t>)> Keep(const std::string& type_name,
-                                                            Series<std::vector<uint8_t>>* series) {
-  class Nothing final : public ScalarVisitor {
-   public:
-    void Integer(std::string_view, int64_t) override {}
-    void Real(std::string_view, double value) override { finite = finite && std::isfinite(value); }
-    void Text(std::string_view, std::string_view) override {}
-    bool finite = true;
-  };
-  return [type = FindMessageType(type_name), series](int64_t tick, std::span<const uint8_t> data) {
+  template <class T>
+  Add Messages(Series<T>* series) const {
+    if (log_ == nullptr) {
+      return [series](int64_t tick, std::span<const uint8_t> data) {
+        T message;
+        if (!IsMessage(data, &message)) return false;
+        series->Set(tick, std::move(message));
+        return true;
+      };
+    }
+    auto paged =
+        std::make_shared<PagedSeries<T>>(log_, [](std::span<const uint8_t> data, T* message) {
+          message->decode(data.data(), 0, static_cast<int>(data.size()));
+        });
+    series->Page(paged);
+    return [paged, begin = begin_, message = T()](int64_t tick,
+                                                  std::span<const uint8_t> data) mutable {
+      if (!IsMessage(data, &message)) return false;
+      paged->Place(tick, static_cast<uint64_t>(data.data() - begin), data.size());
+      return true;
+    };
+  }
+
+  /// Keeps what no series holds: as it is, if it can be read.
+  Add Bytes(const std::string& type_name, Series<std::vector<uint8_t>>* series) const {
+    const MessageType* const type = FindMessageType(type_name);
+    if (log_ == nullptr) {
+      return [type, series](int64_t tick, std::span<const uint8_t> data) {
+        if (!IsReadable(type, data)) return false;
+        series->Set(tick, {data.begin(), data.end()});
+        return true;
+      };
+    }
+    auto paged = std::make_shared<PagedSeries<std::vector<uint8_t>>>(
+        log_, [](std::span<const uint8_t> data, std::vector<uint8_t>* bytes) {
+          bytes->assign(data.begin(), data.end());
+        });
+    series->Page(paged);
+    return [type, paged, begin = begin_](int64_t tick, std::span<const uint8_t> data) {
+      if (!IsReadable(type, data)) return false;
+      paged->Place(tick, static_cast<uint64_t>(data.data() - begin), data.size());
+      return true;
+    };
+  }
+
+ private:
+  template <class T>
+  static bool IsMessage(std::span<const uint8_t> data, T* message) {
+    return DecodeChecked(data.data(), static_cast<int64_t>(data.size()), message) &&
+           MessageTraits<T>::AllFinite(*message);
+  }
+  static bool IsReadable(const MessageType* type, std::span<const uint8_t> data) {
+    class Nothing final : public ScalarVisitor {
+     public:
+      void Integer(std::string_view, int64_t) override {}
+      void Real(std::string_view, double value) override {
+        finite = finite && std::isfinite(value);
+      }
+      void Text(std::string_view, std::string_view) override {}
+      bool finite = true;
+    };
     Nothing values;
-    if (type == nullptr || !type->visit(data.data(), static_cast<int64_t>(data.size()), &values) ||
-        !values.finite) {
-      return false;
-    }
-    series->Set(tick, {data.begin(), data.end()});
-    return true;
-  };
-}
+    return type != nullptr &&
+           type->visit(data.data(), static_cast<int64_t>(data.size()), &values) && values.finite;
+  }
 
-using Adders =
-    std::map<std::string, std::function<bool(int64_t, std::span<const uint8_t>)>, std::less<>>;
+  std::shared_ptr<PagedFile> log_;
+  const uint8_t* begin_;
+};
 
-Adders MakeAdders(RunRecord* run) {
-  Adders adders;
-  run->VisitSeries(
-      [&]<class T>(Series<T>* series) { adders.emplace(T::getTypeName(), AddTo(series)); });
+std::map<std::string, Add, std::less<>> MakeAdders(const Store& store, RunRecord* run) {
+  std::map<std::string, Add, std::less<>> adders;
+  // A series is paged when it has its channel: one of each type.
+  run->VisitSeries([&]<class T>(Series<T>* series) {
+    adders.emplace(T::getTypeName(), store.Messages(series));
+  });
   return adders;
 }
 
@@ -81,24 +125,27 @@ void CheckRobot(const RunRecord& run, const std::string& path) {
 
 }  // namespace
 
-RunRecord ReadRun(const std::string& path) {
+RunRecord ReadRun(const std::string& path, uint64_t most_in_memory) {
   LogReader reader(path);
   RunRecord run;
+  run.paged = reader.file_size() > most_in_memory;
+  const Store store(run.paged ? std::make_shared<PagedFile>(path) : nullptr, reader.bytes());
   RunInfo found = FindRunInfo(&reader, path);
   run.info = std::move(found.info);
   run.spec = std::move(found.spec);
   run.robot = robot::LoadRobotTexts(run.info.robot, run.info.urdf);
   CheckRobot(run, path);
 
-  Adders adders = MakeAdders(&run);
+  auto adders = MakeAdders(store, &run);
   std::vector<Lane> lanes;
   std::map<std::string, size_t, std::less<>> lane_of;
   for (const Channel& channel : run.spec.graph().channel()) {
     if (channel.external() || !IsKept(run.spec, channel.name())) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
-    lanes.push_back({ChannelTicks(run.spec, channel, reader.file_size()),
-                     adder ? adder.mapped() : Keep(channel.type(), &run.other[channel.name()])});
+    lanes.push_back(
+        {ChannelTicks(run.spec, channel, reader.file_size()),
+         adder ? adder.mapped() : store.Bytes(channel.type(), &run.other[channel.name()])});
   }
   LogEvent event;
   while (reader.Next(&event)) {

@@ -37,11 +37,42 @@ struct Estimates {
   Series<estimator_status_t> status;
 };
 
-/// All of one run. Of several channels with one type the graph's first is taken.
+/// Puts messages of one size by tick into a series that is in a scratch file from now on.
+template <class T>
+class PagedAppender {
+ public:
+  /// Throws LogError.
+  explicit PagedAppender(Series<T>* series)
+      : bytes_(PagedFile::Scratch()),
+        paged_(std::make_shared<PagedSeries<T>>(bytes_, [](std::span<const uint8_t> data, T* item) {
+          item->decode(data.data(), 0, static_cast<int>(data.size()));
+        })) {
+    series->Page(paged_);
+  }
+  /// Throws LogError.
+  void Set(int64_t tick, const T& message) {
+    encoded_.resize(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(encoded_.data(), 0, static_cast<int>(encoded_.size()));
+    paged_->Place(tick, bytes_->Append(encoded_), encoded_.size());
+  }
+
+ private:
+  std::shared_ptr<PagedFile> bytes_;
+  std::shared_ptr<PagedSeries<T>> paged_;
+  std::vector<uint8_t> encoded_;
+};
+
+/// A log beyond this size stays on the disk: what is asked for is read again each time. Some 40 s
+/// of 12 joints, which take about 250 MB in memory.
+inline constexpr uint64_t kMostInMemory = 128 << 20;  // bytes
+
+/// All of one run. Of several channels with one type the graph's first is taken. A long run's
+/// series are in files (Series::at): then one thread at a time.
 struct RunRecord {
   run_info_t info;
   RunSpec spec;
   robot::RobotModel robot;
+  bool paged = false;      ///< the series are in files
   int64_t num_ticks = 0;   ///< last tick of any channel + 1
   int64_t first_tick = 0;  ///< metrics look at ticks from here on
 
@@ -115,8 +146,9 @@ struct RunRecord {
 };
 
 /// Throws LogError: no file, a run that FindRunInfo cannot tell, or whose channels do not fit its
-/// robot; RobotError for its robot.
-RunRecord ReadRun(const std::string& path);
+/// robot; RobotError for its robot. `most_in_memory`: a larger log stays on the disk, which must
+/// then hold the file, unchanged, as long as the record.
+RunRecord ReadRun(const std::string& path, uint64_t most_in_memory = kMostInMemory);
 
 /// A HEALTH_* message; empty: unreadable, of another run, or under another component's name.
 std::optional<health_t> ReadHealth(const LogEvent& event, int64_t run_id);

@@ -3,18 +3,23 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
+#include "logging/paged_series.h"
+
 namespace poise::logging {
 
-/// Items of some ticks. A tick without one, between the first and the last that have one, takes
-/// four bytes, whatever T is.
+/// Items of some ticks, in memory or, once Page was called, in a file. In memory a tick without
+/// one, between the first and the last that have one, takes four bytes, whatever T is.
 template <class T>
 class Series {
  public:
-  /// nullptr when there is none of that tick. Valid until the next Set.
+  /// nullptr when there is none of that tick. Valid until the next Set and, in a file, until a tick
+  /// PagedSeries::kHeld or more away is asked for, of this series or a copy.
   const T* at(int64_t tick) const {
+    if (paged_) return paged_->at(tick);
     if (tick < first_ || tick - first_ >= std::ssize(index_)) return nullptr;
     const int32_t item = index_[static_cast<size_t>(tick - first_)];
     return item < 0 ? nullptr : &items_[static_cast<size_t>(item)];
@@ -37,9 +42,12 @@ class Series {
       items_.push_back(std::move(item));
     }
   }
-  bool empty() const { return items_.empty(); }
+  bool empty() const { return paged_ ? paged_->empty() : items_.empty(); }
+  /// From now on `paged` has the items; for one that is empty.
+  void Page(std::shared_ptr<PagedSeries<T>> paged) { paged_ = std::move(paged); }
 
  private:
+  std::shared_ptr<PagedSeries<T>> paged_;  // nullptr: in memory
   std::vector<T> items_;
   int64_t first_ = 0;           // tick of index_[0]
   std::vector<int32_t> index_;  // into items_; -1: none

@@ -20,6 +20,7 @@ struct SensorReadings {
   Eigen::Vector3d imu_angular_velocity;        ///< rad/s, IMU frame
   Eigen::Vector3d imu_acceleration;            ///< m/s², IMU frame, specific force
   std::array<robot::Vector6d, 2> foot_wrench;  ///< environment on robot, sole frame
+  std::array<int8_t, 2> foot_sensor{};         ///< drive_feedback_t::SENSOR_*
   Eigen::Vector3d push_force;                  ///< N, world
 };
 

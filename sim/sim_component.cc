@@ -33,11 +33,15 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     simulation_ = std::make_unique<Simulation>(*model, setup.sim, setup.worlds, context.tick_period,
                                                context.seed, context.lead_ticks);
     sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, setup.sim), context.seed);
+    foot_sensors_ = std::make_unique<FootSensors>(*model, setup.sim);
   } catch (const ConfigError& error) {
     if (error.field().empty()) throw;
     throw ConfigError("sim." + error.field(), error.problem());
   }
   readings_ = std::make_unique<SensorReadings>(model->num_joints());
+  for (const robot::MotorModel& motor : model->motors()) {
+    current_sensor_.push_back(motor.current_sensor ? 1 : 0);
+  }
 
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&drive_command_, "drive_command", {model->num_joints()},
@@ -68,6 +72,7 @@ void SimComponent::Step(const Tick& tick) {
     simulation_->Advance();
   }
   sensors_->Measure(simulation_->measured(), readings_.get());
+  foot_sensors_->Apply(tick.time, readings_.get());
   PublishFeedback();
   PublishPush();
   PublishTruth();
@@ -77,13 +82,17 @@ void SimComponent::PublishFeedback() {
   drive_feedback_t& message = *drive_feedback_;
   for (size_t j = 0; j < message.current.size(); ++j) {
     message.position_counts[j] = readings_->position_counts[j];
-    message.current[j] = simulation_->measured().motor_current[static_cast<Eigen::Index>(j)];
+    // A drive that reports no current reports zero.
+    message.current[j] = current_sensor_[j] != 0
+                             ? simulation_->measured().motor_current[static_cast<Eigen::Index>(j)]
+                             : 0.0;
     message.drive_status[j] = drive_feedback_t::DRIVE_ENABLED;  // simulated drives have no faults
   }
   SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);
   SetVector3(readings_->imu_acceleration, message.imu_acceleration);
   for (size_t f = 0; f < message.foot_wrench.size(); ++f) {
     SetWrench(readings_->foot_wrench[f], &message.foot_wrench[f]);
+    message.foot_sensor[f] = readings_->foot_sensor[f];
   }
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "components/framework/component.h"
 #include "components/framework/component_traits.h"
@@ -14,6 +15,7 @@
 #include "poise/drive_feedback_t.hpp"
 #include "poise/external_push_t.hpp"
 #include "poise/ground_truth_t.hpp"
+#include "sim/foot_sensors.h"
 #include "sim/sensors.h"
 #include "sim/simulation.h"
 
@@ -59,7 +61,9 @@ class SimComponent : public Component {
   Output<ground_truth_t> ground_truth_;
   std::unique_ptr<Simulation> simulation_;
   std::unique_ptr<Sensors> sensors_;
+  std::unique_ptr<FootSensors> foot_sensors_;
   std::unique_ptr<SensorReadings> readings_;
+  std::vector<int8_t> current_sensor_;  // by joint
 };
 
 }  // namespace poise

@@ -60,12 +60,23 @@ void Apply(const Motor& change, const std::string& field, MotorModel* motor) {
 
 RobotModel WithModelErrors(const RobotModel& model, const SimConfig& config) {
   RobotModel result = model;
+  RequireFinite(config.imu_roll(), "imu_roll");
+  RequireFinite(config.imu_pitch(), "imu_pitch");
+  if (config.imu_roll() != 0 || config.imu_pitch() != 0) {
+    const Eigen::Matrix3d turn = (Eigen::AngleAxisd(config.imu_pitch(), Eigen::Vector3d::UnitY()) *
+                                  Eigen::AngleAxisd(config.imu_roll(), Eigen::Vector3d::UnitX()))
+                                     .toRotationMatrix();
+    result = result.WithImuTurned(turn);
+  }
   for (int i = 0; i < config.model_error_size(); ++i) {
     const ModelError& error = config.model_error(i);
     const std::string field = "model_error[" + std::to_string(i) + "]";
-    FindBody(model, error.link(), field + ".link");
+    const std::string link = error.has_link()
+                                 ? error.link()
+                                 : model.bodies()[static_cast<size_t>(model.body_task_body())].name;
+    FindBody(model, link, field + ".link");
     try {
-      result = result.WithModelError(error.link(), error.mass_scale(),
+      result = result.WithModelError(link, error.mass_scale(),
                                      {error.com_x(), error.com_y(), error.com_z()});
     } catch (const robot::RobotError& refused) {
       throw ConfigError(field, refused.what());
@@ -93,6 +104,8 @@ std::vector<MotorModel> SimulatedMotors(const RobotModel& model, const SimConfig
       Apply(change, field, &motors[static_cast<size_t>(joint)]);
     }
   }
+  RequirePositive(config.rotor_inertia_scale(), "rotor_inertia_scale");
+  for (MotorModel& motor : motors) motor.reflected_inertia *= config.rotor_inertia_scale();
   return motors;
 }
 
@@ -103,7 +116,8 @@ DriveTrain SimulatedDriveTrain(const RobotModel& model, const SimConfig& config)
     result.set_torque_lag(drive.torque_lag);
     result.set_current_resolution(drive.current_resolution);
     result.set_backlash(drive.backlash);
-    result.set_gear_stiffness(drive.gear_stiffness);
+    RequirePositive(config.gear_stiffness_scale(), "gear_stiffness_scale");
+    result.set_gear_stiffness(config.gear_stiffness_scale() * drive.gear_stiffness);
     result.set_gear_damping(drive.gear_damping);
     result.set_link_encoder(drive.link_encoder);
     result.set_sensor_delay(drive.sensor_delay);

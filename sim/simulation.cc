@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "components/robot/sole.h"
 #include "sim/config_check.h"
 #include "sim/simulated_robot.h"
 #include "sim/start_posture.h"
@@ -21,11 +22,16 @@ using robot::RobotState;
 
 namespace {
 
-constexpr int kCorners = 4;
 // A corner this far above the ground already rests on it: rounding of the start posture must not
 // let the robot drop.
 constexpr double kContactMargin = 1e-6;  // m
 constexpr double kMaxStartDepth = 5e-3;  // m, of a sole in the block
+
+int NumCorners(const RobotModel& model) {
+  size_t count = 0;
+  for (const robot::FootModel& foot : model.feet()) count += robot::SoleCorners(foot).size();
+  return static_cast<int>(count);
+}
 
 int StepsPerTick(const SimConfig& config, double tick_period) {
   RequirePositive(config.step(), "step");
@@ -108,7 +114,7 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       fall_height_(config.fall_height()),
       fall_tilt_(config.fall_tilt()),
       terrain_(config, seed),
-      world_(worlds(model_, kCorners * static_cast<int>(model_.feet().size()), step_)),
+      world_(worlds(model_, NumCorners(model_), step_)),
       drive_train_(SimulatedDriveTrain(model_, config)),
       drivetrain_options_(DrivetrainOptions(model_, motors_, drive_train_, config)),
       current_loop_(drive_train_, step_),
@@ -132,9 +138,8 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
   }
   for (const robot::FootModel& foot : model_.feet()) {
     auto& corners = corners_.emplace_back();
-    for (int c = 0; c < kCorners; ++c) {
-      corners[static_cast<size_t>(c)] = foot.sole * Vector3d((c & 1 ? -0.5 : 0.5) * foot.length,
-                                                             (c & 2 ? -0.5 : 0.5) * foot.width, 0);
+    for (const Eigen::Vector2d& corner : robot::SoleCorners(foot)) {
+      corners.push_back(foot.sole * Vector3d(corner.x(), corner.y(), 0));
     }
   }
   SetState(start);
@@ -302,7 +307,7 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     ++count;
     if (add) {
       world_->AddContact({body, p, surface.normal, depth, surface.velocity * surface.normal.z(),
-                          terrain_.material(surface.block)});
+                          terrain_.material(surface.block, corners_[foot].size())});
     }
   }
   return count;

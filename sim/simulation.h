@@ -126,7 +126,7 @@ class Simulation {
   Drivetrain::Options drivetrain_options_;
   std::vector<Drivetrain> drivetrains_;
   CurrentLoop current_loop_;
-  std::vector<std::array<Eigen::Vector3d, 4>> corners_;  // m, body frame, by foot
+  std::vector<std::vector<Eigen::Vector3d>> corners_;  // m, body frame, by foot
   int64_t steps_ = 0;
   // By joint: A commanded, flowing now, mean of the last step, and N·m of that mean.
   Eigen::VectorXd command_, current_, mean_current_, torque_;

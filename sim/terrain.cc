@@ -17,7 +17,6 @@ using std::numbers::pi;
 namespace {
 
 constexpr double kMaxTilt = 0.8;  // rad
-constexpr int kSoleCorners = 4;   // that share a sole's stiffness
 constexpr uint64_t kTerrainStream = 1;
 
 }  // namespace
@@ -58,8 +57,7 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
                         -std::sin(block.tilt_roll()),
                         std::cos(block.tilt_pitch()) * std::cos(block.tilt_roll()));
   slope_ = -normal.head<2>() / normal.z();
-  block_material_ = {block.friction(), block.stiffness() / kSoleCorners,
-                     block.damping() / kSoleCorners};
+  block_material_ = {block.friction(), block.stiffness(), block.damping()};
 
   RandomStream random(seed, kTerrainStream);
   wave_amplitude_ = block.irregularity() / kWaves;
@@ -93,6 +91,13 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
   slope *= rise.position;
   if (height <= 0) return ground;
   return {height, velocity, Vector3d(-slope.x(), -slope.y(), 1).normalized(), true};
+}
+
+ContactMaterial Terrain::material(bool block, size_t corners) const {
+  ContactMaterial material = block ? block_material_ : ground_material_;
+  material.stiffness /= static_cast<double>(corners);
+  material.damping /= static_cast<double>(corners);
+  return material;
 }
 
 }  // namespace poise

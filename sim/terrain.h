@@ -20,16 +20,14 @@ class Terrain {
     bool block;              ///< of the block rather than of the ground
   };
 
-  /// The block's stiffness and damping are those of a whole sole, shared by its four corners.
+  /// The block's stiffness and damping are those of a whole sole, shared by its corners.
   /// Throws ConfigError: sizes, stiffness, friction or tilt out of range.
   Terrain(const SimConfig& config, uint64_t seed);
 
   /// The higher of ground and block at (x, y) at time `time` (s).
   Surface At(double x, double y, double time) const;
-  /// Of one sole corner's contact.
-  const ContactMaterial& material(bool block) const {
-    return block ? block_material_ : ground_material_;
-  }
+  /// Of the contact of one of a sole's `corners`.
+  ContactMaterial material(bool block, size_t corners) const;
 
  private:
   struct Wave {
@@ -38,7 +36,7 @@ class Terrain {
   };
   static constexpr int kWaves = 5;
 
-  ContactMaterial ground_material_, block_material_;
+  ContactMaterial ground_material_, block_material_;  // under a whole sole
   bool has_block_ = false;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   Eigen::Vector2d half_size_ = Eigen::Vector2d::Zero();

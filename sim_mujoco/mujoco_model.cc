@@ -5,10 +5,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cstdio>
-#include <cstring>
 #include <mutex>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/robot_files/mujoco_xml.h"
 
 namespace poise {
 namespace {
@@ -64,23 +64,6 @@ std::string Mjcf(const robot::RobotModel& model, int max_contacts, double step) 
   return xml + "</worldbody></mujoco>";
 }
 
-mjModel* Compile(const std::string& xml, std::string* problem) {
-  static std::mutex one_at_a_time;  // MuJoCo keeps the last XML for the process
-  const std::lock_guard lock(one_at_a_time);
-  constexpr char kName[] = "robot.xml";
-  const auto vfs = std::make_unique<mjVFS>();  // some megabytes
-  mj_defaultVFS(vfs.get());
-  mj_makeEmptyFileVFS(vfs.get(), kName, static_cast<int>(xml.size()));
-  const int file = mj_findFileVFS(vfs.get(), kName);
-  std::memcpy(vfs->filedata[file], xml.data(), xml.size());
-  char error[500] = "";
-  mjModel* model = mj_loadXML(kName, vfs.get(), error, sizeof error);
-  mj_deleteVFS(vfs.get());
-  mj_freeLastXML();
-  *problem = error;
-  return model;
-}
-
 void FillBody(const robot::RobotModel& model, size_t index, const MujocoRobot& robot) {
   mjModel* m = robot.model.get();
   const robot::Body& body = model.bodies()[index];
@@ -121,11 +104,7 @@ MujocoRobot BuildMujocoRobot(const robot::RobotModel& model, int max_contacts, d
   const MujocoReports reports;
   MujocoRobot robot;
   std::string problem;
-  try {
-    robot.model.reset(Compile(Mjcf(model, max_contacts, step), &problem));
-  } catch (const MujocoError& error) {
-    problem = error.what();
-  }
+  robot.model.reset(robot::CompileMjcf(Mjcf(model, max_contacts, step), &problem).release());
   if (!robot.model) {
     throw ConfigError(fmt::format("mujoco: refuses the robot {}: {}", model.name(), problem));
   }

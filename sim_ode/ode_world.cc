@@ -67,6 +67,31 @@ void Turn(dBodyID body, const Matrix3d& r) {
   dBodySetRotation(body, rotation);
 }
 
+// In the zero posture, in which ODE's hinges are made.
+std::vector<TreeStep::Body> Tree(const robot::RobotModel& model) {
+  const robot::RobotState zero(model.num_joints());
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, zero, &data);
+  std::vector<TreeStep::Body> bodies;
+  for (size_t b = 0; b < model.bodies().size(); ++b) {
+    const robot::Body& body = model.bodies()[b];
+    TreeStep::Body& made = bodies.emplace_back();
+    made.parent = body.parent;
+    made.mass = body.mass;
+    made.inertia = body.inertia;
+    if (body.parent < 0) continue;
+    const auto p = static_cast<size_t>(body.parent);
+    const Vector3d& axis = data.joint_axis[static_cast<size_t>(body.joint)];
+    made.anchor = -body.com;  // the body's frame is the joint's
+    made.axis = data.body_rotation[b].transpose() * axis;
+    made.parent_anchor =
+        data.body_rotation[p].transpose() * (data.body_position[b] - data.body_position[p]) -
+        model.bodies()[p].com;
+    made.parent_axis = data.body_rotation[p].transpose() * axis;
+  }
+  return bodies;
+}
+
 }  // namespace
 
 Softness SpringDamper(double k, double d, double h) {
@@ -85,11 +110,20 @@ WorldFactory OdeWorlds(const OdeConfig& config) {
 
 OdeWorld::OdeWorld(const OdeConfig& config, const robot::RobotModel& model, int max_contacts,
                    double step)
-    : model_(model), step_(step), ground_{config.contact_erp(), config.contact_cfm()} {
+    : model_(model),
+      step_(step),
+      ground_{config.contact_erp(), config.contact_cfm()},
+      tree_(Tree(model), max_contacts, step, kErp, kCfm),
+      dense_(config.solver() == OdeConfig::DENSE),
+      room_(static_cast<size_t>(max_contacts)),
+      feedback_(room_),
+      force_(room_, Vector3d::Zero()),
+      moment_(room_, Vector3d::Zero()) {
   StartOde();
+  points_.reserve(room_);
+  rows_.reserve(room_);
   world_ = dWorldCreate();
   contacts_ = dJointGroupCreate(0);
-  feedback_.resize(static_cast<size_t>(max_contacts));
   dWorldSetGravity(world_, 0, 0, -robot::kGravity);
   dWorldSetERP(world_, kErp);
   dWorldSetCFM(world_, kCfm);
@@ -132,6 +166,7 @@ OdeWorld::~OdeWorld() {
 }
 
 void OdeWorld::SetState(const robot::RobotState& state) {
+  tree_.Forget();
   robot::RobotData data(model_);
   robot::ComputeKinematics(model_, state, &data);
   for (size_t b = 0; b < bodies_.size(); ++b) {
@@ -218,6 +253,11 @@ bool OdeWorld::Finite() const {
 
 void OdeWorld::SetJoint(int joint, const JointRow& row) {
   const dJointID hinge = hinges_[static_cast<size_t>(joint)];
+  TreeStep::Body& child =
+      tree_.body(static_cast<size_t>(model_.joints()[static_cast<size_t>(joint)].body));
+  child.motor = row.active;
+  child.motor_velocity = row.velocity;
+  child.motor_cfm = row.cfm;
   dJointAddHingeTorque(hinge, row.torque);
   // ODE divides cfm by the step, so the row it solves is J v' + cfm lambda = velocity.
   dJointSetHingeParam(hinge, dParamFMax, row.active ? dInfinity : 0);
@@ -230,37 +270,106 @@ void OdeWorld::AddForce(int body, const Vector3d& force, const Vector3d& point) 
                      point.y(), point.z());
 }
 
-void OdeWorld::AddContact(const TerrainContact& at) {
-  if (num_contacts_ == feedback_.size()) return;
-  const ContactMaterial& material = at.material;
-  const Softness softness =
-      material.stiffness > 0 ? SpringDamper(material.stiffness, material.damping, step_) : ground_;
-  dContact contact{};
-  contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM | dContactMotionN;
-  contact.surface.motionN = at.velocity;
-  contact.surface.mu = material.friction;
-  contact.surface.soft_erp = softness.erp;
-  contact.surface.soft_cfm = softness.cfm;
-  for (int i = 0; i < 3; ++i) {
-    contact.geom.pos[i] = at.position[i];
-    contact.geom.normal[i] = at.normal[i];
+void OdeWorld::AddContact(const TerrainContact& contact) {
+  if (points_.size() < room_) points_.push_back(contact);
+}
+
+Softness OdeWorld::SoftnessOf(const ContactMaterial& material) const {
+  return material.stiffness > 0 ? SpringDamper(material.stiffness, material.damping, step_)
+                                : ground_;
+}
+
+bool OdeWorld::StepTree() {
+  for (size_t b = 0; b < bodies_.size(); ++b) {
+    TreeStep::Body& body = tree_.body(b);
+    body.position = ToEigen(dBodyGetPosition(bodies_[b]));
+    body.rotation = rotation(static_cast<int>(b));
+    body.linear = ToEigen(dBodyGetLinearVel(bodies_[b]));
+    body.angular = ToEigen(dBodyGetAngularVel(bodies_[b]));
+    body.force =
+        ToEigen(dBodyGetForce(bodies_[b])) - body.mass * robot::kGravity * Vector3d::UnitZ();
+    body.torque = ToEigen(dBodyGetTorque(bodies_[b]));
   }
-  contact.geom.depth = std::max(at.depth, 0.0);
-  const dJointID joint = dJointCreateContact(world_, contacts_, &contact);
-  dJointAttach(joint, bodies_[static_cast<size_t>(at.body)], nullptr);
-  dJointSetFeedback(joint, &feedback_[num_contacts_++]);
+  rows_.clear();
+  for (const TerrainContact& point : points_) {
+    const Softness softness = SoftnessOf(point.material);
+    const dVector3 normal = {point.normal.x(), point.normal.y(), point.normal.z()};
+    dVector3 first, second;
+    dPlaneSpace(normal, first, second);
+    rows_.push_back({point.body,
+                     point.position,
+                     {point.normal, ToEigen(first), ToEigen(second)},
+                     softness.erp / step_ * std::max(point.depth, 0.0) + point.velocity,
+                     softness.cfm,
+                     point.material.friction});
+  }
+  if (!tree_.Solve(rows_)) return false;
+  for (size_t b = 0; b < bodies_.size(); ++b) {
+    const dBodyID id = bodies_[b];
+    const TreeStep::Body& body = tree_.body(b);
+    const Vector3d position = body.position + step_ * body.linear;
+    dBodySetPosition(id, position.x(), position.y(), position.z());
+    dBodySetLinearVel(id, body.linear.x(), body.linear.y(), body.linear.z());
+    dBodySetAngularVel(id, body.angular.x(), body.angular.y(), body.angular.z());
+    // As ODE integrates a rotation when it is not told to do it to higher order.
+    const dReal* q = dBodyGetQuaternion(id);
+    dVector4 rate;
+    dWtoDQ(dBodyGetAngularVel(id), q, rate);
+    const dQuaternion turned = {q[0] + step_ * rate[0], q[1] + step_ * rate[1],
+                                q[2] + step_ * rate[2], q[3] + step_ * rate[3]};
+    dBodySetQuaternion(id, turned);
+    dBodySetForce(id, 0, 0, 0);
+    dBodySetTorque(id, 0, 0, 0);
+  }
+  for (size_t c = 0; c < points_.size(); ++c) {
+    force_[c] = tree_.force(c);
+    moment_[c] = (rows_[c].position - tree_.body(static_cast<size_t>(rows_[c].body)).position)
+                     .cross(force_[c]);
+  }
+  return true;
+}
+
+void OdeWorld::StepDense() {
+  for (size_t c = 0; c < points_.size(); ++c) {
+    const TerrainContact& at = points_[c];
+    const Softness softness = SoftnessOf(at.material);
+    dContact contact{};
+    contact.surface.mode = dContactApprox1 | dContactSoftERP | dContactSoftCFM | dContactMotionN;
+    contact.surface.motionN = at.velocity;
+    contact.surface.mu = at.material.friction;
+    contact.surface.soft_erp = softness.erp;
+    contact.surface.soft_cfm = softness.cfm;
+    for (int i = 0; i < 3; ++i) {
+      contact.geom.pos[i] = at.position[i];
+      contact.geom.normal[i] = at.normal[i];
+    }
+    contact.geom.depth = std::max(at.depth, 0.0);
+    const dJointID joint = dJointCreateContact(world_, contacts_, &contact);
+    dJointAttach(joint, bodies_[static_cast<size_t>(at.body)], nullptr);
+    dJointSetFeedback(joint, &feedback_[c]);
+  }
+  if (dWorldStep(world_, step_) == 0) std::snprintf(message_, sizeof message_, "out of memory");
+  dJointGroupEmpty(contacts_);
+  for (size_t c = 0; c < points_.size(); ++c) {
+    force_[c] = ToEigen(feedback_[c].f1);
+    moment_[c] = ToEigen(feedback_[c].t1);
+  }
 }
 
 bool OdeWorld::Step() {
   ode_message[0] = '\0';
   try {
-    if (dWorldStep(world_, step_) == 0) std::snprintf(message_, sizeof message_, "out of memory");
+    if (dense_) {
+      StepDense();
+    } else if (!StepTree()) {
+      ++given_up_steps_;
+      StepDense();
+    }
   } catch (const OdeError& error) {
     std::snprintf(message_, sizeof message_, "%s", error.what());
     return false;
   }
-  dJointGroupEmpty(contacts_);
-  num_contacts_ = 0;
+  points_.clear();
   for (size_t j = 0; j < hinges_.size(); ++j) {
     const double angle = dJointGetHingeAngle(hinges_[j]);
     if (angle - last_angle_[j] > pi) turns_[j] -= 2 * pi;
@@ -271,12 +380,8 @@ bool OdeWorld::Step() {
   return message_[0] == '\0';
 }
 
-Vector3d OdeWorld::contact_force(int index) const {
-  return ToEigen(feedback_[static_cast<size_t>(index)].f1);
-}
+Vector3d OdeWorld::contact_force(int index) const { return force_[static_cast<size_t>(index)]; }
 
-Vector3d OdeWorld::contact_moment(int index) const {
-  return ToEigen(feedback_[static_cast<size_t>(index)].t1);
-}
+Vector3d OdeWorld::contact_moment(int index) const { return moment_[static_cast<size_t>(index)]; }
 
 }  // namespace poise

@@ -5,12 +5,14 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <string_view>
 #include <vector>
 
 #include "components/robot/robot_model.h"
 #include "sim/world.h"
 #include "sim_ode/sim_ode.pb.h"
+#include "sim_ode/tree_step.h"
 
 namespace poise {
 
@@ -24,8 +26,9 @@ struct Softness {
 /// manual, "ERP and CFM".
 Softness SpringDamper(double k, double d, double h);
 
-/// ODE's dWorldStep (direct solver) is used throughout; it is first order in the step and
-/// repeatable bit for bit. It allocates.
+/// ODE keeps bodies and joints. Its equations are solved by TreeStep, or by its own dWorldStep
+/// (direct solver), as OdeConfig.solver says; both are first order in the step and repeatable bit
+/// for bit. Where TreeStep gives up, dWorldStep takes the step. dWorldStep allocates.
 class OdeWorld : public World {
  public:
   /// See WorldFactory. Throws ConfigError when ODE was built in single precision.
@@ -53,7 +56,14 @@ class OdeWorld : public World {
   Eigen::Vector3d contact_force(int index) const override;
   Eigen::Vector3d contact_moment(int index) const override;
 
+  /// Steps that TreeStep gave up.
+  int64_t given_up_steps() const { return given_up_steps_; }
+
  private:
+  Softness SoftnessOf(const ContactMaterial& material) const;
+  bool StepTree();
+  void StepDense();
+
   const robot::RobotModel& model_;
   double step_;
   Softness ground_;  // of contacts that are rigid
@@ -63,8 +73,14 @@ class OdeWorld : public World {
   std::vector<dJointID> hinges_;
   std::vector<double> turns_;  // by joint, rad to add to ODE's angle, a multiple of 2 pi
   std::vector<double> last_angle_;
+  TreeStep tree_;
+  bool dense_;
+  size_t room_;                         // for contacts
+  std::vector<TerrainContact> points_;  // of the next step
+  std::vector<TreeStep::Contact> rows_;
   std::vector<dJointFeedback> feedback_;
-  size_t num_contacts_ = 0;
+  std::vector<Eigen::Vector3d> force_, moment_;  // of the contacts of the last step
+  int64_t given_up_steps_ = 0;
   char message_[160] = "";
 };
 

@@ -76,8 +76,10 @@ int main(int argc, char** argv) {
   poise::AddLogCommand(&app, &command);
   poise::AddNewCommand(&app, &command);
   poise::AddGraphCommand(&app, &command);
+  poise::AddRobotCommand(&app, &command);
   poise::AddListCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
+  poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);

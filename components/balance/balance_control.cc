@@ -42,8 +42,7 @@ Vector6d BaseWrench(const ReducedDynamics& reduced, const VectorRef& torque) {
   acceleration.others = net.others;
   ToReduced<S, Loop>(reduced, net.legs, &z, &acceleration.others);
   SolveReducedTransposed<S, Loop>(reduced, &z, &acceleration.others);
-  acceleration.legs =
-      Eigen::Map<const StackVector<S>>(reduced.bias.joint_acceleration.data(), s);
+  acceleration.legs = Eigen::Map<const StackVector<S>>(reduced.bias.joint_acceleration.data(), s);
   if constexpr (Loop) {
     AddProduct<1>(acceleration.legs, View<S, R>(reduced.rotation, s, r, 6), z);
   } else {
@@ -54,21 +53,21 @@ Vector6d BaseWrench(const ReducedDynamics& reduced, const VectorRef& torque) {
 
 }  // namespace
 
-BalanceControl::BalanceControl(int num_joints, int max_protected_rows)
-    : num_joints_(num_joints) {
+BalanceControl::BalanceControl(int num_joints, int max_protected_rows) : num_joints_(num_joints) {
   if (num_joints < 1 || num_joints > kMaxJoints || max_protected_rows < 1 ||
       max_protected_rows > num_joints) {
     throw std::invalid_argument("BalanceControl: 1 to 128 joints, 1 to that many protected rows");
   }
   moment_.setZero(num_joints, 2);
   projection_.setZero(max_protected_rows, 2);
+  factor_.setZero(max_protected_rows, max_protected_rows);
 }
 
 BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
                                       const TaskDynamics& protected_task,
                                       const ContactGeometry& geometry, const ContactLimits& limits,
                                       bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
-                                      BalanceResult* result) {
+                                      BalanceResult* result, Movers movers) {
   const auto nearest = [&](const Eigen::Vector2d& cop) {
     Eigen::Vector2d allowed = cop;
     if (std::abs(cop.x()) > limits.half_length) {
@@ -79,24 +78,24 @@ BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
     }
     return allowed;
   };
-  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result);
+  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result, movers);
 }
 
 BalanceStatus BalanceControl::Compute(const ContactDynamics& contact,
                                       const TaskDynamics& protected_task,
                                       const ContactGeometry& geometry, const ConvexPolygon& region,
                                       bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
-                                      BalanceResult* result) {
+                                      BalanceResult* result, Movers movers) {
   const auto nearest = [&](const Eigen::Vector2d& cop) { return NearestPoint(region, cop); };
-  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result);
+  return ComputeWith(nearest, contact, protected_task, geometry, enabled, torque, result, movers);
 }
 
 template <class Nearest>
 BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
                                           const TaskDynamics& protected_task,
                                           const ContactGeometry& geometry, bool enabled,
-                                          Eigen::Ref<Eigen::VectorXd> torque,
-                                          BalanceResult* result) {
+                                          Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                                          Movers movers) {
   const ReducedDynamics& reduced = contact.reduced();
   *result = BalanceResult{};
   const int feet = geometry.in_contact[0] + geometry.in_contact[1];
@@ -108,6 +107,7 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
   return WithSizes(reduced, [&]<int S, bool Loop>() {
     constexpr int R = Rank<S, Loop>();
     const Index s = reduced.num_legs, r = reduced.legs_rank(), t = protected_task.num_rows();
+    const bool keep_others = movers == Movers::kLegs && reduced.filled_others > 0;
 
     // (35): the base rows of the equations of motion are the resultant of all contacts, seen from
     // the base.
@@ -139,6 +139,8 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
       d_others[i].setZero(reduced.filled_others);
       AddColumns(-1, OthersCoupling(reduced), 6, rows_t.col(i).data(), d_others[i].data());
       ToReduced<S, Loop>(reduced, StackVector<S>(joints.col(i)), &column, &d_others[i]);
+      // The others' accelerations depend on their own coordinates alone: y_o = L_ooᵀ q̈_o.
+      if (keep_others) d_others[i].setZero(reduced.filled_others);
     }
     const auto products = [&](Eigen::Matrix2d* gram) {
       gram->noalias() = d.transpose().lazyProduct(d);
@@ -151,18 +153,26 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
     products(&raw);
 
     const MatrixRef task = protected_task.reduced_jacobian();
-    const MatrixRef task_factor = protected_task.factor();
+    if (keep_others) {
+      auto own = factor_.topLeftCorner(t, t);
+      for (Index j = 0; j < t; ++j) {
+        for (Index i = j; i < t; ++i) own(i, j) = task.row(i).dot(task.row(j));
+      }
+      if (!Cholesky(own, kMomentDependence)) return BalanceStatus::kSingular;
+    }
+    const MatrixRef task_factor =
+        keep_others ? MatrixRef(factor_.topLeftCorner(t, t)) : protected_task.factor();
     const BlockMatrix task_others = protected_task.others_reduced();
     auto projection = View<Dynamic, 2>(projection_, t, 2);
     for (int i = 0; i < 2; ++i) {
       auto force = projection.col(i);
       force.setZero();
       for (Index j = 0; j < r; ++j) force += task.col(j) * d(j, i);
-      AddDots(1, task_others, t, d_others[i].data(), force.data());
+      if (!keep_others) AddDots(1, task_others, t, d_others[i].data(), force.data());
       SolveLower(task_factor, force);
       SolveLowerTransposed(task_factor, force);
       for (Index j = 0; j < r; ++j) d(j, i) -= task.col(j).dot(force);
-      AddColumns(-1, task_others, t, force.data(), d_others[i].data());
+      if (!keep_others) AddColumns(-1, task_others, t, force.data(), d_others[i].data());
     }
     Eigen::Matrix2d gram;
     products(&gram);

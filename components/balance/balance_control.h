@@ -37,6 +37,12 @@ enum class BalanceStatus {
   kUnloaded,  ///< F_z ≥ 0: no centre of pressure exists; the torque stays as it was
 };
 
+/// What moves so that the centre of pressure does.
+enum class Movers {
+  kAllJoints,  ///< (42): as their inertia makes it cheapest; light arms and heads move most
+  kLegs,       ///< the joints between base and feet; all others keep the task torque's acceleration
+};
+
 /// (35)–(46). Sized once; never allocates afterwards.
 class BalanceControl {
  public:
@@ -51,22 +57,25 @@ class BalanceControl {
   /// computed for. Not `enabled`: evaluates only.
   BalanceStatus Compute(const ContactDynamics& contact, const TaskDynamics& protected_task,
                         const ContactGeometry& geometry, const ContactLimits& limits, bool enabled,
-                        Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result);
+                        Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                        Movers movers = Movers::kAllJoints);
   /// The same with any convex region of frame O's plane, not empty, in place of the rectangle.
   BalanceStatus Compute(const ContactDynamics& contact, const TaskDynamics& protected_task,
                         const ContactGeometry& geometry, const ConvexPolygon& region, bool enabled,
-                        Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result);
+                        Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                        Movers movers = Movers::kAllJoints);
 
  private:
   /// `nearest`: a centre of pressure to the allowed one nearest to it.
   template <class Nearest>
   BalanceStatus ComputeWith(const Nearest& nearest, const ContactDynamics& contact,
                             const TaskDynamics& protected_task, const ContactGeometry& geometry,
-                            bool enabled, Eigen::Ref<Eigen::VectorXd> torque,
-                            BalanceResult* result);
+                            bool enabled, Eigen::Ref<Eigen::VectorXd> torque, BalanceResult* result,
+                            Movers movers);
 
   int num_joints_;
   Eigen::MatrixXd moment_;      // r_s×2, (42) in reduced coordinates, transposed
+  Eigen::MatrixXd factor_;      // of the legs' part of T_h T_hᵀ
   Eigen::MatrixXd projection_;  // t_h×2
 };
 

@@ -17,6 +17,16 @@ ContactMargins CheckContact(const Vector6d& wrench, const ContactLimits& limits)
   margins.yaw = limits.yaw_friction * load - std::abs(wrench(5));
   margins.roll = limits.half_width * load - std::abs(wrench(3));
   margins.pitch = limits.half_length * load - std::abs(wrench(4));
+  if (limits.edges.count > 0) {
+    double least = HUGE_VAL;
+    for (const HalfPlane& edge : limits.edges.planes()) {
+      // |F_z| normal·r with (37), (38) for F_z < 0.
+      const double moment = edge.normal.x() * wrench(4) - edge.normal.y() * wrench(3);
+      const double margin = edge.offset * load - moment;
+      if (!(margin >= least)) least = margin;  // NaN, too
+    }
+    margins.roll = margins.pitch = least;
+  }
   return margins;
 }
 

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "components/balance/contact_dynamics.h"
+#include "components/balance/convex_polygon.h"
 
 namespace poise::balance {
 
@@ -16,6 +17,8 @@ struct ContactLimits {
   double yaw_friction = 0.9;  ///< μ_z, m, (31)
   double half_length = 0;     ///< l_x/2, m, (33), (37)
   double half_width = 0;      ///< l_y/2, m, (32), (38)
+  /// Any convex patch: where there are edges, they stand in place of half_length and half_width.
+  HalfPlanes edges = {};
 };
 
 /// Distance from each condition, positive inside.
@@ -23,8 +26,8 @@ struct ContactMargins {
   double normal = 0;    ///< N, (29)
   double friction = 0;  ///< N, (30)
   double yaw = 0;       ///< N·m, (31)
-  double roll = 0;      ///< N·m, (32)
-  double pitch = 0;     ///< N·m, (33)
+  double roll = 0;      ///< N·m, (32); of edges the least, |F_z| times the distance to the edge
+  double pitch = 0;     ///< N·m, (33); of edges likewise
   /// All margins ≥ −tolerance (N and N·m alike). NaN is never met.
   bool Met(double tolerance = 1e-6) const;
 };

@@ -452,6 +452,27 @@ void ContactDynamics::ExpandTorque(const VectorRef& reduced,
   });
 }
 
+void ContactDynamics::HoldOthers(const VectorRef& joint_acceleration,
+                                 Eigen::Ref<Eigen::VectorXd> reduced) const {
+  WithSizes(reduced_, [&]<int S, bool Loop>() {
+    const Index r = reduced_.legs_rank(), o = reduced_.num_others();
+    eigen_assert(joint_acceleration.size() == reduced_.num_joints &&
+                 reduced.size() == reduced_.rank());
+    StackVector<Rank<S, Loop>()> bias(r);  // L⁻¹ Vᵀ h
+    OthersVector others = reduced_.bias.others_torque;
+    ToReduced<S, Loop>(reduced_,
+                       StackVector<S>(Eigen::Map<const StackVector<S>>(
+                           reduced_.bias.joint_torque.data(), reduced_.num_legs)),
+                       &bias, &others);
+    SplitVector<S> wanted;
+    Gather(reduced_, joint_acceleration.data(), &wanted);
+    const BlockMatrix factor = OthersFactor(reduced_);
+    AddDots(1, {factor.col(r), factor.rows, factor.stride}, o, wanted.others.data(), others.data());
+    reduced.head(r).setZero();
+    reduced.tail(o) = others.head(o);
+  });
+}
+
 void ContactDynamics::ReduceRows(const MatrixRef& jacobian, const VectorRef& bias_acceleration,
                                  Eigen::Ref<Eigen::MatrixXd> rows_t,
                                  Eigen::Ref<Eigen::VectorXd> load) const {
@@ -464,10 +485,10 @@ void ContactDynamics::ReduceRows(const MatrixRef& jacobian, const VectorRef& bia
     const auto phi_t = View<S, 6>(reduced_.phi_t, s, 6);
     StackVector<R> bias(r), row(r);  // L⁻¹ Vᵀ h
     OthersVector others_bias = reduced_.bias.others_torque;
-    ToReduced<S, Loop>(reduced_,
-                       StackVector<S>(Eigen::Map<const StackVector<S>>(
-                           reduced_.bias.joint_torque.data(), s)),
-                       &bias, &others_bias);
+    ToReduced<S, Loop>(
+        reduced_,
+        StackVector<S>(Eigen::Map<const StackVector<S>>(reduced_.bias.joint_torque.data(), s)),
+        &bias, &others_bias);
     StackVector<Dynamic> given(reduced_.num_joints);
     SplitVector<S> joints;
     for (Index i = 0; i < t; ++i) {

@@ -41,10 +41,10 @@ struct ReducedDynamics {
   int filled_others = 0;     ///< o, filled up
   std::vector<int> order;    ///< joints: legs, then others, each ascending
   Eigen::MatrixXd phi_t;     ///< Φᵀ of the legs, s×6
-  Eigen::MatrixXd psi_t;     ///< ([A_bb A_bj] [Φ; I])ᵀ of the legs, s×6: base rows of A q̈ = A_bb a_b
-                             ///< + Ψ q̈_j; of the others see others_coupling
-  Eigen::MatrixXd mass;      ///< M_ss
-  Eigen::MatrixXd rotation;  ///< [Q₁ V], s×s, of Hᵀ = Q₁ R (two feet only)
+  Eigen::MatrixXd psi_t;  ///< ([A_bb A_bj] [Φ; I])ᵀ of the legs, s×6: base rows of A q̈ = A_bb a_b
+                          ///< + Ψ q̈_j; of the others see others_coupling
+  Eigen::MatrixXd mass;             ///< M_ss
+  Eigen::MatrixXd rotation;         ///< [Q₁ V], s×s, of Hᵀ = Q₁ R (two feet only)
   Eigen::MatrixXd mass_basis;       ///< M_ss V, s×(s−6) (two feet only)
   Eigen::MatrixXd factor;           ///< L_ss, lower
   Eigen::MatrixXd loop;             ///< Hᵀ's Householder vectors and R, s×6 (two feet only)
@@ -58,11 +58,13 @@ struct ReducedDynamics {
 
   /// Terms that do not depend on the torque, linear in (b + g, J̇_c q̇).
   struct Bias {
-    Eigen::VectorXd joint_torque;   ///< h of the legs, the particular acceleration's inertia included
+    Eigen::VectorXd
+        joint_torque;  ///< h of the legs, the particular acceleration's inertia included
     Eigen::VectorXd others_torque;  ///< h of the others
-    Eigen::VectorXd joint_acceleration;  ///< of the particular solution, legs; of the others it is 0
-    Vector6d base_acceleration;          ///< a_b
-    Vector6d base_wrench;                ///< −(A_bb a_b + base rows of b + g)
+    Eigen::VectorXd
+        joint_acceleration;      ///< of the particular solution, legs; of the others it is 0
+    Vector6d base_acceleration;  ///< a_b
+    Vector6d base_wrench;        ///< −(A_bb a_b + base rows of b + g)
   };
   Bias bias;
   Eigen::VectorXd gravity_torque;  ///< [Φ; I]ᵀ g, k×1, in the robot's order
@@ -116,6 +118,10 @@ class ContactDynamics {
   void ReduceTorque(const VectorRef& torque, Eigen::Ref<Eigen::VectorXd> reduced) const;
   /// u (r×1) to the least Γ (k×1) that has it, V L u.
   void ExpandTorque(const VectorRef& reduced, Eigen::Ref<Eigen::VectorXd> torque) const;
+  /// u (r×1) with which the joints that are no leg's accelerate by `joint_acceleration` (k×1, of
+  /// which the legs' entries count for nothing), whatever the legs do: their coordinates are the
+  /// last ones, u_o = L_ooᵀ q̈_o + (L⁻¹ Vᵀ h)_o. The legs' become zero.
+  void HoldOthers(const VectorRef& joint_acceleration, Eigen::Ref<Eigen::VectorXd> reduced) const;
   /// J (t×n) and J̇ q̇ (t×1) of task rows to Tᵀ (r×t) and their load (t×1). Rows that the contacts
   /// hold become zero.
   void ReduceRows(const MatrixRef& jacobian, const VectorRef& bias_acceleration,

@@ -42,17 +42,6 @@ Eigen::Vector2d NearestOnSegment(const Eigen::Vector2d& a, const Eigen::Vector2d
   return a + edge * (along / length);
 }
 
-/// Inside or on the edge of a polygon with an area.
-bool Contains(const ConvexPolygon& polygon, const Eigen::Vector2d& point) {
-  if (polygon.num_corners < 3) return false;
-  Eigen::Vector2d a = polygon.corners().back();
-  for (const Eigen::Vector2d& b : polygon.corners()) {
-    if (!(Cross(b - a, point - a) >= 0)) return false;
-    a = b;
-  }
-  return true;
-}
-
 Eigen::Vector2d NearestOnBoundary(const ConvexPolygon& polygon, const Eigen::Vector2d& point) {
   Eigen::Vector2d best = polygon.corners().back(), a = best;
   double least = std::numeric_limits<double>::infinity();
@@ -122,6 +111,110 @@ ConvexPolygon Rectangle(const Eigen::Vector2d& half) {
   rectangle.corner[2] = half;
   rectangle.corner[3] = {-half.x(), half.y()};
   return rectangle;
+}
+
+HalfPlanes EdgesOf(const ConvexPolygon& polygon) {
+  HalfPlanes edges;
+  if (polygon.num_corners < 3) return edges;
+  Eigen::Vector2d a = polygon.corners().back();
+  for (const Eigen::Vector2d& b : polygon.corners()) {
+    const Eigen::Vector2d along = (b - a).normalized();
+    const Eigen::Vector2d normal(along.y(), -along.x());
+    edges.plane[static_cast<size_t>(edges.count++)] = {normal, normal.dot(a)};
+    a = b;
+  }
+  return edges;
+}
+
+ConvexPolygon Clip(const ConvexPolygon& polygon, const HalfPlane& plane) {
+  // Each corner cut off leaves at most two: one more than there were.
+  std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners + 1> kept;
+  size_t count = 0;
+  if (polygon.num_corners < 3) return {};
+  const auto append = [&](const Eigen::Vector2d& point) {
+    if (count < kept.size()) kept[count++] = point;
+  };
+  Eigen::Vector2d a = polygon.corners().back();
+  double outside_a = plane.normal.dot(a) - plane.offset;
+  for (const Eigen::Vector2d& b : polygon.corners()) {
+    const double outside_b = plane.normal.dot(b) - plane.offset;
+    if ((outside_a > 0) != (outside_b > 0)) {
+      append(a + (b - a) * (outside_a / (outside_a - outside_b)));
+    }
+    if (!(outside_b > 0)) append(b);
+    a = b;
+    outside_a = outside_b;
+  }
+  const ConvexPolygon hull = ConvexHull({kept.data(), count});
+  return hull.num_corners < 3 ? ConvexPolygon() : hull;
+}
+
+ConvexPolygon Inset(const ConvexPolygon& polygon, double margin) {
+  ConvexPolygon rest = polygon.num_corners < 3 ? ConvexPolygon() : polygon;
+  if (margin == 0) return rest;
+  for (HalfPlane plane : EdgesOf(polygon).planes()) {
+    plane.offset -= margin;
+    rest = Clip(rest, plane);
+  }
+  return rest;
+}
+
+ConvexPolygon WithFewerCorners(ConvexPolygon polygon, int most) {
+  while (polygon.num_corners > std::max(most, 3)) {
+    const auto corners = polygon.corners();
+    const size_t n = corners.size();
+    size_t cheapest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < n; ++i) {
+      const Eigen::Vector2d& before = corners[(i + n - 1) % n];
+      const double cost = Cross(corners[i] - before, corners[(i + 1) % n] - before);
+      if (cost < least) {
+        least = cost;
+        cheapest = i;
+      }
+    }
+    std::copy(polygon.corner.begin() + static_cast<std::ptrdiff_t>(cheapest) + 1,
+              polygon.corner.begin() + polygon.num_corners,
+              polygon.corner.begin() + static_cast<std::ptrdiff_t>(cheapest));
+    --polygon.num_corners;
+  }
+  return polygon;
+}
+
+Eigen::Vector2d LargestRectangle(const HalfPlanes& region, const Eigen::Vector2d& given) {
+  // |n_x| x + |n_y| y ≤ offset for each edge.
+  const auto other = [&](double half, int axis) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const HalfPlane& plane : region.planes()) {
+      const double slope = std::abs(plane.normal[1 - axis]);
+      const double room = plane.offset - std::abs(plane.normal[axis]) * half;
+      if (room <= 0) return 0.0;
+      if (slope > 0) least = std::min(least, room / slope);
+    }
+    return std::isfinite(least) ? least : 0.0;
+  };
+  if (given.x() > 0) return {given.x(), given.y() > 0 ? given.y() : other(given.x(), 0)};
+  if (given.y() > 0) return {other(given.y(), 1), given.y()};
+  // other(x) is concave, and so is the logarithm of the area x · other(x): it has one top.
+  double low = 0, high = other(0, 1);
+  const auto area = [&](double x) { return x * other(x, 0); };
+  constexpr double kGolden = 0.6180339887498949;
+  for (int i = 0; i < 100; ++i) {
+    const double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
+    (area(left) < area(right) ? low : high) = area(left) < area(right) ? left : right;
+  }
+  const double x = 0.5 * (low + high);
+  return {x, other(x, 0)};
+}
+
+bool Contains(const ConvexPolygon& polygon, const Eigen::Vector2d& point) {
+  if (polygon.num_corners < 3) return false;
+  Eigen::Vector2d a = polygon.corners().back();
+  for (const Eigen::Vector2d& b : polygon.corners()) {
+    if (!(Cross(b - a, point - a) >= 0)) return false;
+    a = b;
+  }
+  return true;
 }
 
 Eigen::Vector2d NearestPoint(const ConvexPolygon& polygon, const Eigen::Vector2d& point) {

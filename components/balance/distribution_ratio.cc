@@ -6,7 +6,7 @@
 namespace poise::balance {
 namespace {
 
-/// |a η + b| < c of one foot and axis, (70).
+/// a η + b < c of one foot, one half of (70).
 struct Bound {
   double a, b, c;
   const char* name;
@@ -24,26 +24,52 @@ LinearMoment OwnMoments(const Vector6d& resultant, const Eigen::Vector3d& right,
   return {-(right - left).cross(force), resultant.tail<3>() - left.cross(force)};
 }
 
-using Bounds = std::array<Bound, 6>;
+/// Of both feet: the edges of their soles, and M_z both ways.
+class Bounds {
+ public:
+  void AddBelow(double a, double b, double c, const char* name) {
+    bound_[static_cast<size_t>(count_++)] = {a, b, c, name};
+  }
+  /// |a η + b| < c.
+  void AddBoth(double a, double b, double c, const char* name) {
+    AddBelow(a, b, c, name);
+    AddBelow(-a, -b, c, name);
+  }
+  const Bound* begin() const { return bound_.data(); }
+  const Bound* end() const { return bound_.data() + count_; }
+
+ private:
+  static constexpr int kMost = 2 * (ConvexPolygon::kMaxCorners + 2);
+  std::array<Bound, kMost> bound_;
+  int count_ = 0;
+};
 
 /// (70)–(79) of both feet, each in its own sole frame. `rotation`: sole to O.
 Bounds MomentBounds(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                    const std::array<Eigen::Matrix3d, 2>& rotation, const ContactLimits& limits) {
+                    const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits) {
   const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
   Bounds bounds;
-  for (int foot = 0; foot < 2; ++foot) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const ContactLimits& own = limits[foot];
     const Eigen::Matrix3d to_sole = rotation[foot].transpose();
     const Eigen::Vector3d a = to_sole * moment.slope, b = to_sole * moment.offset;
     const double load = std::abs(to_sole.row(2).dot(resultant.head<3>()));
-    bounds[3 * foot] = {a.x(), b.x(), limits.half_width * load, "roll"};
-    bounds[3 * foot + 1] = {a.y(), b.y(), limits.half_length * load, "pitch"};
-    bounds[3 * foot + 2] = {a.z(), b.z(), limits.yaw_friction * load, "yaw"};
+    if (own.edges.count == 0) {
+      bounds.AddBoth(a.x(), b.x(), own.half_width * load, "roll");
+      bounds.AddBoth(a.y(), b.y(), own.half_length * load, "pitch");
+    }
+    for (const HalfPlane& edge : own.edges.planes()) {
+      // |F_z| normal·r with (37), (38) for F_z < 0.
+      const Eigen::Vector2d turned(-edge.normal.y(), edge.normal.x());
+      bounds.AddBelow(turned.dot(a.head<2>()), turned.dot(b.head<2>()), edge.offset * load, "edge");
+    }
+    bounds.AddBoth(a.z(), b.z(), own.yaw_friction * load, "yaw");
   }
   return bounds;
 }
 
 RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                        const std::array<Eigen::Matrix3d, 2>& rotation, const ContactLimits& limits,
+                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
                         double eta_min, double eta_max) {
   RatioInterval interval;
   const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
@@ -59,20 +85,20 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
     return interval;
   };
   if (!(interval.min <= interval.max)) return infeasible("ratio limits");
-  for (const Eigen::Matrix3d& r : rotation) {
-    const Eigen::Vector3d force = r.transpose() * resultant.head<3>();
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const Eigen::Vector3d force = rotation[foot].transpose() * resultant.head<3>();
     if (!(force.z() < 0)) return infeasible("normal");
-    if (!(std::hypot(force.x(), force.y()) < limits.friction * -force.z()))
+    if (!(std::hypot(force.x(), force.y()) < limits[foot].friction * -force.z()))
       return infeasible("friction");
   }
   for (const Bound& bound : MomentBounds(resultant, position, rotation, limits)) {
     if (bound.a == 0) {
-      if (!(std::abs(bound.b) < bound.c)) return infeasible(bound.name);
+      if (!(bound.b < bound.c)) return infeasible(bound.name);
       continue;
     }
-    const double one = (-bound.c - bound.b) / bound.a, other = (bound.c - bound.b) / bound.a;
-    interval.min = std::max(std::min(one, other), interval.min);
-    interval.max = std::min(std::max(one, other), interval.max);
+    const double end = (bound.c - bound.b) / bound.a;
+    if (bound.a > 0) interval.max = std::min(end, interval.max);
+    if (bound.a < 0) interval.min = std::max(end, interval.min);
     // NaN passes neither std::max nor std::min as written; it is caught here.
     if (!(std::isfinite(bound.a + bound.b) && interval.min <= interval.max))
       return infeasible(bound.name);
@@ -84,55 +110,56 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
 // m of centre of pressure that one ratio may be worse than another before it counts.
 constexpr double kIndifference = 1e-3;
 
-double Violation(const Bounds& bounds, double eta) {
-  double worst = -HUGE_VAL;
-  for (const Bound& bound : bounds)
-    worst = std::max(worst, std::abs(bound.a * eta + bound.b) - bound.c);
-  return worst;
+double Violation(const Bound& bound, double eta) { return bound.a * eta + bound.b - bound.c; }
+
+/// The bound that η violates most.
+const Bound& Worst(const Bounds& bounds, double eta) {
+  const Bound* worst = bounds.begin();
+  for (const Bound& bound : bounds) {
+    if (Violation(bound, eta) > Violation(*worst, eta)) worst = &bound;
+  }
+  return *worst;
+}
+
+/// The least that the largest violation can be in [eta_min, eta_max]: the lowest point of a convex,
+/// piecewise linear function, between a piece that falls and one that rises.
+double LeastViolation(const Bounds& bounds, double eta_min, double eta_max) {
+  const Bound *fall = &Worst(bounds, eta_min), *rise = &Worst(bounds, eta_max);
+  if (!(fall->a < 0)) return Violation(*fall, eta_min);
+  if (!(rise->a > 0)) return Violation(*rise, eta_max);
+  double least = std::min(Violation(*fall, eta_min), Violation(*rise, eta_max));
+  // Each pass takes a piece that was none of the two.
+  for (const Bound* pass = bounds.begin(); pass != bounds.end(); ++pass) {
+    const Bound &p = *std::min(fall, rise), &q = *std::max(fall, rise);
+    const double eta = (q.b - p.b + p.c - q.c) / (p.a - q.a);
+    if (!(eta >= eta_min && eta <= eta_max)) break;
+    const Bound& worst = Worst(bounds, eta);
+    least = std::min(least, Violation(worst, eta));
+    if (&worst == fall || &worst == rise) break;
+    (worst.a < 0 ? fall : rise) = &worst;
+  }
+  return least;
 }
 
 double Select(const RatioInterval& interval, const Vector6d& resultant,
               const std::array<Eigen::Vector3d, 2>& position,
-              const std::array<Eigen::Matrix3d, 2>& rotation, const ContactLimits& limits,
+              const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
               double eta_min, double eta_max) {
   if (interval.feasible) return std::clamp(interval.optimal, interval.min, interval.max);
-  // The largest violation is convex and piecewise linear in η: its minimum is at an end or where
-  // two pieces meet.
   const Bounds bounds = MomentBounds(resultant, position, rotation, limits);
-  double best = eta_min, least = Violation(bounds, eta_min);
-  const auto consider = [&](double eta) {
-    if (!(eta >= eta_min && eta <= eta_max)) return;
-    const double violation = Violation(bounds, eta);
-    if (violation < least) {
-      least = violation;
-      best = eta;
-    }
-  };
-  consider(eta_max);
-  for (size_t i = 0; i < bounds.size(); ++i) {
-    const Bound& p = bounds[i];
-    consider(-p.b / p.a);
-    for (size_t j = i + 1; j < bounds.size(); ++j) {
-      const Bound& q = bounds[j];
-      // ±(p.a η + p.b) − p.c = q.a η + q.b − q.c and the same with −q.
-      for (const double sign : {1.0, -1.0}) {
-        const double a = sign * q.a, b = sign * q.b;
-        consider((b - p.b + p.c - q.c) / (p.a - a));
-        consider((-b - p.b - p.c + q.c) / (p.a + a));
-      }
-    }
-  }
   // Side by side the soles lack as much at any η: noise alone would tell the best, and η, with the
   // joints' torques, jump from end to end. Of what is as good, the nearest to η*.
-  const double lacking = least + kIndifference * resultant.head<3>().norm();
+  const double lacking =
+      LeastViolation(bounds, eta_min, eta_max) + kIndifference * resultant.head<3>().norm();
   double lower = eta_min, upper = eta_max;
   for (const Bound& bound : bounds) {
     if (bound.a == 0) continue;
     const double half = (bound.c + lacking) / std::abs(bound.a), middle = -bound.b / bound.a;
-    lower = std::max(lower, middle - half);
-    upper = std::min(upper, middle + half);
+    if (bound.a < 0) lower = std::max(lower, middle - half);
+    if (bound.a > 0) upper = std::min(upper, middle + half);
   }
-  return lower <= upper ? std::clamp(interval.optimal, lower, upper) : best;
+  // Not so only where numbers are not finite.
+  return lower <= upper ? std::clamp(interval.optimal, lower, upper) : eta_min;
 }
 
 std::array<Eigen::Matrix3d, 2> Level() {
@@ -149,27 +176,38 @@ std::array<Eigen::Matrix3d, 2> Rotations(const std::array<Eigen::Isometry3d, 2>&
 
 }  // namespace
 
-RatioInterval FeasibleRatio(const Vector6d& resultant,
-                            const std::array<Eigen::Vector3d, 2>& foot_in_o,
-                            const ContactLimits& limits, double eta_min, double eta_max) {
-  return Intersect(resultant, foot_in_o, Level(), limits, eta_min, eta_max);
+RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+                            const SoleLimits& limits, double eta_min, double eta_max) {
+  return Intersect(resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
 }
 
 RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
                             const ContactLimits& limits, double eta_min, double eta_max) {
-  return Intersect(resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
+  return FeasibleRatio(resultant, foot, SoleLimits{limits, limits}, eta_min, eta_max);
+}
+
+RatioInterval FeasibleRatio(const Vector6d& resultant,
+                            const std::array<Eigen::Vector3d, 2>& foot_in_o,
+                            const ContactLimits& limits, double eta_min, double eta_max) {
+  return Intersect(resultant, foot_in_o, Level(), {limits, limits}, eta_min, eta_max);
 }
 
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
+                   const std::array<Eigen::Isometry3d, 2>& foot, const SoleLimits& limits,
                    double eta_min, double eta_max) {
-  return Select(interval, resultant, foot_in_o, Level(), limits, eta_min, eta_max);
+  return Select(interval, resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
 }
 
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Isometry3d, 2>& foot, const ContactLimits& limits,
                    double eta_min, double eta_max) {
-  return Select(interval, resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
+  return SelectRatio(interval, resultant, foot, SoleLimits{limits, limits}, eta_min, eta_max);
+}
+
+double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
+                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
+                   double eta_min, double eta_max) {
+  return Select(interval, resultant, foot_in_o, Level(), {limits, limits}, eta_min, eta_max);
 }
 
 std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,

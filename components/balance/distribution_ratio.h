@@ -2,8 +2,9 @@
 //
 // Each foot takes its share of the force and of the moments about the soles' own centres, which are
 // linear in η; so a condition on a moment is |a η + b| < |c|, the same for both feet when they are
-// parallel to frame O. Everywhere, `resultant` is the robot's on the environment in frame O, and
-// arrays hold the right foot first.
+// parallel to frame O. An edge of a sole that is no rectangle is half of that, a η + b < c.
+// Everywhere, `resultant` is the robot's on the environment in frame O, and arrays hold the right
+// foot first.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,31 +21,39 @@ struct RatioInterval {
   double min = 0, max = 1;  ///< valid when feasible
   double optimal =
       0.5;  ///< η* = −b/a of (71), (72): M_x of both feet zero; unbounded; 0.5 when a = 0
-  /// Which condition left no η ("ratio limits", "normal", "friction", "roll", "pitch", "yaw"), for
-  /// messages; nullptr when feasible.
+  /// Which condition left no η ("ratio limits", "normal", "friction", "roll", "pitch", "edge",
+  /// "yaw"), for messages; nullptr when feasible.
   const char* limiting_condition = nullptr;
 };
 
+/// Limits of the right and the left sole, in their own frames.
+using SoleLimits = std::array<ContactLimits, 2>;
+
 /// Bounds of η from |a η + b| < |c| for M_x, M_y, M_z, (70)–(79), intersected with [eta_min,
-/// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot_in_o`:
-/// sole centres in O, m; feet parallel to O.
+/// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot`: soles
+/// in O; each foot's conditions hold in its own sole frame, however it is turned or tilted.
+RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+                            const SoleLimits& limits, double eta_min, double eta_max);
+/// The same for soles of the same limits.
+RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+                            const ContactLimits& limits, double eta_min, double eta_max);
+/// The same for feet parallel to O. `foot_in_o`: sole centres in O, m.
 RatioInterval FeasibleRatio(const Vector6d& resultant,
                             const std::array<Eigen::Vector3d, 2>& foot_in_o,
                             const ContactLimits& limits, double eta_min, double eta_max);
-/// The same for feet turned or tilted in O: each foot's conditions hold in its own sole frame.
-/// `foot`: soles in O.
-RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
-                            const ContactLimits& limits, double eta_min, double eta_max);
 
 /// The ratio to use: η* clipped to a feasible interval. Infeasible: η* clipped to the ratios in
-/// [eta_min, eta_max] whose largest violation |a η + b| − |c| (N·m, per unit of load share) of the
+/// [eta_min, eta_max] whose largest violation a η + b − c (N·m, per unit of load share) of the
 /// moment conditions is the least, to a millimetre of centre of pressure. Always finite and within
 /// [eta_min, eta_max], which lie in [0, 1].
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
+                   const std::array<Eigen::Isometry3d, 2>& foot, const SoleLimits& limits,
                    double eta_min, double eta_max);
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Isometry3d, 2>& foot, const ContactLimits& limits,
+                   double eta_min, double eta_max);
+double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
+                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
                    double eta_min, double eta_max);
 
 /// (62)–(67): each foot's share of the resultant, in its own sole frame. `foot`: sole frames in O.

@@ -1,19 +1,26 @@
 #include "components/balance/support_polygon.h"
 
+#include <algorithm>
+
 namespace poise::balance {
 
+static_assert(ConvexPolygon::kMaxCorners == 2 * robot::kMaxSoleVertices);
+
+ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin) {
+  if (foot.rectangular()) return Rectangle({0.5 * foot.length - margin, 0.5 * foot.width - margin});
+  return Inset(ConvexHull(foot.vertices), margin);
+}
+
 ConvexPolygon SupportPolygon(const Eigen::Isometry3d& frame_o, const ContactGeometry& geometry,
-                             const std::array<Eigen::Vector2d, 2>& half) {
-  std::array<Eigen::Vector2d, 8> corner;
+                             const std::array<ConvexPolygon, 2>& sole) {
+  std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners> corner;
   size_t count = 0;
   for (size_t foot = 0; foot < 2; ++foot) {
     if (!geometry.in_contact[foot]) continue;
-    for (const double x : {-half[foot].x(), half[foot].x()}) {
-      for (const double y : {-half[foot].y(), half[foot].y()}) {
-        const Eigen::Vector3d world = geometry.sole[foot] * Eigen::Vector3d(x, y, 0);
-        corner[count++] =
-            (frame_o.linear().transpose() * (world - frame_o.translation())).head<2>();
-      }
+    for (const Eigen::Vector2d& at : sole[foot].corners()) {
+      if (count == corner.size()) break;
+      const Eigen::Vector3d world = geometry.sole[foot] * Eigen::Vector3d(at.x(), at.y(), 0);
+      corner[count++] = (frame_o.linear().transpose() * (world - frame_o.translation())).head<2>();
     }
   }
   return ConvexHull({corner.data(), count});

@@ -34,15 +34,17 @@ TaskHierarchy::TaskHierarchy(int num_joints, int max_rows, int max_levels)
 int TaskHierarchy::num_free() const {
   Index taken = 0;
   for (const Level& level : levels()) taken += level.directions;
-  return static_cast<int>(rank_ - taken);
+  return static_cast<int>(span_ - taken);
 }
 
 bool TaskHierarchy::Compute(const ContactDynamics& contact, const MatrixRef& jacobian,
                             const VectorRef& bias_acceleration, const VectorRef& acceleration,
-                            std::span<const int> level_rows) {
+                            std::span<const int> level_rows, const Eigen::VectorXd* others) {
   contact_ = &contact;
   num_levels_ = 0;
   rank_ = contact.reduced().rank();
+  others_held_ = others != nullptr;
+  span_ = others_held_ ? contact.reduced().legs_rank() : rank_;
   basis_size_ = 0;
   num_fading_ = 0;
   Index rows = 0, most = 0;
@@ -55,6 +57,10 @@ bool TaskHierarchy::Compute(const ContactDynamics& contact, const MatrixRef& jac
       jacobian.rows() != rows || bias_acceleration.size() != rows || acceleration.size() != rows ||
       contact.num_joints() != torque_.size()) {
     return false;
+  }
+  if (others_held_) {
+    return others->size() == torque_.size() &&
+           ComputeHolding(jacobian, bias_acceleration, acceleration, level_rows, *others);
   }
   const Index first = level_rows[0];
   if (!first_.Compute(contact, jacobian.topRows(first), bias_acceleration.head(first))) {
@@ -81,6 +87,21 @@ bool TaskHierarchy::Compute(const ContactDynamics& contact, const MatrixRef& jac
   u -= change_.head(rank_);
   contact.ExpandTorque(u, change_);
   torque_ += change_;
+  return torque_.allFinite();
+}
+
+bool TaskHierarchy::ComputeHolding(const MatrixRef& jacobian, const VectorRef& bias_acceleration,
+                                   const VectorRef& acceleration, std::span<const int> level_rows,
+                                   const Eigen::VectorXd& others) {
+  auto u = reduced_.head(rank_);
+  contact_->HoldOthers(others, u);
+  Index row = 0;
+  for (const int t : level_rows) {
+    if (!AddLevel(row, t, jacobian, bias_acceleration, acceleration)) return false;
+    if (row == 0 && levels_[0].directions < t) return false;
+    row += t;
+  }
+  contact_->ExpandTorque(u, torque_);
   return torque_.allFinite();
 }
 
@@ -113,13 +134,13 @@ bool TaskHierarchy::AddLevel(Index first_row, Index t, const MatrixRef& jacobian
   if (!Cholesky(normal, 0.0)) return false;
   SolveLower(normal, z);
   SolveLowerTransposed(normal, z);
-  for (Index j = 0; j < taken; ++j) u += basis_.col(before + j).head(rank_) * z(j);
+  for (Index j = 0; j < taken; ++j) u.head(span_) += basis_.col(before + j).head(span_) * z(j);
   return true;
 }
 
 Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
   for (Index i = 0; i < t; ++i) {
-    auto row = rows_.col(i).head(rank_);
+    auto row = rows_.col(i).head(span_);
     const double length = row.norm();
     scale_(i) = length > 0 ? 1 / length : 0;
     row *= scale_(i);
@@ -127,11 +148,11 @@ Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
     RemoveBasis(basis_size_, row);
   }
   Index taken = 0;
-  for (; basis_size_ < rank_ && taken < t; ++taken) {
+  for (; basis_size_ < span_ && taken < t; ++taken) {
     Index next = 0;
     double most = -1;
     for (Index i = 0; i < t; ++i) {
-      const double left = rows_.col(i).head(rank_).squaredNorm();
+      const double left = rows_.col(i).head(span_).squaredNorm();
       if (left > most) {
         most = left;
         next = i;
@@ -139,14 +160,14 @@ Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
     }
     const double left = std::sqrt(most);
     if (!(left > kNothingLeft)) break;
-    auto direction = basis_.col(basis_size_).head(rank_);
-    direction = rows_.col(next).head(rank_) / left;
+    auto direction = basis_.col(basis_size_).head(span_);
+    direction = rows_.col(next).head(span_) / left;
     // Taken out twice: what rounding left of the basis is so much longer now.
     RemoveBasis(basis_size_, direction);
     direction.normalize();
     ++basis_size_;
     for (Index i = 0; i < t; ++i) {
-      auto row = rows_.col(i).head(rank_);
+      auto row = rows_.col(i).head(span_);
       const double share = direction.dot(row);
       coefficients_(i, taken) = share;
       row -= direction * share;
@@ -163,20 +184,21 @@ Index TaskHierarchy::ExtendBasis(Index t, bool* complete) {
 void TaskHierarchy::RemoveBasis(Index directions, Eigen::Ref<Eigen::VectorXd> vector) const {
   for (int pass = 0; pass < 2; ++pass) {
     for (Index j = 0; j < directions; ++j) {
-      const auto direction = basis_.col(j).head(rank_);
+      const auto direction = basis_.col(j).head(span_);
       vector -= direction * direction.dot(vector);
     }
   }
 }
 
 void TaskHierarchy::ProjectIntoNullSpace(Eigen::Ref<Eigen::VectorXd> torque) const {
-  if (num_levels_ == 1) {
+  if (num_levels_ == 1 && !others_held_) {
     first_.ProjectIntoNullSpace(torque);
     return;
   }
   StackVector<Eigen::Dynamic> u(rank_);
   contact_->ReduceTorque(torque, u);
-  RemoveBasis(basis_size_, u);
+  u.tail(rank_ - span_).setZero();
+  RemoveBasis(basis_size_, u.head(span_));
   contact_->ExpandTorque(u, torque);
 }
 

@@ -5,7 +5,8 @@
 // primitives, IJHR 2005, with the contact-consistent dynamics of section 3: the paper's (28) for
 // any number of levels. In the reduced coordinates of ContactDynamics, where ẍ_i = T_i u − load_i
 // and the dynamically consistent projections are orthogonal ones, level i adds
-//   u_i = u_{i−1} + (T_i N_{i−1})⁺ (f*_i + load_i − T_i u_{i−1}),  N_i = N_{i−1} − (T_i N_{i−1})⁺ T_i N_{i−1}.
+//   u_i = u_{i−1} + (T_i N_{i−1})⁺ (f*_i + load_i − T_i u_{i−1}),  N_i = N_{i−1} − (T_i N_{i−1})⁺
+//   T_i N_{i−1}.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,9 +40,12 @@ class TaskHierarchy {
   /// can, in the norm of each row's effective mass; a direction that the levels above leave less
   /// than kFading of is followed the less the less is left of it, so that torques stay bounded.
   /// `contact` must outlive the use of the results.
+  ///
+  /// With `others` (k×1, rad/s²) the joints that are no leg's come before all levels: they
+  /// accelerate just so, and the levels have the legs alone. The legs' entries count for nothing.
   bool Compute(const ContactDynamics& contact, const MatrixRef& jacobian,
                const VectorRef& bias_acceleration, const VectorRef& acceleration,
-               std::span<const int> level_rows);
+               std::span<const int> level_rows, const Eigen::VectorXd* others = nullptr);
 
   /// k×1. It does nothing in the motions that no level determines.
   const Eigen::VectorXd& torque() const { return torque_; }
@@ -56,6 +60,9 @@ class TaskHierarchy {
   static constexpr double kFading = 1e-2;
 
  private:
+  bool ComputeHolding(const MatrixRef& jacobian, const VectorRef& bias_acceleration,
+                      const VectorRef& acceleration, std::span<const int> level_rows,
+                      const Eigen::VectorXd& others);
   bool AddLevel(Eigen::Index first_row, Eigen::Index t, const MatrixRef& jacobian,
                 const VectorRef& bias_acceleration, const VectorRef& acceleration);
   /// Scales rows to unit length, takes out what is in the basis already, and extends the basis by
@@ -69,7 +76,9 @@ class TaskHierarchy {
   std::vector<Level> levels_;
   size_t num_levels_ = 0;
   int num_fading_ = 0;
+  bool others_held_ = false;
   Eigen::Index rank_ = 0, basis_size_ = 0;
+  Eigen::Index span_ = 0;         // reduced coordinates that the levels have: the legs' or all
   Eigen::MatrixXd basis_;         // r×r, orthonormal columns: what the levels have taken
   Eigen::MatrixXd rows_;          // r×t, Tᵀ of one level
   Eigen::MatrixXd coefficients_;  // t×r, of the level's rows in its directions

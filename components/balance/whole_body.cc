@@ -14,7 +14,8 @@ bool Same(const robot::RobotState& a, const robot::RobotState& b) {
          a.base_orientation.coeffs() == b.base_orientation.coeffs() &&
          a.base_linear_velocity == b.base_linear_velocity &&
          a.base_angular_velocity == b.base_angular_velocity &&
-         a.joint_position == b.joint_position && a.joint_velocity == b.joint_velocity;
+         a.joint_position == b.joint_position && a.joint_velocity == b.joint_velocity &&
+         a.load_mass == b.load_mass && a.load_moment == b.load_moment;
 }
 
 /// Joints between the base and a foot, ascending.
@@ -108,7 +109,7 @@ Eigen::Vector3d WholeBody::AngularMomentum() const {
     about_base += mass.block<3, 1>(3, 6 + j) * state_.joint_velocity[j];
   }
   return about_base -
-         (data_.com - data_.base_position).cross(model_->total_mass() * data_.com_velocity);
+         (data_.com - data_.base_position).cross(data_.total_mass * data_.com_velocity);
 }
 
 ContactGeometry WholeBody::geometry() const {

@@ -4,13 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/balance/support_polygon.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor.pb.h"
 #include "components/contact_wrench_monitor/contact_wrench_monitor_type.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
+#include "components/robot/sole.h"
 
 namespace poise {
 
@@ -19,6 +22,14 @@ namespace {
 
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
 constexpr double kCopTolerance = 1e-6;
+
+// Room in the message.
+constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>;
+// Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must
+// remain.
+constexpr int kMostKept = 3;
+// The COM's three, the heading and the six of a foot in the air.
+constexpr int kStepRows = 10;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
   return balance::SignedDistance(region, cop) >= -kCopTolerance;
@@ -60,13 +71,14 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   sole_margin_ = ReadNotNegative(config.has_sole_margin() ? config.sole_margin() : margin,
                                  "sole_margin", "must be m, 0 or more");
   for (const robot::FootModel& foot : model_->feet()) {
-    if (sole_margin_ >= 0.5 * std::min(foot.length, foot.width)) {
+    if (sole_margin_ >= robot::InnerRadius(foot)) {
       throw ConfigError("sole_margin",
                         fmt::format("is {} m and leaves nothing of the {} foot's "
                                     "sole, {} x {} m",
                                     sole_margin_, foot.name, foot.length, foot.width));
     }
   }
+  CutSoles();
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -75,7 +87,24 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   const int num_joints = model_->num_joints();
   com_height_.emplace(num_joints, 1);
-  balance_control_.emplace(num_joints, 1);
+  all_joints_ = config.movers() == ContactWrenchMonitorConfig::ALL_JOINTS;
+  if (config.joint_limits()) {
+    limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
+  }
+  const int most_rows = std::min(1 + kMostKept, num_joints);
+  protected_.emplace(num_joints, most_rows);
+  protected_jacobian_ = Eigen::MatrixXd::Zero(most_rows, model_->num_velocities());
+  protected_bias_ = Eigen::VectorXd::Zero(most_rows);
+  task_acceleration_ = acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
+  other_torque_ = Eigen::VectorXd::Zero(num_joints);
+  body_share_ = config.body_share();
+  if (!(body_share_ <= 1)) throw ConfigError("body_share", "must be at most 1");
+  const int step_rows = std::min(kStepRows, num_joints);
+  for (auto& motion : step_motion_) motion.emplace(num_joints, step_rows);
+  step_jacobian_ = Eigen::MatrixXd::Zero(step_rows, model_->num_velocities());
+  step_bias_ = Eigen::VectorXd::Zero(step_rows);
+  body_jacobian_ = robot::Matrix6X::Zero(6, model_->num_velocities());
+  balance_control_.emplace(num_joints, std::max(most_rows, step_rows));
   state_ = robot::RobotState(num_joints);
   height_jacobian_ = Eigen::MatrixXd::Zero(1, model_->num_velocities());
   height_bias_ = Eigen::VectorXd::Zero(1);
@@ -150,21 +179,19 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
     return balance_torque_t::STATUS_SINGULAR;
   }
   const balance::ContactLimits limits = Limits(in_contact);
-  balance::ConvexPolygon region = polygon_
-                                      ? Soles(frame_o, sole_margin_)
-                                      : balance::Rectangle({limits.half_length, limits.half_width});
+  balance::ConvexPolygon region =
+      polygon_ ? Soles(frame_o) : balance::Rectangle({limits.half_length, limits.half_width});
   if (cop_feedback_ > 0) {
     UpdateCopError(frame_o, in_contact, tick);
     for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
   }
   if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
+  steps_ = body_share_ >= 0 && support_plan_->stepping != support_plan_t::STEPPING_NONE &&
+           ProtectSteps(in_contact);
   balance::BalanceResult result;
-  const auto compute = [&](const auto& bounds) {
-    return balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds,
-                                     balancing_, torque_, &result);
-  };
-  const balance::BalanceStatus status =
-      polygon_ || cop_feedback_ > 0 ? compute(region) : compute(limits);
+  const balance::BalanceStatus status = polygon_ || cop_feedback_ > 0
+                                            ? Move(geometry, region, &result)
+                                            : Move(geometry, limits, &result);
   if (status == balance::BalanceStatus::kSingular || !torque_.allFinite()) {
     return balance_torque_t::STATUS_SINGULAR;
   }
@@ -174,6 +201,144 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   const bool achieved = status == balance::BalanceStatus::kOk && Inside(result.cop, region);
   return achieved || !balancing_ ? balance_torque_t::STATUS_OK
                                  : balance_torque_t::STATUS_NOT_ACHIEVED;
+}
+
+template <class Bounds>
+balance::BalanceStatus ContactWrenchMonitor::Move(const balance::ContactGeometry& geometry,
+                                                  const Bounds& bounds,
+                                                  balance::BalanceResult* result) {
+  if (steps_ && balancing_ && MoveForStep(geometry, bounds, result)) {
+    return balance::BalanceStatus::kOk;
+  }
+  const balance::BalanceStatus status =
+      balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds, balancing_,
+                                torque_, result, balance::Movers::kLegs);
+  if (!balancing_ || !(result->active_x || result->active_y)) return status;
+  if (status == balance::BalanceStatus::kOk && limits_) KeepLimits(geometry, bounds, result);
+  if (all_joints_) MoveOthers(geometry, bounds, result);
+  return status;
+}
+
+template <class Bounds>
+void ContactWrenchMonitor::MoveOthers(const balance::ContactGeometry& geometry,
+                                      const Bounds& bounds, balance::BalanceResult* result) {
+  const balance::ContactDynamics& contact = whole_body_->contact();
+  std::copy(task_torque_->torque.begin(), task_torque_->torque.end(), other_torque_.data());
+  balance::BalanceResult other;
+  if (balance_control_->Compute(contact, *com_height_, geometry, bounds, true, other_torque_,
+                                &other) != balance::BalanceStatus::kOk) {
+    return;
+  }
+  double share = 1;
+  if (limits_) {
+    contact.Acceleration(torque_, task_acceleration_);
+    contact.Acceleration(other_torque_, acceleration_);
+    for (int j = 0; j < model_->num_joints(); ++j) {
+      const double from = task_acceleration_[6 + j], change = acceleration_[6 + j] - from;
+      const balance::AccelerationRange range =
+          limits_->Accelerations(j, state_.joint_position[j], state_.joint_velocity[j]);
+      const double room = change > 0 ? range.upper - from : range.lower - from;
+      // A joint beyond its range already, by the tasks, takes part in nothing that makes it worse.
+      if (share * std::abs(change) > std::max(0.0, change > 0 ? room : -room)) {
+        share = std::max(0.0, room / change);
+      }
+    }
+  }
+  torque_ += share * (other_torque_ - torque_);
+  result->resultant += share * (other.resultant - result->resultant);
+  result->cop = balance::CenterOfPressure(result->resultant);
+}
+
+template <class Bounds>
+bool ContactWrenchMonitor::KeepLimits(const balance::ContactGeometry& geometry,
+                                      const Bounds& bounds, balance::BalanceResult* result) {
+  const balance::ContactDynamics& contact = whole_body_->contact();
+  Eigen::Index rows = 0;
+  for (const int j : contact.legs()) {
+    const double position = state_.joint_position[j], velocity = state_.joint_velocity[j];
+    if (!limits_->Near(j, position, velocity)) continue;
+    if (rows == 0) {
+      std::copy(task_torque_->torque.begin(), task_torque_->torque.end(), other_torque_.data());
+      contact.Acceleration(torque_, acceleration_);
+      contact.Acceleration(other_torque_, task_acceleration_);
+      protected_jacobian_.setZero();
+      protected_bias_.setZero();
+      protected_jacobian_.row(0) = height_jacobian_.row(0);
+      protected_bias_[0] = height_bias_[0];
+      rows = 1;
+    }
+    const balance::AccelerationRange range = limits_->Accelerations(j, position, velocity);
+    const double most = limits_->range(j).acceleration, now = acceleration_[6 + j];
+    const double before = task_acceleration_[6 + j];
+    const bool above = range.upper < most && now > range.upper && now > before;
+    const bool below = range.lower > -most && now < range.lower && now < before;
+    if ((!above && !below) || rows >= protected_jacobian_.rows()) continue;
+    protected_jacobian_(rows++, 6 + j) = 1;
+  }
+  if (rows < 2 || !protected_->Compute(contact, protected_jacobian_.topRows(rows),
+                                       protected_bias_.head(rows))) {
+    return false;
+  }
+  balance::BalanceResult kept;
+  if (balance_control_->Compute(contact, *protected_, geometry, bounds, true, other_torque_, &kept,
+                                balance::Movers::kLegs) != balance::BalanceStatus::kOk) {
+    return false;
+  }
+  torque_ = other_torque_;
+  *result = kept;
+  return true;
+}
+
+bool ContactWrenchMonitor::ProtectSteps(const std::array<bool, 2>& in_contact) {
+  const robot::RobotData& data = whole_body_->data();
+  robot::ComputePointJacobian(*model_, data, model_->body_task_body(), Eigen::Vector3d::Zero(),
+                              body_jacobian_);
+  step_jacobian_.row(2) = data.com_jacobian.row(2);
+  step_jacobian_.row(3) = body_jacobian_.row(5);
+  Eigen::Index rows = 4;
+  for (size_t i = 0; i < 2; ++i) {
+    if (in_contact[i]) continue;
+    if (rows + 6 > step_jacobian_.rows()) return false;
+    step_jacobian_.middleRows<6>(rows) = data.foot_jacobian[i];
+    rows += 6;
+  }
+  for (size_t way = 0; way < step_motion_.size(); ++way) {
+    if (way == 0) {
+      step_jacobian_.topRows<2>() = data.com_jacobian.topRows<2>();
+    } else {
+      step_jacobian_.topRows<2>() = body_jacobian_.middleRows<2>(3);
+    }
+    // The null space has no use for the bias.
+    if (!step_motion_[way]->Compute(whole_body_->contact(), step_jacobian_.topRows(rows),
+                                    step_bias_.head(rows))) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template <class Bounds>
+bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
+                                       const Bounds& bounds, balance::BalanceResult* result) {
+  const std::array<double, 2> share{body_share_, 1 - body_share_};
+  std::array<balance::BalanceResult, 2> moved;
+  acceleration_.head(torque_.size()).setZero();
+  for (size_t way = 0; way < step_motion_.size(); ++way) {
+    if (share[way] == 0) continue;
+    other_torque_ = torque_;
+    if (balance_control_->Compute(whole_body_->contact(), *step_motion_[way], geometry, bounds,
+                                  true, other_torque_, &moved[way],
+                                  balance::Movers::kLegs) != balance::BalanceStatus::kOk) {
+      return false;
+    }
+    acceleration_.head(torque_.size()) += share[way] * other_torque_;
+  }
+  torque_ = acceleration_.head(torque_.size());
+  // Each brings the centre of pressure to the bound, and so does a mixture of them.
+  *result = moved[body_share_ > 0 ? 0 : 1];
+  result->resultant = share[0] * moved[0].resultant + share[1] * moved[1].resultant;
+  result->cop = balance::CenterOfPressure(result->resultant);
+  return true;
 }
 
 void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
@@ -201,14 +366,24 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
-balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o,
-                                                   double margin) const {
-  std::array<Eigen::Vector2d, 2> half;
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
-    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+void ContactWrenchMonitor::CutSoles() {
+  for (size_t f = 0; f < 2; ++f) sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
+  shared_sole_ = sole_;
+  if (model_->feet()[0].rectangular() && model_->feet()[1].rectangular()) return;
+  // The shares of (62)–(67) have one centre of pressure, each in its own sole's frame: of soles
+  // that mirror each other both can have what is common to them.
+  for (size_t f = 0; f < 2; ++f) {
+    for (const balance::HalfPlane& edge : balance::EdgesOf(sole_[1 - f]).planes()) {
+      shared_sole_[f] = balance::Clip(shared_sole_[f], edge);
+    }
   }
-  return balance::SupportPolygon(frame_o, whole_body_->geometry(), half);
+}
+
+balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
+  const balance::ContactGeometry& geometry = whole_body_->geometry();
+  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  return balance::WithFewerCorners(
+      balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {

@@ -8,6 +8,7 @@
 
 #include "components/balance/balance_control.h"
 #include "components/balance/convex_polygon.h"
+#include "components/balance/joint_limits.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
@@ -34,9 +35,33 @@ class ContactWrenchMonitor : public Component {
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
   int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
+  /// BalanceControl by the configured movers, within the joints' limits; torque_ on entry the task
+  /// torque.
+  template <class Bounds>
+  balance::BalanceStatus Move(const balance::ContactGeometry& geometry, const Bounds& bounds,
+                              balance::BalanceResult* result);
+  /// Mixes what all joints do with what the legs alone do, both of which bring the centre of
+  /// pressure to its bound, so that no joint goes beyond a limit.
+  template <class Bounds>
+  void MoveOthers(const balance::ContactGeometry& geometry, const Bounds& bounds,
+                  balance::BalanceResult* result);
+  /// Leg joints that torque_ would drive beyond a limit, and the task torque less so, keep the task
+  /// torque's acceleration; false when there is none or they cannot.
+  template <class Bounds>
+  bool KeepLimits(const balance::ContactGeometry& geometry, const Bounds& bounds,
+                  balance::BalanceResult* result);
+  /// What a step needs: the COM's height, the heading and the feet in the air, with the rest of the
+  /// COM, so that the body gives way, and with the rest of the body, so that the COM does. False
+  /// when their dynamics do not exist.
+  bool ProtectSteps(const std::array<bool, 2>& in_contact);
+  /// Both of these mixed; false when one cannot bring the centre of pressure to its bound.
+  template <class Bounds>
+  bool MoveForStep(const balance::ContactGeometry& geometry, const Bounds& bounds,
+                   balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
   /// Of the soles in contact, `margin` (m) off their edges.
-  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o, double margin) const;
+  void CutSoles();
+  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
   /// says of the tick before.
   void UpdateCopError(const Eigen::Isometry3d& frame_o, const std::array<bool, 2>& in_contact,
@@ -54,10 +79,24 @@ class ContactWrenchMonitor : public Component {
   std::optional<balance::TaskDynamics> com_height_;
   std::optional<balance::BalanceControl> balance_control_;
   bool balancing_ = true;
+  bool all_joints_ = false;                         // move, not the legs alone
+  std::optional<balance::JointLimits> limits_;      // none: they do not enter the control
+  std::optional<balance::TaskDynamics> protected_;  // the COM's height and joints at their limits
+  Eigen::MatrixXd protected_jacobian_;
+  Eigen::VectorXd protected_bias_, task_acceleration_, acceleration_, other_torque_;
+  double body_share_ = 0;  // of what gives way in steps
+  bool steps_ = false;     // in this tick
+  // By what gives way: the body, the COM.
+  std::array<std::optional<balance::TaskDynamics>, 2> step_motion_;
+  Eigen::MatrixXd step_jacobian_;
+  Eigen::VectorXd step_bias_;
+  robot::Matrix6X body_jacobian_;
   balance::ContactLimits double_support_, single_support_;
-  std::optional<double> beyond_soles_;               // m
-  bool polygon_ = false;                             // the region is the soles' hull
-  double sole_margin_ = 0;                           // m
+  std::optional<double> beyond_soles_;  // m
+  bool polygon_ = false;                // the region is the soles' hull
+  double sole_margin_ = 0;              // m
+  // Less sole_margin_, m, sole frames: alone on the ground, and with the other foot.
+  std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <string>
 
+#include "components/balance/support_polygon.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
+#include "components/robot/sole.h"
 
 namespace poise {
 namespace {
@@ -30,12 +32,15 @@ bool ReadState(const robot_state_t& message, robot::RobotState* state) {
               state->joint_position.data());
   std::copy_n(message.joint_velocity.begin(), state->joint_velocity.size(),
               state->joint_velocity.data());
+  state->load_mass = message.load_mass;
+  state->load_moment = GetVector3(message.load_moment);
   const bool unit = std::abs(state->base_orientation.norm() - 1.0) < 1e-6;
   // Dynamics ask for more than a message's rounding leaves.
   if (unit) state->base_orientation.normalize();
   return unit && state->base_position.allFinite() && state->base_linear_velocity.allFinite() &&
          state->base_angular_velocity.allFinite() && state->joint_position.allFinite() &&
-         state->joint_velocity.allFinite();
+         state->joint_velocity.allFinite() && std::isfinite(state->load_mass) &&
+         state->load_moment.allFinite();
 }
 
 void SetPose(const Eigen::Isometry3d& pose, pose_t* message) {
@@ -84,7 +89,11 @@ Eigen::Vector3d GetVector3(const double (&array)[3]) {
 
 double SoleMargin(const robot::RobotModel& model) {
   constexpr double kShare = 1.0 / 15;  // of the half width: 5 mm of the paper's robot
-  return kShare * std::min(model.feet()[0].width, model.feet()[1].width) / 2;
+  return kShare * SoleRadius(model);
+}
+
+double SoleRadius(const robot::RobotModel& model) {
+  return std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
 }
 
 double HullMargin(const robot::RobotModel& model) {
@@ -96,6 +105,18 @@ double HullMargin(const robot::RobotModel& model) {
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
                                 double margin) {
   const robot::FootModel &right = model.feet()[0], &left = model.feet()[1];
+  if (!right.rectangular() || !left.rectangular()) {
+    balance::ConvexPolygon common = balance::SolePolygon(right, margin);
+    for (const balance::HalfPlane& edge :
+         balance::EdgesOf(balance::SolePolygon(left, margin)).planes()) {
+      common = balance::Clip(common, edge);
+    }
+    const Eigen::Vector2d half = balance::LargestRectangle(
+        balance::EdgesOf(common), {config.half_length(), config.half_width()});
+    if (!config.has_half_length()) config.set_half_length(half.x());
+    if (!config.has_half_width()) config.set_half_width(half.y());
+    return config;
+  }
   if (!config.has_half_length()) {
     config.set_half_length(std::min(right.length, left.length) / 2 - margin);
   }
@@ -112,6 +133,28 @@ balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::
   limits.half_width = Positive(config.has_half_width(), config.half_width(), field + ".half_width");
   limits.friction = Positive(true, config.friction(), field + ".friction");
   limits.yaw_friction = Positive(true, config.yaw_friction(), field + ".yaw_friction");
+  return limits;
+}
+
+balance::SoleLimits ReadSoleLimits(const ContactLimitsConfig& config,
+                                   const robot::RobotModel& model, double margin,
+                                   const std::string& field) {
+  const bool rectangles = model.feet()[0].rectangular() && model.feet()[1].rectangular();
+  const balance::ContactLimits both = ReadLimits(WithinSoles(config, model, margin), field);
+  balance::SoleLimits limits{both, both};
+  if (rectangles) return limits;
+  for (size_t i = 0; i < 2; ++i) {
+    balance::ConvexPolygon sole = balance::SolePolygon(model.feet()[i], margin);
+    for (const double sign : {1.0, -1.0}) {
+      if (config.has_half_length()) sole = balance::Clip(sole, {{sign, 0}, both.half_length});
+      if (config.has_half_width()) sole = balance::Clip(sole, {{0, sign}, both.half_width});
+    }
+    limits[i].edges = balance::EdgesOf(sole);
+    if (limits[i].edges.count == 0) {
+      throw ConfigError(field, "leaves nothing of the " + model.feet()[i].name +
+                                   " foot's sole; raise half_length and half_width");
+    }
+  }
   return limits;
 }
 

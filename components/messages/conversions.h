@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "components/balance/contact_conditions.h"
+#include "components/balance/distribution_ratio.h"
 #include "components/messages/contact_limits.pb.h"
 #include "components/robot/robot_model.h"
 #include "poise/contact_margins_t.hpp"
@@ -37,12 +38,21 @@ double SoleMargin(const robot::RobotModel& model);
 /// be shared: near the outer edge the other sole still carries its least share.
 double HullMargin(const robot::RobotModel& model);
 /// `config`, with the smaller sole's half length and half width, each less `margin` (m), where it
-/// gives none.
+/// gives none. Of soles that are no rectangles: of the largest rectangle about the frames' origins
+/// that lies `margin` inside both.
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
                                 double margin);
+/// m, of the smaller sole: InnerRadius.
+double SoleRadius(const robot::RobotModel& model);
 
 /// Limits of a contact patch. Throws ConfigError "<field>.half_length" ...: missing, not positive
 /// or not finite.
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field);
+/// Limits of the right and the left sole: WithinSoles of rectangles. A polygon's own edges moved
+/// inwards by `margin` (m), and cut at the half length and half width that `config` gives. Throws
+/// ConfigError likewise, and when nothing is left of a sole.
+balance::SoleLimits ReadSoleLimits(const ContactLimitsConfig& config,
+                                   const robot::RobotModel& model, double margin,
+                                   const std::string& field);
 
 }  // namespace poise

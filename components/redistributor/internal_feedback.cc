@@ -8,6 +8,7 @@
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/messages/conversions.h"
 #include "components/robot/posture.h"
 
 namespace poise {
@@ -37,7 +38,7 @@ balance::Matrix6d IntoO(const Eigen::Isometry3d& foot) {
 WrenchFeedback WithRobotLimits(WrenchFeedback feedback, const robot::RobotModel& model) {
   constexpr double kForceShare = 3.0 / 16;  // of the weight: what friction in the legs holds up
   constexpr double kLever = 0.4;            // of the COM's height
-  constexpr double kEdgeShare = 0.2;        // of the smaller sole's half width
+  constexpr double kEdgeShare = 0.2;        // of the smaller sole's inner radius
   const double weight = model.total_mass() * robot::kGravity;
   const double force = TwoDigits(kForceShare * weight);
   if (!feedback.has_max_force()) feedback.set_max_force(force);
@@ -45,7 +46,7 @@ WrenchFeedback WithRobotLimits(WrenchFeedback feedback, const robot::RobotModel&
     feedback.set_max_moment(TwoDigits(kLever * robot::StandingHeight(model) * force));
   }
   if (!feedback.has_edge()) {
-    feedback.set_edge(kEdgeShare * std::min(model.feet()[0].width, model.feet()[1].width) / 2);
+    feedback.set_edge(kEdgeShare * SoleRadius(model));
   }
   return feedback;
 }

@@ -10,6 +10,7 @@
 #include "components/messages/robot_resource.h"
 #include "components/redistributor/redistributor.pb.h"
 #include "components/redistributor/redistributor_type.h"
+#include "components/robot/sole.h"
 
 namespace poise {
 
@@ -36,10 +37,8 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   transition_ = config.transition();
   model_ = LoadRobot(context);
   const double margin = SoleMargin(*model_);
-  double_support_ =
-      ReadLimits(WithinSoles(config.double_support(), *model_, margin), "double_support");
-  single_support_ =
-      ReadLimits(WithinSoles(config.single_support(), *model_, margin), "single_support");
+  double_support_ = ReadSoleLimits(config.double_support(), *model_, margin, "double_support");
+  single_support_ = ReadSoleLimits(config.single_support(), *model_, margin, "single_support");
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
   CheckRatio(eta_min_, "eta_min");
@@ -191,7 +190,7 @@ double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
   const size_t light = plan.transition_foot == robot::kRightFoot ? 0 : 1;
   sole_in_o[light].linear() = sole_in_o[1 - light].linear();
   const balance::RatioInterval allowed =
-      balance::FeasibleRatio(resultant, sole_in_o, double_support_, 0.0, 1.0);
+      balance::FeasibleRatio(resultant, sole_in_o, double_support_[1 - light], 0.0, 1.0);
   return allowed.feasible ? std::clamp(ramped, allowed.min, allowed.max) : ramped;
 }
 
@@ -206,12 +205,8 @@ double Redistributor::FeedbackShare(double eta) const {
 
 bool Redistributor::AboutToTip(const Wrenches& desired) const {
   for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
-    const Eigen::Vector2d cop = balance::CenterOfPressure(desired[i]).cwiseAbs();
-    if (!(cop.x() <= 0.5 * foot.length - feedback_edge_ &&
-          cop.y() <= 0.5 * foot.width - feedback_edge_)) {
-      return true;
-    }
+    const Eigen::Vector2d cop = balance::CenterOfPressure(desired[i]);
+    if (!(robot::DistanceInside(model_->feet()[i], cop) >= feedback_edge_)) return true;
   }
   return false;
 }
@@ -259,13 +254,13 @@ void Redistributor::PassTorqueThrough() {
   std::fill(out.feedback_torque.begin(), out.feedback_torque.end(), 0.0);
 }
 
-void Redistributor::Report(const Wrenches& wrench, const balance::ContactLimits& limits,
+void Redistributor::Report(const Wrenches& wrench, const balance::SoleLimits& limits,
                            const std::array<bool, 2>& in_contact) {
   joint_command_t& out = *joint_command_;
   for (size_t i = 0; i < 2; ++i) {
     const Vector6d value = in_contact[i] ? wrench[i] : Vector6d(Vector6d::Zero());
     const balance::ContactMargins margins =
-        in_contact[i] ? balance::CheckContact(value, limits) : balance::ContactMargins{};
+        in_contact[i] ? balance::CheckContact(value, limits[i]) : balance::ContactMargins{};
     SetWrench(value, &out.foot_wrench[i]);
     SetMargins(margins, &out.margins[i]);
     out.conditions_met[i] = !in_contact[i] || margins.Met() ? 1 : 0;

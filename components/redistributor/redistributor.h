@@ -54,7 +54,7 @@ class Redistributor : public Component {
   double FeedbackShare(double eta) const;
   void ForgetDistribution();
   void PassTorqueThrough();
-  void Report(const Wrenches& wrench, const balance::ContactLimits& limits,
+  void Report(const Wrenches& wrench, const balance::SoleLimits& limits,
               const std::array<bool, 2>& in_contact);
 
   Input<robot_state_t> robot_state_;
@@ -78,7 +78,7 @@ class Redistributor : public Component {
   double last_eta_ = 0;
   // s, when readings tell of the distribution again.
   double learn_from_ = -std::numeric_limits<double>::infinity();
-  balance::ContactLimits double_support_, single_support_;
+  balance::SoleLimits double_support_, single_support_;
   robot::RobotState state_;
   bool state_valid_ = false;
   Eigen::MatrixXd contact_jacobian_;  // 12×n

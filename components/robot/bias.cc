@@ -17,7 +17,7 @@ void ComputeBias(const RobotModel& model, RobotData* data) {
   }
   data->bias.head<3>() = data->subtree[0].force;
   data->bias.segment<3>(3) = data->subtree[0].moment;
-  data->com_bias_acceleration = data->subtree[0].force / model.total_mass();
+  data->com_bias_acceleration = data->subtree[0].force / data->total_mass;
   // Gravity does work through the height of the COM alone: g = m g J_com,z.
   data->gravity = kGravity * data->mass_matrix.col(2);
 }

@@ -21,6 +21,24 @@ inline Matrix3d RotatedInertia(const Matrix3d& r, const Matrix3d& inertia) {
   return w;
 }
 
+// The load moves with the base; its inertia about its own centre is not known and left out.
+void AddLoad(const RobotState& state, RobotData* data) {
+  RobotData::Subtree& base = data->subtree[0];
+  const Vector3d moment = data->body_rotation[0] * state.load_moment;
+  const Vector3d& w = data->body_angular_velocity[0];
+  const Vector3d force = w.cross(w.cross(moment));
+  base.first_moment += moment;
+  base.force += force;
+  if (!(state.load_mass > 0)) return;  // a moment without mass has no inertia
+  const Vector3d place = moment / state.load_mass;
+  base.moment += place.cross(force);
+  const double square = place.dot(moment);
+  for (int c = 0; c < 3; ++c) {
+    for (int row = c; row < 3; ++row) base.inertia(row, c) -= place[row] * moment[c];
+    base.inertia(c, c) += square;
+  }
+}
+
 }  // namespace
 
 void ComputeDynamics(const RobotModel& model, const RobotState& state, RobotData* data) {
@@ -47,6 +65,8 @@ void ComputeDynamics(const RobotModel& model, const RobotState& state, RobotData
     out.inertia(2, 1) = inertia(2, 1) - com.z() * h.y();
     out.inertia(2, 2) = inertia(2, 2) + square - com.z() * h.z();
   }
+  data->total_mass = model.total_mass() + state.load_mass;
+  if (state.load_mass != 0 || !state.load_moment.isZero(0)) AddLoad(state, data);
   ComputeMassMatrix(model, state, data);
   ComputeBias(model, data);
 }

@@ -42,6 +42,7 @@ struct RobotData {
   Eigen::MatrixXd mass_matrix;   ///< A, n×n, reflected rotor inertia included
   Eigen::VectorXd bias;          ///< b, n×1, Coriolis and centrifugal
   Eigen::VectorXd gravity;       ///< g, n×1
+  double total_mass = 0;         ///< kg, with the state's load
   Eigen::Vector3d com;           ///< m, world
   Eigen::Vector3d com_velocity;  ///< m/s
   Eigen::Matrix<double, 3, Eigen::Dynamic> com_jacobian;  ///< 3×n

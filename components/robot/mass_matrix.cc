@@ -35,7 +35,7 @@ void ComputeMassMatrix(const RobotModel& model, const RobotState& state, RobotDa
   }
   const Vector3d& h = data->subtree[0].first_moment;
   const Matrix3d& inertia = data->subtree[0].inertia;
-  for (int i = 0; i < 3; ++i) a[i * n + i] = model.total_mass();
+  for (int i = 0; i < 3; ++i) a[i * n + i] = data->total_mass;
   a[3 * n + 1] = a[1 * n + 3] = -h.z();
   a[3 * n + 2] = a[2 * n + 3] = h.y();
   a[4 * n + 0] = a[0 * n + 4] = h.z();
@@ -48,7 +48,7 @@ void ComputeMassMatrix(const RobotModel& model, const RobotState& state, RobotDa
     }
   }
 
-  const double inverse_mass = 1 / model.total_mass();
+  const double inverse_mass = 1 / data->total_mass;
   data->com = data->base_position + inverse_mass * h;
   Vector3d velocity =
       state.base_linear_velocity + state.base_angular_velocity.cross(inverse_mass * h);

@@ -76,4 +76,10 @@ RobotModel RobotModel::WithModelError(std::string_view body, double mass_scale,
   return copy;
 }
 
+RobotModel RobotModel::WithImuTurned(const Eigen::Matrix3d& turn) const {
+  RobotParts parts = parts_;
+  parts.imu.pose.linear() = parts.imu.pose.linear() * turn;
+  return RobotModel(std::move(parts));
+}
+
 }  // namespace poise::robot

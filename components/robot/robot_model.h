@@ -48,14 +48,23 @@ struct MotorModel {
   double reflected_inertia = 0;                ///< kg·m², H² J_m
   double coulomb_friction = 0, viscous_friction = 0, static_friction = 0, stribeck_velocity = 0;
   int encoder_counts = 0;  ///< per motor revolution
+  bool current_sensor = true;  ///< whether the drive reports its current
   double torque_per_ampere() const { return gear_ratio * torque_constant; }
 };
 
+/// What a sole is computed with, in arrays of a fixed size.
+inline constexpr int kMaxSoleVertices = 16;
+
+/// A flat sole: a rectangle about its frame's origin, or a convex polygon with the origin inside
+/// (components/robot/sole.h).
 struct FootModel {
   std::string name;
   int body = -1;
   Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();  ///< sole frame in the body frame
-  double length = 0, width = 0;                            ///< m
+  double length = 0, width = 0;                            ///< m, of a polygon its extent
+  std::vector<Eigen::Vector2d> vertices;  ///< m, sole frame, anticlockwise; none for a rectangle
+  bool force_sensor = true;               ///< whether the foot has a six-axis sensor
+  bool rectangular() const { return vertices.empty(); }
 };
 
 /// A link of the URDF, one that is fixed to a body or the body's own.
@@ -102,6 +111,10 @@ struct RobotState {
   Eigen::Vector3d base_angular_velocity = Eigen::Vector3d::Zero();
   Eigen::VectorXd joint_position;
   Eigen::VectorXd joint_velocity;
+  /// What the robot carries beyond its model, as if fixed to the base: kg, and kg·m (mass times
+  /// place) in the base frame. An error of the model's COM is a moment without mass.
+  double load_mass = 0;
+  Eigen::Vector3d load_moment = Eigen::Vector3d::Zero();
 
   RobotState() = default;
   explicit RobotState(int num_joints)
@@ -185,6 +198,8 @@ class RobotModel {
   /// model-error studies. Throws RobotError: no such body, scale not positive, shift not finite.
   RobotModel WithModelError(std::string_view body, double mass_scale,
                             const Eigen::Vector3d& com_shift) const;
+  /// A copy whose IMU is turned by `turn`, in its own frame.
+  RobotModel WithImuTurned(const Eigen::Matrix3d& turn) const;
 
  private:
   void BuildTree();

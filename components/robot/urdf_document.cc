@@ -6,55 +6,17 @@
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include <algorithm>
-#include <cctype>
+#include <cmath>
 #include <map>
 #include <mutex>
 
 #include "components/robot/robot_model.h"
+#include "components/robot/xml_text.h"
 
 namespace poise::robot {
 namespace {
 
-// Both parsers recurse over nested elements and chains of links.
-constexpr int kMaxNesting = 64;
-constexpr int kMaxLinks = 1000;
-constexpr size_t kMaxBytes = 16u << 20;
-
-// One line, whatever the file put into a name or a library into a message.
-std::string OneLine(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
-  }
-  if (text.size() > 300) text = text.substr(0, 300) + "...";
-  return text;
-}
-
-// Depth of open elements, before any parser sees the text.
-int Nesting(std::string_view xml) {
-  int depth = 0, deepest = 0;
-  for (size_t i = xml.find('<'); i != std::string_view::npos; i = xml.find('<', i + 1)) {
-    const std::string_view rest = xml.substr(i + 1);
-    if (rest.starts_with("!--")) {
-      i = xml.find("-->", i);
-      if (i == std::string_view::npos) break;
-    } else if (rest.starts_with("/")) {
-      depth = std::max(0, depth - 1);
-    } else if (!rest.empty() && (std::isalpha(static_cast<unsigned char>(rest[0])) ||
-                                 rest[0] == '_' || static_cast<unsigned char>(rest[0]) >= 0x80)) {
-      const size_t end = xml.find('>', i);
-      if (end == std::string_view::npos || xml[end - 1] != '/') {
-        deepest = std::max(deepest, ++depth);
-      }
-    }
-  }
-  return deepest;
-}
-
-std::string Attribute(const TiXmlElement& element, const char* name) {
-  const char* value = element.Attribute(name);
-  return value ? OneLine(value) : std::string();
-}
+constexpr int kMaxLinks = 1000;  // urdfdom recurses over chains of links
 
 std::string RequiredAttribute(const TiXmlElement& element, const char* name,
                               const std::string& what) {
@@ -94,8 +56,25 @@ void CheckLinks(TiXmlElement* robot, std::map<std::string, int>* link_line) {
   }
 }
 
+double Number(const TiXmlElement& element, const char* name, double missing) {
+  const char* const text = element.Attribute(name);
+  if (text == nullptr) return missing;
+  double value = 0;
+  if (element.QueryDoubleAttribute(name, &value) != TIXML_SUCCESS || !std::isfinite(value)) {
+    throw RobotError(fmt::format("URDF line {}: {} '{}' is no finite number: correct it",
+                                 element.Row(), name, OneLine(text)));
+  }
+  return value;
+}
+
+Mimic ReadMimic(const TiXmlElement& mimic, const std::string& joint) {
+  return {RequiredAttribute(mimic, "joint", fmt::format("<mimic> of joint '{}'", joint)),
+          Number(mimic, "multiplier", 1), Number(mimic, "offset", 0)};
+}
+
 std::vector<std::string> CheckJoints(TiXmlElement* robot,
-                                     const std::map<std::string, int>& link_line) {
+                                     const std::map<std::string, int>& link_line,
+                                     std::map<std::string, Mimic>* mimics) {
   std::vector<std::string> order;
   std::map<std::string, int> joint_line;
   std::map<std::string, std::string> parent_joint;
@@ -129,11 +108,12 @@ std::vector<std::string> CheckJoints(TiXmlElement* robot,
       }
     }
     if (const TiXmlElement* mimic = joint->FirstChildElement("mimic")) {
-      throw RobotError(
-          fmt::format("URDF line {}: joint '{}' mimics joint '{}': coupled joints are not "
-                      "supported, make it fixed or remove <mimic>",
-                      mimic->Row(), name, Attribute(*mimic, "joint")));
+      (*mimics)[name] = ReadMimic(*mimic, name);
+      RemoveChildren(joint, "mimic");
     }
+    // Not ours, and urdfdom refuses a robot for what is missing in them.
+    RemoveChildren(joint, "safety_controller");
+    RemoveChildren(joint, "calibration");
     order.push_back(name);
   }
   return order;
@@ -251,30 +231,15 @@ urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& xml,
 }  // namespace
 
 UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings) {
-  if (xml.size() > kMaxBytes) {
-    throw RobotError(
-        fmt::format("URDF has {} bytes, more than {}: is it a URDF?", xml.size(), kMaxBytes));
-  }
-  if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
-    throw RobotError(fmt::format("URDF has a NUL byte at offset {}: is it a text file?", nul));
-  }
-  if (Nesting(xml) > kMaxNesting) {
-    throw RobotError(fmt::format("URDF nests elements more than {} deep: is an element not closed?",
-                                 kMaxNesting));
-  }
   TiXmlDocument document;
-  document.Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
-  if (document.Error()) {
-    throw RobotError(fmt::format("URDF line {}: not XML ({}): correct the text there",
-                                 document.ErrorRow(), OneLine(document.ErrorDesc())));
-  }
+  ParseXml(xml, "URDF", &document);
   TiXmlElement* robot = document.FirstChildElement("robot");
   if (!robot) throw RobotError("URDF has no <robot> element: is it a URDF (xacro expanded)?");
 
   UrdfDocument result;
   std::map<std::string, int> link_line;
   CheckLinks(robot, &link_line);
-  result.joint_order = CheckJoints(robot, link_line);
+  result.joint_order = CheckJoints(robot, link_line, &result.mimics);
   CheckConnected(link_line, robot);
   RemoveForeign(robot);
   Strip(robot);

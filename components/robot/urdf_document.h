@@ -4,9 +4,12 @@
 
 #include <urdf_world/types.h>
 
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "components/robot/robot_source.h"
 
 namespace poise::robot {
 
@@ -14,6 +17,7 @@ struct UrdfDocument {
   urdf::ModelInterfaceSharedPtr model;
   std::vector<std::string>
       joint_order;  ///< joint names as they stand in the text (urdfdom sorts by name)
+  std::map<std::string, Mimic> mimics;  ///< by joint
 };
 
 /// Throws RobotError with line and element: bad XML, links or joints named twice or never, two

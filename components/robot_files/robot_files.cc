@@ -45,6 +45,24 @@ std::string ReadText(const std::string& path) {
 
 }  // namespace
 
+std::string MakerFile(const Robot& description, const std::string& robot_path) {
+  if (description.urdf().empty() == description.mjcf().empty()) {
+    throw RobotError(robot_path + (description.urdf().empty()
+                                       ? ": urdf is missing: give the path of the URDF, or as mjcf "
+                                         "that of the MJCF file, relative to this file"
+                                       : ": urdf and mjcf are both given: leave one out"));
+  }
+  const std::string& name = description.urdf().empty() ? description.mjcf() : description.urdf();
+  const std::filesystem::path path = std::filesystem::path(robot_path).parent_path() / name;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw RobotError(fmt::format(
+        "{}: the maker's file '{}' is not there: put it at {}{}", robot_path, name, path.string(),
+        description.source().empty() ? "" : "; it is to be had from " + description.source()));
+  }
+  return path.string();
+}
+
 RobotModel LoadRobotFiles(const std::string& robot_path, std::vector<std::string>* warnings) {
   const std::string text = ReadText(robot_path);
   Robot robot;
@@ -53,23 +71,20 @@ RobotModel LoadRobotFiles(const std::string& robot_path, std::vector<std::string
   } catch (const RobotError& error) {
     throw RobotError(robot_path + ":" + error.what());
   }
-  if (robot.urdf().empty()) {
-    throw RobotError(robot_path + ": urdf is missing: give the URDF's path relative to this file");
-  }
-  const std::string urdf_path =
-      (std::filesystem::path(robot_path).parent_path() / robot.urdf()).string();
-  const std::string urdf = ReadText(urdf_path);
+  const std::string maker_path = MakerFile(robot, robot_path);
+  const std::string maker_text = ReadText(maker_path);
   try {
-    return MakeRobot(robot, urdf, warnings);
+    return MakeRobot(robot, maker_text, warnings);
   } catch (const RobotError& error) {
-    const bool of_urdf = std::string_view(error.what()).starts_with("URDF");
-    throw RobotError((of_urdf ? urdf_path : robot_path) + ": " + error.what());
+    const std::string_view what = error.what();
+    const bool of_maker = what.starts_with("URDF") || what.starts_with("MJCF");
+    throw RobotError((of_maker ? maker_path : robot_path) + ": " + error.what());
   }
 }
 
-RobotModel LoadRobotTexts(std::string_view robot_text, std::string_view urdf_xml,
+RobotModel LoadRobotTexts(std::string_view robot_text, std::string_view maker_text,
                           std::vector<std::string>* warnings) {
-  return MakeRobot(ParseRobot(robot_text), urdf_xml, warnings);
+  return MakeRobot(ParseRobot(robot_text), maker_text, warnings);
 }
 
 }  // namespace poise::robot

@@ -1,29 +1,40 @@
-// RobotModel from a Robot text file and the URDF it names.
+// RobotModel from a Robot text file and the maker's file, URDF or MJCF, that it names.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "components/robot/link_tree.h"
 #include "components/robot/robot_model.h"
 #include "components/robot_files/robot.pb.h"
 
 namespace poise::robot {
 
-/// Throws RobotError: unreadable URDF, closed loop, no such link or joint, non-physical inertia, a
-/// joint type that cannot be controlled, a joint without motor, not exactly two feet, fewer than
-/// six joints from base to a foot. Visual and collision elements are not looked at, so no mesh is
-/// ever missed. Warnings go to `warnings` when given.
-RobotModel MakeRobot(const Robot& description, std::string_view urdf_xml,
+/// `maker_text` is MJCF where the description has `mjcf`, else URDF. Throws RobotError: unreadable
+/// file, closed loop, no such link or joint, non-physical inertia, a joint type that cannot be
+/// controlled, a joint without motor, not exactly two feet, fewer than six joints from base to a
+/// foot. Visual and collision elements are not looked at, so no mesh is ever missed. Warnings go to
+/// `warnings` when given.
+RobotModel MakeRobot(const Robot& description, std::string_view maker_text,
                      std::vector<std::string>* warnings = nullptr);
 
-/// Reads the Robot file and, relative to it, its URDF. Throws RobotError, one line that begins with
-/// the file at fault.
+/// The first half of it: the maker's links merged to bodies, after the description's repairs,
+/// locks, limits and facings. Throws RobotError.
+LinkTree MakeTree(const Robot& description, std::string_view maker_text,
+                  std::vector<std::string>* warnings = nullptr);
+
+/// The maker's file that a Robot file names: urdf or mjcf, relative to it. Throws RobotError: it
+/// names none or both, or there is no such file, and then says where to get it and where to put it.
+std::string MakerFile(const Robot& description, const std::string& robot_path);
+
+/// Reads the Robot file and the maker's. Throws RobotError, one line that begins with the file at
+/// fault.
 RobotModel LoadRobotFiles(const std::string& robot_path,
                           std::vector<std::string>* warnings = nullptr);
 
 /// The same from texts already read.
-RobotModel LoadRobotTexts(std::string_view robot_text, std::string_view urdf_xml,
+RobotModel LoadRobotTexts(std::string_view robot_text, std::string_view maker_text,
                           std::vector<std::string>* warnings = nullptr);
 
 }  // namespace poise::robot

@@ -1,11 +1,13 @@
-// MakeRobot: the URDF's tree and the Robot file brought together, and checked against each
-// other.
+// MakeRobot: the maker's file and the Robot file brought together, and checked against each other.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <utility>
 
-#include "components/robot/urdf_tree.h"
+#include "components/robot/link_tree.h"
+#include "components/robot/sole.h"
+#include "components/robot/urdf_source.h"
+#include "components/robot_files/mjcf_source.h"
 #include "components/robot_files/robot_files.h"
 
 namespace poise::robot {
@@ -26,13 +28,13 @@ Eigen::Isometry3d ToIsometry(const Pose& pose, const std::string& field) {
   return result;
 }
 
-UrdfTree::LinkPlace FindLink(const UrdfTree& tree, const std::string& link,
+LinkTree::LinkPlace FindLink(const LinkTree& tree, const std::string& link,
                              const std::string& field) {
-  if (link.empty()) throw RobotError(field + " is missing: name a link of the URDF");
+  if (link.empty()) throw RobotError(field + " is missing: name a link of the file");
   const auto place = tree.links.find(link);
   if (place == tree.links.end()) {
-    throw RobotError(
-        fmt::format("{}: the URDF has no link '{}': name one of its links", field, link));
+    throw RobotError(fmt::format("{}: the {} has no link '{}': name one of its links", field,
+                                 tree.format, link));
   }
   return place->second;
 }
@@ -68,6 +70,7 @@ MotorModel ToMotor(const Motor& motor, const std::string& field) {
         fmt::format("{}.encoder_counts is {}: it must be above 0", field, motor.encoder_counts()));
   }
   result.encoder_counts = motor.encoder_counts();
+  result.current_sensor = motor.current_sensor();
   result.coulomb_friction = NotNegative(motor.coulomb_friction(), field + ".coulomb_friction");
   result.viscous_friction = NotNegative(motor.viscous_friction(), field + ".viscous_friction");
   result.static_friction = motor.has_static_friction()
@@ -85,7 +88,7 @@ MotorModel ToMotor(const Motor& motor, const std::string& field) {
   return result;
 }
 
-std::vector<MotorModel> LoadMotors(const Robot& description, const UrdfTree& tree) {
+std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tree) {
   std::vector<MotorModel> motors(tree.joints.size());
   std::vector<int> motor_of(tree.joints.size(), -1);
   for (int m = 0; m < description.motor_size(); ++m) {
@@ -98,14 +101,14 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const UrdfTree& tre
     for (const std::string& name : motor.joint()) {
       if (tree.fixed_joints.contains(name)) {
         throw RobotError(fmt::format(
-            "{}: joint '{}' is fixed in the URDF: remove it here or make it revolute there", field,
-            name));
+            "{}: joint '{}' is fixed in the {}: remove it here or make it revolute there", field,
+            name, tree.format));
       }
       size_t j = 0;
       while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
       if (j == tree.joints.size()) {
-        throw RobotError(
-            fmt::format("{}: the URDF has no joint '{}': correct the name", field, name));
+        throw RobotError(fmt::format("{}: the {} has no joint '{}': correct the name", field,
+                                     tree.format, name));
       }
       if (motor_of[j] >= 0) {
         throw RobotError(fmt::format("{}: joint '{}' already has motor[{}]: remove one", field,
@@ -117,23 +120,47 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const UrdfTree& tre
   }
   for (size_t j = 0; j < tree.joints.size(); ++j) {
     if (motor_of[j] < 0) {
-      throw RobotError(fmt::format(
-          "joint '{}' of the URDF has no motor: add it to a motor or make it fixed in the URDF",
-          tree.joints[j].name));
+      throw RobotError(
+          fmt::format("joint '{}' of the {} has no motor: add it to a motor, lock it here or make "
+                      "it fixed there",
+                      tree.joints[j].name, tree.format));
     }
   }
   return motors;
 }
 
-FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& field) {
+void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
+  if (foot.vertex_size() == 0) {
+    result->length = Positive(foot.length(), field + ".length");
+    result->width = Positive(foot.width(), field + ".width");
+    return;
+  }
+  if (foot.has_length() || foot.has_width()) {
+    throw RobotError(field + " has both vertex and length or width: remove one of the two");
+  }
+  for (const SoleVertex& vertex : foot.vertex()) {
+    result->vertices.emplace_back(vertex.x(), vertex.y());
+  }
+  if (const std::string problem = SoleProblem(result->vertices); !problem.empty()) {
+    throw RobotError(
+        fmt::format("{}.vertex{}{}", field, problem.front() == '[' ? "" : " ", problem));
+  }
+  const Eigen::Map<const Eigen::Matrix2Xd> corners(result->vertices.front().data(), 2,
+                                                   foot.vertex_size());
+  const Eigen::Vector2d extent = corners.rowwise().maxCoeff() - corners.rowwise().minCoeff();
+  result->length = extent.x();
+  result->width = extent.y();
+}
+
+FootModel LoadFoot(const Foot& foot, const LinkTree& tree, const std::string& field) {
   FootModel result;
   result.name = foot.name();
   if (result.name.empty()) throw RobotError(field + ".name is missing: e.g. \"right\"");
-  const UrdfTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
+  const LinkTree::LinkPlace place = FindLink(tree, foot.link(), field + ".link");
   result.body = place.body;
   result.sole = place.pose * ToIsometry(foot.sole(), field + ".sole");
-  result.length = Positive(foot.length(), field + ".length");
-  result.width = Positive(foot.width(), field + ".width");
+  LoadSole(foot, field, &result);
+  result.force_sensor = foot.force_sensor();
   int joints = 0;
   for (int b = place.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) ++joints;
   if (joints < kContactDimension) {
@@ -146,7 +173,7 @@ FootModel LoadFoot(const Foot& foot, const UrdfTree& tree, const std::string& fi
 }
 
 // Of the sole, in the base frame, all joints at zero.
-double LateralPlace(const FootModel& foot, const UrdfTree& tree) {
+double LateralPlace(const FootModel& foot, const LinkTree& tree) {
   Eigen::Vector3d point = foot.sole.translation();
   for (int b = foot.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) {
     point = tree.joints[static_cast<size_t>(b) - 1].origin * point;
@@ -154,7 +181,7 @@ double LateralPlace(const FootModel& foot, const UrdfTree& tree) {
   return point.y();
 }
 
-std::vector<FootModel> LoadFeet(const Robot& description, const UrdfTree& tree) {
+std::vector<FootModel> LoadFeet(const Robot& description, const LinkTree& tree) {
   if (description.foot_size() != 2) {
     throw RobotError(fmt::format("foot: {} given, exactly two are needed, the right one first",
                                  description.foot_size()));
@@ -183,7 +210,7 @@ std::vector<FootModel> LoadFeet(const Robot& description, const UrdfTree& tree) 
   return feet;
 }
 
-StanceModel LoadStance(const Stance& stance, const UrdfTree& tree) {
+StanceModel LoadStance(const Stance& stance, const LinkTree& tree) {
   StanceModel result;
   result.joint_position = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(tree.joints.size()));
   for (int i = 0; i < stance.joint_size(); ++i) {
@@ -192,8 +219,8 @@ StanceModel LoadStance(const Stance& stance, const UrdfTree& tree) {
     size_t j = 0;
     while (j < tree.joints.size() && tree.joints[j].name != name) ++j;
     if (j == tree.joints.size()) {
-      throw RobotError(
-          fmt::format("{}: the URDF has no joint '{}' that moves: correct the name", field, name));
+      throw RobotError(fmt::format("{}: the {} has no joint '{}' that moves: correct the name",
+                                   field, tree.format, name));
     }
     const double position = stance.joint(i).position();
     if (!std::isfinite(position)) {
@@ -225,18 +252,120 @@ DriveTrainModel LoadDriveTrain(const DriveTrain& drive) {
   return result;
 }
 
+[[noreturn]] void FailName(const RobotSource& source, const std::string& field, const char* kind,
+                           const std::string& name) {
+  throw RobotError(
+      fmt::format("{}: the {} has no {} '{}': correct the name", field, source.format, kind, name));
+}
+
+SourceJoint& JointOf(RobotSource* source, const std::string& field, const std::string& name) {
+  SourceJoint* const joint = source->FindJoint(name);
+  if (joint == nullptr) FailName(*source, field, "joint", name);
+  return *joint;
+}
+
+double Finite(double value, const std::string& field) {
+  if (!std::isfinite(value))
+    throw RobotError(fmt::format("{} is {}: it must be finite", field, value));
+  return value;
+}
+
+void ApplyRepair(const Repair& repair, const std::string& field, RobotSource* source) {
+  SourceLink* const link = source->FindLink(repair.link());
+  if (link == nullptr) FailName(*source, field, "link", repair.link());
+  MassProperties& mass = link->mass;
+  if (repair.has_mass()) mass.mass = NotNegative(repair.mass(), field + ".mass");
+  if (repair.has_com()) mass.com = ToIsometry(repair.com(), field + ".com").translation();
+  if (repair.has_inertia()) {
+    const Inertia& i = repair.inertia();
+    mass.inertia << i.ixx(), i.ixy(), i.ixz(), i.ixy(), i.iyy(), i.iyz(), i.ixz(), i.iyz(), i.izz();
+  }
+  if (!repair.has_rotor()) return;
+  const double rotor = NotNegative(repair.rotor(), field + ".rotor");
+  for (const SourceJoint& joint : source->joints) {
+    if (joint.child != repair.link() || joint.kind == JointKind::kFixed) continue;
+    const Eigen::Vector3d axis = joint.axis.normalized();
+    mass.inertia -= rotor * axis * axis.transpose();
+    return;
+  }
+  throw RobotError(
+      fmt::format("{}.rotor: no joint moves link '{}': remove it", field, repair.link()));
+}
+
+// What the Robot file says of the maker's: repairs, limits, joints that stand still.
+void Correct(const Robot& description, RobotSource* source) {
+  for (int i = 0; i < description.repair_size(); ++i) {
+    ApplyRepair(description.repair(i), fmt::format("repair[{}]", i), source);
+  }
+  for (int i = 0; i < description.limit_size(); ++i) {
+    const JointLimit& limit = description.limit(i);
+    const std::string field = fmt::format("limit[{}]", i);
+    for (const std::string& name : limit.joint()) {
+      SourceJoint& joint = JointOf(source, field, name);
+      if (limit.has_lower()) joint.lower = Finite(limit.lower(), field + ".lower");
+      if (limit.has_upper()) joint.upper = Finite(limit.upper(), field + ".upper");
+      if (limit.has_effort()) joint.effort = Positive(limit.effort(), field + ".effort");
+      if (limit.has_velocity()) joint.velocity = Positive(limit.velocity(), field + ".velocity");
+      joint.has_limits = true;
+    }
+  }
+  for (int i = 0; i < description.lock_size(); ++i) {
+    const std::string field = fmt::format("lock[{}]", i);
+    const double position = Finite(description.lock(i).position(), field + ".position");
+    for (const std::string& name : description.lock(i).joint()) {
+      SourceJoint& joint = JointOf(source, field, name);
+      if (joint.kind == JointKind::kFloating || joint.kind == JointKind::kOther) {
+        throw RobotError(fmt::format(
+            "{}: joint '{}' is neither revolute nor prismatic: it cannot be locked", field, name));
+      }
+      joint.locked = position;
+    }
+  }
+}
+
+void Face(const Robot& description, LinkTree* tree) {
+  for (int i = 0; i < description.facing_size(); ++i) {
+    const Facing& facing = description.facing(i);
+    const std::string field = fmt::format("facing[{}]", i);
+    const LinkTree::LinkPlace place = FindLink(*tree, facing.link(), field + ".link");
+    if (tree->bodies[static_cast<size_t>(place.body)].name != facing.link()) {
+      throw RobotError(fmt::format("{}: link '{}' is fixed to '{}': name that one", field,
+                                   facing.link(),
+                                   tree->bodies[static_cast<size_t>(place.body)].name));
+    }
+    Pose pose;
+    pose.set_roll(facing.roll());
+    pose.set_pitch(facing.pitch());
+    pose.set_yaw(facing.yaw());
+    TurnBody(place.body, ToIsometry(pose, field).linear(), tree);
+  }
+}
+
 }  // namespace
 
-RobotModel MakeRobot(const Robot& description, std::string_view urdf_xml,
+LinkTree MakeTree(const Robot& description, std::string_view maker_text,
+                  std::vector<std::string>* warnings) {
+  if (description.has_urdf() == description.has_mjcf() && description.has_urdf()) {
+    throw RobotError("urdf and mjcf are both given: leave one out");
+  }
+  RobotSource source = description.has_mjcf() ? ReadMjcf(maker_text, warnings).source
+                                              : ReadUrdf(maker_text, warnings);
+  Correct(description, &source);
+  LinkTree tree = BuildLinkTree(source);
+  Face(description, &tree);
+  return tree;
+}
+
+RobotModel MakeRobot(const Robot& description, std::string_view maker_text,
                      std::vector<std::string>* warnings) {
-  UrdfTree tree = LoadUrdfTree(urdf_xml, warnings);
+  LinkTree tree = MakeTree(description, maker_text, warnings);
   RobotParts parts;
   parts.name = description.name().empty() ? tree.name : description.name();
   parts.motors = LoadMotors(description, tree);
   parts.feet = LoadFeet(description, tree);
 
   const Imu& imu = description.imu();
-  const UrdfTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
+  const LinkTree::LinkPlace imu_place = FindLink(tree, imu.link(), "imu.link");
   parts.imu.body = imu_place.body;
   parts.imu.pose = imu_place.pose * ToIsometry(imu.pose(), "imu.pose");
   parts.imu.gyro_noise = NotNegative(imu.gyro_noise(), "imu.gyro_noise");

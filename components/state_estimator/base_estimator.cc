@@ -22,6 +22,7 @@ constexpr double kMaxGyroBias = 0.05;     // rad/s: any larger is a broken senso
 constexpr double kRestTime = 0.2;
 constexpr double kRestJointMotion = 1e-4;
 constexpr double kRestLoadChange = 0.02;
+constexpr double kBiasTime = 5;  // s, over which the accelerometer is averaged
 
 Vector3d Clamp(const Vector3d& v, double limit) { return v.cwiseMin(limit).cwiseMax(-limit); }
 
@@ -81,6 +82,15 @@ void BaseEstimator::Update(const BaseSensors& sensors, double dt) {
     UpdateAnchors(dt);
   }
   state_.base_angular_velocity = orientation_ * angular_velocity_;
+  AverageAccelerometer(sensors, dt);
+}
+
+// Over time the robot does not accelerate: the average beyond gravity is bias, or the IMU's tilt.
+void BaseEstimator::AverageAccelerometer(const BaseSensors& sensors, double dt) {
+  const Vector3d up = (orientation_ * imu_rotation_).transpose() * Vector3d::UnitZ();
+  const Vector3d beyond = Clamp(sensors.acceleration, kMaxAcceleration) - robot::kGravity * up;
+  averaged_ = std::min(averaged_ + dt, kBiasTime);
+  accelerometer_bias_ += std::min(dt / averaged_, 1.0) * (beyond - accelerometer_bias_);
 }
 
 void BaseEstimator::Archive(StateArchive* archive) {
@@ -90,7 +100,7 @@ void BaseEstimator::Archive(StateArchive* archive) {
                 orientation_, gyro_bias_, imu_orientation_, gyro_, imu_rotation_, angular_velocity_,
                 imu_velocity_, imu_acceleration_);
   for (Foot& foot : feet_) archive->Show(foot.last_offset, foot.anchor);
-  archive->Show(foot_weight_, rest_position_, rest_load_, rest_gyro_, rest_samples_, rest_left_,
+  archive->Show(accelerometer_bias_, averaged_, foot_weight_, rest_position_, rest_load_, rest_gyro_, rest_samples_, rest_left_,
                 placed_);
 }
 

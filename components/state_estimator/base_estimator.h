@@ -60,6 +60,9 @@ class BaseEstimator {
   /// ground.
   const std::array<double, 2>& foot_weight() const { return foot_weight_; }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< rad/s, IMU frame
+  /// m/s², IMU frame: what the accelerometer reads on average beyond gravity, as the orientation
+  /// has it. Of no effect on the state.
+  const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
   /// Sole in the world: where the estimator holds it to stand, and where the kinematics see it.
   const Eigen::Isometry3d& anchor(int foot) const {
     return feet_[static_cast<size_t>(foot)].anchor;
@@ -87,6 +90,7 @@ class BaseEstimator {
   void UpdateTrust();
   void UpdatePosition(double dt);
   void UpdateAnchors(double dt);
+  void AverageAccelerometer(const BaseSensors& sensors, double dt);
 
   std::shared_ptr<const robot::RobotModel> model_;
   BaseEstimatorConfig config_;
@@ -98,6 +102,8 @@ class BaseEstimator {
   Eigen::VectorXd joint_rate_;  // rad/s, unfiltered
   Eigen::Matrix3d orientation_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accelerometer_bias_ = Eigen::Vector3d::Zero();
+  double averaged_ = 0;  // s, of the accelerometer's readings
   Eigen::Quaterniond imu_orientation_ = Eigen::Quaterniond::Identity();  // IMU to world
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();  // rad/s, without bias, IMU frame
   // Of this step, in the base frame: IMU to base; rate of the base, rad/s; velocity of the IMU

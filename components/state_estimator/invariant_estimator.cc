@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "components/robot/sole.h"
+
 namespace poise {
 namespace {
 
@@ -329,9 +331,7 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
       filter_.HoldPosition(i, foot.reading);
       LetSlip(f);  // it has yet to settle
     }
-    const robot::FootModel& model = model_->feet()[f];
-    const double inside = std::min(0.5 * model.length - std::abs(sensors.foot_cop[f].x()),
-                                   0.5 * model.width - std::abs(sensors.foot_cop[f].y()));
+    const double inside = robot::DistanceInside(model_->feet()[f], sensors.foot_cop[f]);
     if (filter_.holds_rotation(i)) {
       if (!(inside > 0.5 * config_.cop_margin)) filter_.ReleaseRotation(i);
     } else if (inside > config_.cop_margin) {

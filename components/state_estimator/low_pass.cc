@@ -8,7 +8,8 @@ LowPass::LowPass(int num_signals, double cutoff)
     : omega_(2 * std::numbers::pi * cutoff),
       value_(Eigen::VectorXd::Zero(num_signals)),
       rate_(Eigen::VectorXd::Zero(num_signals)),
-      next_rate_(Eigen::VectorXd::Zero(num_signals)) {}
+      next_rate_(Eigen::VectorXd::Zero(num_signals)),
+      curvature_(Eigen::VectorXd::Zero(num_signals)) {}
 
 void LowPass::Step(const Eigen::VectorXd& input, double dt) {
   // value' = rate, rate' = ω² (input − value) − √2 ω rate; both means over the step solved for the
@@ -20,7 +21,14 @@ void LowPass::Step(const Eigen::VectorXd& input, double dt) {
   next_rate_ =
       scale * ((1 - damping - stiffness) * rate_ + 2 * h * omega_ * omega_ * (input - value_));
   value_ += h * (rate_ + next_rate_);
+  if (dt > 0) curvature_ = (next_rate_ - rate_) / dt;
   rate_ = next_rate_;
+}
+
+void LowPass::Reset(const Eigen::VectorXd& input) {
+  value_ = input;
+  rate_.setZero();
+  curvature_.setZero();
 }
 
 }  // namespace poise

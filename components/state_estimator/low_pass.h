@@ -17,11 +17,19 @@ class LowPass {
   /// One step of `dt` s with `input`; the output is value().
   void Step(const Eigen::VectorXd& input, double dt);
   const Eigen::VectorXd& value() const { return value_; }
+  /// The output's first derivative, 1/s of the signals.
+  const Eigen::VectorXd& rate() const { return rate_; }
+  /// Its second derivative, 1/s², the mean over the last step: at the step's end alone the input,
+  /// held over the step, would be too old by half of it, an error of −ω² dt/2 times rate(). Of the
+  /// last Step of this process: not archived.
+  const Eigen::VectorXd& curvature() const { return curvature_; }
+  /// At rest at `input`.
+  void Reset(const Eigen::VectorXd& input);
   void Archive(StateArchive* archive) { archive->Show(value_, rate_); }
 
  private:
   double omega_;
-  Eigen::VectorXd value_, rate_, next_rate_;
+  Eigen::VectorXd value_, rate_, next_rate_, curvature_;
 };
 
 }  // namespace poise

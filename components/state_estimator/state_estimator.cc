@@ -8,6 +8,7 @@
 #include "components/messages/robot_resource.h"
 #include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/state_estimator_type.h"
+#include "poise/drive_feedback_t.hpp"
 
 namespace poise {
 
@@ -102,12 +103,76 @@ InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config,
   return out;
 }
 
+FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
+  const auto read = [](const char* group, const char* name, double value) {
+    if (std::isfinite(value) && value > 0) return value;
+    throw ConfigError(std::string(group) + "." + name, "must be a finite number above 0");
+  };
+  const WrenchObserverConfig& in = config.wrench_observer();
+  const FootSensorCheckConfig& check = config.foot_sensor_check();
+  const char* const observer = "wrench_observer";
+  FootWrenchSettings out;
+  out.observer = {
+      .cutoff = read(observer, "cutoff", in.cutoff()),
+      .friction_error = read(observer, "friction_error", in.friction_error()),
+      .friction_stiffness = read(observer, "friction_stiffness", in.friction_stiffness()),
+      .torque_error = read(observer, "torque_error", in.torque_error()),
+      .mass_error = read(observer, "mass_error", in.mass_error()),
+      .com_error = read(observer, "com_error", in.com_error()),
+      .acceleration_error = read(observer, "acceleration_error", in.acceleration_error()),
+      .push_gate = read(observer, "push_gate", in.push_gate()),
+      .latency = read(observer, "latency", in.latency())};
+  if (in.check_every() < 1) {
+    throw ConfigError("wrench_observer.check_every", "must be at least 1");
+  }
+  out.check_every = in.check_every();
+  const char* const group = "foot_sensor_check";
+  out.check = {.enabled = check.enabled(),
+               .gate = read(group, "gate", check.gate()),
+               .frozen_gate = read(group, "frozen_gate", check.frozen_gate()),
+               .agree_gate = read(group, "agree_gate", check.agree_gate()),
+               .time = read(group, "time", check.time()),
+               .frozen_time = read(group, "frozen_time", check.frozen_time()),
+               .recover_time = read(group, "recover_time", check.recover_time())};
+  return out;
+}
+
+CalibratorSettings ReadCalibratorSettings(const StateEstimatorConfig& config) {
+  const CalibrationConfig& in = config.calibration();
+  const auto read = [](const char* name, double value) {
+    if (std::isfinite(value) && value > 0) return value;
+    throw ConfigError(std::string("calibration.") + name, "must be a finite number above 0");
+  };
+  return {.enabled = in.enabled(),
+          .max_mass = read("max_mass", in.max_mass()),
+          .max_shift = read("max_shift", in.max_shift()),
+          .walk = read("walk", in.walk()),
+          .force_error = read("force_error", in.force_error()),
+          .moment_error = read("moment_error", in.moment_error()),
+          .still_rate = read("still_rate", in.still_rate()),
+          .still_acceleration = read("still_acceleration", in.still_acceleration()),
+          .gate = read("gate", in.gate()),
+          .apply_time = read("apply_time", in.apply_time()),
+          .cutoff = config.wrench_observer().cutoff()};
+}
+
+FootReading ReadFoot(const robot_sensors_t& sensors, size_t foot) {
+  FootReading reading;
+  if (sensors.foot_sensor[foot] == drive_feedback_t::SENSOR_ABSENT) {
+    reading.state = FootSensorCheck::State::kAbsent;
+  } else if (sensors.foot_sensor[foot] != drive_feedback_t::SENSOR_OK) {
+    reading.state = FootSensorCheck::State::kInvalid;
+  }
+  reading.wrench = GetWrench(sensors.foot_wrench[foot]);
+  return reading;
+}
+
 constexpr double kLeastForce = 1;  // N: below it a sole has no centre of pressure
 
 // The sensor reads what the robot does to the ground; the signs cancel.
-Eigen::Vector2d CenterOfPressure(const wrench_t& wrench) {
-  if (!(wrench.force[2] < -kLeastForce)) return Eigen::Vector2d::Zero();
-  return {-wrench.moment[1] / wrench.force[2], wrench.moment[0] / wrench.force[2]};
+Eigen::Vector2d CenterOfPressure(const robot::Vector6d& wrench) {
+  if (!(wrench[2] < -kLeastForce)) return Eigen::Vector2d::Zero();
+  return {-wrench[4] / wrench[2], wrench[3] / wrench[2]};
 }
 
 }  // namespace
@@ -117,6 +182,9 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   const InvariantEstimatorConfig invariant = ReadInvariantConfig(config, model->drive_train());
+  wrenches_ = std::make_unique<FootWrenches>(model, ReadFootWrenchSettings(config));
+  calibrator_ =
+      std::make_unique<Calibrator>(model, ReadCalibratorSettings(config), context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
@@ -136,6 +204,8 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
 
 bool StateEstimator::Archive(StateArchive* archive) {
   archive->Show(last_time_);
+  wrenches_->Archive(archive);
+  calibrator_->Archive(archive);
   if (anchored_) anchored_->Archive(archive);
   if (invariant_) invariant_->Archive(archive);
   return true;
@@ -143,16 +213,27 @@ bool StateEstimator::Archive(StateArchive* archive) {
 
 void StateEstimator::Estimate(const Tick& tick) {
   const robot_sensors_t& in = *robot_sensors_;
-  const BaseSensors sensors = {
+  BaseSensors sensors = {
       {in.joint_position.data(), in.num_joints},
       Vector3d(in.imu_angular_velocity),
       Vector3d(in.imu_acceleration),
-      {-in.foot_wrench[0].force[2], -in.foot_wrench[1].force[2]},
-      {CenterOfPressure(in.foot_wrench[0]), CenterOfPressure(in.foot_wrench[1])},
+      {},
+      {},
       {in.joint_torque.data(), in.num_joints},
   };
   const double dt = tick.time - last_time_;
   last_time_ = tick.time;
+  wrenches_->Update(tick.index, dt, sensors, {ReadFoot(in, 0), ReadFoot(in, 1)}, Correction());
+  for (size_t f = 0; f < 2; ++f) {
+    sensors.foot_load[f] = -wrenches_->wrench(f)[2];
+    sensors.foot_cop[f] = CenterOfPressure(wrenches_->wrench(f));
+  }
+  if (calibrator_->enabled()) {
+    calibrator_->Track({wrenches_->wrench(0), wrenches_->wrench(1)}, dt);
+    if (wrenches_->observed()) {
+      calibrator_->Update(wrenches_->observer(), wrenches_->measured(0) && wrenches_->measured(1));
+    }
+  }
   if (invariant_) {
     invariant_->Update(sensors, dt);
     PublishInvariant();
@@ -160,7 +241,71 @@ void StateEstimator::Estimate(const Tick& tick) {
     anchored_->Update(sensors, dt);
     PublishAnchored();
   }
-  std::copy(in.foot_wrench.begin(), in.foot_wrench.end(), robot_state_->foot_wrench.begin());
+  PublishWrenches();
+  if (calibrator_->enabled()) PublishCalibration();
+}
+
+// What the estimator knows of the IMU's errors by now.
+ObserverCorrection StateEstimator::Correction() const {
+  ObserverCorrection correction;
+  if (invariant_) {
+    correction.gyro_bias = invariant_->filter().state().gyro_bias;
+    correction.accelerometer_bias = invariant_->filter().state().accelerometer_bias;
+  } else {
+    correction.gyro_bias = anchored_->gyro_bias();
+    correction.accelerometer_bias = anchored_->accelerometer_bias();
+  }
+  correction.load_mass = calibrator_->load()[0];
+  correction.load_moment = calibrator_->load().tail<3>();
+  return correction;
+}
+
+void StateEstimator::PublishWrenches() {
+  robot_state_t& out = *robot_state_;
+  for (size_t f = 0; f < out.foot_wrench.size(); ++f) {
+    SetWrench(wrenches_->wrench(f), &out.foot_wrench[f]);
+    SetWrench(wrenches_->deviation(f), &out.foot_wrench_deviation[f]);
+    out.foot_wrench_source[f] =
+        wrenches_->measured(f) ? robot_state_t::SOURCE_SENSOR : robot_state_t::SOURCE_OBSERVER;
+    estimator_status_->foot_sensor[f] = static_cast<int8_t>(wrenches_->check(f).state());
+  }
+  estimator_status_t& status = *estimator_status_;
+  const WrenchObserver& observer = wrenches_->observer();
+  status.has_observer = observer.torque_known() ? 1 : 0;
+  status.push_excess = observer.push_excess();
+  for (size_t f = 0; f < status.observed_wrench.size(); ++f) {
+    SetWrench(observer.wrenches().segment<6>(static_cast<Eigen::Index>(6 * f)),
+              &status.observed_wrench[f]);
+  }
+  size_t next = 0;
+  for (int row = 0; row < 12; ++row) {
+    for (int column = row; column < 12; ++column) {
+      status.observed_covariance[next++] = observer.covariance()(row, column);
+    }
+  }
+}
+
+// The IMU's tilt is what its accelerometer's bias looks like: standing tells only both together.
+void StateEstimator::PublishCalibration() {
+  const Calibrator::Load& load = calibrator_->load();
+  robot_state_->load_mass = load[0];
+  SetVector3(load.tail<3>(), robot_state_->load_moment);
+  estimator_status_t& status = *estimator_status_;
+  status.calibration = calibrator_->running() ? estimator_status_t::CALIBRATION_RUNNING
+                                              : estimator_status_t::CALIBRATION_WAITING;
+  status.load_mass = calibrator_->estimate()[0];
+  SetVector3(calibrator_->estimate().tail<3>(), status.load_moment);
+  // Turned by (roll, pitch) an IMU at rest reads (−g pitch, g roll, g).
+  const Vector3d bias = Correction().accelerometer_bias;
+  status.imu_tilt[0] = bias.y() / robot::kGravity;
+  status.imu_tilt[1] = -bias.x() / robot::kGravity;
+  const Eigen::Matrix4d& covariance = calibrator_->covariance();
+  size_t next = 0;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column, ++next) {
+      status.calibration_covariance[next] = column < 4 ? covariance(row, column) : 0;
+    }
+  }
 }
 
 void StateEstimator::PublishState(const robot::RobotState& state) {

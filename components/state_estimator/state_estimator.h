@@ -5,6 +5,8 @@
 
 #include "components/framework/component.h"
 #include "components/state_estimator/base_estimator.h"
+#include "components/state_estimator/calibrator.h"
+#include "components/state_estimator/foot_wrenches.h"
 #include "components/state_estimator/invariant_estimator.h"
 #include "poise/estimator_status_t.hpp"
 #include "poise/robot_sensors_t.hpp"
@@ -21,6 +23,9 @@ class StateEstimator : public Component {
 
  private:
   void Estimate(const Tick& tick);
+  ObserverCorrection Correction() const;
+  void PublishWrenches();
+  void PublishCalibration();
   void PublishState(const robot::RobotState& state);
   void PublishAnchored();
   void PublishInvariant();
@@ -31,6 +36,8 @@ class StateEstimator : public Component {
   // The method's; the other is null.
   std::unique_ptr<BaseEstimator> anchored_;
   std::unique_ptr<InvariantEstimator> invariant_;
+  std::unique_ptr<FootWrenches> wrenches_;
+  std::unique_ptr<Calibrator> calibrator_;
   double last_time_ = 0;
 };
 

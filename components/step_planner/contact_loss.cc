@@ -1,5 +1,7 @@
 #include "components/step_planner/contact_loss.h"
 
+#include <algorithm>
+
 namespace poise {
 namespace {
 
@@ -7,8 +9,8 @@ constexpr double kTimeTolerance = 1e-9;  // s, far below a tick, far above round
 
 }  // namespace
 
-void ContactLoss::Update(double time, double load, bool carries) {
-  if (!carries || !(load < release_load_)) return Reset();
+void ContactLoss::Update(double time, double load, bool carries, double deviation) {
+  if (!carries || !(load < std::max(release_load_, deviation))) return Reset();
   if (!below_) {
     below_ = true;
     since_ = time;

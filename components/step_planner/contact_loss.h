@@ -14,7 +14,9 @@ class ContactLoss {
       : release_load_(config.release_load()), duration_(config.lost_duration()) {}
 
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
-  void Update(double time, double load, bool carries);
+  /// `deviation`: N, of an observed load, which must be below that instead where it is more; 0 of a
+  /// measured one.
+  void Update(double time, double load, bool carries, double deviation = 0);
   /// From here on anew: another phase, another plan.
   void Reset() { below_ = lost_ = false; }
   bool lost() const { return lost_; }

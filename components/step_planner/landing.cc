@@ -9,19 +9,28 @@ constexpr double kTouchTolerance = 1e-9;  // s, far below a tick, far above roun
 // Time constant, s, of the reference's velocity: a search begins and a lowering ends without a
 // step.
 constexpr double kVelocityTime = 0.05;
+// Standard deviations of an observed load that are a touch, and below which it is none.
+constexpr double kTouchDeviations = 3, kReleaseDeviations = 1.2;
 // Time constant, s, with which a touching sole's reference comes to where the sole stands: a
 // fraction of settle_duration's default.
 constexpr double kRelaxTime = 0.1;
 
 }  // namespace
 
+LoadLevels::LoadLevels(const ContactConfirmation& config, double deviation)
+    : touch(std::max(config.touch_load(), kTouchDeviations * deviation)),
+      release(std::max(config.release_load(), kReleaseDeviations * deviation)),
+      press(std::max(config.press_load(), 2 * touch)) {
+  if (deviation <= 0) press = config.press_load();
+}
+
 void TouchDetector::Reset(bool touching) {
   touching_ = touching;
   changing_ = false;
 }
 
-bool TouchDetector::Update(double time, double load) {
-  const bool contradicts = touching_ ? load < config_.release_load() : load > config_.touch_load();
+bool TouchDetector::Update(double time, double load, const LoadLevels& levels) {
+  const bool contradicts = touching_ ? load < levels.release : load > levels.touch;
   if (!contradicts) {
     changing_ = false;
     return touching_;
@@ -62,12 +71,13 @@ void Landing::Release() {
   left_ = true;
 }
 
-void Landing::Measure(double time, double load) {
+void Landing::Measure(double time, double load, double deviation) {
   period_ = std::clamp(time - time_, 0.0, kMaxPeriod);
   time_ = time;
   load_ = load;
+  levels_ = LoadLevels(config_, deviation);
   const bool before = touch_.touching();
-  if (touch_.Update(time, load) && !before) touched_ = time;
+  if (touch_.Update(time, load, levels_) && !before) touched_ = time;
 }
 
 bool Landing::confirmed() const {
@@ -127,15 +137,15 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
 }
 
 void Landing::Search() {
-  const double missing = std::max(1 - load_ / config_.press_load(), 0.0);
+  const double missing = std::max(1 - load_ / levels_.press, 0.0);
   const Eigen::Vector3d velocity(0, 0, -config_.search_speed() * missing);
   reference_.velocity += Share(kVelocityTime) * (velocity - reference_.velocity);
   reference_.position += period_ * reference_.velocity;
 }
 
 void Landing::Touch(const Eigen::Isometry3d& sole) {
-  const double loaded = std::clamp(
-      (load_ - config_.release_load()) / (config_.touch_load() - config_.release_load()), 0.0, 1.0);
+  const double loaded =
+      std::clamp((load_ - levels_.release) / (levels_.touch - levels_.release), 0.0, 1.0);
   Eigen::Vector3d share = Eigen::Vector3d::Constant(Share(kRelaxTime));
   share.z() *= loaded;
   reference_.position += share.cwiseProduct(sole.translation() - reference_.position);
@@ -171,7 +181,8 @@ bool Landing::Update(bool before_touch_down, bool due, const Eigen::Isometry3d& 
 
 void Landing::Archive(StateArchive* archive) {
   touch_.Archive(archive);
-  archive->Show(state_, time_, period_, load_, touched_, left_, lowered_, move_end_, end_height_);
+  archive->Show(state_, time_, period_, load_, levels_, touched_, left_, lowered_, move_end_,
+                end_height_);
   reference_.Archive(archive);
   archive->Show(rotation_);
   retreat_.Archive(archive);

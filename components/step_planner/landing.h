@@ -11,6 +11,15 @@
 
 namespace poise {
 
+/// N: the configured loads, raised where the load is not known so well.
+struct LoadLevels {
+  double touch = 0, release = 0, press = 0;
+
+  /// `deviation`: N, of an observed load; 0 of a measured one, whose noise the configured loads
+  /// allow for.
+  LoadLevels(const ContactConfirmation& config, double deviation);
+};
+
 /// Contact from a measured load, with hysteresis: it is made when the load has stayed above
 /// touch_load for touch_duration, and lost when it has stayed below release_load as long.
 class TouchDetector {
@@ -20,7 +29,7 @@ class TouchDetector {
   /// `touching`: what holds until the load says otherwise.
   void Reset(bool touching);
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
-  bool Update(double time, double load);
+  bool Update(double time, double load, const LoadLevels& levels);
   bool touching() const { return touching_; }
   void Archive(StateArchive* archive) { archive->Show(touching_, changing_, since_); }
 
@@ -44,7 +53,8 @@ class Landing {
  public:
   enum class State { kSwing, kSearching, kTouching, kRetracted };
 
-  explicit Landing(const ContactConfirmation& config) : config_(config), touch_(config) {}
+  explicit Landing(const ContactConfirmation& config)
+      : config_(config), touch_(config), levels_(config, 0) {}
 
   /// The foot is free from here on, its reference at rest at height `z`, m. It counts as touching
   /// the ground that it leaves until its load says that it has left.
@@ -55,8 +65,9 @@ class Landing {
   /// The foot follows the references again, from where it stands, though it searched or found no
   /// surface: the plan goes on otherwise.
   void Release();
-  /// Once a tick, before the schedule: `load` in N, measured along the sole's normal.
-  void Measure(double time, double load);
+  /// Once a tick, before the schedule: `load` in N along the sole's normal, and what it is known to
+  /// (see LoadLevels).
+  void Measure(double time, double load, double deviation = 0);
   /// Measured contact that has settled: double support may begin.
   bool confirmed() const;
   /// No surface was found, and the foot is up again.
@@ -86,11 +97,12 @@ class Landing {
   State state_ = State::kSwing;
   double time_ = 0, period_ = 0;  // s, of this tick, since the last
   double load_ = 0;               // N
-  double touched_ = 0;            // s, when the touch began
-  bool left_ = false;             // the ground or surface from which the last move started
-  bool lowered_ = false;          // the last move went down
-  double move_end_ = 0;           // s
-  double end_height_ = 0;         // m, where the scenario's reference ends
+  LoadLevels levels_;
+  double touched_ = 0;     // s, when the touch began
+  bool left_ = false;      // the ground or surface from which the last move started
+  bool lowered_ = false;   // the last move went down
+  double move_end_ = 0;    // s
+  double end_height_ = 0;  // m, where the scenario's reference ends
   PointMotion reference_;
   Eigen::Matrix3d rotation_ = Eigen::Matrix3d::Identity();
   QuinticMove retreat_;

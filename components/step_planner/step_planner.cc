@@ -10,9 +10,11 @@
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
 #include "components/messages/robot_resource.h"
+#include "components/robot/sole.h"
 #include "components/step_planner/planner_config.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/step_planner_type.h"
+#include "components/step_planner/stepping_report.h"
 
 namespace poise {
 
@@ -74,6 +76,18 @@ double ReadStanceHalf(bool given, double value, double sole, double reserve, con
   return value;
 }
 
+balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const Eigen::Vector2d& half,
+                                  const StepPlannerConfig& config) {
+  if (foot.rectangular()) return balance::Rectangle(half);
+  balance::ConvexPolygon sole =
+      balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
+  for (const double sign : {1.0, -1.0}) {
+    if (config.has_stance_half_length()) sole = balance::Clip(sole, {{sign, 0}, half.x()});
+    if (config.has_stance_half_width()) sole = balance::Clip(sole, {{0, sign}, half.y()});
+  }
+  return sole;
+}
+
 }  // namespace
 
 void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
@@ -102,7 +116,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
                    [this](const Tick& tick) { support_plan_->status = Plan(tick.time); });
   support_plan_t& out = *support_plan_;
   const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
-  out.transition_foot = -1;
+  out.transition_foot = out.step_foot = -1;
   SetMotion(RotationMotion(), &out.body_reference);
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = out.next_in_contact[i] = in_contact_[i] ? 1 : 0;
@@ -115,15 +129,19 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
   const HipStrategyConfig& hip = config.hip_strategy();
   for (size_t i = 0; i < 2; ++i) {
     const robot::FootModel& foot = model_->feet()[i];
-    if (hip.start() >= 0.5 * std::min(foot.length, foot.width)) {
+    if (hip.start() >= robot::InnerRadius(foot)) {
       throw ConfigError("hip_strategy.start",
                         fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                     hip.start(), foot.name, foot.length, foot.width));
     }
-    stance_half_[i] = {ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(),
-                                      foot.length, kLengthReserve, "stance_half_length"),
-                       ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(),
-                                      foot.width, kWidthReserve, "stance_half_width")};
+    const Eigen::Vector2d half(
+        ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(), foot.length,
+                       kLengthReserve, "stance_half_length"),
+        ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(), foot.width,
+                       kWidthReserve, "stance_half_width"));
+    sole_[i] = balance::SolePolygon(foot, 0);
+    tilt_sole_[i] = balance::SolePolygon(foot, hip.start());
+    stance_sole_[i] = StanceSole(foot, half, config);
   }
   hip_strategy_.emplace(hip);
   joint_reserve_ = hip.joint_reserve();
@@ -163,6 +181,7 @@ int8_t StepPlanner::Plan(double time) {
   ReportFeet();
   ReportReferences();
   ReportCapture(time, capture);
+  if (recovers_) ReportStepping(recovery_, time, Estimate().sole, &*support_plan_);
   return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
                                                  : support_plan_t::STATUS_OK;
 }
@@ -171,8 +190,11 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
   ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
   const int ramped = schedule_->state().transition_foot;
   for (size_t i = 0; i < 2; ++i) {
-    landing_[i].Measure(time, load[i]);
-    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i));
+    const bool observed = robot_state_->foot_wrench_source[i] == robot_state_t::SOURCE_OBSERVER;
+    const double deviation = observed ? robot_state_->foot_wrench_deviation[i].force[2] : 0;
+    landing_[i].Measure(time, load[i], deviation);
+    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i),
+                            deviation);
     input.foot_confirmed[i] = landing_[i].confirmed();
     input.contact_lost[i] = contact_loss_[i].lost();
     input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
@@ -289,7 +311,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
 void StepPlanner::TiltBody(double time, const Capture& capture) {
   HipInput input{.time = time, .near_joint_limit = NearJointLimit()};
   if (capture.known) {
-    const balance::ConvexPolygon region = Soles(capture.frame_o, hip_strategy_->start());
+    const balance::ConvexPolygon region = Soles(capture.frame_o, tilt_sole_);
     if (region.num_corners > 0) {
       const Eigen::Vector2d& point = capture.pendulum.position;
       const Eigen::Vector2d out = point - balance::NearestPoint(region, point);
@@ -336,13 +358,9 @@ balance::ContactGeometry StepPlanner::Geometry() const {
   return {{data.foot_pose[0], data.foot_pose[1]}, in_contact_};
 }
 
-balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o, double margin) const {
-  std::array<Eigen::Vector2d, 2> half;
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
-    half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
-  }
-  return balance::SupportPolygon(frame_o, Geometry(), half);
+balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o,
+                                          const std::array<balance::ConvexPolygon, 2>& sole) const {
+  return balance::SupportPolygon(frame_o, Geometry(), sole);
 }
 
 std::array<bool, 2> StepPlanner::ComOverFoot() const {
@@ -357,7 +375,7 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
     offset += std::sqrt(offset.z() / robot::kGravity) * data.com_velocity;
     offset.z() -= offset.dot(normal) / normal.z();
     const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
-    over[i] = std::abs(at.x()) <= stance_half_[i].x() && std::abs(at.y()) <= stance_half_[i].y();
+    over[i] = balance::Contains(stance_sole_[i], at);
   }
   return over;
 }
@@ -445,11 +463,11 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
   support_plan_t& out = *support_plan_;
   const robot::RobotData& data = whole_body_->data();
   const Eigen::Isometry3d& frame_o = capture.frame_o;
-  const balance::ConvexPolygon soles = Soles(frame_o, 0);
+  const balance::ConvexPolygon soles = Soles(frame_o, sole_);
   if (soles.num_corners == 0) return;
   balance::CapturePoint counts = capture.pendulum;
   if (angular_momentum_) {
-    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / model_->total_mass();
+    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / whole_body_->data().total_mass;
     balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
                                  &counts);
   }

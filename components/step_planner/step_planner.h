@@ -59,10 +59,11 @@ class StepPlanner : public Component {
   bool NearJointLimit() const;
   EstimatedPose Estimate() const;
   balance::ContactGeometry Geometry() const;
-  /// Hull of the soles in contact, `margin` (m) off their edges.
-  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o, double margin) const;
+  /// Hull of the soles in contact; `sole`: in their own frames.
+  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o,
+                               const std::array<balance::ConvexPolygon, 2>& sole) const;
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
-  /// rest, lies inside its reduced rectangle. At rest that is the COM's projection, and the CoP.
+  /// rest, lies inside its reduced sole. At rest that is the COM's projection, and the CoP.
   std::array<bool, 2> ComOverFoot() const;
   void ReportPhase(double time);
   void ReportFeet();
@@ -90,8 +91,9 @@ class StepPlanner : public Component {
   References references_;
   robot::RobotState state_;
   std::array<bool, 2> in_contact_{true, true};
-  bool last_controlled_ = false;                // the phase before had tasks
-  std::array<Eigen::Vector2d, 2> stance_half_;  // m, of each sole's reduced rectangle
+  bool last_controlled_ = false;  // the phase before had tasks
+  // m, sole frames: whole, less what the hip strategy starts from, and what one foot balances on.
+  std::array<balance::ConvexPolygon, 2> sole_, tilt_sole_, stance_sole_;
 };
 
 }  // namespace poise

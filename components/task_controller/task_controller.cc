@@ -16,13 +16,21 @@ namespace poise {
 std::string_view task_controller_proto_schema();  // generated
 namespace {
 
-/// Throws ConfigError when the tasks cannot be met on these feet, or leave motions to nobody.
+/// Joints that are not between the base and a foot.
+int NumOthers(const robot::RobotModel& model) {
+  return static_cast<int>(model.num_joints() -
+                          static_cast<int>(balance::MakeContactDynamics(model).legs().size()));
+}
+
+/// Throws ConfigError when the tasks cannot be met on these feet. `others`: joints that are not
+/// theirs.
 void CheckRows(const TaskList& tasks, const robot::RobotModel& model, const FeetInContact& feet,
-               const TaskControllerConfig& config) {
+               int others) {
   const char* support = feet[0] && feet[1] ? "on both feet"
                         : feet[0]          ? "on the right foot"
                                            : "on the left foot";
-  const int motions = model.num_velocities() - 6 * (feet[0] ? 1 : 0) - 6 * (feet[1] ? 1 : 0);
+  const int motions =
+      model.num_velocities() - others - 6 * (feet[0] ? 1 : 0) - 6 * (feet[1] ? 1 : 0);
   const TaskList::Rows rows = tasks.CountRows(feet);
   if (rows.first > motions) {
     throw ConfigError("task", fmt::format("asks for {} motions on its first level, and robot '{}' "
@@ -32,11 +40,6 @@ void CheckRows(const TaskList& tasks, const robot::RobotModel& model, const Feet
   if (rows.all == 0) {
     throw ConfigError("task", fmt::format("has none that does not rest {}: add one", support));
   }
-  if (rows.all < motions && !config.has_posture()) {
-    throw ConfigError("posture", fmt::format("is missing; the tasks leave {} joint motions of "
-                                             "robot '{}' free {}: give kp and kd",
-                                             motions - rows.all, model.name(), support));
-  }
 }
 
 }  // namespace
@@ -45,17 +48,26 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   const auto config = context.config<TaskControllerConfig>();
   model_ = LoadRobot(context);
   const int num_joints = model_->num_joints();
-  tasks_.emplace(config, model_);
-  if (config.has_posture()) posture_ = ReadGains(config.posture(), "posture");
+  const balance::StandingGains gains =
+      ReadStandingGains(config, balance::GainsByRule(*model_, context.tick_period));
+  tasks_.emplace(config, model_, gains);
+  posture_ = gains.posture;
+  base_share_ = balance::BaseVelocityShare(gains.base_velocity_cutoff, context.tick_period);
+  const int others = config.task_size() == 0 ? NumOthers(*model_) : 0;
+  others_held_ = others > 0;
   for (const FeetInContact& feet : {FeetInContact{true, true}, {true, false}, {false, true}}) {
-    CheckRows(*tasks_, *model_, feet, config);
+    CheckRows(*tasks_, *model_, feet, others);
+  }
+  if (config.joint_limits()) {
+    limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
   }
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   state_ = robot::RobotState(num_joints);
-  posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ =
+  posture_reference_ = posture_acceleration_ = posture_torque_ = torque_ = free_torque_ =
       Eigen::VectorXd::Zero(num_joints);
+  acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
 
   wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
   wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
@@ -66,7 +78,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 }
 
 bool TaskController::Archive(StateArchive* archive) {
-  archive->Show(in_contact_, started_, posture_reference_);
+  archive->Show(in_contact_, started_, posture_reference_, base_velocity_);
   tasks_->Archive(archive);
   ArchiveMessage(&*task_torque_, archive);
   return true;
@@ -89,6 +101,7 @@ int8_t TaskController::Control() {
   const balance::TaskState state{*model_, state_, whole_body_->data()};
   if (!started_ || plan.gravity_compensation != 0) {
     started_ = true;
+    base_velocity_ << state_.base_linear_velocity, state_.base_angular_velocity;
     posture_reference_ = state_.joint_position;
     tasks_->Hold(state);
   }
@@ -97,6 +110,7 @@ int8_t TaskController::Control() {
     balance::GravityCompensation(whole_body_->contact(), torque_);
   } else {
     tasks_->Follow(plan);
+    SmoothBase();
     if (!ComputeTorque(state, in_contact)) return task_torque_t::STATUS_SINGULAR;
     const auto body = static_cast<size_t>(model_->body_task_body());
     orientation_error = balance::OrientationError(GetMotion(plan.body_reference).rotation,
@@ -108,23 +122,85 @@ int8_t TaskController::Control() {
   return task_torque_t::STATUS_OK;
 }
 
-bool TaskController::ComputeTorque(const balance::TaskState& state,
-                                   const FeetInContact& in_contact) {
+void TaskController::SmoothBase() {
+  if (base_share_ == 1) return;
+  balance::Vector6d now;
+  now << state_.base_linear_velocity, state_.base_angular_velocity;
+  base_velocity_ += base_share_ * (now - base_velocity_);
+  tasks_->set_base_velocity_lag(now - base_velocity_);
+}
+
+void TaskController::ComputePosture() {
+  posture_acceleration_ = posture_.kp * (posture_reference_ - state_.joint_position) -
+                          posture_.kd * state_.joint_velocity;
+  if (!limits_) return;
+  for (int j = 0; j < posture_acceleration_.size(); ++j) {
+    const balance::AccelerationRange range =
+        limits_->Accelerations(j, state_.joint_position[j], state_.joint_velocity[j]);
+    posture_acceleration_[j] = std::clamp(posture_acceleration_[j], range.lower, range.upper);
+  }
+}
+
+bool TaskController::ComputeTasks(const balance::TaskState& state, const FeetInContact& in_contact,
+                                  std::span<const TaskList::ForcedJoint> forced) {
   const balance::ContactDynamics& contact = whole_body_->contact();
-  if (!tasks_->Compute(state, contact, in_contact)) return false;
+  if (!tasks_->Compute(state, contact, in_contact, others_held_ ? &posture_acceleration_ : nullptr,
+                       forced)) {
+    return false;
+  }
   const balance::TaskHierarchy& hierarchy = tasks_->hierarchy();
   torque_ = hierarchy.torque();
   if (hierarchy.num_free() > 0) {
     // (28): what the tasks leave free is held up against gravity and drawn to the posture of the
     // start, the joints' own inertia as weight.
-    posture_acceleration_ = posture_.kp * (posture_reference_ - state_.joint_position) -
-                            posture_.kd * state_.joint_velocity;
     balance::GravityCompensation(contact, posture_torque_);
     const Eigen::Index k = posture_torque_.size();
     posture_torque_.noalias() +=
         whole_body_->data().mass_matrix.bottomRightCorner(k, k) * posture_acceleration_;
     hierarchy.ProjectIntoNullSpace(posture_torque_);
     torque_ += posture_torque_;
+  }
+  return true;
+}
+
+bool TaskController::FindLimits() {
+  bool have_acceleration = false, found = false;
+  const std::span<const int> legs = whole_body_->contact().legs();
+  for (int j = 0; j < model_->num_joints() && num_forced_ < forced_.size(); ++j) {
+    if (others_held_ && std::ranges::find(legs, j) == legs.end()) continue;
+    const auto is_joint = [&](const TaskList::ForcedJoint& forced) { return forced.joint == j; };
+    const auto end = forced_.begin() + static_cast<std::ptrdiff_t>(num_forced_);
+    if (std::any_of(forced_.begin(), end, is_joint)) continue;
+    const double position = state_.joint_position[j], velocity = state_.joint_velocity[j];
+    if (!limits_->Near(j, position, velocity)) continue;
+    if (!have_acceleration) {
+      whole_body_->contact().Acceleration(torque_, acceleration_);
+      have_acceleration = true;
+    }
+    const balance::AccelerationRange range = limits_->Accelerations(j, position, velocity);
+    const double most = limits_->range(j).acceleration, a = acceleration_[6 + j];
+    // Of a range that a limit narrows this side alone.
+    const bool above = range.upper < most && a > range.upper;
+    const bool below = range.lower > -most && a < range.lower;
+    if (!above && !below) continue;
+    forced_[num_forced_++] = {j, above ? range.upper : range.lower};
+    found = true;
+  }
+  return found;
+}
+
+bool TaskController::ComputeTorque(const balance::TaskState& state,
+                                   const FeetInContact& in_contact) {
+  ComputePosture();
+  num_forced_ = 0;
+  if (!ComputeTasks(state, in_contact, {})) return false;
+  // What stops one joint may drive another: a second round, then the bridge's own limits remain.
+  for (int round = 0; limits_ && round < 2 && FindLimits(); ++round) {
+    free_torque_ = torque_;
+    if (!ComputeTasks(state, in_contact, {forced_.data(), num_forced_})) {
+      torque_ = free_torque_;  // these joints cannot be stopped together on these contacts
+      break;
+    }
   }
   return true;
 }

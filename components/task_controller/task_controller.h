@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "components/balance/joint_limits.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
@@ -28,6 +29,15 @@ class TaskController : public Component {
   /// Fills the torque; STATUS_* of the message.
   int8_t Control();
   bool ComputeTorque(const balance::TaskState& state, const FeetInContact& in_contact);
+  /// Filters the base's velocity for the tasks.
+  void SmoothBase();
+  /// PD to the posture, within the joints' limits; all joints.
+  void ComputePosture();
+  bool ComputeTasks(const balance::TaskState& state, const FeetInContact& in_contact,
+                    std::span<const TaskList::ForcedJoint> forced);
+  /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that
+  /// does not; added to `forced_`. False when there is none.
+  bool FindLimits();
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
@@ -37,12 +47,19 @@ class TaskController : public Component {
   std::shared_ptr<balance::WholeBody> whole_body_;
   std::optional<TaskList> tasks_;
   robot::RobotState state_;
+  balance::Vector6d base_velocity_ = balance::Vector6d::Zero();  // filtered
+  double base_share_ = 1;  // what of a new velocity it takes over in a tick
   bool state_valid_ = false;
   FeetInContact in_contact_{true, true};  // of the last tick
   bool started_ = false;
+  bool others_held_ = false;  // the joints that are no leg's have their posture alone
   balance::TaskGains posture_;
+  std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
+  std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
+  size_t num_forced_ = 0;
+  Eigen::VectorXd acceleration_;  // n×1
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
-  Eigen::VectorXd torque_;
+  Eigen::VectorXd torque_, free_torque_;
 };
 
 }  // namespace poise

@@ -36,31 +36,14 @@ TaskConfig::Reference DefaultReference(const TaskConfig& task) {
   return TaskConfig::START;
 }
 
-struct NamedGains {
-  std::string field;
-  const Gains* gains;
-};
-
-/// The task's own gains, or those of the reference that it follows.
-NamedGains GainsOf(const TaskConfig& task, TaskConfig::Reference reference,
-                   const std::string& field, const TaskControllerConfig& config) {
-  if (task.has_gains()) return {field + ".gains", &task.gains()};
-  switch (reference) {
-    case TaskConfig::COM:
-      if (config.has_com()) return {"com", &config.com()};
-      throw ConfigError("com", "is missing; give kp and kd of the COM's position");
-    case TaskConfig::BODY:
-      if (config.has_orientation()) return {"orientation", &config.orientation()};
-      throw ConfigError("orientation", "is missing; give kp and kd of the body's orientation");
-    case TaskConfig::RIGHT_FOOT:
-    case TaskConfig::LEFT_FOOT:
-      if (config.has_foot()) return {"foot", &config.foot()};
-      throw ConfigError("foot", "is missing; give kp and kd of the pose of a foot out of contact");
-    case TaskConfig::START:
-      break;
-  }
-  throw ConfigError(field + ".gains",
-                    fmt::format("is missing; give kp and kd of task '{}'", task.type()));
+/// Of what moves.
+balance::TaskGains GainsOf(const balance::TargetParts& needed, TaskConfig::Reference reference,
+                           const std::string& type, const balance::StandingGains& gains) {
+  if (needed.angular_momentum) return {0, gains.orientation.kd};
+  if (needed.joints) return gains.posture;
+  if (type == "com") return gains.com;
+  if (reference == TaskConfig::BODY || type == "orientation") return gains.orientation;
+  return gains.foot;
 }
 
 /// Parts of a target that a reference of the plan has.
@@ -122,27 +105,46 @@ balance::TaskGains ReadGains(const Gains& gains, const std::string& field, bool 
   return {gains.kp(), gains.kd()};
 }
 
+balance::StandingGains ReadStandingGains(const TaskControllerConfig& config,
+                                         const balance::StandingGains& rule) {
+  balance::StandingGains gains = rule;
+  if (config.has_com()) gains.com = ReadGains(config.com(), "com");
+  if (config.has_orientation()) gains.orientation = ReadGains(config.orientation(), "orientation");
+  if (config.has_foot()) gains.foot = ReadGains(config.foot(), "foot");
+  if (config.has_posture()) gains.posture = ReadGains(config.posture(), "posture");
+  if (config.has_base_velocity_cutoff()) {
+    gains.base_velocity_cutoff = config.base_velocity_cutoff();
+    if (!(gains.base_velocity_cutoff >= 0) || !std::isfinite(gains.base_velocity_cutoff)) {
+      throw ConfigError("base_velocity_cutoff", "must be Hz, 0 or more");
+    }
+  } else if (config.has_com()) {
+    gains.base_velocity_cutoff = 0;
+  }
+  return gains;
+}
+
 TaskList::TaskList(const TaskControllerConfig& config,
-                   std::shared_ptr<const robot::RobotModel> model)
+                   std::shared_ptr<const robot::RobotModel> model,
+                   const balance::StandingGains& gains)
     : model_(std::move(model)) {
   if (config.task_size() == 0) {
-    for (const TaskConfig& task : PaperTasks()) Add(task, "task", config);
+    for (const TaskConfig& task : PaperTasks()) Add(task, "task", gains);
   }
   for (int i = 0; i < config.task_size(); ++i) {
-    Add(config.task(i), fmt::format("task[{}]", i), config);
+    Add(config.task(i), fmt::format("task[{}]", i), gains);
   }
   std::ranges::stable_sort(entries_, {}, &Entry::level);
-  int rows = 0;
+  int rows = kMostForced;
   for (const Entry& entry : entries_) rows += entry.task->num_rows();
-  hierarchy_.emplace(model_->num_joints(), rows, static_cast<int>(entries_.size()));
-  level_rows_.reserve(entries_.size());
+  hierarchy_.emplace(model_->num_joints(), rows, static_cast<int>(entries_.size()) + 1);
+  level_rows_.reserve(entries_.size() + 1);
   jacobian_.setZero(rows, model_->num_velocities());
   bias_acceleration_.setZero(rows);
   acceleration_.setZero(rows);
 }
 
 void TaskList::Add(const TaskConfig& task, const std::string& field,
-                   const TaskControllerConfig& config) {
+                   const balance::StandingGains& gains) {
   balance::TaskSpec spec;
   spec.type = task.type();
   spec.link = task.link();
@@ -165,9 +167,9 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   }
   const balance::TargetParts needed = entry.task->needs();
   CheckReference(needed, task, entry.reference, field);
-  const NamedGains gains = GainsOf(task, entry.reference, field, config);
-  entry.task->set_gains(
-      ReadGains(*gains.gains, gains.field, needed.position || needed.rotation || needed.joints));
+  const bool has_position = needed.position || needed.rotation || needed.joints;
+  entry.task->set_gains(task.has_gains() ? ReadGains(task.gains(), field + ".gains", has_position)
+                                         : GainsOf(needed, entry.reference, task.type(), gains));
   for (const int foot : {0, 1}) {
     const auto own = static_cast<TaskConfig::Foot>(foot);
     entry.rests[static_cast<size_t>(foot)] =
@@ -221,13 +223,22 @@ const balance::TaskTarget& TaskList::Target(const Entry& entry) const {
 }
 
 bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDynamics& contact,
-                       const FeetInContact& in_contact) {
+                       const FeetInContact& in_contact, const Eigen::VectorXd* others,
+                       std::span<const ForcedJoint> forced) {
   level_rows_.clear();
-  if (in_contact != written_for_) {
+  if (in_contact != written_for_ || forced.size() != num_forced_ || !forced.empty()) {
     jacobian_.setZero();
     written_for_ = in_contact;
+    num_forced_ = forced.size();
   }
   Eigen::Index row = 0;
+  for (const ForcedJoint& joint : forced.first(std::min<size_t>(forced.size(), kMostForced))) {
+    jacobian_(row, 6 + joint.joint) = 1;
+    bias_acceleration_[row] = 0;
+    acceleration_[row] = joint.acceleration;
+    ++row;
+  }
+  if (row > 0) level_rows_.push_back(static_cast<int>(row));
   const Entry* last = nullptr;
   for (const Entry& entry : entries_) {
     if (!IsActive(entry, in_contact)) continue;
@@ -235,13 +246,18 @@ bool TaskList::Compute(const balance::TaskState& state, const balance::ContactDy
     balance::TaskRows rows{jacobian_.middleRows(row, t), bias_acceleration_.segment(row, t),
                            acceleration_.segment(row, t)};
     entry.task->Write(state, Target(entry), &rows);
+    // −k_d J v becomes −k_d J of the slower velocity.
+    if (!base_lag_.isZero(0)) {
+      rows.acceleration.noalias() +=
+          entry.task->gains().kd * rows.jacobian.leftCols<6>().lazyProduct(base_lag_);
+    }
     if (last == nullptr || entry.level != last->level) level_rows_.push_back(0);
     level_rows_.back() += static_cast<int>(t);
     last = &entry;
     row += t;
   }
   return hierarchy_->Compute(contact, jacobian_.topRows(row), bias_acceleration_.head(row),
-                             acceleration_.head(row), level_rows_);
+                             acceleration_.head(row), level_rows_, others);
 }
 
 void TaskList::Archive(StateArchive* archive) {

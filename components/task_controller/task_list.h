@@ -4,9 +4,11 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/balance/task_hierarchy.h"
 #include "components/balance/tasks/task.h"
 #include "components/framework/state_archive.h"
@@ -23,12 +25,17 @@ using FeetInContact = std::array<bool, 2>;
 balance::TaskGains ReadGains(const Gains& gains, const std::string& field,
                              bool has_position = true);
 
+/// Those of the configuration, and of `rule` what it does not give. Throws ConfigError.
+balance::StandingGains ReadStandingGains(const TaskControllerConfig& config,
+                                         const balance::StandingGains& rule);
+
 /// A configuration without tasks has the paper's three on one level: the COM's position, the
 /// body's orientation, the pose of each foot out of contact.
 class TaskList {
  public:
-  /// Throws ConfigError that names the task's field.
-  TaskList(const TaskControllerConfig& config, std::shared_ptr<const robot::RobotModel> model);
+  /// `gains` are those of tasks without their own. Throws ConfigError that names the task's field.
+  TaskList(const TaskControllerConfig& config, std::shared_ptr<const robot::RobotModel> model,
+           const balance::StandingGains& gains);
 
   /// Rows of the first level that has any, and of all, with these contacts.
   struct Rows {
@@ -40,10 +47,20 @@ class TaskList {
   void Hold(const balance::TaskState& state);
   /// Takes over the references of a plan.
   void Follow(const support_plan_t& plan);
+  /// [linear; angular], m/s and rad/s: how much faster the base of the next states moves than the
+  /// tasks are to see it.
+  void set_base_velocity_lag(const balance::Vector6d& lag) { base_lag_ = lag; }
   /// The hierarchy's torque at `state`, for which `contact` was computed. False when no task is
-  /// active, or as TaskHierarchy::Compute says. Never allocates.
+  /// active, or as TaskHierarchy::Compute says, which gets `others`. `forced` come before all
+  /// levels: joints that must accelerate so (rad/s²), at most kMostForced. Never allocates.
+  struct ForcedJoint {
+    int joint = -1;
+    double acceleration = 0;
+  };
+  static constexpr int kMostForced = 4;
   bool Compute(const balance::TaskState& state, const balance::ContactDynamics& contact,
-               const FeetInContact& in_contact);
+               const FeetInContact& in_contact, const Eigen::VectorXd* others = nullptr,
+               std::span<const ForcedJoint> forced = {});
   const balance::TaskHierarchy& hierarchy() const { return *hierarchy_; }
 
   /// The references that are held.
@@ -58,7 +75,7 @@ class TaskList {
     balance::TaskTarget held;
   };
 
-  void Add(const TaskConfig& task, const std::string& field, const TaskControllerConfig& config);
+  void Add(const TaskConfig& task, const std::string& field, const balance::StandingGains& gains);
   const balance::TaskTarget& Target(const Entry& entry) const;
   static bool IsActive(const Entry& entry, const FeetInContact& in_contact) {
     return !(entry.rests[0] && in_contact[0]) && !(entry.rests[1] && in_contact[1]);
@@ -72,6 +89,8 @@ class TaskList {
   std::vector<int> level_rows_;
   Eigen::MatrixXd jacobian_;
   FeetInContact written_for_{false, false};  // other feet, other rows
+  size_t num_forced_ = 0;                    // and other forced joints
+  balance::Vector6d base_lag_ = balance::Vector6d::Zero();
   Eigen::VectorXd bias_acceleration_, acceleration_;
 };
 

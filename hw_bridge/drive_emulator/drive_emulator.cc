@@ -278,6 +278,9 @@ void DriveEmulator::Apply(Trouble* trouble, bool active) {
     case DriveTrouble::STO:
       slave.drive().SetSto(active);
       break;
+    case DriveTrouble::RESTART:
+      active ? chain_->PowerOff(trouble->slave) : chain_->PowerOn(trouble->slave);
+      break;
     case DriveTrouble::FROZEN_ENCODER:
       slave.drive().FreezeEncoder(active);
       break;
@@ -303,6 +306,7 @@ void DriveEmulator::Sense(const Tick& tick) {
     std::copy(std::begin(drive_feedback_->imu_acceleration),
               std::end(drive_feedback_->imu_acceleration), message.imu_acceleration);
     message.foot_wrench = drive_feedback_->foot_wrench;
+    message.foot_sensor = drive_feedback_->foot_sensor;
   } else {
     sensor_feedback_.Withhold();
   }

@@ -9,59 +9,116 @@
 namespace poise::ethercat {
 namespace {
 
-constexpr size_t kCoeHeader = 2;
-constexpr size_t kSdoBytes = 8;
-constexpr uint8_t kUpload = 0x40, kDownloadDone = 0x60, kAborted = 0x80;
-// Expedited, size indicated; bits 2 and 3: bytes of the four that hold no data.
-constexpr uint8_t kExpeditedDownload = 0x23, kExpeditedUpload = 0x43;
+constexpr size_t kInitiate = 8;      // command, index, subindex and four bytes
+constexpr size_t kLeastSegment = 7;  // bytes of data in the shortest segment
+constexpr uint8_t kExpeditedBit = 0x02, kSizeBit = 0x01, kCompleteBit = 0x10;
+constexpr uint8_t kToggleBit = 0x10, kLastBit = 0x01;
+// Command specifiers, the upper three bits, mean one thing in a request, another in a response.
+constexpr uint8_t kSpecifier = 0xE0, kAbortSpecifier = 0x80;
 
-uint8_t CommandByte(const Sdo& sdo) {
-  const auto unused = static_cast<uint8_t>((4 - sdo.size) << 2);
-  switch (sdo.command) {
-    case SdoCommand::kUploadRequest:
-      return kUpload;
-    case SdoCommand::kUploadResponse:
-      return kExpeditedUpload | unused;
-    case SdoCommand::kDownloadRequest:
-      return kExpeditedDownload | unused;
-    case SdoCommand::kDownloadResponse:
-      return kDownloadDone;
-    case SdoCommand::kAbort:
-    case SdoCommand::kOther:
-      break;
-  }
-  return kAborted;
+struct Coding {
+  SdoCommand command;
+  CoeService service;
+  uint8_t specifier;
+};
+constexpr Coding kCodings[] = {
+    {SdoCommand::kDownloadSegmentRequest, CoeService::kSdoRequest, 0x00},
+    {SdoCommand::kDownloadRequest, CoeService::kSdoRequest, 0x20},
+    {SdoCommand::kUploadRequest, CoeService::kSdoRequest, 0x40},
+    {SdoCommand::kUploadSegmentRequest, CoeService::kSdoRequest, 0x60},
+    {SdoCommand::kAbort, CoeService::kSdoRequest, kAbortSpecifier},
+    {SdoCommand::kUploadSegmentResponse, CoeService::kSdoResponse, 0x00},
+    {SdoCommand::kDownloadSegmentResponse, CoeService::kSdoResponse, 0x20},
+    {SdoCommand::kUploadResponse, CoeService::kSdoResponse, 0x40},
+    {SdoCommand::kDownloadResponse, CoeService::kSdoResponse, 0x60},
+};
+
+const Coding& CodingOf(SdoCommand command) {
+  return *std::find_if(std::begin(kCodings), std::end(kCodings) - 1,
+                       [command](const Coding& coding) { return coding.command == command; });
 }
 
-void PutHeaders(CoeService service, uint16_t address, uint8_t counter, std::span<uint8_t> mailbox) {
-  std::fill(mailbox.begin(), mailbox.end(), uint8_t{0});
-  Put<uint16_t>(mailbox, 0, kCoeHeader + kSdoBytes);
-  Put<uint16_t>(mailbox, 2, address);
-  mailbox[5] = static_cast<uint8_t>(static_cast<uint8_t>(MailboxType::kCoe) | counter << 4);
+bool IsSegment(SdoCommand command) {
+  return command == SdoCommand::kUploadSegmentResponse ||
+         command == SdoCommand::kDownloadSegmentRequest;
+}
+bool HasToggle(SdoCommand command) {
+  return IsSegment(command) || command == SdoCommand::kUploadSegmentRequest ||
+         command == SdoCommand::kDownloadSegmentResponse;
+}
+/// Carries the object's data, or the beginning of it.
+bool Initiates(SdoCommand command) {
+  return command == SdoCommand::kUploadResponse || command == SdoCommand::kDownloadRequest;
+}
+
+uint8_t CommandByte(const Sdo& sdo) {
+  auto byte = static_cast<uint8_t>(CodingOf(sdo.command).specifier);
+  if (HasToggle(sdo.command)) byte |= sdo.toggle ? kToggleBit : uint8_t{0};
+  if (IsSegment(sdo.command)) {
+    byte |= sdo.last ? kLastBit : uint8_t{0};
+    // Only of the shortest segment are bytes unused.
+    if (sdo.data.size() < kLeastSegment) {
+      byte |= static_cast<uint8_t>((kLeastSegment - sdo.data.size()) << 1);
+    }
+  } else if (Initiates(sdo.command)) {
+    byte |= sdo.size > 0 ? static_cast<uint8_t>(kExpeditedBit | kSizeBit | (4 - sdo.size) << 2)
+                         : kSizeBit;
+  }
+  const bool whole = Initiates(sdo.command) || sdo.command == SdoCommand::kUploadRequest ||
+                     sdo.command == SdoCommand::kDownloadResponse;
+  if (whole && sdo.complete) byte |= kCompleteBit;
+  return byte;
+}
+
+/// Bytes after the CoE header.
+size_t SdoBytes(const Sdo& sdo) {
+  if (IsSegment(sdo.command)) return std::max(kInitiate, 1 + sdo.data.size());
+  if (Initiates(sdo.command) && sdo.size == 0) return kInitiate + sdo.data.size();
+  return kInitiate;
+}
+
+void PutHeaders(CoeService service, uint16_t address, uint8_t counter, size_t bytes,
+                std::span<uint8_t> mailbox) {
+  EncodeMailboxHeader(MailboxType::kCoe, address, counter, kCoeHeader + bytes, mailbox);
   Put<uint16_t>(mailbox, kMailboxHeader,
                 static_cast<uint16_t>(static_cast<uint16_t>(service) << 12));
 }
 
 Sdo DecodeSdo(std::span<const uint8_t> bytes, CoeService service) {
   const uint8_t command = bytes[0];
-  Sdo sdo{.object = {.index = Get<uint16_t>(bytes, 1), .subindex = bytes[3]},
-          .value = Get<uint32_t>(bytes, 4)};
-  const bool request = service == CoeService::kSdoRequest;
-  // Command specifiers, the upper three bits, mean one thing in a request, another in a response.
-  const uint8_t specifier = command & 0xE0;
-  if (specifier == kAborted) {
-    sdo.command = SdoCommand::kAbort;
-    sdo.size = 4;
-  } else if (request && specifier == 0x40) {
-    sdo.command = SdoCommand::kUploadRequest;
-  } else if (!request && specifier == 0x60) {
-    sdo.command = SdoCommand::kDownloadResponse;
-  } else if (specifier == (request ? 0x20 : 0x40) && (command & 0x02) != 0) {
-    sdo.command = request ? SdoCommand::kDownloadRequest : SdoCommand::kUploadResponse;
-    const bool sized = (command & 0x01) != 0;
-    sdo.size = static_cast<uint8_t>(sized ? 4 - ((command >> 2) & 3) : 4);
-    if (sdo.size < 4) sdo.value &= (1U << (8 * sdo.size)) - 1;
+  const uint8_t specifier = command & kSpecifier;
+  Sdo sdo;
+  for (const Coding& coding : kCodings) {
+    // Some slaves send aborts as responses: what is meant is clear.
+    const bool same = coding.service == service || coding.command == SdoCommand::kAbort;
+    if (same && coding.specifier == specifier) sdo.command = coding.command;
   }
+  if (HasToggle(sdo.command)) {
+    sdo.toggle = (command & kToggleBit) != 0;
+    if (!IsSegment(sdo.command)) return sdo;
+    sdo.last = (command & kLastBit) != 0;
+    sdo.data = bytes.subspan(1);
+    if (sdo.data.size() == kLeastSegment) {
+      sdo.data = sdo.data.first(kLeastSegment - (command >> 1 & 7));
+    }
+    return sdo;
+  }
+  sdo.object = {.index = Get<uint16_t>(bytes, 1), .subindex = bytes[3]};
+  sdo.value = Get<uint32_t>(bytes, 4);
+  if (sdo.command == SdoCommand::kAbort) {
+    sdo.size = 4;
+    return sdo;
+  }
+  sdo.complete = (command & kCompleteBit) != 0;
+  if (!Initiates(sdo.command)) return sdo;
+  if ((command & kExpeditedBit) == 0) {
+    sdo.total = sdo.value;
+    sdo.value = 0;
+    sdo.data = bytes.subspan(kInitiate);
+    return sdo;
+  }
+  sdo.size = static_cast<uint8_t>((command & kSizeBit) != 0 ? 4 - ((command >> 2) & 3) : 4);
+  if (sdo.size < 4) sdo.value &= (1U << (8 * sdo.size)) - 1;
   return sdo;
 }
 
@@ -77,34 +134,93 @@ std::optional<MailboxMessage> DecodeMailbox(std::span<const uint8_t> mailbox) {
                         .payload = mailbox.subspan(kMailboxHeader, length)};
 }
 
-void EncodeSdo(const Sdo& sdo, CoeService service, uint16_t address, uint8_t counter,
-               std::span<uint8_t> mailbox) {
-  PutHeaders(service, address, counter, mailbox);
+void EncodeMailboxHeader(MailboxType type, uint16_t address, uint8_t counter, size_t payload,
+                         std::span<uint8_t> mailbox) {
+  std::fill(mailbox.begin(), mailbox.end(), uint8_t{0});
+  Put<uint16_t>(mailbox, 0, static_cast<uint16_t>(payload));
+  Put<uint16_t>(mailbox, 2, address);
+  mailbox[5] = static_cast<uint8_t>(static_cast<uint8_t>(type) | counter << 4);
+}
+
+std::string_view MailboxErrorText(uint16_t detail) {
+  constexpr std::string_view kTexts[] = {"unknown",
+                                         "syntax of the six-byte header is wrong",
+                                         "the mailbox protocol is not supported",
+                                         "the channel field has a wrong value",
+                                         "the service of the protocol is not supported",
+                                         "the header of the protocol is wrong",
+                                         "the received data are too short",
+                                         "no more memory in the slave",
+                                         "the length of data is inconsistent"};
+  return kTexts[detail < std::size(kTexts) ? detail : 0];
+}
+
+void EncodeMailboxError(MailboxError detail, uint8_t counter, std::span<uint8_t> mailbox) {
+  EncodeMailboxHeader(MailboxType::kError, 0, counter, 4, mailbox);
+  Put<uint16_t>(mailbox, kMailboxHeader, 1);  // the type: a mailbox command
+  Put<uint16_t>(mailbox, kMailboxHeader + 2, static_cast<uint16_t>(detail));
+}
+
+size_t EncodedSize(const Sdo& sdo) { return kMailboxHeader + kCoeHeader + SdoBytes(sdo); }
+
+void EncodeSdo(const Sdo& sdo, uint16_t address, uint8_t counter, std::span<uint8_t> mailbox) {
+  PutHeaders(CodingOf(sdo.command).service, address, counter, SdoBytes(sdo), mailbox);
   const std::span<uint8_t> bytes = mailbox.subspan(kMailboxHeader + kCoeHeader);
   bytes[0] = CommandByte(sdo);
+  if (HasToggle(sdo.command)) {
+    std::copy(sdo.data.begin(), sdo.data.end(), bytes.begin() + 1);
+    return;
+  }
   Put<uint16_t>(bytes, 1, sdo.object.index);
   bytes[3] = sdo.object.subindex;
-  PutSized(bytes, 4, sdo.value, sdo.command == SdoCommand::kAbort ? 4 : sdo.size);
+  if (sdo.command == SdoCommand::kAbort) {
+    Put<uint32_t>(bytes, 4, sdo.value);
+  } else if (Initiates(sdo.command) && sdo.size == 0) {
+    Put<uint32_t>(bytes, 4, sdo.total);
+    std::copy(sdo.data.begin(), sdo.data.end(), bytes.begin() + kInitiate);
+  } else if (Initiates(sdo.command)) {
+    PutSized(bytes, 4, sdo.value, sdo.size);
+  }
 }
 
 void EncodeEmergency(const Emergency& emergency, uint8_t counter, std::span<uint8_t> mailbox) {
-  PutHeaders(CoeService::kEmergency, 0, counter, mailbox);
+  PutHeaders(CoeService::kEmergency, 0, counter, kInitiate, mailbox);
   Put<uint16_t>(mailbox, kMailboxHeader + kCoeHeader, emergency.code);
   mailbox[kMailboxHeader + kCoeHeader + 2] = emergency.error_register;
 }
 
+void EncodeSdoInfo(const SdoInfo& info, uint8_t counter, std::span<uint8_t> mailbox) {
+  PutHeaders(CoeService::kSdoInformation, 0, counter, kInfoHeader + info.data.size(), mailbox);
+  const std::span<uint8_t> bytes = mailbox.subspan(kMailboxHeader + kCoeHeader);
+  bytes[0] = static_cast<uint8_t>(static_cast<uint8_t>(info.opcode) | (info.incomplete ? 0x80 : 0));
+  Put<uint16_t>(bytes, 2, info.fragments_left);
+  std::copy(info.data.begin(), info.data.end(), bytes.begin() + kInfoHeader);
+}
+
 std::optional<CoeMessage> DecodeCoe(std::span<const uint8_t> payload) {
-  if (payload.size() < kCoeHeader + kSdoBytes) return std::nullopt;
-  const int service = Get<uint16_t>(payload, 0) >> 12;
-  if (service < 1 || service > 3) return std::nullopt;
+  if (payload.size() < kCoeHeader) return std::nullopt;
+  CoeMessage message;
+  message.service = static_cast<CoeService>(Get<uint16_t>(payload, 0) >> 12);
   const std::span<const uint8_t> bytes = payload.subspan(kCoeHeader);
-  CoeMessage message{.service = static_cast<CoeService>(service), .sdo = {}, .emergency = {}};
-  if (message.service == CoeService::kEmergency) {
-    message.emergency = {.code = Get<uint16_t>(bytes, 0), .error_register = bytes[2]};
-  } else {
-    message.sdo = DecodeSdo(bytes, message.service);
+  switch (message.service) {
+    case CoeService::kEmergency:
+      if (bytes.size() < kInitiate) return std::nullopt;
+      message.emergency = {.code = Get<uint16_t>(bytes, 0), .error_register = bytes[2]};
+      return message;
+    case CoeService::kSdoRequest:
+    case CoeService::kSdoResponse:
+      if (bytes.size() < kInitiate) return std::nullopt;
+      message.sdo = DecodeSdo(bytes, message.service);
+      return message;
+    case CoeService::kSdoInformation:
+      if (bytes.size() < kInfoHeader) return std::nullopt;
+      message.info = {.opcode = static_cast<InfoOpcode>(bytes[0] & 0x7F),
+                      .incomplete = (bytes[0] & 0x80) != 0,
+                      .fragments_left = Get<uint16_t>(bytes, 2),
+                      .data = bytes.subspan(kInfoHeader)};
+      return message;
   }
-  return message;
+  return std::nullopt;
 }
 
 std::string_view SdoAbortText(uint32_t code) {

@@ -1,4 +1,5 @@
-// CANopen over EtherCAT (CoE): mailbox messages with expedited SDOs (ETG.1000.6, 5.6).
+// CANopen over EtherCAT (CoE): mailbox messages, SDO transfers of every kind, emergencies and SDO
+// information as bytes (ETG.1000.6, 5.6).
 #pragma once
 
 #include <cstdint>
@@ -9,6 +10,7 @@
 namespace poise::ethercat {
 
 inline constexpr size_t kMailboxHeader = 6;
+inline constexpr size_t kCoeHeader = 2;
 inline constexpr size_t kSdoMessage = kMailboxHeader + 2 + 8;  ///< of an expedited SDO, bytes
 
 enum class MailboxType : uint8_t { kError = 0, kCoe = 3 };
@@ -22,22 +24,47 @@ struct MailboxMessage {
 
 /// nullopt: shorter than its header says.
 std::optional<MailboxMessage> DecodeMailbox(std::span<const uint8_t> mailbox);
+/// Writes the header of a message with `payload` bytes. Precondition: `mailbox` has room for it.
+void EncodeMailboxHeader(MailboxType type, uint16_t address, uint8_t counter, size_t payload,
+                         std::span<uint8_t> mailbox);
 
 /// Next value of the counter that tells a repeated mailbox message from a fresh one.
 constexpr uint8_t NextMailboxCounter(uint8_t counter) {
   return static_cast<uint8_t>(counter >= 7 ? 1 : counter + 1);
 }
 
-enum class CoeService : uint8_t { kEmergency = 1, kSdoRequest = 2, kSdoResponse = 3 };
+/// Details of a mailbox error (ETG.1000.4, table 30).
+enum class MailboxError : uint16_t {
+  kSyntax = 1,
+  kUnsupportedProtocol = 2,
+  kInvalidChannel = 3,
+  kServiceNotSupported = 4,
+  kInvalidHeader = 5,
+  kSizeTooShort = 6,
+  kNoMemory = 7,
+  kInvalidSize = 8,
+};
+std::string_view MailboxErrorText(uint16_t detail);
+void EncodeMailboxError(MailboxError detail, uint8_t counter, std::span<uint8_t> mailbox);
 
-/// Of the SDO commands those that one message carries.
+enum class CoeService : uint8_t {
+  kEmergency = 1,
+  kSdoRequest = 2,
+  kSdoResponse = 3,
+  kSdoInformation = 8,
+};
+
 enum class SdoCommand {
   kUploadRequest,
-  kUploadResponse,
-  kDownloadRequest,
+  kUploadResponse,   ///< expedited, or the first part of a normal or segmented transfer
+  kDownloadRequest,  ///< likewise
   kDownloadResponse,
+  kUploadSegmentRequest,
+  kUploadSegmentResponse,
+  kDownloadSegmentRequest,
+  kDownloadSegmentResponse,
   kAbort,
-  kOther,  ///< a segmented or normal transfer
+  kOther,
 };
 
 struct ObjectAddress {
@@ -48,15 +75,22 @@ struct ObjectAddress {
 
 struct Sdo {
   SdoCommand command = SdoCommand::kOther;
-  ObjectAddress object;
-  uint32_t value = 0;  ///< data of `size` bytes, or the abort code
-  uint8_t size = 0;    ///< of the data, 1 to 4
+  ObjectAddress object = {};  ///< not of segments
+  bool complete = false;      ///< complete access: the whole object, from this subindex (0 or 1)
+  uint32_t value = 0;         ///< expedited: data of `size` bytes; or the abort code
+  uint8_t size = 0;           ///< of expedited data, 1 to 4; 0: `data` holds what there is
+  uint32_t total = 0;         ///< of a normal transfer: bytes of the whole object
+  bool toggle = false, last = false;   ///< of segments
+  std::span<const uint8_t> data = {};  ///< of a normal transfer's first part, or of a segment
 };
 
-/// Writes a whole mailbox message; the rest of `mailbox` becomes zero. Preconditions: at least
-/// kSdoMessage bytes; not kOther.
-void EncodeSdo(const Sdo& sdo, CoeService service, uint16_t address, uint8_t counter,
-               std::span<uint8_t> mailbox);
+/// Bytes of the mailbox message that carries it, header included; those of an expedited one at
+/// least.
+size_t EncodedSize(const Sdo& sdo);
+/// Writes a whole mailbox message; the rest of `mailbox` becomes zero. The service follows from the
+/// command: an abort is an SDO request in both directions (ETG.1000.6, table 40). Preconditions:
+/// EncodedSize() bytes at least; not kOther.
+void EncodeSdo(const Sdo& sdo, uint16_t address, uint8_t counter, std::span<uint8_t> mailbox);
 
 struct Emergency {
   uint16_t code = 0;  ///< as in 603F
@@ -64,22 +98,45 @@ struct Emergency {
 };
 void EncodeEmergency(const Emergency& emergency, uint8_t counter, std::span<uint8_t> mailbox);
 
+/// SDO information: what objects a slave has (ETG.1000.6, 5.6.3).
+enum class InfoOpcode : uint8_t {
+  kListRequest = 1,
+  kListResponse = 2,
+  kObjectRequest = 3,
+  kObjectResponse = 4,
+  kEntryRequest = 5,
+  kEntryResponse = 6,
+  kError = 7,
+};
+struct SdoInfo {
+  InfoOpcode opcode = InfoOpcode::kError;
+  bool incomplete = false;  ///< more fragments follow
+  uint16_t fragments_left = 0;
+  std::span<const uint8_t> data = {};  ///< what follows the four-byte information header
+};
+inline constexpr size_t kInfoHeader = 4;
+void EncodeSdoInfo(const SdoInfo& info, uint8_t counter, std::span<uint8_t> mailbox);
+
 struct CoeMessage {
   CoeService service = CoeService::kSdoRequest;
-  Sdo sdo;              ///< of kSdoRequest and kSdoResponse
-  Emergency emergency;  ///< of kEmergency
+  Sdo sdo = {};              ///< of kSdoRequest and kSdoResponse
+  Emergency emergency = {};  ///< of kEmergency
+  SdoInfo info = {};         ///< of kSdoInformation
 };
-/// The payload of a CoE mailbox; nullopt when it is too short or of no service above.
+/// The payload of a CoE mailbox; nullopt when it is too short or of no service above. Spans point
+/// into `payload`.
 std::optional<CoeMessage> DecodeCoe(std::span<const uint8_t> payload);
 
 /// Abort codes that an object dictionary gives (ETG.1000.6, table 41).
 enum class SdoAbort : uint32_t {
   kNone = 0,
+  kToggle = 0x05030000,
   kUnknownCommand = 0x05040001,
   kUnsupportedAccess = 0x06010000,
   kWriteOnly = 0x06010001,
   kReadOnly = 0x06010002,
   kSubindexNotWritable = 0x06010003,
+  kNoCompleteAccess = 0x06010004,
   kNoObject = 0x06020000,
   kNotMappable = 0x06040041,
   kPdoTooLong = 0x06040042,
@@ -88,6 +145,7 @@ enum class SdoAbort : uint32_t {
   kLengthTooLow = 0x06070013,
   kNoSubindex = 0x06090011,
   kValueRange = 0x06090030,
+  kGeneral = 0x08000000,
   kDeviceState = 0x08000022,
 };
 /// Text of any SDO abort code; "unknown SDO abort code" when it is none of the standard's.

@@ -1,32 +1,28 @@
-// Distributed clocks: one time for all slaves of a line, SYNC0, and the cycle that follows it.
+// Distributed clocks: one time for all slaves, SYNC0, and the cycle that follows it.
 #pragma once
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "hw_bridge/ethercat/slave_access.h"
 
 namespace poise::ethercat {
 
-/// What a slave latched as one broadcast write passed it, ns of its own clock.
-struct DcTimes {
-  uint32_t port0 = 0;  ///< on its way out
-  uint32_t port1 = 0;  ///< on its way back from the slaves behind
-  bool last = false;   ///< no slave behind
-  int64_t unit = 0;    ///< at the processing unit
-};
+/// Whether a slave has a 64-bit distributed clock.
+bool HasClock(SlaveAccess* slave);
 
-/// Delay, ns, from the first slave to each, of slaves in a line: half of the difference between
-/// neighbours' round trips, since both ways take the same time.
-std::vector<int32_t> PropagationDelays(std::span<const DcTimes> times);
+/// Writes delays (ns, by slave) and offsets so that all slaves show the first one's time, which
+/// starts at `epoch`; their clocks' control loops begin anew. `slaves` have clocks.
+void SetUpClocks(Transactions* transactions, std::span<SlaveAccess* const> slaves,
+                 std::span<const int32_t> delays, int64_t epoch);
 
-/// Writes delays and offsets so that all slaves show the first one's time, which starts at
-/// `epoch`. Slaves in chain order. Throws EthercatError: a slave without 64-bit clock.
-void SetUpClocks(Transactions* transactions, std::span<SlaveAccess> slaves, int64_t epoch);
+/// Makes one slave's clock that of `reference`, whose time goes on and whom a frame reaches `delay`
+/// ns earlier.
+void JoinClock(Transactions* transactions, SlaveAccess* reference, SlaveAccess* slave,
+               int32_t delay);
 
-/// Starts SYNC0 of all slaves at `shift` ns (modulo `cycle`) of the common time.
-void StartSync0(std::span<SlaveAccess> slaves, uint32_t cycle, int32_t shift);
+/// Starts a slave's SYNC0 at `shift` ns (modulo `cycle`) of the common time.
+void StartSync0(SlaveAccess* slave, uint32_t cycle, int32_t shift);
 
 /// A difference to the common time, ns, from register 0x092C.
 constexpr int32_t DcDifference(uint32_t value) {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
+#include "components/framework/say_error.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::ethercat {
@@ -82,6 +84,9 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
     if (!drive.has_rated_torque()) {
       drive.set_rated_torque(static_cast<uint32_t>(std::lround(torque)));
     }
+    if (!drive.has_max_torque()) {
+      drive.set_max_torque(DriveScale(motor, drive).LimitPerMille(motor.peak_current));
+    }
     if (std::abs(drive.rated_current() - current) > 0.01 * current ||
         std::abs(drive.rated_torque() - torque) > 0.01 * torque) {
       throw EthercatError(fmt::format(
@@ -122,6 +127,60 @@ EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
   MessageTraits<drive_feedback_t>::Resize(feedback_, counts);
   MessageTraits<drive_command_t>::Resize(idle_, std::span(counts).first(1));
   reports_.resize(drives_.size());
+  FindReadings(complete, model.feet().size());
+}
+
+double* EthercatDriveBus::Target(const SensorReading& reading) {
+  const size_t axis = reading.axis();
+  switch (reading.quantity()) {
+    case SensorReading::ANGULAR_VELOCITY:
+      return &feedback_.imu_angular_velocity[axis];
+    case SensorReading::ACCELERATION:
+      return &feedback_.imu_acceleration[axis];
+    case SensorReading::FORCE:
+      return &feedback_.foot_wrench[reading.foot()].force[axis];
+    case SensorReading::MOMENT:
+      break;
+  }
+  return &feedback_.foot_wrench[reading.foot()].moment[axis];
+}
+
+void EthercatDriveBus::FindReadings(const MasterConfig& config, size_t num_feet) {
+  for (int i = 0; i < config.other_size(); ++i) {
+    const auto slave = static_cast<size_t>(config.drive_size() + i);
+    for (const SensorReading& reading : config.other(i).reading()) {
+      const auto place = master_.image().FindInput(slave, static_cast<uint16_t>(reading.index()),
+                                                   static_cast<uint8_t>(reading.subindex()));
+      const bool of_foot =
+          reading.quantity() == SensorReading::FORCE || reading.quantity() == SensorReading::MOMENT;
+      if (!place || reading.axis() > 2 || (of_foot && reading.foot() >= num_feet) ||
+          (reading.is_float() && place->bits != 32)) {
+        throw EthercatError(fmt::format(
+            "EtherCAT configuration: other \"{}\": reading of {:04X}:{:02X}: give an object of its "
+            "tx, an axis of 0 to 2, and a foot of the robot; is_float takes 32 bits",
+            config.other(i).name(), reading.index(), reading.subindex()));
+      }
+      (of_foot ? sensors_.feet : sensors_.imu) = true;
+      readings_.push_back({*place, reading});
+    }
+  }
+}
+
+void EthercatDriveBus::Diagnose(bus_status_t* status) const {
+  const Attendant* attendant = master_.attendant();
+  for (size_t i = 0; i < master_.num_slaves(); ++i) {
+    const SlaveDiagnosis slave = attendant != nullptr ? attendant->diagnosis(i) : SlaveDiagnosis{};
+    status->online[i] = slave.online ? 1 : 0;
+    status->al_status[i] = slave.al_status;
+    status->al_code[i] = slave.al_code;
+    status->error_code[i] = slave.error_code;
+    status->emergency[i] = slave.emergency;
+    status->emergencies[i] = slave.emergencies;
+    status->clock_difference[i] = slave.clock_difference;
+    status->receive_errors[i] = slave.receive_errors;
+    status->lost_links[i] = slave.lost_links;
+    status->recoveries[i] = slave.recoveries;
+  }
 }
 
 void EthercatDriveBus::Start() {
@@ -130,6 +189,10 @@ void EthercatDriveBus::Start() {
   while (!master_.CountSlaves() && link_->Now() < deadline) {
   }
   master_.Start();
+  if (config_.attend()) {
+    master_.Attend(config_.simulated_time(),
+                   [](const std::string& line) { SayError("EtherCAT: " + line); });
+  }
 }
 
 std::string EthercatDriveBus::Stop() {
@@ -198,6 +261,17 @@ void EthercatDriveBus::TakeInputs() {
     reports_[j] = {.state = ReportOf(drive.state),
                    .sto = drive.state != DriveState::kUnknown &&
                           (inputs.statusword & kStatusVoltageEnabled) == 0};
+  }
+  for (const Reading& reading : readings_) {
+    const uint64_t raw = master_.input(reading.place);
+    double value = 0;
+    if (reading.config.is_float()) {
+      value = std::bit_cast<float>(static_cast<uint32_t>(raw));
+    } else {
+      const int unused = 64 - reading.place.bits;  // the sign, to the top and back
+      value = static_cast<double>(static_cast<int64_t>(raw << unused) >> unused);
+    }
+    *Target(reading.config) = value * reading.config.scale() + reading.config.offset();
   }
 }
 

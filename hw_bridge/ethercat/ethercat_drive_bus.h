@@ -22,9 +22,9 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
 
 /// Target and greatest torque (6071, 6072) are zero until every drive that is to be enabled is, in
 /// cyclic synchronous torque; drives of faulted or disabled joints get none, and a quick stop when
-/// they are enabled. Receive gives counts, currents and states, no sensors, and nullptr in a cycle
-/// whose inputs are not whole. In it DRIVE_FAULT stands for a fault, STO, a mode that is not the
-/// one commanded, and a chain that is not in OP.
+/// they are enabled. Receive gives counts, currents and states, of sensors what other slaves of the
+/// bus read, and nullptr in a cycle whose inputs are not whole. In it DRIVE_FAULT stands for a
+/// fault, STO, a mode that is not the one commanded, and a chain that is not in OP.
 class EthercatDriveBus final : public DriveBus {
  public:
   /// `link` must outlive this. Throws EthercatError.
@@ -46,6 +46,9 @@ class EthercatDriveBus final : public DriveBus {
   void RequestFaultReset() override;
   /// 0 without distributed clocks.
   int64_t cycle_correction() const override { return cycle_correction_; }
+  int num_slaves() const override { return static_cast<int>(master_.num_slaves()); }
+  void Diagnose(bus_status_t* status) const override;
+  SensorsOfBus sensors() const override { return sensors_; }
   /// Of the drive of a joint, as last received.
   DriveState drive_state(size_t joint) const { return drives_[joint].state; }
   const Master& master() const { return master_; }
@@ -62,6 +65,14 @@ class EthercatDriveBus final : public DriveBus {
     bool commanded = false;  // to be enabled
   };
 
+  /// A sensor's number in the process data, and where it belongs.
+  struct Reading {
+    ProcessImage::Place place;
+    SensorReading config;
+  };
+
+  void FindReadings(const MasterConfig& config, size_t num_feet);
+  double* Target(const SensorReading& reading);
   /// Takes what has come of the last frame; the result of the exchange that has inputs.
   CycleResult ReceiveFrames();
   void TakeInputs();
@@ -74,6 +85,8 @@ class EthercatDriveBus final : public DriveBus {
   Link* link_;
   CycleSteering steering_;
   std::vector<Drive> drives_;  // by joint
+  std::vector<Reading> readings_;
+  SensorsOfBus sensors_;
   std::vector<DriveReport> reports_;
   drive_feedback_t feedback_;
   drive_command_t idle_;               // no torque

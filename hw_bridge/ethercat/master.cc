@@ -3,20 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace poise::ethercat {
 namespace {
 
 constexpr uint16_t kFirstStation = 1001;  // 0 is the address of a slave that has none
-constexpr uint32_t kLogicalStart = 0x00010000;
-constexpr uint16_t kWatchdogDivider = 2498;  // 100 us
-constexpr uint32_t kWatchdogUnitsPerMs = 10;
+constexpr uint16_t kEventMask = 0x0004;   // AL events in each datagram, as other masters set it
 
 const MasterConfig& Checked(const MasterConfig& config) {
   const auto require = [](bool condition, std::string_view problem) {
     if (!condition) throw EthercatError(fmt::format("EtherCAT configuration: {}", problem));
   };
-  require(config.has_profile(), "profile is missing: which drives are on the bus?");
+  const auto own_profile = [](const DriveConfig& drive) { return drive.has_profile(); };
+  require(config.has_profile() ||
+              std::all_of(config.drive().begin(), config.drive().end(), own_profile),
+          "profile is missing: which drives are on the bus?");
   require(config.drive_size() > 0, "drive is missing: name each drive of the chain");
   require(config.cycle() >= 100'000 && config.cycle() <= 100'000'000,
           "cycle must be between 100000 and 100000000 ns");
@@ -49,19 +51,47 @@ int64_t Milliseconds(uint32_t value) { return int64_t{value} * kMillisecond; }
 
 Master::Master(Link* link, const MasterConfig& config)
     : config_(Checked(config)),
-      image_(config.profile(), config.drive_size()),
+      image_(config_),
+      setup_(&config_, &image_),
       transactions_(link, Milliseconds(config.frame_timeout()),
                     static_cast<int>(config.attempts())),
       timeouts_{.eeprom = Milliseconds(config.eeprom_timeout()),
                 .mailbox = Milliseconds(config.mailbox_timeout()),
                 .state = Milliseconds(config.state_timeout())},
-      identities_(static_cast<size_t>(config.drive_size())),
+      identities_(image_.num_slaves()),
       outputs_(static_cast<size_t>(config.drive_size())),
       inputs_(static_cast<size_t>(config.drive_size())),
       image_bytes_(image_.size(), 0) {
-  for (int i = 0; i < config.drive_size(); ++i) {
-    slaves_.emplace_back(&transactions_, timeouts_, i, static_cast<uint16_t>(kFirstStation + i));
-    slaves_.back().set_name(config.drive(i).joint());
+  PlaceSlaves();
+}
+
+Master::~Master() = default;
+
+/// Places as the configuration counts them: those of the others first, drives on what is left.
+void Master::PlaceSlaves() {
+  const auto count = static_cast<int>(image_.num_slaves());
+  std::vector<bool> taken(static_cast<size_t>(count), false);
+  positions_.assign(static_cast<size_t>(count), -1);
+  for (int i = 0; i < config_.other_size(); ++i) {
+    const OtherSlave& other = config_.other(i);
+    if (other.position() >= static_cast<uint32_t>(count) || taken[other.position()]) {
+      throw EthercatError(
+          fmt::format("EtherCAT configuration: other \"{}\": position {} is taken or beyond the "
+                      "last of {} slaves",
+                      other.name(), other.position(), count));
+    }
+    taken[other.position()] = true;
+    positions_[static_cast<size_t>(config_.drive_size() + i)] = static_cast<int>(other.position());
+  }
+  for (size_t i = 0, at = 0; i < num_drives(); ++i, ++at) {
+    while (taken[at]) ++at;
+    positions_[i] = static_cast<int>(at);
+  }
+  slaves_.clear();
+  for (size_t i = 0; i < positions_.size(); ++i) {
+    slaves_.emplace_back(&transactions_, timeouts_, positions_[i],
+                         static_cast<uint16_t>(kFirstStation + positions_[i]));
+    slaves_.back().set_name(setup_.NameOf(i));
   }
 }
 
@@ -73,168 +103,244 @@ std::optional<int> Master::CountSlaves() {
 }
 
 void Master::Start() {
-  operational_ = clocks_running_ = false;
+  attendant_.reset();
+  operational_ = clocks_.running = false;
+  PlaceSlaves();
+  CheckCount();
+  ResetAndAddress();
+  FindWiring();
+  FindPositions();
+  for (size_t i = 0; i < num_slaves(); ++i) {
+    identities_[i] = setup_.Check(i, &slaves_[i]);
+    setup_.Configure(i, &slaves_[i]);
+  }
+  clocks_.has_clock.assign(num_slaves(), false);
+  if (config_.distributed_clocks()) SetUpDistributedClocks();
+  for (SlaveAccess& slave : slaves_) slave.ChangeState(AlState::kSafeOp);
+  GoOperational();
+}
+
+void Master::CheckCount() {
   const std::optional<int> found = CountSlaves();
   if (!found) {
     throw EthercatError(
         "no frame comes back from the EtherCAT bus; is the cable in, the chain powered, the "
         "emulator running, the address right?");
   }
-  if (static_cast<size_t>(*found) != num_drives()) {
-    throw EthercatError(fmt::format(
-        "the EtherCAT bus has {} slaves, the configuration {} drives (the first without a slave: "
-        "{}); check cables and power, or the list of drives",
-        *found, num_drives(),
-        static_cast<size_t>(*found) < num_drives() ? config_.drive(*found).joint() : "none"));
-  }
-  ResetAndAddress();
-  for (size_t i = 0; i < num_drives(); ++i) {
-    slaves_[i].AwaitState(AlState::kInit, [&] { slaves_[i].Pause(); });
-    CheckDrive(i);
-    slaves_[i].SetUpMailbox();
-    slaves_[i].ChangeState(AlState::kPreOp);
-    SetUpProcessData(i);
-  }
-  if (config_.distributed_clocks()) SetUpDistributedClocks();
-  for (SlaveAccess& slave : slaves_) slave.ChangeState(AlState::kSafeOp);
-  GoOperational();
+  if (static_cast<size_t>(*found) == num_slaves()) return;
+  const auto missing = static_cast<int>(std::find(positions_.begin(), positions_.end(), *found) -
+                                        positions_.begin());
+  throw EthercatError(fmt::format(
+      "the EtherCAT bus has {} slaves, the configuration {} drives{} (the first without a slave: "
+      "{}); check cables and power, or the list of drives",
+      *found, num_drives(),
+      config_.other_size() > 0 ? fmt::format(" and {} others", config_.other_size()) : "",
+      static_cast<size_t>(missing) < num_slaves() ? setup_.NameOf(static_cast<size_t>(missing))
+                                                  : "none"));
 }
 
 void Master::ResetAndAddress() {
-  const auto broadcast = [this](uint16_t address, size_t size, uint16_t value) {
+  const auto broadcast = [this](uint16_t address, std::span<const uint8_t> data, bool all) {
     std::array<uint8_t, kNumFmmus * kFmmuSize> bytes{};
-    Put<uint16_t>(bytes, 0, value);
+    std::copy(data.begin(), data.end(), bytes.begin());
     const auto counter =
-        transactions_.Execute(Command::kBwr, 0, address, std::span(bytes).first(size));
-    if (!counter || *counter != num_drives()) {
+        transactions_.Execute(Command::kBwr, 0, address, std::span(bytes).first(data.size()));
+    if (!counter || (all && *counter != num_slaves())) {
       throw EthercatError(fmt::format("writing register 0x{:04X} reached {} of {} slaves", address,
-                                      counter.value_or(0), num_drives()));
+                                      counter.value_or(0), num_slaves()));
     }
   };
-  broadcast(reg::kAlControl, 2, static_cast<uint16_t>(AlState::kInit) | kAlError);
-  // Slaves without distributed clocks do not count here.
-  std::array<uint8_t, 1> off{};
-  static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kDcActivation, off));
-  broadcast(reg::kFmmu, kNumFmmus * kFmmuSize, 0);
-  broadcast(reg::kSyncManager, kNumSyncManagers * kSyncManagerSize, 0);
-  for (size_t i = 0; i < num_drives(); ++i) {
+  constexpr std::array<uint8_t, kNumFmmus * kFmmuSize> kZeros{};
+  constexpr uint8_t kInit[] = {static_cast<uint8_t>(AlState::kInit) | kAlError, 0};
+  constexpr uint8_t kOne[] = {1}, kEvents[] = {kEventMask & 0xFF, kEventMask >> 8};
+  constexpr uint8_t kForce[] = {kEepromForce}, kMaster[] = {kEepromMaster};
+  const auto zeros = [&](size_t size) { return std::span(kZeros).first(size); };
+  // A slave that has not yet taken an earlier request refuses this one; AwaitInit repeats it.
+  broadcast(reg::kAlControl, kInit, false);
+  // What another master, or this one before it was killed, may have left. Not all slaves have all
+  // of it.
+  broadcast(reg::kDcActivation, zeros(1), false);
+  broadcast(reg::kDlControl, kOne, true);
+  broadcast(reg::kLoopControl, zeros(1), true);
+  broadcast(reg::kAliasControl, zeros(1), true);
+  broadcast(reg::kEventMask, kEvents, false);
+  broadcast(reg::kReceiveErrors, zeros(8), false);
+  broadcast(reg::kLostLinks, zeros(4), false);
+  broadcast(reg::kFmmu, zeros(kNumFmmus * kFmmuSize), false);
+  broadcast(reg::kSyncManager, zeros(kNumSyncManagers * kSyncManagerSize), false);
+  broadcast(reg::kEepromConfig, kForce, true);
+  broadcast(reg::kEepromConfig, kMaster, true);
+  for (const SlaveAccess& slave : slaves_) {
     std::array<uint8_t, 2> station{};
-    Put<uint16_t>(station, 0, slaves_[i].station());
-    const auto counter = transactions_.Execute(
-        Command::kApwr, AutoIncrementAddress(static_cast<int>(i)), reg::kStationAddress, station);
+    Put<uint16_t>(station, 0, slave.station());
+    const auto counter =
+        transactions_.Execute(Command::kApwr, AutoIncrementAddress(slave.station() - kFirstStation),
+                              reg::kStationAddress, station);
     if (!counter || *counter != 1) {
       throw EthercatError(fmt::format("{}: does not take its station address; is the chain whole?",
-                                      slaves_[i].Describe()));
+                                      slave.Describe()));
     }
   }
+  for (SlaveAccess& slave : slaves_) slave.AwaitInit();
 }
 
-void Master::CheckDrive(size_t drive) {
-  const DriveProfile& profile = config_.profile();
-  const DriveConfig& expected = config_.drive(static_cast<int>(drive));
-  SlaveAccess& slave = slaves_[drive];
-  const Identity identity = slave.ReadIdentity();
-  identities_[drive] = identity;
-  const auto compare = [&](std::string_view what, uint32_t found, uint32_t wanted) {
-    if (found == wanted) return;
-    throw EthercatError(fmt::format(
-        "{}: its {} is 0x{:08X}, that of \"{}\" 0x{:08X}; is this the right drive at this place?",
-        slave.Describe(), what, found, profile.name(), wanted));
-  };
-  compare("vendor", identity.vendor, profile.vendor_id());
-  compare("product code", identity.product, profile.product_code());
-  if (profile.has_revision()) compare("revision", identity.revision, profile.revision());
-  if (expected.has_serial()) compare("serial number", identity.serial, expected.serial());
-}
-
-void Master::SetUpProcessData(size_t drive) {
-  SlaveAccess& slave = slaves_[drive];
-  const DriveConfig& expected = config_.drive(static_cast<int>(drive));
-  const auto rated = [&](std::string_view field, uint16_t index, uint32_t wanted,
-                         std::string_view unit) {
-    const uint32_t found = slave.Upload({index, 0});
-    if (found == wanted) return;
-    throw EthercatError(fmt::format(
-        "{}: object {:04X} ({}) is {} {}, the configuration says {} {}; every torque would be "
-        "wrong by that ratio: set up the drive or the configuration",
-        slave.Describe(), index, field, found, unit, wanted, unit));
-  };
-  rated("rated_torque", object::kRatedTorque, expected.rated_torque(), "mN·m");
-  rated("rated_current", object::kRatedCurrent, expected.rated_current(), "mA");
-  const uint32_t modes = slave.Upload({object::kSupportedModes, 0});
-  if ((modes >> (kModeCyclicTorque - 1) & 1) == 0) {
-    throw EthercatError(fmt::format(
-        "{}: object {:04X} (supported modes) is 0x{:08X}, without cyclic synchronous torque",
-        slave.Describe(), object::kSupportedModes, modes));
-  }
-  image_.Configure(&slave);
-
-  const std::array<uint16_t, kNumSyncManagers> addresses = slave.ReadSyncManagerAddresses();
-  const auto set_up = [&](SyncManager manager, int fmmu, uint8_t control, uint8_t direction,
-                          size_t image_offset, size_t size) {
-    const uint16_t start = addresses[manager];
-    if (start < reg::kRam) {
-      throw EthercatError(fmt::format("{}: its EEPROM gives no address for sync manager {}",
-                                      slave.Describe(), static_cast<int>(manager)));
+void Master::FindWiring() {
+  // Until positions are known, names may be another's: the place in the chain is what counts.
+  const size_t count = num_slaves();
+  std::array<uint8_t, 4> latch{};
+  static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kDcReceiveTime, latch));
+  std::vector<SlavePorts> ports(count);
+  std::vector<std::string> names(count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto at = static_cast<size_t>(positions_[i]);
+    SlaveAccess& slave = slaves_[i];
+    names[at] = slave.Describe();
+    ports[at].dl_status = slave.Read<uint16_t>(reg::kDlStatus);
+    ports[at].has_times = HasClock(&slave);
+    for (size_t port = 0; ports[at].has_times && port < kNumPorts; ++port) {
+      ports[at].times[port] =
+          slave.Read<uint32_t>(static_cast<uint16_t>(reg::kDcReceiveTime + 4 * port));
     }
-    std::array<uint8_t, kSyncManagerSize> sync{};
-    Put<uint16_t>(sync, 0, start);
-    Put<uint16_t>(sync, 2, static_cast<uint16_t>(size));
-    sync[4] = control;
-    sync[6] = kSmEnable;
-    slave.Write(static_cast<uint16_t>(reg::kSyncManager + manager * kSyncManagerSize), sync);
-    std::array<uint8_t, kFmmuSize> map{};
-    Put<uint32_t>(map, 0, kLogicalStart + static_cast<uint32_t>(image_offset));
-    Put<uint16_t>(map, 4, static_cast<uint16_t>(size));
-    map[7] = 7;  // the last bit of the last byte
-    Put<uint16_t>(map, 8, start);
-    map[11] = direction;
-    map[12] = 1;
-    slave.Write(static_cast<uint16_t>(reg::kFmmu + fmmu * kFmmuSize), map);
+  }
+  wiring_ =
+      FindTopology(ports, [&names](int position) { return names[static_cast<size_t>(position)]; });
+}
+
+void Master::FindPositions() {
+  struct Wanted {
+    std::optional<uint32_t> number;
+    std::string_view what;
   };
-  set_up(kProcessOut, 0, kSmProcessOut, kFmmuWrite, image_.outputs_at(drive),
-         image_.outputs_per_drive());
-  set_up(kProcessIn, 1, kSmProcessIn, kFmmuRead, image_.inputs_at(drive),
-         image_.inputs_per_drive());
-  slave.Write<uint16_t>(reg::kWatchdogDivider, kWatchdogDivider);
-  slave.Write<uint16_t>(reg::kWatchdogProcessData,
-                        static_cast<uint16_t>(config_.watchdog() * kWatchdogUnitsPerMs));
+  std::vector<Wanted> wanted;
+  bool all = true;
+  for (size_t i = 0; i < num_slaves(); ++i) {
+    const auto identification = setup_.IdentificationOf(i);
+    const auto alias = setup_.AliasOf(i);
+    wanted.push_back({identification ? identification : alias,
+                      identification ? "identification" : "station alias"});
+    all = all && wanted.back().number.has_value();
+  }
+  const auto read = [this](SlaveAccess& slave, std::string_view what) -> std::optional<uint32_t> {
+    if (what == "station alias") return slave.Read<uint16_t>(reg::kStationAlias);
+    const std::optional<uint16_t> found = slave.ReadIdentification();
+    return found ? std::optional<uint32_t>(*found) : std::nullopt;
+  };
+  if (!all) {
+    for (size_t i = 0; i < num_slaves(); ++i) {
+      if (!wanted[i].number) continue;
+      const auto found = read(slaves_[i], wanted[i].what);
+      if (found == wanted[i].number) continue;
+      throw EthercatError(fmt::format(
+          "{}: its {} is {}, the configuration says {}; is this the right drive at this place?",
+          slaves_[i].Describe(), wanted[i].what, found ? std::to_string(*found) : "not given",
+          *wanted[i].number));
+    }
+    return;
+  }
+  // Every slave says who it is: where it is in the chain does not matter.
+  std::vector<int> places(num_slaves(), -1);
+  for (size_t at = 0; at < num_slaves(); ++at) {
+    SlaveAccess here(&transactions_, timeouts_, static_cast<int>(at),
+                     static_cast<uint16_t>(kFirstStation + at));
+    bool known = false;
+    for (size_t i = 0; i < num_slaves() && !known; ++i) {
+      if (places[i] >= 0 || read(here, wanted[i].what) != wanted[i].number) continue;
+      places[i] = static_cast<int>(at);
+      known = true;
+    }
+    if (known) continue;
+    const auto found = read(here, wanted[0].what);
+    throw EthercatError(fmt::format(
+        "{}: its {} is {}, which no slave of the configuration has (or one that was found before)",
+        here.Describe(), wanted[0].what, found ? std::to_string(*found) : "not given"));
+  }
+  positions_ = places;
+  for (size_t i = 0; i < num_slaves(); ++i) {
+    slaves_[i] = SlaveAccess(&transactions_, timeouts_, places[i],
+                             static_cast<uint16_t>(kFirstStation + places[i]));
+    slaves_[i].set_name(setup_.NameOf(i));
+  }
 }
 
 void Master::SetUpDistributedClocks() {
-  SetUpClocks(&transactions_, slaves_, transactions_.link()->Now());
-  for (uint32_t i = 0; i < config_.drift_frames(); ++i) {
-    std::array<uint8_t, 8> time{};
-    const auto counter =
-        transactions_.Execute(Command::kFrmw, slaves_[0].station(), reg::kDcSystemTime, time);
-    if (!counter) throw EthercatError("distributed clocks: no frame came back");
+  std::vector<SlaveAccess*> with_clock;
+  std::vector<int32_t> delays;
+  clocks_.delays.assign(num_slaves(), 0);
+  // In the chain's order: the first that has a clock is the reference.
+  for (size_t at = 0; at < num_slaves(); ++at) {
+    const auto i = static_cast<size_t>(
+        std::find(positions_.begin(), positions_.end(), static_cast<int>(at)) - positions_.begin());
+    clocks_.delays[i] = wiring_[at].delay;
+    clocks_.has_clock[i] = HasClock(&slaves_[i]);
+    if (!clocks_.has_clock[i]) {
+      if (!setup_.is_drive(i)) continue;
+      throw EthercatError(
+          fmt::format("{}: has no 64-bit distributed clock; set distributed_clocks: false",
+                      slaves_[i].Describe()));
+    }
+    if (with_clock.empty()) clocks_.reference = i;
+    with_clock.push_back(&slaves_[i]);
+    delays.push_back(wiring_[at].delay);
   }
-  StartSync0(slaves_, config_.cycle(), config_.sync0_shift());
-  clocks_running_ = true;
+  SetUpClocks(&transactions_, with_clock, delays, transactions_.link()->Now());
+  AwaitClocks();
+  for (SlaveAccess* slave : with_clock) {
+    StartSync0(slave, config_.cycle(), config_.sync0_shift());
+  }
+  clocks_.running = true;
 }
 
-void Master::ExchangeOnce() {
+void Master::AwaitClocks() {
+  const auto compensate = [this] {
+    std::array<uint8_t, 8> time{};
+    const auto counter = transactions_.Execute(Command::kFrmw, slaves_[clocks_.reference].station(),
+                                               reg::kDcSystemTime, time);
+    if (!counter) throw EthercatError("distributed clocks: no frame came back");
+  };
+  for (uint32_t i = 0; i < config_.drift_frames(); ++i) compensate();
+  // Static drift is gone; whether the clocks agree, they say themselves.
+  const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
+  for (size_t i = 0; i < num_slaves(); ++i) {
+    if (!clocks_.has_clock[i] || i == clocks_.reference) continue;
+    while (true) {
+      const int32_t difference = DcDifference(slaves_[i].Read<uint32_t>(reg::kDcDifference));
+      if (std::abs(int64_t{difference}) <= config_.clock_tolerance()) break;
+      if (transactions_.link()->Now() > deadline) {
+        throw EthercatError(fmt::format(
+            "{}: its clock is still {} ns off the common time (register 0x092C), {} are allowed",
+            slaves_[i].Describe(), difference, config_.clock_tolerance()));
+      }
+      for (int frame = 0; frame < 10; ++frame) compensate();
+    }
+  }
+}
+
+CycleResult Master::Pace() {
+  Link* link = transactions_.link();
+  if (next_cycle_ + int64_t{config_.cycle()} < link->Now()) next_cycle_ = link->Now();
+  // What is asked of slaves meanwhile is asked within the cycle, after its frame.
+  std::array<uint8_t, 1> ignored;
+  while (link->Receive(ignored, next_cycle_) != 0) ++transactions_.mutable_counts()->unexpected;
+  next_cycle_ += config_.cycle();
   static_cast<void>(Send());
-  static_cast<void>(Receive(transactions_.link()->Now() + Milliseconds(config_.frame_timeout())));
-  slaves_[0].Pause();
+  return Receive(link->Now() + Milliseconds(config_.frame_timeout()));
 }
 
 void Master::GoOperational() {
   std::fill(outputs_.begin(), outputs_.end(), DriveOutputs{});
   operational_ = true;  // from here on there is something to stop
-  const auto exchange = [this] { ExchangeOnce(); };
+  next_cycle_ = transactions_.link()->Now();
+  const auto pace = [this] { static_cast<void>(Pace()); };
   // Slaves enter OP only once they have outputs.
-  exchange();
+  pace();
   for (SlaveAccess& slave : slaves_) {
-    slave.RequestState(AlState::kOp);
-    exchange();
+    slave.RequestState(AlState::kOp, pace);
+    pace();
   }
-  for (SlaveAccess& slave : slaves_) slave.AwaitState(AlState::kOp, exchange);
+  for (SlaveAccess& slave : slaves_) slave.AwaitState(AlState::kOp, pace);
   const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
   while (true) {
-    static_cast<void>(Send());
-    const CycleResult result =
-        Receive(transactions_.link()->Now() + Milliseconds(config_.frame_timeout()));
+    const CycleResult result = Pace();
     if (result.complete) return;
     if (transactions_.link()->Now() > deadline) {
       throw EthercatError(fmt::format(
@@ -244,36 +350,58 @@ void Master::GoOperational() {
   }
 }
 
+void Master::Attend(bool lockstep, Attendant::Say say) {
+  attendant_ = std::make_unique<Attendant>(&config_, &setup_, clocks_, slaves_, positions_,
+                                           timeouts_, lockstep, std::move(say));
+}
+
 bool Master::Stop() {
+  attendant_.reset();
+  acyclic_.reset();
   if (operational_) {
     // Zero torque and the drives' way down first: in INIT they would trip on lost process data.
     std::fill(outputs_.begin(), outputs_.end(), DriveOutputs{});
-    const int64_t down = transactions_.link()->Now() + 3 * int64_t{config_.cycle()};
-    while (transactions_.link()->Now() < down) ExchangeOnce();
+    for (int i = 0; i < 3; ++i) static_cast<void>(Pace());
   }
-  operational_ = clocks_running_ = false;
+  operational_ = clocks_.running = false;
+  constexpr int64_t kAskAgain = 100 * kMillisecond;
   const int64_t deadline = transactions_.link()->Now() + timeouts_.state;
   std::array<uint8_t, 2> bytes{};
+  int64_t asked = transactions_.link()->Now() - kAskAgain;
   // A bus from which nothing comes back is not waited for: its watchdogs have acted.
-  for (int silent = 0; silent < 2;) {
-    Put<uint16_t>(bytes, 0, static_cast<uint16_t>(AlState::kInit) | kAlError);
-    static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kAlControl, bytes));
+  for (int silent = 0; silent < 2; slaves_[0].Pause()) {
+    if (transactions_.link()->Now() - asked >= kAskAgain) {
+      Put<uint16_t>(bytes, 0, static_cast<uint16_t>(AlState::kInit) | kAlError);
+      static_cast<void>(transactions_.Execute(Command::kBwr, 0, reg::kAlControl, bytes));
+      asked = transactions_.link()->Now();
+    }
     Put<uint16_t>(bytes, 0, 0);
     const auto counter = transactions_.Execute(Command::kBrd, 0, reg::kAlStatus, bytes);
     silent = counter ? 0 : silent + 1;
-    if (counter && *counter == num_drives() && bytes[0] == static_cast<uint8_t>(AlState::kInit)) {
-      return true;
+    // Those that are not there do not come by being waited for.
+    if (counter && bytes[0] == static_cast<uint8_t>(AlState::kInit)) {
+      return *counter == num_slaves();
     }
     if (transactions_.link()->Now() > deadline) return false;
-    slaves_[0].Pause();
   }
   return false;
 }
 
+uint16_t Master::Expected(Exchange exchange) const {
+  return exchange == Exchange::kReadWrite ? image_.expected_read_write()
+         : exchange == Exchange::kRead    ? image_.expected_read()
+                                          : image_.expected_write();
+}
+
 bool Master::Send(Exchange exchange) {
   FrameCounts& counts = *transactions_.mutable_counts();
-  if (awaited_) ++counts.lost;
+  if (awaited_) {
+    ++counts.lost;
+    trouble_ = true;
+  }
   awaited_ = false;
+  if (attendant_ && acyclic_) attendant_->slot().Lost();
+  acyclic_.reset();
   exchange_ = exchange;
   for (size_t i = 0; i < outputs_.size(); ++i) image_.Put(i, outputs_[i], image_bytes_);
   const size_t outputs = image_.outputs_size();
@@ -297,8 +425,24 @@ bool Master::Send(Exchange exchange) {
       break;
   }
   builder_.AddZero(Command::kBrd, cyclic_index_, 0, reg::kAlStatus, 2);
-  if (clocks_running_) {
-    builder_.AddZero(Command::kFrmw, cyclic_index_, slaves_[0].station(), reg::kDcSystemTime, 8);
+  if (clocks_.running) {
+    // The reference puts its time in. Should it not be there, the others are told what it would be.
+    std::array<uint8_t, 8> time{};
+    if (seen_at_ != 0) {
+      Put<int64_t>(time, 0, system_time_ + transactions_.link()->Now() - seen_at_);
+    }
+    builder_.Add(Command::kFrmw, cyclic_index_, slaves_[clocks_.reference].station(),
+                 reg::kDcSystemTime, time);
+  }
+  // With the outputs: their answer is not waited for within the cycle.
+  if (attendant_ && exchange != Exchange::kRead) {
+    attendant_->BeginCycle(transactions_.link()->Now(), trouble_);
+    acyclic_ = attendant_->slot().Take();
+    if (acyclic_ && !builder_.Add(acyclic_->command, cyclic_index_, acyclic_->adp, acyclic_->ado,
+                                  acyclic_->data)) {
+      attendant_->slot().Lost();
+      acyclic_.reset();
+    }
   }
   if (!transactions_.link()->Send(builder_.bytes())) {
     ++counts.send_errors;
@@ -311,9 +455,7 @@ bool Master::Send(Exchange exchange) {
 
 CycleResult Master::Receive(int64_t deadline) {
   CycleResult result;
-  const size_t drives = num_drives();
-  result.expected_working_counter =
-      static_cast<uint16_t>(exchange_ == Exchange::kReadWrite ? 3 * drives : drives);
+  result.expected_working_counter = Expected(exchange_);
   FrameCounts& counts = *transactions_.mutable_counts();
   // However many strangers' frames there are, a cycle looks at so many only.
   constexpr int kMostFrames = 64;
@@ -322,6 +464,7 @@ CycleResult Master::Receive(int64_t deadline) {
     if (size == 0) {
       ++counts.lost;
       awaited_ = false;
+      trouble_ = true;
       break;
     }
     const FrameReader reader{std::span(received_).first(size)};
@@ -339,10 +482,11 @@ CycleResult Master::Receive(int64_t deadline) {
 
 bool Master::Take(const FrameReader& frame, CycleResult* result) {
   FrameReader reader = frame;
-  if (reader.num_datagrams() != (clocks_running_ ? 3 : 2)) return false;
+  const int expected = 2 + (clocks_.running ? 1 : 0) + (acyclic_ ? 1 : 0);
+  if (reader.num_datagrams() != expected) return false;
   const Datagram data = *reader.Next();
   const Datagram status = *reader.Next();
-  const std::optional<Datagram> clock = reader.Next();
+  const std::optional<Datagram> clock = clocks_.running ? reader.Next() : std::nullopt;
   const bool read = exchange_ != Exchange::kWrite;
   const size_t outputs = image_.outputs_size();
   // Where the inputs begin in this datagram.
@@ -368,12 +512,17 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
                   image_bytes_.begin())) {
     return false;
   }
+  if (acyclic_ && !TakeAcyclic(&reader)) return false;
   result->returned = true;
   result->working_counter = data.working_counter;
   result->complete = data.working_counter == result->expected_working_counter;
   result->slaves_answering = status.working_counter;
   result->al_status = status.data[0];
-  if (clock && clock->working_counter > 0) result->system_time = Get<int64_t>(clock->data, 0);
+  if (clock && clock->working_counter > 0) {
+    result->system_time = Get<int64_t>(clock->data, 0);
+    system_time_ = *result->system_time;
+    seen_at_ = transactions_.link()->Now();
+  }
   if (!result->complete) {
     ++short_working_counters_;
   } else if (read) {
@@ -382,6 +531,19 @@ bool Master::Take(const FrameReader& frame, CycleResult* result) {
               image_bytes_.begin() + static_cast<std::ptrdiff_t>(outputs));
     for (size_t i = 0; i < inputs_.size(); ++i) inputs_[i] = image_.Get(i, image_bytes_);
   }
+  trouble_ = result->al_status != static_cast<uint8_t>(AlState::kOp) ||
+             result->slaves_answering != num_slaves() || !result->complete;
+  return true;
+}
+
+bool Master::TakeAcyclic(FrameReader* reader) {
+  const Datagram datagram = *reader->Next();
+  if (datagram.index != cyclic_index_ || datagram.command != acyclic_->command ||
+      datagram.ado != acyclic_->ado || datagram.data.size() != acyclic_->data.size()) {
+    return false;
+  }
+  attendant_->slot().Answer(datagram);
+  acyclic_.reset();
   return true;
 }
 

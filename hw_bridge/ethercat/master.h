@@ -1,15 +1,20 @@
-// Master: starts a chain of CiA 402 drives and exchanges their process data each cycle.
+// Master: starts a chain of CiA 402 drives and other slaves, and exchanges their process data each
+// cycle.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "hw_bridge/ethercat/attendant.h"
 #include "hw_bridge/ethercat/distributed_clocks.h"
 #include "hw_bridge/ethercat/ethercat.pb.h"
 #include "hw_bridge/ethercat/process_image.h"
 #include "hw_bridge/ethercat/slave_access.h"
+#include "hw_bridge/ethercat/slave_setup.h"
+#include "hw_bridge/ethercat/topology.h"
 #include "hw_bridge/ethercat/transactions.h"
 
 namespace poise::ethercat {
@@ -32,17 +37,25 @@ class Master {
  public:
   /// `link` must outlive this. Throws EthercatError: a configuration that cannot work.
   Master(Link* link, const MasterConfig& config);
+  ~Master();
 
   size_t num_drives() const { return outputs_.size(); }
+  /// The drives, then the others.
+  size_t num_slaves() const { return slaves_.size(); }
+  const SlaveSetup& setup() const { return setup_; }
   const ProcessImage& image() const { return image_; }
 
   /// Number of slaves that answer a broadcast read of the AL status; nullopt: no frame came back.
   std::optional<int> CountSlaves();
   /// Leads all slaves from whatever state to OP, with outputs of zero (no torque, 6072 = 0), and
-  /// returns only when number, identity, ratings and mapping of the drives are as configured.
-  /// Process data must flow from then on, or the drives' watchdogs expire. Throws EthercatError;
-  /// the slaves then stay where they are: call Stop().
+  /// returns only when number, wiring, identity, ratings and mapping of the slaves are as
+  /// configured. Process data must flow from then on, or the drives' watchdogs expire. Throws
+  /// EthercatError; the slaves then stay where they are: call Stop().
   void Start();
+  /// After Start: slaves are looked after while cycles go on (attendant.h).
+  void Attend(bool lockstep, Attendant::Say say);
+  /// nullptr: nobody looks after them.
+  const Attendant* attendant() const { return attendant_.get(); }
   /// Takes all torque, disables the drives and leads all slaves to INIT. False when not all have
   /// got there.
   bool Stop();
@@ -59,28 +72,46 @@ class Master {
   /// of earlier cycles are counted and dropped.
   CycleResult Receive(int64_t deadline);
 
-  /// Of the drive's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis.
-  SlaveAccess& slave(size_t drive) { return slaves_[drive]; }
+  /// Of the slave's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis; not
+  /// while an attendant speaks with it.
+  SlaveAccess& slave(size_t slave) { return slaves_[slave]; }
+  /// A slave's place in the chain, 0 the first.
+  int position(size_t slave) const { return positions_[slave]; }
+  /// What a slave reports in an object, of the last complete read. `place`: from image().
+  uint64_t input(const ProcessImage::Place& place) const {
+    return ProcessImage::Extract(place, image_bytes_);
+  }
   /// As read at start.
   const Identity& identity(size_t drive) const { return identities_[drive]; }
   const FrameCounts& counts() const { return transactions_.counts(); }
   int64_t short_working_counters() const { return short_working_counters_; }
 
  private:
+  void CheckCount();
   void ResetAndAddress();
-  void CheckDrive(size_t drive);
-  void SetUpProcessData(size_t drive);
+  void FindWiring();
+  void FindPositions();
+  void PlaceSlaves();
   void SetUpDistributedClocks();
+  void AwaitClocks();
   void GoOperational();
-  void ExchangeOnce();
+  /// Exchanges process data at the next cycle's time.
+  CycleResult Pace();
   bool Take(const FrameReader& reader, CycleResult* result);
+  bool TakeAcyclic(FrameReader* reader);
+  uint16_t Expected(Exchange exchange) const;
 
   MasterConfig config_;
   ProcessImage image_;
+  SlaveSetup setup_;
   Transactions transactions_;
   Timeouts timeouts_;
   std::vector<SlaveAccess> slaves_;
   std::vector<Identity> identities_;
+  std::vector<int> positions_;      // by slave
+  std::vector<SlavePlace> wiring_;  // by position
+  ClockPlan clocks_;
+  std::unique_ptr<Attendant> attendant_;
   std::vector<DriveOutputs> outputs_;
   std::vector<DriveInputs> inputs_;
 
@@ -90,8 +121,12 @@ class Master {
   std::array<uint8_t, kMaxFrame> received_{};
   Exchange exchange_ = Exchange::kReadWrite;
   uint8_t cyclic_index_ = 0;
-  bool awaited_ = false;  // sent and not yet returned
-  bool operational_ = false, clocks_running_ = false;
+  bool awaited_ = false;             // sent and not yet returned
+  std::optional<Datagram> acyclic_;  // the attendant's, in the frame under way
+  bool operational_ = false;
+  bool trouble_ = false;                   // the last frame was lost, or not all slaves were in OP
+  int64_t next_cycle_ = 0;                 // ns, of Pace()
+  int64_t system_time_ = 0, seen_at_ = 0;  // ns: the reference clock's, and the link's time then
   int64_t short_working_counters_ = 0;
 };
 

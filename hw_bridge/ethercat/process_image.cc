@@ -10,6 +10,8 @@
 namespace poise::ethercat {
 namespace {
 
+constexpr uint32_t kMostBits = 64;
+
 /// Bits of the objects that the bridge knows, by CiA 402; 0: any.
 int StandardBits(uint16_t index) {
   switch (index) {
@@ -32,72 +34,112 @@ int StandardBits(uint16_t index) {
   }
 }
 
-void Require(const std::vector<uint16_t>& needed, std::string_view pdo, const auto& entries,
+void Require(std::initializer_list<uint16_t> needed, std::string_view pdo, const auto& direction,
              const std::string& profile) {
   for (const uint16_t index : needed) {
-    if (std::none_of(entries.begin(), entries.end(),
-                     [index](const auto& entry) { return entry.index == index; })) {
-      throw EthercatError(fmt::format(
-          "drive profile \"{}\": {} lacks object {:04X}, without which no torque is controlled",
-          profile, pdo, index));
-    }
+    if (direction.Find(index) != nullptr) continue;
+    throw EthercatError(
+        fmt::format("drive profile \"{}\": {} lacks object {:04X}, without which no torque is "
+                    "controlled",
+                    profile, pdo, index));
   }
 }
 
 }  // namespace
 
-ProcessImage::Pdo ProcessImage::MakePdo(
-    const google::protobuf::RepeatedPtrField<MappedObject>& objects, uint32_t index,
-    uint16_t assign, const std::string& profile) {
-  const bool rx = assign == object::kRxAssign;
+const ProcessImage::Entry* ProcessImage::Direction::Find(uint16_t index, int subindex) const {
+  const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& entry) {
+    return entry.index == index && (subindex < 0 || entry.subindex == subindex);
+  });
+  return found != entries.end() ? &*found : nullptr;
+}
+
+ProcessImage::Direction ProcessImage::MakeDirection(const DriveProfile& profile, bool rx) {
   const uint32_t base = rx ? 0x1600 : 0x1A00;
-  if (index < base || index > base + 0x1FF) {
-    throw EthercatError(fmt::format("drive profile \"{}\": {}_pdo 0x{:04X} is not in {:04X}-{:04X}",
-                                    profile, rx ? "rx" : "tx", index, base, base + 0x1FF));
-  }
-  Pdo pdo{.index = static_cast<uint16_t>(index), .assign = assign, .entries = {}, .size = 0};
-  for (const MappedObject& object : objects) {
-    const auto object_index = static_cast<uint16_t>(object.index());
-    const int standard = StandardBits(object_index);
+  Direction direction;
+  uint32_t pdo = rx ? profile.rx_pdo() : profile.tx_pdo();
+  for (const MappedObject& object : rx ? profile.rx() : profile.tx()) {
+    if (object.has_pdo()) pdo = object.pdo();
+    if (pdo < base || pdo > base + 0x1FF) {
+      throw EthercatError(
+          fmt::format("drive profile \"{}\": {}_pdo 0x{:04X} is not in {:04X}-{:04X}",
+                      profile.name(), rx ? "rx" : "tx", pdo, base, base + 0x1FF));
+    }
+    const auto index = static_cast<uint16_t>(object.index());
+    const int standard = StandardBits(index);
+    const bool aligned = standard == 0 || direction.bits % 8 == 0;
     if (object.index() > 0xFFFF || object.subindex() > 0xFF || object.bits() == 0 ||
-        object.bits() % 8 != 0 || object.bits() > 32 ||
+        object.bits() > kMostBits || !aligned ||
         (standard != 0 && static_cast<int>(object.bits()) != standard)) {
       throw EthercatError(
           fmt::format("drive profile \"{}\": object {:04X}:{:02X} of {} bits cannot be mapped{}",
-                      profile, object.index(), object.subindex(), object.bits(),
-                      standard != 0 ? fmt::format("; CiA 402 gives it {}", standard)
-                                    : "; give 8, 16, 24 or 32 bits"));
+                      profile.name(), object.index(), object.subindex(), object.bits(),
+                      !aligned        ? "; it must begin with a byte"
+                      : standard != 0 ? fmt::format("; CiA 402 gives it {}", standard)
+                                      : "; give 1 to 64 bits"));
     }
-    pdo.entries.push_back({.index = object_index,
-                           .subindex = static_cast<uint8_t>(object.subindex()),
-                           .bits = static_cast<uint8_t>(object.bits()),
-                           .offset = pdo.size});
-    pdo.size += object.bits() / 8;
+    const auto own = static_cast<uint16_t>(pdo);
+    if (direction.pdos.empty() || direction.pdos.back() != own) direction.pdos.push_back(own);
+    direction.entries.push_back({.index = index,
+                                 .subindex = static_cast<uint8_t>(object.subindex()),
+                                 .bits = static_cast<uint8_t>(object.bits()),
+                                 .bit = direction.bits,
+                                 .pdo = own});
+    direction.bits += object.bits();
   }
-  return pdo;
+  if (direction.bits % 8 != 0) {
+    throw EthercatError(fmt::format(
+        "drive profile \"{}\": {} has {} bits, which are no whole bytes; add a gap (index 0)",
+        profile.name(), rx ? "rx" : "tx", direction.bits));
+  }
+  return direction;
 }
 
-ProcessImage::ProcessImage(const DriveProfile& profile, int num_drives)
-    : rx_(MakePdo(profile.rx(), profile.rx_pdo(), object::kRxAssign, profile.name())),
-      tx_(MakePdo(profile.tx(), profile.tx_pdo(), object::kTxAssign, profile.name())),
-      num_drives_(static_cast<size_t>(num_drives)) {
-  Require(
-      {object::kControlword, object::kModeOfOperation, object::kTargetTorque, object::kMaxTorque},
-      "rx", rx_.entries, profile.name());
-  Require({object::kStatusword, object::kModeDisplay, object::kPosition, object::kTorque}, "tx",
-          tx_.entries, profile.name());
+ProcessImage::ProcessImage(const MasterConfig& config) {
+  const auto add = [this](const DriveProfile& profile) {
+    slaves_.push_back({.rx = MakeDirection(profile, true),
+                       .tx = MakeDirection(profile, false),
+                       .fixed = profile.fixed_mapping()});
+  };
+  for (const DriveConfig& drive : config.drive()) {
+    const DriveProfile& profile = drive.has_profile() ? drive.profile() : config.profile();
+    add(profile);
+    Require({object::kControlword, object::kTargetTorque}, "rx", slaves_.back().rx, profile.name());
+    Require({object::kStatusword, object::kPosition, object::kTorque}, "tx", slaves_.back().tx,
+            profile.name());
+  }
+  for (const OtherSlave& other : config.other()) add(other.profile());
+  for (Slave& slave : slaves_) {
+    slave.outputs_at = outputs_size_;
+    outputs_size_ += slave.rx.size();
+    writes_ += slave.rx.size() > 0 ? 1 : 0;
+    reads_ += slave.tx.size() > 0 ? 1 : 0;
+  }
+  size_ = outputs_size_;
+  for (Slave& slave : slaves_) {
+    slave.inputs_at = size_;
+    size_ += slave.tx.size();
+  }
   // Beside the process data, the cyclic frame has room for the datagrams of AL status and clock.
   constexpr size_t kOthers = 2 * kDatagramOverhead + 2 + 8;
-  if (size() > kMaxDatagramData - kOthers) {
+  constexpr size_t kRoom = kMaxDatagramData - kOthers;
+  if (size() > kRoom) {
     throw EthercatError(
-        fmt::format("{} drives with {} bytes each do not fit one frame; at most {} do", num_drives,
-                    rx_.size + tx_.size, (kMaxDatagramData - kOthers) / (rx_.size + tx_.size)));
+        fmt::format("{} slaves with {} bytes each do not fit one frame; at most {} do",
+                    num_slaves(), size() / num_slaves(), kRoom / (size() / num_slaves())));
   }
 }
 
-void ProcessImage::Put(size_t drive, const DriveOutputs& outputs, std::span<uint8_t> image) const {
-  const std::span<uint8_t> bytes = image.subspan(outputs_at(drive), rx_.size);
-  for (const Entry& entry : rx_.entries) {
+bool ProcessImage::Sends(size_t slave, uint16_t index) const {
+  return slaves_[slave].rx.Find(index) != nullptr;
+}
+bool ProcessImage::Reports(size_t slave, uint16_t index) const {
+  return slaves_[slave].tx.Find(index) != nullptr;
+}
+
+void ProcessImage::Put(size_t slave, const DriveOutputs& outputs, std::span<uint8_t> image) const {
+  const std::span<uint8_t> bytes = image.subspan(outputs_at(slave), outputs_of(slave));
+  for (const Entry& entry : slaves_[slave].rx.entries) {
     int64_t value = 0;
     switch (entry.index) {
       case object::kControlword:
@@ -119,17 +161,19 @@ void ProcessImage::Put(size_t drive, const DriveOutputs& outputs, std::span<uint
         value = outputs.target_velocity;
         break;
       default:
-        break;  // mapped, but nothing the bridge has a value for: zero
+        continue;  // mapped, but nothing the bridge has a value for: it stays zero
     }
-    PutSized(bytes, entry.offset, static_cast<uint64_t>(value), entry.bits / 8U);
+    PutSized(bytes, entry.bit / 8, static_cast<uint64_t>(value), entry.bits / 8U);
   }
 }
 
-DriveInputs ProcessImage::Get(size_t drive, std::span<const uint8_t> image) const {
-  const std::span<const uint8_t> bytes = image.subspan(inputs_at(drive), tx_.size);
+DriveInputs ProcessImage::Get(size_t slave, std::span<const uint8_t> image) const {
+  const std::span<const uint8_t> bytes = image.subspan(inputs_at(slave), inputs_of(slave));
   DriveInputs inputs;
-  for (const Entry& entry : tx_.entries) {
-    const uint64_t value = GetSized(bytes, entry.offset, entry.bits / 8U);
+  inputs.mode = kModeCyclicTorque;
+  for (const Entry& entry : slaves_[slave].tx.entries) {
+    if (StandardBits(entry.index) == 0) continue;
+    const uint64_t value = GetSized(bytes, entry.bit / 8, entry.bits / 8U);
     switch (entry.index) {
       case object::kStatusword:
         inputs.statusword = static_cast<uint16_t>(value);
@@ -153,45 +197,75 @@ DriveInputs ProcessImage::Get(size_t drive, std::span<const uint8_t> image) cons
   return inputs;
 }
 
-void ProcessImage::Configure(SlaveAccess* slave) const {
-  ConfigurePdo(rx_, slave);
-  ConfigurePdo(tx_, slave);
+std::optional<ProcessImage::Place> ProcessImage::FindInput(size_t slave, uint16_t index,
+                                                           uint8_t subindex) const {
+  const Entry* entry = slaves_[slave].tx.Find(index, subindex);
+  if (entry == nullptr) return std::nullopt;
+  return Place{.bit = 8 * inputs_at(slave) + entry->bit, .bits = entry->bits};
 }
 
-void ProcessImage::ConfigurePdo(const Pdo& pdo, SlaveAccess* slave) {
-  if (Mapped(pdo, slave)) return;
+uint64_t ProcessImage::Extract(const Place& place, std::span<const uint8_t> image) {
+  uint64_t value = 0;
+  for (size_t i = 0; i < place.bits; ++i) {
+    const size_t bit = place.bit + i;
+    value |= uint64_t{static_cast<uint8_t>(image[bit / 8] >> (bit % 8) & 1)} << i;
+  }
+  return value;
+}
+
+void ProcessImage::Configure(size_t slave, int outputs, int inputs, SlaveAccess* access) const {
+  const auto assign = [](int manager) { return static_cast<uint16_t>(object::kAssign + manager); };
+  ConfigureDirection(slaves_[slave].rx, assign(outputs), slaves_[slave].fixed, access);
+  ConfigureDirection(slaves_[slave].tx, assign(inputs), slaves_[slave].fixed, access);
+}
+
+void ProcessImage::ConfigureDirection(const Direction& direction, uint16_t assign, bool fixed,
+                                      SlaveAccess* access) {
+  if (direction.entries.empty() || Mapped(direction, assign, access)) return;
   // The order that ETG.1000.6 demands: count 0, entries, count.
-  slave->Download({pdo.assign, 0}, 0, 1);
-  slave->Download({pdo.index, 0}, 0, 1);
-  uint8_t subindex = 0;
-  for (const Entry& entry : pdo.entries) {
-    const uint32_t mapping =
-        uint32_t{entry.index} << 16 | uint32_t{entry.subindex} << 8 | entry.bits;
-    slave->Download({pdo.index, ++subindex}, mapping, 4);
+  access->Download({assign, 0}, 0, 1);
+  if (!fixed) {
+    for (const uint16_t pdo : direction.pdos) {
+      access->Download({pdo, 0}, 0, 1);
+      uint8_t subindex = 0;
+      for (const Entry& entry : direction.entries) {
+        if (entry.pdo != pdo) continue;
+        const uint32_t mapping =
+            uint32_t{entry.index} << 16 | uint32_t{entry.subindex} << 8 | entry.bits;
+        access->Download({pdo, ++subindex}, mapping, 4);
+      }
+      access->Download({pdo, 0}, subindex, 1);
+    }
   }
-  slave->Download({pdo.index, 0}, subindex, 1);
-  slave->Download({pdo.assign, 1}, pdo.index, 2);
-  slave->Download({pdo.assign, 0}, 1, 1);
-  if (!Mapped(pdo, slave)) {
+  uint8_t count = 0;
+  for (const uint16_t pdo : direction.pdos) access->Download({assign, ++count}, pdo, 2);
+  access->Download({assign, 0}, count, 1);
+  if (!Mapped(direction, assign, access)) {
     throw EthercatError(
-        fmt::format("{}: accepts the mapping of PDO {:04X} but does not keep it; does the drive "
-                    "allow that PDO to be mapped?",
-                    slave->Describe(), pdo.index));
+        fmt::format("{}: {} the mapping of PDO {:04X}{}", access->Describe(),
+                    fixed ? "its own mapping is another than" : "accepts", direction.pdos.front(),
+                    fixed ? " in the configuration; `poise drives scan` writes what it has"
+                          : " but does not keep it; does the drive allow that PDO to be mapped?"));
   }
 }
 
-bool ProcessImage::Mapped(const Pdo& pdo, SlaveAccess* slave) {
-  if (slave->Upload({pdo.assign, 0}) != 1 || slave->Upload({pdo.assign, 1}) != pdo.index ||
-      slave->Upload({pdo.index, 0}) != pdo.entries.size()) {
-    return false;
-  }
-  for (size_t i = 0; i < pdo.entries.size(); ++i) {
-    const Entry& entry = pdo.entries[i];
-    const uint32_t mapping = slave->Upload({pdo.index, static_cast<uint8_t>(i + 1)});
-    if (mapping >> 16 != entry.index || (mapping >> 8 & 0xFF) != entry.subindex ||
-        (mapping & 0xFF) != entry.bits) {
-      return false;
+bool ProcessImage::Mapped(const Direction& direction, uint16_t assign, SlaveAccess* access) {
+  if (access->Upload({assign, 0}) != direction.pdos.size()) return false;
+  for (size_t i = 0; i < direction.pdos.size(); ++i) {
+    const uint16_t pdo = direction.pdos[i];
+    if (access->Upload({assign, static_cast<uint8_t>(i + 1)}) != pdo) return false;
+    uint8_t subindex = 0;
+    const uint32_t count = access->Upload({pdo, 0});
+    for (const Entry& entry : direction.entries) {
+      if (entry.pdo != pdo) continue;
+      if (subindex == count) return false;
+      const uint32_t mapping = access->Upload({pdo, ++subindex});
+      if (mapping >> 16 != entry.index || (mapping >> 8 & 0xFF) != entry.subindex ||
+          (mapping & 0xFF) != entry.bits) {
+        return false;
+      }
     }
+    if (subindex != count) return false;
   }
   return true;
 }

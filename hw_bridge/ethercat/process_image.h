@@ -1,8 +1,10 @@
-// ProcessImage: where each mapped object of each drive lies in the cyclic datagram.
+// ProcessImage: where each mapped object of each slave lies in the cyclic datagram.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "hw_bridge/ethercat/ethercat.pb.h"
@@ -27,6 +29,8 @@ inline constexpr uint16_t kTorque = 0x6077;        ///< per mille of rated
 inline constexpr uint16_t kTargetPosition = 0x607A;
 inline constexpr uint16_t kTargetVelocity = 0x60FF;
 inline constexpr uint16_t kSupportedModes = 0x6502;  ///< bit 9: cyclic synchronous torque
+/// PDO assignment of a sync manager: this and its number.
+inline constexpr uint16_t kAssign = 0x1C10;
 inline constexpr uint16_t kRxAssign = 0x1C12, kTxAssign = 0x1C13;
 }  // namespace object
 
@@ -50,49 +54,78 @@ struct DriveInputs {
   int16_t torque = 0;    ///< per mille of rated
 };
 
-/// Outputs of all drives, then inputs of all drives, drive by drive without gaps.
+/// Outputs of all slaves, then inputs of all, slave by slave without gaps: the drives first, in
+/// their order, then the others.
 class ProcessImage {
  public:
-  /// Throws EthercatError: no objects, sizes that do not suit them, an object missing without which
-  /// a drive in cyclic synchronous torque cannot be controlled (6040 6060 6071 6072 and 6041 6061
-  /// 6064 6077), more than one datagram carries.
-  ProcessImage(const DriveProfile& profile, int num_drives);
+  /// Throws EthercatError: sizes that do not suit the objects, an object missing without which a
+  /// drive in cyclic synchronous torque cannot be controlled (6040 6071 and 6041 6064 6077), more
+  /// than one datagram carries.
+  explicit ProcessImage(const MasterConfig& config);
 
-  size_t outputs_per_drive() const { return rx_.size; }
-  size_t inputs_per_drive() const { return tx_.size; }
-  size_t outputs_size() const { return rx_.size * num_drives_; }
-  size_t size() const { return (rx_.size + tx_.size) * num_drives_; }
-  /// Offset of a drive's outputs or inputs in the image.
-  size_t outputs_at(size_t drive) const { return rx_.size * drive; }
-  size_t inputs_at(size_t drive) const { return outputs_size() + tx_.size * drive; }
+  size_t num_slaves() const { return slaves_.size(); }
+  size_t outputs_of(size_t slave) const { return slaves_[slave].rx.size(); }
+  size_t inputs_of(size_t slave) const { return slaves_[slave].tx.size(); }
+  size_t outputs_size() const { return outputs_size_; }
+  size_t size() const { return size_; }
+  /// Offset of a slave's outputs or inputs in the image.
+  size_t outputs_at(size_t slave) const { return slaves_[slave].outputs_at; }
+  size_t inputs_at(size_t slave) const { return slaves_[slave].inputs_at; }
+  /// Working counters of a frame that all slaves take part in.
+  uint16_t expected_read_write() const { return static_cast<uint16_t>(reads_ + 2 * writes_); }
+  uint16_t expected_read() const { return static_cast<uint16_t>(reads_); }
+  uint16_t expected_write() const { return static_cast<uint16_t>(writes_); }
 
-  /// Precondition of both: `image` has size() bytes. Objects that are not mapped are left out.
-  void Put(size_t drive, const DriveOutputs& outputs, std::span<uint8_t> image) const;
-  DriveInputs Get(size_t drive, std::span<const uint8_t> image) const;
+  /// Whether the process data of a slave have an object.
+  bool Sends(size_t slave, uint16_t index) const;
+  bool Reports(size_t slave, uint16_t index) const;
 
-  /// Makes a slave in PRE-OP map these objects, by SDO, and reads back that it does.
-  void Configure(SlaveAccess* slave) const;
+  /// Precondition of all: `image` has size() bytes. Objects that are not mapped are left out; a
+  /// mode that is not reported is the one that was asked for.
+  void Put(size_t slave, const DriveOutputs& outputs, std::span<uint8_t> image) const;
+  DriveInputs Get(size_t slave, std::span<const uint8_t> image) const;
+
+  /// Bit offset in the image and bits of an object that a slave reports.
+  struct Place {
+    size_t bit = 0;
+    uint8_t bits = 0;
+  };
+  std::optional<Place> FindInput(size_t slave, uint16_t index, uint8_t subindex) const;
+  static uint64_t Extract(const Place& place, std::span<const uint8_t> image);
+
+  /// Makes a slave in PRE-OP map these objects to the process data of sync managers `outputs` and
+  /// `inputs`, by SDO, and reads back that it does.
+  void Configure(size_t slave, int outputs, int inputs, SlaveAccess* access) const;
 
  private:
   struct Entry {
     uint16_t index;
     uint8_t subindex;
     uint8_t bits;
-    size_t offset;  // in the PDO, bytes
+    size_t bit;  // offset in the direction's data
+    uint16_t pdo;
   };
-  struct Pdo {
-    uint16_t index = 0, assign = 0;
+  struct Direction {
     std::vector<Entry> entries;
-    size_t size = 0;  // bytes
+    std::vector<uint16_t> pdos;  // assigned, in order
+    size_t bits = 0;
+    size_t size() const { return bits / 8; }
+    const Entry* Find(uint16_t index, int subindex = -1) const;
+  };
+  struct Slave {
+    Direction rx, tx;
+    bool fixed = false;
+    size_t outputs_at = 0, inputs_at = 0;
   };
 
-  static Pdo MakePdo(const google::protobuf::RepeatedPtrField<MappedObject>& objects,
-                     uint32_t index, uint16_t assign, const std::string& profile);
-  static void ConfigurePdo(const Pdo& pdo, SlaveAccess* slave);
-  static bool Mapped(const Pdo& pdo, SlaveAccess* slave);
+  static Direction MakeDirection(const DriveProfile& profile, bool rx);
+  static void ConfigureDirection(const Direction& direction, uint16_t assign, bool fixed,
+                                 SlaveAccess* access);
+  static bool Mapped(const Direction& direction, uint16_t assign, SlaveAccess* access);
 
-  Pdo rx_, tx_;
-  size_t num_drives_;
+  std::vector<Slave> slaves_;
+  size_t outputs_size_ = 0, size_ = 0;
+  int reads_ = 0, writes_ = 0;
 };
 
 }  // namespace poise::ethercat

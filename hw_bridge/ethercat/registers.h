@@ -15,11 +15,18 @@ inline constexpr uint16_t kPortDescriptor = 0x0007;
 inline constexpr uint16_t kFeatures = 0x0008;  ///< bit 2: distributed clocks, bit 3: 64 bits wide
 inline constexpr uint16_t kStationAddress = 0x0010;
 inline constexpr uint16_t kStationAlias = 0x0012;
-inline constexpr uint16_t kDlControl = 0x0100;
+inline constexpr uint16_t kDlControl = 0x0100;     ///< bit 0: frames of other types are destroyed
+inline constexpr uint16_t kLoopControl = 0x0101;   ///< two bits a port, 0: automatic
+inline constexpr uint16_t kAliasControl = 0x0103;  ///< bit 0: the station alias is an address too
 inline constexpr uint16_t kDlStatus = 0x0110;
 inline constexpr uint16_t kAlControl = 0x0120;
 inline constexpr uint16_t kAlStatus = 0x0130;
 inline constexpr uint16_t kAlStatusCode = 0x0134;
+inline constexpr uint16_t kEventMask = 0x0200;      ///< of the event bits in each datagram
+inline constexpr uint16_t kReceiveErrors = 0x0300;  ///< a port: invalid frames, physical errors
+inline constexpr uint16_t kForwardedErrors = 0x0308;
+inline constexpr uint16_t kUnitErrors = 0x030C, kPdiErrors = 0x030D;
+inline constexpr uint16_t kLostLinks = 0x0310;        ///< a byte a port
 inline constexpr uint16_t kWatchdogDivider = 0x0400;  ///< of 25 MHz, minus 2
 inline constexpr uint16_t kWatchdogPdi = 0x0410;
 inline constexpr uint16_t kWatchdogProcessData = 0x0420;  ///< units of the divider
@@ -38,6 +45,8 @@ inline constexpr uint16_t kDcOffset = 0x0920;
 inline constexpr uint16_t kDcDelay = 0x0928;
 inline constexpr uint16_t kDcDifference = 0x092C;  ///< sign and magnitude
 inline constexpr uint16_t kDcSpeedStart = 0x0930;
+inline constexpr uint16_t kDcTimeFilter = 0x0934;
+inline constexpr uint16_t kDcSpeedFilter = 0x0935;
 inline constexpr uint16_t kDcCyclicUnit = 0x0980;
 inline constexpr uint16_t kDcActivation = 0x0981;  ///< bit 0: cyclic unit, bit 1: SYNC0
 inline constexpr uint16_t kDcStart = 0x0990;
@@ -45,6 +54,7 @@ inline constexpr uint16_t kDcSync0Cycle = 0x09A0;
 inline constexpr uint16_t kRam = 0x1000;  ///< start of the process data RAM
 }  // namespace reg
 
+inline constexpr int kNumPorts = 4;
 inline constexpr int kNumFmmus = 8;
 inline constexpr int kNumSyncManagers = 8;
 inline constexpr uint16_t kFmmuSize = 16;
@@ -70,6 +80,8 @@ inline constexpr uint8_t kSmPdiDisable = 0x01;     ///< PDI control byte
 inline constexpr uint8_t kFmmuRead = 0x01;
 inline constexpr uint8_t kFmmuWrite = 0x02;
 
+// EEPROM configuration, 0x0500: whose the EEPROM is.
+inline constexpr uint8_t kEepromMaster = 0x00, kEepromApplication = 0x01, kEepromForce = 0x02;
 inline constexpr uint16_t kEepromReadCommand = 0x0100;
 inline constexpr uint16_t kEepromBusy = 0x8000;
 inline constexpr uint16_t kEepromErrors = 0x7800;
@@ -78,6 +90,7 @@ inline constexpr uint16_t kEeprom8Bytes = 0x0040;
 /// Word addresses in the slave information interface (SII, ETG.2010).
 namespace sii {
 inline constexpr uint16_t kVendor = 0x08, kProduct = 0x0A, kRevision = 0x0C, kSerial = 0x0E;
+inline constexpr uint16_t kAlias = 0x04;
 inline constexpr uint16_t kMailboxOutOffset = 0x18, kMailboxInOffset = 0x1A;  ///< size: next word
 inline constexpr uint16_t kMailboxProtocols = 0x1C;
 inline constexpr uint16_t kProtocolCoe = 0x0004;
@@ -88,7 +101,8 @@ inline constexpr uint16_t kCategoryEnd = 0xFFFF;
 
 enum class AlState : uint8_t { kInit = 1, kPreOp = 2, kBoot = 3, kSafeOp = 4, kOp = 8 };
 inline constexpr uint8_t kAlStateMask = 0x0F;
-inline constexpr uint8_t kAlError = 0x10;  ///< in the status; in the control: acknowledge
+inline constexpr uint8_t kAlIdentification = 0x20;  ///< request and answer of the identification
+inline constexpr uint8_t kAlError = 0x10;           ///< in the status; in the control: acknowledge
 
 /// AL status codes that a drive gives (ETG.1000.6, table 11).
 enum class AlStatusCode : uint16_t {

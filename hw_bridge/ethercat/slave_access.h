@@ -4,9 +4,11 @@
 #include <array>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "hw_bridge/ethercat/bytes.h"
 #include "hw_bridge/ethercat/coe.h"
+#include "hw_bridge/ethercat/links/link.h"
 #include "hw_bridge/ethercat/registers.h"
 #include "hw_bridge/ethercat/transactions.h"
 
@@ -22,8 +24,36 @@ struct MailboxArea {
   uint16_t offset = 0, size = 0;
 };
 
+/// A sync manager as the EEPROM's category 41 has it.
+struct SyncManagerEntry {
+  uint16_t start = 0, length = 0;
+  uint8_t control = 0;
+  uint8_t type = 0;  ///< 1, 2: mailbox out, in; 3, 4: process data out, in; 0: not used or not said
+};
+
 struct Timeouts {
   int64_t eeprom = 0, mailbox = 0, state = 0;  ///< ns
+};
+
+/// A slave's refusal of an SDO, by its code.
+class SdoAbortError : public EthercatError {
+ public:
+  SdoAbortError(const std::string& what, uint32_t code) : EthercatError(what), code_(code) {}
+  uint32_t code() const { return code_; }
+
+ private:
+  uint32_t code_;
+};
+
+/// What SDO information says of an object.
+struct ObjectDescription {
+  uint16_t index = 0, data_type = 0;
+  uint8_t max_subindex = 0, code = 0;  ///< 7: a variable, 8: an array, 9: a record
+  std::string name;
+};
+struct EntryDescription {
+  uint16_t data_type = 0, bits = 0, access = 0;
+  std::string name;
 };
 
 /// Acyclic access to one slave. Everything that fails throws EthercatError naming the slave, what
@@ -33,6 +63,12 @@ class SlaveAccess {
   SlaveAccess(Transactions* transactions, const Timeouts& timeouts, int position, uint16_t station)
       : transactions_(transactions), timeouts_(timeouts), position_(position), station_(station) {}
 
+  /// The same slave, with all that is known of it, through other transactions.
+  SlaveAccess Through(Transactions* transactions) const {
+    SlaveAccess other = *this;
+    other.transactions_ = transactions;
+    return other;
+  }
   void set_name(std::string name) { name_ = std::move(name); }
   /// "slave 3 (station 1003, left_knee_pitch)"
   std::string Describe() const;
@@ -53,11 +89,16 @@ class SlaveAccess {
     Write(address, bytes);
   }
 
-  /// A 32-bit value of the EEPROM at a word address.
+  /// A 32-bit value of the EEPROM at a word address. Takes the EEPROM from the slave's application.
   uint32_t ReadEeprom(uint16_t word);
+  /// Hands the EEPROM over to the slave's application, which may need it on its way to PRE-OP.
+  void ReleaseEeprom();
   Identity ReadIdentity();
-  /// Start addresses of the sync managers by number, from the EEPROM; 0 where it has none.
-  std::array<uint16_t, kNumSyncManagers> ReadSyncManagerAddresses();
+  /// By number, from the EEPROM; all zero where it has none.
+  std::array<SyncManagerEntry, kNumSyncManagers> ReadSyncManagers();
+  /// The number that the slave gives when it is asked for its identification (ETG.1020: AL control
+  /// bit 5, answered in the AL status code); nullopt: it has none. In INIT or PRE-OP.
+  std::optional<uint16_t> ReadIdentification();
 
   struct AlStatus {
     AlState state = AlState::kInit;
@@ -67,8 +108,18 @@ class SlaveAccess {
   AlStatus ReadAlStatus();
   /// "SAFE-OP with error 0x001B (sync manager watchdog)"
   static std::string Text(const AlStatus& status);
-  /// Requests a state (acknowledging an error first) without waiting for it.
-  void RequestState(AlState state);
+  /// Requests a state without waiting for it. An error is acknowledged first, and the request
+  /// follows once the slave has taken the acknowledgement back; `meanwhile` runs between looks.
+  template <class Meanwhile>
+  void RequestState(AlState state, Meanwhile meanwhile) {
+    const int64_t deadline = Now() + timeouts_.state;
+    while (!TryRequest(state, deadline)) meanwhile();
+  }
+  void RequestState(AlState state) {
+    RequestState(state, [this] { Pause(); });
+  }
+  /// Waits for INIT from whatever state, for which an error from before is no obstacle.
+  void AwaitInit();
   /// Waits for the state; `meanwhile` runs between looks. Throws with the AL status code's name
   /// when the slave refuses, or at the timeout.
   template <class Meanwhile>
@@ -83,24 +134,48 @@ class SlaveAccess {
     AwaitState(state, [this] { Pause(); });
   }
 
-  /// Prepares SDO transfers: reads where the mailboxes are from the EEPROM and sets the sync
-  /// managers 0 and 1.
-  void SetUpMailbox();
-  /// The object's value and, when asked for, its size in bytes (1 to 4).
+  /// Reads where the mailboxes are from the EEPROM and sets the sync managers 0 and 1. False, and
+  /// nothing is set: the slave has no CoE.
+  bool SetUpMailbox();
+  bool has_mailbox() const { return out_.size != 0; }
+  /// The object's value and, when asked for, its size in bytes (1 to 4), by whatever transfer the
+  /// slave chooses.
   uint32_t Upload(ObjectAddress object, uint8_t* size = nullptr);
+  /// The object's bytes. `complete`: those of all subindices from `object.subindex` (0 or 1) on.
+  std::vector<uint8_t> UploadBytes(ObjectAddress object, bool complete = false);
   /// `size`: 1 to 4 bytes.
   void Download(ObjectAddress object, uint32_t value, uint8_t size);
+  /// Expedited, normal or segmented, as `data` are long. Precondition: not empty.
+  void DownloadBytes(ObjectAddress object, std::span<const uint8_t> data, bool complete = false);
+  /// SDO information: the indices of all objects (`list` 1), of those that can be mapped (2, 3).
+  std::vector<uint16_t> ListObjects(uint16_t list = 1);
+  ObjectDescription DescribeObject(uint16_t index);
+  EntryDescription DescribeEntry(ObjectAddress object);
+  /// Takes a message that waits in the mailbox, if there is one, without waiting for any.
+  void PollMailbox();
   /// The last emergency message met in the mailbox; code 0: none.
   const Emergency& last_emergency() const { return emergency_; }
+  int64_t emergencies() const { return emergencies_; }
 
  private:
   int64_t Now() const { return transactions_->link()->Now(); }
   bool StateReached(AlState state, int64_t deadline);
+  bool TryRequest(AlState state, int64_t deadline);
+  /// False: the slave has not yet taken what was written there before.
+  bool WriteAlControl(uint8_t control);
   /// Waits until the EEPROM is not busy; the error bits it then shows.
   uint16_t AwaitEeprom(uint16_t word);
-  Sdo Exchange(const Sdo& request);
+  /// Sends a request and waits for its answer, which points into received_. Throws SdoAbortError.
+  Sdo Exchange(const Sdo& request, const std::string& what);
+  /// The next CoE message that is no emergency, which is kept.
+  CoeMessage ReceiveCoe(int64_t deadline, const std::string& what);
+  /// Header and payload of all fragments of the answer to an information request.
+  std::vector<uint8_t> ExchangeInfo(InfoOpcode request, std::span<const uint8_t> data,
+                                    const std::string& what);
+  /// What the mailbox holds, when it is CoE and new; an emergency is kept and none is returned.
+  std::optional<CoeMessage> TakeReceived(const std::string& what);
   void SendMailbox(std::span<uint8_t> mailbox, int64_t deadline, const std::string& what);
-  void ReceiveMailbox(std::span<uint8_t> mailbox, int64_t deadline, const std::string& what);
+  void ReceiveMailbox(int64_t deadline, const std::string& what);
   [[noreturn]] void Fail(const std::string& problem) const;
 
   Transactions* transactions_;
@@ -112,7 +187,10 @@ class SlaveAccess {
   uint8_t mailbox_counter_ = 0;
   uint8_t received_counter_ = 0;  // the slave's, of the last message; a repetition has the same
   bool repeat_ = false;           // the repeat request's toggle
+  bool owns_eeprom_ = false, acknowledged_ = false;
+  std::vector<uint8_t> received_;  // the mailbox as read last
   Emergency emergency_;
+  int64_t emergencies_ = 0;
 };
 
 }  // namespace poise::ethercat

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int32_t kNotANumber = std::numeric_limits<int32_t>::min();
 constexpr double kStepsPerSpan = 1 << 20;
+constexpr double kBoundStepsPerSpan = 1 << 12;
 constexpr double kLargest = 1 << 30;
 constexpr double kOutliers = 0.005;  // at each end
 constexpr int kMaxOrder = 2;
@@ -24,7 +25,7 @@ double PowerOfTwoBelow(double x) {
   return std::exp2(std::floor(std::log2(x)));
 }
 
-double Step(std::span<const double> values, bool integer) {
+double Step(std::span<const double> values, bool integer, double steps_per_span) {
   std::vector<double> finite;
   finite.reserve(values.size());
   std::ranges::copy_if(values, std::back_inserter(finite),
@@ -40,16 +41,17 @@ double Step(std::span<const double> values, bool integer) {
       return finite[static_cast<size_t>(i)];
     };
     // Divided first: a difference of the largest numbers would be infinite.
-    const double span = at(1 - kOutliers) / kStepsPerSpan - at(kOutliers) / kStepsPerSpan;
-    step = PowerOfTwoBelow(span > 0 ? span : largest / kStepsPerSpan);
+    const double span = at(1 - kOutliers) / steps_per_span - at(kOutliers) / steps_per_span;
+    step = PowerOfTwoBelow(span > 0 ? span : largest / steps_per_span);
   }
   return std::max(step, 2 * PowerOfTwoBelow(largest / kLargest));
 }
 
-std::vector<uint32_t> Quantise(std::span<const double> values, double step) {
+std::vector<uint32_t> Quantise(std::span<const double> values, double step,
+                               double (*round)(double)) {
   std::vector<uint32_t> result(values.size());
-  std::ranges::transform(values, result.begin(), [step](double x) {
-    return std::bit_cast<uint32_t>(std::isfinite(x) ? static_cast<int32_t>(std::llround(x / step))
+  std::ranges::transform(values, result.begin(), [step, round](double x) {
+    return std::bit_cast<uint32_t>(std::isfinite(x) ? static_cast<int32_t>(round(x / step))
                                                     : kNotANumber);
   });
   return result;
@@ -103,12 +105,9 @@ std::string Base64(const std::vector<uint8_t>& bytes) {
   return text;
 }
 
-}  // namespace
-
-PackedColumn PackColumn(std::span<const double> values, bool integer) {
+PackedColumn Pack(std::vector<uint32_t> best, double step) {
   PackedColumn column;
-  column.step = Step(values, integer);
-  std::vector<uint32_t> best = Quantise(values, column.step);
+  column.step = step;
   int64_t best_cost = Cost(best);
   std::vector<uint32_t> differences = best;
   for (int order = 1; order <= kMaxOrder; ++order) {
@@ -121,6 +120,22 @@ PackedColumn PackColumn(std::span<const double> values, bool integer) {
   }
   column.data = Base64(Deflate(Planes(best)));
   return column;
+}
+
+}  // namespace
+
+PackedColumn PackColumn(std::span<const double> values, bool integer) {
+  const double step = Step(values, integer, kStepsPerSpan);
+  return Pack(Quantise(values, step, [](double x) { return std::round(x); }), step);
+}
+
+PackedColumn PackBound(std::span<const double> values, Bound bound, bool integer) {
+  // A step that is a power of two divides without a rounding error.
+  const double step = Step(values, integer, kBoundStepsPerSpan);
+  const auto down = [](double x) { return std::floor(x); };
+  const auto up = [](double x) { return std::ceil(x); };
+  return Pack(bound == Bound::kLeast ? Quantise(values, step, down) : Quantise(values, step, up),
+              step);
 }
 
 }  // namespace poise::logging

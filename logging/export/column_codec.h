@@ -21,4 +21,9 @@ struct PackedColumn {
 /// largest value would not fit into 31 bits. Throws std::runtime_error when zlib does.
 PackedColumn PackColumn(std::span<const double> values, bool integer);
 
+/// A bound of values, rounded away from them: no value lies beyond it. The step is coarser, 2^-12
+/// of the span that 99 % of the bounds take.
+enum class Bound { kLeast, kLargest };
+PackedColumn PackBound(std::span<const double> values, Bound bound, bool integer);
+
 }  // namespace poise::logging

@@ -15,6 +15,7 @@
 #include "lcmtypes/field_table.h"
 #include "logging/export/log_export.h"
 #include "logging/log_messages.h"
+#include "logging/paged_file.h"
 #include "logging/partial_file.h"
 
 namespace poise::logging {
@@ -185,6 +186,67 @@ class Results {
   std::vector<ExportedChannel> channels_;
 };
 
+/// Where the messages of each tick stand in a log, in memory that does not grow with ticks that
+/// come one after the other.
+class TickPlaces {
+ public:
+  struct Place {
+    uint64_t offset = 0;  // of the data, + 1; 0: none
+    uint64_t size = 0;
+  };
+
+  /// `width`: places a tick.
+  explicit TickPlaces(size_t width) : width_(width), places_(PagedFile::Scratch()) {}
+
+  Place Get(uint64_t row, size_t column) {
+    Place place;
+    std::memcpy(&place, places_->At(At(row, column)), sizeof(place));
+    return place;
+  }
+  void Set(uint64_t row, size_t column, const Place& place) {
+    std::memcpy(places_->Writable(At(row, column)), &place, sizeof(place));
+  }
+  /// The row of a tick, which is made when there is none.
+  uint64_t RowOf(int64_t tick) {
+    auto after = runs_.upper_bound(tick);
+    if (after != runs_.begin()) {
+      Run& run = std::prev(after)->second;
+      const uint64_t ahead =
+          static_cast<uint64_t>(tick) - static_cast<uint64_t>(std::prev(after)->first);
+      if (ahead < run.count) return run.row + ahead;
+      if (ahead == run.count && run.row + run.count == rows_) {
+        ++run.count;
+        return NewRow();
+      }
+    }
+    runs_[tick] = {rows_, 1};
+    return NewRow();
+  }
+  /// Calls visit(tick, row) by ascending tick.
+  template <class Visit>
+  void ForEach(const Visit& visit) const {
+    for (const auto& [first, run] : runs_) {
+      for (uint64_t i = 0; i < run.count; ++i) visit(first + static_cast<int64_t>(i), run.row + i);
+    }
+  }
+
+ private:
+  struct Run {
+    uint64_t row = 0;
+    uint64_t count = 0;
+  };
+  uint64_t At(uint64_t row, size_t column) const { return (row * width_ + column) * sizeof(Place); }
+  uint64_t NewRow() {
+    places_->Resize(At(rows_ + 1, 0));
+    return rows_++;
+  }
+
+  size_t width_;
+  std::unique_ptr<PagedFile> places_;
+  std::map<int64_t, Run> runs_;  // by first tick
+  uint64_t rows_ = 0;
+};
+
 }  // namespace
 
 std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string& folder) {
@@ -271,7 +333,7 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
   for (const Channel& channel : messages.spec().graph().channel()) {
     if (!channel.external()) add(channel.name(), channel.type());
   }
-  std::map<int64_t, std::vector<std::span<const uint8_t>>> ticks;  // spans into the reader's file
+  TickPlaces places(messages.run_known() ? std::max<size_t>(columns.size(), 1) : kMostChannels);
   LogEvent event;
   while (messages.reader().Next(&event)) {
     const MessageType* const type = messages.TypeOf(event);
@@ -296,34 +358,37 @@ std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::
       column.width = AppendNames(*type, event.data, messages.names(),
                                  std::string(event.channel) + ".", &column.names, &units);
     }
-    auto& cells = ticks[LogMessages::Tick(*type, event)];
-    cells.resize(columns.size());
-    std::span<const uint8_t>& cell = cells[found->second];
-    ++(cell.empty() ? result.messages : result.refused);
-    if (cell.empty()) cell = event.data;
+    const uint64_t row = places.RowOf(LogMessages::Tick(*type, event));
+    const bool first = places.Get(row, found->second).offset == 0;
+    ++(first ? result.messages : result.refused);
+    if (first) {
+      places.Set(row, found->second,
+                 {static_cast<uint64_t>(event.data.data() - messages.reader().bytes()) + 1,
+                  event.data.size()});
+    }
   }
   const int64_t lead = LeadTime(messages);
   File out(file);
   std::string row = "time,tick";
   for (const Column& column : columns) row += column.names;
   out.Write(row + "\n");
-  for (const auto& [tick, cells] : ticks) {
+  PagedFile bytes(log);
+  places.ForEach([&](int64_t tick, uint64_t at) {
     row.clear();
-    for (size_t i = 0; i < cells.size(); ++i) {
-      if (cells[i].empty()) continue;
-      const int offset = columns[i].shape->type->run_id_offset;
-      row = TimeAndTick(ReadInt64(cells[i].data() + offset + 16) - lead, tick);
-      break;
-    }
+    std::string cells;
     for (size_t i = 0; i < columns.size(); ++i) {
-      if (i >= cells.size() || cells[i].empty()) {
-        row.append(columns[i].width, ',');
-      } else {
-        AppendValues(*columns[i].shape->type, cells[i], &row);
+      const TickPlaces::Place place = places.Get(at, i);
+      if (place.offset == 0) {
+        cells.append(columns[i].width, ',');
+        continue;
       }
+      const uint8_t* const begin = bytes.At(place.offset - 1);
+      const MessageType& type = *columns[i].shape->type;
+      if (row.empty()) row = TimeAndTick(ReadInt64(begin + type.run_id_offset + 16) - lead, tick);
+      AppendValues(type, {begin, place.size}, &cells);
     }
-    out.Write(row + "\n");
-  }
+    out.Write(row + cells + "\n");
+  });
   File units_file(fs::path(file).replace_extension(kUnitsFile).string());
   WriteUnits(units, &units_file);
   out.Close();

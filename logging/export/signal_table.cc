@@ -40,10 +40,65 @@ class ColumnAppender : public ScalarVisitor {
   size_t next_ = 0;
 };
 
+/// Puts one message's scalars into the rows of its channel.
+class RowFiller : public ScalarVisitor {
+ public:
+  RowFiller(const MessageType* type, const PageRows* rows) : type_(type), rows_(rows) {}
+
+  void Integer(std::string_view path, int64_t value) override {
+    if (IsSignal(*type_, path)) Put(path, true, static_cast<double>(value));
+  }
+  void Real(std::string_view path, double value) override { Put(path, false, value); }
+  void Text(std::string_view, std::string_view) override {}
+
+  /// The row of the message that comes. False: it has none.
+  bool BeginMessage(int64_t tick) {
+    int64_t stride = 0;
+    const int64_t row = rows_->RowOf(tick, &stride);
+    row_ = static_cast<size_t>(row);
+    next_ = 0;
+    return row >= 0;
+  }
+  std::vector<RowColumn>& columns() { return columns_; }
+
+ private:
+  void Put(std::string_view path, bool integer, double value) {
+    if (next_ == columns_.size()) {
+      const std::vector<double> none(static_cast<size_t>(rows_->size()), std::nan(""));
+      columns_.push_back({std::string(path), integer, none, {}, {}});
+      if (!rows_->every_tick()) columns_.back().least = columns_.back().largest = none;
+    }
+    RowColumn& column = columns_[next_++];
+    if (std::isnan(column.values[row_])) column.values[row_] = value;
+    if (column.least.empty()) return;
+    column.least[row_] = std::fmin(column.least[row_], value);
+    column.largest[row_] = std::fmax(column.largest[row_], value);
+  }
+
+  const MessageType* type_;
+  const PageRows* rows_;
+  std::vector<RowColumn> columns_;
+  size_t row_ = 0;
+  size_t next_ = 0;
+};
+
+struct RowLane {
+  const MessageType* type = nullptr;
+  RowFiller filler;
+  int64_t messages = 0;
+  std::vector<bool> seen;  ///< by tick
+
+  /// False: the tick has a message already.
+  bool Take(int64_t tick) {
+    const auto i = static_cast<size_t>(tick);
+    if (i >= seen.size()) seen.resize(i + 1);
+    if (seen[i]) return false;
+    return seen[i] = true;
+  }
+};
+
 struct ColumnLane {
   const MessageType* type;
-  std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded
-  bool external = false;
   ColumnAppender appender;
   std::vector<int64_t> ticks;
   std::vector<bool> seen;  ///< by tick
@@ -59,6 +114,82 @@ struct ColumnLane {
     if (static_cast<size_t>(tick) >= seen.size()) seen.resize(static_cast<size_t>(tick) + 1);
     seen[static_cast<size_t>(tick)] = true;
   }
+};
+
+/// Goes through a log's messages that columns are made of.
+class ColumnSource {
+ public:
+  ColumnSource(const std::string& path, const RunRecord& run) : run_(run), reader_(path) {
+    for (const Channel& channel : run.spec.graph().channel()) {
+      const MessageType* type = FindMessageType(channel.type());
+      const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+      lanes_.try_emplace(
+          channel.name(),
+          Lane{order_.size(), type,
+               PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)), counts,
+                            run.spec.run_id()),
+               channel.external()});
+      order_.push_back(channel.name());
+    }
+  }
+
+  /// The next message, of channel `*index` of names(), of a tick of the run. False at the end.
+  bool Next(size_t* index, const MessageType** type, int64_t* tick,
+            std::span<const uint8_t>* data) {
+    LogEvent event;
+    while (reader_.Next(&event)) {
+      auto found = lanes_.find(event.channel);
+      if (found == lanes_.end()) {
+        if (!event.channel.starts_with("HEALTH_")) continue;
+        found = lanes_
+                    .try_emplace(std::string(event.channel),
+                                 Lane{order_.size(), FindMessageType("health_t"), {}, false})
+                    .first;
+        order_.emplace_back(event.channel);
+      }
+      const Lane& lane = found->second;
+      const std::optional<int64_t> at = TickOf(lane, event);
+      if (!at || *at < 0 || *at >= run_.num_ticks) continue;
+      *index = lane.index;
+      *type = lane.type;
+      *tick = *at;
+      *data = event.data;
+      return true;
+    }
+    return false;
+  }
+  const std::vector<std::string>& names() const { return order_; }
+
+ private:
+  struct Lane {
+    size_t index;
+    const MessageType* type;
+    std::optional<PacketFilter> filter;  ///< none: HEALTH_*, checked as it is decoded
+    bool external;
+  };
+
+  std::optional<int64_t> TickOf(const Lane& lane, const LogEvent& event) const {
+    if (!lane.filter) {
+      health_t message;
+      if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &message) ||
+          message.run_id != run_.spec.run_id()) {
+        return {};
+      }
+      return message.tick;
+    }
+    if (lane.filter->Check(event.data.data(), event.data.size(), 0, run_.num_ticks - 1) !=
+        PacketVerdict::kAccepted) {
+      return {};
+    }
+    if (!lane.external) return lane.filter->tick(event.data.data());
+    return static_cast<int64_t>(
+        std::llround(static_cast<double>(event.utime) * 1e-6 / run_.spec.tick_period()));
+  }
+
+  const RunRecord& run_;
+  LogReader reader_;
+  std::map<std::string, Lane, std::less<>> lanes_;
+  std::vector<std::string> order_;
 };
 
 /// By ascending tick.
@@ -84,66 +215,50 @@ bool IsSignal(const MessageType& type, std::string_view path) {
 }
 
 std::vector<ChannelColumns> ReadColumns(const std::string& path, const RunRecord& run) {
-  LogReader reader(path);
-  std::map<std::string, ColumnLane, std::less<>> lanes;
-  std::vector<std::string> order;
-  for (const Channel& channel : run.spec.graph().channel()) {
-    const MessageType* type = FindMessageType(channel.type());
-    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
-    lanes.try_emplace(
-        channel.name(),
-        ColumnLane{type,
-                   PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)),
-                                counts, run.spec.run_id()),
-                   channel.external(),
-                   ColumnAppender(type),
-                   {},
-                   {}});
-    order.push_back(channel.name());
+  ColumnSource source(path, run);
+  std::vector<std::optional<ColumnLane>> lanes;
+  size_t index = 0;
+  const MessageType* type = nullptr;
+  int64_t tick = 0;
+  std::span<const uint8_t> data;
+  while (source.Next(&index, &type, &tick, &data)) {
+    if (index >= lanes.size()) lanes.resize(index + 1);
+    std::optional<ColumnLane>& lane = lanes[index];
+    if (!lane) lane.emplace(ColumnLane{type, ColumnAppender(type), {}, {}});
+    if (!lane->Seen(tick)) lane->Append(tick, data);
   }
-  const MessageType* const health = FindMessageType("health_t");
-  LogEvent event;
-  while (reader.Next(&event)) {
-    auto found = lanes.find(event.channel);
-    if (found == lanes.end()) {
-      if (!event.channel.starts_with("HEALTH_")) continue;
-      order.emplace_back(event.channel);
-      found = lanes
-                  .try_emplace(order.back(),
-                               ColumnLane{health, {}, false, ColumnAppender(health), {}, {}})
-                  .first;
-    }
-    ColumnLane& lane = found->second;
-    int64_t tick = 0;
-    if (lane.filter) {
-      if (lane.filter->Check(event.data.data(), event.data.size(), 0, run.num_ticks - 1) !=
-          PacketVerdict::kAccepted) {
-        continue;
-      }
-      tick = lane.filter->tick(event.data.data());
-    } else {
-      health_t message;
-      if (!DecodeChecked(event.data.data(), static_cast<int64_t>(event.data.size()), &message) ||
-          message.run_id != run.spec.run_id() || message.tick < 0 ||
-          message.tick >= run.num_ticks) {
-        continue;
-      }
-      tick = message.tick;
-    }
-    if (lane.external) {
-      tick = static_cast<int64_t>(
-          std::llround(static_cast<double>(event.utime) * 1e-6 / run.spec.tick_period()));
-    }
-    if (tick >= 0 && tick < run.num_ticks && !lane.Seen(tick)) lane.Append(tick, event.data);
-  }
-
   std::vector<ChannelColumns> channels;
-  for (const std::string& name : order) {
-    ColumnLane& lane = lanes.find(name)->second;
-    if (lane.ticks.empty()) continue;
-    channels.push_back(
-        {name, lane.type->name, std::move(lane.ticks), std::move(lane.appender.columns())});
+  for (size_t i = 0; i < lanes.size(); ++i) {
+    if (!lanes[i] || lanes[i]->ticks.empty()) continue;
+    channels.push_back({source.names()[i], lanes[i]->type->name, std::move(lanes[i]->ticks),
+                        std::move(lanes[i]->appender.columns())});
     Sort(&channels.back());
+  }
+  return channels;
+}
+
+std::vector<ChannelRows> ReadRows(const std::string& path, const RunRecord& run,
+                                  const PageRows& rows) {
+  ColumnSource source(path, run);
+  std::vector<std::optional<RowLane>> lanes;
+  size_t index = 0;
+  const MessageType* type = nullptr;
+  int64_t tick = 0;
+  std::span<const uint8_t> data;
+  while (source.Next(&index, &type, &tick, &data)) {
+    if (index >= lanes.size()) lanes.resize(index + 1);
+    std::optional<RowLane>& lane = lanes[index];
+    if (!lane) lane.emplace(RowLane{type, RowFiller(type, &rows), 0, {}});
+    if (!lane->filler.BeginMessage(tick) || !lane->Take(tick)) continue;
+    if (type->visit(data.data(), static_cast<int64_t>(data.size()), &lane->filler)) {
+      ++lane->messages;
+    }
+  }
+  std::vector<ChannelRows> channels;
+  for (size_t i = 0; i < lanes.size(); ++i) {
+    if (!lanes[i] || lanes[i]->messages == 0) continue;
+    channels.push_back({source.names()[i], lanes[i]->type->name, lanes[i]->messages,
+                        std::move(lanes[i]->filler.columns())});
   }
   return channels;
 }

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "logging/export/page_rows.h"
 #include "logging/run_record.h"
 #include "poise/message_traits.hpp"
 
@@ -30,6 +31,28 @@ struct ChannelColumns {
   std::vector<int64_t> ticks;
   std::vector<SignalColumn> columns;
 };
+
+/// One scalar field by row.
+struct RowColumn {
+  std::string field;
+  bool integer = false;
+  std::vector<double> values;  ///< of a row's first message; NaN: the row has none
+  /// Least and largest of all the row's messages; empty where each row is a tick.
+  std::vector<double> least;
+  std::vector<double> largest;
+};
+
+struct ChannelRows {
+  std::string name;
+  std::string type;
+  int64_t messages = 0;
+  std::vector<RowColumn> columns;
+};
+
+/// The same channels as ReadColumns, by row: memory grows with the rows and not with the log.
+/// Throws LogError.
+std::vector<ChannelRows> ReadRows(const std::string& path, const RunRecord& run,
+                                  const PageRows& rows);
 
 /// Columns of the log's channels, those of the graph first, then HEALTH_*; a channel without
 /// messages is left out. Counts, run_id, tick and texts are no columns. Of two messages of a tick

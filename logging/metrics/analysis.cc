@@ -84,6 +84,18 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
   return result;
 }
 
+std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, size_t foot,
+                                                       int64_t tick) {
+  const robot_state_t* state = run.state.at(tick);
+  if (state != nullptr && foot < state->foot_wrench_source.size() &&
+      state->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER) {
+    return GetWrench(state->foot_wrench[foot]);
+  }
+  const robot_sensors_t* sensors = run.sensors.at(tick);
+  if (sensors == nullptr) return {};
+  return GetWrench(sensors->foot_wrench[foot]);
+}
+
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
   const robot_sensors_t* sensors = run.sensors.at(tick);
   const support_plan_t* plan = run.plan.at(tick - 1);
@@ -95,7 +107,7 @@ std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
     if (!InContact(*plan, foot)) continue;
     const auto f = static_cast<size_t>(foot);
     resultant += balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) *
-                 GetWrench(sensors->foot_wrench[f]);
+                 *KnownWrench(run, f, tick);
   }
   if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
   return balance::CenterOfPressure(resultant);
@@ -109,7 +121,7 @@ std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int
   if (sensors == nullptr || plan == nullptr || command == nullptr) return {};
   if (!InContact(*plan, foot)) return {};
   const auto f = static_cast<size_t>(foot);
-  return GetWrench(sensors->foot_wrench[f]) - GetWrench(command->foot_wrench[f]);
+  return *KnownWrench(run, f, tick) - GetWrench(command->foot_wrench[f]);
 }
 
 Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {

@@ -39,6 +39,11 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run);
 /// the soles' poses are those of the tick before.
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick);
 
+/// The foot's wrench at `tick` as the controller knows it, robot on environment, sole frame: the
+/// sensor's reading, or the observer's where there is no good sensor. Empty without either.
+std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, size_t foot,
+                                                       int64_t tick);
+
 /// Reading at `tick` less the wrench computed for it (the tick before), robot on environment, sole
 /// frame; empty for a foot out of contact.
 std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,

@@ -124,7 +124,12 @@ std::optional<bool> ContactLost(const RunRecord& run, size_t foot, int64_t tick)
   if (command == nullptr || sensors == nullptr || command->in_contact[foot] == 0) return {};
   const double weight = run.robot.total_mass() * robot::kGravity;
   if (-command->foot_wrench[foot].force[2] < kLoadedShare * weight) return {};
-  return -sensors->foot_wrench[foot].force[2] <= kNoiseDeviations * run.robot.force_noise();
+  const robot_state_t* state = run.state.at(tick);
+  const bool observed = state != nullptr && foot < state->foot_wrench_source.size() &&
+                        state->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER;
+  const double noise = observed ? state->foot_wrench_deviation[foot].force[2]
+                                : kNoiseDeviations * run.robot.force_noise();
+  return -(*KnownWrench(run, foot, tick))[2] <= noise;
 }
 
 std::vector<Interval> Intervals(const RunRecord& run,

@@ -190,6 +190,36 @@ void AddFeet(const RunRecord& run, bool ended, EventList* events) {
   }
 }
 
+const char* SensorFaultText(int8_t state) {
+  switch (state) {
+    case estimator_status_t::SENSOR_INVALID:
+      return "gives no valid reading";
+    case estimator_status_t::SENSOR_DEAD:
+      return "reads zero";
+    case estimator_status_t::SENSOR_FROZEN:
+      return "reads the same all the time";
+    case estimator_status_t::SENSOR_BIASED:
+      return "differs from what the joints' torques show";
+    default:
+      return nullptr;
+  }
+}
+
+void AddFootSensors(const RunRecord& run, EventList* events) {
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto broken = [&](int64_t tick) -> std::optional<bool> {
+      const estimator_status_t* status = run.estimator.at(tick);
+      if (status == nullptr) return {};
+      return SensorFaultText(status->foot_sensor[foot]) != nullptr;
+    };
+    events->AddIntervals(
+        Intervals(run, broken), "foot_sensor_fault", "foot_sensor_back", [&](int64_t tick) {
+          return fmt::format("{}: its sensor {}; its wrench is observed", FootName(run, foot),
+                             SensorFaultText(run.estimator.at(tick)->foot_sensor[foot]));
+        });
+  }
+}
+
 void AddBalancing(const RunRecord& run, EventList* events) {
   for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
     const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
@@ -246,6 +276,51 @@ void AddCapturePoint(const RunRecord& run, EventList* events) {
                             plan.step_position[0], plan.step_position[1], plan.step_time,
                             -kMilli * plan.capture_margin));
     events->AddEndOf(interval, "step_needed_ends", "capture point inside the soles again");
+  }
+}
+
+const char* StepReason(int8_t reason) {
+  switch (reason) {
+    case support_plan_t::REASON_PERSISTENT:
+      return "the capture point stays beyond the soles";
+    case support_plan_t::REASON_SURE:
+      return "the capture point is farther beyond the soles than balancing brings back";
+    case support_plan_t::REASON_DEADLINE:
+      return "later the foothold would be out of reach";
+    case support_plan_t::REASON_AGAIN:
+      return "the step before did not catch the capture point";
+    case support_plan_t::REASON_WALK:
+      return "the robot walks";
+    case support_plan_t::REASON_TOGETHER:
+      return "the feet are put side by side";
+    default:
+      return "no reason";
+  }
+}
+
+void AddSteps(const RunRecord& run, EventList* events) {
+  const support_plan_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    if (before != nullptr && plan->num_steps > before->num_steps && plan->step_foot >= 0) {
+      events->Add(
+          tick, "step_begins",
+          fmt::format("{} to ({:.2f}, {:.2f}) m in {:.2f} s: {}",
+                      FootName(run, static_cast<size_t>(plan->step_foot)), plan->foothold[0],
+                      plan->foothold[1], plan->touch_down_time, StepReason(plan->step_reason)));
+    }
+    if (before != nullptr && plan->stepping != before->stepping) {
+      if (plan->stepping == support_plan_t::STEPPING_LOADING) {
+        events->Add(tick, "step_lands",
+                    fmt::format("{}; capture point {:.1f} mm inside the soles",
+                                FootName(run, static_cast<size_t>(plan->step_foot)),
+                                kMilli * plan->capture_margin));
+      } else if (plan->stepping == support_plan_t::STEPPING_NONE) {
+        events->Add(tick, "step_rests", "the COM is at rest between the feet");
+      }
+    }
+    before = plan;
   }
 }
 
@@ -446,8 +521,10 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddTransitions(run, &events);
   AddWaiting(run, &events);
   AddFeet(run, ended, &events);
+  AddFootSensors(run, &events);
   AddBalancing(run, &events);
   AddCapturePoint(run, &events);
+  AddSteps(run, &events);
   AddBridge(run, &events);
   AddPush(run, ended, &events);
   AddCrane(run, &events);

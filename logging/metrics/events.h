@@ -23,8 +23,9 @@ struct Event {
 /// support_changed, unloading_begins, unloading_ends, loading_begins, loading_ends, waiting_begins,
 /// waiting_ends, searching, touch_down, contact_early, contact_late, no_surface, contact_lost,
 /// contact_regained, balancing_on, balancing_off, eta_infeasible_begins, eta_infeasible_ends,
-/// cop_not_achieved_begins, cop_not_achieved_ends, step_needed, step_needed_ends, bridge_state,
-/// push_begins, push_peak, push_ends, crane_let_go, fall, run_ended, log_ends.
+/// cop_not_achieved_begins, cop_not_achieved_ends, step_needed, step_needed_ends, step_begins,
+/// step_lands, step_rests, bridge_state, push_begins, push_peak, push_ends, crane_let_go, fall,
+/// run_ended, log_ends.
 std::vector<Event> Events(const RunRecord& run, bool ended = true);
 
 /// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty

@@ -53,7 +53,9 @@ void AddTorques(MetricList* list);    ///< joints and bridge
 void AddDrives(MetricList* list);     ///< what the drives made of the torques, and their bus
 void AddTransitions(MetricList* list);  ///< changes of support and touch-downs
 void AddSensors(MetricList* list);      ///< push
+void AddStepping(MetricList* list);     ///< steps that the planner decided on
 void AddEstimator(MetricList* list);    ///< errors of the base's estimate, and their covariance
+void AddObserver(MetricList* list);     ///< foot wrenches without sensors, and the sensors' faults
 void AddLog(MetricList* list);          ///< completeness of the log and of the bus
 
 }  // namespace poise::logging

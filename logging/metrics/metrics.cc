@@ -22,6 +22,8 @@ MetricList MakeMetrics() {
   AddTransitions(&list);
   AddSensors(&list);
   AddEstimator(&list);
+  AddObserver(&list);
+  AddStepping(&list);
   AddLog(&list);
   return list;
 }

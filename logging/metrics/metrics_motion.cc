@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "components/messages/conversions.h"
+#include "components/robot/dynamics.h"
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
@@ -33,6 +34,23 @@ Answer ComDifference(const RunRecord& run) {
                 return (GetVector3(here->com_position) - GetVector3(there->com_position)).norm();
               }),
       kMilli);
+}
+
+Answer ModelComErrorAtEnd(const RunRecord& run) {
+  const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
+  const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
+  if (plan == nullptr || truth == nullptr) return {};
+  robot::RobotState state(run.robot.num_joints());
+  state.base_position = GetVector3(truth->base_position);
+  const double* q = truth->base_orientation;
+  state.base_orientation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  for (int j = 0; j < run.robot.num_joints(); ++j) {
+    state.joint_position[j] = truth->joint_position[static_cast<size_t>(j)];
+  }
+  robot::RobotData data(run.robot);
+  robot::ComputeKinematics(run.robot, state, &data);
+  robot::ComputeDynamics(run.robot, state, &data);
+  return kMilli * (data.com - GetVector3(plan->com_reference.position)).norm();
 }
 
 /// Largest error of the body's orientation about x in the first or last time on both feet.
@@ -101,6 +119,11 @@ void AddMotion(MetricList* list) {
          return kMilli *
                 (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
        }});
+  list->push_back(
+      {"com_error_end_model", "mm",
+       "the same of the COM that the controller's model has in the true posture: without the model's "
+       "own error",
+       ModelComErrorAtEnd});
   list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
                    [](const RunRecord& run) {
                      return Scaled(Maximum(run,

@@ -108,13 +108,12 @@ std::function<std::optional<bool>(int64_t)> MeasuredViolation(const RunRecord& r
                                                               const Edge& edge) {
   return [&run, foot, edge, half = SoleHalf(run, foot, edge)](int64_t t) -> std::optional<bool> {
     const joint_command_t* command = run.command.at(t - 1);
-    const robot_sensors_t* sensors = run.sensors.at(t);
-    if (command == nullptr || sensors == nullptr || command->in_contact[foot] == 0) return {};
+    const auto wrench = KnownWrench(run, foot, t);
+    if (command == nullptr || !wrench || command->in_contact[foot] == 0) return {};
     const Answer limit = half[command->in_contact[0] != 0 && command->in_contact[1] != 0 ? 1 : 0];
-    const wrench_t& wrench = sensors->foot_wrench[foot];
-    const double load = -wrench.force[2];
+    const double load = -(*wrench)[2];
     if (!limit || load < kReadableShare * run.robot.total_mass() * robot::kGravity) return {};
-    return std::abs(wrench.moment[edge.moment]) > load * *limit;
+    return std::abs((*wrench)[3 + edge.moment]) > load * *limit;
   };
 }
 

@@ -79,9 +79,9 @@ Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) 
   const joint_command_t* command = run.command.at(measured ? tick - 1 : tick);
   if (command == nullptr || command->in_contact[foot] == 0) return {};
   if (!measured) return 0.0 - command->foot_wrench[foot].force[2];
-  const robot_sensors_t* sensors = run.sensors.at(tick);
-  if (sensors == nullptr) return {};
-  return 0.0 - sensors->foot_wrench[foot].force[2];
+  const auto wrench = KnownWrench(run, foot, tick);
+  if (!wrench) return {};
+  return 0.0 - (*wrench)[2];
 }
 
 void AddFootLoads(MetricList* list) {

@@ -10,24 +10,28 @@
 
 namespace poise::logging {
 
-/// Taps an InlineRunner and keeps its messages. Take gives what ReadRun gives of the log that
-/// InlineRecorder writes of the same run, but no latencies: they are of the machine, not of the
-/// run. Both must outlive the last Step of the runner.
+/// Keeps the messages of an InlineRunner. Take gives what ReadRun gives of the log that
+/// InlineRecorder writes of the same run. Must outlive the last Step of the runner.
 class InlineRecord {
  public:
-  /// Installs itself as the runner's tap. Throws RobotError.
+  /// Installs itself as the runner's tap, and keeps nothing of RunRecord::other. Throws RobotError.
   InlineRecord(const RunSpec& spec, const std::string& scenario, InlineRunner* runner);
+  /// For who has a tap of its own and calls Add in it. Throws RobotError.
+  InlineRecord(const RunSpec& spec, run_info_t info, const InlineRunner* runner);
 
-  /// Ends the record.
-  RunRecord Take();
+  void Add(int channel, const OutputPort& output, const Tick& tick);
+
+  /// Ends the record. Latencies are of the machine, not of the run: 0 unless asked for.
+  RunRecord Take(bool latencies = false);
 
  private:
   using Keep = std::function<void(int64_t tick, const void* message)>;
 
-  InlineRunner* runner_;
+  const InlineRunner* runner_;
   RunRecord run_;
-  std::vector<Keep> keep_;         // by channel; empty: no series of its type
-  std::vector<int64_t> messages_;  // by channel
+  std::vector<Keep> keep_;                            // by channel; empty: no series of its type
+  std::vector<Series<std::vector<uint8_t>>*> other_;  // by channel, where keep_ is empty
+  std::vector<int64_t> messages_;                     // by channel
 };
 
 }  // namespace poise::logging

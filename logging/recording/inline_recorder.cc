@@ -6,14 +6,15 @@
 
 namespace poise::logging {
 
-InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec,
-                               const std::string& scenario, InlineRunner* runner)
-    : writer_(path, spec, MakeRunInfo(spec, scenario)), runner_(runner) {
-  runner->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
+InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec, const run_info_t& info,
+                               InlineRunner* runner, InlineRecord* kept)
+    : writer_(path, spec, info), runner_(runner) {
+  runner->set_tap([this, kept](int channel, const OutputPort& output, const Tick& tick) {
     const auto size = static_cast<size_t>(output.encoded_size());
     if (buffer_.size() < size) buffer_.resize(size);
     output.Encode(buffer_.data(), static_cast<int>(size));
     writer_.AddMessage(channel, tick.index, {buffer_.data(), size});
+    if (kept != nullptr) kept->Add(channel, output, tick);
   });
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "components/framework/runners/inline_runner.h"
+#include "logging/recording/inline_record.h"
 #include "logging/run_log_writer.h"
 #include "poise/health_t.hpp"
 
@@ -18,9 +19,10 @@ health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int compon
 /// apart from health. Both must outlive the last Step of the runner.
 class InlineRecorder {
  public:
-  /// Installs itself as the runner's tap. `spec` must hold the channels' counts. Throws LogError.
-  InlineRecorder(const std::string& path, const RunSpec& spec, const std::string& scenario,
-                 InlineRunner* runner);
+  /// Installs itself as the runner's tap. `spec` must hold the channels' counts. `kept`, where
+  /// there is one, gets every message too. Throws LogError.
+  InlineRecorder(const std::string& path, const RunSpec& spec, const run_info_t& info,
+                 InlineRunner* runner, InlineRecord* kept = nullptr);
 
   /// Writes the components' health as it stands, and closes. Throws LogError.
   void Close(const RunSpec& spec);

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,14 +12,17 @@
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/recording/listeners.h"
 #include "logging/run_log_writer.h"
 
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kFlushInterval = 50'000'000;  // ns
-constexpr int kSpin = 50;                       // ms
-constexpr int kLastSpins = 20;                  // each takes a batch of every channel
+constexpr int64_t kFlushInterval = 50'000'000;    // ns
+constexpr int kSpin = 50;                         // ms
+constexpr int64_t kListenInterval = 20'000'000;  // ns, between two looks for a listener
+constexpr timespec kNap{0, 1'000'000};
+constexpr int kLastSpins = 20;  // each takes a batch of every channel
 
 void WriteReport(const std::string& path, const RunSpec& spec, const RecorderReport& report,
                  const ChannelCollector& collector) {
@@ -57,8 +61,9 @@ RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
   if (options.mirror) mirror.emplace(MirrorUrl(spec));
   std::vector<std::string> names;
   for (const Channel& channel : spec.graph().channel()) names.push_back(channel.name());
+  bool heard = options.mirror && AnyoneListens(MirrorUrl(spec));
   const auto send = [&](const char* channel, std::span<const uint8_t> data) {
-    if (mirror && !mirror->Send(channel, data.data(), data.size())) ++report.mirror_errors;
+    if (heard && !mirror->Send(channel, data.data(), data.size())) ++report.mirror_errors;
   };
 
   ChannelCollector::Callbacks callbacks;
@@ -74,14 +79,21 @@ RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
   };
   ChannelCollector collector(spec, "recorder", std::move(callbacks));
 
-  int64_t next_flush = 0;
+  int64_t next_flush = 0, next_look = 0;
   try {
     while (!collector.stopped() && (options.stop == nullptr || *options.stop == 0)) {
+      // A nap, so that one look finds the messages of some ticks, not each as it comes: half of the
+      // recorder's time was waking up.
+      clock_nanosleep(CLOCK_MONOTONIC, 0, &kNap, nullptr);
       collector.Spin(kSpin);
       const int64_t now = NowNanoseconds();
       if (now >= next_flush) {
         writer.Flush();
         next_flush = now + kFlushInterval;
+      }
+      if (mirror && now >= next_look) {
+        heard = AnyoneListens(MirrorUrl(spec));
+        next_look = now + kListenInterval;
       }
     }
     // What came before the stop still waits in the channels' sockets.

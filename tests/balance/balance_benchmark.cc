@@ -94,7 +94,7 @@ void Run(benchmark::State& state, std::shared_ptr<const robot::RobotModel> model
     if (on(kRatio) && two_feet) {
       std::array<Eigen::Isometry3d, 2> foot{tick.geometry.sole[0], tick.geometry.sole[1]};
       for (auto& f : foot) f = w.result.frame_o.inverse(Eigen::Isometry) * f;
-      ContactLimits sole{0.9, 0.9, 0.12, 0.05};
+      ContactLimits sole{0.9, 0.9, 0.12, 0.05, {}};
       const RatioInterval interval = FeasibleRatio(w.result.resultant, foot, sole, 0.02, 0.98);
       const double eta = SelectRatio(interval, w.result.resultant, foot, sole, 0.02, 0.98);
       const auto share = DistributeResultant(w.result.resultant, foot, eta);

@@ -21,7 +21,7 @@ Eigen::Isometry3d Pose(double x, double y, double z, double roll = 0, double pit
 }
 
 TEST(CheckContact, MarginsOfAWrenchByHand) {
-  const ContactLimits limits{0.9, 0.2, 0.12, 0.05};
+  const ContactLimits limits{0.9, 0.2, 0.12, 0.05, {}};
   Vector6d w;
   w << 30, -40, -100, 4, -11, 19;
   const ContactMargins m = CheckContact(w, limits);
@@ -36,7 +36,7 @@ TEST(CheckContact, MarginsOfAWrenchByHand) {
 }
 
 TEST(CheckContact, EachConditionAloneDecides) {
-  const ContactLimits limits{0.9, 0.2, 0.12, 0.05};
+  const ContactLimits limits{0.9, 0.2, 0.12, 0.05, {}};
   const Vector6d good = (Vector6d() << 0, 0, -100, 0, 0, 0).finished();
   ASSERT_TRUE(CheckContact(good, limits).Met());
   const double limit[6] = {90, 90, 0, 5, 12, 20};

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kGrid = 4000;
 constexpr double kEtaMin = 0.02, kEtaMax = 0.98;
-const ContactLimits kSole{0.9, 0.9, 0.12, 0.05};
+const ContactLimits kSole{0.9, 0.9, 0.12, 0.05, {}};
 
 class Random {
  public:

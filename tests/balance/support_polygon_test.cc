@@ -27,7 +27,7 @@ Eigen::Isometry3d Sole(const Vector3d& at, const Vector3d& rotation = Vector3d::
 ConvexPolygon Polygon(const ContactGeometry& geometry, const Vector2d& half,
                       Eigen::Isometry3d* frame_o) {
   EXPECT_TRUE(FrameO(geometry.sole, geometry.in_contact, frame_o));
-  return SupportPolygon(*frame_o, geometry, {half, half});
+  return SupportPolygon(*frame_o, geometry, {Rectangle(half), Rectangle(half)});
 }
 
 Vector2d HalfExtent(const ConvexPolygon& polygon) {

@@ -1,4 +1,5 @@
 // What a run's page costs: writing it, its size, the time to its first picture, frames per second while it plays.
+// RUN may be a page that is there already.
 // Usage: node tests/benchmarks/report_benchmark.mjs RUN [--poise PROGRAM] [--web DIR] [--repeat N]
 import {spawnSync} from 'node:child_process';
 import {mkdtempSync, rmSync, statSync} from 'node:fs';
@@ -30,7 +31,8 @@ if (options.help || !run || rest.length > 0 || !(repeat >= 1)) {
 
 const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
 const folder = mkdtempSync(join(tmpdir(), 'poise-report-benchmark-'));
-const html = join(folder, 'report.html');
+const there = run.endsWith('.html');
+const html = there ? run : join(folder, 'report.html');
 
 function write() {
   const start = performance.now();
@@ -70,10 +72,10 @@ async function play(page, session) {
 
 let browser;
 try {
-  const written = Array.from({length: repeat}, write);
+  const written = there ? [] : Array.from({length: repeat}, write);
   browser = await launchBrowser(options.web);
-  const pictures = [], ready = [], opening = [], rates = {'at the robot': [], 'at the plots': []};
-  let ticks = 0;
+  const pictures = [], ready = [], plots = [], opening = [], rates = {'at the robot': [], 'at the plots': []};
+  let ticks = 0, rows = 0;
   for (let i = 0; i < repeat; ++i) {
     const {page, problems} = await openPage(browser, html, {viewport: {width: 1440, height: 1000}, deviceScaleFactor: 1});
     if (problems.length) throw new Error(problems.join('\n'));
@@ -82,11 +84,14 @@ try {
     await page.reload();
     await page.waitForFunction(() => document.documentElement.dataset.ready);
     opening.push(await processorTime(session));
+    await page.locator('.plot-host').first().evaluate((e) => e.scrollIntoView());
+    await page.waitForSelector('.plot-host canvas');
+    plots.push(await page.evaluate(() => performance.now()) / 1000);
     const marks = await page.evaluate(() => ({picture: Number(document.documentElement.dataset.picture),
-      ready: Number(document.documentElement.dataset.ready), ticks: window.poise.run.numTicks}));
+      ready: Number(document.documentElement.dataset.ready), ticks: window.poise.run.meta.run.ticks, rows: window.poise.run.numRows}));
     pictures.push(marks.picture / 1000);
     ready.push(marks.ready / 1000);
-    ticks = marks.ticks;
+    ({ticks, rows} = marks);
     rates['at the robot'].push(await play(page, session));
     await page.locator('#figures').evaluate((e) => e.scrollIntoView());
     await page.waitForTimeout(500);
@@ -94,9 +99,11 @@ try {
     await page.context().close();
   }
   console.log(`ticks                           ${ticks}`);
+  console.log(`rows in the page                ${rows}`);
   console.log(`file                            ${(statSync(html).size / 1e6).toFixed(2)} MB`);
-  console.log(`written, table included         ${median(written).toFixed(2)} s`);
+  if (!there) console.log(`written, table included         ${median(written).toFixed(2)} s`);
   console.log(`first picture of the robot      ${median(pictures).toFixed(2)} s from opening`);
+  console.log(`first plot                      ${median(plots).toFixed(2)} s from opening`);
   console.log(`page complete                   ${median(ready).toFixed(2)} s from opening`);
   console.log(`main thread until then          ${median(opening).toFixed(2)} s of processor time`);
   for (const [where, values] of Object.entries(rates)) {

@@ -588,20 +588,19 @@ TEST(Redistributor, EveryPointOfTheDerivedRegionCanBeShared) {
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     const robot::RobotModel model = robot::LoadTestRobot(robot);
     const double margin = HullMargin(model);
-    const balance::ContactLimits limits =
-        ReadLimits(WithinSoles({}, model, SoleMargin(model)), "double_support");
+    const balance::SoleLimits limits =
+        ReadSoleLimits({}, model, SoleMargin(model), "double_support");
     const robot::RobotData data = robot::Evaluate(model, StandingState(model));
     const balance::ContactGeometry geometry{{data.foot_pose[0], data.foot_pose[1]}, {true, true}};
     Eigen::Isometry3d frame_o;
     ASSERT_TRUE(balance::FrameO(geometry.sole, geometry.in_contact, &frame_o));
-    std::array<Eigen::Vector2d, 2> half;
+    std::array<balance::ConvexPolygon, 2> reduced;
     std::array<Eigen::Isometry3d, 2> sole;
     for (size_t i = 0; i < 2; ++i) {
-      const robot::FootModel& foot = model.feet()[i];
-      half[i] = {0.5 * foot.length - margin, 0.5 * foot.width - margin};
+      reduced[i] = balance::SolePolygon(model.feet()[i], margin);
       sole[i] = frame_o.inverse() * geometry.sole[i];
     }
-    const balance::ConvexPolygon region = balance::SupportPolygon(frame_o, geometry, half);
+    const balance::ConvexPolygon region = balance::SupportPolygon(frame_o, geometry, reduced);
     ASSERT_GE(region.num_corners, 4);
     for (const Eigen::Vector2d& cop : region.corners()) {
       balance::Vector6d resultant = balance::Vector6d::Zero();

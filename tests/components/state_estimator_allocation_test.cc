@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "components/state_estimator/calibrator.h"
+#include "components/state_estimator/foot_wrenches.h"
 #include "components/state_estimator/invariant_estimator.h"
 #include "tests/components/base_motion.h"
 
@@ -42,6 +44,25 @@ TYPED_TEST(AnyEstimator, AllocatesNothingPerTick) {
       estimator.Update(sensors, BaseMotion::kPeriod);
       ASSERT_EQ(allocations - before, 0) << i;
     }
+  }
+}
+
+TEST(FootWrenchesAndCalibrator, AllocateNothingPerTick) {
+  BaseMotion motion(POISE_SOURCE_DIR + std::string("/deploy/robots/dyros/dyros_legs.pbtxt"));
+  FootWrenches wrenches(motion.model(), {});
+  Calibrator calibrator(motion.model(), {.enabled = true}, BaseMotion::kPeriod);
+  const Eigen::VectorXd torque = Eigen::VectorXd::LinSpaced(motion.model()->num_joints(), -9, 9);
+  for (int i = 0; i < 30; ++i) {
+    motion.Next();
+    const BaseSensors read = motion.sensors();
+    const BaseSensors sensors = {read.joint_position, read.angular_velocity, read.acceleration,
+                                 {},                  {},
+                                 {torque.data(), torque.size()}};
+    const long before = allocations;
+    wrenches.Update(i, BaseMotion::kPeriod, sensors, {}, {});
+    calibrator.Track({wrenches.wrench(0), wrenches.wrench(1)}, BaseMotion::kPeriod);
+    calibrator.Update(wrenches.observer(), true);
+    ASSERT_EQ(allocations - before, 0) << i;
   }
 }
 

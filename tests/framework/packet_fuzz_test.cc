@@ -27,7 +27,7 @@ int64_t NumPackets() {
 template <class T>
 MessageCounts SomeCounts() {
   const std::map<std::string, int32_t> values = {
-      {"num_joints", 12}, {"num_feet", 2}, {"num_motors", 12}};
+      {"num_joints", 12}, {"num_feet", 2}, {"num_motors", 12}, {"num_slaves", 12}};
   MessageCounts counts;
   for (const char* name : MessageTraits<T>::kCountNames) counts.push_back(values.at(name));
   return counts;

@@ -109,6 +109,10 @@ TEST_F(BadInputTest, TheEngineIsOneThatThereIs) {
       {"mujoco.contact_time_constant", "less than a step"});
   ExpectRefused({"run", StandScenario(), "--set", "ode.contact_cfm=0"},
                 {"--set ode.contact_cfm", "greater than 0"});
+  ExpectRefused({"run", StandScenario(), "--world", "mujoco", "--set", "ode.contact_cfm=1e-6"},
+                {"--set ode.contact_cfm=1e-6", "engine is mujoco", "--world ode"});
+  ExpectRefused({"run", StandScenario(), "--set", "mujoco.contact_softness=1e-6"},
+                {"--set mujoco.contact_softness=1e-6", "engine is ode", "--world mujoco"});
   EXPECT_EQ(RunPoise({"run", StandScenario(), "--inline", "--set", "engine=ode", "--out",
                       folder_ / "run"})
                 .exit_code,

@@ -81,6 +81,9 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
   const ProgramResult run = RunPoise({"run", "pushed", "--inline", "--out", run_});
   ASSERT_EQ(run.exit_code, 0) << run.output;
   ExpectFits(run.output, 80);
+  EXPECT_THAT(Flat(run.output), HasSubstr("engine ode: contact_erp 0.2, contact_cfm 1e-07, solver "
+                                          "TREE, step 0.001 s,"));
+  EXPECT_THAT(Flat(run.output), HasSubstr("ground friction 0.9"));
   // The figures are the summary's.
   const nlohmann::json summary = ReadSummary(run_);
   double peak = 0;
@@ -103,6 +106,7 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
   EXPECT_THAT(run.output, HasSubstr("file://" + run_ + "/report.html"));
   const ProgramResult full = RunPoise({"report", run_, "--no-html", "--full"});
   EXPECT_THAT(full.output, HasSubstr("\njoint torque"));
+  EXPECT_THAT(Flat(full.output), HasSubstr("engine ode: contact_erp 0.2"));
   EXPECT_THAT(full.output, HasSubstr("duration = 0.5: for this test"));
   EXPECT_THAT(full.output, HasSubstr("push ends"));
   for (const char* width : {"80", "60", "40"}) {

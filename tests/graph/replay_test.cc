@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <random>
 
@@ -16,6 +17,7 @@
 #include "logging/run_log_writer.h"
 #include "logging/run_record.h"
 #include "tests/graph/poise_program.h"
+#include "tests/test_seed.h"
 
 namespace poise {
 namespace {
@@ -263,6 +265,67 @@ TEST_F(ReplayTest, PlaysTheLogOnItsPublicUrlInOrder) {
   const ProgramResult result = slow.Wait();
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_HAS(result, "interrupted");
+}
+
+TEST_F(ReplayTest, APackedLogIsMadeAgainByteForByte) {
+  Run({"--inline", "--duration", "0.5"});
+  const std::string log = run_ + "/run.lcm", packed = run_ + "/run.packed";
+  const std::string bytes = ReadAll(log);
+  const std::string info = RunPoise({"log", "info", run_}).output;
+  const ProgramResult pack = RunPoise({"log", "pack", run_});
+  ASSERT_EQ(pack.exit_code, 0) << pack.output;
+  EXPECT_FALSE(std::filesystem::exists(log));
+  EXPECT_LT(20 * std::filesystem::file_size(packed), bytes.size());
+  // Whoever reads the run gets its log; one that is packed again is the same.
+  const ProgramResult again = RunPoise({"log", "info", run_});
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_NE(again.output.find(info), std::string::npos) << again.output;
+  EXPECT_EQ(ReadAll(log), bytes);
+  const std::string small = ReadAll(packed);
+  std::filesystem::remove(packed);
+  ASSERT_EQ(RunPoise({"log", "pack", run_, "--keep"}).exit_code, 0);
+  EXPECT_EQ(ReadAll(packed), small);
+  EXPECT_EQ(ReadAll(log), bytes);
+}
+
+TEST_F(ReplayTest, OnlyALogThatComesOutTheSameIsPacked) {
+  Run({"--inline", "--duration", "0.2"});
+  // One bit of one message, as another build's arithmetic would have it.
+  int64_t torque = 0;
+  const std::string changed = Changed([&](const logging::LogEvent& event, auto* data) {
+    if (event.channel == "JOINT_COMMAND" && ++torque == 30) data->at(100) ^= 1;
+    return true;
+  });
+  ProgramResult result = RunPoise({"log", "pack", changed});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_HAS(result, "make other messages");
+  EXPECT_TRUE(std::filesystem::exists(changed));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "changed.packed"));
+  std::filesystem::remove(changed);
+  torque = 0;
+  const std::string cut = Changed([&](const logging::LogEvent& event, auto*) {
+    return event.channel != "JOINT_COMMAND" || ++torque != 50;
+  });
+  EXPECT_EQ(RunPoise({"log", "pack", cut}).exit_code, 1);
+  // A packed log that is damaged, anywhere, gives an error or the log.
+  ASSERT_EQ(RunPoise({"log", "pack", run_}).exit_code, 0);
+  const std::string packed = run_ + "/run.packed", log = run_ + "/run.lcm";
+  const std::string bytes = ReadAll(packed);
+  std::mt19937 random(TestSeed(1));
+  for (int trial = 0; trial < 12; ++trial) {
+    std::string damaged = bytes;
+    if (trial % 2 == 0)
+      damaged.resize(random() % damaged.size());
+    else
+      damaged[random() % damaged.size()] ^= static_cast<char>(1 + random() % 255);
+    std::ofstream(packed, std::ios::binary) << damaged;
+    std::filesystem::remove(log);
+    result = RunPoise({"log", "info", run_});
+    EXPECT_GE(result.exit_code, 0) << "trial " << trial;
+    if (std::filesystem::exists(log)) continue;
+    EXPECT_EQ(result.exit_code, 1) << result.output;
+    EXPECT_HAS(result, "poise: ");
+  }
 }
 
 }  // namespace

@@ -202,7 +202,23 @@ TEST_F(SweepTest, MapsAreThereAsPng) {
   EXPECT_LT(near(at(240, 200), {68, 1, 84}), 12);     // 20 N
   EXPECT_LT(near(at(600, 200), {253, 231, 37}), 12);  // 60 N
   EXPECT_EQ(at(4, 4), (std::array<int, 3>{255, 255, 255}));
-  EXPECT_FALSE(fs::exists(Out("sweep") + "/rsvg-convert.log"));
+  EXPECT_FALSE(fs::exists(Out("sweep") + "/map_1.log"));
+}
+
+// Nobody asked for a curve of each metric.
+TEST_F(SweepTest, CurvesOfMetricsAreDrawnAsPngWhenAskedFor) {
+  const std::vector<std::string> sweep = {
+      "sweep", "pushed", "--vary", "sim.push[0].peak=20,40,60", "--column", "push_peak", "--out"};
+  const auto run = [&](std::vector<std::string> command, const std::vector<std::string>& more) {
+    command.insert(command.end(), more.begin(), more.end());
+    Expect(0, command);
+  };
+  run(sweep, {Out("some")});
+  EXPECT_TRUE(fs::exists(Out("some") + "/map_1.png"));
+  EXPECT_TRUE(fs::exists(Out("some") + "/map_2.svg"));
+  EXPECT_FALSE(fs::exists(Out("some") + "/map_2.png"));
+  run(sweep, {Out("all"), "--png"});
+  EXPECT_TRUE(fs::exists(Out("all") + "/map_2.png"));
 }
 
 TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {

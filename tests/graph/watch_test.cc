@@ -7,10 +7,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "logging/run_record.h"
 #include "tests/graph/poise_program.h"
@@ -129,7 +131,11 @@ TEST_F(WatchTest, EchoShowsTheMessagesThatTheLogGets) {
 TEST_F(WatchTest, EchoEndsWithTheRun) {
   PoiseProgram echo({"echo", "JOINT_COMMAND", "tick", "--rate", "20", "--run", run});
   EXPECT_TRUE(WaitUntil([&] { return HasSocket(echo.pid()); }));
-  EXPECT_TRUE(WaitForLog(run, fs::file_size(run + "/run.lcm") + kUnderWay));
+  // The recorder looks for listeners every 20 ms, and the run must not end before echo's next line.
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_TRUE(WaitForLog(run, fs::file_size(run + "/run.lcm") + kUnderWay));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
   const logging::RunRecord record = End();
   const ProgramResult result = echo.Wait();
   EXPECT_EQ(result.exit_code, 0);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <map>
 
 #include "tests/graph/poise_program.h"
@@ -38,6 +39,35 @@ TEST_F(WorldsTest, HasEveryCheckOfEveryEngine) {
   const auto& push = measured.at("push, largest");
   EXPECT_NEAR(std::stod(push.at("ode")), std::stod(push.at("mujoco")), 1);
   EXPECT_TRUE(std::filesystem::exists(out + "/pushed/mujoco/run.lcm"));
+  // Both stand: their feet carry the same weight.
+  EXPECT_NE(result.output.find("measured wrenches, difference"), std::string::npos);
+  const std::vector<CsvRow> wrenches = ReadCsv(out + "/wrenches.csv");
+  ASSERT_EQ(wrenches.size(), 4u);
+  for (const CsvRow& row : wrenches) {
+    EXPECT_GT(std::stod(row.at("rms")), 0);
+    EXPECT_LE(std::stod(row.at("rms")), std::stod(row.at("largest")));
+    if (row.at("quantity") == "force") {
+      EXPECT_LT(std::stod(row.at("rms")), 60);
+    }
+  }
+}
+
+TEST_F(WorldsTest, ASweepIsComparedRunByRun) {
+  std::filesystem::create_directories(deploy_ / "deploy/sweeps");
+  std::ofstream(deploy_ / "deploy/sweeps/forces.pbtxt")
+      << "scenario: \"pushed\"\n"
+         "vary { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n";
+  const std::string out = deploy_ / "worlds";
+  // Each engine gets its own fields alone.
+  const ProgramResult result = RunPoise({"worlds", "forces", "--set", "ode.contact_cfm=2e-7",
+                                         "--set", "mujoco.contact_softness=2e-7", "--out", out});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_NE(result.output.find("the same outcome in 2 of 2 runs"), std::string::npos)
+      << result.output;
+  EXPECT_NE(result.output.find("apart by at most 0 N"), std::string::npos) << result.output;
+  for (const char* const engine : {"ode", "mujoco"}) {
+    EXPECT_EQ(ReadCsv(out + "/forces/" + engine + "/table.csv").size(), 2u);
+  }
 }
 
 TEST_F(WorldsTest, AFailedCheckInAnEngineFails) {

@@ -100,8 +100,9 @@ class BridgeRig {
                   {"urdf", ReadText("robots/dyros/dyros_legs.urdf")}};
     ComponentContext context;
     context.name = "hw_bridge";
-    context.config_text = "ethercat { link { udp {} } master { drift_frames: 200 profile {" +
-                          ReadText("drives/elmo_gold.pbtxt") + "} } } " + config_;
+    context.config_text = "ethercat { link { udp {} } " + bus + " master { " + master +
+                          " drift_frames: 200 profile {" + ReadText("drives/elmo_gold.pbtxt") +
+                          "} } } " + config_;
     context.tick_period = 0.002;
     context.resources = &resources_;
     context.shared = &shared_;
@@ -162,6 +163,8 @@ class BridgeRig {
   bool TakeWithheld() { return std::exchange(withheld_, false); }
 
   static constexpr int64_t kRunId = 5;
+  std::string bus = "attend: false";  // fields of hw_bridge.ethercat
+  std::string master;                 // and of its master
   volatile std::sig_atomic_t signal = 0;
   ethercat::EmulatedChainConfig chain_config;
   std::array<Shaft, kDrives + 1> shafts;  // one more than joints, for a drive too many

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <sstream>
@@ -115,6 +116,25 @@ TEST(HwBridge, SensesInSiUnitsAndAsRobotOnEnvironment) {
     EXPECT_EQ(sensors.foot_wrench[1].moment[i], 3 + i);
     EXPECT_EQ(sensors.foot_wrench[1].force[i], 0);
   }
+}
+
+// The robot stands without them: the estimator observes the wrenches.
+TEST(HwBridge, AFootSensorThatReadsNoNumberIsInvalidAndStopsNothing) {
+  Bridge bridge;
+  bridge.feedback.foot_wrench[0].force[2] = std::numeric_limits<double>::quiet_NaN();
+  bridge.feedback.foot_wrench[1].force[2] = 270;
+  bridge.Step();
+  const robot_sensors_t& sensors = bridge.sensors();
+  EXPECT_EQ(sensors.foot_sensor[0], drive_feedback_t::SENSOR_INVALID);
+  EXPECT_EQ(sensors.foot_wrench[0].force[2], 0);
+  EXPECT_EQ(sensors.foot_sensor[1], drive_feedback_t::SENSOR_OK);
+  EXPECT_EQ(sensors.foot_wrench[1].force[2], -270);
+  bridge.feedback.foot_wrench[0].force[2] = 270;
+  bridge.feedback.foot_sensor[1] = drive_feedback_t::SENSOR_ABSENT;
+  bridge.Step();
+  EXPECT_EQ(bridge.sensors().foot_sensor[0], drive_feedback_t::SENSOR_OK);
+  EXPECT_EQ(bridge.sensors().foot_sensor[1], drive_feedback_t::SENSOR_ABSENT);
+  EXPECT_EQ(bridge.sensors().foot_wrench[1].force[2], 0);
 }
 
 TEST(HwBridge, TurnsTorqueIntoCurrent) {

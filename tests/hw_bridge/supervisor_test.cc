@@ -310,12 +310,11 @@ TEST(Supervisor, FeedbackThatIsNotFiniteStops) {
       [](drive_feedback_t* f) { f->current[2] = kNan; },
       [](drive_feedback_t* f) { f->imu_acceleration[0] = kInfinity; },
       [](drive_feedback_t* f) { f->imu_angular_velocity[2] = kNan; },
-      [](drive_feedback_t* f) { f->foot_wrench[1].force[2] = -kInfinity; },
-      [](drive_feedback_t* f) { f->foot_wrench[0].moment[1] = kNan; },
       [](drive_feedback_t* f) { f->current[0] = 1e300; },
       [](drive_feedback_t* f) { f->position_counts.pop_back(); },
       [](drive_feedback_t* f) { f->drive_status.clear(); },
       [](drive_feedback_t* f) { f->foot_wrench.clear(); },
+      [](drive_feedback_t* f) { f->foot_sensor.clear(); },
   };
   for (size_t i = 0; i < spoils.size(); ++i) {
     Bench bench;

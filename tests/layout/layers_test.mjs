@@ -9,7 +9,7 @@ const files = repositoryFiles().filter((f) => !/^(tests|examples)\//.test(f));  
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
 const BUS = ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/framework/bus', 'components/framework/runners',
-  'components/robot', 'components/robot_files', 'components/balance', 'components/balance/tasks', 'components/messages'];
+  'components/robot', 'components/robot_files', 'components/balance', 'components/balance/tasks', 'components/balance/gains', 'components/messages'];
 /** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
 const BELOW = {
   'lcmtypes': [],
@@ -21,6 +21,7 @@ const BELOW = {
   'components/robot_files': ['components/robot'],
   'components/balance': ['components/robot'],
   'components/balance/tasks': ['components/robot', 'components/balance'],
+  'components/balance/gains': ['components/robot', 'components/balance', 'components/balance/tasks'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/robot_files', 'components/balance'],
   'components': BUS,
   'sim': BUS,
@@ -38,7 +39,7 @@ const BELOW = {
   'logging/replay': [...BUS, 'logging'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
-const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
+const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
 /** Folders that one file may name although it is not below them: where all processes are listed. */
 const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
 

@@ -22,7 +22,7 @@ using ::testing::ElementsAre;
 template <class T>
 std::vector<int32_t> SomeCounts() {
   const std::map<std::string, int32_t> values = {
-      {"num_joints", 5}, {"num_feet", 2}, {"num_motors", 3}};
+      {"num_joints", 5}, {"num_feet", 2}, {"num_motors", 3}, {"num_slaves", 6}};
   std::vector<int32_t> counts;
   for (const char* name : MessageTraits<T>::kCountNames) counts.push_back(values.at(name));
   return counts;

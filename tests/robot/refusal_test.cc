@@ -229,6 +229,22 @@ constexpr Case kCases[] = {
     {"SoleLength", kRobot, "length: 0.30", "length: 0", {"foot[0].length is 0", "above 0"}},
     {"SoleWidth", kRobot, "width: 0.15", "width: -1", {"foot[0].width is -1"}},
     {"SoleMissing", kRobot, "width: 0.15", "", {"foot[0].width"}},
+    {"SoleBothWays",
+     kRobot,
+     "width: 0.15",
+     "width: 0.15 vertex { x: 1 }",
+     {"foot[0]", "remove one"}},
+    {"SoleClockwise",
+     kRobot,
+     "length: 0.30\n  width: 0.15",
+     "vertex { x: 0.1 y: 0.1 } vertex { x: 0.1 y: -0.1 } vertex { x: -0.1 y: -0.1 }",
+     {"foot[0].vertex", "clockwise", "anticlockwise"}},
+    {"SoleDented",
+     kRobot,
+     "length: 0.30\n  width: 0.15",
+     "vertex { x: -0.1 y: -0.1 } vertex { x: 0 y: -0.05 } vertex { x: 0.1 y: -0.1 } "
+     "vertex { y: 0.1 }",
+     {"foot[0].vertex[1]", "(0, -0.05)", "convex"}},
     {"SolePoseNan", kRobot, "sole { x: 0.03", "sole { x: nan", {"foot[0].sole"}},
     {"FiveJoints",
      kRobot,
@@ -377,7 +393,11 @@ TEST(RefusalOfFiles, BeginWithTheFileAtFault) {
   const std::string path = folder + "robot.pbtxt";
   std::string robot = ReadWhole(RobotPath(TestRobot::kDyros));
   std::ofstream(path) << robot;
-  EXPECT_THAT(FileRefusal(path), HasSubstr(folder + "dyros_legs.urdf: cannot be read"));
+  // At fault is the text: it names a file that is not there.
+  EXPECT_THAT(FileRefusal(path), testing::StartsWith(path +
+                                                     ": the maker's file 'dyros_legs.urdf' "
+                                                     "is not there: put it at " +
+                                                     folder + "dyros_legs.urdf"));
 
   std::string urdf = ReadWhole(UrdfPath(TestRobot::kDyros));
   std::ofstream(folder + "dyros_legs.urdf") << urdf;

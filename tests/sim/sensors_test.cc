@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "poise/drive_feedback_t.hpp"
+#include "sim/foot_sensors.h"
 #include "tests/sim/simulation_fixture.h"
 
 namespace poise {
@@ -150,6 +152,53 @@ TEST_F(SensorsTest, OneSensorsNoiseDoesNotMoveAnothers) {
     EXPECT_EQ(readings_.imu_acceleration, from_b.imu_acceleration);
     EXPECT_EQ(readings_.foot_wrench[0].tail<3>(), from_b.foot_wrench[0].tail<3>());
   }
+}
+
+TEST_F(SensorsTest, FeetFailAsConfigured) {
+  SimConfig config;
+  const auto add = [&](const char* foot, FootSensorFault::Kind kind, double start, double end) {
+    FootSensorFault* fault = config.add_foot_sensor_fault();
+    fault->set_foot(foot);
+    fault->set_kind(kind);
+    fault->set_start(start);
+    fault->set_end(end);
+    fault->set_force_z(50);
+  };
+  add("right", FootSensorFault::FROZEN, 1, 2);
+  add("right", FootSensorFault::BIASED, 2, 3);
+  add("right", FootSensorFault::INVALID, 3, 4);
+  add("left", FootSensorFault::DEAD, 1, 2);
+  FootSensors feet(model_, config);
+  const auto read = [&](double time) {
+    for (size_t f = 0; f < 2; ++f) {
+      readings_.foot_wrench[f].setConstant(time);
+    }
+    feet.Apply(time, &readings_);
+  };
+  const robot::Vector6d ones = robot::Vector6d::Ones();
+  read(0.5);
+  EXPECT_EQ(readings_.foot_wrench[0], 0.5 * ones);
+  read(1);
+  EXPECT_EQ(readings_.foot_wrench[0], 0.5 * ones);
+  EXPECT_EQ(readings_.foot_wrench[1], 0 * ones);
+  EXPECT_EQ(readings_.foot_sensor[1], drive_feedback_t::SENSOR_OK) << "it does not know";
+  read(1.5);
+  EXPECT_EQ(readings_.foot_wrench[0], 0.5 * ones);
+  read(2);
+  EXPECT_EQ(readings_.foot_wrench[0], 2 * ones + 50 * robot::Vector6d::Unit(2));
+  EXPECT_EQ(readings_.foot_wrench[1], 2 * ones);
+  read(3);
+  EXPECT_EQ(readings_.foot_sensor[0], drive_feedback_t::SENSOR_INVALID);
+  EXPECT_EQ(readings_.foot_wrench[0], 0 * ones);
+  read(4);
+  EXPECT_EQ(readings_.foot_sensor[0], drive_feedback_t::SENSOR_OK);
+
+  config.set_foot_sensors(false);
+  FootSensors none(model_, config);
+  none.Apply(0, &readings_);
+  EXPECT_EQ(readings_.foot_sensor[1], drive_feedback_t::SENSOR_ABSENT);
+  config.mutable_foot_sensor_fault(0)->set_foot("middle");
+  EXPECT_THROW(FootSensors(model_, config), ConfigError);
 }
 
 }  // namespace

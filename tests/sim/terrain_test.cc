@@ -57,12 +57,12 @@ TEST(Terrain, ReliefRisesWithTheBlock) {
 
 TEST(Terrain, SpringAndDamperOfAWholeSoleAreSharedByFourCorners) {
   const ContactMaterial material =
-      Make("block { stiffness: 18000 damping: 300 friction: 0.7 }").material(true);
+      Make("block { stiffness: 18000 damping: 300 friction: 0.7 }").material(true, 4);
   EXPECT_EQ(material.stiffness, 18000 / 4.0);
   EXPECT_EQ(material.damping, 300 / 4.0);
   EXPECT_EQ(material.friction, 0.7);
-  EXPECT_EQ(Make("ground { friction: 0.4 }").material(false).friction, 0.4);
-  EXPECT_EQ(Make("").material(false).stiffness, 0) << "rigid";
+  EXPECT_EQ(Make("ground { friction: 0.4 }").material(false, 4).friction, 0.4);
+  EXPECT_EQ(Make("").material(false, 4).stiffness, 0) << "rigid";
 }
 
 TEST(Terrain, TiltTurnsTheNormal) {

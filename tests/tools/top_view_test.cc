@@ -8,6 +8,7 @@
 namespace poise {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -66,6 +67,26 @@ TEST_F(TopViewTest, ShowsTheRunsProgress) {
   // 1521 ticks of 2 ms; 250 ticks/s are half of real time.
   EXPECT_THAT(Text(), HasSubstr("tick 1521 of 5000  3.042 s  250.0 ticks/s  0.50 x real time"));
   EXPECT_THAT(Text(), HasSubstr("refused here: 3 packets"));
+}
+
+TEST_F(TopViewTest, ShowsEachSlaveOfTheBus) {
+  EXPECT_THAT(Text(), Not(HasSubstr("SLAVE")));
+  bus_status_t& bus = snapshot.bus.emplace();
+  bus.num_slaves = 3;
+  bus.online = {1, 1, 0};
+  bus.al_status = {8, 0x14, 8};
+  bus.al_code = {0, 0x1B, 0};
+  bus.error_code = {0, 0x8130, 0};
+  bus.emergency = {0, 0x8130, 0};
+  bus.emergencies = {0, 2, 0};
+  bus.clock_difference = {-7, 12, 0};
+  bus.receive_errors = {0, 0, 5};
+  bus.lost_links = {0, 0, 1};
+  bus.recoveries = {0, 3, 0};
+  EXPECT_THAT(Row("0 "), ElementsAre("0", "OP", "0000", "0000", "0", "-7", "0", "0", "0"));
+  EXPECT_THAT(Row("1 "), ElementsAre("1", "SAFE-OP,", "error", "001B", "8130", "8130", "2", "12",
+                                     "0", "0", "3"));
+  EXPECT_THAT(Text(), HasSubstr("2     does not answer"));
 }
 
 TEST_F(TopViewTest, ShowsTheBridgesState) {

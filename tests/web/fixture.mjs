@@ -31,8 +31,8 @@ export const robot = {
     {name: 'thigh', parent: 0, joint: 0, origin: identity, axis: [0, 1, 0]},
     {name: 'foot', parent: 1, joint: 1, origin: identity, axis: [1, 0, 0]}],
   joints: [{name: 'hip_pitch', torque_limit: 50}, {name: 'ankle_roll', torque_limit: 20}],
-  feet: [{name: 'right', body: 2, sole: identity, length: 0.3, width: 0.15},
-    {name: 'left', body: 0, sole: identity, length: 0.3, width: 0.15}],
+  feet: ['right', 'left'].map((name, i) => ({name, body: [2, 0][i], sole: identity,
+    corners: [[-0.15, -0.075], [0.15, -0.075], [0.15, 0.075], [-0.15, 0.075]]})),
   visuals: [],
 };
 

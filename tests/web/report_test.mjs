@@ -52,7 +52,7 @@ const soles = (page, time) => page.evaluate((t) => {
   player.seek(t);
   scene.scene.updateMatrixWorld(true);
   return run.robot.feet.map((foot, f) => {
-    const sole = scene.robotView.groups[foot.body].children.find((c) => c.children[0]?.geometry?.parameters.width === foot.length);
+    const sole = scene.robotView.groups[foot.body].children.find((c) => c.children[0]?.geometry?.type === 'ExtrudeGeometry');
     return [sole.matrixWorld.elements.slice(12, 15), scene.samples.pose(`sole${f}`, player.tick).position];
   });
 }, time);
@@ -194,7 +194,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
     assert.ok(Number(from) < Number(to), line);
     samples[component] = (samples[component] ?? 0) + Number(count);
   }
-  const ticks = await page.evaluate(() => window.poise.run.numTicks);
+  const ticks = await page.evaluate(() => window.poise.run.numRows);
   assert.ok(Object.keys(samples).length >= 6);
   for (const [component, count] of Object.entries(samples)) {
     assert.ok(count >= ticks && count % ticks === 0, `${component}: ${count} samples of ${ticks} ticks`);
@@ -365,6 +365,62 @@ test('a page that nobody has scrolled prints with all its plots, light', async (
   await page.context().close();
 });
 
+test('a page too small for every tick shows rows, shaded between their least and largest values', async () => {
+  poise('report', path('a'));
+  poise('report', path('a'), '--html', path('rows.html'), '--page-size', '0.3');
+  const names = ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'GROUND_TRUTH.com_position[1]', 'EXTERNAL_PUSH.force[1]',
+    'JOINT_COMMAND.eta', 'SUPPORT_PLAN.in_contact[1]'];
+  const full = await openPage(browser, path('a/report.html'));
+  const values = await full.page.evaluate((list) => Promise.all(list.map(async (name) => {
+    const s = window.poise.run.signals.get(name);
+    await s.load();
+    return [...s.values];
+  })), names);
+  await full.page.context().close();
+  const {page, problems} = await openPage(browser, path('rows.html'));
+  const {ticks, rows} = await page.evaluate(async (list) => {
+    const {run} = window.poise;
+    return {ticks: [...Array(run.numRows + 1).keys()].map((row) => run.tickOf(row)), rows: await Promise.all(list.map(async (name) => {
+      const s = run.signals.get(name);
+      await s.load();
+      return {values: [...s.values], least: s.least && [...s.least], largest: s.largest && [...s.largest]};
+    }))};
+  }, names);
+  assert.equal(ticks.at(-1), values[0].length);
+  assert.ok(ticks.length - 1 < 0.8 * values[0].length);
+  let wide = 0;
+  rows.forEach(({values: first, least, largest}, k) => {
+    // Both pages round values, to 2^-20 of a span or finer.
+    const slack = 1e-6 * Math.max(...values[k].map(Math.abs));
+    for (let row = 0; row < first.length; ++row) {
+      const all = values[k].slice(ticks[row], ticks[row + 1]);
+      near(first[row], all[0], 2 * slack + 1e-9);
+      assert.ok((least ?? first)[row] <= Math.min(...all) + slack, `${names[k]}, row ${row}`);
+      assert.ok((largest ?? first)[row] >= Math.max(...all) - slack, `${names[k]}, row ${row}`);
+      wide += all.length > 1;
+    }
+  });
+  assert.ok(wide > 100);
+  // Near the beginning there is every tick.
+  assert.deepEqual(ticks.slice(0, 100), [...Array(100).keys()]);
+  const bands = await page.evaluate(async () => {
+    const panel = window.poise.grid.panels.find((p) => p.definition.title.startsWith('COM motion'));
+    await panel.show();
+    const force = window.poise.grid.add({title: 'raw', unit: 'N', series: [{label: 'x', role: 'computed', name: 'ROBOT_SENSORS.foot_wrench[0].force[2]'}]});
+    await force.show();
+    return [force.plot.bands.length, force.plot.series.length, force.data.length];
+  });
+  assert.deepEqual(bands, [1, 4, 4]);
+  assert.match(await page.locator('.rows-note').textContent(), /every tick near the run's ends/);
+  await page.evaluate(() => window.poise.player.seek(window.poise.run.timeAt(window.poise.run.numRows - 1)));
+  assert.match(await page.locator('#time').textContent(), /tick \d+ of \d+|tick \d+/);
+  await page.keyboard.press('Home');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await state(page)).tick, 1);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
 test('a part of a run is told to be one', async () => {
   const cut = poise('log', 'cut', path('a'), '--from', '0.5', '--to', '1.1', '--out', path('part.lcm'));
   assert.equal(cut.status, 0, cut.stderr);
@@ -404,12 +460,12 @@ test('a run that grows grows in the plots, the bar and the picture', async () =>
     await Promise.all([...run.signals.values()].map((s) => s.load()));
     await Promise.all(grid.panels.map((p) => p.show()));
     // 0.1 s more, in which every signal stays as it is, but the push, which is there again along x.
-    const n = 50, last = run.numTicks - 1;
+    const n = 50, last = run.numRows - 1;
     const values = {};
     for (const s of run.signals.values()) values[s.name] = new Float64Array(n).fill(s.values[last]);
     values['EXTERNAL_PUSH.force[0]'] = new Float64Array(n).fill(250);
     run.appendTicks(n, values);
-    return run.numTicks;
+    return run.numRows;
   });
   await page.locator('.panel', {hasText: 'External push'}).first().scrollIntoViewIfNeeded();
   await page.waitForFunction((n) => document.getElementById('scrub').max === String(n - 1)
@@ -487,7 +543,7 @@ test('a log that ends before its first tick, or after it, is a page too', async 
     writeLog(path(`${name}.lcm`), events.slice(0, count));
     assert.equal(poise('report', path(`${name}.lcm`)).status, 1);
     const {page, problems} = await openPage(browser, path(`${name}.html`));
-    assert.equal(await page.evaluate(() => window.poise.run.numTicks), count === 1 ? 0 : 1);
+    assert.equal(await page.evaluate(() => window.poise.run.numRows), count === 1 ? 0 : 1);
     assert.equal(await page.locator('[role=alert]').count(), 0);
     await page.click('#play');
     await page.keyboard.press('ArrowRight');

@@ -140,7 +140,7 @@ test('a run grows by ticks, and what follows from its signals with it', async ()
     run.appendTicks(700, {'EXTERNAL_PUSH.force[0]': new Float32Array(700).fill(3), 'EXTERNAL_PUSH.force[1]': new Float32Array(700).fill(4 * k)});
   }
   assert.equal(appended, 5);
-  assert.equal(run.numTicks, 3500);
+  assert.equal(run.numRows, 3500);
   const push = await valuesOf(run, 'EXTERNAL_PUSH.force[1]');
   assert.equal(push.length, 3500);
   assert.deepEqual([push[699], push[700], push[3499]], [0, 4, 16]);
@@ -286,13 +286,59 @@ test('a part of a run begins where it was cut', async () => {
   const zigzag = deflateSync(Uint8Array.from([...[7, 8, 9].map((x) => 2 * x), ...new Array(9).fill(0)])).toString('base64');
   const part = new Run({...meta, run: {...meta.run, ticks: 10, cut: {first_tick: 7, last_tick: 9}},
     channels: meta.channels.map((c) => ({...c, count: 3, ticks}))}, messages, () => zigzag);
-  assert.deepEqual([part.firstTick, part.numTicks, part.start, part.rowAt(0.016)], [7, 3, 0.014, 1]);
+  assert.deepEqual([part.firstTick, part.numRows, part.start, part.rowAt(0.016)], [7, 3, 0.014, 1]);
   assert.deepEqual(await valuesOf(part, 'SUPPORT_PLAN.in_contact[0]'), [1, 1, 1]);
   assert.ok([...part.channels].every((c) => !c.sparse));
   addDerivedSignals(part);
   assert.deepEqual((await findPhases(part)).support, [{from: 0.014, to: 0.02, value: 'right foot'}]);
   assert.match(figuresFor(part).find((f) => f.figure === '9a').note, /0\.014 s/);
   assert.doesNotMatch(figuresFor(whole).find((f) => f.figure === '9a').note, / s,/);
+});
+
+/** A run of 1,004 ticks of 2 ms, 4 of which stand before time 0, in rows: 4 of one tick, 8 of up to 100, 5, 2 of up to 100. */
+function rowsRun(columns = {}) {
+  const whole = makeRun('7.2', {'support_plan_t.in_contact[0]': 1, 'support_plan_t.in_contact[1]': 1}, 10);
+  const {meta} = whole;
+  return new Run({...meta, run: {...meta.run, ticks: 1004, lead_ticks: 4}, rows: [[0, 1, 4], [4, 100, 8], [804, 1, 5], [809, 100, 2]],
+    channels: meta.channels.map((c) => ({...c, count: 1004, signals: c.signals.map((s) => ({...s, ...columns[`${c.name}.${s.field}`]}))}))},
+  messages, () => { throw new Error('no packed column here'); });
+}
+
+test('rows of several ticks are found by time, and times by row', () => {
+  const run = rowsRun();
+  assert.equal(run.numRows, 19);
+  const ticks = [0, 1, 2, 3, 4, 104, 204, 304, 404, 504, 604, 704, 804, 805, 806, 807, 808, 809, 909];
+  assert.deepEqual(ticks.map((_, row) => run.tickOf(row)), ticks);
+  for (let tick = 0; tick < 1004; ++tick) {
+    const row = ticks.findLastIndex((first) => first <= tick);
+    assert.equal(run.rowOfTick(tick), row, `tick ${tick}`);
+    assert.equal(run.rowOf((tick - 4) * 0.002), row, `tick ${tick}`);
+  }
+  assert.deepEqual([0, 3, 4, 11, 12, 18].map((row) => run.strideOf(row)), [1, 1, 100, 100, 1, 100]);
+  near(run.start, -0.008);
+  near(run.end, 1.81);
+  assert.ok(run.rowOf(-1) < 0 && run.rowOf(5) >= run.numRows);
+  assert.deepEqual([run.rowAt(-1), run.rowAt(5)], [0, 18]);
+});
+
+test('a row of several ticks has bounds, and what needs the tick before has a gap there', async () => {
+  const run = rowsRun({'BALANCE_TORQUE.active_x': {least: {value: 0}, largest: {value: 1}},
+    'ROBOT_SENSORS.foot_wrench[0].force[2]': {value: -50, least: {value: -60.5}, largest: {value: -40}}});
+  addDerivedSignals(run);
+  const force = run.signals.get('ROBOT_SENSORS.foot_wrench[0].force[2]');
+  await force.load();
+  assert.deepEqual([force.values.length, force.least[5], force.largest[18]], [19, -60.5, -40]);
+  const bare = run.signals.get('ROBOT_SENSORS.foot_wrench[1].force[2]');
+  await bare.load();
+  assert.equal(bare.least, undefined);
+  const cop = await valuesOf(run, 'derived.cop_measured_x');
+  assert.deepEqual(cop.map((x) => !Number.isNaN(x)), Array.from({length: 19}, (_, i) => (i >= 1 && i <= 4) || (i >= 13 && i <= 17)));
+  // Balancing was on in some tick of each row, and its last row's end is not known to be before the run's.
+  const {balancing, support} = await findPhases(run);
+  assert.deepEqual(balancing.map((p) => p.value), [true]);
+  near(balancing[0].from, -0.008);
+  assert.deepEqual(support.map((p) => p.value), ['both feet']);
+  near(support[0].to, 2);
 });
 
 test('the search finds signals by all words of name and text', () => {
@@ -316,7 +362,7 @@ test('a live run keeps its last ticks, and what is derived goes on', async () =>
     run.appendTicks(n, {...Object.fromEntries(['x', 'y', 'z'].map((_, i) => [`EXTERNAL_PUSH.force[${i}]`, new Float32Array(n)])),
       'EXTERNAL_PUSH.force[0]': ramp(first, n), 'SUPPORT_PLAN.com_position[1]': ramp(first + 5, n)});
   }
-  assert.deepEqual([run.firstTick, run.numTicks], [1940, 1500]);
+  assert.deepEqual([run.firstTick, run.numRows], [1940, 1500]);
   near(run.start, 3.88);
   near(run.end, 6.878);
   assert.deepEqual([run.rowAt(0), run.rowAt(4), run.rowAt(100)], [0, 60, 1499]);

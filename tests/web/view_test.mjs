@@ -33,8 +33,8 @@ async function start(name, parameters, viewParameters = []) {
 }
 
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: PATIENCE});
-const end = (page) => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numTicks);
-const more = async (page, ticks = 20) => until(page, (n) => window.poise.run.firstTick + window.poise.run.numTicks > n,
+const end = (page) => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numRows);
+const more = async (page, ticks = 20) => until(page, (n) => window.poise.run.firstTick + window.poise.run.numRows > n,
   await end(page) + ticks);
 
 test('a page follows a run in progress, looks back while it goes on, and has all of it in the end', async () => {
@@ -156,10 +156,10 @@ test('a page keeps the last ticks only', async () => {
   const {page, problems} = await openPage(browser, view.url);
   // Full, however late the page came, and some have gone.
   const first = await page.evaluate(() => window.poise.run.firstTick);
-  await until(page, (from) => window.poise.run.numTicks >= 500 && window.poise.run.firstTick > from + 300, first);
+  await until(page, (from) => window.poise.run.numRows >= 500 && window.poise.run.firstTick > from + 300, first);
   const held = await page.evaluate(() => {
     const {run: r} = window.poise;
-    return [r.numTicks, ...[...r.signals.values()].filter((s) => s.values).map((s) => s.values.length)];
+    return [r.numRows, ...[...r.signals.values()].filter((s) => s.values).map((s) => s.values.length)];
   });
   for (const n of held) assert.equal(n, 500);
   await page.evaluate(() => window.poise.player.seek(window.poise.run.start));
@@ -177,7 +177,7 @@ test('a page that loses its server goes on with the next one where it was', asyn
   await more(page);
   assert.equal(await view.stop(), 0);
   await until(page, () => window.poise.feed.state === 'waiting');
-  const [first, ticks] = await page.evaluate(() => [window.poise.run.firstTick, window.poise.run.numTicks]);
+  const [first, ticks] = await page.evaluate(() => [window.poise.run.firstTick, window.poise.run.numRows]);
   const next = await startView(options.poise, run, path('again'), '--port', String(view.port));
   programs.push(next);
   await until(page, () => window.poise.feed.state === 'live');

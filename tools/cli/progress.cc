@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kRewriteInterval = 0.1;  // s, on a terminal
 constexpr double kLineInterval = 2;       // s, elsewhere
+constexpr double kQuietStage = 1;         // s
+constexpr std::chrono::milliseconds kStageInterval{250};
 
 }  // namespace
 
@@ -28,6 +30,42 @@ void StatusLine::Clear() {
   if (terminal_ && shown_) fmt::print("\r\x1b[K");
   std::fflush(stdout);
   shown_ = false;
+}
+
+StageLine::StageLine(bool quiet)
+    : line_(quiet), made_(std::chrono::steady_clock::now()), thread_([this] { Run(); }) {}
+
+StageLine::~StageLine() {
+  End();
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void StageLine::Begin(const std::string& stage) {
+  const std::lock_guard lock(mutex_);
+  stage_ = stage;
+  begin_ = std::chrono::steady_clock::now();
+}
+
+void StageLine::End() {
+  const std::lock_guard lock(mutex_);
+  stage_.clear();
+  line_.Clear();
+}
+
+void StageLine::Run() {
+  using Seconds = std::chrono::duration<double>;
+  std::unique_lock lock(mutex_);
+  while (!changed_.wait_for(lock, kStageInterval, [this] { return over_; })) {
+    const auto now = std::chrono::steady_clock::now();
+    const double wall = Seconds(now - made_).count(), stage = Seconds(now - begin_).count();
+    if (stage_.empty() || stage < kQuietStage || !line_.Due(wall)) continue;
+    line_.Show(fmt::format("{}: {:.0f} s", stage_, stage), wall);
+  }
 }
 
 void Progress::Show(double time, double wall) {

@@ -1,7 +1,11 @@
 // Progress on the terminal.
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <string>
+#include <thread>
 
 namespace poise {
 
@@ -21,6 +25,33 @@ class StatusLine {
   bool terminal_;
   bool shown_ = false;
   double next_;  // wall time from which to show again
+};
+
+/// What a long piece of work is at, and for how long: said by a thread of its own from the first second
+/// of a stage on. Whoever prints ends the stage first.
+class StageLine {
+ public:
+  explicit StageLine(bool quiet);
+  ~StageLine();
+  StageLine(const StageLine&) = delete;
+  StageLine& operator=(const StageLine&) = delete;
+
+  /// Ends the stage before it.
+  void Begin(const std::string& stage);
+  /// Removes the line; nothing is shown until the next Begin.
+  void End();
+
+ private:
+  void Run();
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  StatusLine line_;
+  std::string stage_;  // empty: none
+  std::chrono::steady_clock::time_point begin_;
+  std::chrono::steady_clock::time_point made_;
+  bool over_ = false;
+  std::thread thread_;
 };
 
 /// A run's progress.

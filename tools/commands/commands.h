@@ -30,8 +30,12 @@ void AddEstimatorsCommand(CLI::App* app, Command* command);
 void AddLogCommand(CLI::App* app, Command* command);
 void AddNewCommand(CLI::App* app, Command* command);
 void AddGraphCommand(CLI::App* app, Command* command);
+void AddRobotCommand(CLI::App* app, Command* command);
+/// `poise robot import`, a command of `robot`.
+void AddRobotImport(CLI::App* robot, Command* command);
 void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
+void AddDrivesCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);

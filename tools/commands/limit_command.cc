@@ -75,9 +75,9 @@ int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
                session.rows().size(), session.folder().string());
     return kExitFailed;
   }
-  WriteOutput(session.folder(), session.header(), session.rows());
-  PrintOutput(session.folder(), session.header(), session.rows());
-  return AllRan(session.rows()) ? kExitOk : kExitFailed;
+  const bool all_ran =
+      Deliver(session.folder(), session.header(), session.rows(), options.all_pictures);
+  return all_ran ? kExitOk : kExitFailed;
 }
 
 }  // namespace

@@ -217,7 +217,10 @@ int List(const ListRequest& request) {
   }
   if (wanted("robots")) {
     ListFiles("robots",
-              [](const std::string& file) { return "URDF " + ReadMessage<Robot>(file).urdf(); });
+              [](const std::string& file) {
+                const Robot robot = ReadMessage<Robot>(file);
+                return robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf();
+              });
   }
   if (wanted("graphs")) {
     ListFiles("graphs", [](const std::string& file) {

@@ -7,12 +7,16 @@
 #include "logging/log_cut.h"
 #include "logging/log_survey.h"
 #include "logging/printable.h"
+#include "logging/replay/log_pack.h"
 #include "logging/run_info.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/run/remake.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/former_fields.h"
+#include "tools/scenario/registry.h"
 #include "tools/scenario/scenario_loading.h"
 
 namespace poise {
@@ -228,6 +232,37 @@ int Export(const ExportOptions& options) {
   return whole ? kExitOk : kExitFailed;
 }
 
+struct PackOptions {
+  std::string run;
+  bool keep = false;
+};
+
+/// run.packed in a run's folder, and beside any other log.
+fs::path PackedName(const fs::path& log) { return fs::path(log).replace_extension(".packed"); }
+
+int Pack(const PackOptions& options) {
+  const fs::path log = FindLog(options.run);
+  const fs::path packed = PackedName(log);
+  CatchStopSignals();
+  RemakeProgress progress(log);
+  const logging::PackResult result =
+      logging::PackLog(log.string(), packed.string(), Components(), progress.OnTick());
+  progress.Clear();
+  if (!options.keep) fs::remove(log);
+  fmt::print(
+      "{}: {} in place of {}: this build has made all {} ticks again, bit for bit, and makes them "
+      "when they are asked for\n",
+      packed.string(), FormatBytes(static_cast<int64_t>(result.packed_bytes)),
+      FormatBytes(static_cast<int64_t>(result.bytes)), result.ticks);
+  return kExitOk;
+}
+
+int Unpack(const std::string& run) {
+  // FindLog makes a packed log again.
+  fmt::print("{}\n", FindLog(run).string());
+  return kExitOk;
+}
+
 CLI::Option* AddRun(CLI::App* app, std::string* run) {
   return app->add_option("run", *run, "folder of a run or a log; default: the latest run");
 }
@@ -290,15 +325,32 @@ void AddExport(CLI::App* log, Command* command) {
   app->callback([options, command] { *command = [options] { return Export(*options); }; });
 }
 
+void AddPack(CLI::App* log, Command* command) {
+  auto options = std::make_shared<PackOptions>();
+  CLI::App* pack = log->add_subcommand(
+      "pack",
+      "put a small file in the place of a log that this build makes again, byte for byte: a run in "
+      "lockstep without an operator's messages. It is made again first, to see that it is so");
+  AddRun(pack, &options->run);
+  pack->add_flag("--keep", options->keep, "leave the log");
+  pack->callback([options, command] { *command = [options] { return Pack(*options); }; });
+  auto run = std::make_shared<std::string>();
+  CLI::App* unpack = log->add_subcommand(
+      "unpack", "make a packed log again; every command that reads a run's log does so too");
+  AddRun(unpack, run.get());
+  unpack->callback([run, command] { *command = [run] { return Unpack(*run); }; });
+}
+
 }  // namespace
 
 void AddLogCommand(CLI::App* app, Command* command) {
-  CLI::App* log = app->add_subcommand("log", "inspect, check, cut and export a run's log");
+  CLI::App* log = app->add_subcommand("log", "inspect, check, cut, export and pack a run's log");
   log->require_subcommand(1);
   AddInfo(log, command);
   AddCheck(log, command);
   AddCut(log, command);
   AddExport(log, command);
+  AddPack(log, command);
 }
 
 }  // namespace poise

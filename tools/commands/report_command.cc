@@ -3,7 +3,9 @@
 
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/progress.h"
 #include "tools/commands/commands.h"
 #include "tools/report/html_report.h"
 #include "tools/report/report.h"
@@ -22,13 +24,16 @@ struct ReportOptions {
   bool no_html = false;
   bool full = false;
   bool force = false;
+  double page_size = kPageSize;  // MB
 };
 
-ReportedRun ReadReportedRun(const std::string& run) {
+ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {
   ReportedRun result;
   result.log = FindLog(run).string();
   WarnOfRunInfo(result.log);
+  line->Begin("reading the log");
   result.record = logging::ReadRun(result.log);
+  line->End();
   if (result.record.info.scenario.empty()) {
     throw logging::LogError(
         fmt::format("{}: RUN_INFO is damaged and scenario.pbtxt is not beside it: put the "
@@ -36,13 +41,17 @@ ReportedRun ReadReportedRun(const std::string& run) {
                     result.log));
   }
   ParseScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  line->Begin("figures of the table");
   PrepareRecord(result.log, result.scenario, &result.record);
   if (result.scenario.has_reference() && result.record.reference == nullptr) {
+    line->End();
     fmt::print(
         stderr, "warning: {}: is missing; what compares with it has no value\n",
         (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
   }
+  line->Begin("figures of the table");
   result.checks = EvaluateChecks(result.scenario, result.record);
+  line->End();
   return result;
 }
 
@@ -55,9 +64,10 @@ std::filesystem::path DefaultHtml(const std::string& log) {
 
 int Report(const ReportOptions& options) {
   if (!options.html.empty()) CheckFileFree("--html", options.html, options.force);
+  StageLine line(/*quiet=*/false);
   std::vector<ReportedRun> runs;
-  runs.push_back(ReadReportedRun(options.run));
-  if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay));
+  runs.push_back(ReadReportedRun(options.run, &line));
+  if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay, &line));
   const ReportedRun& run = runs.front();
   const std::string commit = run.record.spec.poise_commit().empty()
                                  ? ""
@@ -67,9 +77,11 @@ int Report(const ReportOptions& options) {
           "{} of {}, poise {}{}\n{}", run.record.spec.scenario(), run.record.info.started_at,
           run.record.spec.poise_version(), commit, FormatChanges(run.scenario))),
       ScreenStyle().columns, 2);
+  line.Begin("events");
   const std::vector<logging::Event> events = logging::Events(run.record);
   const ShownRun shown{run.scenario, run.record, run.checks, events, "", {}};
   text += fmt::format("\n{}\n", options.full ? FormatFullScreen(shown) : FormatScreen(shown));
+  line.End();
   fmt::print("{}", text);
   if (run.record.spec.has_cut()) {
     fmt::print("{}\n", Wrapped("part of a run: the scenario's checks are of the whole one and are "
@@ -81,7 +93,9 @@ int Report(const ReportOptions& options) {
   if (!options.no_html) {
     const std::filesystem::path html =
         options.html.empty() ? DefaultHtml(run.log) : std::filesystem::path(options.html);
-    WriteHtmlReport(html, runs);
+    line.Begin("the page");
+    WriteHtmlReport(html, runs, options.page_size);
+    line.End();
     fmt::print("\nThe run, step by step: {}\n", FileAddress(html));
   }
   for (const CheckResult& check : run.checks) {
@@ -100,7 +114,15 @@ void AddReportCommand(CLI::App* app, Command* command) {
   report->add_option("overlay", options->overlay, "a second run, drawn over the first in the page");
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
-  report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  CLI::Option* no_html =
+      report->add_flag("--no-html", options->no_html, "the table alone")->excludes(html);
+  report
+      ->add_option("--page-size", options->page_size,
+                   "MB that the page's numbers may take: of a run too long for that it shows every "
+                   "tick at its ends and events, elsewhere rows with least and largest values")
+      ->check(Within("a size of 0.1 to 1000 MB", [](double mb) { return mb >= 0.1 && mb <= 1000; }))
+      ->capture_default_str()
+      ->excludes(no_html);
   report->add_flag("--force", options->force, "replace the file of --html");
   report->add_flag("--full", options->full, "every figure, the events and the assumptions");
   report->callback([options, command] { *command = [options] { return Report(*options); }; });

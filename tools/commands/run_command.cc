@@ -113,6 +113,9 @@ void AddRunCommand(CLI::App* app, Command* command) {
                 "a robot without joint friction, sensor noise, drive train and model error");
   run->add_flag("--no-reference", arguments->no_reference,
                 "do not run the scenario's reference variant beside it");
+  run->add_option("--robot", options->changes.robot,
+                  "a name (poise list robots), a robot's folder or its .pbtxt file; default: the "
+                  "scenario's");
   run->add_option("--world", options->changes.world,
                   "engine of the simulated robot: ode or mujoco; default: the scenario's");
   run->add_option("--set", options->changes.set,

@@ -20,43 +20,28 @@ struct MergeOptions {
   std::string out;
   bool force = false;
   bool partial = false;
+  bool all_pictures = false;
 };
 
 int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
   const SweepDefinition definition(arguments, /*limit=*/false);
   const auto [first, end] = SelectedRuns(options, definition.points().size());
   SweepSession session(definition, kKindSweep, options);
-  const auto is_selected = [first = first, end = end](const SweepRow& row) {
-    return row.run >= first && row.run < end;
-  };
-  int64_t done = 0;
-  for (const auto& [key, row] : session.rows()) done += is_selected(row) ? 1 : 0;
+  const int64_t before = CountDone(first, end, session.rows());
   fmt::print("{}: {} runs{}{}, {} at a time; {}\n", definition.name(), end - first,
              end - first < definition.points().size()
                  ? fmt::format(" of {}", definition.points().size())
                  : "",
-             done > 0 ? fmt::format(", {} done before", done) : "", options.jobs,
+             before > 0 ? fmt::format(", {} done before", before) : "", options.jobs,
              session.folder().string());
-  int64_t next = first;
-  const bool complete = session.Run(
-      [&]() -> std::optional<SweepSession::Request> {
-        while (next < end && session.rows().contains({next, 0})) ++next;
-        if (next >= end) return {};
-        return SweepSession::Request{next++, {}};
-      },
-      [&](const SweepRow&) { ++done; },
-      [&] {
-        return SweepSession::Progress{static_cast<double>(done), static_cast<double>(end - first),
-                                      fmt::format("{} of {} runs done", done, end - first)};
-      });
-  if (!complete) {
+  if (!RunPoints(first, end, &session)) {
     fmt::print(stderr, "poise: interrupted; {} of {} runs are done; --resume --out {} goes on\n",
-               done, end - first, session.folder().string());
+               CountDone(first, end, session.rows()), end - first, session.folder().string());
     return kExitFailed;
   }
-  WriteOutput(session.folder(), session.header(), session.rows());
-  PrintOutput(session.folder(), session.header(), session.rows());
-  return AllRan(session.rows()) ? kExitOk : kExitFailed;
+  const bool all_ran =
+      Deliver(session.folder(), session.header(), session.rows(), options.all_pictures);
+  return all_ran ? kExitOk : kExitFailed;
 }
 
 /// Throws ConfigError when points are missing or not searched to the end.
@@ -111,9 +96,8 @@ int Merge(const MergeOptions& options) {
     SweepResultsWriter writer(out, merged->header, {});
     for (const auto& [key, row] : merged->rows) writer.Append(row);
   }
-  WriteOutput(out, merged->header, merged->rows);
-  PrintOutput(out, merged->header, merged->rows);
-  return AllRan(merged->rows) ? kExitOk : kExitFailed;
+  const bool all_ran = Deliver(out, merged->header, merged->rows, options.all_pictures);
+  return all_ran ? kExitOk : kExitFailed;
 }
 
 }  // namespace
@@ -128,8 +112,9 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
       "table.csv (a row a run, the same\nbytes whether resumed, split or in parallel) and "
-      "maps.html, and each map as map_N.svg and map_N.png.\nA sweep's file: "
-      "tools/sweep/sweep.proto; docs/sweeps.md.\n"
+      "maps.html, and each map as map_N.svg; as map_N.png, too, those that the sweep's file asks "
+      "for and those of what stands; with --png all. A sweep's file: tools/sweep/sweep.proto; "
+      "docs/sweeps.md.\n"
       "Exit code: 0 when every run was made, fallen or not; 1 when interrupted or a run could not "
       "be made; 2 wrong usage\nor configuration.");
   CLI::App* merge = sweep->add_subcommand(
@@ -139,6 +124,7 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   merge->add_option("--out", merge_options->out, "folder for the whole")->required();
   merge->add_flag("--force", merge_options->force, "replace what --out holds");
   merge->add_flag("--partial", merge_options->partial, "though points are missing");
+  merge->add_flag("--png", merge_options->all_pictures, "every map as PNG, too");
   merge->callback(
       [merge_options, command] { *command = [merge_options] { return Merge(*merge_options); }; });
   sweep->callback([arguments, session, command, merge] {

@@ -53,6 +53,11 @@ class Watch {
           DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bridge)) {
         statistics_.SetBridge(bridge);
       }
+      bus_status_t bus;
+      if (message.type->fingerprint == bus_status_t::getHash() &&
+          DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()), &bus)) {
+        statistics_.SetBus(bus);
+      }
       statistics_.AddMessage(message.index, message.tick, message.data.size(), last_arrival_);
     });
     control_.Spin(0);

@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include "components/framework/configuration/configuration.h"
@@ -11,10 +13,16 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/report/wrench_difference.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
 #include "tools/run/several_runs.h"
+#include "tools/scenario/catalog.h"
 #include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+#include "tools/sweep/sweep_agreement.h"
+#include "tools/sweep/sweep_session.h"
+#include "tools/sweep/sweep_table.h"
 
 namespace poise {
 namespace {
@@ -25,6 +33,7 @@ struct WorldsArguments {
   std::vector<std::string> scenarios = {kAllScenarios};
   std::string out;
   RunOptions options;
+  SessionOptions session;  ///< of sweeps: jobs, range
 };
 
 /// A scenario in one engine.
@@ -123,10 +132,20 @@ std::string WorldsCsv(const std::string& scenario, const std::vector<WorldRun>& 
   return lines;
 }
 
+/// What `engine` is told: no other engine's fields.
+RunChanges ChangesFor(const std::string& engine, RunChanges changes) {
+  std::erase_if(changes.set, [&](const std::string& change) {
+    const std::string of = EngineOfField(change);
+    return !of.empty() && of != engine;
+  });
+  changes.world = engine;
+  return changes;
+}
+
 WorldRun RunWorld(const std::string& scenario, const std::string& engine, RunOptions options,
                   const fs::path& dir) {
   WorldRun world{engine, {}};
-  options.changes.world = engine;
+  options.changes = ChangesFor(engine, options.changes);
   fmt::print("{}: ", engine);
   std::fflush(stdout);
   try {
@@ -139,18 +158,94 @@ WorldRun RunWorld(const std::string& scenario, const std::string& engine, RunOpt
   return world;
 }
 
+constexpr char kWrenchCsvHead[] = "scenario,foot,quantity,unit,rms,largest,time\n";
+
+/// Prints how far the measured wrenches of the first engine's run and the last one's are apart;
+/// lines for wrenches.csv. Throws LogError or RobotError.
+std::string CompareWrenches(const std::string& scenario, const std::vector<WorldRun>& worlds) {
+  const auto read = [](const WorldRun& world) {
+    return logging::ReadRun((world.result.dir / "run.lcm").string());
+  };
+  const std::array<WrenchDifference, 2> feet =
+      CompareFootWrenches(read(worlds.front()), read(worlds.back()));
+  fmt::print("\n{}", FormatWrenchDifferences(feet));
+  std::string lines;
+  for (size_t f = 0; f < feet.size(); ++f) {
+    const auto add = [&](const char* quantity, const char* unit, const VectorDifference& of) {
+      if (of.ticks == 0) return;
+      lines += fmt::format("{},{},{},{},{},{},{}\n", CsvCell(scenario), f == 0 ? "right" : "left",
+                           quantity, unit, of.rms, of.largest, of.time);
+    };
+    add("force", "N", feet[f].force);
+    add("moment", "N·m", feet[f].moment);
+  }
+  return lines;
+}
+
+/// Runs a sweep in every engine and prints where they agree. False when a run could not be made or
+/// a signal ended it. Throws ConfigError, RobotError.
+bool SweepWorlds(const std::string& sweep, const WorldsArguments& arguments,
+                 const std::vector<std::string>& engines, const fs::path& folder) {
+  std::vector<EngineRows> worlds;
+  bool passed = true;
+  Sweep swept;
+  for (const std::string& engine : engines) {
+    SweepArguments what;
+    what.what = sweep;
+    what.changes = ChangesFor(engine, arguments.options.changes);
+    const SweepDefinition definition(what, /*limit=*/false);
+    const auto [first, end] = SelectedRuns(arguments.session, definition.points().size());
+    SessionOptions session_options = arguments.session;
+    session_options.out = (folder / engine).string();
+    SweepSession session(definition, kKindSweep, session_options);
+    fmt::print("{}: {} runs, {} at a time\n", engine, end - first, session_options.jobs);
+    std::fflush(stdout);
+    if (!RunPoints(first, end, &session)) {
+      fmt::print(stderr, "poise: interrupted\n");
+      return false;
+    }
+    WriteFile(session.folder() / "table.csv", SweepCsv(session.header(), session.rows()));
+    for (const auto& [key, row] : session.rows()) {
+      if (row.outcome != kInvalid && row.outcome != kCrashed) continue;
+      if (passed) fmt::print(stderr, "poise: {}: run {}: {}\n", engine, row.run, row.reason);
+      passed = false;
+    }
+    swept = definition.sweep();
+    worlds.push_back({engine, session.rows()});
+  }
+  fmt::print("\n{}\n", FormatAgreement(swept, worlds.front(), worlds.back()));
+  return passed;
+}
+
+/// True for the name or file of a sweep; a scenario's name comes first.
+bool IsSweep(const std::string& name) {
+  if (name == kAllScenarios) return false;
+  const fs::path file = FindFileOfKinds({"scenarios", "sweeps"}, name, fs::current_path());
+  Sweep sweep;
+  try {
+    ParseTextProto(ReadFile(file.string()), file.string(), &sweep);
+  } catch (const ConfigError&) {
+    return false;
+  }
+  return sweep.has_scenario();
+}
+
 int Worlds(WorldsArguments arguments) {
   RunOptions& options = arguments.options;
   options.in_process = true;
   options.quiet = true;
   const std::vector<std::string> engines = Engines();
-  const std::vector<std::string> scenarios = ExpandScenarios(arguments.scenarios);
+  std::vector<std::string> given, sweeps;
+  for (const std::string& name : arguments.scenarios) {
+    (IsSweep(name) ? sweeps : given).push_back(name);
+  }
+  const std::vector<std::string> scenarios = ExpandScenarios(given);
   std::vector<std::string> names;
   LogSizes sizes;
   for (const std::string& scenario : scenarios) {
     for (const std::string& engine : engines) {
       RunOptions checked = options;
-      checked.changes.world = engine;
+      checked.changes = ChangesFor(engine, checked.changes);
       const ScenarioRun run(scenario, checked);
       if (engine == engines.front()) names.push_back(run.name());
       sizes.sum += run.log_sizes().sum;
@@ -163,6 +258,7 @@ int Worlds(WorldsArguments arguments) {
   bool passed = true;
   std::set<std::string> taken;
   std::string csv = kCsvHead;
+  std::string wrenches = kWrenchCsvHead;
   for (size_t i = 0; i < scenarios.size(); ++i) {
     const std::string name = UniqueName(names[i], &taken);
     fmt::print("{}\n", name);
@@ -175,9 +271,22 @@ int Worlds(WorldsArguments arguments) {
     }
     fmt::print("\n{}\n", FormatWorlds(worlds));
     csv += WorldsCsv(name, worlds);
+    const bool ran = std::all_of(worlds.begin(), worlds.end(), [](const WorldRun& world) {
+      return world.result.problem.empty();
+    });
+    if (ran) wrenches += CompareWrenches(name, worlds);
   }
-  WriteFile(folder.path() / "worlds.csv", csv);
-  fmt::print("{}; {}\n", passed ? "all passed" : "FAILED", (folder.path() / "worlds.csv").string());
+  if (!scenarios.empty()) {
+    WriteFile(folder.path() / "worlds.csv", csv);
+    WriteFile(folder.path() / "wrenches.csv", wrenches);
+  }
+  for (const std::string& sweep : sweeps) {
+    const std::string name = UniqueName(fs::path(sweep).stem().string(), &taken);
+    fmt::print("{}\n", name);
+    passed = SweepWorlds(sweep, arguments, engines, folder.path() / name) && passed;
+    if (StopSignal() != 0) return kExitFailed;
+  }
+  fmt::print("{}; {}\n", passed ? "all passed" : "FAILED", folder.path().string());
   return passed ? kExitOk : kExitFailed;
 }
 
@@ -189,11 +298,16 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
   CLI::App* worlds = app->add_subcommand(
       "worlds", "run scenarios in every physics engine and compare what comes of them");
   worlds->footer(
-      "Ratio: of the last engine's figure to the first one's. Exit code 1 when a check failed in "
-      "an engine.");
+      "Of a scenario: each check's figure in each engine, the ratio of the last engine's to the "
+      "first one's, and how far the measured foot wrenches are apart (worlds.csv, wrenches.csv). "
+      "Of a sweep: in how many runs the outcome is the same, and how far the largest values that "
+      "stand are apart (table.csv of each engine). A change with --set of an engine's own field "
+      "goes to that engine alone.\n"
+      "Exit code 1 when a check failed in an engine or a run of a sweep could not be made.");
   worlds
       ->add_option("scenario", arguments->scenarios,
-                   "names or .pbtxt files; all: every experiment of the paper")
+                   "names or .pbtxt files of scenarios and sweeps; all: every experiment of the "
+                   "paper")
       ->capture_default_str();
   worlds->add_option("--variant", options->changes.variant, "of the scenario");
   worlds->add_option("--without", options->changes.without, "leave out a part of the controller")
@@ -214,6 +328,13 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
   worlds->add_option("--out", arguments->out,
                      "folder for a run's folder each and worlds.csv; default: a dated one under "
                      "runs/");
+  arguments->session.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  worlds
+      ->add_option("--jobs", arguments->session.jobs,
+                   "runs of a sweep at a time; default: the processor's cores")
+      ->check(CLI::Range(1, 1024));
+  worlds->add_option("--range", arguments->session.range, "of a sweep, only points A to B - 1")
+      ->type_name("A:B");
   worlds->add_flag("--force", options->force,
                    "replace what --out holds; start though the logs may not fit the disk");
   worlds->callback([arguments, command] { *command = [arguments] { return Worlds(*arguments); }; });

@@ -39,6 +39,8 @@ void LiveStatistics::AddMessage(int channel, int64_t tick, size_t bytes, int64_t
   count.last_arrival = now;
 }
 
+void LiveStatistics::SetBus(const bus_status_t& status) { bus_ = status; }
+
 void LiveStatistics::SetBridge(const bridge_status_t& status) { bridge_ = status; }
 
 void LiveStatistics::SetProcess(const std::string& name, const ControlClient::Status& status) {
@@ -54,6 +56,7 @@ LiveSnapshot LiveStatistics::Take(int64_t now) {
   snapshot.tick = newest_.tick;
   snapshot.tick_rate = newest_.RateSince(first_);
   snapshot.bridge = bridge_;
+  snapshot.bus = bus_;
   first_ = newest_;
   std::vector<std::string> names;
   for (const ComponentInstance& instance : spec_.graph().component()) {

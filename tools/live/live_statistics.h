@@ -10,6 +10,7 @@
 #include "components/framework/bus/control_client.h"
 #include "components/framework/graph.pb.h"
 #include "poise/bridge_status_t.hpp"
+#include "poise/bus_status_t.hpp"
 
 namespace poise {
 
@@ -36,6 +37,7 @@ struct LiveSnapshot {
   std::vector<Process> processes;         ///< in the graph's order, then the recorder
   std::vector<ChannelRow> channels;       ///< in the graph's order
   std::optional<bridge_status_t> bridge;  ///< newest
+  std::optional<bus_status_t> bus;        ///< newest; of a run with drives on a bus
   int64_t tick = -1;                      ///< newest of any channel
   double tick_rate = -1;                  ///< ticks/s
 };
@@ -49,6 +51,7 @@ class LiveStatistics {
   /// `channel`: index in the graph.
   void AddMessage(int channel, int64_t tick, size_t bytes, int64_t now);
   void SetBridge(const bridge_status_t& status);
+  void SetBus(const bus_status_t& status);
   void SetProcess(const std::string& name, const ControlClient::Status& status);
   /// The moment `now`; the next interval begins.
   LiveSnapshot Take(int64_t now);
@@ -79,6 +82,7 @@ class LiveStatistics {
   std::vector<ChannelCount> channels_;
   std::map<std::string, ProcessCount> processes_;
   std::optional<bridge_status_t> bridge_;
+  std::optional<bus_status_t> bus_;
   Progress first_;
   Progress newest_;
   int64_t interval_begin_;

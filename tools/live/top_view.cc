@@ -136,6 +136,37 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
   }
 }
 
+/// A line for each slave of the drives' bus.
+void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
+  constexpr int kOperational = 8, kError = 16;
+  lines->push_back(
+      {fmt::format("{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}", "SLAVE", "STATE", "603F",
+                   "EMERGENCY", "COUNT", "CLOCK ns", "RX ERR", "LOST LINK", "RECOVERED"),
+       Style::kTitle});
+  for (size_t i = 0; i < bus.online.size(); ++i) {
+    const int status = bus.al_status[i];
+    const char* const name = (status & 15) == 1   ? "INIT"
+                             : (status & 15) == 2 ? "PRE-OP"
+                             : (status & 15) == 4 ? "SAFE-OP"
+                             : (status & 15) == 8 ? "OP"
+                                                  : "unknown";
+    std::string state = bus.online[i] == 0 ? "does not answer" : name;
+    if (bus.online[i] != 0 && (status & kError) != 0) {
+      state += fmt::format(", error {:04X}", bus.al_code[i]);
+    }
+    const bool good = bus.online[i] != 0 && status == kOperational;
+    const bool odd = bus.error_code[i] != 0 || bus.receive_errors[i] != 0;
+    lines->push_back({fmt::format("{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}", i, state,
+                                  fmt::format("{:04X}", bus.error_code[i]),
+                                  fmt::format("{:04X}", bus.emergency[i]), bus.emergencies[i],
+                                  bus.clock_difference[i], bus.receive_errors[i], bus.lost_links[i],
+                                  bus.recoveries[i]),
+                      !good ? Style::kFailure
+                      : odd ? Style::kWarning
+                            : Style::kPlain});
+  }
+}
+
 void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t name = 7;
   size_t type = 4;
@@ -186,6 +217,10 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& 
   lines.emplace_back();
   AddProcesses(spec, snapshot, &lines);
   lines.emplace_back();
+  if (snapshot.bus && !snapshot.bus->online.empty()) {
+    AddBus(*snapshot.bus, &lines);
+    lines.emplace_back();
+  }
   AddChannels(snapshot, &lines);
   return lines;
 }

@@ -1,8 +1,11 @@
 #include "tools/maps/sweep_output.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
+#include <memory>
 #include <sstream>
 #include <system_error>
 #include <thread>
@@ -12,6 +15,7 @@
 #include "logging/printable.h"
 #include "tools/cli/child_process.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/signals.h"
 #include "tools/maps/sweep_charts.h"
 #include "tools/maps/sweep_edge.h"
 #include "tools/maps/sweep_maps.h"
@@ -41,63 +45,94 @@ fs::path FindProgram(const std::string& name) {
   return {};
 }
 
-/// Throws std::system_error; false: it failed, and `log` says why.
-bool ConvertToPng(const fs::path& converter, const fs::path& svg, const fs::path& log) {
-  const fs::path png = fs::path(svg).replace_extension(".png");
-  ChildProcess child(
-      kConverter, {converter.string(), "--zoom", kPngZoom, "--output", png.string(), svg.string()},
-      log.string());
-  while (!child.ended()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  return child.succeeded();
-}
-
-void WriteMaps(const fs::path& folder, const std::vector<std::string>& charts) {
-  const fs::path converter = FindProgram(kConverter);
-  const fs::path log = folder / "rsvg-convert.log";
-  std::string problem;
-  if (converter.empty()) {
-    problem =
-        fmt::format("{} is not installed; on Debian: librsvg2-bin, or deploy/setup", kConverter);
+/// The maps of the page as files of their own. Pictures are drawn by processes beside this one.
+class MapFiles {
+ public:
+  /// Writes the maps as SVG and begins with the first `pictures` of them. Throws ConfigError.
+  MapFiles(const fs::path& folder, const std::vector<std::string>& charts, size_t pictures)
+      : folder_(folder), charts_(charts.size()), pictures_(pictures) {
+    for (size_t i = 0; i < charts.size(); ++i) WriteFile(Svg(i), StandaloneSvg(charts[i]));
+    if (pictures_ > 0 && converter_.empty()) {
+      problem_ =
+          fmt::format("{} is not installed; on Debian: librsvg2-bin, or deploy/setup", kConverter);
+    }
+    Draw();
   }
-  for (size_t i = 0; i < charts.size(); ++i) {
-    const fs::path svg = folder / fmt::format("map_{}.svg", i + 1);
-    WriteFile(svg, StandaloneSvg(charts[i]));
-    if (!problem.empty()) continue;
-    try {
-      if (!ConvertToPng(converter, svg, log)) problem = "see " + log.string();
-    } catch (const std::system_error& error) {
-      problem = error.what();
+
+  /// Waits for the pictures and prints what there is; on stderr why one is missing.
+  void Finish() {
+    while ((next_ < pictures_ && problem_.empty()) || !drawing_.empty()) {
+      if (StopSignal() != 0) {
+        problem_ = "interrupted";
+        break;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      for (auto child = drawing_.begin(); child != drawing_.end();) {
+        child = (*child)->ended() && End(**child) ? drawing_.erase(child) : std::next(child);
+      }
+      Draw();
+    }
+    drawing_.clear();
+    if (charts_ > 0) {
+      fmt::print("{}: {} maps, {} as .png\n", (folder_ / "map_1.svg").string(), charts_, drawn_);
+    }
+    if (!problem_.empty()) {
+      fmt::print(stderr, "poise: the maps are not all there as PNG: {}\n", problem_);
     }
   }
-  if (!problem.empty()) {
-    fmt::print(stderr, "poise: the maps are not all there as PNG: {}\n", problem);
-  } else {
-    std::error_code error;
-    fs::remove(log, error);  // empty
+
+ private:
+  fs::path Svg(size_t i) const { return folder_ / fmt::format("map_{}.svg", i + 1); }
+  /// Begins with pictures, as many at a time as there are cores.
+  void Draw() {
+    const size_t at_once = std::max(1u, std::thread::hardware_concurrency());
+    while (next_ < pictures_ && problem_.empty() && drawing_.size() < at_once) {
+      const fs::path svg = Svg(next_++);
+      const std::vector<std::string> command = {converter_.string(),
+                                                "--zoom",
+                                                kPngZoom,
+                                                "--output",
+                                                fs::path(svg).replace_extension(".png").string(),
+                                                svg.string()};
+      const std::string log = fs::path(svg).replace_extension(".log").string();
+      try {
+        drawing_.push_back(std::make_unique<ChildProcess>(kConverter, command, log));
+      } catch (const std::system_error& error) {
+        problem_ = error.what();
+      }
+    }
   }
-}
+  /// True.
+  bool End(const ChildProcess& child) {
+    if (child.succeeded()) {
+      ++drawn_;
+      std::error_code error;
+      fs::remove(child.log_path(), error);  // empty
+    } else {
+      problem_ = "see " + child.log_path();
+    }
+    return true;
+  }
 
-}  // namespace
+  fs::path folder_;
+  size_t charts_, pictures_;
+  size_t next_ = 0, drawn_ = 0;
+  const fs::path converter_ = FindProgram(kConverter);
+  std::vector<std::unique_ptr<ChildProcess>> drawing_;
+  std::string problem_;
+};
 
-void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
-                 const SweepRows& rows) {
-  WriteFile(folder / kTableFile, SweepCsv(header, rows));
-  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
-  const SweepMaps maps = MapCharts(header, rows);
-  WriteFile(folder / kMapsFile, MapsPage(header, rows, maps));
-  WriteMaps(folder, maps.all());
-}
-
-void PrintOutput(const std::filesystem::path& folder, const SweepHeader& header,
-                 const SweepRows& rows) {
+void PrintOutput(const fs::path& folder, const SweepHeader& header, const SweepRows& rows) {
   for (const std::string& sentence : SurvivalSentences(header, rows)) fmt::print("{}\n", sentence);
   fmt::print("\n{}", FormatOutcomes(header, rows));
   if (header.sweep.has_limit()) fmt::print("\n{}", FormatLimits(header, rows));
   fmt::print("\n{}\n", (folder / kTableFile).string());
   if (header.sweep.has_limit()) fmt::print("{}\n", (folder / kLimitsFile).string());
   fmt::print("{}\n", (folder / kMapsFile).string());
+  std::fflush(stdout);
 }
 
+/// True when no row is kInvalid or kCrashed; else says on stderr which are.
 bool AllRan(const SweepRows& rows) {
   int problems = 0;
   for (const auto& [key, row] : rows) {
@@ -111,6 +146,24 @@ bool AllRan(const SweepRows& rows) {
     fmt::print(stderr, "poise: and {} more\n", problems - kShownProblems);
   }
   return problems == 0;
+}
+
+}  // namespace
+
+bool Deliver(const fs::path& folder, const SweepHeader& header, const SweepRows& rows,
+             bool all_pictures) {
+  WriteFile(folder / kTableFile, SweepCsv(header, rows));
+  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
+  const SweepMaps maps = MapCharts(header, rows);
+  WriteFile(folder / kMapsFile, MapsPage(header, rows, maps));
+  const std::vector<std::string> charts = maps.all();
+  // A curve of each metric, which nobody asked for, is drawn as SVG alone: a converter's start is
+  // most of its time.
+  const bool all = all_pictures || header.sweep.map_size() > 0;
+  MapFiles files(folder, charts, all ? charts.size() : maps.survival.size());
+  PrintOutput(folder, header, rows);
+  files.Finish();
+  return AllRan(rows);
 }
 
 }  // namespace poise

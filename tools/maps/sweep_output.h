@@ -7,17 +7,12 @@
 
 namespace poise {
 
-/// Writes table.csv and maps.html, each map as map_N.svg and map_N.png, and limits.csv of a search
-/// for limits, of the rows there are. Says on stderr why there are no PNG files. Throws
+/// Writes table.csv, maps.html, each map as map_N.svg, and limits.csv of a search for limits, of
+/// the rows there are. Prints what they came to and which files there are, while the maps that the
+/// sweep asks for and those of survival, or with `all_pictures` every map, become map_N.png; says
+/// on stderr which pictures and runs are missing. False when a row is kInvalid or kCrashed. Throws
 /// ConfigError.
-void WriteOutput(const std::filesystem::path& folder, const SweepHeader& header,
-                 const SweepRows& rows);
-
-/// Prints what the rows came to and which files the folder holds.
-void PrintOutput(const std::filesystem::path& folder, const SweepHeader& header,
-                 const SweepRows& rows);
-
-/// True when no row is kInvalid or kCrashed; else says on stderr which are.
-bool AllRan(const SweepRows& rows);
+bool Deliver(const std::filesystem::path& folder, const SweepHeader& header, const SweepRows& rows,
+             bool all_pictures);
 
 }  // namespace poise

@@ -32,6 +32,19 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kDataMark = "<!--POISE-RUN-DATA-->";
 
+// What a megabyte of page holds, fitted to runs of 12 joints: numbers take about 1.5 bytes where
+// each tick is there, and about 4 with their bounds.
+constexpr double kNumbersPerMegabyte = 0.65e6;      // ticks times signals: each tick is there
+constexpr double kBoundNumbersPerMegabyte = 0.2e6;  // rows times signals, else
+constexpr int64_t kLeastRows = 500;
+
+// Around which events every tick is shown, the first ones first.
+constexpr const char* kFocus[] = {
+    "fall",         "bridge_state",   "step_needed", "contact_lost",    "push_peak",
+    "push_begins",  "contact_early",  "no_surface",  "touch_down",      "support_changed",
+    "contact_late", "phase_began",    "push_ends",   "balancing_on",    "eta_infeasible_begins",
+    "crane_let_go", "loading_begins", "searching",   "unloading_begins"};
+
 /// PREFIX/share/poise/report.html where Poise is installed; else build/web/report.html, beside
 /// build/PRESET/bin/poise.
 fs::path TemplatePath() {
@@ -117,6 +130,14 @@ class BlobWriter {
 
   /// {"value"} of a column of one value, else {"blob", "step", "order"}.
   Json Add(std::span<const double> values, bool integer) {
+    return Add(values, [&] { return logging::PackColumn(values, integer); });
+  }
+  Json AddBound(std::span<const double> values, logging::Bound bound, bool integer) {
+    return Add(values, [&] { return logging::PackBound(values, bound, integer); });
+  }
+
+ private:
+  Json Add(std::span<const double> values, const std::function<logging::PackedColumn()>& pack) {
     const double first = values.front();
     if (std::ranges::all_of(values, [first](double x) { return x == first; })) {
       return {{"value", first}};
@@ -124,7 +145,7 @@ class BlobWriter {
     if (std::ranges::none_of(values, [](double x) { return std::isfinite(x); })) {
       return {{"value", nullptr}};
     }
-    logging::PackedColumn column = logging::PackColumn(values, integer);
+    logging::PackedColumn column = pack();
     const auto [blob, added] =
         blobs_.try_emplace(std::move(column.data), fmt::format("run{}-{}", run_, blobs_.size()));
     if (added) {
@@ -134,7 +155,6 @@ class BlobWriter {
     return {{"blob", blob->second}, {"step", column.step}, {"order", column.order}};
   }
 
- private:
   std::ostream* out_;
   size_t run_;
   std::map<std::string, std::string> blobs_;  // id by content
@@ -158,6 +178,62 @@ Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t 
     json.push_back(std::move(item));
   }
   return json;
+}
+
+/// Of a page whose rows hold several ticks.
+Json RowChannelsJson(const std::vector<logging::ChannelRows>& channels, int64_t num_ticks,
+                     BlobWriter* blobs) {
+  constexpr double kFew = 0.2;  // of the ticks, as in web/src/data.js
+  Json json = Json::array();
+  for (const logging::ChannelRows& channel : channels) {
+    Json item = {{"name", channel.name}, {"type", channel.type}, {"count", channel.messages}};
+    if (static_cast<double>(channel.messages) < kFew * static_cast<double>(num_ticks)) {
+      item["sparse"] = true;
+    }
+    item["signals"] = Json::array();
+    for (const logging::RowColumn& column : channel.columns) {
+      Json signal = {{"field", column.field}, {"integer", column.integer}};
+      signal.update(blobs->Add(column.values, column.integer));
+      const auto same = [](double a, double b) {
+        return a == b || (std::isnan(a) && std::isnan(b));
+      };
+      if (!std::ranges::equal(column.least, column.largest, same)) {
+        signal["least"] = blobs->AddBound(column.least, logging::Bound::kLeast, column.integer);
+        signal["largest"] =
+            blobs->AddBound(column.largest, logging::Bound::kLargest, column.integer);
+      }
+      item["signals"].push_back(std::move(signal));
+    }
+    json.push_back(std::move(item));
+  }
+  return json;
+}
+
+/// The rows of a run that may take `megabytes` of a page.
+logging::PageRows RowsOf(const logging::RunRecord& record,
+                         const std::vector<logging::Event>& events, double megabytes) {
+  const int64_t first = record.spec.cut().first_tick();
+  double signals = 0;
+  for (const Channel& channel : record.spec.graph().channel()) {
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    signals += static_cast<double>(FindMessageType(channel.type())->encoded_size(counts)) / 8;
+  }
+  const double share = megabytes / signals;
+  if (static_cast<double>(record.num_ticks - first) <= kNumbersPerMegabyte * share) {
+    return logging::PageRows(first, record.num_ticks);
+  }
+  std::vector<int64_t> focus;
+  for (const char* const name : kFocus) {
+    for (const logging::Event& event : events) {
+      if (event.name != name) continue;
+      focus.push_back(std::llround(event.time / record.spec.tick_period()) +
+                      record.spec.lead_ticks());
+    }
+  }
+  return logging::PageRows(
+      first, record.num_ticks,
+      std::max(kLeastRows, static_cast<int64_t>(kBoundNumbersPerMegabyte * share)),
+      record.spec.tick_period(), focus);
 }
 
 /// The log's name in its folder: a page says nothing of the rest of the machine.
@@ -188,13 +264,25 @@ void WriteMetadata(const Json& json, std::ostream* out) {
        << "</script>\n";
 }
 
-void WriteRun(const ReportedRun& run, size_t index, std::ostream* out) {
+void WriteRun(const ReportedRun& run, size_t index, double megabytes, std::ostream* out) {
   Json json = Metadata(run.record, run.scenario, run.checks);
   json["run"]["log"] = LogName(run.log);
-  json["events"] = EventsJson(logging::Events(run.record));
+  const std::vector<logging::Event> events = logging::Events(run.record);
+  json["events"] = EventsJson(events);
   BlobWriter blobs(out, index);
-  json["channels"] =
-      ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
+  const logging::PageRows rows = RowsOf(run.record, events, megabytes);
+  if (rows.every_tick()) {
+    json["channels"] =
+        ChannelsJson(logging::ReadColumns(run.log, run.record), run.record.num_ticks, &blobs);
+  } else {
+    json["rows"] = Json::array();
+    for (const logging::RowSpan& span : rows.spans()) {
+      json["rows"].push_back({span.first_tick, span.stride, span.count});
+    }
+    json["events_without_detail"] = rows.left_out();
+    json["channels"] =
+        RowChannelsJson(logging::ReadRows(run.log, run.record, rows), run.record.num_ticks, &blobs);
+  }
   WriteMetadata(json, out);
 }
 
@@ -207,6 +295,28 @@ void WritePage(std::ostream* out, const std::function<void()>& write) {
   *out << std::string_view(page).substr(mark + kDataMark.size());
 }
 
+/// What `write` writes, or `file` as it was. Throws ConfigError; `flag` names the file.
+void WriteFile(const fs::path& file, const char* flag,
+               const std::function<void(std::ostream* out)>& write) {
+  std::optional<logging::PartialFile> partial;
+  try {
+    partial.emplace(file.string());
+  } catch (const logging::LogError& error) {
+    throw ConfigError(fmt::format("{}; name another file with {}", error.what(), flag));
+  }
+  PageFile page;
+  page.open(partial->part(), std::ios::out | std::ios::binary);
+  std::ostream out(&page);
+  write(&out);
+  out.flush();
+  if (!out || page.close() == nullptr) {
+    const int problem = page.problem() != 0 ? page.problem() : errno;
+    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with {}",
+                                  file.string(), std::strerror(problem), flag));
+  }
+  partial->Keep();
+}
+
 }  // namespace
 
 Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
@@ -217,32 +327,38 @@ Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
   return json;
 }
 
-void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs) {
+void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs, double megabytes) {
   for (const ReportedRun& run : runs) {
     std::error_code other;
     if (!fs::equivalent(file, run.log, other)) continue;
     throw ConfigError(
         fmt::format("{}: is the log itself; name another file with --html", file.string()));
   }
-  std::optional<logging::PartialFile> partial;
-  try {
-    partial.emplace(file.string());
-  } catch (const logging::LogError& error) {
-    throw ConfigError(fmt::format("{}; name another file with --html", error.what()));
-  }
-  PageFile page;
-  page.open(partial->part(), std::ios::out | std::ios::binary);
-  std::ostream out(&page);
-  WritePage(&out, [&] {
-    for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, &out);
+  WriteFile(file, "--html", [&](std::ostream* out) {
+    WritePage(out, [&] {
+      const double share = megabytes / static_cast<double>(runs.size());
+      for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, share, out);
+    });
   });
-  out.flush();
-  if (!out || page.close() == nullptr) {
-    const int problem = page.problem() != 0 ? page.problem() : errno;
-    throw ConfigError(fmt::format("{}: cannot be written: {}; name another file with --html",
-                                  file.string(), std::strerror(problem)));
-  }
-  partial->Keep();
+}
+
+void WriteRobotPage(const fs::path& file, const RobotCheck& check) {
+  const robot::RobotState& stance = check.stance;
+  const Eigen::Vector3d& at = stance.base_position;
+  const Eigen::Quaterniond& turn = stance.base_orientation;
+  Json json;
+  json["robot"] = RobotJson(check.model, check.urdf);
+  json["stance"]["base"] = {{"position", {at.x(), at.y(), at.z()}},
+                            {"orientation", {turn.w(), turn.x(), turn.y(), turn.z()}}};
+  json["stance"]["joints"] = std::vector<double>(stance.joint_position.begin(),
+                                                 stance.joint_position.end());
+  json["check"] = RobotCheckJson(check);
+  WriteFile(file, "--page", [&](std::ostream* out) {
+    WritePage(out, [&] {
+      *out << "<script type=\"application/json\" class=\"poise-robot\">" << ScriptText(json)
+           << "</script>\n";
+    });
+  });
 }
 
 std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario, Json channels,

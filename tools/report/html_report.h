@@ -9,6 +9,7 @@
 
 #include "logging/run_record.h"
 #include "tools/report/report.h"
+#include "tools/robot/robot_check.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -25,10 +26,17 @@ struct ReportedRun {
 nlohmann::ordered_json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
                                    const std::vector<CheckResult>& checks);
 
-/// Writes the page with the first run, and the others drawn over it. Throws ConfigError: the page's
-/// template is not built, `file` cannot be written or is a log; LogError for a log that is gone. A
-/// page that is not finished leaves `file` as it was.
-void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs);
+inline constexpr double kPageSize = 30;  // MB: opens in seconds, goes by mail
+
+/// Writes the page with the first run, and the others drawn over it, in about `megabytes` at most:
+/// of a run too long for that it shows rows of several ticks (docs/report-format.md). Throws
+/// ConfigError: the page's template is not built, `file` cannot be written or is a log; LogError
+/// for a log that is gone. A page that is not finished leaves `file` as it was.
+void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs,
+                     double megabytes = kPageSize);
+
+/// Writes the page of a robot that was checked. Throws ConfigError likewise.
+void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in
 /// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not

@@ -1,15 +1,20 @@
 #include "tools/report/run_screen.h"
 
+#include <google/protobuf/message.h>
+#include <google/protobuf/text_format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
 #include <string_view>
 
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/run_story.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {
@@ -75,6 +80,30 @@ bool SameFile(const fs::path& a, const fs::path& b) {
 
 }  // namespace
 
+std::string FormatEngine(const Scenario& scenario, const Graph& graph) {
+  std::string engine;
+  for (const ComponentInstance& instance : graph.component()) {
+    const std::string& name = Components().TraitsOf(TypeOf(instance)).engine;
+    if (!name.empty()) engine = name;
+  }
+  const auto* section = Scenario::descriptor()->FindFieldByName(engine);
+  if (engine.empty() || section == nullptr || section->is_repeated() ||
+      section->cpp_type() != google::protobuf::FieldDescriptor::CPPTYPE_MESSAGE) {
+    return "";
+  }
+  const google::protobuf::Message& told = scenario.GetReflection()->GetMessage(scenario, section);
+  std::string text = fmt::format("engine {}:", engine);
+  for (int i = 0; i < told.GetDescriptor()->field_count(); ++i) {
+    const auto* field = told.GetDescriptor()->field(i);
+    if (field->is_repeated()) continue;
+    std::string value;
+    google::protobuf::TextFormat::PrintFieldValueToString(told, field, -1, &value);
+    text += fmt::format(" {} {},", field->name(), value);
+  }
+  return fmt::format("{} step {} s, ground friction {}", text, scenario.sim().step(),
+                     scenario.sim().ground().friction());
+}
+
 std::string FormatScreen(const ShownRun& run) {
   const std::string table = ShortTable(run.scenario, run.checks);
   return Sentences(run) + (table.empty() ? table : fmt::format("\n{}", table));
@@ -83,7 +112,8 @@ std::string FormatScreen(const ShownRun& run) {
 std::string FormatFullScreen(const ShownRun& run) {
   return fmt::format("{}\n{}\n{}{}", Sentences(run), FormatTable(run.checks),
                      logging::LinesForTerminal(FormatEvents(run.events)),
-                     logging::LinesForTerminal(FormatAssumptions(run.scenario)));
+                     logging::LinesForTerminal(FormatAssumptions(run.scenario)) +
+                         Paragraph(FormatEngine(run.scenario, run.record.spec.graph())));
 }
 
 std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem) {

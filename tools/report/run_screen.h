@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/graph.pb.h"
 #include "logging/metrics/events.h"
 #include "logging/run_record.h"
 #include "tools/report/report.h"
@@ -29,6 +30,10 @@ std::string FormatScreen(const ShownRun& run);
 
 /// The same with every row, the events and the assumptions.
 std::string FormatFullScreen(const ShownRun& run);
+
+/// The physics engine of the run's simulated robot with all that it alone is told, the step and the
+/// ground's friction; empty: nothing is simulated.
+std::string FormatEngine(const Scenario& scenario, const Graph& graph);
 
 /// "passed: 22 of 22 checks hold", or "FAILED: 1 of 22: NAME measured X, limit Y", one line.
 /// `problem`: what else made the run fail; empty when nothing did.

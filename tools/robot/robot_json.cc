@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "components/robot/urdf_tree.h"
-#include "logging/metrics/analysis.h"
+#include "components/balance/support_polygon.h"
+#include "tools/robot/robot_check.h"
 
 namespace poise {
 namespace {
@@ -72,7 +72,7 @@ std::optional<Json> Shape(const TiXmlElement& visual) {
   return Json{{"shape", kind}, {"radius", radius}, {"length", length}};
 }
 
-Json Visuals(const robot::UrdfTree& tree, std::string_view urdf) {
+Json Visuals(const robot::RobotModel& model, std::string_view urdf) {
   Json visuals = Json::array();
   TiXmlDocument document;
   document.Parse(std::string(urdf).c_str(), nullptr, TIXML_ENCODING_UTF8);
@@ -81,16 +81,16 @@ Json Visuals(const robot::UrdfTree& tree, std::string_view urdf) {
   for (const TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr;
        link = link->NextSiblingElement("link")) {
     const char* const name = link->Attribute("name");
-    const auto place = name ? tree.links.find(name) : tree.links.end();
-    if (place == tree.links.end()) continue;
+    const robot::Frame* const place = name ? model.FindFrame(name) : nullptr;
+    if (place == nullptr) continue;
     for (const TiXmlElement* visual = link->FirstChildElement("visual"); visual != nullptr;
          visual = visual->NextSiblingElement("visual")) {
       try {
         std::optional<Json> shape = Shape(*visual);
         if (!shape) continue;
-        const Eigen::Isometry3d pose = place->second.pose * Origin(*visual);
+        const Eigen::Isometry3d pose = place->pose * Origin(*visual);
         if (!pose.matrix().allFinite()) continue;
-        (*shape)["body"] = place->second.body;
+        (*shape)["body"] = place->body;
         (*shape)["pose"] = PoseJson(pose);
         visuals.push_back(std::move(*shape));
       } catch (const urdf::ParseError&) {
@@ -104,7 +104,10 @@ Json Visuals(const robot::UrdfTree& tree, std::string_view urdf) {
 }  // namespace
 
 Json RobotJson(const logging::RunRecord& run) {
-  const robot::RobotModel& model = run.robot;
+  return RobotJson(run.robot, run.info.urdf);
+}
+
+Json RobotJson(const robot::RobotModel& model, std::string_view urdf) {
   Json json;
   json["name"] = model.name();
   json["mass"] = model.total_mass();
@@ -124,17 +127,20 @@ Json RobotJson(const logging::RunRecord& run) {
     json["joints"].push_back({{"name", joint.name},
                               {"lower", joint.lower},
                               {"upper", joint.upper},
-                              {"torque_limit", logging::JointTorqueLimit(run, i)}});
+                              {"torque_limit", TorqueLimit(model, i)}});
   }
   json["feet"] = Json::array();
   for (const robot::FootModel& foot : model.feet()) {
+    Json corners = Json::array();
+    for (const Eigen::Vector2d& corner : balance::SolePolygon(foot, 0).corners()) {
+      corners.push_back({corner.x(), corner.y()});
+    }
     json["feet"].push_back({{"name", foot.name},
                             {"body", foot.body},
                             {"sole", PoseJson(foot.sole)},
-                            {"length", foot.length},
-                            {"width", foot.width}});
+                            {"corners", std::move(corners)}});
   }
-  json["visuals"] = Visuals(robot::LoadUrdfTree(run.info.urdf, nullptr), run.info.urdf);
+  json["visuals"] = Visuals(model, urdf);
   return json;
 }
 

@@ -41,6 +41,12 @@ Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) 
   const OutputPort* state = FindPort<robot_state_t>(estimator.wiring.outputs());
   const OutputPort* status = FindPort<estimator_status_t>(estimator.wiring.outputs());
   auto estimates = std::make_shared<logging::Estimates>();
+  std::optional<logging::PagedAppender<robot_state_t>> paged_state;
+  std::optional<logging::PagedAppender<estimator_status_t>> paged_status;
+  if (run.paged) {
+    paged_state.emplace(&estimates->state);
+    paged_status.emplace(&estimates->status);
+  }
   int64_t ticks = 0, time = 0;
   for (int64_t t = 0; t < run.num_ticks; ++t) {
     const robot_sensors_t* readings = run.sensors.at(t);
@@ -54,8 +60,15 @@ Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) 
     for (const Stage& stage : estimator.wiring.stages()) stage.run(tick);
     time += NowNanoseconds() - start;
     ++ticks;
-    estimates->state.Set(t, *static_cast<const robot_state_t*>(state->message()));
-    estimates->status.Set(t, *static_cast<const estimator_status_t*>(status->message()));
+    const auto& state_now = *static_cast<const robot_state_t*>(state->message());
+    const auto& status_now = *static_cast<const estimator_status_t*>(status->message());
+    if (run.paged) {
+      paged_state->Set(t, state_now);
+      paged_status->Set(t, status_now);
+    } else {
+      estimates->state.Set(t, state_now);
+      estimates->status.Set(t, status_now);
+    }
   }
   sensors->Bind(nullptr);
   const double tick_time =

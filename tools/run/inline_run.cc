@@ -14,10 +14,19 @@
 namespace poise {
 
 RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
-                     const std::string& log_path, Progress* progress) {
+                     const std::string& log_path, Progress* progress,
+                     std::optional<logging::RunRecord>* record) {
   constexpr int64_t kFlushInterval = 50'000'000;  // ns
+  // Ticks whose messages stay in memory, about 6 KB each with 12 joints, so that a run's checks
+  // need not read the log back: that took a seventh of a short run.
+  constexpr int64_t kMostKept = 30'000;
   InlineRunner runner(spec, Components());
-  logging::InlineRecorder recorder(log_path, spec, scenario_text, &runner);
+  const run_info_t info = logging::MakeRunInfo(spec, scenario_text);
+  std::optional<logging::InlineRecord> kept;
+  if (record != nullptr && spec.num_ticks() > 0 && spec.num_ticks() <= kMostKept) {
+    kept.emplace(spec, info, &runner);
+  }
+  logging::InlineRecorder recorder(log_path, spec, info, &runner, kept ? &*kept : nullptr);
   RunOutcome outcome;
   const int64_t start = NowNanoseconds();
   int64_t next_flush = start;
@@ -40,6 +49,7 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   outcome.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
   progress->Clear();
   recorder.Close(spec);
+  if (kept) *record = kept->Take(/*latencies=*/true);
   outcome.interrupted = !runner.ended();
   outcome.completed = runner.ended() && !runner.failed();
   outcome.message = outcome.interrupted ? fmt::format("interrupted ({})", sigdescr_np(StopSignal()))

@@ -16,6 +16,7 @@
 #include "logging/printable.h"
 #include "logging/run_info.h"
 #include "tools/cli/output_place.h"
+#include "tools/run/remake.h"
 #include "tools/run/run_registry.h"
 #include "tools/scenario/catalog.h"
 
@@ -24,8 +25,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFiles[] = {"run.lcm",        "summary.json",   "recorder.json",
-                                  "run_spec.pbtxt", "scenario.pbtxt", "report.html"};
+constexpr const char* kFiles[] = {"run.lcm",       "run.packed",     "summary.json",
+                                  "recorder.json", "run_spec.pbtxt", "scenario.pbtxt",
+                                  "report.html"};
 
 /// The folder or log that `run` means. Throws ConfigError.
 fs::path FindRun(const std::string& run) {
@@ -117,8 +119,15 @@ void PointLatestTo(const fs::path& dir) {
 
 fs::path FindLog(const std::string& run) {
   fs::path path = FindRun(run);
-  if (!fs::is_directory(path)) return path;
+  if (!fs::is_directory(path)) {
+    if (!logging::IsPackedLog(path.string())) return path;
+    const fs::path log = fs::path(path).replace_extension(".lcm");
+    if (!fs::exists(log)) MakeLogAgain(path, log);
+    return log;
+  }
   path /= "run.lcm";
+  const fs::path packed = path.parent_path() / "run.packed";
+  if (!fs::exists(path) && fs::exists(packed)) MakeLogAgain(packed, path);
   if (!fs::exists(path)) {
     throw ConfigError(fmt::format("{}: is missing: that run has not begun, or never came to start",
                                   path.string()));

@@ -43,7 +43,7 @@ std::filesystem::path ReferenceDir(const std::filesystem::path& dir);
 void PointLatestTo(const std::filesystem::path& dir);
 
 /// The log that `run` means: a folder of a run, a log, or, when empty, the latest run under runs/.
-/// Throws ConfigError.
+/// A packed log is made again. Throws ConfigError, LogError.
 std::filesystem::path FindLog(const std::string& run);
 
 /// Warns on stderr where a log's RUN_INFO is damaged and the run is told by its folder's files.

@@ -79,12 +79,13 @@ void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
 }
 
 RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
-                                const LaunchOptions& launch) {
+                                const LaunchOptions& launch,
+                                std::optional<logging::RunRecord>* record) {
   const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
                     quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
   if (in_process) {
-    return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress);
+    return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress, record);
   }
   const LaunchFiles files{dir.string(), (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
   return Launcher(spec, files, launch, &progress).Run();
@@ -114,6 +115,8 @@ void ScenarioRun::PrintHeading() const {
                                         options_.launch.log ? " and the recorder" : ", no log"),
       spec.seed(), PoiseVersion(),
       *PoiseCommit() == '\0' ? "" : fmt::format(" ({})", PoiseCommit()));
+  const std::string engine = FormatEngine(scenario, spec.graph());
+  if (!engine.empty()) text += engine + "\n";
   if (!options_.in_process) {
     text += fmt::format("run {}; listen at {}\n", spec.run_id(), MirrorUrl(spec));
   }
@@ -193,9 +196,10 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     PrintOutcome(fmt::format("reference run (variant {})", scenario.reference()),
                  *summary.reference);
   }
+  std::optional<logging::RunRecord> kept;  // of what ran in this process
   if (StopSignal() == 0) {
     summary.outcome =
-        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch);
+        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch, &kept);
     PrintOutcome("run", summary.outcome);
     if (!options_.quiet && !summary.outcome.interrupted) {
       fmt::print("{}", FormatFaults(summary.outcome));
@@ -209,7 +213,10 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const bool recorded = fs::exists(log);  // else the recorder never came to start
   logging::RunRecord record;
   if (recorded) {
-    record = logging::ReadRun(log);
+    StageLine line(options_.quiet);
+    if (!kept) line.Begin("reading the log");
+    record = kept ? std::move(*kept) : logging::ReadRun(log);
+    line.Begin("figures of the table");
     PrepareRecord(log, scenario, &record);
     if (outcome.wall_time > 0) {
       record.real_time_factor = record.duration(record.num_ticks) / outcome.wall_time;

@@ -61,7 +61,8 @@ class ScenarioRun {
                bool warn) const;
   static void WriteFiles(const Part& part, const std::filesystem::path& dir);
   static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
-                            bool quiet, const LaunchOptions& launch);
+                            bool quiet, const LaunchOptions& launch,
+                            std::optional<logging::RunRecord>* record = nullptr);
   void PrintHeading() const;
   /// What happened, the table, the verdict, where to look next.
   void PrintEnd(const logging::RunRecord& record, const RunResult& result, bool latest) const;

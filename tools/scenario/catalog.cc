@@ -23,14 +23,36 @@ bool IsBase(const fs::path& name) {
   return std::find(folder.begin(), folder.end(), "base") != folder.end();
 }
 
+/// The text of a robot's folder: that of the folder's name, or the only one.
+fs::path TextIn(const fs::path& folder) {
+  const fs::path dir = folder.has_filename() ? folder : folder.parent_path();
+  const fs::path same = dir / (dir.filename().string() + kEnding);
+  std::error_code error;
+  if (fs::is_regular_file(same, error)) return same;
+  std::vector<fs::path> texts;
+  for (const auto& entry : fs::directory_iterator(dir, error)) {
+    if (entry.path().extension() == kEnding) texts.push_back(entry.path());
+  }
+  return texts.size() == 1 ? texts.front() : same;
+}
+
 /// The files that `name` may mean, the first that exists is meant.
 std::vector<fs::path> Candidates(const std::string& kind, const std::string& name,
                                  const fs::path& beside) {
-  const fs::path file = name.ends_with(kEnding) ? name : name + kEnding;
-  if (file.is_absolute()) return {file.lexically_normal()};
-  std::vector<fs::path> candidates = {(beside / file).lexically_normal()};
-  for (const fs::path& folder : DataFolders()) {
-    candidates.push_back((folder / kind / file).lexically_normal());
+  const bool with_ending = name.ends_with(kEnding);
+  std::vector<fs::path> folders = {beside};
+  if (fs::path(name).is_absolute()) {
+    folders = {fs::path()};
+  } else {
+    for (const fs::path& folder : DataFolders()) folders.push_back(folder / kind);
+  }
+  std::vector<fs::path> candidates;
+  std::error_code error;
+  for (const fs::path& folder : folders) {
+    candidates.push_back((folder / (with_ending ? name : name + kEnding)).lexically_normal());
+    if (kind == "robots" && !with_ending && fs::is_directory(folder / name, error)) {
+      candidates.push_back(TextIn((folder / name).lexically_normal()));
+    }
   }
   return candidates;
 }

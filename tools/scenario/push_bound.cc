@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "components/messages/conversions.h"
+#include "components/robot/sole.h"
 #include "sim/push.h"
 #include "sim/simulated_robot.h"
 #include "sim/start_posture.h"
@@ -74,14 +75,11 @@ std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::
   double ground = 0;
   for (size_t f = 0; f < run.robot.feet().size(); ++f) {
     if (truth->foot_contact_points[f] == 0) continue;
-    const robot::FootModel& foot = run.robot.feet()[f];
     const Eigen::Isometry3d sole = GetPose(truth->foot_pose[f]);
-    for (const double x : {-0.5, 0.5}) {
-      for (const double y : {-0.5, 0.5}) {
-        const Eigen::Vector3d corner = sole * Eigen::Vector3d(x * foot.length, y * foot.width, 0);
-        corners.emplace_back(corner.x(), corner.y());
-        ground += corner.z();
-      }
+    for (const Vector2d& at : robot::SoleCorners(run.robot.feet()[f])) {
+      const Eigen::Vector3d corner = sole * Eigen::Vector3d(at.x(), at.y(), 0);
+      corners.emplace_back(corner.x(), corner.y());
+      ground += corner.z();
     }
   }
   if (corners.empty()) return {};

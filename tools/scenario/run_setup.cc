@@ -123,6 +123,22 @@ void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
   }
 }
 
+/// Refuses what another engine than the run's is told: it would change nothing.
+void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) {
+  std::string engine;
+  for (const ComponentInstance& instance : graph.component()) {
+    const std::string& name = Components().TraitsOf(TypeOf(instance)).engine;
+    if (!name.empty()) engine = name;
+  }
+  if (engine.empty()) return;
+  for (const std::string& change : changes) {
+    const std::string other = EngineOfField(change);
+    if (other.empty() || other == engine) continue;
+    throw ConfigError(fmt::format("--set {}: the run's engine is {}; --world {} takes it", change,
+                                  engine, other));
+  }
+}
+
 /// Puts components of `graph` into the process of that name.
 void PutInto(const std::string& process, const std::vector<std::string>& components,
              const std::string& flag, Graph* graph) {
@@ -205,6 +221,14 @@ bool PortsFree(int first, int count) {
 
 }  // namespace
 
+std::string EngineOfField(const std::string& field) {
+  const std::string section = field.substr(0, field.find_first_of(".[="));
+  for (const auto& [type, entry] : Components().entries()) {
+    if (!section.empty() && entry.traits.engine == section) return section;
+  }
+  return "";
+}
+
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings) {
   const Scenario& scenario = loaded.scenario;
@@ -214,6 +238,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.set_scenario(NameOf(loaded));
   *spec.mutable_graph() = GraphFiles(loaded.graph_file).Merged();
   ChooseEngine(loaded, spec.mutable_graph());
+  CheckEngineOf(changes.set, spec.graph());
   HostComponents(changes, spec.mutable_graph());
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
@@ -227,15 +252,9 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   }
   Robot robot;
   ReadTextProto(loaded.robot_file, &robot);
-  if (!robot.has_urdf()) {
-    throw ConfigError(
-        fmt::format("{}: urdf: is missing; name the robot's URDF, relative to this "
-                    "file",
-                    loaded.robot_file));
-  }
   robot::LoadRobotFiles(loaded.robot_file, warnings);
   AddResource(&spec, "robot", loaded.robot_file);
-  AddResource(&spec, "urdf", fs::path(loaded.robot_file).parent_path() / robot.urdf());
+  AddResource(&spec, "urdf", robot::MakerFile(robot, loaded.robot_file));
   spec.set_realtime(changes.realtime);
   if (changes.priority) spec.mutable_realtime_options()->set_priority(*changes.priority);
   if (changes.cpu) spec.mutable_realtime_options()->set_cpu(*changes.cpu);

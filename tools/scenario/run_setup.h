@@ -11,10 +11,14 @@
 namespace poise {
 
 /// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
-/// No ports yet. Throws ConfigError, or RobotError when the robot's files cannot work; what is odd
-/// about them goes to `warnings`.
+/// No ports yet. Throws ConfigError, also for a change of another engine's field, or RobotError
+/// when the robot's files cannot work; what is odd about them goes to `warnings`.
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings);
+
+/// The engine that a scenario's field is for, "mujoco" of "mujoco.contact_softness=1e-6"; empty: it
+/// is for none alone.
+std::string EngineOfField(const std::string& field);
 
 /// Makes and configures every component, checks the graph and fills in the channels' counts.
 /// Throws ConfigError with one line per problem, each with file, line and field.

@@ -26,6 +26,7 @@ constexpr double kMaxLead = 60;     // s
 constexpr double kMinRate = 50;     // Hz
 constexpr double kMaxRate = 10000;  // Hz
 constexpr char kSetFlag[] = "--set";
+constexpr char kRobotFlag[] = "--robot";
 
 bool InName(unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; }
 
@@ -290,7 +291,8 @@ std::string Resolve(const LoadedScenario& loaded, const std::string& kind, const
                     const std::string& name) {
   const bool set =
       std::any_of(loaded.changes.begin(), loaded.changes.end(), [&](const FieldChange& change) {
-        return change.by == kSetFlag && PathOf(loaded, change) == field;
+        return (change.by == kSetFlag || change.by == kRobotFlag) &&
+               PathOf(loaded, change) == field;
       });
   try {
     return FindFile(kind, name, set ? fs::current_path() : loaded.files.FolderOf(field)).string();
@@ -392,6 +394,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   if (changes.ideal) ApplyIdeal(&loaded);
   if (!changes.variant.empty()) ApplyVariant(changes.variant, &loaded);
   if (!changes.world.empty()) ApplyChange({"engine=" + changes.world, "--world"}, &loaded);
+  if (!changes.robot.empty()) ApplyChange({"robot=" + changes.robot, kRobotFlag}, &loaded);
   for (const std::string& set : changes.set) ApplyChange({set, kSetFlag}, &loaded);
   if (changes.duration) {
     ApplyChange({fmt::format("duration={}", *changes.duration), "--duration"}, &loaded);

@@ -21,6 +21,7 @@ struct RunChanges {
   std::string variant;             ///< of the scenario; empty: none
   bool reference = true;           ///< false: the scenario's reference variant is not run
   std::string world;               ///< the engine; empty: the scenario's or the graph's
+  std::string robot;               ///< name, folder or file; empty: the scenario's
   std::vector<std::string> set;    ///< "field.path=value", as SetField takes them, in order
   std::optional<double> duration;  ///< s
   std::optional<uint64_t> seed;

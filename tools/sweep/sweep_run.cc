@@ -55,7 +55,8 @@ logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
   WriteFile(dir.path() / "run_spec.pbtxt", spec);
   WriteFile(dir.path() / "scenario.pbtxt", text);
   const fs::path log = dir.path() / "run.lcm";
-  logging::InlineRecorder recorder(log, prepared.spec, text, &runner);
+  logging::InlineRecorder recorder(log, prepared.spec, logging::MakeRunInfo(prepared.spec, text),
+                                   &runner);
   run();
   recorder.Close(prepared.spec);
   return logging::ReadRun(log);

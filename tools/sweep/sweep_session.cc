@@ -122,6 +122,7 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
       ->type_name("K/N")
       ->excludes(range);
   app->add_flag("--logs", session->logs, "keep each run's log and files in OUT/logs/POINT");
+  app->add_flag("--png", session->all_pictures, "every map as PNG, not only what stands");
   app->add_flag("--quiet", session->quiet, "no progress");
 }
 
@@ -156,6 +157,28 @@ std::string HeaderProblem(const SweepHeader& header, const SweepHeader& found) {
     return "was made by another build of poise, whose figures may differ";
   }
   return "";
+}
+
+int64_t CountDone(int64_t first, int64_t end, const SweepRows& rows) {
+  return std::count_if(rows.begin(), rows.end(), [&](const auto& row) {
+    return row.second.run >= first && row.second.run < end;
+  });
+}
+
+bool RunPoints(int64_t first, int64_t end, SweepSession* session) {
+  int64_t done = CountDone(first, end, session->rows());
+  int64_t next = first;
+  return session->Run(
+      [&]() -> std::optional<SweepSession::Request> {
+        while (next < end && session->rows().contains({next, 0})) ++next;
+        if (next >= end) return {};
+        return SweepSession::Request{next++, {}};
+      },
+      [&](const SweepRow&) { ++done; },
+      [&] {
+        return SweepSession::Progress{static_cast<double>(done), static_cast<double>(end - first),
+                                      fmt::format("{} of {} runs done", done, end - first)};
+      });
 }
 
 SweepSession::SweepSession(const SweepDefinition& definition, const std::string& kind,

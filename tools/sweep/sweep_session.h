@@ -31,6 +31,7 @@ struct SessionOptions {
   bool force = false;  ///< replace what `out` holds
   bool logs = false;
   bool quiet = false;
+  bool all_pictures = false;  ///< every map as PNG, too
 };
 
 /// Adds the options that `poise sweep` and `poise limit` share. Both structs must outlive the
@@ -83,6 +84,13 @@ class SweepSession {
   size_t found_ = 0;
   std::optional<SweepResultsWriter> writer_;
 };
+
+/// Runs points `first` to `end` - 1 of a sweep that have no row yet, with progress. False when a
+/// signal ended it. Throws as SweepSession::Run does.
+bool RunPoints(int64_t first, int64_t end, SweepSession* session);
+
+/// How many of these points have a row.
+int64_t CountDone(int64_t first, int64_t end, const SweepRows& rows);
 
 /// Empty: `found` is of the same sweep and program as `header`; else what differs and what to do.
 std::string HeaderProblem(const SweepHeader& header, const SweepHeader& found);

@@ -49,6 +49,12 @@ function liveButton({player, feed}) {
   return button;
 }
 
+/** Of which ticks a row's picture and numbers are, where it holds several. */
+function rowText(run, row) {
+  const stride = run.strideOf(row);
+  return stride > 1 ? ` of ${stride}` : '';
+}
+
 /** Fills `host`; `shared` as for panels, `feed` when the run is live. Returns {refresh}, for a run that has grown. */
 export function playerBar(host, shared) {
   const {player, view, run} = shared;
@@ -60,12 +66,12 @@ export function playerBar(host, shared) {
     change: () => player.setSpeed(Number(speed.value))},
   ...SPEEDS.map((s) => element('option', {value: s, selected: s === 1}, `${s}×`)));
   const scrub = element('input', {type: 'range', id: 'scrub', step: 1,
-    'aria-label': 'Time', input: () => player.seek(run.timeAt(Number(scrub.value) - run.firstTick)),
+    'aria-label': 'Time', input: () => player.seek(run.timeOfTick(Number(scrub.value))),
     keydown: (e) => e.preventDefault()});  // the page's own keys step
   const time = element('output', {id: 'time'});
   const scale = () => {
     scrub.min = run.firstTick;
-    scrub.max = run.firstTick + Math.max(0, run.numTicks - 1);
+    scrub.max = run.tickOf(Math.max(0, run.numRows - 1));
   };
   scale();
   const marks = element('div', {class: 'marks'}, track(shared));
@@ -78,7 +84,7 @@ export function playerBar(host, shared) {
     button('all', 'Show all that the page holds in the plots (0)', () => view.reset()));
   const showTime = () => {
     scrub.value = player.tick;
-    time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}`));
+    time.replaceChildren(`${player.time.toFixed(3)} s`, element('span', {class: 'tick'}, `  tick ${player.tick}${rowText(run, player.row)}`));
   };
   player.addEventListener('time', showTime);
   player.addEventListener('state', () => {

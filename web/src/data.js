@@ -35,6 +35,10 @@ export class Signal {
   #column = null;
   #loading = null;
 
+  /** By row, of a page whose rows hold several ticks: the least and the largest of all the row's values; there after load(). */
+  least;
+  largest;
+
   constructor(channel, spec, description) {
     this.channel = channel;
     this.field = spec.field;
@@ -49,10 +53,14 @@ export class Signal {
 
   get values() { return this.#column?.values; }
 
-  load() {
-    return this.#loading ??= this.channel.read(this.spec, this.integer).then((array) => {
-      this.#column = new Column(array);
-    });
+  load() { return this.#loading ??= this.#load(); }
+
+  async #load() {
+    const {channel, spec} = this;
+    const bounds = spec.least ? [spec.least, spec.largest].map((bound) => channel.read(bound, true)) : [];
+    const [values, least, largest] = await Promise.all([channel.read(spec, this.integer), ...bounds]);
+    Object.assign(this, {least, largest});
+    this.#column = new Column(values);
   }
 
   /** Adds `values` at the end and lets go of the first `dropped`. Throws when packed values have not been loaded. */
@@ -81,24 +89,63 @@ class Channel {
     this.type = spec.type;
     this.blob = blob;
     /** It has a message in a few ticks only, as of an operator; a channel with gaps has not. */
-    this.sparse = spec.ticks !== undefined && (run.meta.live !== undefined || spec.count < FEW * run.numTicks);
+    this.sparse = spec.sparse
+      ?? (spec.ticks !== undefined && (run.meta.live !== undefined || spec.count < FEW * run.numRows));
   }
 
-  /** A packed column by tick. */
+  /** A packed column by row. */
   async read(packed, integer) {
+    if (this.run.rows) return unpack(packed, this.run.numRows, this.blob, integer);
     const column = await unpack(packed, this.spec.count, this.blob, integer);
     if (this.spec.ticks === undefined) return column;
     const ticks = await (this.#ticks ??= unpack(this.spec.ticks, this.spec.count, this.blob, true));
-    const values = new column.constructor(this.run.numTicks).fill(NaN);
+    const values = new column.constructor(this.run.numRows).fill(NaN);
     ticks.forEach((tick, i) => { values[tick - this.run.firstTick] = column[i]; });
     return values;
   }
 }
 
+/** The last of `list` for which `before` holds, or the first. */
+function lastOf(list, before) {
+  let low = 0, high = list.length;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (before(list[middle])) low = middle;
+    else high = middle;
+  }
+  return list[low];
+}
+
+/** Rows of several ticks: [first tick, stride, rows] in order, without gaps, up to tick `end`. */
+class Rows {
+  constructor(spans, end) {
+    this.count = 0;
+    this.spans = spans.map(([tick, stride, count]) => {
+      const span = {tick, stride, count, row: this.count};
+      this.count += count;
+      return span;
+    });
+    this.end = end;
+  }
+  spanOfRow(row) { return lastOf(this.spans, (s) => s.row <= row); }
+  tickOf(row) {
+    if (row >= this.count) return this.end + row - this.count;
+    const {tick, stride, row: first} = this.spanOfRow(row);
+    return tick + (row - first) * (row < 0 ? 1 : stride);
+  }
+  rowOf(tick) {
+    if (tick >= this.end) return this.count + tick - this.end;
+    const {tick: first, stride, row} = lastOf(this.spans, (s) => s.tick <= tick);
+    return tick < first ? tick - first : row + Math.floor((tick - first) / stride);
+  }
+  /** The most ticks in one row. */
+  get largest() { return Math.max(...this.spans.map((s) => s.stride)); }
+}
+
 /**
  * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.js; `blob`: gives the text of a packed
- * column by its id. It holds the ticks from `firstTick` on, a row each; a part of a run begins later than 0. A live run (meta.live) starts without ticks, grows
- * by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
+ * column by its id. It holds the ticks from `firstTick` on, a row each, or of a long run in `rows` of several (meta.rows); a part of a run begins later than 0.
+ * A live run (meta.live) starts without ticks, grows by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
  */
 export class Run extends EventTarget {
   constructor(meta, messages, blob) {
@@ -107,7 +154,8 @@ export class Run extends EventTarget {
     this.period = meta.run.tick_period;
     this.leadTicks = meta.run.lead_ticks ?? 0;  // before the scenario's time 0
     this.firstTick = meta.run.cut?.first_tick ?? 0;
-    this.numTicks = Math.max(0, meta.run.ticks - this.firstTick);
+    this.rows = meta.rows && new Rows(meta.rows, meta.run.ticks);
+    this.numRows = this.rows?.count ?? Math.max(0, meta.run.ticks - this.firstTick);
     this.keep = meta.live?.keep ?? Infinity;
     this.signals = new Map();
     const names = elementNames(meta.robot);
@@ -123,7 +171,7 @@ export class Run extends EventTarget {
 
   /** Time of the first row and of the last, s. */
   get start() { return this.timeAt(0); }
-  get end() { return this.timeAt(Math.max(0, this.numTicks - 1)); }
+  get end() { return this.timeAt(Math.max(0, this.numRows - 1)); }
   add(signal) { this.signals.set(signal.name, signal); }
 
   /** The signal of the first channel of `type`, as the run's checks take it; undefined when there is none. */
@@ -132,22 +180,28 @@ export class Run extends EventTarget {
     return channel && this.signals.get(`${channel.name}.${field}`);
   }
 
+  /** A row's first tick; the row that holds a tick. Either may lie outside of what the run holds. */
+  tickOf(row) { return this.rows ? this.rows.tickOf(row) : this.firstTick + row; }
+  rowOfTick(tick) { return this.rows ? this.rows.rowOf(tick) : tick - this.firstTick; }
+  timeOfTick(tick) { return (tick - this.leadTicks) * this.period; }
   /** The row of a time, which may lie outside of what the run holds. */
-  rowOf(time) { return Math.round(time / this.period) + this.leadTicks - this.firstTick; }
-  rowAt(time) { return Math.min(this.numTicks - 1, Math.max(0, this.rowOf(time))); }
-  timeAt(row) { return (this.firstTick + row - this.leadTicks) * this.period; }
+  rowOf(time) { return this.rowOfTick(Math.round(time / this.period) + this.leadTicks); }
+  rowAt(time) { return Math.min(this.numRows - 1, Math.max(0, this.rowOf(time))); }
+  timeAt(row) { return this.timeOfTick(this.tickOf(row)); }
+  /** Ticks between a row and the next. */
+  strideOf(row) { return this.rows ? this.rows.spanOfRow(row).stride : 1; }
 
   /** `values`: by signal name, `count` numbers each; a signal that is not named gets NaN. */
   appendTicks(count, values) {
     const none = new Float32Array(count).fill(NaN);
-    const dropped = Math.max(0, this.numTicks + count - this.keep);
+    const dropped = Math.max(0, this.numRows + count - this.keep);
     const derived = [];
     for (const [name, signal] of this.signals) {
       if (signal.append) signal.append(values[name] ?? none, dropped);
       else derived.push(signal);
     }
     this.firstTick += dropped;
-    this.numTicks += count - dropped;
+    this.numRows += count - dropped;
     for (const signal of derived) signal.grow(dropped);
     this.dispatchEvent(new Event('append'));
   }

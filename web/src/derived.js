@@ -43,9 +43,9 @@ const firstNumber = (memory, value) => {
 };
 
 /** A sensor's reading shows the command of the tick before, so frame and soles are those of the tick before. */
-function measuredCop(axis, least) {
+function measuredCop(run, axis, least) {
   return (arrays, i) => {
-    if (i === 0) return NaN;
+    if (i === 0 || run.tickOf(i) - run.tickOf(i - 1) !== 1) return NaN;
     const at = (from, count, row) => arrays.slice(from, from + count).map((a) => a[row]);
     const frame = poseOf(at(28, 7, i - 1));
     const sum = {force: [0, 0, 0], moment: [0, 0, 0]};
@@ -85,7 +85,7 @@ function copSignals(run) {
     ['support_plan_t', 'in_contact[0]'], ['support_plan_t', 'in_contact[1]'], ...pose('balance_torque_t', 'frame_o')];
   return [0, 1].flatMap((i) => [
     {name: `cop_measured_${AXES[i]}`, unit: 'm', text: 'measured centre of pressure, frame O',
-      deps: both, compute: measuredCop(i, least)},
+      deps: both, compute: measuredCop(run, i, least)},
     {name: `cop_desired_${AXES[i]}`, unit: 'm', text: 'O_d: the bound while balancing controls this axis, frame O',
       deps: [['balance_torque_t', `cop_task[${i}]`], ['balance_torque_t', `cop_limit[${i}]`],
         ['balance_torque_t', `active_${AXES[i]}`], ['balance_torque_t', 'region'], ['balance_torque_t', `cop[${i}]`]],
@@ -95,7 +95,7 @@ function copSignals(run) {
     ...['measured', 'computed'].map((kind) => ({
       name: `cop_${kind}_abs_${AXES[i]}`, unit: 'm', text: `${kind} centre of pressure, frame O, absolute`,
       deps: kind === 'measured' ? both : [['balance_torque_t', `cop[${i}]`]],
-      compute: (arrays, k) => Math.abs(kind === 'measured' ? measuredCop(i, least)(arrays, k) : arrays[0][k]),
+      compute: (arrays, k) => Math.abs(kind === 'measured' ? measuredCop(run, i, least)(arrays, k) : arrays[0][k]),
     })),
   ]);
 }
@@ -202,12 +202,12 @@ class DerivedSignal {
     const held = this.values.length;
     // Rows that came and went in one piece were never here.
     const rows = this.#rows(Math.max(0, held - dropped));
-    this.#column.append(rows, held + rows.length - this.run.numTicks, this.run.keep);
+    this.#column.append(rows, held + rows.length - this.run.numRows, this.run.keep);
   }
 
   #rows(from) {
     const arrays = this.#signals.map((s) => s.values);
-    const rows = new Float32Array(this.run.numTicks - from);
+    const rows = new Float32Array(this.run.numRows - from);
     for (let i = 0; i < rows.length; ++i) {
       const value = Math.fround(this.compute(arrays, from + i, this.#memory));
       rows[i] = Number.isFinite(value) ? value : NaN;
@@ -279,17 +279,17 @@ class Phases {
   /** After the run has grown. */
   update() {
     const {run} = this;
-    for (let row = Math.max(0, this.#next - run.firstTick); row < run.numTicks; ++row) {
+    for (let row = Math.max(0, this.#next - run.firstTick); row < run.numRows; ++row) {
       const tick = run.firstTick + row;
       this.#balancing.add(tick, this.#isBalancing(row));
       this.#support.add(tick, this.#supportOf(row));
       this.#next = tick + 1;
     }
-    const at = (tick) => run.timeAt(tick - run.firstTick);
+    const at = (tick) => run.timeAt(tick - run.firstTick);  // counted as if each row were a tick
     const seconds = ({from, to, value}) => ({from: at(from), to: at(to + 1), value});
     const list = (stretches) => {
       stretches.dropBefore(run.firstTick);
-      return stretches.list(BRIDGED / run.period).map(seconds);
+      return stretches.list(run.rows ? 0 : BRIDGED / run.period).map(seconds);
     };
     const support = list(this.#support);
     this.balancing = list(this.#balancing).filter((p) => p.value);
@@ -298,7 +298,7 @@ class Phases {
   }
 
   #isBalancing(row) {
-    const values = this.#active.map((s) => s.values[row]);
+    const values = this.#active.map((s) => (s.largest ?? s.values)[row]);  // in any of the row's ticks
     return values.length > 0 && values.every(Number.isNaN) ? undefined : values.some((v) => v > 0);
   }
 

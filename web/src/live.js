@@ -31,8 +31,8 @@ export function decodeBatch(buffer, run) {
 
 /** Adds a batch to the run: ticks that it has are passed over, those that it never got are rows of NaN. */
 export function addBatch(run, {first, count, values}) {
-  if (run.numTicks === 0) run.firstTick = first;
-  const missed = first - run.firstTick - run.numTicks;
+  if (run.numRows === 0) run.firstTick = first;
+  const missed = first - run.firstTick - run.numRows;
   if (missed > 0) {
     const rows = Math.min(missed, run.keep);
     run.firstTick += missed - rows;
@@ -62,7 +62,7 @@ export class LiveFeed extends EventTarget {
 
   #connect() {
     const {run} = this;
-    const url = new URL(`stream?from=${run.firstTick + run.numTicks}`, location.href);
+    const url = new URL(`stream?from=${run.firstTick + run.numRows}`, location.href);
     url.protocol = 'ws:';
     const socket = new WebSocket(url);
     socket.binaryType = 'arraybuffer';
@@ -71,7 +71,7 @@ export class LiveFeed extends EventTarget {
       else addBatch(run, decodeBatch(data, run));
     });
     socket.addEventListener('close', () => {
-      if (this.status.ended && run.firstTick + run.numTicks >= this.#ticks) return;  // all has come
+      if (this.status.ended && run.firstTick + run.numRows >= this.#ticks) return;  // all has come
       this.#setState('waiting');
       setTimeout(() => this.#connect(), RETRY);
     });
@@ -98,7 +98,7 @@ export class LiveFeed extends EventTarget {
 
 /** Waits until there is something to show. */
 export async function firstTicks(feed) {
-  if (feed.run.numTicks > 0) return;
+  if (feed.run.numRows > 0) return;
   const text = element('p', {class: 'soft'});
   const tell = () => {
     text.textContent = {connecting: 'Connecting', live: 'Waiting for the first tick', ended: 'The run has ended without a tick.',

@@ -8,10 +8,12 @@ import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
+import {robotPage} from './robot_page.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
 import {liveTables, stateBadges, tables} from './table.js';
+import {quantity} from './units.js';
 
 const READOUT_PERIOD = 80;  // ms
 
@@ -82,7 +84,24 @@ function dockedScene(scene) {
   return element('label', {class: 'soft dock-box'}, box, ' robot beside the plots');
 }
 
+/** What a page that cannot hold every tick of its run shows instead. */
+function rowsNote(run) {
+  if (!run.rows) return '';
+  const {largest, count} = run.rows;
+  const missing = run.meta.events_without_detail ?? 0;
+  return element('p', {class: 'note rows-note'},
+    `${count} rows for ${run.meta.run.ticks - run.firstTick} ticks: every tick near the run's ends and its main events`
+    + `${missing ? ` (${missing} more events found no room)` : ''}, elsewhere one in up to ${largest} (${quantity(largest * run.period, 's')}). `
+    + 'There a curve shows single ticks, and its shade reaches from the least to the largest of all of them; what is computed here from '
+    + 'several signals has no shade. The log has every tick: poise log cut and poise report show any stretch of it.');
+}
+
 async function start() {
+  const robot = document.querySelector('script.poise-robot');
+  if (robot) {
+    robotPage(JSON.parse(robot.textContent));
+    return;
+  }
   const [run, overlay] = embeddedRuns(document);
   if (!run) throw new Error('this page holds no run: write one with poise report');
   for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
@@ -113,7 +132,7 @@ async function start() {
     element('li', {}, element('span', {class: 'area single'}), 'single support'),
     element('li', {}, element('span', {class: 'area missing'}), 'no message tells'),
     element('li', {}, element('span', {class: 'area event'}), 'event'),
-    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')),
+    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')), rowsNote(run),
   dockedScene(scene), printer.button);
   for (const definition of figuresFor(run)) grid.add(definition);
   const live = feed && liveTables(run, feed);
@@ -151,7 +170,7 @@ async function start() {
       shared.events = feed.status.events;
       const {ended, checked_ticks: ticks} = feed.status;
       eventPlace.replaceChildren(eventList(shared.events, player,
-        ended ? '' : ` up to ${run.timeAt(ticks - run.firstTick).toFixed(1)} s`));
+        ended ? '' : ` up to ${run.timeOfTick(ticks).toFixed(1)} s`));
       bar.refresh();
       grid.redraw();
     };

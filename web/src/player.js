@@ -19,7 +19,7 @@ export class Player extends EventTarget {
 
   /** Of the run's values at the cursor. */
   get row() { return this.run.rowAt(this.time); }
-  get tick() { return this.run.firstTick + this.row; }
+  get tick() { return this.run.tickOf(this.row); }
 
   /** Stays there while a live run goes on. */
   seek(time) {

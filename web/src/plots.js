@@ -9,6 +9,7 @@ import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from
 const HEIGHT = 200;       // px
 const CLICK_SLACK = 4;    // px that a click may move
 const ZOOM_STEP = 1.25;
+const SHADE = '4d';       // how opaque a line's colour is between its bounds, 30 %
 
 /** The stretch of time that all plots show. Fires 'change', and 'away' when the run's end was put out of sight. */
 export class TimeView extends EventTarget {
@@ -63,8 +64,8 @@ function nullable(values, n, from = 0) {
 /** Seconds of every row, one array for all plots. */
 function timesOf(run) {
   const held = times.get(run);
-  if (held?.length !== run.numTicks || held[0] !== run.start) {
-    times.set(run, Float64Array.from({length: run.numTicks}, (_, i) => run.timeAt(i)));
+  if (held?.length !== run.numRows || held[0] !== run.start) {
+    times.set(run, Float64Array.from({length: run.numRows}, (_, i) => run.timeAt(i)));
   }
   return times.get(run);
 }
@@ -72,11 +73,14 @@ const times = new WeakMap();
 
 /** The other run's values at the first run's ticks. */
 function resampled(values, run, other) {
-  return Array.from({length: run.numTicks}, (_, i) => {
+  return Array.from({length: run.numRows}, (_, i) => {
     const v = values[other.rowOf(run.timeAt(i))];
     return Number.isFinite(v) ? v : null;
   });
 }
+
+/** A colour, #rrggbb, that shows what lies beneath it. */
+const translucent = (color) => color + SHADE;
 
 /** The last number in a few rows: what a channel with few messages said last. */
 function lastNumber(values, row) {
@@ -138,13 +142,17 @@ export class Panel {
     this.lines = lines;
   }
 
-  /** The lines' values of the rows from `from` on. */
+  /** The lines' values of the rows from `from` on, and after them the bounds of those that have some. */
   #columns(from = 0) {
     const {run} = this.shared;
-    return this.lines.map((line) => line.constant !== undefined ? new Array(run.numTicks - from).fill(line.constant)
+    return [...this.lines.map((line) => line.constant !== undefined ? new Array(run.numRows - from).fill(line.constant)
       : line.overlay ? resampled(line.signal.values, run, line.run)
-        : nullable(line.signal.values, run.numTicks, from));
+        : nullable(line.signal.values, run.numRows, from)),
+    ...this.#bounded().flatMap(({signal}) => [nullable(signal.largest, run.numRows), nullable(signal.least, run.numRows)])];
   }
+
+  /** Lines whose rows have a least and a largest value. */
+  #bounded() { return this.lines.filter((line) => line.signal?.least && !line.overlay); }
 
   #readAll() {
     this.firstTick = this.shared.run.firstTick;
@@ -156,7 +164,7 @@ export class Panel {
     const {run, overlay} = this.shared;
     const dropped = run.firstTick - this.firstTick;
     const held = this.data[0].length - dropped;
-    if (dropped === 0 && held === run.numTicks) return;
+    if (dropped === 0 && held === run.numRows) return;
     if (held <= 0 || overlay) {
       this.#readAll();
     } else {
@@ -195,7 +203,13 @@ export class Panel {
         const sparse = line.signal?.channel.sparse === true;  // a few messages a second: each one is shown
         return {label: line.label, stroke: style.color, dash: style.dash, width: style.width,
           points: {show: sparse, size: 5}, spanGaps: sparse, show: !this.hidden.has(line.label)};
-      })],
+      }), ...this.#bounded().flatMap((line) => [0, 1].map(() => ({label: line.label, stroke: 'transparent', width: 0,
+        points: {show: false}, show: !this.hidden.has(line.label)})))],
+      bands: this.#bounded().map((line, k) => {
+        const {color} = styleOf(line.role, false);
+        const first = this.lines.length + 1 + 2 * k;
+        return {series: [first, first + 1], fill: () => translucent(color())};
+      }),
       hooks: {
         drawClear: [(u) => this.#shade(u)],
         draw: [() => this.updateCursor()],  // by the scales as they are drawn
@@ -238,8 +252,8 @@ export class Panel {
           const on = this.hidden.delete(line.label);
           if (!on) this.hidden.add(line.label);
           e.currentTarget.setAttribute('aria-pressed', String(on));
-          this.lines.forEach((other, k) => {
-            if (other.label === line.label) this.plot.setSeries(k + 1, {show: on});
+          this.plot.series.forEach((other, k) => {
+            if (k > 0 && other.label === line.label) this.plot.setSeries(k, {show: on});
           });
         }}, swatch, line.label, this.values[i]);
     }).filter(Boolean));
@@ -250,11 +264,11 @@ export class Panel {
   #updateValues(index) {
     if (!this.values) return;
     const {run, player} = this.shared;
-    const tick = index === null ? player.tick : this.firstTick + index;
+    const at = index === null ? player.row : this.firstTick + index - run.firstTick;
     this.lines.forEach((line, i) => {
       if (line.constant !== undefined) return;
       const {values, integer, channel} = line.signal;
-      const row = line.run.rowOf(run.timeAt(tick - run.firstTick));
+      const row = line.run.rowOf(run.timeAt(at));
       const value = channel.sparse ? lastNumber(values, row) : values[row] ?? NaN;
       this.values[i].textContent = (integer && this.#nameOf(line.signal, value)) || quantity(value, this.#unitOf(line));
     });

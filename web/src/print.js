@@ -33,7 +33,7 @@ export class Printer {
 
   /** So that what the browser's own menu prints has its plots, too. Of a long run they would take too much memory. */
   drawWhenIdle(run) {
-    if (run.numTicks > MOST_ROWS) return;
+    if (run.numRows > MOST_ROWS) return;
     const idle = globalThis.requestIdleCallback ?? ((f) => setTimeout(f, 50));
     const next = () => {
       const panel = this.grid.panels.find((p) => !p.building);

@@ -1,6 +1,7 @@
 // A robot of boxes, cylinders and spheres; a body that has none gets capsules between its joints.
 import {
-  BoxGeometry, CapsuleGeometry, CylinderGeometry, Group, Mesh, MeshStandardMaterial, Quaternion, SphereGeometry, Vector3,
+  BoxGeometry, CapsuleGeometry, CylinderGeometry, ExtrudeGeometry, Group, Mesh, MeshStandardMaterial, Quaternion, Shape,
+  SphereGeometry, Vector2, Vector3,
 } from 'three';
 
 const LINK_RADIUS = 0.028;  // m, of capsules
@@ -74,9 +75,9 @@ export class RobotView {
     this.robot.feet.forEach((foot, f) => {
       const sole = new Group();
       place(sole, foot.sole);
-      const plate = new Mesh(new BoxGeometry(foot.length, foot.width, SOLE_THICKNESS), this.soleMaterials[f]);
-      plate.position.z = SOLE_THICKNESS / 2;  // above the sole's plane
-      sole.add(plate);
+      const outline = new Shape(foot.corners.map(([x, y]) => new Vector2(x, y)));
+      const plate = new ExtrudeGeometry(outline, {depth: SOLE_THICKNESS, bevelEnabled: false});  // above the sole's plane
+      sole.add(new Mesh(plate, this.soleMaterials[f]));
       this.groups[foot.body].add(sole);
     });
   }

@@ -149,7 +149,7 @@ export class SceneView {
       this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
       this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
     ]);
-    this.setRow(this.run.meta.live ? this.run.numTicks - 1 : 0);
+    this.setRow(this.run.meta.live ? this.run.numRows - 1 : 0);
     this.look('free');
   }
 
@@ -200,8 +200,8 @@ export class SceneView {
     this.crane = new CraneView(METRES_PER_NEWTON);
     colored(this.crane.material, 'support');
     colored(this.crane.arrow.material, 'push');
-    this.soles = this.run.robot.feet.map(() => outline('support', 4));
-    this.polygon = outline('support', 8);
+    this.soles = this.run.robot.feet.map((foot) => outline('support', foot.corners.length));
+    this.polygon = outline('support', this.run.robot.feet.reduce((sum, foot) => sum + foot.corners.length, 0));
     this.region = outline('limit', REGION_CORNERS, true);
     this.capture = flat('disc', 'capture', 0.011);
     this.step = flat('ring', 'capture', 0.045);
@@ -297,9 +297,7 @@ export class SceneView {
     const polygon = [];
     this.run.robot.feet.forEach((foot, f) => {
       const sole = samples.pose(`sole${f}`, row);
-      const [x, y] = [foot.length / 2, foot.width / 2];
-      const corners = [[x, y], [-x, y], [-x, -y], [x, -y]]
-        .map(([a, b]) => add(sole.position, rotate(sole.orientation, [a, b, 0])));
+      const corners = foot.corners.map(([x, y]) => add(sole.position, rotate(sole.orientation, [x, y, 0])));
       this.soles[f].set(show.pressure && corners.flat().every(Number.isFinite) ? corners : []);
       if (samples.at(`contact${f}`, row) > 0) polygon.push(...corners);
       for (const kind of ['measured', 'computed']) {
@@ -365,7 +363,7 @@ export class SceneView {
   /** Both soles in the view from above; in steps, so that it holds still. */
   #fitAbove(soles, middle) {
     const reach = soles.map((sole, f) => Math.hypot(sole[0] - middle[0], sole[1] - middle[1])
-      + this.run.robot.feet[f].length / 2);
+      + Math.max(...this.run.robot.feet[f].corners.map(([x]) => Math.abs(x))));
     const half = Math.max(ABOVE, Math.ceil(Math.max(...reach) / ABOVE_STEP) * ABOVE_STEP);
     if (half === this.above.top) return;
     Object.assign(this.above, {left: -half, right: half, top: half, bottom: -half});

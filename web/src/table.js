@@ -10,7 +10,7 @@ const verdict = ({limit, passed}) => limit === null ? '' : passed === null ? ele
 /** "the part from 1.2 s to 3.4 s of a run", or '' of a whole one. */
 function partOf(run) {
   const {cut} = run.meta.run;
-  const seconds = (tick) => `${formatNumber(run.timeAt(tick - run.firstTick), 6)} s`;
+  const seconds = (tick) => `${formatNumber(run.timeOfTick(tick), 6)} s`;
   return cut ? `part of a run: ${seconds(cut.first_tick)} to ${seconds(cut.last_tick + 1)}` : '';
 }
 
@@ -92,7 +92,7 @@ export function liveTables(run, feed) {
         return;
       }
       checks.replaceChildren(...(found.length ? [checkTable(run, undefined,
-        `Checks up to ${formatNumber(run.timeAt(ticks - run.firstTick))} s: pending until the run's end`)] : []));
+        `Checks up to ${formatNumber(run.timeOfTick(ticks))} s: pending until the run's end`)] : []));
       latencies.replaceChildren(...[latencyFigure(components), latencyTable(components)].filter(Boolean));
     },
   };

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "components/balance/support_polygon.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 
@@ -148,13 +149,9 @@ Eigen::Rotation2Dd Turn(double yaw) { return Eigen::Rotation2Dd(yaw); }
 
 }  // namespace
 
-balance::ConvexPolygon SoleOutline(const robot::FootModel& foot, double margin) {
-  return balance::Rectangle({0.5 * foot.length - margin, 0.5 * foot.width - margin});
-}
-
 balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin, const Vector2d& centre,
                               double yaw) {
-  balance::ConvexPolygon sole = SoleOutline(foot, margin);
+  balance::ConvexPolygon sole = balance::SolePolygon(foot, margin);
   const Eigen::Matrix2d turn = Turn(yaw).toRotationMatrix();
   for (Vector2d& corner : sole.mutable_corners()) corner = centre + turn * corner;
   return sole;
@@ -169,29 +166,6 @@ balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::Co
     }
   }
   return balance::ConvexHull({points.data(), count});
-}
-
-balance::ConvexPolygon Clip(const balance::ConvexPolygon& polygon, const Vector2d& normal,
-                            double offset) {
-  balance::ConvexPolygon part;
-  const auto append = [&](const Vector2d& point) {
-    if (part.num_corners < balance::ConvexPolygon::kMaxCorners) {
-      part.corner[static_cast<size_t>(part.num_corners++)] = point;
-    }
-  };
-  if (polygon.num_corners == 0) return part;
-  Vector2d last = polygon.corners().back();
-  double last_depth = normal.dot(last) - offset;
-  for (const Vector2d& corner : polygon.corners()) {
-    const double depth = normal.dot(corner) - offset;
-    if ((depth >= 0) != (last_depth >= 0)) {
-      append(last + (corner - last) * (last_depth / (last_depth - depth)));
-    }
-    if (depth >= 0) append(corner);
-    last = corner;
-    last_depth = depth;
-  }
-  return part;
 }
 
 Reach::Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
@@ -232,7 +206,7 @@ balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com) const {
   balance::ConvexPolygon reached = leg_[static_cast<size_t>(foot)][1];
   for (Vector2d& corner : reached.mutable_corners()) corner += com;
   const double side = foot == robot::kLeftFoot ? 1 : -1;
-  return Clip(reached, {0, side}, least_spacing_);
+  return balance::Clip(reached, {{0, -side}, -least_spacing_});
 }
 
 }  // namespace poise::stepping

@@ -9,17 +9,11 @@
 
 namespace poise::stepping {
 
-/// Outline of a foot's sole in its own frame, `margin` (m) off its edges.
-balance::ConvexPolygon SoleOutline(const robot::FootModel& foot, double margin);
-/// The same placed at `centre`, turned by `yaw`, rad.
+/// A foot's sole, `margin` (m) off its edges, its frame at `centre`, turned by `yaw`, rad.
 balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,
                               const Eigen::Vector2d& centre, double yaw);
 /// Hull of two polygons; of the corners beyond what a polygon holds the last are left out.
 balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::ConvexPolygon& b);
-/// The part of `polygon` where normal · x ≥ offset.
-balance::ConvexPolygon Clip(const balance::ConvexPolygon& polygon, const Eigen::Vector2d& normal,
-                            double offset);
-
 /// The legs' reach for an upright body with level soles. All in axes of the body's heading, x
 /// ahead, y to the left, m.
 class Reach {

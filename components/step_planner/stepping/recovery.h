@@ -36,6 +36,8 @@ enum class StepReason {
   kSure,        ///< so far beyond that nothing else can bring it back
   kDeadline,    ///< waiting longer would leave the reach
   kAgain,       ///< the step before did not catch it
+  kWalk,        ///< the robot walks
+  kTogether,    ///< the feet are put side by side
 };
 
 /// Pure function of its calls; never allocates.

@@ -1,5 +1,7 @@
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 
@@ -7,15 +9,102 @@
 
 namespace poise::ethercat {
 
+namespace {
+
+constexpr std::array<int, kNumPorts> kFrameOrder = {0, 3, 1, 2};
+
+}  // namespace
+
 EmulatedChain::EmulatedChain(const EmulatedChainConfig& config, std::span<MotorLoad* const> loads)
-    : hop_(config.hop()), connected_(static_cast<size_t>(config.drive_size())) {
-  for (int i = 0; i < config.drive_size(); ++i) {
-    slaves_.push_back(std::make_unique<EmulatedSlave>(config.drive(i), i + 1 == config.drive_size(),
-                                                      loads[static_cast<size_t>(i)]));
+    : config_(config),
+      loads_(loads.begin(), loads.end()),
+      behind_(static_cast<size_t>(config.drive_size()), {-1, -1, -1, -1}),
+      port_times_(behind_.size()),
+      hop_(config.hop()),
+      connected_(behind_.size()) {
+  for (size_t i = 0; i < behind_.size(); ++i) {
+    slaves_.push_back(MakeSlave(i));
+    if (i == 0) continue;
+    const EmulatedDriveConfig& drive = config_.drive(static_cast<int>(i));
+    const size_t parent = drive.has_behind() ? drive.behind() : i - 1;
+    // A slave with swapped plugs goes on at its port 0.
+    const bool swapped = parent < i && config_.drive(static_cast<int>(parent)).swapped();
+    const size_t port = swapped && drive.port() == 1 ? 0 : drive.port();
+    if (parent >= i || port >= kNumPorts || behind_[parent][port] >= 0) {
+      throw EthercatError(
+          fmt::format("emulated slave {}: it cannot hang at port {} of slave {}: that is none "
+                      "before it, or the "
+                      "port is taken",
+                      i, port, parent));
+    }
+    behind_[parent][port] = static_cast<int>(i);
+  }
+  FindWay();
+}
+
+std::unique_ptr<EmulatedSlave> EmulatedChain::MakeSlave(size_t slave) const {
+  return std::make_unique<EmulatedSlave>(config_.drive(static_cast<int>(slave)), loads_[slave]);
+}
+
+int64_t EmulatedChain::Walk(size_t slave, int64_t arrival) {
+  const bool swapped = config_.drive(static_cast<int>(slave)).swapped();
+  const size_t entry = swapped ? 2 : 0;  // place of port 1 or port 0 in the frame's order
+  auto& times = port_times_[slave];
+  times = {};
+  times[static_cast<size_t>(kFrameOrder[entry])] = arrival;
+  int64_t time = arrival;
+  if (!swapped) way_.push_back({slave, time});
+  for (size_t i = 1; i < kNumPorts; ++i) {
+    const auto port = static_cast<size_t>(kFrameOrder[(entry + i) % kNumPorts]);
+    const int next = behind_[slave][port];
+    if (next >= 0 && static_cast<size_t>(next) < connected_) {
+      time = Walk(static_cast<size_t>(next), time + hop_) + hop_;
+      times[port] = time;
+    }
+    // The processing unit is behind port 0.
+    if (port == 0) way_.push_back({slave, time});
+  }
+  return time;
+}
+
+void EmulatedChain::FindWay() {
+  way_.clear();
+  if (connected_ > 0 && !slaves_.empty()) Walk(0, 0);
+  for (size_t i = 0; i < slaves_.size(); ++i) {
+    std::array<bool, kNumPorts> linked{};
+    for (size_t port = 0; port < kNumPorts; ++port) {
+      const int next = behind_[i][port];
+      // Beyond a cut all are together still.
+      const bool same_side = (static_cast<size_t>(next) < connected_) == (i < connected_);
+      linked[port] = next >= 0 && same_side;
+    }
+    const bool swapped = config_.drive(static_cast<int>(i)).swapped();
+    linked[swapped ? 1 : 0] = i != connected_ || connected_ == slaves_.size();
+    slaves_[i]->esc().SetPorts(linked);
   }
 }
 
+void EmulatedChain::CutAfter(size_t count) {
+  if (count == connected_) return;
+  connected_ = count;
+  FindWay();
+}
+
+void EmulatedChain::PowerOff(size_t slave) {
+  slaves_[slave] = MakeSlave(slave);
+  slaves_[slave]->AdvanceTo(now_);  // its motor is without torque
+  CutAfter(slave);
+}
+
+void EmulatedChain::PowerOn(size_t slave) {
+  slaves_[slave] = MakeSlave(slave);
+  slaves_[slave]->AdvanceTo(now_);
+  connected_ = slaves_.size();
+  FindWay();
+}
+
 void EmulatedChain::AdvanceTo(int64_t now) {
+  now_ = std::max(now, now_);
   for (const auto& slave : slaves_) slave->AdvanceTo(now);
 }
 
@@ -29,9 +118,9 @@ bool EmulatedChain::HandleFrame(std::span<uint8_t> frame, int64_t now) {
   while (const std::optional<Datagram> datagram = reader.Next()) {
     const std::span<uint8_t> bytes =
         frame.subspan(datagram->offset, kDatagramOverhead + datagram->data.size());
-    for (size_t i = 0; i < std::min(connected_, slaves_.size()); ++i) {
-      if (slaves_[i]->silent()) continue;
-      Process(*datagram, bytes, slaves_[i].get(), now + static_cast<int64_t>(i) * hop_);
+    for (const Visit& visit : way_) {
+      EmulatedSlave* slave = slaves_[visit.slave].get();
+      if (!slave->silent()) Process(*datagram, bytes, slave, now + visit.time);
     }
     if (datagram->command == Command::kBwr && datagram->ado == reg::kDcReceiveTime) {
       LatchReceiveTimes(now);
@@ -43,11 +132,13 @@ bool EmulatedChain::HandleFrame(std::span<uint8_t> frame, int64_t now) {
 }
 
 void EmulatedChain::LatchReceiveTimes(int64_t now) {
-  const size_t count = std::min(connected_, slaves_.size());
-  for (size_t i = 0; i < count; ++i) {
-    const int64_t out = now + static_cast<int64_t>(i) * hop_;
-    const int64_t back = now + static_cast<int64_t>(2 * (count - 1) - i) * hop_;
-    if (!slaves_[i]->silent()) slaves_[i]->esc().LatchReceiveTimes(out, back);
+  for (const Visit& visit : way_) {
+    if (slaves_[visit.slave]->silent()) continue;
+    std::array<std::optional<int64_t>, kNumPorts> ports = port_times_[visit.slave];
+    for (std::optional<int64_t>& port : ports) {
+      if (port) *port += now;
+    }
+    slaves_[visit.slave]->esc().LatchReceiveTimes(ports, now + visit.time);
   }
 }
 
@@ -58,9 +149,6 @@ void EmulatedChain::Process(const Datagram& datagram, std::span<uint8_t> bytes,
   const size_t counter_at = kDatagramHeader + data.size();
   // The address as it is at this slave, changed by those before.
   const auto adp = Get<uint16_t>(bytes, 2);
-  std::array<uint8_t, 2> station_bytes{};
-  static_cast<void>(esc.Read(reg::kStationAddress, station_bytes, now));
-  const auto station = Get<uint16_t>(station_bytes, 0);
 
   bool read = false, write = false, merge = false;
   switch (datagram.command) {
@@ -75,8 +163,8 @@ void EmulatedChain::Process(const Datagram& datagram, std::span<uint8_t> bytes,
     case Command::kFprd:
     case Command::kFpwr:
     case Command::kFprw:
-      read = adp == station && datagram.command != Command::kFpwr;
-      write = adp == station && datagram.command != Command::kFprd;
+      read = esc.HasAddress(adp) && datagram.command != Command::kFpwr;
+      write = esc.HasAddress(adp) && datagram.command != Command::kFprd;
       break;
     case Command::kBrd:
     case Command::kBwr:
@@ -89,7 +177,7 @@ void EmulatedChain::Process(const Datagram& datagram, std::span<uint8_t> bytes,
       write = !read;
       break;
     case Command::kFrmw:
-      read = adp == station;
+      read = esc.HasAddress(adp);
       write = !read;
       break;
     case Command::kLrd:

@@ -26,30 +26,63 @@ uint32_t Counts(double angle, uint32_t counts_per_turn) {
 EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary* dictionary,
                              MotorLoad* load)
     : config_(config), load_(load) {
-  ObjectDictionary& objects = *dictionary;
-  controlword_ = objects.Add({object::kControlword, 0}, 2, kRx);
-  statusword_ = objects.Add({object::kStatusword, 0}, 2, kTx);
-  mode_ = objects.Add({object::kModeOfOperation, 0}, 1, kRx);
-  mode_display_ = objects.Add({object::kModeDisplay, 0}, 1, kTx);
-  target_torque_ = objects.Add({object::kTargetTorque, 0}, 2, kRx);
-  max_torque_ = objects.Add({object::kMaxTorque, 0}, 2, kRx);
-  torque_object_ = objects.Add({object::kTorque, 0}, 2, kTx);
-  position_ = objects.Add({object::kPosition, 0}, 4, kTx);
-  velocity_ = objects.Add({object::kVelocity, 0}, 4, kTx);
-  error_code_ = objects.Add({object::kErrorCode, 0}, 2, kTx);
-  objects.Add({object::kTargetPosition, 0}, 4, kRx);
-  objects.Add({object::kTargetVelocity, 0}, 4, kRx);
-  objects.Add({object::kRatedCurrent, 0}, 4, kRw, config.rated_current());
-  objects.Add({object::kRatedTorque, 0}, 4, kRw, config.rated_torque());
-  objects.Add({object::kSupportedModes, 0}, 4, ObjectDictionary::kReadOnly,
-              1U << (kModeCyclicTorque - 1));
+  constexpr uint8_t kReadOnly = ObjectDictionary::kReadOnly;
+  constexpr uint32_t kQuickStopSlowDown = 2;  // then switch on disabled
+  const auto add = [&](uint16_t index, uint8_t size, uint8_t access, const char* name,
+                       uint32_t value = 0) {
+    return Add(dictionary, index, size, access, name, value);
+  };
+  controlword_ = add(object::kControlword, 2, kRx, "Controlword");
+  statusword_ = add(object::kStatusword, 2, kTx, "Statusword");
+  mode_ = add(object::kModeOfOperation, 1, kRx, "Modes of operation");
+  mode_display_ = add(object::kModeDisplay, 1, kTx, "Modes of operation display");
+  target_torque_ = add(object::kTargetTorque, 2, kRx, "Target torque");
+  max_torque_ = add(object::kMaxTorque, 2, kRx, "Max torque", config.peak_torque());
+  torque_object_ = add(object::kTorque, 2, kTx, "Torque actual value");
+  position_ = add(object::kPosition, 4, kTx, "Position actual value");
+  velocity_ = add(object::kVelocity, 4, kTx, "Velocity actual value");
+  error_code_ = add(object::kErrorCode, 2, kTx, "Error code");
+  error_register_ = add(0x1001, 1, kReadOnly, "Error register");
+  add(object::kTargetPosition, 4, kRx, "Target position");
+  add(object::kTargetVelocity, 4, kRx, "Target velocity");
+  add(0x605A, 2, kRw, "Quick stop option code", kQuickStopSlowDown);
+  add(0x6073, 2, kRw, "Max current", config.peak_torque());
+  add(object::kRatedCurrent, 4, kRw, "Motor rated current", config.rated_current());
+  add(object::kRatedTorque, 4, kRw, "Motor rated torque",
+      config.rated_torque() * config.torque_unit());
+  add(0x6087, 4, kRw, "Torque slope", static_cast<uint32_t>(1e3 * config.torque_slew()));
+  add(object::kSupportedModes, 4, kReadOnly, "Supported drive modes",
+      1U << (kModeCyclicTorque - 1));
+  // Interpolation time period: 2 x 10^-3 s.
+  const auto& lacking = config.lacks();
+  if (std::find(lacking.begin(), lacking.end(), 0x60C2U) == lacking.end()) {
+    dictionary->Add({0x60C2, 0}, 1, kReadOnly, 2);
+    dictionary->Add({0x60C2, 1}, 1, kRw, 2);
+    dictionary->Add({0x60C2, 2}, 1, kRw, 0xFD)->is_signed = true;
+    dictionary->SetName(0x60C2, "Interpolation time period");
+  }
+  for (Object* object :
+       {mode_, mode_display_, target_torque_, torque_object_, position_, velocity_}) {
+    object->is_signed = true;
+  }
   Schedule(DriveState::kSwitchOnDisabled, 0);
   Report();
+}
+
+EmulatedDrive::Object* EmulatedDrive::Add(ObjectDictionary* objects, uint16_t index, uint8_t size,
+                                          uint8_t access, const char* name, uint32_t value) {
+  if (std::find(config_.lacks().begin(), config_.lacks().end(), index) != config_.lacks().end()) {
+    hidden_.push_back({.size = size, .access = access, .value = value});
+    return &hidden_.back();
+  }
+  objects->SetName(index, name);
+  return objects->Add({index, 0}, size, access, value);
 }
 
 void EmulatedDrive::TriggerFault(uint16_t error) {
   if (state_ == DriveState::kFaultReactionActive || state_ == DriveState::kFault) return;
   error_code_->value = error;
+  error_register_->value = 1;  // a generic error
   emergency_ = error;
   Enter(DriveState::kFaultReactionActive);
   Schedule(DriveState::kFault, now_);
@@ -94,7 +127,7 @@ void EmulatedDrive::UpdateState(int64_t now, bool outputs_valid) {
   if (next_ && now >= next_time_) Enter(*next_);
   if (outputs_valid) Follow(controlword, reset_edge, now);
   // Another mode is not supported: the drive stays in the one it has.
-  const bool change = outputs_valid && static_cast<int8_t>(mode_->value) == kModeCyclicTorque &&
+  const bool change = static_cast<int8_t>(mode_->value) == kModeCyclicTorque &&
                       mode_display_->value != mode_->value;
   if (!change) {
     mode_wanted_at_ = now;
@@ -154,6 +187,7 @@ void EmulatedDrive::Follow(uint16_t controlword, bool reset_edge, int64_t now) {
     case DriveState::kFault:
       if (reset_edge) {
         error_code_->value = 0;
+        error_register_->value = 0;
         Enter(DriveState::kSwitchOnDisabled);
       }
       return;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 
 #include "hw_bridge/ethercat/cia402.h"
@@ -62,8 +63,11 @@ class EmulatedDrive {
   EmulatedDriveConfig config_;
   MotorLoad* load_;
   using Object = ObjectDictionary::Object;
+  Object* Add(ObjectDictionary* objects, uint16_t index, uint8_t size, uint8_t access,
+              const char* name, uint32_t value = 0);
   Object *controlword_, *statusword_, *mode_, *mode_display_, *target_torque_, *max_torque_,
-      *torque_object_, *position_, *velocity_, *error_code_;
+      *torque_object_, *position_, *velocity_, *error_code_, *error_register_;
+  std::deque<Object> hidden_;  // that the drive has, but not for a master
 
   DriveState state_ = DriveState::kNotReadyToSwitchOn;
   std::optional<DriveState> next_;  // entered at next_time_

@@ -10,6 +10,16 @@ namespace {
 
 constexpr size_t kRegisters = 0x1000;
 
+/// Counters, which a write clears, whatever is written.
+bool IsCounter(size_t address) {
+  return (address >= reg::kReceiveErrors && address < reg::kLostLinks + kNumPorts) ||
+         address == reg::kWatchdogCounter || address == reg::kWatchdogCounter + 1U;
+}
+
+void CountUp(uint8_t* counter) {
+  if (*counter < 0xFF) ++*counter;
+}
+
 bool Overlap(size_t a, size_t a_size, size_t b, size_t b_size) {
   return a < b + b_size && b < a + a_size;
 }
@@ -24,9 +34,15 @@ const std::array<bool, kRegisters>& Writable() {
     allow(reg::kStationAddress, 2);
     allow(reg::kDlControl, 4);
     allow(reg::kAlControl, 2);
+    allow(reg::kEventMask, 2);
+    allow(reg::kReceiveErrors, 8);
+    allow(reg::kForwardedErrors, 4);
+    allow(reg::kUnitErrors, 2);
+    allow(reg::kLostLinks, kNumPorts);
     allow(reg::kWatchdogDivider, 2);
     allow(reg::kWatchdogPdi, 2);
     allow(reg::kWatchdogProcessData, 2);
+    allow(reg::kWatchdogCounter, 2);
     allow(reg::kEepromConfig, 1);
     allow(reg::kEepromControl, 14);
     allow(reg::kFmmu, kNumFmmus * kFmmuSize);
@@ -39,6 +55,7 @@ const std::array<bool, kRegisters>& Writable() {
     allow(reg::kDcSystemTime, 8);
     allow(reg::kDcOffset, 12);
     allow(reg::kDcSpeedStart, 2);
+    allow(reg::kDcTimeFilter, 2);
     allow(reg::kDcCyclicUnit, 2);
     allow(reg::kDcStart, 24);
     return result;
@@ -53,18 +70,43 @@ EmulatedEsc::EmulatedEsc(const Options& options) : options_(options) {
   memory_[reg::kFmmuCount] = kNumFmmus;
   memory_[reg::kSyncManagerCount] = kNumSyncManagers;
   memory_[reg::kRamSize] = 8;
-  memory_[reg::kPortDescriptor] = 0x0F;  // ports 0 and 1 are MII
-  memory_[reg::kFeatures] = 0x0C;        // distributed clocks, 64 bits
-  // Links on the open ports, communication there, loops closed elsewhere.
-  Put<uint16_t>(memory_, reg::kDlStatus, options.last ? 0x5611 : 0x5A31);
+  memory_[reg::kPortDescriptor] = 0xFF;                       // all ports are MII
+  memory_[reg::kFeatures] = options.has_clock ? 0x0C : 0x00;  // distributed clocks, 64 bits
+  Put<uint16_t>(memory_, reg::kStationAlias, options.alias);
+  memory_[reg::kDlControl] = 1;  // frames of other types are destroyed
+  SetPorts({true, false, false, false});
   Put<uint16_t>(memory_, reg::kWatchdogDivider, 2498);
   Put<uint16_t>(memory_, reg::kWatchdogPdi, 1000);
   Put<uint16_t>(memory_, reg::kWatchdogProcessData, 1000);
   memory_[reg::kWatchdogStatus] = 1;
   Put<uint16_t>(memory_, reg::kEepromControl, kEeprom8Bytes);
   Put<uint16_t>(memory_, reg::kDcSpeedStart, 0x1000);
+  memory_[reg::kDcTimeFilter] = 0x04;
+  memory_[reg::kDcSpeedFilter] = 0x0C;
   SetAlStatus(static_cast<uint8_t>(AlState::kInit), AlStatusCode::kNone);
   local_ = static_cast<double>(options.clock_start);
+}
+
+void EmulatedEsc::SetPorts(const std::array<bool, kNumPorts>& linked) {
+  // PDI operational; a link and communication on the open ports, loops closed elsewhere.
+  uint16_t status = 0x0001;
+  const auto before = Get<uint16_t>(memory_, reg::kDlStatus);
+  for (size_t i = 0; i < linked.size(); ++i) {
+    const auto link = static_cast<uint16_t>(1U << (4 + i));
+    status |= static_cast<uint16_t>(linked[i] ? link | 0x0200U << (2 * i) : 0x0100U << (2 * i));
+    if (!linked[i] && (before & link) != 0) CountUp(&memory_[reg::kLostLinks + i]);
+  }
+  Put<uint16_t>(memory_, reg::kDlStatus, status);
+}
+
+void EmulatedEsc::CountReceiveError(int port) {
+  CountUp(&memory_[reg::kReceiveErrors + 2 * static_cast<size_t>(port)]);
+}
+
+bool EmulatedEsc::HasAddress(uint16_t station) const {
+  const bool alias = (memory_[reg::kAliasControl] & 1) != 0;
+  return Get<uint16_t>(memory_, reg::kStationAddress) == station ||
+         (alias && Get<uint16_t>(memory_, reg::kStationAlias) == station);
 }
 
 uint8_t& EmulatedEsc::SyncByte(int index, size_t offset) {
@@ -132,7 +174,9 @@ bool EmulatedEsc::Read(uint16_t address, std::span<uint8_t> data, int64_t now) {
 bool EmulatedEsc::Write(uint16_t address, std::span<const uint8_t> data, int64_t now) {
   AdvanceTo(now);
   if (data.empty() || address + data.size() > kMemory) return false;
-  if (address < kRegisters) return WriteRegisters(address, data);
+  if (address < kRegisters) {
+    return !Refuses(address, data.size()) && WriteRegisters(address, data);
+  }
   int manager = -1;
   const Rule rule = SyncManagerRule(address, data.size(), true, &manager);
   if (rule == Rule::kRefused) return false;
@@ -143,7 +187,7 @@ bool EmulatedEsc::Write(uint16_t address, std::span<const uint8_t> data, int64_t
   if ((sync.control & kSmModeMask) == kSmModeMailbox) {
     SyncByte(manager, 5) |= kSmStatusFull;
     mailbox_written_ = mailbox_written_ || manager == kMailboxOut;
-  } else if (manager == kProcessOut) {
+  } else if (manager == output_manager_) {
     outputs_written_ = true;
     if ((sync.control & kSmWatchdog) != 0) {
       watchdog_triggered_ = now;
@@ -153,6 +197,16 @@ bool EmulatedEsc::Write(uint16_t address, std::span<const uint8_t> data, int64_t
     }
   }
   return true;
+}
+
+bool EmulatedEsc::Refuses(size_t address, size_t size) const {
+  // AL control is a mailbox to the application: one request at a time.
+  if (al_control_ && Overlap(address, size, reg::kAlControl, 2)) return true;
+  // The EEPROM's interface is the application's after the hand-over.
+  const bool applications = (memory_[reg::kEepromConfig] & kEepromApplication) != 0;
+  if (applications && Overlap(address, size, reg::kEepromControl, 14)) return true;
+  const bool clock = address >= reg::kDcReceiveTime && address < reg::kDcReceiveTime + 0x100U;
+  return clock && !options_.has_clock;
 }
 
 bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) {
@@ -171,7 +225,7 @@ bool EmulatedEsc::WriteRegisters(size_t address, std::span<const uint8_t> data) 
     any = true;
     // The system time is no memory: a write is a comparison.
     if (at >= reg::kDcReceiveTime && at < reg::kDcOffset) continue;
-    memory_[at] = data[i];
+    memory_[at] = IsCounter(at) ? uint8_t{0} : data[i];
   }
   if (any) AfterWrite(address, data.size(), data);
   return any;
@@ -279,20 +333,22 @@ void EmulatedEsc::UpdateWatchdog() {
   watchdog_running_ = false;
   watchdog_expired_ = true;
   memory_[reg::kWatchdogStatus] = 0;
-  uint8_t& count = memory_[reg::kWatchdogCounter];
-  if (count < 0xFF) ++count;
+  CountUp(&memory_[reg::kWatchdogCounter]);
 }
 
-void EmulatedEsc::LatchReceiveTimes(int64_t port0, int64_t port1) {
-  AdvanceTo(port0);
+void EmulatedEsc::LatchReceiveTimes(const std::array<std::optional<int64_t>, kNumPorts>& ports,
+                                    int64_t unit) {
+  if (!options_.has_clock) return;
+  AdvanceTo(unit);
   const double rate = 1 + options_.clock_error * 1e-6;
-  const auto local = static_cast<int64_t>(std::llround(local_));
-  const auto back =
-      static_cast<int64_t>(std::llround(local_ + static_cast<double>(port1 - port0) * rate));
-  Put<uint32_t>(memory_, reg::kDcReceiveTime, static_cast<uint32_t>(local));
-  Put<uint32_t>(memory_, reg::kDcReceiveTime + 4,
-                options_.last ? uint32_t{0} : static_cast<uint32_t>(back));
-  Put<int64_t>(memory_, reg::kDcReceiveTimeUnit, local);
+  const auto local = [&](int64_t time) {
+    return static_cast<int64_t>(std::llround(local_ + static_cast<double>(time - now_) * rate));
+  };
+  for (size_t i = 0; i < ports.size(); ++i) {
+    Put<uint32_t>(memory_, reg::kDcReceiveTime + 4 * i,
+                  ports[i] ? static_cast<uint32_t>(local(*ports[i])) : uint32_t{0});
+  }
+  Put<int64_t>(memory_, reg::kDcReceiveTimeUnit, local(unit));
 }
 
 int64_t EmulatedEsc::SystemTime() const {
@@ -344,6 +400,14 @@ std::span<const uint8_t> EmulatedEsc::Buffer(int index) const {
   return std::span(memory_).subspan(sync.start, sync.length);
 }
 
+void EmulatedEsc::ClearMailboxes() {
+  mailbox_written_ = repeat_requested_ = false;
+  for (const int manager : {kMailboxOut, kMailboxIn}) {
+    if ((sync_manager(manager).control & kSmModeMask) != kSmModeMailbox) continue;
+    SyncByte(manager, 5) &= static_cast<uint8_t>(~kSmStatusFull);
+  }
+}
+
 std::span<const uint8_t> EmulatedEsc::TakeMailbox() {
   if (!std::exchange(mailbox_written_, false)) return {};
   SyncByte(kMailboxOut, 5) &= static_cast<uint8_t>(~kSmStatusFull);
@@ -367,9 +431,9 @@ void EmulatedEsc::AcknowledgeRepeat() {
 }
 
 std::span<uint8_t> EmulatedEsc::process_inputs() {
-  const std::span<const uint8_t> buffer = Buffer(kProcessIn);
+  const std::span<const uint8_t> buffer = Buffer(input_manager_);
   if (buffer.empty()) return {};
-  return std::span(memory_).subspan(sync_manager(kProcessIn).start, buffer.size());
+  return std::span(memory_).subspan(sync_manager(input_manager_).start, buffer.size());
 }
 
 bool EmulatedEsc::TakeOutputsWritten() { return std::exchange(outputs_written_, false); }

@@ -20,7 +20,8 @@ class EmulatedEsc {
     int64_t eeprom_time = 0;       ///< ns that reading a word takes
     double clock_error = 0;        ///< of its oscillator, ppm
     int64_t clock_start = 0;       ///< ns, its local time at time 0
-    bool last = false;             ///< no slave behind: port 1 is closed
+    bool has_clock = true;
+    uint16_t alias = 0;  ///< station alias
   };
   explicit EmulatedEsc(const Options& options);
 
@@ -35,13 +36,21 @@ class EmulatedEsc {
   };
   /// A logical command's data through the FMMUs, in place.
   Access Logical(uint32_t address, std::span<uint8_t> data, bool read, bool write, int64_t now);
-  /// The times that a broadcast write to 0x0900 latches: passing ports 0 and 1 (ns, true time).
-  void LatchReceiveTimes(int64_t port0, int64_t port1);
+  /// The times that a broadcast write to 0x0900 latches: passing each port and the processing unit
+  /// (ns, true time); a port that is not in use: nothing.
+  void LatchReceiveTimes(const std::array<std::optional<int64_t>, kNumPorts>& ports, int64_t unit);
+  /// Whether a station address is this slave's: the configured one, or the alias when it is in use.
+  bool HasAddress(uint16_t station) const;
 
   // The slave application's side (PDI).
 
   /// Lets time pass: EEPROM, watchdog, SYNC0.
   void AdvanceTo(int64_t now);
+  /// Which ports have a link. One that loses it counts it.
+  void SetPorts(const std::array<bool, kNumPorts>& linked);
+  /// A damaged frame has come in at a port.
+  void CountReceiveError(int port);
+  bool al_control_pending() const { return al_control_.has_value(); }
   /// What the master has written to AL control since the last call.
   std::optional<uint16_t> TakeAlControl();
   void SetAlStatus(uint8_t status, AlStatusCode code);
@@ -55,6 +64,8 @@ class EmulatedEsc {
   /// The application's own disabling of a sync manager: its memory refuses the master.
   void SetSyncManagerDisabled(int index, bool disabled);
 
+  /// Empties both mailboxes, as a slave does that leaves for INIT.
+  void ClearMailboxes();
   /// A message the master has put into the mailbox, which is free again; empty: none.
   std::span<const uint8_t> TakeMailbox();
   /// Where the application puts a message for the master; empty when the mailbox is full or off.
@@ -65,7 +76,12 @@ class EmulatedEsc {
   void AcknowledgeRepeat();
 
   /// Buffers of the process data; empty when the sync manager is not active.
-  std::span<const uint8_t> process_outputs() const { return Buffer(kProcessOut); }
+  std::span<const uint8_t> process_outputs() const { return Buffer(output_manager_); }
+  /// Which sync managers have the process data: those after the mailboxes, unless there are none.
+  void SetProcessManagers(int outputs, int inputs) {
+    output_manager_ = outputs;
+    input_manager_ = inputs;
+  }
   std::span<uint8_t> process_inputs();
   /// Whether the master has written all process outputs since the last call.
   bool TakeOutputsWritten();
@@ -89,6 +105,7 @@ class EmulatedEsc {
   Rule SyncManagerRule(size_t address, size_t size, bool write, int* manager) const;
   std::span<const uint8_t> Buffer(int index) const;
   uint8_t& SyncByte(int index, size_t offset);
+  bool Refuses(size_t address, size_t size) const;
   bool WriteRegisters(size_t address, std::span<const uint8_t> data);
   void AfterWrite(size_t address, size_t size, std::span<const uint8_t> data);
   void UpdateEeprom();
@@ -97,6 +114,7 @@ class EmulatedEsc {
   void StartSync0();
 
   Options options_;
+  int output_manager_ = kProcessOut, input_manager_ = kProcessIn;
   std::array<uint8_t, kMemory> memory_{};
   int64_t now_ = 0;  // ns, true time
   std::optional<uint16_t> al_control_;

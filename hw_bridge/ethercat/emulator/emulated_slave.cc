@@ -21,19 +21,27 @@ std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
     words[word] = static_cast<uint16_t>(value);
     words[word + 1] = static_cast<uint16_t>(value >> 16);
   };
+  words[sii::kAlias] = static_cast<uint16_t>(config.alias());
   put(sii::kVendor, config.vendor_id());
   put(sii::kProduct, config.product_code());
   put(sii::kRevision, config.revision());
   put(sii::kSerial, config.serial());
-  put(sii::kMailboxOutOffset, kMailboxOutStart | uint32_t{kMailboxSize} << 16);
-  put(sii::kMailboxInOffset, kMailboxInStart | uint32_t{kMailboxSize} << 16);
-  words[sii::kMailboxProtocols] = sii::kProtocolCoe;
   // Sync manager category: start, length, control and status, activation and type.
-  words.insert(words.end(), {sii::kCategorySyncManagers, 16});
-  words.insert(words.end(), {kMailboxOutStart, kMailboxSize, kSmMailboxOut, 0x0101});
-  words.insert(words.end(), {kMailboxInStart, kMailboxSize, kSmMailboxIn, 0x0201});
-  words.insert(words.end(), {kOutputsStart, 0, kSmProcessOut, 0x0301});
-  words.insert(words.end(), {kInputsStart, 0, kSmProcessIn, 0x0401});
+  std::vector<uint16_t> managers;
+  const auto add = [&managers](uint16_t start, uint16_t size, uint16_t control, uint16_t type) {
+    managers.insert(managers.end(), {start, size, control, static_cast<uint16_t>(type << 8 | 1)});
+  };
+  if (config.mailbox()) {
+    put(sii::kMailboxOutOffset, kMailboxOutStart | uint32_t{kMailboxSize} << 16);
+    put(sii::kMailboxInOffset, kMailboxInStart | uint32_t{kMailboxSize} << 16);
+    words[sii::kMailboxProtocols] = sii::kProtocolCoe;
+    add(kMailboxOutStart, kMailboxSize, kSmMailboxOut, 1);
+    add(kMailboxInStart, kMailboxSize, kSmMailboxIn, 2);
+  }
+  add(kOutputsStart, 0, kSmProcessOut, 3);
+  add(kInputsStart, 0, kSmProcessIn, 4);
+  words.insert(words.end(), {sii::kCategorySyncManagers, static_cast<uint16_t>(managers.size())});
+  words.insert(words.end(), managers.begin(), managers.end());
   words.push_back(sii::kCategoryEnd);
   return words;
 }
@@ -56,68 +64,160 @@ int Rank(AlState state) {
 
 }  // namespace
 
-EmulatedSlave::EmulatedSlave(const EmulatedDriveConfig& config, bool last, MotorLoad* load)
+EmulatedSlave::EmulatedSlave(const EmulatedDriveConfig& config, MotorLoad* load)
     : config_(config),
       esc_({.eeprom = MakeEeprom(config),
             .eeprom_time = static_cast<int64_t>(config.eeprom_time() * 1e3),
             .clock_error = config.clock_error(),
             .clock_start = config.clock_start(),
-            .last = last}),
-      drive_(config, &objects_, load) {
-  constexpr uint32_t kServoDrive = 0x00020192;  // device type: CiA 402, servo
-  objects_.Add({0x1000, 0}, 4, ObjectDictionary::kReadOnly, kServoDrive);
-  objects_.Add({0x1018, 0}, 1, ObjectDictionary::kReadOnly, 4);
-  objects_.Add({0x1018, 1}, 4, ObjectDictionary::kReadOnly, config.vendor_id());
-  objects_.Add({0x1018, 2}, 4, ObjectDictionary::kReadOnly, config.product_code());
-  objects_.Add({0x1018, 3}, 4, ObjectDictionary::kReadOnly, config.revision());
-  objects_.Add({0x1018, 4}, 4, ObjectDictionary::kReadOnly, config.serial());
-  objects_.Add({0x1C00, 0}, 1, ObjectDictionary::kReadOnly, 4);
-  for (uint8_t i = 1; i <= 4; ++i) {
-    objects_.Add({0x1C00, i}, 1, ObjectDictionary::kReadOnly, i);
+            .has_clock = config.has_clock(),
+            .alias = static_cast<uint16_t>(config.alias())}),
+      drive_(config, config.other() ? &unused_ : &objects_, load),
+      coe_(&objects_, kMailboxSize, config.complete_access()) {
+  if (!config_.mailbox()) {
+    output_manager_ = 0;
+    input_manager_ = 1;
+    esc_.SetProcessManagers(output_manager_, input_manager_);
   }
-  AddPdoObjects(object::kRxAssign, kRxFixed, kRxUser, ObjectDictionary::kRxMappable,
-                {Mapping(object::kControlword, 16), Mapping(object::kTargetPosition, 32)});
-  AddPdoObjects(object::kTxAssign, kTxFixed, kTxUser, ObjectDictionary::kTxMappable,
-                {Mapping(object::kStatusword, 16), Mapping(object::kPosition, 32)});
+  AddCommonObjects();
+  const bool own = config_.other() || config_.fixed_rx_size() > 0 || config_.fixed_tx_size() > 0;
+  if (own) {
+    AddOwnPdos(object::kRxAssign, config_.fixed_rx(), ObjectDictionary::kRxMappable);
+    AddOwnPdos(object::kTxAssign, config_.fixed_tx(), ObjectDictionary::kTxMappable);
+    return;
+  }
+  AddFixedPdo(kRxFixed, {Mapping(object::kControlword, 16), Mapping(object::kTargetPosition, 32)});
+  AddFixedPdo(kTxFixed, {Mapping(object::kStatusword, 16), Mapping(object::kPosition, 32)});
+  AddFreePdo(object::kRxAssign, kRxUser, ObjectDictionary::kRxMappable);
+  AddFreePdo(object::kTxAssign, kTxUser, ObjectDictionary::kTxMappable);
+  AddAssignment(object::kRxAssign, {kRxFixed}, {kRxFixed, kRxUser});
+  AddAssignment(object::kTxAssign, {kTxFixed}, {kTxFixed, kTxUser});
 }
 
-void EmulatedSlave::AddPdoObjects(uint16_t assign, uint16_t fixed_pdo, uint16_t user_pdo,
-                                  uint8_t mappable, std::initializer_list<uint32_t> fixed) {
+void EmulatedSlave::AddCommonObjects() {
+  constexpr uint32_t kServoDrive = 0x00020192;  // device type: CiA 402, servo
+  constexpr uint8_t kReadOnly = ObjectDictionary::kReadOnly;
   constexpr uint8_t kRw = ObjectDictionary::kWritable;
-  objects_.Add({assign, 0}, 1, kRw, 1, [this](uint32_t count) {
-    if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-    return count <= 1 ? SdoAbort::kNone : SdoAbort::kValueRange;
-  });
-  objects_.Add({assign, 1}, 2, kRw, fixed_pdo, [=, this](uint32_t pdo) {
-    if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-    if (objects_.Find({assign, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
-    return pdo == fixed_pdo || pdo == user_pdo ? SdoAbort::kNone : SdoAbort::kValueRange;
-  });
-  objects_.Add({fixed_pdo, 0}, 1, ObjectDictionary::kReadOnly, static_cast<uint32_t>(fixed.size()));
-  uint8_t subindex = 0;
-  for (const uint32_t mapping : fixed) {
-    objects_.Add({fixed_pdo, ++subindex}, 4, ObjectDictionary::kReadOnly, mapping);
+  const auto name = [this](uint16_t index, const char* text) { objects_.SetName(index, text); };
+  objects_.Add({0x1000, 0}, 4, kReadOnly, config_.other() ? 0 : kServoDrive);
+  name(0x1000, "Device type");
+  if (objects_.Find({0x1001, 0}) == nullptr) objects_.Add({0x1001, 0}, 1, kReadOnly);
+  name(0x1001, "Error register");
+  objects_.AddText({0x1008, 0}, config_.device_name());
+  name(0x1008, "Manufacturer device name");
+  objects_.AddText({0x1009, 0}, "1.0");
+  name(0x1009, "Manufacturer hardware version");
+  objects_.AddText({0x100A, 0}, "1.0");
+  name(0x100A, "Manufacturer software version");
+  objects_.Add({0x1018, 0}, 1, kReadOnly, 4);
+  objects_.Add({0x1018, 1}, 4, kReadOnly, config_.vendor_id());
+  objects_.Add({0x1018, 2}, 4, kReadOnly, config_.product_code());
+  objects_.Add({0x1018, 3}, 4, kReadOnly, config_.revision());
+  objects_.Add({0x1018, 4}, 4, kReadOnly, config_.serial());
+  name(0x1018, "Identity object");
+  objects_.Add({0x1C00, 0}, 1, kReadOnly, 4);
+  for (uint8_t i = 1; i <= 4; ++i) objects_.Add({0x1C00, i}, 1, kReadOnly, i);
+  name(0x1C00, "Sync manager type");
+  // Sync manager parameters (ETG.1020): synchronised by SYNC0, cycle as SYNC0 has it.
+  for (const uint16_t index : {uint16_t{0x1C32}, uint16_t{0x1C33}}) {
+    constexpr uint32_t kDcSync0 = 2, kSupported = 0x0006;          // SM event and SYNC0
+    constexpr uint32_t kCycle = 2'000'000, kLeastCycle = 125'000;  // ns
+    objects_.Add({index, 0}, 1, kReadOnly, 0x20);
+    objects_.Add({index, 1}, 2, kRw, kDcSync0);
+    objects_.Add({index, 2}, 4, kRw, kCycle);
+    objects_.Add({index, 4}, 2, kReadOnly, kSupported);
+    objects_.Add({index, 5}, 4, kReadOnly, kLeastCycle);
+    objects_.Add({index, 6}, 4, kReadOnly, 0);
+    objects_.Add({index, 9}, 4, kReadOnly, 0);
+    objects_.Add({index, 0x0B}, 2, kReadOnly, 0);
+    objects_.Add({index, 0x20}, 1, kReadOnly, 0);
+    name(index, index == 0x1C32 ? "SM output parameter" : "SM input parameter");
   }
-  objects_.Add({user_pdo, 0}, 1, kRw, 0, [=, this](uint32_t count) {
+  // Room for a note of the user's: an object that takes segments.
+  constexpr size_t kMostNote = 512;
+  objects_.AddText({0x2F00, 0}, "", kMostNote);
+  name(0x2F00, "User note");
+}
+
+void EmulatedSlave::AddAssignment(uint16_t assign, const std::vector<uint16_t>& assigned,
+                                  const std::vector<uint16_t>& allowed) {
+  constexpr uint8_t kRw = ObjectDictionary::kWritable;
+  objects_.SetName(assign, assign == object::kRxAssign ? "RxPDO assign" : "TxPDO assign");
+  objects_.Add({assign, 0}, 1, kRw, static_cast<uint32_t>(assigned.size()), [this](uint32_t count) {
     if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-    const bool assigned =
-        objects_.Find({assign, 0})->value == 1 && objects_.Find({assign, 1})->value == user_pdo;
-    if (assigned) return SdoAbort::kUnsupportedAccess;
+    return count <= kMostAssigned ? SdoAbort::kNone : SdoAbort::kValueRange;
+  });
+  for (uint8_t i = 1; i <= kMostAssigned; ++i) {
+    const uint32_t pdo = i <= assigned.size() ? assigned[i - 1U] : 0U;
+    objects_.Add({assign, i}, 2, kRw, pdo, [=, this](uint32_t value) {
+      if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
+      if (objects_.Find({assign, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
+      const bool known = std::find(allowed.begin(), allowed.end(), value) != allowed.end();
+      return known ? SdoAbort::kNone : SdoAbort::kValueRange;
+    });
+  }
+}
+
+void EmulatedSlave::AddFixedPdo(uint16_t pdo, const std::vector<uint32_t>& mappings) {
+  objects_.SetName(pdo, "PDO mapping");
+  objects_.Add({pdo, 0}, 1, ObjectDictionary::kReadOnly, static_cast<uint32_t>(mappings.size()));
+  uint8_t subindex = 0;
+  for (const uint32_t mapping : mappings) {
+    objects_.Add({pdo, ++subindex}, 4, ObjectDictionary::kReadOnly, mapping);
+  }
+}
+
+void EmulatedSlave::AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable) {
+  constexpr uint8_t kRw = ObjectDictionary::kWritable;
+  objects_.SetName(pdo, "PDO mapping");
+  objects_.Add({pdo, 0}, 1, kRw, 0, [=, this](uint32_t count) {
+    if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
+    for (uint32_t i = 1; i <= objects_.Find({assign, 0})->value; ++i) {
+      if (objects_.Find({assign, static_cast<uint8_t>(i)})->value == pdo) {
+        return SdoAbort::kUnsupportedAccess;
+      }
+    }
     if (count > kMostMapped) return SdoAbort::kPdoTooLong;
     for (uint32_t i = 1; i <= count; ++i) {
-      const uint32_t mapping = objects_.Find({user_pdo, static_cast<uint8_t>(i)})->value;
+      const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
       const SdoAbort abort = CheckMapping(mapping, mappable);
       if (abort != SdoAbort::kNone) return abort;
     }
     return SdoAbort::kNone;
   });
   for (uint8_t i = 1; i <= kMostMapped; ++i) {
-    objects_.Add({user_pdo, i}, 4, kRw, 0, [=, this](uint32_t mapping) {
+    objects_.Add({pdo, i}, 4, kRw, 0, [=, this](uint32_t mapping) {
       if (state_ != AlState::kPreOp) return SdoAbort::kDeviceState;
-      if (objects_.Find({user_pdo, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
+      if (objects_.Find({pdo, 0})->value != 0) return SdoAbort::kSubindexNotWritable;
       return CheckMapping(mapping, mappable);
     });
   }
+}
+
+void EmulatedSlave::AddOwnPdos(uint16_t assign,
+                               const google::protobuf::RepeatedPtrField<MappedObject>& objects,
+                               uint8_t mappable) {
+  std::vector<uint16_t> pdos;
+  std::vector<uint32_t> mappings;
+  uint16_t pdo = assign == object::kRxAssign ? kRxFixed : kTxFixed;
+  const auto finish = [&] {
+    if (mappings.empty()) return;
+    pdos.push_back(pdo);
+    AddFixedPdo(pdo, mappings);
+    mappings.clear();
+  };
+  for (const MappedObject& mapped : objects) {
+    const auto own = mapped.has_pdo() ? static_cast<uint16_t>(mapped.pdo()) : pdo;
+    if (own != pdo) finish();
+    pdo = own;
+    mappings.push_back(mapped.index() << 16 | mapped.subindex() << 8 | mapped.bits());
+    const ObjectAddress address{static_cast<uint16_t>(mapped.index()),
+                                static_cast<uint8_t>(mapped.subindex())};
+    if (address.index == 0 || objects_.Find(address) != nullptr) continue;
+    objects_.Add(address, static_cast<uint8_t>(std::min(4U, (mapped.bits() + 7) / 8)), mappable);
+  }
+  finish();
+  AddAssignment(assign, pdos, pdos);
 }
 
 SdoAbort EmulatedSlave::CheckMapping(uint32_t mapping, uint8_t mappable) const {
@@ -128,29 +228,34 @@ SdoAbort EmulatedSlave::CheckMapping(uint32_t mapping, uint8_t mappable) const {
   return fits ? SdoAbort::kNone : SdoAbort::kNotMappable;
 }
 
-std::vector<EmulatedSlave::Object*> EmulatedSlave::Mapped(uint16_t assign) {
-  std::vector<Object*> mapped;
-  if (objects_.Find({assign, 0})->value == 0) return mapped;
-  const auto pdo = static_cast<uint16_t>(objects_.Find({assign, 1})->value);
-  const uint32_t count = objects_.Find({pdo, 0})->value;
-  for (uint32_t i = 1; i <= count; ++i) {
-    const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
-    mapped.push_back(
-        objects_.Find({static_cast<uint16_t>(mapping >> 16), static_cast<uint8_t>(mapping >> 8)}));
+EmulatedSlave::ProcessData EmulatedSlave::FindMapped(uint16_t assign) {
+  ProcessData data;
+  const uint32_t pdos = objects_.Find({assign, 0})->value;
+  for (uint32_t p = 1; p <= pdos; ++p) {
+    const auto pdo = static_cast<uint16_t>(objects_.Find({assign, static_cast<uint8_t>(p)})->value);
+    const Object* count = objects_.Find({pdo, 0});
+    for (uint32_t i = 1; count != nullptr && i <= count->value; ++i) {
+      const uint32_t mapping = objects_.Find({pdo, static_cast<uint8_t>(i)})->value;
+      const size_t bits = mapping & 0xFF;
+      data.entries.push_back({objects_.Find({static_cast<uint16_t>(mapping >> 16),
+                                             static_cast<uint8_t>(mapping >> 8)}),
+                              data.bits, bits});
+      data.bits += bits;
+    }
   }
-  return mapped;
-}
-
-size_t EmulatedSlave::Size(const std::vector<Object*>& mapped) {
-  size_t size = 0;
-  for (const Object* object : mapped) size += object->size;
-  return size;
+  return data;
 }
 
 void EmulatedSlave::AdvanceTo(int64_t now) {
   now_ = std::max(now, now_);
   esc_.AdvanceTo(now_);
-  if (const std::optional<uint16_t> control = esc_.TakeAlControl()) HandleAlControl(*control);
+  if (esc_.al_control_pending()) {
+    if (!control_seen_at_) control_seen_at_ = now_;
+    if (now_ - *control_seen_at_ >= Nanoseconds(config_.al_response_time())) {
+      control_seen_at_.reset();
+      HandleAlControl(*esc_.TakeAlControl());
+    }
+  }
   if (esc_.TakeOutputsWritten()) outputs_seen_ = outputs_pending_ = true;
   const bool sync0 = esc_.TakeSync0();
   sync0_seen_ = sync0_seen_ || sync0;
@@ -159,19 +264,24 @@ void EmulatedSlave::AdvanceTo(int64_t now) {
     Enter(AlState::kSafeOp);
     Fail(AlStatusCode::kSyncManagerWatchdog);
     // The application stops taking outputs: the working counter shows it.
-    esc_.SetSyncManagerDisabled(kProcessOut, true);
+    esc_.SetSyncManagerDisabled(output_manager_, true);
   }
   if (outputs_pending_ && (sync0 || !esc_.sync0_enabled())) {
     outputs_pending_ = false;
     if (state_ == AlState::kOp) ApplyOutputs();
   }
-  drive_.AdvanceTo(now_, state_ == AlState::kOp);
+  if (!config_.other()) drive_.AdvanceTo(now_, state_ == AlState::kOp);
   AnswerMailbox();
   UpdateInputs();
 }
 
 void EmulatedSlave::HandleAlControl(uint16_t control) {
   const auto wanted = static_cast<AlState>(control & kAlStateMask);
+  if ((control & kAlIdentification) != 0 && config_.has_identification() && !error_) {
+    esc_.SetAlStatus(static_cast<uint8_t>(state_) | kAlIdentification,
+                     static_cast<AlStatusCode>(config_.identification()));
+    return;
+  }
   if (error_) {
     if ((control & kAlError) == 0) return;  // an error has to be acknowledged first
     error_ = false;
@@ -192,7 +302,7 @@ void EmulatedSlave::HandleAlControl(uint16_t control) {
     requested_ = wanted;
     requested_at_ = now_;
     if (wanted == AlState::kOp) {
-      esc_.SetSyncManagerDisabled(kProcessOut, false);
+      esc_.SetSyncManagerDisabled(output_manager_, false);
       esc_.RestartWatchdog();
       outputs_seen_ = sync0_seen_ = false;
     }
@@ -210,16 +320,18 @@ AlStatusCode EmulatedSlave::CheckTransition(AlState state) {
                            matches(kMailboxIn, kMailboxSize, kSmMailboxIn, kModeAndDirection) &&
                            esc_.sync_manager(kMailboxOut).start == kMailboxOutStart &&
                            esc_.sync_manager(kMailboxIn).start == kMailboxInStart;
-    if (!mailboxes) return AlStatusCode::kInvalidMailboxConfiguration;
+    if (config_.mailbox() && !mailboxes) return AlStatusCode::kInvalidMailboxConfiguration;
   } else if (state == AlState::kSafeOp) {
-    outputs_ = Mapped(object::kRxAssign);
-    inputs_ = Mapped(object::kTxAssign);
-    if (!matches(kProcessOut, Size(outputs_), kSmProcessOut, kModeAndDirection) ||
-        esc_.sync_manager(kProcessOut).start != kOutputsStart) {
+    outputs_ = FindMapped(object::kRxAssign);
+    inputs_ = FindMapped(object::kTxAssign);
+    if (outputs_.bits > 0 &&
+        (!matches(output_manager_, outputs_.size(), kSmProcessOut, kModeAndDirection) ||
+         esc_.sync_manager(output_manager_).start != kOutputsStart)) {
       return AlStatusCode::kInvalidOutputConfiguration;
     }
-    if (!matches(kProcessIn, Size(inputs_), kSmProcessIn, kModeAndDirection) ||
-        esc_.sync_manager(kProcessIn).start != kInputsStart) {
+    if (inputs_.bits > 0 &&
+        (!matches(input_manager_, inputs_.size(), kSmProcessIn, kModeAndDirection) ||
+         esc_.sync_manager(input_manager_).start != kInputsStart)) {
       return AlStatusCode::kInvalidInputConfiguration;
     }
     if (esc_.sync0_enabled() && esc_.sync0_cycle() == 0) return AlStatusCode::kInvalidSync0Cycle;
@@ -233,9 +345,14 @@ void EmulatedSlave::Enter(AlState state) {
   esc_.SetAlStatus(static_cast<uint8_t>(state), AlStatusCode::kNone);
   if (state != AlState::kOp) esc_.RestartWatchdog();
   if (Rank(state) < Rank(AlState::kPreOp)) {
+    // What was under way in the mailbox is gone, an emergency that nobody has read included.
     request_.reset();
     request_counter_ = 0;
     last_reply_.clear();
+    coe_.Reset();
+    emergencies_.clear();
+    esc_.ClearMailboxes();
+    static_cast<void>(drive_.TakeEmergency());
   }
 }
 
@@ -250,7 +367,7 @@ void EmulatedSlave::FinishTransition() {
   if (*requested_ == AlState::kOp) {
     // Into OP only with outputs to follow and, if it is to be used, with SYNC0.
     const bool synced = sync0_seen_ || !esc_.sync0_enabled();
-    if (!outputs_seen_ || !synced) {
+    if ((outputs_.bits > 0 && !outputs_seen_) || !synced) {
       if (now_ - requested_at_ > Nanoseconds(config_.output_timeout())) {
         Fail(outputs_seen_ ? AlStatusCode::kNoSync : AlStatusCode::kSyncManagerWatchdog);
       }
@@ -261,7 +378,7 @@ void EmulatedSlave::FinishTransition() {
 }
 
 void EmulatedSlave::AnswerMailbox() {
-  if (Rank(state_) < Rank(AlState::kPreOp)) return;
+  if (!config_.mailbox() || Rank(state_) < Rank(AlState::kPreOp)) return;
   if (esc_.TakeRepeatRequest()) {
     const std::span<uint8_t> mailbox = esc_.BeginMailboxReply();
     if (mailbox.size() >= last_reply_.size() && !last_reply_.empty()) {
@@ -271,71 +388,76 @@ void EmulatedSlave::AnswerMailbox() {
     esc_.AcknowledgeRepeat();
   }
   if (const std::optional<uint16_t> code = drive_.TakeEmergency()) {
-    if (const std::span<uint8_t> mailbox = esc_.BeginMailboxReply(); !mailbox.empty()) {
-      reply_counter_ = NextMailboxCounter(reply_counter_);
-      EncodeEmergency({.code = *code, .error_register = 1}, reply_counter_, mailbox);
-      last_reply_.assign(mailbox.begin(), mailbox.end());
-      esc_.EndMailboxReply();
-    }
+    emergencies_.push_back({.code = *code, .error_register = 1});
   }
   if (!request_) {
     const std::span<const uint8_t> bytes = esc_.TakeMailbox();
     const std::optional<MailboxMessage> message = DecodeMailbox(bytes);
-    if (!message) return;
-    if (message->counter != 0 && message->counter == request_counter_) return;  // repeated
-    request_counter_ = message->counter;
-    if (message->type != MailboxType::kCoe) return;
-    const std::optional<CoeMessage> coe = DecodeCoe(message->payload);
-    if (!coe || coe->service != CoeService::kSdoRequest) return;
-    request_ = coe->sdo;
-    reply_at_ = now_ + Nanoseconds(config_.mailbox_time() * 1e-3);
+    const bool repeated = message && message->counter != 0 && message->counter == request_counter_;
+    if (message && !repeated) {
+      request_counter_ = message->counter;
+      reply_at_ = now_ + Nanoseconds(config_.mailbox_time() * 1e-3);
+      if (message->type == MailboxType::kCoe) {
+        request_.emplace(message->payload.begin(), message->payload.end());
+      } else {
+        std::vector<uint8_t> error(kMailboxHeader + 4);
+        EncodeMailboxError(MailboxError::kUnsupportedProtocol, 0, error);
+        SendMailbox(error);
+      }
+    }
   }
-  if (now_ >= reply_at_) Reply(*request_);
+  if (request_ && now_ >= reply_at_) {
+    coe_.Handle(*request_);
+    request_.reset();
+  }
+  if (!emergencies_.empty()) {
+    std::vector<uint8_t> message(kSdoMessage);
+    EncodeEmergency(emergencies_.front(), 0, message);
+    if (esc_.BeginMailboxReply().empty()) return;
+    emergencies_.pop_front();
+    SendMailbox(message);
+  } else if (coe_.has_answer() && !esc_.BeginMailboxReply().empty()) {
+    SendMailbox(coe_.TakeAnswer());
+  }
 }
 
-void EmulatedSlave::Reply(const Sdo& sdo) {
+void EmulatedSlave::SendMailbox(const std::vector<uint8_t>& message) {
   const std::span<uint8_t> mailbox = esc_.BeginMailboxReply();
-  if (mailbox.empty()) return;  // the master has not yet read the last answer
-  Sdo answer{.object = sdo.object};
-  auto abort = SdoAbort::kUnknownCommand;
-  if (sdo.command == SdoCommand::kUploadRequest) {
-    answer.command = SdoCommand::kUploadResponse;
-    abort = objects_.Read(sdo.object, &answer.value, &answer.size);
-  } else if (sdo.command == SdoCommand::kDownloadRequest) {
-    answer.command = SdoCommand::kDownloadResponse;
-    abort = objects_.Write(sdo.object, sdo.value, sdo.size);
-  }
-  if (abort != SdoAbort::kNone) {
-    answer = {.command = SdoCommand::kAbort,
-              .object = sdo.object,
-              .value = static_cast<uint32_t>(abort),
-              .size = 4};
-  }
-  request_.reset();
+  if (mailbox.size() < message.size()) return;  // the master has not yet read the one before
+  std::fill(mailbox.begin(), mailbox.end(), uint8_t{0});
+  std::copy(message.begin(), message.end(), mailbox.begin());
   reply_counter_ = NextMailboxCounter(reply_counter_);
-  EncodeSdo(answer, CoeService::kSdoResponse, 0, reply_counter_, mailbox);
+  mailbox[5] = static_cast<uint8_t>((mailbox[5] & 0x0F) | reply_counter_ << 4);
   last_reply_.assign(mailbox.begin(), mailbox.end());
   esc_.EndMailboxReply();
 }
 
 void EmulatedSlave::ApplyOutputs() {
   const std::span<const uint8_t> bytes = esc_.process_outputs();
-  if (bytes.size() != Size(outputs_)) return;
-  size_t offset = 0;
-  for (Object* object : outputs_) {
-    object->value = static_cast<uint32_t>(GetSized(bytes, offset, object->size));
-    offset += object->size;
+  if (bytes.size() != outputs_.size()) return;
+  for (const Mapped& mapped : outputs_.entries) {
+    if (mapped.object == nullptr) continue;
+    uint64_t value = 0;
+    for (size_t i = 0; i < mapped.bits; ++i) {
+      const size_t bit = mapped.bit + i;
+      value |= uint64_t{static_cast<uint8_t>(bytes[bit / 8] >> (bit % 8) & 1)} << i;
+    }
+    mapped.object->value = static_cast<uint32_t>(value);
   }
 }
 
 void EmulatedSlave::UpdateInputs() {
   if (Rank(state_) < Rank(AlState::kSafeOp)) return;
   const std::span<uint8_t> bytes = esc_.process_inputs();
-  if (bytes.size() != Size(inputs_)) return;
-  size_t offset = 0;
-  for (const Object* object : inputs_) {
-    PutSized(bytes, offset, object->value, object->size);
-    offset += object->size;
+  if (bytes.size() != inputs_.size()) return;
+  std::fill(bytes.begin(), bytes.end(), uint8_t{0});
+  for (const Mapped& mapped : inputs_.entries) {
+    if (mapped.object == nullptr) continue;
+    const uint64_t value = mapped.object->value;
+    for (size_t i = 0; i < mapped.bits && i < 32; ++i) {
+      const size_t bit = mapped.bit + i;
+      bytes[bit / 8] |= static_cast<uint8_t>((value >> i & 1) << (bit % 8));
+    }
   }
 }
 

@@ -1,11 +1,14 @@
-// EmulatedSlave: slave controller, AL state machine, CoE mailbox and process data of one drive.
+// EmulatedSlave: slave controller, AL state machine, CoE mailbox and process data of one drive, or
+// of another slave.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
+#include "hw_bridge/ethercat/emulator/coe_server.h"
 #include "hw_bridge/ethercat/emulator/emulated_drive.h"
 #include "hw_bridge/ethercat/emulator/emulated_esc.h"
 #include "hw_bridge/ethercat/emulator/emulator.pb.h"
@@ -15,8 +18,8 @@ namespace poise::ethercat {
 
 class EmulatedSlave {
  public:
-  /// `last`: no slave behind. `load` must outlive this.
-  EmulatedSlave(const EmulatedDriveConfig& config, bool last, MotorLoad* load);
+  /// `load` must outlive this.
+  EmulatedSlave(const EmulatedDriveConfig& config, MotorLoad* load);
   EmulatedSlave(const EmulatedSlave&) = delete;
   EmulatedSlave& operator=(const EmulatedSlave&) = delete;
 
@@ -35,14 +38,30 @@ class EmulatedSlave {
 
  private:
   using Object = ObjectDictionary::Object;
-  static constexpr uint8_t kMostMapped = 8;  // objects in a PDO
+  static constexpr uint8_t kMostMapped = 8;    // objects in a PDO
+  static constexpr uint8_t kMostAssigned = 4;  // PDOs of a sync manager
 
+  struct Mapped {
+    Object* object;  // nullptr: a gap
+    size_t bit, bits;
+  };
+  struct ProcessData {
+    std::vector<Mapped> entries;
+    size_t bits = 0;
+    size_t size() const { return (bits + 7) / 8; }
+  };
+
+  void AddCommonObjects();
   /// Objects of the PDOs and their assignment to sync managers.
-  void AddPdoObjects(uint16_t assign, uint16_t fixed_pdo, uint16_t user_pdo, uint8_t mappable,
-                     std::initializer_list<uint32_t> fixed);
+  void AddAssignment(uint16_t assign, const std::vector<uint16_t>& assigned,
+                     const std::vector<uint16_t>& allowed);
+  void AddFixedPdo(uint16_t pdo, const std::vector<uint32_t>& mappings);
+  void AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable);
+  /// PDOs as configured; objects of a slave that is no drive come with them.
+  void AddOwnPdos(uint16_t assign, const google::protobuf::RepeatedPtrField<MappedObject>& objects,
+                  uint8_t mappable);
   SdoAbort CheckMapping(uint32_t mapping, uint8_t mappable) const;
-  std::vector<Object*> Mapped(uint16_t assign);
-  static size_t Size(const std::vector<Object*>& mapped);
+  ProcessData FindMapped(uint16_t assign);
 
   void HandleAlControl(uint16_t control);
   AlStatusCode CheckTransition(AlState state);
@@ -50,14 +69,16 @@ class EmulatedSlave {
   void Fail(AlStatusCode code);
   void FinishTransition();
   void AnswerMailbox();
-  void Reply(const Sdo& sdo);
+  void SendMailbox(const std::vector<uint8_t>& message);
   void ApplyOutputs();
   void UpdateInputs();
 
   EmulatedDriveConfig config_;
-  ObjectDictionary objects_;
+  ObjectDictionary objects_, unused_;  // unused: of the drive in a slave that is none
   EmulatedEsc esc_;
   EmulatedDrive drive_;
+  CoeServer coe_;
+  int output_manager_ = kProcessOut, input_manager_ = kProcessIn;
   int64_t now_ = 0;
 
   AlState state_ = AlState::kInit;
@@ -65,13 +86,15 @@ class EmulatedSlave {
   std::optional<AlState> requested_;  // a way up, to be finished
   int64_t requested_at_ = 0;          // ns
   bool outputs_seen_ = false, sync0_seen_ = false;
+  std::optional<int64_t> control_seen_at_;  // ns, of AL control that is not yet looked at
 
-  std::vector<Object*> outputs_, inputs_;  // as mapped when SAFE-OP was entered
-  bool outputs_pending_ = false;           // written, to be applied at SYNC0
+  ProcessData outputs_, inputs_;  // as mapped when SAFE-OP was entered
+  bool outputs_pending_ = false;  // written, to be applied at SYNC0
 
-  std::optional<Sdo> request_;  // answered at reply_at_
+  std::optional<std::vector<uint8_t>> request_;  // a CoE payload, answered at reply_at_
   int64_t reply_at_ = 0;
   uint8_t request_counter_ = 0, reply_counter_ = 0;
+  std::deque<Emergency> emergencies_;
   std::vector<uint8_t> last_reply_;
   bool silent_ = false;
 };

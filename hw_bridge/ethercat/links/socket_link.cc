@@ -137,8 +137,8 @@ RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
   if (ioctl(socket_, SIOCGIFHWADDR, &request) != 0) fail(std::strerror(errno));
   std::fill_n(out_.begin(), 6, uint8_t{0xFF});  // to all
   std::memcpy(&out_[6], request.ifr_hwaddr.sa_data, 6);
-  out_[6] = static_cast<uint8_t>(side == Side::kSlaves ? out_[6] | kLocallyAdministered
-                                                       : out_[6] & ~kLocallyAdministered);
+  // A master's own frames must not look as if they had passed a slave.
+  if (side == Side::kMaster) out_[6] &= static_cast<uint8_t>(~kLocallyAdministered);
   out_[12] = kEtherType >> 8;
   out_[13] = kEtherType & 0xFF;
 }
@@ -167,7 +167,11 @@ size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
     if (received <= static_cast<ssize_t>(kEthernetHeader)) continue;
     if (from.sll_pkttype == PACKET_OUTGOING) continue;
     const bool passed_a_slave = (in_[6] & kLocallyAdministered) != 0;
-    if (passed_a_slave != (side_ == Side::kMaster)) continue;
+    if (side_ == Side::kMaster && !passed_a_slave) continue;
+    if (side_ == Side::kSlaves) {
+      std::copy_n(in_.begin(), 12, out_.begin());
+      out_[6] |= kLocallyAdministered;
+    }
     const size_t size = std::min(static_cast<size_t>(received) - kEthernetHeader, frame.size());
     std::copy_n(in_.begin() + kEthernetHeader, size, frame.begin());
     return size;

@@ -58,8 +58,9 @@ class UdpLink final : public SocketLink {
 /// Ethernet frames of type 0x88A4 on one network interface (AF_PACKET; needs CAP_NET_RAW).
 class RawLink final : public SocketLink {
  public:
-  /// A slave's side sets the locally administered bit of the source address, as an ESC does to the
-  /// frames that pass it; a master's side takes only such frames when `master` is true.
+  /// A slave's side gives frames back with the addresses they came with, the locally administered
+  /// bit of the source set, as an ESC does to the frames that pass it (whether it was set before or
+  /// not); a master's side takes only such frames.
   enum class Side { kMaster, kSlaves };
   /// Throws EthercatError: no such interface, interface down, no privilege.
   RawLink(const std::string& interface, Side side);

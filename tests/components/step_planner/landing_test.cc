@@ -21,7 +21,7 @@ TEST(TouchDetector, CountsALoadThatLasts) {
   int tick = 0;
   const auto hold = [&](double load, int ticks) {
     bool touching = false;
-    for (int i = 0; i < ticks; ++i) touching = touch.Update(kTick * tick++, load);
+    for (int i = 0; i < ticks; ++i) touching = touch.Update(kTick * tick++, load, LoadLevels(config, 0));
     return touching;
   };
   // 0.02 s are ten periods: eleven readings.
@@ -41,12 +41,12 @@ TEST(TouchDetector, TimeIsThatOfTheTicks) {
   ContactConfirmation config;
   config.set_touch_duration(0.1);
   TouchDetector touch(config);
-  EXPECT_FALSE(touch.Update(7.00, 20));
-  EXPECT_FALSE(touch.Update(7.09, 20));
-  EXPECT_TRUE(touch.Update(7.10, 20));
+  EXPECT_FALSE(touch.Update(7.00, 20, LoadLevels(config, 0)));
+  EXPECT_FALSE(touch.Update(7.09, 20, LoadLevels(config, 0)));
+  EXPECT_TRUE(touch.Update(7.10, 20, LoadLevels(config, 0)));
   config.set_touch_duration(0);
   TouchDetector at_once(config);
-  EXPECT_TRUE(at_once.Update(3, 10.1));
+  EXPECT_TRUE(at_once.Update(3, 10.1, LoadLevels(config, 0)));
 }
 
 // z of a foot of mass m that the task accelerates with f* against Coulomb friction and a surface of

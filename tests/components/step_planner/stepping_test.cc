@@ -139,26 +139,6 @@ TEST(Swing, TheTurnEndsLevel) {
   }
 }
 
-TEST(Reach, ClipsAsEachPointSays) {
-  std::mt19937 random{TestSeed(162)};
-  std::uniform_real_distribution<double> any(-1, 1);
-  for (int trial = 0; trial < 50; ++trial) {
-    std::array<Vector2d, 8> points;
-    for (Vector2d& point : points) point = {any(random), any(random)};
-    const balance::ConvexPolygon hull = balance::ConvexHull(points);
-    const Vector2d normal = Vector2d(any(random), any(random)).normalized();
-    const double offset = 0.5 * any(random);
-    const balance::ConvexPolygon part = Clip(hull, normal, offset);
-    for (int i = 0; i < 100; ++i) {
-      const Vector2d point(any(random), any(random));
-      const double inside =
-          std::min(balance::SignedDistance(hull, point), normal.dot(point) - offset);
-      if (std::abs(inside) < 1e-6) continue;
-      EXPECT_EQ(part.num_corners > 2 && balance::SignedDistance(part, point) > 0, inside > 0);
-    }
-  }
-}
-
 class ReachCase : public testing::TestWithParam<TestRobot> {
  protected:
   robot::RobotModel model_ = robot::LoadTestRobot(GetParam());

@@ -1,59 +1,9 @@
 // The emulated chain by hand-made frames: addresses, working counters, registers, EEPROM,
 // mailboxes.
-#include <gtest/gtest.h>
-
-#include "hw_bridge/ethercat/bytes.h"
-#include "tests/hw_bridge/ethercat/chain_fixture.h"
+#include "tests/hw_bridge/ethercat/raw_chain.h"
 
 namespace poise::ethercat {
 namespace {
-
-struct Answer {
-  uint16_t adp = 0, working_counter = 0;
-  std::vector<uint8_t> data;
-  template <class T>
-  T As() const {
-    return Get<T>(data, 0);
-  }
-};
-
-class EthercatChain : public ::testing::Test {
- protected:
-  EthercatChain() : bench_(3) { bench_.Build(); }
-
-  Answer Do(Command command, uint16_t adp, uint16_t ado, std::vector<uint8_t> data) {
-    FrameBuilder builder;
-    builder.Add(command, 7, adp, ado, data);
-    std::vector<uint8_t> bytes(builder.bytes().begin(), builder.bytes().end());
-    now_ += kMillisecond;
-    EXPECT_TRUE(bench_.chain->HandleFrame(bytes, now_));
-    FrameReader reader(bytes);
-    const Datagram back = *reader.Next();
-    EXPECT_EQ(back.index, 7);
-    return {back.adp, back.working_counter, {back.data.begin(), back.data.end()}};
-  }
-  Answer Read(Command command, uint16_t adp, uint16_t ado, size_t size) {
-    return Do(command, adp, ado, std::vector<uint8_t>(size, 0));
-  }
-  void AddressAll() {
-    for (int i = 0; i < 3; ++i) {
-      Do(Command::kApwr, AutoIncrementAddress(i), reg::kStationAddress,
-         {static_cast<uint8_t>(0xE9 + i), 0x03});
-    }
-  }
-  Answer Wait(int64_t time) {
-    now_ += time;
-    bench_.chain->AdvanceTo(now_);
-    return Read(Command::kFprd, 1001, reg::kAlStatus, 6);
-  }
-  void SetUpMailbox() {
-    Do(Command::kFpwr, 1001, 0x0800, {0x00, 0x10, 0x80, 0x00, 0x26, 0x00, 0x01, 0x00});
-    Do(Command::kFpwr, 1001, 0x0808, {0x80, 0x10, 0x80, 0x00, 0x22, 0x00, 0x01, 0x00});
-  }
-
-  Bench bench_;
-  int64_t now_ = 0;
-};
 
 TEST_F(EthercatChain, CountsSlavesByBroadcast) {
   const Answer answer = Read(Command::kBrd, 0, reg::kAlStatus, 2);
@@ -193,8 +143,7 @@ TEST_F(EthercatChain, MailboxTakesOneMessageAtATimeAndKeepsItsAnswer) {
   Do(Command::kFpwr, 1001, reg::kAlControl, {2, 0});
   ASSERT_EQ(Wait(20 * kMillisecond).data[0], 2);
   std::vector<uint8_t> request(128, 0);
-  EncodeSdo({.command = SdoCommand::kUploadRequest, .object = {0x6076, 0}}, CoeService::kSdoRequest,
-            0, 1, request);
+  EncodeSdo({.command = SdoCommand::kUploadRequest, .object = {0x6076, 0}}, 0, 1, request);
   EXPECT_EQ(Do(Command::kFpwr, 1001, 0x1001, request).working_counter, 0);  // not at its start
   EXPECT_EQ(Read(Command::kFprd, 1001, 0x1000, 128).working_counter, 0);    // wrong direction
   EXPECT_EQ(Read(Command::kFprd, 1001, 0x1080, 128).working_counter, 0);    // empty

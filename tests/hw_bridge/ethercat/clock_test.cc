@@ -12,16 +12,6 @@
 namespace poise::ethercat {
 namespace {
 
-TEST(DistributedClocks, DelaysAreHalfTheRoundTripsDifference) {
-  // Three slaves in a line, cables of 100 and 250 ns, seen by clocks that differ at will; the first
-  // wraps around between its two ports.
-  const uint32_t a = 0xFFFFFF00, b = 1000, c = 7;
-  const std::vector<DcTimes> times = {{.port0 = a, .port1 = a + 700, .last = false, .unit = 0},
-                                      {.port0 = b, .port1 = b + 500, .last = false, .unit = 0},
-                                      {.port0 = c, .port1 = 0, .last = true, .unit = 0}};
-  EXPECT_EQ(PropagationDelays(times), (std::vector<int32_t>{0, 100, 350}));
-}
-
 TEST(DistributedClocks, DifferenceRegisterIsSignAndMagnitude) {
   EXPECT_EQ(DcDifference(25), 25);
   EXPECT_EQ(DcDifference(0x80000000U | 25), -25);

@@ -63,6 +63,7 @@ class EthercatBus : public ::testing::Test {
       drive.set_joint(Model().joints()[static_cast<size_t>(kDrives - 1 - i)].name);
       bench_.chain_config.add_drive();
     }
+    config_.set_attend(false);  // the tests count frames and look at their bytes
     command_.num_motors = kDrives;
     command_.current.assign(kDrives, 0);
     command_.enabled.assign(kDrives, 0);

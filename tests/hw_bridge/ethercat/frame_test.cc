@@ -121,27 +121,31 @@ TEST(EthercatMailbox, ReadsWhatAnotherMastersSlaveAnswered) {
   EXPECT_EQ(sdo.size, 4);
   EXPECT_EQ(sdo.value, 0x001E82EAU);
 
-  // A normal transfer of 254 bytes, which is none of ours.
+  // A normal transfer: 240 bytes of an object of 2,048, the rest in segments.
   Bytes normal = {0xfa, 0x00, 0xe9, 0x03, 0x00, 0x33, 0x00, 0x30,
                   0x41, 0x01, 0xfe, 0x00, 0x00, 0x08, 0x00, 0x00};
   normal.resize(256, 0);
-  EXPECT_EQ(DecodeCoe(DecodeMailbox(normal)->payload)->sdo.command, SdoCommand::kOther);
+  const Sdo first = DecodeCoe(DecodeMailbox(normal)->payload)->sdo;
+  EXPECT_EQ(first.command, SdoCommand::kUploadResponse);
+  EXPECT_EQ(first.size, 0);
+  EXPECT_EQ(first.total, 2048U);
+  EXPECT_EQ(first.data.size(), 240U);
 }
 
 TEST(EthercatMailbox, WritesSdosAsCanopenLaysThemOut) {
   Bytes mailbox(kSdoMessage + 2, 0xEE);
   // CiA 301: 23h is an expedited download of 4 bytes, 2Fh of one; 40h an upload, 80h an abort.
   EncodeSdo({.command = SdoCommand::kDownloadRequest, .object = {0x1C12, 0}, .value = 1, .size = 1},
-            CoeService::kSdoRequest, 0, 3, mailbox);
+            0, 3, mailbox);
   EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0x00, 0x00, 0x00, 0x33, 0x00, 0x20, 0x2f, 0x12,
                                          0x1c, 0x00, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00}));
-  EncodeSdo({.command = SdoCommand::kUploadRequest, .object = {0xF980, 2}}, CoeService::kSdoRequest,
-            1001, 0, mailbox);
+  EncodeSdo({.command = SdoCommand::kUploadRequest, .object = {0xF980, 2}}, 1001, 0, mailbox);
   EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0xe9, 0x03, 0x00, 0x03, 0x00, 0x20, 0x40, 0x80,
                                          0xf9, 0x02, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00}));
+  // An abort is an SDO request (service 2), whoever sends it (ETG.1000.6, abort SDO transfer).
   EncodeSdo({.command = SdoCommand::kAbort, .object = {0x6076, 0}, .value = 0x06010002, .size = 4},
-            CoeService::kSdoResponse, 0, 7, mailbox);
-  EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0x00, 0x00, 0x00, 0x73, 0x00, 0x30, 0x80, 0x76,
+            0, 7, mailbox);
+  EXPECT_THAT(mailbox, ElementsAreArray({0x0a, 0x00, 0x00, 0x00, 0x00, 0x73, 0x00, 0x20, 0x80, 0x76,
                                          0x60, 0x00, 0x02, 0x00, 0x01, 0x06, 0x00, 0x00}));
 }
 

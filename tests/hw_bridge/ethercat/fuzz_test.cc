@@ -214,5 +214,131 @@ TEST(EthercatFuzz, StartUpEndsWithAnErrorOrWithDrives) {
   EXPECT_GT(refused, 0);
 }
 
+/// A mailbox message of any kind with some of its bytes changed, or any bytes.
+Bytes HostileMailbox(Random& random) {
+  constexpr uint16_t kIndices[] = {0x1000, 0x1008, 0x1018, 0x1600, 0x1607, 0x1C12,
+                                   0x2F00, 0x6040, 0x6071, 0x6072, 0x6076, 0xFFFF};
+  constexpr SdoCommand kCommands[] = {SdoCommand::kUploadRequest,
+                                      SdoCommand::kDownloadRequest,
+                                      SdoCommand::kUploadSegmentRequest,
+                                      SdoCommand::kDownloadSegmentRequest,
+                                      SdoCommand::kUploadResponse,
+                                      SdoCommand::kUploadSegmentResponse,
+                                      SdoCommand::kDownloadResponse,
+                                      SdoCommand::kDownloadSegmentResponse,
+                                      SdoCommand::kAbort};
+  Bytes message(128, 0);
+  Bytes data(Below(100, random));
+  for (uint8_t& byte : data) byte = static_cast<uint8_t>(random());
+  if (random() % 4 == 0) {
+    EncodeSdoInfo({.opcode = static_cast<InfoOpcode>(random() % 9),
+                   .incomplete = random() % 4 == 0,
+                   .fragments_left = static_cast<uint16_t>(random() % 4),
+                   .data = data},
+                  static_cast<uint8_t>(random() % 8), message);
+  } else {
+    const Sdo sdo{.command = kCommands[Below(std::size(kCommands), random)],
+                  .object = {kIndices[Below(std::size(kIndices), random)],
+                             static_cast<uint8_t>(random() % 5)},
+                  .complete = random() % 3 == 0,
+                  .value = static_cast<uint32_t>(random()),
+                  .size = static_cast<uint8_t>(random() % 5),
+                  .total = static_cast<uint32_t>(random() % 8 == 0 ? random() : random() % 600),
+                  .toggle = random() % 2 == 0,
+                  .last = random() % 2 == 0,
+                  .data = data};
+    if (EncodedSize(sdo) <= message.size()) {
+      EncodeSdo(sdo, 0, static_cast<uint8_t>(random() % 8), message);
+    }
+  }
+  if (random() % 2 == 0) {
+    for (size_t i = 0, n = 1 + Below(6, random); i < n; ++i) {
+      message[Below(random() % 2 == 0 ? 16 : message.size(), random)] =
+          static_cast<uint8_t>(random());
+    }
+  }
+  return message;
+}
+
+TEST(EthercatFuzz, SlavesSurviveHostileMailboxes) {
+  Bench bench(1);
+  bench.master_config.set_drift_frames(5);
+  bench.Start();
+  bench.SetTorque(900, 1000);
+  bench.Drive(DriveGoal::kEnabled, 20);
+  EmulatedEsc& esc = bench.chain->slave(0).esc();
+  Random random(TestSeed(14));
+  std::array<uint8_t, 128> answer{};
+  int64_t taken = 0, answered = 0;
+  for (int64_t i = 0, count = NumFrames(); i < count; ++i) {
+    const Bytes message = HostileMailbox(random);
+    taken += esc.Write(0x1000, message, bench.link->Now()) ? 1 : 0;
+    bench.Cycle();
+    // A master that reads now and then.
+    if (random() % 4 != 0) answered += esc.Read(0x1080, answer, bench.link->Now()) ? 1 : 0;
+    ExpectWithinLimits(bench);
+  }
+  EXPECT_GT(taken, NumFrames() / 4);
+  EXPECT_GT(answered, NumFrames() / 8);
+  EXPECT_TRUE(bench.Cycle().complete);
+}
+
+/// A slave's mailbox whose answers are anything.
+class HostileMailboxLink final : public Link {
+ public:
+  HostileMailboxLink(Link* link, Random* random) : link_(link), random_(random) {}
+  int64_t Now() const override { return link_->Now(); }
+  bool Send(std::span<const uint8_t> frame) override { return link_->Send(frame); }
+  size_t Receive(std::span<uint8_t> frame, int64_t deadline) override {
+    const size_t size = link_->Receive(frame, deadline);
+    const auto datagram = FrameReader(frame.first(size)).Next();
+    if (!datagram || datagram->ado != 0x1080 || datagram->data.size() != 128) return size;
+    const Bytes message = HostileMailbox(*random_);
+    const auto at = static_cast<std::ptrdiff_t>(datagram->offset + kDatagramHeader);
+    std::copy(message.begin(), message.end(), frame.begin() + at);
+    frame[static_cast<size_t>(at) + message.size()] = 1;  // working counter
+    ++hostile;
+    return size;
+  }
+  int64_t hostile = 0;
+
+ private:
+  Link* link_;
+  Random* random_;
+};
+
+TEST(EthercatFuzz, MasterSurvivesHostileMailboxes) {
+  Bench bench(1);
+  bench.Start();
+  Random random(TestSeed(15));
+  HostileMailboxLink hostile(bench.link.get(), &random);
+  Transactions transactions(&hostile, kMillisecond, 2);
+  SlaveAccess slave = bench.master->slave(0).Through(&transactions);
+  const Bytes data(300, 7);
+  int64_t errors = 0;
+  while (hostile.hostile < NumFrames()) {
+    const std::string error = ErrorOf([&] {
+      switch (random() % 5) {
+        case 0:
+          slave.UploadBytes({0x1018, 0}, true);
+          break;
+        case 1:
+          slave.DownloadBytes({0x2F00, 0}, data);
+          break;
+        case 2:
+          slave.ListObjects();
+          break;
+        case 3:
+          slave.DescribeEntry({0x6071, 0});
+          break;
+        default:
+          slave.UploadBytes({0x1008, 0});
+      }
+    });
+    errors += error.empty() ? 0 : 1;
+  }
+  EXPECT_GT(errors, 0);
+}
+
 }  // namespace
 }  // namespace poise::ethercat

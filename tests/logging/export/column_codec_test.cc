@@ -67,6 +67,30 @@ double RoundTripError(const std::vector<double>& values, bool integer = false) {
   return error;
 }
 
+TEST(ColumnCodec, ABoundIsNeverInsideOfWhatItBounds) {
+  std::mt19937 random(TestSeed(2));
+  for (int trial = 0; trial < 40; ++trial) {
+    std::normal_distribution<double> noise(std::exp2(trial - 20), std::exp2(0.7 * trial - 15));
+    std::vector<double> values(400);
+    for (double& x : values) x = noise(random);
+    values[7] = kNaN;
+    values[9] *= 1e3;  // an outlier
+    const PackedColumn low = PackBound(values, Bound::kLeast, false);
+    const PackedColumn high = PackBound(values, Bound::kLargest, false);
+    const std::vector<double> least = Unpack(low, values.size());
+    const std::vector<double> largest = Unpack(high, values.size());
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (i == 7) {
+        EXPECT_TRUE(std::isnan(least[i]) && std::isnan(largest[i]));
+        continue;
+      }
+      EXPECT_LE(least[i], values[i]);
+      EXPECT_GE(largest[i], values[i]);
+      EXPECT_LE(largest[i] - least[i], low.step + high.step);
+    }
+  }
+}
+
 TEST(ColumnCodec, KeepsAMillionthOfTheSpan) {
   std::mt19937 random(TestSeed(1));
   std::normal_distribution<double> noise(0, 0.01);

@@ -1,0 +1,52 @@
+#include "components/balance/gains/gain_rule.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "components/robot/posture.h"
+
+namespace poise::balance {
+namespace {
+
+constexpr double kStiffness = 2.75;     // times ω: stiffer than the fall that it stops
+constexpr double kDamping = 0.7;        // of the COM and the body
+constexpr double kPhase = 1.0 / 3;      // rad at k_d that the loop's delay may cost
+constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
+constexpr double kVelocityCutoff = 20;  // Hz
+
+}  // namespace
+
+double PendulumFrequency(const robot::RobotModel& model) {
+  return std::sqrt(robot::kGravity / robot::StandingHeight(model));
+}
+
+double LoopDelay(const robot::RobotModel& model, double velocity_cutoff, double period) {
+  const robot::DriveTrainModel& drive = model.drive_train();
+  // A second-order Butterworth filter delays by √2/ω_c.
+  return std::numbers::sqrt2 / (2 * std::numbers::pi * velocity_cutoff) + drive.sensor_delay +
+         drive.torque_lag + 0.5 * period;
+}
+
+double LimitHorizon(const robot::RobotModel& model, double period) {
+  return kHorizon * LoopDelay(model, VelocityCutoff(model), period);
+}
+
+double VelocityCutoff(const robot::RobotModel&) { return kVelocityCutoff; }
+
+StandingGains GainsByRule(const robot::RobotModel& model, double period) {
+  StandingGains gains;
+  gains.velocity_cutoff = VelocityCutoff(model);
+  gains.base_velocity_cutoff = gains.velocity_cutoff;  // both parts of a velocity lag alike
+  const double omega = kStiffness * PendulumFrequency(model);
+  const double most = kPhase / LoopDelay(model, gains.velocity_cutoff, period);  // of k_d
+  const auto of = [&](double damping) {
+    const double frequency = std::min(omega, most / (2 * damping));
+    return TaskGains{frequency * frequency, 2 * damping * frequency};
+  };
+  gains.com = gains.orientation = of(kDamping);
+  gains.foot = gains.posture = of(1);
+  return gains;
+}
+
+}  // namespace poise::balance

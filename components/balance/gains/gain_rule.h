@@ -1,0 +1,27 @@
+// Gains that nobody sets: from the robot's mass, height, gears, delay and limits. docs/gains.md has
+// each rule with its reason, and the poles that it makes.
+#pragma once
+
+#include "components/balance/gains/closed_loop_poles.h"
+#include "components/robot/robot_model.h"
+
+namespace poise::balance {
+
+/// rad/s, √(g/h) with h the COM's height in the stance.
+double PendulumFrequency(const robot::RobotModel& model);
+
+/// Hz, of the low-pass on joint velocities.
+double VelocityCutoff(const robot::RobotModel& model);
+
+/// s, from a joint's motion to the torque that answers it: velocity filter, delay, current loop,
+/// half a tick.
+double LoopDelay(const robot::RobotModel& model, double velocity_cutoff, double period);
+
+/// s, of the joints' limits (JointLimits): an approach to a limit is a loop of first order.
+double LimitHorizon(const robot::RobotModel& model, double period);
+
+/// The rule. `period` s, of the tick. Never fails: a robot that it cannot make stable has poles
+/// that say so.
+StandingGains GainsByRule(const robot::RobotModel& model, double period);
+
+}  // namespace poise::balance

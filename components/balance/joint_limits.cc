@@ -1,0 +1,66 @@
+#include "components/balance/joint_limits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "components/robot/dynamics.h"
+
+namespace poise::balance {
+namespace {
+
+/// The largest acceleration that, held over `h`, leaves `room` (rad) above position and viable
+/// velocity: (v + h a)² ≤ 2 A (room − h v − h² a / 2) when the joint then still goes towards the
+/// limit.
+double Largest(double room, double velocity, double most_velocity, double most, double h) {
+  double a = std::min(most, (most_velocity - velocity) / h);
+  // q + h v + h² a / 2 ≤ limit
+  a = std::min(a, 2 * (room - h * velocity) / (h * h));
+  const double b = 2 * velocity / h + most;
+  const double c = (velocity * velocity - 2 * most * (room - h * velocity)) / (h * h);
+  const double discriminant = b * b - 4 * c;
+  a = std::min(a, discriminant > 0 ? 0.5 * (-b + std::sqrt(discriminant)) : -0.5 * b);
+  return std::max(a, -most);
+}
+
+}  // namespace
+
+AccelerationRange ViableAccelerations(const JointRange& range, double position, double velocity,
+                                      double horizon) {
+  AccelerationRange result;
+  result.upper =
+      Largest(range.upper - position, velocity, range.velocity, range.acceleration, horizon);
+  result.lower =
+      -Largest(position - range.lower, -velocity, range.velocity, range.acceleration, horizon);
+  if (result.lower > result.upper) {
+    // Between two limits too near to each other, or too fast for either: to rest.
+    const double stop = std::clamp(-velocity / horizon, -range.acceleration, range.acceleration);
+    result.lower = result.upper = stop;
+  }
+  return result;
+}
+
+JointLimits::JointLimits(const robot::RobotModel& model, double horizon) : horizon_(horizon) {
+  robot::RobotData data(model);
+  robot::RobotState state(model.num_joints());
+  state.joint_position = model.stance().joint_position;
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
+    const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
+    JointRange range;
+    const double reserve = std::min(kPositionReserve, 0.1 * (joint.upper - joint.lower));
+    range.lower = joint.lower + reserve;
+    range.upper = joint.upper - reserve;
+    range.velocity = joint.velocity_limit > 0 ? kVelocityShare * joint.velocity_limit
+                                              : std::numeric_limits<double>::max();
+    const double torque = std::min(joint.effort, motor.torque_per_ampere() * motor.peak_current);
+    const double most = kTorqueShare * torque / data.mass_matrix(6 + j, 6 + j);
+    range.acceleration = most > 0 && most < kHardest ? most : kHardest;
+    ranges_.push_back(range);
+  }
+}
+
+}  // namespace poise::balance

@@ -1,0 +1,74 @@
+#include "components/robot/xml_text.h"
+
+#include <fmt/format.h>
+#include <tinyxml.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "components/robot/robot_model.h"
+
+namespace poise::robot {
+namespace {
+
+// Parsers recurse over nested elements.
+constexpr int kMaxNesting = 64;
+constexpr size_t kMaxBytes = 16u << 20;
+
+// Depth of open elements, before any parser sees the text.
+int Nesting(std::string_view xml) {
+  int depth = 0, deepest = 0;
+  for (size_t i = xml.find('<'); i != std::string_view::npos; i = xml.find('<', i + 1)) {
+    const std::string_view rest = xml.substr(i + 1);
+    if (rest.starts_with("!--")) {
+      i = xml.find("-->", i);
+      if (i == std::string_view::npos) break;
+    } else if (rest.starts_with("/")) {
+      depth = std::max(0, depth - 1);
+    } else if (!rest.empty() && (std::isalpha(static_cast<unsigned char>(rest[0])) ||
+                                 rest[0] == '_' || static_cast<unsigned char>(rest[0]) >= 0x80)) {
+      const size_t end = xml.find('>', i);
+      if (end == std::string_view::npos || xml[end - 1] != '/') {
+        deepest = std::max(deepest, ++depth);
+      }
+    }
+  }
+  return deepest;
+}
+
+}  // namespace
+
+std::string OneLine(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  }
+  if (text.size() > 300) text = text.substr(0, 300) + "...";
+  return text;
+}
+
+std::string Attribute(const TiXmlElement& element, const char* name) {
+  const char* value = element.Attribute(name);
+  return value ? OneLine(value) : std::string();
+}
+
+void ParseXml(std::string_view xml, const char* format, TiXmlDocument* document) {
+  if (xml.size() > kMaxBytes) {
+    throw RobotError(fmt::format("{0} has {1} bytes, more than {2}: is it a {0}?", format,
+                                 xml.size(), kMaxBytes));
+  }
+  if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
+    throw RobotError(
+        fmt::format("{} has a NUL byte at offset {}: is it a text file?", format, nul));
+  }
+  if (Nesting(xml) > kMaxNesting) {
+    throw RobotError(fmt::format("{} nests elements more than {} deep: is an element not closed?",
+                                 format, kMaxNesting));
+  }
+  document->Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
+  if (document->Error()) {
+    throw RobotError(fmt::format("{} line {}: not XML ({}): correct the text there", format,
+                                 document->ErrorRow(), OneLine(document->ErrorDesc())));
+  }
+}
+
+}  // namespace poise::robot

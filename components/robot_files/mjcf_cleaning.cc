@@ -1,0 +1,602 @@
+#include "components/robot_files/mjcf_cleaning.h"
+
+#include <fmt/format.h>
+#include <tinyxml.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include "components/robot/robot_model.h"
+#include "components/robot/xml_text.h"
+
+namespace poise::robot {
+namespace {
+
+using Names = std::vector<std::string_view>;
+
+constexpr size_t kMaxElements = 20000;
+constexpr double kMaxNumber = 1e6;  // in any unit that the file may use: beyond it, a mistake
+
+const Names kOrientation = {"quat", "axisangle", "xyaxes", "zaxis", "euler"};
+const Names kActuators = {"general",     "motor",  "position", "velocity",
+                          "intvelocity", "damper", "cylinder"};
+
+// Numeric attributes that reach MuJoCo, by element.
+const std::map<std::string_view, Names> kNumbers = {
+    {"joint", {"axis", "pos", "range", "ref", "armature", "damping", "frictionloss"}},
+    {"geom", {"size", "pos", "fromto", "mass", "density", "contype", "conaffinity", "group"}},
+    {"site", {"pos"}},
+    {"body", {"pos"}},
+    {"inertial", {"pos"}},
+    {"actuator", {"gear", "ctrlrange", "forcerange"}},
+    {"compiler", {"inertiagrouprange"}},
+};
+// Those whose value is one of a few words.
+const std::map<std::string_view, Names> kWords = {
+    {"type",
+     {"hinge", "slide", "ball", "free", "box", "sphere", "cylinder", "capsule", "ellipsoid"}},
+    {"limited", {"true", "false", "auto"}},
+    {"ctrllimited", {"true", "false", "auto"}},
+    {"forcelimited", {"true", "false", "auto"}},
+    {"angle", {"degree", "radian"}},
+    {"inertiafromgeom", {"true", "false", "auto"}},
+    {"autolimits", {"true", "false"}},
+};
+const std::map<std::string_view, Names> kWordsOf = {
+    {"joint", {"type", "limited"}},
+    {"geom", {"type"}},
+    {"actuator", {"ctrllimited", "forcelimited"}},
+    {"compiler", {"angle", "inertiafromgeom", "autolimits"}},
+};
+
+bool Has(const Names& names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+// A class of defaults: what the reader itself must resolve.
+struct DefaultClass {
+  std::string parent;
+  std::map<std::string, std::string> joint, geom;
+};
+
+class Cleaner {
+ public:
+  Cleaner(std::vector<std::string>* warnings, CleanMjcf* result)
+      : warnings_(warnings), result_(*result) {}
+
+  void Clean(const TiXmlElement& root) {
+    if (root.ValueStr() != "mujoco") {
+      Fail(root, "<{}> is no MJCF: its outermost element must be <mujoco>", Shown(root.Value()));
+    }
+    result_.model = Attribute(root, "model");
+    Sections(root, "compiler", [&](const TiXmlElement& e) { Compiler(e); });
+    Sections(root, "asset", [&](const TiXmlElement& e) { Assets(e); });
+    std::string xml = "<mujoco><compiler autolimits='true'" + compiler_ +
+                      " balanceinertia='true' boundmass='1e-9' boundinertia='1e-12'/>"
+                      "<size njmax='1' nconmax='1'/>";
+    Sections(root, "default", [&](const TiXmlElement& e) { Defaults(e, "", &xml); });
+    const TiXmlElement& robot = RobotBody(root);
+    xml += "<worldbody>";
+    Body(robot, -1, "", &xml);
+    xml += "</worldbody><actuator>";
+    Sections(root, "actuator", [&](const TiXmlElement& e) { Actuators(e, &xml); });
+    xml += "</actuator></mujoco>";
+    result_.xml = std::move(xml);
+    Sections(root, "equality", [&](const TiXmlElement& e) { Equalities(e); });
+    Sections(root, "sensor", [&](const TiXmlElement& e) { Sensors(e); });
+    Sections(root, "keyframe", [&](const TiXmlElement& e) { Keys(e); });
+    for (const TiXmlElement* e = root.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string& name = e->ValueStr();
+      if (name == "include") Fail(*e, "<include> is not followed: give the file that it names");
+      if (name == "tendon" || name == "extension" || name == "deformable") {
+        Note(*e, "<{}> is left out", name);
+      }
+    }
+  }
+
+ private:
+  static std::string Shown(const char* text) { return OneLine(text ? text : ""); }
+
+  template <typename... Args>
+  [[noreturn]] void Fail(const TiXmlElement& at, fmt::format_string<Args...> text,
+                         Args&&... args) const {
+    throw RobotError(
+        fmt::format("MJCF line {}: {}", at.Row(), fmt::format(text, std::forward<Args>(args)...)));
+  }
+
+  template <typename... Args>
+  void Note(const TiXmlElement& at, fmt::format_string<Args...> text, Args&&... args) {
+    if (warnings_ == nullptr) return;
+    warnings_->push_back(
+        fmt::format("MJCF line {}: {}", at.Row(), fmt::format(text, std::forward<Args>(args)...)));
+  }
+
+  static void Sections(const TiXmlElement& root, const char* name,
+                       const std::function<void(const TiXmlElement&)>& read) {
+    for (const TiXmlElement* e = root.FirstChildElement(name); e; e = e->NextSiblingElement(name)) {
+      read(*e);
+    }
+  }
+
+  // The numbers of an attribute, all finite.
+  std::vector<double> Numbers(const TiXmlElement& element, std::string_view name) const {
+    std::vector<double> numbers;
+    const char* text = element.Attribute(std::string(name).c_str());
+    while (text != nullptr) {
+      while (std::isspace(static_cast<unsigned char>(*text))) ++text;
+      if (*text == '\0') break;
+      char* end = nullptr;
+      const double number = std::strtod(text, &end);
+      if (end == text || !std::isfinite(number) || std::abs(number) > kMaxNumber ||
+          (*end != '\0' && !std::isspace(static_cast<unsigned char>(*end)))) {
+        Fail(element, "{} of <{}> is '{}': numbers of at most {:g} must stand there", name,
+             Shown(element.Value()), Shown(element.Attribute(std::string(name).c_str())),
+             kMaxNumber);
+      }
+      numbers.push_back(number);
+      text = end;
+    }
+    return numbers;
+  }
+
+  template <size_t n>
+  std::array<double, n> Exactly(const TiXmlElement& element, const char* name) const {
+    const std::vector<double> numbers = Numbers(element, name);
+    if (numbers.size() != n) {
+      Fail(element, "{} of <{}> has {} numbers, it needs {}", name, Shown(element.Value()),
+           numbers.size(), n);
+    }
+    std::array<double, n> result;
+    std::ranges::copy(numbers, result.begin());
+    return result;
+  }
+
+  // What MuJoCo is to see of an element of this kind.
+  std::string Kept(const TiXmlElement& element, std::string_view kind) const {
+    std::string text;
+    const auto keep = [&](std::string_view name) {
+      const std::vector<double> numbers = Numbers(element, name);
+      if (numbers.empty()) return;
+      text += fmt::format(" {}='", name);
+      for (const double number : numbers) text += fmt::format("{:.17g} ", number);
+      text.back() = '\'';
+    };
+    for (const std::string_view name : kNumbers.at(kind)) keep(name);
+    if (kind != "joint" && kind != "actuator" && kind != "compiler") {
+      for (const std::string_view name : kOrientation) keep(name);
+    }
+    if (const auto words = kWordsOf.find(kind); words != kWordsOf.end()) {
+      for (const std::string_view name : words->second) {
+        const std::string value = Attribute(element, std::string(name).c_str());
+        if (value.empty()) continue;
+        if (!Has(kWords.at(name), value)) {
+          // Types that MuJoCo need not see are told by the reader.
+          if (kind == "geom") continue;
+          Fail(element, "{} of <{}> is '{}': it is unknown", name, Shown(element.Value()), value);
+        }
+        text += fmt::format(" {}='{}'", name, value);
+      }
+    }
+    return text;
+  }
+
+  std::string ClassAttribute(const TiXmlElement& element, const char* name) const {
+    const std::string value = Attribute(element, name);
+    if (value.empty()) return "";
+    const auto known = class_index_.find(value);
+    if (known == class_index_.end()) {
+      Fail(element, "{} '{}' of <{}> is no class of <default>", name, value,
+           Shown(element.Value()));
+    }
+    return value == main_ ? fmt::format(" {}='main'", name)
+                          : fmt::format(" {}='c{}'", name, known->second);
+  }
+
+  void Compiler(const TiXmlElement& element) {
+    compiler_ += Kept(element, "compiler");
+    if (const size_t again = compiler_.find(" autolimits="); again != std::string::npos) {
+      compiler_.erase(again, compiler_.find('\'', again + 13) + 1 - again);
+    }
+    if (Attribute(element, "coordinate") == "global") {
+      Fail(element, "coordinate='global' is not supported: save the file with local coordinates");
+    }
+    if (const std::string order = Attribute(element, "eulerseq"); !order.empty()) {
+      if (order.size() != 3 || order.find_first_not_of("xyzXYZ") != std::string::npos) {
+        Fail(element, "eulerseq is '{}': three of x, y, z, X, Y, Z must stand there", order);
+      }
+      compiler_ += fmt::format(" eulerseq='{}'", order);
+    }
+    if (const auto total = Numbers(element, "settotalmass"); !total.empty() && total[0] > 0) {
+      Fail(element, "settotalmass is not supported: write the masses themselves");
+    }
+    if (const std::string folder = Attribute(element, "meshdir"); !folder.empty()) {
+      result_.mesh_folder = folder;
+    } else if (const std::string assets = Attribute(element, "assetdir"); !assets.empty()) {
+      result_.mesh_folder = assets;
+    }
+  }
+
+  void Assets(const TiXmlElement& section) {
+    Sections(section, "mesh", [&](const TiXmlElement& mesh) {
+      const std::string file = Attribute(mesh, "file");
+      std::string name = Attribute(mesh, "name");
+      if (name.empty()) {  // the file's, without folder and ending
+        name = file.substr(file.find_last_of('/') + 1);
+        name = name.substr(0, name.rfind('.'));
+      }
+      CleanGeom& entry = meshes_[name];
+      entry.mesh = file;
+      if (mesh.Attribute("scale")) entry.scale = Exactly<3>(mesh, "scale");
+    });
+  }
+
+  void Defaults(const TiXmlElement& element, const std::string& parent, std::string* xml) {
+    std::string name = Attribute(element, "class");
+    const bool is_main = parent.empty();
+    if (name.empty() && is_main) name = "main";
+    if (name.empty()) Fail(element, "<default> within another has no class: add class=\"...\"");
+    if (is_main && main_.empty()) main_ = name;
+    if (is_main && name != main_) Fail(element, "<default> '{}' stands beside '{}'", name, main_);
+    const bool is_new = class_index_.emplace(name, class_index_.size()).second;
+    if (!is_new && !is_main) Fail(element, "class '{}' of <default> stands twice", name);
+    DefaultClass& own = classes_[name];
+    own.parent = parent;
+    // The outermost class is MuJoCo's "main".
+    *xml += is_main ? std::string("<default>")
+                    : fmt::format("<default class='c{}'>", class_index_[name]);
+    for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string& kind = e->ValueStr();
+      if (kind == "default") {
+        Defaults(*e, name, xml);
+      } else if (kind == "joint" || kind == "geom") {
+        auto& known = kind == "joint" ? own.joint : own.geom;
+        for (const TiXmlAttribute* a = e->FirstAttribute(); a; a = a->Next()) {
+          known[a->Name()] = OneLine(a->Value());
+        }
+        if (e->Attribute("actuatorfrcrange"))
+          force_range_[name] = Exactly<2>(*e, "actuatorfrcrange");
+        *xml += fmt::format("<{}{}/>", kind, Kept(*e, kind));
+      } else if (kind == "site" || Has(kActuators, kind)) {
+        *xml += kind == "site" ? fmt::format("<site{}/>", Kept(*e, "site"))
+                               : fmt::format("<motor{}/>", Kept(*e, "actuator"));
+      }
+    }
+    *xml += "</default>";
+  }
+
+  // The class whose defaults an element takes.
+  std::string ClassOf(const TiXmlElement& element, const std::string& child_class) const {
+    const std::string own = Attribute(element, "class");
+    if (!own.empty()) return own;
+    return child_class.empty() ? main_ : child_class;
+  }
+
+  std::string Resolved(const TiXmlElement& element, const char* name,
+                       const std::string& child_class,
+                       std::map<std::string, std::string> DefaultClass::*kind) const {
+    if (element.Attribute(name)) return Attribute(element, name);
+    for (auto c = classes_.find(ClassOf(element, child_class)); c != classes_.end();
+         c = classes_.find(c->second.parent)) {
+      const auto& known = c->second.*kind;
+      if (const auto found = known.find(name); found != known.end()) return found->second;
+    }
+    return "";
+  }
+
+  bool IsFree(const TiXmlElement& joint) const {
+    return Resolved(joint, "type", "", &DefaultClass::joint) == "free";
+  }
+
+  bool HasFreeJoint(const TiXmlElement& body) const {
+    if (body.FirstChildElement("freejoint")) return true;
+    const TiXmlElement* joint = body.FirstChildElement("joint");
+    return joint != nullptr && IsFree(*joint);
+  }
+
+  static bool HasJoints(const TiXmlElement& body) {
+    if (body.FirstChildElement("joint")) return true;
+    for (const TiXmlElement* b = body.FirstChildElement("body"); b;
+         b = b->NextSiblingElement("body")) {
+      if (HasJoints(*b)) return true;
+    }
+    return false;
+  }
+
+  const TiXmlElement& RobotBody(const TiXmlElement& root) {
+    const TiXmlElement* robot = nullptr;
+    const TiXmlElement* first = nullptr;
+    Sections(root, "worldbody", [&](const TiXmlElement& world) {
+      for (const TiXmlElement* e = world.FirstChildElement(); e; e = e->NextSiblingElement()) {
+        CheckStructure(*e);
+        if (e->ValueStr() != "body") continue;
+        if (HasFreeJoint(*e)) {
+          if (robot != nullptr) {
+            Fail(*e, "body '{}' floats, and so does '{}': leave one in the file",
+                 Attribute(*e, "name"), Attribute(*robot, "name"));
+          }
+          robot = e;
+        } else if (first == nullptr && HasJoints(*e)) {
+          first = e;
+        }
+      }
+    });
+    if (robot != nullptr) return *robot;
+    if (first == nullptr) Fail(root, "no body of <worldbody> has joints: where is the robot?");
+    Note(*first, "body '{}' has no free joint: it floats here", Attribute(*first, "name"));
+    return *first;
+  }
+
+  // Elements that would put bodies where the reader sees none.
+  void CheckStructure(const TiXmlElement& element) const {
+    static const Names kUnknown = {"frame",     "replicate", "attach",
+                                   "composite", "flexcomp",  "include"};
+    if (Has(kUnknown, element.ValueStr())) {
+      Fail(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
+           Shown(element.Value()));
+    }
+  }
+
+  std::string UniqueName(const TiXmlElement& element, const char* kind, size_t index,
+                         std::set<std::string>* taken) {
+    std::string name = Attribute(element, "name");
+    if (name.empty()) name = fmt::format("{}_{}", kind, index);
+    if (!taken->insert(name).second) {
+      Fail(element, "the name '{}' of a {} stands twice: rename one", name, kind);
+    }
+    return name;
+  }
+
+  void Count(const TiXmlElement& element) {
+    if (++elements_ > kMaxElements)
+      Fail(element, "more than {} elements: simplify it", kMaxElements);
+  }
+
+  void Body(const TiXmlElement& element, int parent, std::string child_class, std::string* xml) {
+    Count(element);
+    const int index = static_cast<int>(result_.bodies.size());
+    CleanBody& body = result_.bodies.emplace_back();
+    body.name = UniqueName(element, "body", static_cast<size_t>(index), &links_);
+    body.parent = parent;
+    if (!Attribute(element, "childclass").empty()) {
+      ClassAttribute(element, "childclass");
+      child_class = Attribute(element, "childclass");
+    }
+    *xml += fmt::format("<body name='b{}'{}{}>", index, ClassAttribute(element, "childclass"),
+                        Kept(element, "body"));
+    bool has_inertial = false;
+    for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string& kind = e->ValueStr();
+      CheckStructure(*e);
+      if (kind == "body") continue;
+      if (kind == "inertial") {
+        if (has_inertial) Fail(*e, "body '{}' has two <inertial>", result_.bodies.back().name);
+        has_inertial = true;
+        Inertial(*e, &result_.bodies[static_cast<size_t>(index)], xml);
+      } else if (kind == "joint" && !(parent < 0 && IsFree(*e))) {
+        Joint(*e, index, child_class, xml);
+      } else if (kind == "freejoint" && parent >= 0) {
+        Fail(*e, "body '{}' floats within another: move it to <worldbody>",
+             result_.bodies[static_cast<size_t>(index)].name);
+      } else if (kind == "geom") {
+        Geom(*e, index, child_class, xml);
+      } else if (kind == "site") {
+        Site(*e, index, xml);
+      }
+    }
+    for (const TiXmlElement* e = element.FirstChildElement("body"); e;
+         e = e->NextSiblingElement("body")) {
+      Body(*e, index, child_class, xml);
+    }
+    *xml += "</body>";
+  }
+
+  void Inertial(const TiXmlElement& element, CleanBody* body, std::string* xml) {
+    body->has_inertial = true;
+    body->mass = Exactly<1>(element, "mass")[0];
+    std::string place = Kept(element, "inertial");
+    if (element.Attribute("fullinertia")) {
+      body->full = Exactly<6>(element, "fullinertia");
+      for (const std::string_view name : kOrientation) {
+        if (element.Attribute(std::string(name).c_str())) {
+          Fail(element, "<inertial> has fullinertia and {}: leave one out", name);
+        }
+      }
+    } else if (element.Attribute("diaginertia")) {
+      body->diagonal = Exactly<3>(element, "diaginertia");
+    }
+    *xml += "<inertial mass='1' diaginertia='1 1 1'" +
+            (element.Attribute("pos") ? place : " pos='0 0 0'" + place) + "/>";
+  }
+
+  void Joint(const TiXmlElement& element, int body, const std::string& child_class,
+             std::string* xml) {
+    Count(element);
+    CleanBody& owner = result_.bodies[static_cast<size_t>(body)];
+    const size_t index = result_.joints.size();
+    CleanJoint& joint = result_.joints.emplace_back();
+    joint.name = UniqueName(element, "joint", index, &joint_names_);
+    joint.body = body;
+    if (owner.joint >= 0) {
+      Fail(element, "body '{}' has two joints, '{}' and '{}': give each a body of its own",
+           owner.name, result_.joints[static_cast<size_t>(owner.joint)].name, joint.name);
+    }
+    if (body == 0) {
+      Fail(element,
+           "joint '{}' holds the root body '{}' to the world: a robot that balances floats",
+           joint.name, owner.name);
+    }
+    owner.joint = static_cast<int>(index);
+    if (element.Attribute("actuatorfrcrange")) {
+      joint.force_range = Exactly<2>(element, "actuatorfrcrange");
+    } else {
+      for (std::string c = ClassOf(element, child_class); !c.empty(); c = classes_[c].parent) {
+        const auto known = force_range_.find(c);
+        if (known == force_range_.end()) continue;
+        joint.force_range = known->second;
+        break;
+      }
+    }
+    if (const auto k = Resolved(element, "stiffness", child_class, &DefaultClass::joint);
+        !k.empty() && std::strtod(k.c_str(), nullptr) != 0) {
+      Note(element, "the spring of joint '{}' is left out", joint.name);
+    }
+    *xml += fmt::format("<joint name='j{}'{}{}/>", index, ClassAttribute(element, "class"),
+                        Kept(element, "joint"));
+  }
+
+  void Geom(const TiXmlElement& element, int body, const std::string& child_class,
+            std::string* xml) {
+    Count(element);
+    const std::string type = Resolved(element, "type", child_class, &DefaultClass::geom);
+    const std::string mesh = Resolved(element, "mesh", child_class, &DefaultClass::geom);
+    CleanGeom geom;
+    const bool is_mesh = !mesh.empty() || type == "mesh";
+    if (is_mesh) {
+      const auto known = meshes_.find(mesh);
+      if (known == meshes_.end()) return;
+      geom = known->second;
+    } else if (!type.empty() && !Has(kWords.at("type"), type)) {
+      return;  // a plane, a height field
+    }
+    geom.body = body;
+    std::string kept = Kept(element, "geom");
+    if (is_mesh) {  // a sphere without mass holds its place
+      kept.clear();
+      for (const char* name : {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "contype",
+                               "conaffinity", "group"}) {
+        const std::vector<double> numbers = Numbers(element, name);
+        if (numbers.empty()) continue;
+        kept += fmt::format(" {}='", name);
+        for (const double number : numbers) kept += fmt::format("{:.17g} ", number);
+        kept.back() = '\'';
+      }
+      kept += " type='sphere' size='0.001' mass='0'";
+    }
+    *xml += fmt::format("<geom name='g{}'{}{}/>", result_.geoms.size(),
+                        ClassAttribute(element, "class"), kept);
+    result_.geoms.push_back(geom);
+  }
+
+  void Site(const TiXmlElement& element, int body, std::string* xml) {
+    Count(element);
+    if (Attribute(element, "name").empty()) return;
+    const size_t index = result_.sites.size();
+    CleanSite& site = result_.sites.emplace_back();
+    site.name = Attribute(element, "name");
+    site.body = body;
+    // A body may have the same name: the site then takes another.
+    if (!links_.insert(site.name).second) site.name = UniqueSite(site.name);
+    *xml += fmt::format("<site name='s{}'{}{}/>", index, ClassAttribute(element, "class"),
+                        Kept(element, "site"));
+  }
+
+  std::string UniqueSite(const std::string& name) {
+    for (int i = 0;; ++i) {
+      const std::string other = name + "_site" + (i == 0 ? "" : std::to_string(i));
+      if (links_.insert(other).second) return other;
+    }
+  }
+
+  int JointIndex(const std::string& name) const {
+    for (size_t j = 0; j < result_.joints.size(); ++j) {
+      if (result_.joints[j].name == name) return static_cast<int>(j);
+    }
+    return -1;
+  }
+
+  void Actuators(const TiXmlElement& section, std::string* xml) {
+    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      Count(*e);
+      const std::string& kind = e->ValueStr();
+      const int joint = JointIndex(Attribute(*e, "joint"));
+      if (!Has(kActuators, kind) || joint < 0) {
+        Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out",
+             Shown(e->Value()), Attribute(*e, "name"));
+        continue;
+      }
+      // Of whatever kind: gear and ranges are the same attributes of all.
+      *xml += fmt::format("<motor name='a{}' joint='j{}'{}{}/>", result_.actuators.size(), joint,
+                          ClassAttribute(*e, "class"), Kept(*e, "actuator"));
+      result_.actuators.push_back({joint, kind == "motor"});
+    }
+  }
+
+  void Equalities(const TiXmlElement& section) {
+    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      if (e->ValueStr() != "joint") {
+        Note(*e, "equality <{}> '{}' closes a loop: it is left out", Shown(e->Value()),
+             Attribute(*e, "name"));
+        continue;
+      }
+      const int joint = JointIndex(Attribute(*e, "joint1"));
+      if (joint < 0) {
+        Fail(*e, "equality names joint1 '{}', which the robot does not have",
+             Attribute(*e, "joint1"));
+      }
+      const std::vector<double> coefficients =
+          e->Attribute("polycoef") ? Numbers(*e, "polycoef") : std::vector<double>{0, 1};
+      Mimic mimic;
+      mimic.joint = Attribute(*e, "joint2");
+      mimic.offset = coefficients.empty() ? 0 : coefficients[0];
+      mimic.multiplier = coefficients.size() > 1 && !mimic.joint.empty() ? coefficients[1] : 0;
+      result_.joints[static_cast<size_t>(joint)].mimic = mimic;
+    }
+  }
+
+  void Sensors(const TiXmlElement& section) {
+    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string site = Attribute(*e, "site");
+      if (site.empty()) continue;
+      const std::vector<double> noise = Numbers(*e, "noise");
+      result_.sensors.push_back({e->ValueStr(), site, noise.empty() ? 0 : noise[0]});
+    }
+  }
+
+  void Keys(const TiXmlElement& section) {
+    Sections(section, "key", [&](const TiXmlElement& element) {
+      const std::vector<double> position = Numbers(element, "qpos");
+      const std::string name = Attribute(element, "name");
+      const size_t joints = result_.joints.size();
+      const bool floats = position.size() == joints + 7;
+      if (position.empty()) return;
+      if (position.size() != joints && !floats) {
+        Note(element, "keyframe '{}' has {} numbers for {} joints: it is left out", name,
+             position.size(), joints);
+        return;
+      }
+      MjcfKey& key = result_.keys.emplace_back();
+      key.name = name;
+      for (size_t j = 0; j < joints; ++j) {
+        key.joint[result_.joints[j].name] = position[j + (floats ? 7 : 0)];
+      }
+    });
+  }
+
+  std::vector<std::string>* warnings_;
+  CleanMjcf& result_;
+  std::string compiler_;  // attributes
+  std::string main_;
+  std::map<std::string, DefaultClass> classes_;
+  std::map<std::string, size_t> class_index_;
+  std::map<std::string, std::array<double, 2>> force_range_;  // by class
+  std::map<std::string, CleanGeom> meshes_;
+  std::set<std::string> links_, joint_names_;
+  size_t elements_ = 0;
+};
+
+}  // namespace
+
+CleanMjcf CleanedMjcf(std::string_view xml, std::vector<std::string>* warnings) {
+  TiXmlDocument document;
+  ParseXml(xml, "MJCF", &document);
+  const TiXmlElement* const root = document.RootElement();
+  if (root == nullptr) throw RobotError("MJCF has no element: is it an MJCF file?");
+  CleanMjcf result;
+  Cleaner(warnings, &result).Clean(*root);
+  return result;
+}
+
+}  // namespace poise::robot

@@ -1,0 +1,103 @@
+#include "components/state_estimator/calibrator.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "components/state_estimator/lie_group.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Vector3d;
+
+// Standard deviations at first: of the mass a share of the robot's, of its place m. A load of 15 %
+// anywhere, a COM off by 3 cm.
+constexpr double kStartMass = 0.15, kStartShift = 0.05;
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model,
+                       const CalibratorSettings& settings, double period)
+    : model_(std::move(model)),
+      settings_(settings),
+      filter_(12, settings.cutoff),
+      input_(Eigen::VectorXd::Zero(12)),
+      correlated_(std::max(1.0, 1 / (2 * settings.cutoff * period))) {
+  const double mass = model_->total_mass();
+  covariance_.diagonal() << Square(kStartMass * mass),
+      Vector3d::Constant(Square(kStartShift * mass));
+}
+
+void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt) {
+  for (size_t f = 0; f < 2; ++f) input_.segment<6>(static_cast<Eigen::Index>(6 * f)) = wrench[f];
+  if (started_) {
+    filter_.Step(input_, dt);
+  } else {
+    filter_.Reset(input_);
+  }
+  started_ = true;
+  since_ += dt;
+  const double mass = model_->total_mass();
+  Load wanted = estimate_;
+  wanted[0] = std::clamp(wanted[0], -settings_.max_mass * mass, settings_.max_mass * mass);
+  const double reach = settings_.max_shift * mass;
+  for (int i = 1; i < 4; ++i) wanted[i] = std::clamp(wanted[i], -reach, reach);
+  applied_ += std::min(dt / settings_.apply_time, 1.0) * (wanted - applied_);
+}
+
+void Calibrator::Update(const WrenchObserver& observer, bool usable) {
+  const Vector3d& s = observer.specific_force();
+  const Vector3d& w = observer.data().body_angular_velocity[0];
+  running_ = usable && w.norm() < settings_.still_rate &&
+             std::abs(s.norm() - robot::kGravity) < settings_.still_acceleration;
+  if (!running_) return;
+  // Environment on robot, base axes, about the base's origin.
+  robot::Vector6d ground = robot::Vector6d::Zero();
+  for (size_t f = 0; f < 2; ++f) {
+    const robot::Vector6d wrench = -filter_.value().segment<6>(static_cast<Eigen::Index>(6 * f));
+    const Vector3d force = observer.sole_rotation(f) * wrench.head<3>();
+    ground.head<3>() += force;
+    ground.tail<3>() +=
+        observer.sole_rotation(f) * wrench.tail<3>() + observer.sole_position(f).cross(force);
+  }
+  Eigen::Matrix<double, 6, 4> regressor = Eigen::Matrix<double, 6, 4>::Zero();
+  regressor.block<3, 1>(0, 0) = s;
+  regressor.block<3, 3>(0, 1) = Skew(observer.base_turn()) + SkewSquared(w, w.squaredNorm());
+  regressor.block<3, 3>(3, 1) = -Skew(s);
+  Correct(regressor, ground - observer.base_wrench());
+}
+
+void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
+                         const robot::Vector6d& measured) {
+  const double mass = model_->total_mass();
+  const double dt = std::max(since_, 0.0);
+  since_ = 0;
+  covariance_.diagonal().array() += Square(settings_.walk * mass) * dt;
+  const robot::Vector6d gap = measured - regressor * estimate_;
+  Eigen::Matrix<double, 6, 1> noise;
+  noise.head<3>().setConstant(correlated_ * Square(settings_.force_error));
+  noise.tail<3>().setConstant(correlated_ * Square(settings_.moment_error));
+  const Eigen::Matrix<double, 4, 6> cross = covariance_ * regressor.transpose();
+  Eigen::Matrix<double, 6, 6> total = regressor * cross;
+  total.diagonal() += noise;
+  const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factors(total);
+  const double difference = gap.dot(factors.solve(gap));
+  // Something else pushes the robot, or a reading is wrong.
+  if (!(difference < settings_.gate)) {
+    running_ = false;
+    return;
+  }
+  const Eigen::Matrix<double, 6, 4> gain = factors.solve(cross.transpose());
+  estimate_ += gain.transpose() * gap;
+  covariance_ -= cross * gain;
+}
+
+void Calibrator::Archive(StateArchive* archive) {
+  filter_.Archive(archive);
+  archive->Show(estimate_, applied_, covariance_, since_, running_, started_);
+}
+
+}  // namespace poise

@@ -1,0 +1,67 @@
+// Calibrator: what the robot carries beyond its model, found while it stands and sways slowly.
+//
+// The soles' wrenches tell the resultant that the ground exerts; the model tells what the motion
+// asks for. What lies between is linear in four numbers, a mass and its moment (mass times place in
+// the base frame): a load, or an error of the model's COM, which is a moment without mass. A Kalman
+// filter of constant parameters with a slow walk. docs/estimation.md says what standing still, a
+// sway, and neither can tell.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+
+#include "components/framework/state_archive.h"
+#include "components/state_estimator/low_pass.h"
+#include "components/state_estimator/wrench_observer.h"
+
+namespace poise {
+
+/// See CalibrationConfig in state_estimator.proto for what each means.
+struct CalibratorSettings {
+  bool enabled = false;
+  double max_mass = 0.2, max_shift = 0.1;
+  double walk = 0.002, force_error = 2, moment_error = 0.3;
+  double still_rate = 0.3, still_acceleration = 0.5;
+  double gate = 40, apply_time = 0.2;
+  double cutoff = 40;  ///< Hz, the observer's: readings and model pass the same filter
+};
+
+class Calibrator {
+ public:
+  /// (mass, kg; moment x, y, z, kg·m).
+  using Load = Eigen::Vector4d;
+
+  Calibrator(std::shared_ptr<const robot::RobotModel> model, const CalibratorSettings& settings,
+             double period);
+
+  bool enabled() const { return settings_.enabled; }
+  /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
+  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt);
+  /// With what the observer has found in this tick without any load; `usable`: both wrenches are
+  /// measured.
+  void Update(const WrenchObserver& observer, bool usable);
+
+  /// To be applied: the estimate, within bounds, reached smoothly.
+  const Load& load() const { return applied_; }
+  const Load& estimate() const { return estimate_; }
+  const Eigen::Matrix4d& covariance() const { return covariance_; }
+  /// Whether the last Update could learn: the robot stood.
+  bool running() const { return running_; }
+  void Archive(StateArchive* archive);
+
+ private:
+  void Correct(const Eigen::Matrix<double, 6, 4>& regressor, const robot::Vector6d& measured);
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  CalibratorSettings settings_;
+  LowPass filter_;
+  Eigen::VectorXd input_;
+  double correlated_;  // samples that the filter makes one of
+  Load estimate_ = Load::Zero(), applied_ = Load::Zero();
+  Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();
+  double since_ = 0;  // s, since the last correction
+  bool running_ = false, started_ = false;
+};
+
+}  // namespace poise

@@ -1,0 +1,41 @@
+#include "components/state_estimator/foot_sensor_check.h"
+
+#include <Eigen/Cholesky>
+
+namespace poise {
+
+void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
+  said_ = said;
+  same_time_ = measured == measured_ ? same_time_ + dt : 0;
+  measured_ = measured;
+  if (said == State::kOk) return;
+  state_ = said;
+  wrong_time_ = right_time_ = same_time_ = 0;
+}
+
+void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covariance,
+                              const Wrench& noise, double least_force, double dt) {
+  if (said_ != State::kOk || !settings_.enabled) return;
+  Covariance total = covariance;
+  total.diagonal() += noise.cwiseAbs2();
+  const Wrench gap = measured_ - observed;
+  const double difference =
+      gap.head<3>().norm() < least_force ? 0 : gap.dot(total.llt().solve(gap));
+  if (!(difference >= 0)) return;  // not a covariance
+  difference_ = difference;
+  // What does not change by a bit has no noise: a little disagreement is then enough.
+  const bool same = same_time_ >= settings_.frozen_time;
+  const bool wrong = difference > (same ? settings_.frozen_gate : settings_.gate);
+  wrong_time_ = wrong ? wrong_time_ + dt : 0;
+  right_time_ = !same && difference < settings_.agree_gate ? right_time_ + dt : 0;
+  if (state_ == State::kOk) {
+    if (wrong_time_ < (same ? settings_.frozen_time : settings_.time)) return;
+    state_ = !same ? State::kBiased : measured_.isZero(0) ? State::kDead : State::kFrozen;
+    right_time_ = 0;
+  } else if (right_time_ >= settings_.recover_time) {
+    state_ = State::kOk;
+    wrong_time_ = 0;
+  }
+}
+
+}  // namespace poise

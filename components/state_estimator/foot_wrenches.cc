@@ -1,0 +1,66 @@
+#include "components/state_estimator/foot_wrenches.h"
+
+namespace poise {
+namespace {
+
+// Share of the weight by which sensor and observer must differ. A push that turns the joints'
+// friction over makes the observer wrong by up to an eighth of it (7.2); no loop is hurt by less.
+constexpr double kLeastShare = 0.15;
+
+}  // namespace
+
+FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
+                           const FootWrenchSettings& settings)
+    : observer_(model, settings.observer),
+      check_every_(settings.check_every),
+      push_gate_(settings.observer.push_gate),
+      least_force_(kLeastShare * model->total_mass() * robot::kGravity),
+      check_{FootSensorCheck(settings.check), FootSensorCheck(settings.check)} {
+  noise_.head<3>().setConstant(model->force_noise());
+  noise_.tail<3>().setConstant(model->moment_noise());
+  wrench_.fill(robot::Vector6d::Zero());
+  deviation_.fill(noise_);
+}
+
+void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
+                          const std::array<FootReading, 2>& reading,
+                          const ObserverCorrection& correction) {
+  observer_.Track(sensors, dt);
+  since_ += dt;
+  for (size_t f = 0; f < 2; ++f) check_[f].Read(reading[f].state, reading[f].wrench, dt);
+  const bool needed = !check_[0].good() || !check_[1].good();
+  observed_ = (needed || (observer_.torque_known() && tick % check_every_ == 0)) &&
+              observer_.Observe(correction);
+  if (observed_) {
+    if (observer_.torque_known()) Compare();
+    since_ = 0;
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    if (check_[f].good()) {
+      wrench_[f] = reading[f].wrench;
+      deviation_[f] = noise_;
+    } else {
+      const auto at = static_cast<Eigen::Index>(6 * f);
+      wrench_[f] = observer_.wrenches().segment<6>(at);
+      deviation_[f] = observer_.covariance().diagonal().segment<6>(at).cwiseMax(0).cwiseSqrt();
+    }
+  }
+}
+
+void FootWrenches::Compare() {
+  // While something pushes the robot, the observer has the legs alone to go by.
+  if (observer_.push_excess() > push_gate_) return;
+  for (size_t f = 0; f < 2; ++f) {
+    const auto at = static_cast<Eigen::Index>(6 * f);
+    check_[f].Compare(observer_.wrenches().segment<6>(at),
+                      observer_.covariance().block<6, 6>(at, at), noise_, least_force_, since_);
+  }
+}
+
+void FootWrenches::Archive(StateArchive* archive) {
+  observer_.Archive(archive);
+  for (FootSensorCheck& check : check_) check.Archive(archive);
+  archive->Show(since_);
+}
+
+}  // namespace poise

@@ -1,0 +1,60 @@
+// FootWrenches: what the feet carry, from their sensors where these are good, else as observed.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "components/framework/state_archive.h"
+#include "components/state_estimator/foot_sensor_check.h"
+#include "components/state_estimator/wrench_observer.h"
+
+namespace poise {
+
+struct FootWrenchSettings {
+  WrenchObserverSettings observer;
+  FootSensorCheckSettings check;
+  int check_every = 4;  ///< ticks between observations while all sensors are good
+};
+
+/// Of one foot.
+struct FootReading {
+  FootSensorCheck::State state = FootSensorCheck::State::kOk;  ///< as it says itself
+  robot::Vector6d wrench = robot::Vector6d::Zero();            ///< robot on environment, sole frame
+};
+
+class FootWrenches {
+ public:
+  FootWrenches(std::shared_ptr<const robot::RobotModel> model, const FootWrenchSettings& settings);
+
+  /// Once a tick, `dt` s after the last. `correction`: what is known before this tick. Allocates
+  /// nothing. Any finite input gives finite wrenches.
+  void Update(int64_t tick, double dt, const BaseSensors& sensors,
+              const std::array<FootReading, 2>& reading, const ObserverCorrection& correction);
+
+  /// Robot on environment, sole frame, and its standard deviations.
+  const robot::Vector6d& wrench(size_t foot) const { return wrench_[foot]; }
+  const robot::Vector6d& deviation(size_t foot) const { return deviation_[foot]; }
+  /// Of the foot's sensor; else as observed.
+  bool measured(size_t foot) const { return check_[foot].good(); }
+  const FootSensorCheck& check(size_t foot) const { return check_[foot]; }
+  const WrenchObserver& observer() const { return observer_; }
+  /// Whether this tick's Update has observed.
+  bool observed() const { return observed_; }
+  void Archive(StateArchive* archive);
+
+ private:
+  void Compare();
+
+  WrenchObserver observer_;
+  int check_every_;
+  double push_gate_, least_force_;
+  robot::Vector6d noise_;
+  std::array<FootSensorCheck, 2> check_;
+  std::array<robot::Vector6d, 2> wrench_, deviation_;
+  double since_ = 0;  // s, since the last observation
+  bool observed_ = false;
+};
+
+}  // namespace poise

@@ -1,0 +1,313 @@
+#include "components/state_estimator/wrench_observer.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "components/state_estimator/lie_group.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
+
+// No robot exceeds these: they keep every finite reading from making a number that is not.
+constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxTorque = 1e4;
+constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts anew
+// Before any row: no foot carries more, shares of the weight, and of the weight at a metre.
+constexpr double kPriorForce = 2, kPriorMoment = 0.3;
+// (N·m)², of a joint's row at least: what encoder steps leave of its acceleration.
+constexpr double kLeastVariance = 0.01;
+// s, over which the wrenches' rate of change is averaged.
+constexpr double kRateTime = 0.02;
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
+                               const WrenchObserverSettings& settings)
+    : model_(std::move(model)),
+      settings_(settings),
+      filter_(2 * model_->num_joints() + 6, settings.cutoff),
+      input_(Eigen::VectorXd::Zero(2 * model_->num_joints() + 6)),
+      state_(model_->num_joints()),
+      data_(*model_),
+      linear_(model_->bodies().size(), Vector3d::Zero()),
+      angular_(linear_),
+      force_(linear_),
+      moment_(linear_),
+      joint_torque_(Eigen::VectorXd::Zero(model_->num_joints())) {
+  for (int j = 0; j < model_->num_joints(); ++j) {
+    std::array<bool, 2> supports{};
+    for (size_t f = 0; f < 2; ++f) {
+      for (const int other : model_->supporting_joints(model_->feet()[f].body)) {
+        supports[f] = supports[f] || other == j;
+      }
+    }
+    if (!supports[0] && !supports[1]) continue;
+    leg_joints_.push_back(j);
+    supports_.push_back(supports);
+  }
+  bristle_ = bristle_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
+  for (size_t k = 0; k < leg_joints_.size(); ++k) {
+    bristle_error_[static_cast<Eigen::Index>(k)] =
+        model_->motors()[static_cast<size_t>(leg_joints_[k])].static_friction / std::sqrt(3.0);
+  }
+  sole_position_.fill(Vector3d::Zero());
+  sole_rotation_.fill(Matrix3d::Identity());
+}
+
+void WrenchObserver::Track(const BaseSensors& sensors, double dt) {
+  const Eigen::Index n = model_->num_joints();
+  const auto within = [](const auto& v, double limit) {
+    return v.cwiseMin(limit).cwiseMax(-limit);
+  };
+  input_.head(n) = within(sensors.joint_position, kMaxPosition);
+  input_.segment<3>(n) = within(sensors.angular_velocity, kMaxRate);
+  input_.segment<3>(n + 3) = within(sensors.acceleration, kMaxForce);
+  torque_known_ = sensors.joint_torque.size() == n && !sensors.joint_torque.isZero(0);
+  if (torque_known_) {
+    input_.tail(n) = within(sensors.joint_torque, kMaxTorque);
+  } else {
+    input_.tail(n).setZero();
+  }
+  since_ += dt;
+  if (started_ && dt <= kLongestStep) {
+    filter_.Step(input_, dt);
+    TrackFriction(dt);
+  } else {
+    filter_.Reset(input_);
+    observed_ = false;
+  }
+  started_ = true;
+}
+
+// Dahl's model: dF = σ (1 − F sgn(dq) / F_c) dq, exactly over a step of one direction.
+void WrenchObserver::TrackFriction(double dt) {
+  const Eigen::Index n = model_->num_joints();
+  for (size_t k = 0; k < leg_joints_.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const double limit = model_->motors()[static_cast<size_t>(leg_joints_[k])].coulomb_friction;
+    if (!(limit > 0)) continue;
+    const double way = dt * filter_.rate().head(n)[leg_joints_[k]];
+    const double end = std::copysign(limit, way);
+    const double keep = std::exp(-settings_.friction_stiffness * std::abs(way) / limit);
+    bristle_[i] = end + keep * (bristle_[i] - end);
+    const double error = settings_.friction_error * limit;
+    bristle_error_[i] = error + keep * (bristle_error_[i] - error);
+  }
+}
+
+// Base and joints from the readings, whatever body carries the IMU. The IMU's angular acceleration
+// is its gyro's rate of change, in its own axes and in those of an observer at rest.
+void WrenchObserver::ReadMotion(const ObserverCorrection& correction) {
+  const Eigen::Index n = model_->num_joints();
+  state_.joint_position = filter_.value().head(n);
+  state_.joint_velocity = filter_.rate().head(n);
+  const robot::ImuModel& imu = model_->imu();
+  const auto b = static_cast<size_t>(imu.body);
+  const Vector3d gyro = filter_.value().segment<3>(n) - correction.gyro_bias;
+  Matrix3d to_base = imu.pose.linear();
+  if (b != 0) {
+    // Between it and the base lie joints: their axes first.
+    state_.base_angular_velocity.setZero();
+    robot::ComputeKinematics(*model_, state_, &data_);
+    to_base = data_.body_rotation[b] * imu.pose.linear();
+    state_.base_angular_velocity = to_base * gyro - data_.body_angular_velocity[b];
+  } else {
+    state_.base_angular_velocity = to_base * gyro;
+  }
+  robot::ComputeKinematics(*model_, state_, &data_);
+
+  const Vector3d arm = data_.body_rotation[b] * imu.pose.translation();
+  const Vector3d point = data_.body_position[b] + arm;
+  const Vector3d& w = data_.body_angular_velocity[b];
+  Vector3d turn = to_base * filter_.rate().segment<3>(n) - data_.body_angular_bias[b];
+  Vector3d push =
+      to_base * (filter_.value().segment<3>(n + 3) - correction.accelerometer_bias) -
+      (data_.body_linear_bias[b] + data_.body_angular_bias[b].cross(arm) + w.cross(w.cross(arm)));
+  for (const int joint : model_->supporting_joints(imu.body)) {
+    const auto j = static_cast<size_t>(joint);
+    const Vector3d spin = data_.joint_axis[j] * filter_.curvature()[joint];
+    turn -= spin;
+    push -= spin.cross(point - data_.body_position[j + 1]);
+  }
+  base_acceleration_ = turn;
+  base_force_ = push - turn.cross(point);
+}
+
+// The load moves with the base; its inertia is not known and left out.
+void WrenchObserver::AddLoad(const ObserverCorrection& correction) {
+  const Vector3d& h = correction.load_moment;
+  const Vector3d& w = data_.body_angular_velocity[0];
+  force_[0] +=
+      correction.load_mass * base_force_ + base_acceleration_.cross(h) + w.cross(w.cross(h));
+  moment_[0] += h.cross(base_force_);
+  mass_ += correction.load_mass;
+  com_ += h;
+}
+
+// Newton and Euler of the filtered motion, gravity being part of the base's acceleration.
+void WrenchObserver::InverseDynamics() {
+  const robot::KinematicTree& tree = model_->tree();
+  linear_[0] = base_force_;
+  angular_[0] = base_acceleration_;
+  for (size_t b = 1; b < tree.bodies.size(); ++b) {
+    const auto p = static_cast<size_t>(tree.bodies[b].parent);
+    angular_[b] = angular_[p] +
+                  data_.joint_axis[b - 1] * filter_.curvature()[static_cast<Eigen::Index>(b) - 1];
+    linear_[b] = linear_[p] + angular_[p].cross(data_.body_position[b] - data_.body_position[p]);
+  }
+  for (size_t b = 0; b < tree.bodies.size(); ++b) {
+    const robot::KinematicTree::BodyMass& body = tree.bodies[b];
+    const Matrix3d& rotation = data_.body_rotation[b];
+    const Vector3d arm = rotation * body.com;
+    const Vector3d com = data_.body_position[b] + arm;
+    const Vector3d& w = data_.body_angular_velocity[b];
+    const Vector3d alpha = angular_[b] + data_.body_angular_bias[b];
+    const Vector3d linear = linear_[b] + data_.body_linear_bias[b];
+    const Vector3d turned = rotation.transpose() * w;
+    force_[b] = body.mass * (linear + alpha.cross(arm) + w.cross(w.cross(arm)));
+    moment_[b] = com.cross(force_[b]) + rotation * (body.inertia * (rotation.transpose() * alpha) +
+                                                    turned.cross(body.inertia * turned));
+    com_ += body.mass * com;
+  }
+}
+
+void WrenchObserver::AddJointRows() {
+  const robot::KinematicTree& tree = model_->tree();
+  for (size_t b = tree.bodies.size() - 1; b > 0; --b) {
+    const auto j = static_cast<Eigen::Index>(b) - 1;
+    joint_torque_[j] =
+        data_.joint_axis[b - 1].dot(moment_[b] - data_.body_position[b].cross(force_[b])) +
+        tree.joints[b - 1].reflected_inertia * filter_.curvature()[j];
+    const auto p = static_cast<size_t>(tree.bodies[b].parent);
+    force_[p] += force_[b];
+    moment_[p] += moment_[b];
+  }
+
+  const double weight = model_->total_mass() * robot::kGravity;
+  Covariance information = Covariance::Zero();
+  for (int i = 0; i < 12; ++i) {
+    information(i, i) = 1 / Square((i % 6 < 3 ? kPriorForce : kPriorMoment) * weight);
+  }
+  Wrenches sum = Wrenches::Zero();
+  for (size_t k = 0; torque_known_ && k < leg_joints_.size(); ++k) {
+    const Eigen::Index joint = leg_joints_[k];
+    const auto j = static_cast<size_t>(joint);
+    const robot::MotorModel& motor = model_->motors()[j];
+    const double speed = state_.joint_velocity[joint],
+                 torque = filter_.value()[6 + state_.joint_position.size() + joint];
+    const double held = bristle_[static_cast<Eigen::Index>(k)];
+    const double friction = held + motor.viscous_friction * speed;
+    const double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
+                            Square(settings_.friction_error * motor.viscous_friction * speed) +
+                            Square(settings_.torque_error * torque) +
+                            Square(settings_.mass_error * joint_torque_[joint]) + kLeastVariance;
+    const double known = torque - friction - joint_torque_[joint];
+    std::array<robot::Vector6d, 2> row;
+    for (size_t f = 0; f < 2; ++f) {
+      if (!supports_[k][f]) continue;
+      const Vector3d& axis = data_.joint_axis[j];
+      row[f] << sole_rotation_[f].transpose() *
+                    axis.cross(sole_position_[f] - data_.body_position[j + 1]),
+          sole_rotation_[f].transpose() * axis;
+      const robot::Vector6d weighted = row[f] / variance;
+      const auto at = static_cast<Eigen::Index>(6 * f);
+      information.block<6, 6>(at, at).noalias() += weighted * row[f].transpose();
+      sum.segment<6>(at) += known * weighted;
+    }
+    if (supports_[k][0] && supports_[k][1]) {
+      information.block<6, 6>(6, 0).noalias() += row[1] * row[0].transpose() / variance;
+    }
+  }
+  information.block<6, 6>(0, 6) = information.block<6, 6>(6, 0).transpose();
+  const Eigen::LLT<Covariance> factors(information);
+  spread_ = factors.solve(Covariance::Identity());
+  estimate_ = spread_ * sum;
+}
+
+bool WrenchObserver::AddBaseRows() {
+  const double mass = std::max(mass_, 0.1 * model_->total_mass());
+  const Vector3d com = com_ / mass;
+  Matrix6x12 sum;  // of both feet, about the COM
+  for (size_t f = 0; f < 2; ++f) {
+    const auto at = static_cast<Eigen::Index>(6 * f);
+    const Matrix3d& r = sole_rotation_[f];
+    sum.block<3, 3>(0, at) = r;
+    sum.block<3, 3>(0, at + 3).setZero();
+    sum.block<3, 3>(3, at) = Skew(sole_position_[f] - com) * r;
+    sum.block<3, 3>(3, at + 3) = r;
+  }
+  robot::Vector6d base;
+  base << -force_[0], -moment_[0] + com.cross(force_[0]);
+  const double size = base_force_.norm();
+  robot::Vector6d noise;
+  for (int i = 0; i < 3; ++i) {
+    noise[i] = Square(mass * settings_.mass_error * base_force_[i]) +
+               Square(mass * settings_.acceleration_error);
+    noise[3 + i] = Square(mass * settings_.com_error * size);
+  }
+  const robot::Vector6d gap = base - sum * estimate_;
+  const Eigen::Matrix<double, 12, 6> cross = spread_ * sum.transpose();
+  Matrix6 innovation = sum * cross;
+  Matrix6 total = innovation;
+  total.diagonal() += noise;
+  Eigen::LLT<Matrix6> factors(total);
+  push_excess_ = torque_known_ ? gap.dot(factors.solve(gap)) : 0;
+  if (!std::isfinite(push_excess_)) return false;
+  if (push_excess_ > settings_.push_gate) {
+    // Something else pushes: what the base says is worth less, the more they disagree.
+    total.diagonal() += (Square(push_excess_ / settings_.push_gate) - 1) * noise;
+    factors.compute(total);
+  }
+  const Eigen::Matrix<double, 6, 12> gain = factors.solve(cross.transpose());
+  estimate_ += gain.transpose() * gap;
+  spread_ -= cross * gain;
+  return estimate_.allFinite();
+}
+
+bool WrenchObserver::Observe(const ObserverCorrection& correction) {
+  mass_ = model_->total_mass();
+  com_.setZero();
+  ReadMotion(correction);
+  for (size_t f = 0; f < 2; ++f) {
+    const robot::FootModel& foot = model_->feet()[f];
+    const auto b = static_cast<size_t>(foot.body);
+    sole_position_[f] = data_.body_position[b] + data_.body_rotation[b] * foot.sole.translation();
+    sole_rotation_[f] = data_.body_rotation[b] * foot.sole.linear();
+  }
+  InverseDynamics();
+  AddJointRows();
+  base_wrench_ << force_[0], moment_[0];
+  // What the base carries, it carries alone: no joint's row knows of it.
+  AddLoad(correction);
+  if (!AddBaseRows()) return false;
+  if (observed_ && since_ > 0) {
+    const double share = std::min(since_ / kRateTime, 1.0);
+    rate_ += share * ((estimate_ - wrenches_) / since_ - rate_);
+  } else {
+    rate_.setZero();
+  }
+  since_ = 0;
+  observed_ = true;
+  wrenches_ = estimate_;
+  covariance_ = spread_;
+  const Wrenches late = settings_.latency * rate_;
+  covariance_.noalias() += late * late.transpose();
+  return true;
+}
+
+void WrenchObserver::Archive(StateArchive* archive) {
+  filter_.Archive(archive);
+  archive->Show(input_, bristle_, bristle_error_, wrenches_, rate_, push_excess_, since_,
+                torque_known_, started_, observed_);
+  archive->Show(covariance_);
+}
+
+}  // namespace poise

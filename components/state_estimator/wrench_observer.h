@@ -1,0 +1,116 @@
+// WrenchObserver: the feet's wrenches from joint torques, IMU, encoders and the model, with their
+// covariance: a momentum observer.
+//
+// The generalised momentum p = A v obeys p' = τ − friction + (C' v − g) + Jᵀ w: what moves it and
+// is not known comes from the ground. All readings pass one low-pass, whose derivatives of the
+// joints' positions and of the gyro are those of p; so all rows are of the same instant, and no
+// reading is differentiated without being filtered. In the base's frame the accelerometer holds
+// both the base's acceleration and gravity: neither orientation nor velocity of the base enters.
+// The legs' joint rows tell each foot's wrench, as far as friction lets them; the six rows of the
+// base tell the sum of both, unless something pushes the robot, which shows as a disagreement and
+// takes their weight.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "components/framework/state_archive.h"
+#include "components/robot/dynamics.h"
+#include "components/state_estimator/base_sensors.h"
+#include "components/state_estimator/low_pass.h"
+
+namespace poise {
+
+/// See WrenchObserverConfig in state_estimator.proto for what each means.
+struct WrenchObserverSettings {
+  double cutoff = 40;
+  double friction_error = 0.5, friction_stiffness = 1e4, torque_error = 0.02;
+  double mass_error = 0.02, com_error = 0.006, acceleration_error = 0.03;
+  double push_gate = 25;
+  double latency = 0.01;
+};
+
+/// What else the readings are known to hold, and the robot to carry.
+struct ObserverCorrection {
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< rad/s, IMU frame
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< m/s², IMU frame
+  double load_mass = 0;                                          ///< kg
+  Eigen::Vector3d load_moment = Eigen::Vector3d::Zero();         ///< kg·m, base frame
+};
+
+class WrenchObserver {
+ public:
+  /// Of both feet, [force; moment] each, right first.
+  using Wrenches = Eigen::Matrix<double, 12, 1>;
+  using Covariance = Eigen::Matrix<double, 12, 12>;
+
+  WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
+                 const WrenchObserverSettings& settings);
+
+  /// Takes the readings of a tick, `dt` s after the last. The first are taken to be those of a
+  /// robot at rest. Allocates nothing, as Observe.
+  void Track(const BaseSensors& sensors, double dt);
+  /// Finds the wrenches from what has been read. False, and nothing changes, when it holds no
+  /// finite number.
+  bool Observe(const ObserverCorrection& correction);
+
+  /// Robot on environment, each in its sole's frame, N and N·m.
+  const Wrenches& wrenches() const { return wrenches_; }
+  const Covariance& covariance() const { return covariance_; }
+  /// Whether a joint torque is known; without, the base's rows alone tell the sum of both feet.
+  bool torque_known() const { return torque_known_; }
+  /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
+  /// of freedom when nothing but the feet touches the robot.
+  double push_excess() const { return push_excess_; }
+  /// Of the last Observe, in the base frame, without the load: specific force of the base's origin
+  /// (acceleration less gravity, m/s²), and the force and moment about the base's origin that the
+  /// model asks of the ground (N, N·m).
+  const Eigen::Vector3d& specific_force() const { return base_force_; }
+  const Eigen::Vector3d& base_turn() const { return base_acceleration_; }  ///< rad/s²
+  const robot::Vector6d& base_wrench() const { return base_wrench_; }
+  const robot::RobotData& data() const { return data_; }
+  /// m from the base's origin, and rotation: the sole in the base frame.
+  const Eigen::Vector3d& sole_position(size_t foot) const { return sole_position_[foot]; }
+  const Eigen::Matrix3d& sole_rotation(size_t foot) const { return sole_rotation_[foot]; }
+  void Archive(StateArchive* archive);
+
+ private:
+  void ReadMotion(const ObserverCorrection& correction);
+  void AddLoad(const ObserverCorrection& correction);
+  void InverseDynamics();
+  void TrackFriction(double dt);
+  void AddJointRows();
+  bool AddBaseRows();
+
+  std::shared_ptr<const robot::RobotModel> model_;
+  WrenchObserverSettings settings_;
+  std::vector<int> leg_joints_;
+  std::vector<std::array<bool, 2>> supports_;  // by leg joint: of which feet
+  LowPass filter_;                             // positions, gyro, accelerometer, torques
+  Eigen::VectorXd input_;
+  robot::RobotState state_;  // of the filter, base at the origin
+  robot::RobotData data_;
+  Eigen::Vector3d base_force_ = Eigen::Vector3d::Zero();         // m/s²
+  Eigen::Vector3d base_acceleration_ = Eigen::Vector3d::Zero();  // rad/s²
+  std::vector<Eigen::Vector3d> linear_, angular_;  // by body: m/s², rad/s², gravity as acceleration
+  std::vector<Eigen::Vector3d> force_, moment_;    // by body and all it carries
+  Eigen::VectorXd joint_torque_;                   // N·m, that the motion asks for
+  Eigen::Vector3d com_ = Eigen::Vector3d::Zero();  // m, from the base's origin
+  double mass_ = 0;                                // kg
+  robot::Vector6d base_wrench_ = robot::Vector6d::Zero();
+  std::array<Eigen::Vector3d, 2> sole_position_;
+  std::array<Eigen::Matrix3d, 2> sole_rotation_;
+  Wrenches wrenches_ = Wrenches::Zero(), rate_ = Wrenches::Zero(), estimate_ = Wrenches::Zero();
+  Covariance covariance_ = Covariance::Identity(), spread_ = Covariance::Identity();
+  // By leg joint, N·m: what friction holds, which a joint that has slipped one way goes on doing
+  // when it sticks, until it is bent back; and its standard deviation, before it has slipped for
+  // the first time anything up to break-away.
+  Eigen::VectorXd bristle_, bristle_error_;
+  double push_excess_ = 0;
+  double since_ = 0;  // s, since the last Observe
+  bool torque_known_ = false, started_ = false, observed_ = false;
+};
+
+}  // namespace poise

@@ -1,0 +1,22 @@
+// What the planner's own steps say in SUPPORT_PLAN.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/step_planner/stepping/recovery.h"
+#include "poise/support_plan_t.hpp"
+
+namespace poise {
+
+/// STEPPING_*.
+int8_t SteppingCode(stepping::Stage stage);
+/// REASON_*.
+int8_t ReasonCode(stepping::StepReason reason);
+
+/// Fills stepping, step_*, num_steps, foothold*, touch_down_time and cop_reference at `time`, s;
+/// soles in the world, right first.
+void ReportStepping(const stepping::Recovery& recovery, double time,
+                    const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
+
+}  // namespace poise

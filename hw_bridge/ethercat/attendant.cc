@@ -1,0 +1,233 @@
+#include "hw_bridge/ethercat/attendant.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "hw_bridge/ethercat/distributed_clocks.h"
+
+namespace poise::ethercat {
+namespace {
+
+// Between two rounds over all slaves: errors are to be seen while someone looks on, not sooner.
+constexpr int64_t kRound = 20 * kMillisecond;
+constexpr int64_t kLookAgain = 2 * kMillisecond;  // at a slave that is not in OP
+constexpr int kAttempts = 3;                      // frames for a datagram
+
+}  // namespace
+
+Attendant::Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockPlan clocks,
+                     const std::vector<SlaveAccess>& slaves, const std::vector<int>& positions,
+                     const Timeouts& timeouts, bool lockstep, Say say)
+    : config_(config),
+      setup_(setup),
+      clocks_(std::move(clocks)),
+      positions_(positions),
+      lockstep_(lockstep),
+      say_(std::move(say)),
+      transactions_(&slot_, timeouts.state, kAttempts),
+      complaints_(slaves.size()),
+      left_at_(slaves.size(), -1) {
+  for (const SlaveAccess& slave : slaves) {
+    slaves_.push_back(slave.Through(&transactions_));
+    Cell& cell = cells_.emplace_back();
+    cell.al = static_cast<uint8_t>(AlState::kOp);
+  }
+  thread_ = std::thread([this] { Run(); });
+}
+
+Attendant::~Attendant() {
+  while (!ended_) {
+    slot_.Close();
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  thread_.join();
+}
+
+void Attendant::BeginCycle(int64_t now, bool trouble) {
+  if (trouble) trouble_.store(true, std::memory_order_relaxed);
+  slot_.Advance(now);
+  if (lockstep_) slot_.Settle();
+}
+
+SlaveDiagnosis Attendant::diagnosis(size_t slave) const {
+  const Cell& cell = cells_[slave];
+  const uint32_t al = cell.al.load(std::memory_order_relaxed);
+  return {.online = cell.online.load(std::memory_order_relaxed),
+          .al_status = static_cast<uint8_t>(al),
+          .al_code = static_cast<uint16_t>(al >> 16),
+          .error_code = cell.error_code.load(std::memory_order_relaxed),
+          .emergency = cell.emergency.load(std::memory_order_relaxed),
+          .emergencies = cell.emergencies.load(std::memory_order_relaxed),
+          .clock_difference = cell.clock_difference.load(std::memory_order_relaxed),
+          .receive_errors = cell.receive_errors.load(std::memory_order_relaxed),
+          .lost_links = cell.lost_links.load(std::memory_order_relaxed),
+          .recoveries = cell.recoveries.load(std::memory_order_relaxed)};
+}
+
+void Attendant::Complain(size_t slave, const std::string& line) {
+  if (complaints_[slave] == line) return;  // once, until it is back
+  complaints_[slave] = line;
+  if (say_) say_(line);
+}
+
+void Attendant::Run() {
+  std::array<uint8_t, 1> none;
+  for (int turn = 0; !slot_.closed(); ++turn) {
+    const bool trouble = trouble_.exchange(false);
+    for (size_t i = 0; i < slaves_.size() && !slot_.closed(); ++i) {
+      // Details can wait while slaves are to be led back.
+      LookAt(i, trouble ? -1 : turn);
+    }
+    const int64_t pause = trouble ? kLookAgain : kRound;
+    static_cast<void>(slot_.Receive(none, slot_.Now() + pause));
+  }
+  slot_.Finish();
+  ended_ = true;
+}
+
+void Attendant::LookAt(size_t slave, int turn) {
+  try {
+    if (!NoteState(slave)) {
+      Recover(slave);
+    } else if (turn >= 0) {
+      NoteDetails(slave, turn);
+    }
+  } catch (const EthercatError& error) {
+    if (!slot_.closed()) Complain(slave, error.what());
+  }
+}
+
+bool Attendant::NoteState(size_t slave) {
+  Cell& cell = cells_[slave];
+  std::array<uint8_t, 6> bytes{};
+  const auto counter =
+      transactions_.Execute(Command::kFprd, slaves_[slave].station(), reg::kAlStatus, bytes, 1);
+  cell.online = counter && *counter == 1;
+  if (cell.online) cell.al = uint32_t{bytes[0]} | uint32_t{Get<uint16_t>(bytes, 4)} << 16;
+  const bool operational = cell.online && bytes[0] == static_cast<uint8_t>(AlState::kOp);
+  if (operational) {
+    left_at_[slave] = -1;
+    complaints_[slave].clear();
+  } else if (left_at_[slave] < 0) {
+    left_at_[slave] = slot_.Now();
+  }
+  return operational;
+}
+
+void Attendant::NoteDetails(size_t slave, int turn) {
+  Cell& cell = cells_[slave];
+  SlaveAccess& access = slaves_[slave];
+  // One of them a round.
+  switch (turn % 4) {
+    case 0: {
+      std::array<uint8_t, 20> errors{};  // 0x0300 to 0x0313
+      access.Read(reg::kReceiveErrors, errors);
+      int32_t received = 0, lost = 0;
+      for (size_t i = 0; i < 8; ++i) received += errors[i];
+      for (size_t i = reg::kLostLinks - reg::kReceiveErrors; i < errors.size(); ++i) {
+        lost += errors[i];
+      }
+      cell.receive_errors = received;
+      cell.lost_links = lost;
+      return;
+    }
+    case 1:
+      if (clocks_.running && clocks_.has_clock[slave]) {
+        cell.clock_difference = DcDifference(access.Read<uint32_t>(reg::kDcDifference));
+      }
+      return;
+    case 2:
+      access.PollMailbox();
+      cell.emergencies = access.emergencies();
+      cell.emergency = access.last_emergency().code;
+      return;
+    default:
+      if (!setup_->is_drive(slave)) return;
+      cell.error_code = static_cast<uint16_t>(access.Upload({object::kErrorCode, 0}));
+      cell.emergencies = access.emergencies();
+      cell.emergency = access.last_emergency().code;
+  }
+}
+
+void Attendant::Recover(size_t slave) {
+  SlaveAccess& access = slaves_[slave];
+  Cell& cell = cells_[slave];
+  if (!cell.online) {
+    // Its configured address is gone with its power; its place is not.
+    std::array<uint8_t, 2> station{};
+    const auto counter = transactions_.Execute(
+        Command::kAprd, AutoIncrementAddress(positions_[slave]), reg::kStationAddress, station, 1);
+    if (!counter || *counter != 1) {
+      Complain(slave, fmt::format("{}: does not answer; cable or power", access.Describe()));
+      return;
+    }
+    if (Get<uint16_t>(station, 0) != 0) return;  // another one's place: the chain is cut before it
+    Complain(slave, fmt::format("{}: has started anew; it is led back", access.Describe()));
+    Rejoin(slave);
+  } else {
+    const SlaveAccess::AlStatus status = access.ReadAlStatus();
+    Complain(slave, fmt::format("{}: is in {}; it is led back to OP", access.Describe(),
+                                SlaveAccess::Text(status)));
+    if (status.state == AlState::kSafeOp) {
+      RestoreClock(slave);
+      access.ChangeState(AlState::kOp);
+    } else if (status.state != AlState::kOp || status.error) {
+      Rejoin(slave);
+    }
+  }
+  if (!NoteState(slave)) return;
+  ++cell.recoveries;
+  ++recoveries_;
+  if (say_) say_(fmt::format("{}: is in OP again", access.Describe()));
+}
+
+void Attendant::RestoreClock(size_t slave) {
+  if (!clocks_.running || !clocks_.has_clock[slave] || slave == clocks_.reference) return;
+  SlaveAccess& access = slaves_[slave];
+  const int32_t difference = DcDifference(access.Read<uint32_t>(reg::kDcDifference));
+  if (std::abs(int64_t{difference}) <= config_->clock_tolerance()) return;
+  StartClock(slave);
+}
+
+void Attendant::StartClock(size_t slave) {
+  SlaveAccess& access = slaves_[slave];
+  access.Write<uint8_t>(reg::kDcActivation, 0);
+  // The reference itself takes the time from one that has kept it.
+  for (size_t other = 0; other < slaves_.size(); ++other) {
+    const size_t from = (clocks_.reference + other) % slaves_.size();
+    if (from == slave || !clocks_.has_clock[from]) continue;
+    try {
+      JoinClock(&transactions_, &slaves_[from], &access,
+                clocks_.delays[slave] - clocks_.delays[from]);
+      break;
+    } catch (const EthercatError& error) {
+      Complain(from, error.what());  // it has no time to give; another may
+    }
+  }
+  StartSync0(&access, config_->cycle(), config_->sync0_shift());
+}
+
+void Attendant::Rejoin(size_t slave) {
+  SlaveAccess& access = slaves_[slave];
+  std::array<uint8_t, 2> station{};
+  Put<uint16_t>(station, 0, access.station());
+  static_cast<void>(transactions_.Execute(Command::kApwr, AutoIncrementAddress(positions_[slave]),
+                                          reg::kStationAddress, station));
+  access.RequestState(AlState::kInit);
+  access.AwaitInit();
+  constexpr std::array<uint8_t, kNumFmmus * kFmmuSize> kZeros{};
+  if (clocks_.has_clock[slave]) access.Write<uint8_t>(reg::kDcActivation, 0);
+  for (const auto& [address, size] : {std::pair<uint16_t, size_t>{reg::kFmmu, 2 * kFmmuSize},
+                                      {reg::kSyncManager, 4 * kSyncManagerSize}}) {
+    access.Write(address, std::span(kZeros).first(size));
+  }
+  static_cast<void>(setup_->Check(slave, &access));
+  setup_->Configure(slave, &access);
+  if (clocks_.running && clocks_.has_clock[slave]) StartClock(slave);
+  access.ChangeState(AlState::kSafeOp);
+  access.ChangeState(AlState::kOp);
+}
+
+}  // namespace poise::ethercat

@@ -1,0 +1,99 @@
+// Attendant: looks after the slaves while the cycle goes on. It leads those that have left OP back
+// to it and reads what each says of itself.
+#pragma once
+
+#include <atomic>
+#include <deque>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "hw_bridge/ethercat/links/slot_link.h"
+#include "hw_bridge/ethercat/slave_setup.h"
+
+namespace poise::ethercat {
+
+/// What a slave has shown of late.
+struct SlaveDiagnosis {
+  bool online = true;       ///< it answers
+  uint8_t al_status = 0;    ///< register 0x0130: state, and 0x10 for an error
+  uint16_t al_code = 0;     ///< register 0x0134
+  uint16_t error_code = 0;  ///< 603F; 0 of a slave that is no drive
+  uint16_t emergency = 0;   ///< the last one's code
+  int64_t emergencies = 0;
+  int32_t clock_difference = 0;  ///< ns, register 0x092C
+  int32_t receive_errors = 0;    ///< registers 0x0300 to 0x0307, of all ports
+  int32_t lost_links = 0;        ///< registers 0x0310 to 0x0313, of all ports
+  int64_t recoveries = 0;        ///< times that it was led back to OP
+};
+
+/// How clocks are kept, for slaves that come back.
+struct ClockPlan {
+  bool running = false;
+  size_t reference = 0;         ///< slave whose time is everybody's
+  std::vector<bool> has_clock;  ///< by slave
+  std::vector<int32_t> delays;  ///< ns, by slave
+};
+
+/// Runs in a thread of its own, whose datagrams go in the cycle's frames. Everything it does can
+/// wait: only drives' own watchdogs and the supervisor answer for safety.
+class Attendant {
+ public:
+  using Say = std::function<void(const std::string& line)>;
+  /// `slaves` as they are in OP; all others must outlive this. `lockstep`: each cycle waits until
+  /// this thread waits for it, so that the same cycles give the same frames. `say`: told of slaves
+  /// that leave OP and come back, from this thread.
+  Attendant(const MasterConfig* config, const SlaveSetup* setup, ClockPlan clocks,
+            const std::vector<SlaveAccess>& slaves, const std::vector<int>& positions,
+            const Timeouts& timeouts, bool lockstep, Say say);
+  /// Ends the thread.
+  ~Attendant();
+
+  // The cycle's side: none of these waits (but in lockstep) or allocates.
+  SlotLink& slot() { return slot_; }
+  /// A cycle begins at `now`, ns. `trouble`: not all slaves are in OP, or not all have answered.
+  void BeginCycle(int64_t now, bool trouble);
+  SlaveDiagnosis diagnosis(size_t slave) const;
+  /// All slaves' recoveries.
+  int64_t recoveries() const { return recoveries_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Cell {
+    std::atomic<bool> online{true};
+    std::atomic<uint32_t> al{0};  // status, and the code above it
+    std::atomic<uint16_t> error_code{0}, emergency{0};
+    std::atomic<int64_t> emergencies{0}, recoveries{0};
+    std::atomic<int32_t> clock_difference{0}, receive_errors{0}, lost_links{0};
+  };
+
+  void Run();
+  void LookAt(size_t slave, int turn);
+  /// Whether the slave is in OP without an error.
+  bool NoteState(size_t slave);
+  void NoteDetails(size_t slave, int turn);
+  void Recover(size_t slave);
+  /// A slave that has lost its configuration: everything from INIT on.
+  void Rejoin(size_t slave);
+  void RestoreClock(size_t slave);
+  void StartClock(size_t slave);
+  void Complain(size_t slave, const std::string& line);
+
+  const MasterConfig* config_;
+  const SlaveSetup* setup_;
+  ClockPlan clocks_;
+  std::vector<int> positions_;
+  bool lockstep_;
+  Say say_;
+  SlotLink slot_;
+  Transactions transactions_;
+  std::vector<SlaveAccess> slaves_;
+  std::deque<Cell> cells_;
+  std::vector<std::string> complaints_;  // the last line of each slave
+  std::vector<int64_t> left_at_;         // ns, when a slave was first seen outside OP; -1: in OP
+  std::atomic<bool> trouble_{false}, ended_{false};
+  std::atomic<int64_t> recoveries_{0};
+  std::thread thread_;
+};
+
+}  // namespace poise::ethercat

@@ -1,0 +1,230 @@
+#include <Eigen/Cholesky>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+// Share of the weight from which on a foot has a centre of pressure worth comparing.
+constexpr double kCopShare = 0.25;
+// A touch-down by the true load: as ContactConfirmation's defaults have it.
+constexpr double kTrueTouchLoad = 10, kTrueTouchTime = 0.02;  // N, s
+constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
+
+using Wrench = Eigen::Matrix<double, 6, 1>;
+
+double WeightOf(const RunRecord& run) { return run.robot.total_mass() * robot::kGravity; }
+
+struct Compared {
+  Wrench observed, truth;
+};
+
+/// Of one foot; empty without observer.
+std::optional<Compared> WrenchesAt(const RunRecord& run, size_t foot, int64_t tick) {
+  const estimator_status_t* status = run.estimator.at(tick);
+  const ground_truth_t* truth = run.truth.at(tick);
+  if (status == nullptr || truth == nullptr || status->has_observer == 0) return {};
+  return Compared{GetWrench(status->observed_wrench[foot]), GetWrench(truth->foot_wrench[foot])};
+}
+
+/// Largest over both feet of what `value` gives.
+std::function<Answer(const RunRecord&, int64_t)> OfFeet(
+    std::function<Answer(const RunRecord&, const Compared&)> value) {
+  return [value](const RunRecord& run, int64_t tick) {
+    Answer result;
+    for (size_t foot = 0; foot < 2; ++foot) {
+      const auto compared = WrenchesAt(run, foot, tick);
+      if (!compared) continue;
+      const Answer v = value(run, *compared);
+      if (v) result = std::max(result.value_or(0), *v);
+    }
+    return result;
+  };
+}
+
+void AddObserverErrors(MetricList* list, const char* name, const char* unit, const char* text,
+                       const std::function<Answer(const RunRecord&, int64_t)>& value) {
+  list->push_back({fmt::format("observer_{}_rms", name), unit,
+                   fmt::format("observed less true {}, of the worse foot, RMS", text),
+                   [value](const RunRecord& run) {
+                     return RootMeanSquare(run, [&](int64_t t) { return value(run, t); });
+                   }});
+  list->push_back({fmt::format("observer_{}_max", name), unit,
+                   fmt::format("observed less true {}, of the worse foot, largest", text),
+                   [value](const RunRecord& run) {
+                     return Maximum(run, [&](int64_t t) { return value(run, t); });
+                   }});
+}
+
+Answer ObserverNees(const RunRecord& run, int64_t tick) {
+  const auto right = WrenchesAt(run, 0, tick), left = WrenchesAt(run, 1, tick);
+  if (!right || !left) return {};
+  const estimator_status_t& status = *run.estimator.at(tick);
+  Eigen::Matrix<double, 12, 12> covariance;
+  size_t next = 0;
+  for (int row = 0; row < 12; ++row) {
+    for (int column = row; column < 12; ++column) {
+      covariance(row, column) = covariance(column, row) = status.observed_covariance[next++];
+    }
+  }
+  Eigen::Matrix<double, 12, 1> error;
+  error << right->observed - right->truth, left->observed - left->truth;
+  const Eigen::LLT<Eigen::Matrix<double, 12, 12>> factors(covariance);
+  if (factors.info() != Eigen::Success) return {};
+  return error.dot(factors.solve(error));
+}
+
+/// When the foot's true load has been above kTrueTouchLoad for kTrueTouchTime, the last time before
+/// `tick` or the first after it.
+std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick) {
+  const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
+  const auto loaded = [&](int64_t t) {
+    const ground_truth_t* truth = run.truth.at(t);
+    return truth != nullptr && -truth->foot_wrench[foot].force[2] > kTrueTouchLoad;
+  };
+  int64_t begin = tick;
+  if (loaded(tick)) {
+    while (begin > 0 && loaded(begin - 1)) --begin;
+  } else {
+    while (begin < run.num_ticks && !loaded(begin)) ++begin;
+    if (begin == run.num_ticks) return {};
+  }
+  return begin + lasts;
+}
+
+// s: what the calibration is asked for at, and how long its figures are averaged.
+constexpr double kCalibrated = 2, kAveraged = 0.2;
+
+/// Mean of what `value` gives in the kAveraged before `time`, s; empty when the run is shorter.
+Answer MeanBefore(const RunRecord& run, double time, const std::function<Answer(int64_t)>& value) {
+  double sum = 0;
+  int64_t count = 0;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (run.time(tick) > time || run.time(tick) < time - kAveraged) continue;
+    if (const Answer v = value(tick)) {
+      sum += *v;
+      ++count;
+    }
+  }
+  if (count == 0 || run.time(run.num_ticks) < time) return {};
+  return sum / static_cast<double>(count);
+}
+
+void AddCalibration(MetricList* list) {
+  const auto mass = [](const RunRecord& run, int64_t tick) -> Answer {
+    const robot_state_t* state = run.state.at(tick);
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (state == nullptr || truth == nullptr) return {};
+    double force = 0;
+    for (size_t f = 0; f < 2; ++f) {
+      force +=
+          (GetPose(truth->foot_pose[f]).linear() * GetVector3(truth->foot_wrench[f].force)).z();
+    }
+    const double carried = -force / robot::kGravity;
+    return 100 * (run.robot.total_mass() + state->load_mass - carried) / carried;
+  };
+  const auto com = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
+    const support_plan_t* plan = run.plan.at(tick);
+    const ground_truth_t* truth = run.truth.at(tick);
+    if (plan == nullptr || truth == nullptr) return {};
+    return kMilli * (plan->com_position[axis] - truth->com_position[axis]);
+  };
+  const auto tilt = [](const RunRecord& run, int64_t tick, int axis) -> Answer {
+    const estimator_status_t* status = run.estimator.at(tick);
+    if (status == nullptr || status->calibration == estimator_status_t::CALIBRATION_OFF) return {};
+    return kMilli * status->imu_tilt[axis];
+  };
+  for (const bool end : {false, true}) {
+    const std::string when = end ? "end" : "2s";
+    const std::string text = end ? "at the end" : "after 2 s";
+    const auto time = [end](const RunRecord& run) {
+      return end ? run.time(run.num_ticks) : kCalibrated;
+    };
+    list->push_back({"mass_error_" + when, "%",
+                     "mass that the controller believes in less what the ground carries, " + text,
+                     [=](const RunRecord& run) {
+                       return MeanBefore(run, time(run), [&](int64_t t) { return mass(run, t); });
+                     }});
+    for (int axis = 0; axis < 3; ++axis) {
+      list->push_back({fmt::format("com_estimate_error_{}_{}", kAxis[axis], when), "mm",
+                       fmt::format("estimated less true COM, {}, {}", kAxis[axis], text),
+                       [=](const RunRecord& run) {
+                         return MeanBefore(run, time(run),
+                                           [&](int64_t t) { return com(run, t, axis); });
+                       }});
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      list->push_back({fmt::format("imu_tilt_{}_{}", kAxis[axis], when), "mrad",
+                       fmt::format("tilt of the IMU about its {}, as found, {}", kAxis[axis], text),
+                       [=](const RunRecord& run) {
+                         return MeanBefore(run, time(run),
+                                           [&](int64_t t) { return tilt(run, t, axis); });
+                       }});
+    }
+  }
+}
+
+}  // namespace
+
+void AddObserver(MetricList* list) {
+  AddCalibration(list);
+  AddObserverErrors(list, "force", "%", "foot force, share of the weight",
+                    OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
+                      return 100 * (c.observed - c.truth).head<3>().norm() / WeightOf(run);
+                    }));
+  AddObserverErrors(
+      list, "cop", "mm", "centre of pressure in the sole, of feet with a quarter of the weight",
+      OfFeet([](const RunRecord& run, const Compared& c) -> Answer {
+        if (-c.truth[2] < kCopShare * WeightOf(run) || !(c.observed[2] < 0)) return {};
+        const auto cop = [](const Wrench& w) { return Eigen::Vector2d(-w[4] / w[2], w[3] / w[2]); };
+        return kMilli * (cop(c.observed) - cop(c.truth)).norm();
+      }));
+  list->push_back({"observer_nees_share", "",
+                   "ticks whose normalised squared error of both observed foot wrenches lies below "
+                   "21.03, which a right covariance gives for 0.95",
+                   [](const RunRecord& run) -> Answer {
+                     int64_t count = 0;
+                     const Answer inside = CountTicks(run, [&](int64_t t) -> std::optional<bool> {
+                       const Answer value = ObserverNees(run, t);
+                       if (!value) return {};
+                       ++count;
+                       return *value < kWrenchNeesBound;
+                     });
+                     if (count == 0) return {};
+                     return Scaled(inside, 1.0 / static_cast<double>(count));
+                   }});
+  list->push_back(
+      {"touch_down_delay_max", "ms",
+       "touch-downs as planned for, less when the true load had been above 10 N for 20 ms, "
+       "largest size",
+       [](const RunRecord& run) {
+         Answer worst;
+         for (const TouchDown& touch : TouchDowns(run)) {
+           const auto truth = TrueTouch(run, touch.foot, touch.tick);
+           if (!truth) continue;
+           const double late = run.duration(touch.tick - *truth);
+           worst = std::max(worst.value_or(0), kMilli * std::abs(late));
+         }
+         return worst;
+       }});
+  list->push_back(
+      {"foot_sensor_fault_time", "s",
+       "time in which a foot's sensor was taken for broken (a robot without sensors has none)",
+       [](const RunRecord& run) {
+         return Scaled(CountTicks(run,
+                                  [&](int64_t t) -> std::optional<bool> {
+                                    const estimator_status_t* status = run.estimator.at(t);
+                                    if (status == nullptr) return {};
+                                    for (const int8_t state : status->foot_sensor) {
+                                      if (state > estimator_status_t::SENSOR_ABSENT) return true;
+                                    }
+                                    return false;
+                                  }),
+                       run.spec.tick_period());
+       }});
+}
+
+}  // namespace poise::logging

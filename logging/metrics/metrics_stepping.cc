@@ -1,0 +1,86 @@
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+/// Ticks in which a foot is on its way, a step each.
+std::vector<Interval> Steps(const RunRecord& run) {
+  return Intervals(run, [&](int64_t tick) -> std::optional<bool> {
+    const support_plan_t* plan = run.plan.at(tick);
+    if (plan == nullptr) return {};
+    return plan->stepping == support_plan_t::STEPPING_UNLOADING ||
+           plan->stepping == support_plan_t::STEPPING_SWINGING;
+  });
+}
+
+/// The first tick that was pushed in.
+std::optional<int64_t> PushBegin(const RunRecord& run) {
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const external_push_t* push = run.push.at(tick);
+    if (push == nullptr) continue;
+    for (const double force : push->force) {
+      if (force != 0) return tick;
+    }
+  }
+  return {};
+}
+
+Answer FromPush(const RunRecord& run, std::optional<int64_t> tick) {
+  const std::optional<int64_t> push = PushBegin(run);
+  if (!push || !tick || *tick < *push) return {};
+  return run.duration(*tick - *push);
+}
+
+std::optional<Interval> FirstStep(const RunRecord& run) {
+  const std::vector<Interval> steps = Steps(run);
+  if (steps.empty()) return {};
+  return steps.front();
+}
+
+}  // namespace
+
+void AddStepping(MetricList* list) {
+  list->push_back({"steps", "", "steps of the planner's own, begun", [](const RunRecord& run) {
+                     return Maximum(run, [&](int64_t t) -> Answer {
+                       const support_plan_t* plan = run.plan.at(t);
+                       if (plan == nullptr) return {};
+                       return plan->num_steps;
+                     });
+                   }});
+  list->push_back({"step_decision", "s", "from the push's begin to the decision for a step",
+                   [](const RunRecord& run) -> Answer {
+                     const std::optional<Interval> step = FirstStep(run);
+                     return step ? FromPush(run, step->begin) : Answer();
+                   }});
+  list->push_back({"step_touch_down", "s", "from the push's begin to the first step's touch-down",
+                   [](const RunRecord& run) -> Answer {
+                     const std::optional<Interval> step = FirstStep(run);
+                     return step ? FromPush(run, step->end) : Answer();
+                   }});
+  list->push_back({"step_duration", "s", "the longest from a step's decision to its touch-down",
+                   [](const RunRecord& run) -> Answer {
+                     Answer longest;
+                     for (const Interval& step : Steps(run)) {
+                       if (!step.end) continue;
+                       longest =
+                           std::max(longest.value_or(0), run.duration(*step.end - step.begin));
+                     }
+                     return longest;
+                   }});
+  list->push_back({"foothold_margin_min", "mm",
+                   "capture point inside the soles (negative: outside) as a foot touches down, "
+                   "planned, smallest",
+                   [](const RunRecord& run) -> Answer {
+                     Answer least;
+                     for (const Interval& step : Steps(run)) {
+                       const support_plan_t* plan = step.end ? run.plan.at(*step.end) : nullptr;
+                       if (plan == nullptr) continue;
+                       const double margin = kMilli * plan->foothold_margin;
+                       least = least ? std::min(*least, margin) : margin;
+                     }
+                     return least;
+                   }});
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,151 @@
+// What `poise robot check` says, against statics and the pendulum by hand.
+#include "tools/robot/robot_check.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/robot/dynamics.h"
+#include "components/robot_files/robot_files.h"
+#include "tools/cli/output_style.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+fs::path Robots() { return fs::path(POISE_SOURCE_DIR) / "deploy" / "robots"; }
+
+const RobotCheck& Paper() {
+  static const RobotCheck check = CheckRobot(Robots() / "dyros" / "dyros_legs.pbtxt");
+  return check;
+}
+
+const RobotCheck& Heron() {
+  static const RobotCheck check = CheckRobot(Robots() / "heron" / "heron.pbtxt");
+  return check;
+}
+
+/// A check of the paper's robot with its text changed.
+RobotCheck Edited(const std::string& what, const std::string& instead) {
+  const fs::path folder = fs::path(testing::TempDir()) / "poise_robot_check";
+  fs::create_directories(folder);
+  fs::copy_file(Robots() / "dyros" / "dyros_legs.urdf", folder / "dyros_legs.urdf",
+                fs::copy_options::overwrite_existing);
+  std::string text = ReadFile((Robots() / "dyros" / "dyros_legs.pbtxt").string());
+  const size_t at = text.find(what);
+  EXPECT_NE(at, std::string::npos);
+  text.replace(at, what.size(), instead);
+  const fs::path file = folder / "dyros_legs.pbtxt";
+  std::ofstream(file) << text;
+  return CheckRobot(file);
+}
+
+TEST(RobotCheck, PushesAreThePendulumsToTheSolesEdges) {
+  const RobotCheck& check = Paper();
+  EXPECT_NEAR(check.com_height, 0.75, 1e-7);
+  EXPECT_NEAR(check.frequency, std::sqrt(9.80665 / 0.75), 1e-6);
+  ASSERT_EQ(check.pushes.size(), 16u);
+  const double momentum = check.model.total_mass() * check.frequency;
+  // Soles of 0.30 x 0.15 m, the COM midway between them or above one's centre.
+  EXPECT_NEAR(check.pushes[0].both, momentum * 0.15, 1e-4);
+  EXPECT_NEAR(check.pushes[4].both, momentum * (0.5 * check.foot_spacing + 0.075), 1e-4);
+  EXPECT_NEAR(check.pushes[12].right, momentum * 0.075, 1e-4);
+  EXPECT_NEAR(check.pushes[8].left, momentum * 0.15, 1e-4);
+  // Obliquely over the long edge or the short one, whichever is nearer.
+  EXPECT_NEAR(check.pushes[2].right, momentum * 0.075 * std::numbers::sqrt2, 1e-4);
+}
+
+TEST(RobotCheck, AKneeBearsMoreOnOneFootThanOnBoth) {
+  for (const RobotCheck* check : {&Paper(), &Heron()}) {
+    ASSERT_TRUE(check->stands_on_one_foot);
+    for (const JointLoad& load : check->loads) {
+      if (load.joint.find("knee") == std::string::npos) continue;
+      EXPECT_GT(load.single_support, 1.5 * load.double_support);
+      // The whole weight a quarter of a metre before the knee would be a deep crouch.
+      EXPECT_LT(load.single_support, check->model.total_mass() * robot::kGravity * 0.25);
+    }
+  }
+}
+
+// The stance is symmetric: each leg bears half. Then virtual work about the knees' common axis: the
+// weight above them turns about it as both knees' torques together do.
+TEST(RobotCheck, TorqueOnBothFeetIsThatOfVirtualWork) {
+  const RobotCheck& check = Paper();
+  const robot::RobotModel& model = check.model;
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, check.stance, &data);
+  const auto joint = static_cast<size_t>(model.FindJoint("right_knee_pitch"));
+  const auto body = static_cast<size_t>(model.joints()[joint].body);
+  const Vector3d knee = data.base_position + data.body_position[body];
+  double moment = 0;
+  for (size_t b = 0; b < model.bodies().size(); ++b) {
+    const std::string& name = model.bodies()[b].name;
+    if (name.find("shank") != std::string::npos || name.find("ankle") != std::string::npos ||
+        name.find("foot") != std::string::npos) {
+      continue;
+    }
+    const Vector3d com =
+        data.base_position + data.body_position[b] + data.body_rotation[b] * model.bodies()[b].com;
+    moment += model.bodies()[b].mass * robot::kGravity * (com.x() - knee.x());
+  }
+  // Horizontal forces of the ground, which cancel between the feet, do not turn about an axis in y.
+  const double knees =
+      check.loads[joint].double_support +
+      check.loads[static_cast<size_t>(model.FindJoint("left_knee_pitch"))].double_support;
+  EXPECT_NEAR(knees, std::abs(moment), 1e-6);
+}
+
+TEST(RobotCheck, SolesHaveTheirAreas) {
+  EXPECT_NEAR(Paper().soles[0].area, 0.30 * 0.15, 1e-12);
+  EXPECT_EQ(Paper().soles[0].corners.size(), 4u);
+  // Of the polygon in strips between its corners: trapezoids from heel to ball, and to the toe.
+  const double area = 0.11 * (0.072 + 0.092) / 2 + 0.07 * 0.092 + 0.04 * (0.092 + 0.072) / 2;
+  EXPECT_NEAR(Heron().soles[0].area, area, 1e-12);
+  EXPECT_NEAR(Heron().soles[1].area, area, 1e-12);
+  EXPECT_EQ(Heron().soles[1].corners.size(), 8u);
+}
+
+TEST(RobotCheck, ReachIsWithinTheLegsLength) {
+  for (const RobotCheck* check : {&Paper(), &Heron()}) {
+    for (const double reach :
+         {check->reach.forward, check->reach.back, check->reach.outward, check->reach.up}) {
+      EXPECT_GT(reach, 0.05);
+      EXPECT_LT(reach, 1.2);
+    }
+    EXPECT_LT(check->reach.up, check->com_height);
+  }
+}
+
+TEST(RobotCheck, BothOfTheHousesRobotsAreGood) {
+  for (const RobotCheck* check : {&Paper(), &Heron()}) {
+    EXPECT_TRUE(check->ok()) << FormatRobotCheck(*check, 80);
+  }
+}
+
+TEST(RobotCheck, NamesWhatIsTooWeakAndWhatStandsAtItsEnd) {
+  const RobotCheck weak = Edited("torque_constant: 0.10", "torque_constant: 0.02");
+  ASSERT_FALSE(weak.ok());
+  EXPECT_NE(FormatRobotCheck(weak, 200).find("knee_pitch needs"), std::string::npos)
+      << FormatRobotCheck(weak, 200);
+}
+
+TEST(RobotCheck, FitsATerminalAndSaysTheSameAsJson) {
+  std::istringstream text(FormatRobotCheck(Heron(), 80));
+  for (std::string line; std::getline(text, line);) EXPECT_LE(DisplayWidth(line), 80) << line;
+  const nlohmann::ordered_json json = RobotCheckJson(Heron());
+  EXPECT_EQ(json["torque"].size(), 29u);
+  EXPECT_EQ(json["push"].size(), 16u);
+  EXPECT_NEAR(json["mass"].get<double>(), 48.4, 1e-9);
+  EXPECT_TRUE(json["defects"].empty());
+}
+
+}  // namespace
+}  // namespace poise

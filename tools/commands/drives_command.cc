@@ -1,0 +1,179 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <memory>
+
+#include "components/framework/configuration/configuration.h"
+#include "hw_bridge/ethercat/emulator/rotor_chain.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/output_place.h"
+#include "tools/cli/signals.h"
+#include "tools/commands/commands.h"
+#include "tools/commands/drives_scan.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+struct DrivesOptions {
+  std::string link = "udp";
+  int count = 12;
+  std::string profile = "elmo_gold";
+  double inertia = 1e-4;
+  double damping = 1e-3;
+  double duration = 0;
+  std::string out;
+};
+
+/// "raw:eth1", "udp", "udp:PORT" or "udp:ADDRESS:PORT".
+ethercat::LinkConfig ParseLink(const std::string& text) {
+  ethercat::LinkConfig link;
+  if (text.starts_with("raw:") && text.size() > 4) {
+    link.set_interface(text.substr(4));
+    return link;
+  }
+  if (text != "udp" && !text.starts_with("udp:")) {
+    throw ConfigError(
+        fmt::format("--link {}: must be udp, udp:PORT, udp:ADDRESS:PORT, or raw:INTERFACE", text));
+  }
+  link.mutable_udp();
+  if (text == "udp") return link;
+  std::string rest = text.substr(4);
+  if (const size_t colon = rest.rfind(':'); colon != std::string::npos) {
+    link.mutable_udp()->set_address(rest.substr(0, colon));
+    rest = rest.substr(colon + 1);
+  }
+  uint32_t port = 0;
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), port);
+  if (error != std::errc() || end != rest.data() + rest.size() || port == 0 || port > 0xFFFF) {
+    throw ConfigError(fmt::format("--link {}: the port must be 1 to 65535", text));
+  }
+  link.mutable_udp()->set_port(port);
+  return link;
+}
+
+std::unique_ptr<ethercat::SocketLink> OpenSlaves(const ethercat::LinkConfig& config) {
+  if (config.has_interface()) {
+    return std::make_unique<ethercat::RawLink>(config.interface(),
+                                               ethercat::RawLink::Side::kSlaves);
+  }
+  return ethercat::UdpLink::Listen(
+      {.address = config.udp().address(), .port = static_cast<uint16_t>(config.udp().port())});
+}
+
+ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
+  ethercat::DriveProfile profile;
+  ReadTextProto((DeployDir() / "drives" / (options.profile + ".pbtxt")).string(), &profile);
+  ethercat::EmulatedChainConfig chain;
+  for (int i = 0; i < options.count; ++i) {
+    ethercat::EmulatedDriveConfig& drive = *chain.add_drive();
+    drive.set_vendor_id(profile.vendor_id());
+    drive.set_product_code(profile.product_code());
+    drive.set_serial(static_cast<uint32_t>(100 + i));
+    drive.set_device_name(profile.name());
+    drive.set_al_response_time(1);  // as a real one: it reads AL control when it gets to it
+    drive.set_torque_unit(profile.rated_torque_unit() < 1 ? 1000 : 1);
+    if (!profile.fixed_mapping()) continue;
+    *drive.mutable_fixed_rx() = profile.rx();
+    *drive.mutable_fixed_tx() = profile.tx();
+  }
+  return chain;
+}
+
+void ShowDrives(ethercat::RotorChain* drives, int64_t frames, double seconds) {
+  std::string states;
+  double torque = 0, speed = 0;
+  for (size_t i = 0; i < drives->chain().size(); ++i) {
+    const ethercat::EmulatedSlave& slave = drives->chain().slave(i);
+    const std::string name(ethercat::Name(slave.al_state()));
+    const std::string state =
+        fmt::format("{}{} ({})", name, slave.al_error() ? " with an error" : "",
+                    ethercat::Name(slave.drive().state()));
+    if (i == 0) states = state;
+    if (state != states) states = "differing states";
+    torque = std::max(torque, std::abs(drives->rotor(i).torque()));
+    speed = std::max(speed, std::abs(drives->rotor(i).velocity()));
+  }
+  fmt::print("{:6.0f} s  {:6} frames/s  {}  torque at most {:.3f} N·m, speed {:.1f} rad/s\n",
+             seconds, frames, states, torque, speed);
+  std::fflush(stdout);
+}
+
+int Emulate(const DrivesOptions& options) {
+  CatchStopSignals();
+  const auto link = OpenSlaves(ParseLink(options.link));
+  ethercat::RotorChain drives(ChainOf(options), options.inertia, options.damping);
+  fmt::print("{} drives of type {} on {}; Ctrl-C ends them\n", options.count, options.profile,
+             options.link);
+  std::fflush(stdout);
+  const int64_t start = link->Now();
+  const auto end =
+      options.duration > 0 ? start + static_cast<int64_t>(options.duration * 1e9) : INT64_MAX;
+  std::array<uint8_t, ethercat::kMaxFrame> frame{};
+  int64_t shown = start, frames = 0;
+  while (StopSignal() == 0 && link->Now() < end) {
+    const size_t size = link->Receive(frame, link->Now() + ethercat::kMillisecond);
+    const int64_t now = link->Now() - start;
+    const std::span<uint8_t> bytes = std::span(frame).first(size);
+    if (size == 0) {
+      drives.AdvanceTo(now);
+    } else if (drives.HandleFrame(bytes, now)) {
+      static_cast<void>(link->Send(bytes));
+    }
+    if (link->Now() - shown < ethercat::kSecond) continue;
+    shown = link->Now();
+    ShowDrives(&drives, drives.chain().frames() - frames, static_cast<double>(now) * 1e-9);
+    frames = drives.chain().frames();
+  }
+  return kExitOk;
+}
+
+int Scan(const DrivesOptions& options) {
+  const auto link = ethercat::OpenLink(ParseLink(options.link));
+  const std::string text = ConfigurationOf(ScanChain(link.get()));
+  if (options.out.empty()) {
+    fmt::print("{}", text);
+  } else {
+    WriteFile(options.out, text);
+    fmt::print("{}: written\n", options.out);
+  }
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddDrivesCommand(CLI::App* app, Command* command) {
+  auto options = std::make_shared<DrivesOptions>();
+  CLI::App* drives = app->add_subcommand("drives", "EtherCAT drives without a robot");
+  drives->require_subcommand(1);
+  const std::string link_help = "udp, udp:PORT, udp:ADDRESS:PORT, or raw:INTERFACE (CAP_NET_RAW)";
+
+  CLI::App* emulate = drives->add_subcommand(
+      "emulate", "an emulated chain of drives, a rotor on each, for any master to try");
+  emulate->add_option("--link", options->link, link_help)->capture_default_str();
+  emulate->add_option("--count", options->count, "drives")
+      ->capture_default_str()
+      ->check(Within("in [1, 200]", [](double n) { return n >= 1 && n <= 200; }));
+  emulate->add_option("--profile", options->profile, "type, of deploy/drives")
+      ->capture_default_str();
+  emulate->add_option("--inertia", options->inertia, "kg·m², of each rotor")
+      ->capture_default_str()
+      ->check(Within("above 0", [](double value) { return value > 0; }));
+  emulate->add_option("--damping", options->damping, "N·m·s/rad, of each rotor")
+      ->capture_default_str()
+      ->check(Within("above 0", [](double value) { return value > 0; }));
+  emulate->add_option("--duration", options->duration, "s until they end; 0: until Ctrl-C")
+      ->capture_default_str();
+  emulate->callback([options, command] { *command = [options] { return Emulate(*options); }; });
+
+  CLI::App* scan = drives->add_subcommand(
+      "scan",
+      "read a chain and write it as a configuration; slaves go to PRE-OP and back, no torque");
+  scan->add_option("--link", options->link, link_help)->capture_default_str();
+  scan->add_option("--out", options->out, "file; default: standard output");
+  scan->callback([options, command] { *command = [options] { return Scan(*options); }; });
+}
+
+}  // namespace poise

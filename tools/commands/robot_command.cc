@@ -1,0 +1,79 @@
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "components/robot_files/robot_files.h"
+#include "fmt/format.h"
+#include "tools/cli/output_style.h"
+#include "tools/cli/plain_streams.h"
+#include "tools/cli/text_table.h"
+#include "tools/commands/commands.h"
+#include "tools/report/html_report.h"
+#include "tools/report/run_screen.h"
+#include "tools/robot/robot_check.h"
+#include "tools/scenario/catalog.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CheckOptions {
+  std::string robot, page;
+  bool json = false;
+};
+
+int CheckOneRobot(const CheckOptions& options) {
+  const RobotCheck check = CheckRobot(FindFile("robots", options.robot, fs::current_path()));
+  if (options.json) {
+    KeepUnicode();
+    fmt::print("{}\n", RobotCheckJson(check).dump(2));
+  } else {
+    fmt::print("{}", FormatRobotCheck(check, ScreenStyle().columns));
+  }
+  if (!options.page.empty()) {
+    WriteRobotPage(options.page, check);
+    if (!options.json) fmt::print("\nThe robot in 3D: {}\n", FileAddress(options.page));
+  }
+  return check.ok() ? kExitOk : kExitFailed;
+}
+
+int ListRobots() {
+  std::vector<TableRow> rows{{"robot", "joints", "mass", "soles"}};
+  bool good = true;
+  for (const std::string& name : ListNames("robots")) {
+    try {
+      const robot::RobotModel model = robot::LoadRobotFiles(InstalledFile("robots", name).string());
+      const bool rectangles = model.feet()[0].rectangular() && model.feet()[1].rectangular();
+      rows.push_back({name, std::to_string(model.num_joints()),
+                      FormatNumber(model.total_mass(), "kg"),
+                      rectangles ? "rectangles" : "polygons"});
+    } catch (const robot::RobotError& error) {
+      rows.push_back({name, "", "", TableCell(error.what(), Tone::kBad)});
+      good = false;
+    }
+  }
+  fmt::print("{}", FormatColumns(rows));
+  return good ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddRobotCommand(CLI::App* app, Command* command) {
+  CLI::App* robot = app->add_subcommand("robot", "bring a robot of your own, and look at robots");
+  robot->require_subcommand(1);
+  AddRobotImport(robot, command);
+  auto options = std::make_shared<CheckOptions>();
+  CLI::App* check = robot->add_subcommand(
+      "check", "what a robot is and can do, and what is wrong with its files; takes seconds");
+  check->add_option("robot", options->robot, "a name (poise robot list) or a .pbtxt file")
+      ->required();
+  check->add_flag("--json", options->json, "everything in SI units, for programs");
+  check->add_option("--page", options->page, "write the robot in 3D to this file")
+      ->type_name("FILE");
+  check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
+  CLI::App* list = robot->add_subcommand("list", "the robots that there are");
+  list->callback([command] { *command = ListRobots; });
+}
+
+}  // namespace poise

@@ -1,0 +1,125 @@
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include "components/framework/configuration/configuration.h"
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/output_place.h"
+#include "tools/cli/output_style.h"
+#include "tools/cli/text_table.h"
+#include "tools/commands/commands.h"
+#include "tools/robot_import/robot_import.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ImportArguments {
+  ImportOptions options;
+  std::string to;
+  std::vector<double> sole;
+  bool force = false;
+};
+
+Tone ToneOf(Sureness sureness) {
+  switch (sureness) {
+    case Sureness::kSure:
+      return Tone::kGood;
+    case Sureness::kLikely:
+      return Tone::kPlain;
+    default:
+      return Tone::kBad;
+  }
+}
+
+/// Puts the maker's file into the folder, untouched.
+void CopyFile(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  if (fs::equivalent(from, to, error)) return;
+  fs::copy_file(from, to, fs::copy_options::overwrite_existing, error);
+  if (error) {
+    throw ConfigError(
+        fmt::format("{}: cannot be copied to {}: {}", from.string(), to.string(), error.message()));
+  }
+}
+
+int ImportIt(ImportArguments arguments) {
+  ImportOptions& options = arguments.options;
+  if (!arguments.sole.empty()) options.sole = {arguments.sole.at(0), arguments.sole.at(1)};
+  RobotImport imported;
+  try {
+    imported = ImportRobot(options);
+  } catch (const std::exception& error) {
+    const std::string what = error.what();
+    const bool named = what.starts_with(options.file.string()) || what.starts_with("--");
+    throw ConfigError(named ? what : options.file.string() + ": " + what);
+  }
+  const std::string& name = imported.robot.name();
+  const fs::path folder = arguments.to.empty() ? fs::path(name) : fs::path(arguments.to);
+  const fs::path text = folder / (name + ".pbtxt");
+  CheckFileFree("--to", text, arguments.force);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw ConfigError(fmt::format("{}: {}", folder.string(), error.message()));
+  CopyFile(options.file, folder / options.file.filename());
+  WriteFile(text, RobotText(imported));
+
+  std::vector<TableRow> rows = {{"what", "value", "from", "how sure"}};
+  for (const Finding& f : imported.findings) {
+    rows.push_back({f.what, f.value, f.from, {SurenessName(f.sureness), ToneOf(f.sureness)}});
+  }
+  fmt::print("{}", FormatColumns(std::move(rows)));
+  if (!imported.defects.empty()) {
+    rows = {{fmt::format("{} defects of the file", imported.defects.size()), "what was done"}};
+    for (const Defect& d : imported.defects) rows.push_back({d.what, d.done});
+    fmt::print("\n{}", FormatColumns(std::move(rows)));
+  }
+  fmt::print(
+      "\n{}: the text; {} lies beside it, untouched\n  to see it stand:  poise run stand --robot "
+      "{}\n",
+      text.string(), options.file.filename().string(), folder.string());
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddRobotImport(CLI::App* robot, Command* command) {
+  auto arguments = std::make_shared<ImportArguments>();
+  ImportOptions* const options = &arguments->options;
+  CLI::App* import = robot->add_subcommand(
+      "import", "write a folder with a maker's URDF or MJCF file and the text that Poise needs");
+  import->footer(
+      "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit "
+      "code: "
+      "0 written, 2 the file cannot be used, or the robot cannot balance.");
+  import->add_option("file", options->file, "URDF (xacro expanded) or MJCF")->required();
+  import->add_option("--to", arguments->to,
+                     "folder that is written; default: the robot's name in the current folder");
+  import->add_option("--name", options->name, "of the robot; default: the file's");
+  import->add_option("--srdf", options->srdf,
+                     "group states, among them how it stands; default: the .srdf beside the file");
+  import->add_option("--stance", options->stance,
+                     "keyframe or group state in which it stands; default: one named half_sitting, "
+                     "stand or home");
+  import->add_option("--right-foot", options->foot[0], "link, in place of the one that is found");
+  import->add_option("--left-foot", options->foot[1], "link, in place of the one that is found");
+  import->add_option("--sole", arguments->sole, "length and width, m, in place of what shapes show")
+      ->expected(2)
+      ->type_name("LENGTH WIDTH")
+      ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2;
+}));
+import->add_option("--imu", options->imu, "link or site that carries it");
+import->add_option("--body", options->body, "link whose orientation is controlled");
+import->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
+    ->allow_extra_args(false)
+    ->take_all();
+import->add_flag("--force", arguments->force, "replace a text that is there");
+  import->callback(
+      [arguments, command] { *command = [arguments] { return ImportIt(*arguments);
+  };  // namespace poise
+  });
+  }
+
+  }  // namespace poise

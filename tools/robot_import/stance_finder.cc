@@ -1,0 +1,134 @@
+#include "tools/robot_import/stance_finder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "components/robot/dynamics.h"
+#include "components/robot/posture.h"
+
+namespace poise {
+namespace {
+
+using Eigen::Vector3d;
+using robot::RobotModel;
+
+// rad, between thigh and shank: far enough from the straight leg, where no torque lifts the COM.
+constexpr std::array kBends = {0.6, 0.5, 0.7, 0.4, 0.8, 0.9};
+constexpr double kLateral = 0.7;        // cosine: a joint about the lateral axis
+constexpr double kLimitShare = 0.1;     // of its range, that a joint keeps from its limits
+constexpr double kMostMargin = 0.15;    // rad, at most
+constexpr double kRounding = 1e4;       // steps in a metre that a text has
+constexpr double kJointRounding = 1e3;  // in a radian
+
+double Rounded(double value, double steps = kRounding) { return std::round(value * steps) / steps; }
+
+robot::RobotData Kinematics(const RobotModel& model, const Eigen::VectorXd& joints) {
+  robot::RobotState state(model.num_joints());
+  state.joint_position = joints;
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  return data;
+}
+
+/// rad about y, from `a` to `b` in the sagittal plane.
+double PitchBetween(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.z() * b.x() - a.x() * b.z(), a.x() * b.x() + a.z() * b.z());
+}
+
+void BendLeg(const RobotModel& model, const Anatomy& anatomy, size_t foot, double bend,
+             Eigen::VectorXd* joints) {
+  const Leg& leg = anatomy.leg[foot];
+  const robot::RobotData data = Kinematics(model, *joints);
+  struct Pitch {
+    int joint;
+    double sign;
+    Vector3d place;
+  };
+  std::vector<Pitch> pitch;
+  for (const int j : leg.joints) {
+    const auto body = static_cast<size_t>(model.joints()[static_cast<size_t>(j)].body);
+    const Vector3d axis = data.body_rotation[body] * model.joints()[static_cast<size_t>(j)].axis;
+    if (std::abs(axis.y()) < kLateral) continue;
+    pitch.push_back({j, axis.y() > 0 ? 1.0 : -1.0, data.body_position[body]});
+  }
+  if (pitch.size() < 3) return;
+  const Pitch& hip = pitch.front();
+  const Pitch& ankle = pitch.back();
+  const auto nearest_end = [&](const Pitch& p) {
+    return std::min((p.place - hip.place).norm(), (p.place - ankle.place).norm());
+  };
+  const Pitch& knee = *std::max_element(
+      pitch.begin() + 1, pitch.end() - 1,
+      [&](const Pitch& a, const Pitch& b) { return nearest_end(a) < nearest_end(b); });
+  const Vector3d thigh = knee.place - hip.place, shank = ankle.place - knee.place;
+  const double bent = PitchBetween(thigh, shank);
+  // Forward knees, or backward ones where the joint does not bend the other way.
+  const auto& limits = model.joints()[static_cast<size_t>(knee.joint)];
+  const double margin = std::min(kMostMargin, kLimitShare * (limits.upper - limits.lower));
+  double turn = bend - bent;
+  const auto reaches = [&](double angle) {
+    const double q = (*joints)[knee.joint] + knee.sign * angle;
+    return q > limits.lower + margin && q < limits.upper - margin;
+  };
+  if (!reaches(turn) && reaches(-bend - bent)) turn = -bend - bent;
+  // The foot stays below the hip.
+  const Vector3d folded = thigh + Eigen::AngleAxisd(turn, Vector3d::UnitY()) * shank;
+  const double lean = PitchBetween(folded, Vector3d(0, 0, -1));
+  (*joints)[knee.joint] += knee.sign * turn;
+  (*joints)[hip.joint] += hip.sign * lean;
+  // The sole ends level, also where a limit kept the leg from its zero.
+  const Vector3d toe = data.foot_pose[foot].linear().col(0);
+  (*joints)[ankle.joint] -= ankle.sign * (turn + lean + std::atan2(-toe.z(), toe.x()));
+}
+
+}  // namespace
+
+Eigen::VectorXd WithinLimits(const RobotModel& model, Eigen::VectorXd wanted) {
+  for (int j = 0; j < model.num_joints(); ++j) {
+    const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
+    if (!std::isfinite(joint.lower) || !std::isfinite(joint.upper)) continue;
+    const double margin = std::min(kMostMargin, kLimitShare * (joint.upper - joint.lower));
+    wanted[j] = std::clamp(wanted[j], joint.lower + margin, joint.upper - margin);
+  }
+  return wanted;
+}
+
+Eigen::VectorXd WithBentKnees(const RobotModel& model, const Anatomy& anatomy, double bend,
+                              Eigen::VectorXd nominal) {
+  for (size_t f = 0; f < 2; ++f) BendLeg(model, anatomy, f, bend, &nominal);
+  return WithinLimits(model, nominal);
+}
+
+FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
+                       const Eigen::VectorXd& nominal, bool bend_knees) {
+  const robot::RobotData zero = Kinematics(model, nominal);
+  const double spacing = Rounded(std::abs(zero.foot_pose[robot::kLeftFoot].translation().y() -
+                                          zero.foot_pose[robot::kRightFoot].translation().y()));
+  std::string problem;
+  for (const double bend : kBends) {
+    robot::PostureGoal goal;
+    goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
+    const robot::RobotData data = Kinematics(model, goal.nominal);
+    goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
+                                                    data.foot_pose[1].translation().z()));
+    for (size_t f = 0; f < 2; ++f) {
+      goal.foot[f] = Eigen::Isometry3d(
+          Eigen::Translation3d(0, f == robot::kRightFoot ? -spacing / 2 : spacing / 2, 0));
+    }
+    try {
+      const robot::RobotState state = robot::SolvePosture(model, goal);
+      FoundStance found{state.joint_position, goal.com_height, spacing};
+      for (double& q : found.joint_position) q = Rounded(q, kJointRounding);
+      return found;
+    } catch (const robot::RobotError& error) {
+      if (problem.empty()) problem = error.what();
+    }
+    if (!bend_knees) break;
+  }
+  throw robot::RobotError(problem);
+}
+
+}  // namespace poise
