@@ -10,6 +10,7 @@
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/phase_graph.h"
 #include "components/step_planner/recovery_config.h"
+#include "components/step_planner/walk_config.h"
 
 namespace poise {
 namespace {
@@ -233,6 +234,7 @@ void CheckStepPlannerConfig(const StepPlannerConfig& config) {
   CheckStep(config.step());
   CheckHipStrategyConfig(config.hip_strategy());
   CheckRecoveryConfig(config.recovery());
+  CheckWalkConfig(config.walk());
   for (int i = 0; i < config.phase_size(); ++i) {
     const Phase& phase = config.phase(i);
     if (phase.has_duration()) CheckNotNegative(phase.duration(), Field(i) + ".duration");

@@ -114,6 +114,8 @@ class ReferenceGenerator {
   /// under way are dropped. After another planner has led them.
   void Anchor(const EstimatedPose& estimate, const PointMotion& com,
               const Eigen::Vector3d& com_target, double time, double duration);
+  /// The body rests at `rotation` from here on; its turns under way and to come are dropped.
+  void HoldBody(const Eigen::Matrix3d& rotation) { body_turn_.Hold(rotation); }
   const ReferencePoint& foot(size_t index) const { return foot_[index]; }
   void Archive(StateArchive* archive);
 

@@ -107,6 +107,9 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   angular_momentum_ = step.angular_momentum();
   recovers_ = config.recovery().enabled();
   if (recovers_) recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_);
+  walks_ = config.walk().enabled();
+  if (walks_) walk_ = MakeWalk(config.walk(), config.contact(), *model_);
+  walk_commands_ = WalkCommands(config.walk());
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());
 
@@ -158,6 +161,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
   references_.Archive(archive);
   archive->Show(in_contact_, last_controlled_, stands_otherwise_);
   recovery_.Archive(archive);
+  walk_.Archive(archive);
   ArchiveMessage(&*support_plan_, archive);
   return true;
 }
@@ -170,7 +174,7 @@ int8_t StepPlanner::Plan(double time) {
   }
   whole_body_->UpdateDynamics(state_);
   const ScheduleInput observed = Observe(time, load);
-  if (recovers_ && Recover(time, load)) {
+  if (Step(time, load)) {
     schedule_->Hold(time);
   } else if (schedule_->Advance(observed).phase_began) {
     BeginPhase(time);
@@ -182,6 +186,9 @@ int8_t StepPlanner::Plan(double time) {
   ReportReferences();
   ReportCapture(time, capture);
   if (recovers_) ReportStepping(recovery_, time, Estimate().sole, &*support_plan_);
+  if (walks_ && !recovery_.active()) {
+    ReportWalking(walk_, time, Estimate().sole, &*support_plan_);
+  }
   return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
                                                  : support_plan_t::STATUS_OK;
 }
@@ -202,9 +209,15 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
   return input;
 }
 
-bool StepPlanner::Recover(double time, const std::array<double, 2>& load) {
+bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
+  if (!recovers_ && !walks_) return false;
+  const stepping::StepInput input = SeeSteps(time, load);
+  return (recovers_ && !walk_.active() && Recover(input)) || (walks_ && WalkOn(input)) ||
+         stands_otherwise_;
+}
+
+stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 2>& load) {
   const robot::RobotData& data = whole_body_->data();
-  const bool was_active = recovery_.active();
   stepping::StepInput input;
   input.time = time;
   input.com = data.com;
@@ -220,21 +233,43 @@ bool StepPlanner::Recover(double time, const std::array<double, 2>& load) {
     input.free_foot = references_.foot[i];
     input.free_rotation = references_.foot_rotation[i].rotation;
   }
-  if (recovery_.Update(input)) {
-    in_contact_ = recovery_.output().in_contact;
-    for (ContactLoss& loss : contact_loss_) loss.Reset();
-    return true;
-  }
-  if (was_active) EndRecovery(time);
-  return stands_otherwise_;
+  return input;
 }
 
-void StepPlanner::EndRecovery(double time) {
-  in_contact_ = recovery_.output().in_contact;
+const stepping::StepOutput* StepPlanner::Steps() const {
+  return recovery_.active() ? &recovery_.output() : walk_.active() ? &walk_.output() : nullptr;
+}
+
+bool StepPlanner::Recover(const stepping::StepInput& input) {
+  const bool was_active = recovery_.active();
+  const bool acts = recovery_.Update(input);
+  if (acts) TakeContacts(recovery_.output());
+  if (was_active && !acts) EndSteps(recovery_.output(), input.time);
+  return acts;
+}
+
+bool StepPlanner::WalkOn(const stepping::StepInput& input) {
+  const bool was_active = walk_.active();
+  const bool acts = walk_.Update(input, walk_commands_.At(input.time));
+  if (acts) TakeContacts(walk_.output());
+  if (was_active && !acts) {
+    EndSteps(walk_.output(), input.time);
+    generator_->HoldBody(references_.body.rotation);
+  }
+  return acts;
+}
+
+void StepPlanner::TakeContacts(const stepping::StepOutput& steps) {
+  in_contact_ = steps.in_contact;
+  for (ContactLoss& loss : contact_loss_) loss.Reset();
+}
+
+void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {
+  in_contact_ = steps.in_contact;
   stands_otherwise_ = ContactsOf(schedule_->phase().support()) != in_contact_;
   const EstimatedPose estimate = Estimate();
   Eigen::Vector3d rest = 0.5 * (estimate.sole[0].translation() + estimate.sole[1].translation());
-  PointMotion com = recovery_.output().com;
+  PointMotion com = steps.com;
   com.acceleration.setZero();
   rest.z() = com.position.z();
   generator_->Anchor(estimate, com, rest, time, kSettleTime);
@@ -283,14 +318,14 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   const robot::RobotData& data = whole_body_->data();
   references_ = generator_->Update(time, data.com);
   if (schedule_->phase().gravity_compensation()) return;
-  if (recovery_.active()) {
-    const stepping::StepOutput& step = recovery_.output();
-    references_.com = step.com;
+  if (const stepping::StepOutput* steps = Steps(); steps != nullptr) {
+    references_.com = steps->com;
     for (size_t i = 0; i < 2; ++i) {
       if (in_contact_[i]) continue;
-      references_.foot[i] = step.swing;
-      references_.foot_rotation[i] = step.swing_rotation;
+      references_.foot[i] = steps->swing;
+      references_.foot_rotation[i] = steps->swing_rotation;
     }
+    if (walk_.active()) TurnBody();
     if (hip_strategy_->enabled()) TiltBody(time, capture);
     return;
   }
@@ -306,6 +341,14 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
     }
   }
   if (hip_strategy_->enabled()) TiltBody(time, capture);
+}
+
+void StepPlanner::TurnBody() {
+  const stepping::Quintic::Point& yaw = walk_.body_yaw();
+  const Eigen::AngleAxisd turn(yaw.position, Eigen::Vector3d::UnitZ());
+  references_.body.rotation = turn * references_.body.rotation;
+  references_.body.angular_velocity.z() += yaw.velocity;
+  references_.body.angular_acceleration.z() += yaw.acceleration;
 }
 
 void StepPlanner::TiltBody(double time, const Capture& capture) {
@@ -410,19 +453,19 @@ void StepPlanner::ReportPhase(double time) {
   out.transition_progress = schedule.progress;
   if (!Held()) return;
   out.waiting_for = support_plan_t::WAITING_NONE;
-  const stepping::StepOutput& step = recovery_.output();
-  const int kind = recovery_.active() ? step.transition : 0;
+  const stepping::StepOutput* steps = Steps();
+  const int kind = steps != nullptr ? steps->transition : 0;
   out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
                    : kind > 0 ? support_plan_t::TRANSITION_LOADING
                               : support_plan_t::TRANSITION_NONE;
-  out.transition_foot = static_cast<int8_t>(kind == 0 ? -1 : step.foot);
-  out.transition_progress = kind == 0 ? 0 : step.progress;
+  out.transition_foot = static_cast<int8_t>(kind == 0 ? -1 : steps->foot);
+  out.transition_progress = kind == 0 ? 0 : steps->progress;
 }
 
 void StepPlanner::ReportFeet() {
   support_plan_t& out = *support_plan_;
   const int next = schedule_->next();
-  const std::array<bool, 2> then = recovery_.active() ? std::array{true, true}
+  const std::array<bool, 2> then = Steps() != nullptr ? std::array{true, true}
                                    : next == PhaseGraph::kNone || Held()
                                        ? in_contact_
                                        : ContactsOf(schedule_->phase(next).support());
@@ -430,8 +473,8 @@ void StepPlanner::ReportFeet() {
     out.in_contact[i] = in_contact_[i] ? 1 : 0;
     out.next_in_contact[i] = then[i] ? 1 : 0;
     out.foot_state[i] = in_contact_[i] ? support_plan_t::FOOT_SUPPORT
-                        : recovery_.active()
-                            ? (recovery_.output().searching ? support_plan_t::FOOT_SEARCHING
+                        : Steps() != nullptr
+                            ? (Steps()->searching ? support_plan_t::FOOT_SEARCHING
                                                             : support_plan_t::FOOT_SWING)
                             : FootCode(landing_[i].state());
     SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);

@@ -17,6 +17,7 @@
 #include "components/step_planner/reference_generator.h"
 #include "components/step_planner/step_detector.h"
 #include "components/step_planner/stepping/recovery.h"
+#include "components/step_planner/walk_config.h"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
 
@@ -42,12 +43,22 @@ class StepPlanner : public Component {
   int8_t Plan(double time);
   /// What the robot says to the schedule.
   ScheduleInput Observe(double time, const std::array<double, 2>& load);
+  /// The tick of what leads in place of the schedule; false: the schedule goes on.
+  bool Step(double time, const std::array<double, 2>& load);
+  stepping::StepInput SeeSteps(double time, const std::array<double, 2>& load);
   /// The recovery's tick; false: it does not act, and the schedule goes on.
-  bool Recover(double time, const std::array<double, 2>& load);
-  /// References from where the recovery has left the robot.
-  void EndRecovery(double time);
-  /// The schedule is held, by a recovery or because the robot stands otherwise than it says.
-  bool Held() const { return recovery_.active() || stands_otherwise_; }
+  bool Recover(const stepping::StepInput& input);
+  /// The same of walking.
+  bool WalkOn(const stepping::StepInput& input);
+  /// What leads COM and feet in place of the schedule; null: nothing does.
+  const stepping::StepOutput* Steps() const;
+  void TakeContacts(const stepping::StepOutput& steps);
+  /// References from where `steps` have left the robot.
+  void EndSteps(const stepping::StepOutput& steps, double time);
+  /// The schedule is held, by steps or because the robot stands otherwise than it says.
+  bool Held() const { return Steps() != nullptr || stands_otherwise_; }
+  /// The body's heading follows the feet.
+  void TurnBody();
   /// Contacts, references and landings of a phase's first tick.
   void BeginPhase(double time);
   Capture ComputeCapture() const;
@@ -85,7 +96,10 @@ class StepPlanner : public Component {
   StepDetector step_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
-  bool stands_otherwise_ = false;  // on both feet after a recovery, where the phase is on one
+  bool walks_ = false;  // where it is told to
+  stepping::Walk walk_;
+  WalkCommands walk_commands_;
+  bool stands_otherwise_ = false;  // on both feet after steps, where the phase is on one
   double step_reach_ = 0;          // m
   bool angular_momentum_ = false;  // counts in the capture point that asks for a step
   References references_;

@@ -60,4 +60,43 @@ void ReportStepping(const stepping::Recovery& recovery, double time,
   plan->foothold_margin = step.margin;
 }
 
+namespace {
+
+int8_t WalkCode(stepping::WalkStage stage) {
+  switch (stage) {
+    case stepping::WalkStage::kStarting:
+    case stepping::WalkStage::kUnloading:
+      return support_plan_t::STEPPING_UNLOADING;
+    case stepping::WalkStage::kSwinging:
+      return support_plan_t::STEPPING_SWINGING;
+    case stepping::WalkStage::kLoading:
+      return support_plan_t::STEPPING_LOADING;
+    case stepping::WalkStage::kStopping:
+      return support_plan_t::STEPPING_CATCHING;
+    case stepping::WalkStage::kStanding:
+      break;
+  }
+  return support_plan_t::STEPPING_NONE;
+}
+
+}  // namespace
+
+void ReportWalking(const stepping::Walk& walk, double time,
+                   const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
+  const stepping::StepOutput& steps = walk.output();
+  const bool swings = walk.stage() == stepping::WalkStage::kSwinging;
+  const auto foot = static_cast<size_t>(walk.stepping_foot());
+  const double ground = sole[1 - foot].translation().z();
+  const Eigen::Vector2d& foothold = walk.foothold().position;
+  plan->stepping = WalkCode(walk.stage());
+  plan->num_steps = walk.num_steps();
+  plan->step_reason = support_plan_t::REASON_WALK;
+  plan->step_foot = static_cast<int8_t>(foot);
+  SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);
+  SetVector3({steps.cop.x(), steps.cop.y(), ground}, plan->cop_reference);
+  plan->touch_down_time = swings ? std::max(0.0, walk.touch_down() - time) : 0;
+  const stepping::WalkCommand& command = walk.command();
+  SetVector3({command.velocity.x(), command.velocity.y(), command.turn_rate}, plan->walk_velocity);
+}
+
 }  // namespace poise

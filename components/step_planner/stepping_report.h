@@ -5,6 +5,7 @@
 #include <array>
 
 #include "components/step_planner/stepping/recovery.h"
+#include "components/step_planner/stepping/walk.h"
 #include "poise/support_plan_t.hpp"
 
 namespace poise {
@@ -18,5 +19,9 @@ int8_t ReasonCode(stepping::StepReason reason);
 /// soles in the world, right first.
 void ReportStepping(const stepping::Recovery& recovery, double time,
                     const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
+
+/// The same of walking, and walk_velocity.
+void ReportWalking(const stepping::Walk& walk, double time,
+                   const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
 
 }  // namespace poise

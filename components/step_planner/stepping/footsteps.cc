@@ -1,0 +1,50 @@
+#include "components/step_planner/stepping/footsteps.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "components/robot/robot_model.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+
+Vector2d Turned(double yaw, const Vector2d& point) { return Eigen::Rotation2Dd(yaw) * point; }
+
+}  // namespace
+
+Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& command, double period,
+                      const FootstepLimits& limits) {
+  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  // Out by two steps, then none.
+  const auto outwards = [&](double rate) { return rate * side > 0 ? 2 * rate * period : 0.0; };
+  const Vector2d half(0, 0.5 * side * limits.spacing);
+  const double turn =
+      std::clamp(outwards(command.turn_rate), -limits.most_turn, limits.most_turn);
+  const Vector2d way(
+      std::clamp(period * command.velocity.x(), -limits.longest, limits.longest),
+      std::clamp(outwards(command.velocity.y()), -limits.widest, limits.widest));
+  Footstep step;
+  step.yaw = stance.yaw + turn;
+  // The middle between the feet goes along the mean heading.
+  const Vector2d from_stance = half + Turned(0.5 * turn, way) + Turned(turn, half);
+  const double apart = std::max(side * from_stance.y(), limits.least_spacing);
+  step.position = stance.position + Turned(stance.yaw, {from_stance.x(), side * apart});
+  return step;
+}
+
+WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
+                     double turn) {
+  WalkCommand next = command;
+  const Vector2d change = command.velocity - from.velocity;
+  const double size = change.norm();
+  if (size > speed) next.velocity = from.velocity + speed / size * change;
+  next.turn_rate = from.turn_rate + std::clamp(command.turn_rate - from.turn_rate, -turn, turn);
+  // It stops only once it is slow enough to.
+  next.stepping = command.stepping || !next.in_place();
+  return next;
+}
+
+}  // namespace poise::stepping

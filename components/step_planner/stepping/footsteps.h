@@ -1,0 +1,41 @@
+// Where the feet go for a commanded velocity.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace poise::stepping {
+
+/// What is walked: in axes of the heading.
+struct WalkCommand {
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s ahead, to the left
+  double turn_rate = 0;                                ///< rad/s, to the left
+  bool stepping = false;                               ///< walks, if only in place
+
+  bool in_place() const { return velocity.isZero(0) && turn_rate == 0; }
+};
+
+/// A level sole: its centre, m, and its heading, rad.
+struct Footstep {
+  Eigen::Vector2d position = Eigen::Vector2d::Zero();
+  double yaw = 0;
+};
+
+struct FootstepLimits {
+  double spacing = 0;        ///< m between soles side by side
+  double least_spacing = 0;  ///< m, sideways between soles that do not touch
+  double longest = 0;        ///< m ahead or back in a step
+  double widest = 0;         ///< m of a step to the side beyond `spacing`
+  double most_turn = 0;      ///< rad in a step
+};
+
+/// Where `foot` comes down when the other stands at `stance`, for a step every `period` s. Ahead
+/// each step goes half a stride. To the side, and in a turn, the foot of that side goes out by what
+/// two steps ask for and the other comes beside it: so no foot crosses or turns towards the other.
+Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& command, double period,
+                      const FootstepLimits& limits);
+
+/// `command` approached from `from` by at most `speed`, m/s, and `turn`, rad/s.
+WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
+                     double turn);
+
+}  // namespace poise::stepping

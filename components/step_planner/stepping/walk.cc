@@ -1,0 +1,318 @@
+#include "components/step_planner/stepping/walk.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_transition.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kLongestTick = 0.02;   // s, counted at most for a tick after a gap
+constexpr double kRiseOver = 0.5;       // share of a swing before which no load is a landing
+constexpr double kTogether = 0.03;      // m, rad: the feet stand side by side
+// Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
+constexpr int kAhead = 3;
+
+double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
+
+}  // namespace
+
+void Walk::Enter(WalkStage stage, double time) {
+  stage_ = stage;
+  since_ = time;
+}
+
+Footstep Walk::Standing(const StepState& state, int foot) const {
+  const auto i = static_cast<size_t>(foot);
+  return {state.sole[i], state.sole_yaw[i]};
+}
+
+Footstep Walk::Next(const Footstep& stance, int foot) const {
+  return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
+}
+
+bool Walk::FeetTogether(const StepState& state) const {
+  const double yaw = state.sole_yaw[static_cast<size_t>(stance_)];
+  const Vector2d between = Eigen::Rotation2Dd(-yaw) * (state.sole[1] - state.sole[0]);
+  return std::abs(between.x()) < kTogether &&
+         std::abs(Difference(state.sole_yaw[1], state.sole_yaw[0])) < kTogether;
+}
+
+bool Walk::AtRest(const StepInput& input, const StepState& state) {
+  const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
+  const bool rests = (state.pendulum.capture_point() - middle).norm() < spec_.rest_distance &&
+                     input.com_velocity.norm() < spec_.rest_speed;
+  if (!rests) moving_since_ = input.time;
+  return input.time >= moving_since_ + spec_.rest_time - kTimeTolerance;
+}
+
+bool Walk::Update(const StepInput& input, const WalkCommand& command) {
+  const double time = input.time;
+  StepState state = Observe(input, active() ? in_contact_ : input.in_contact);
+  switch (stage_) {
+    case WalkStage::kStanding:
+      if (!command.stepping || !input.allowed || !(input.in_contact[0] && input.in_contact[1])) {
+        time_ = time;
+        return false;
+      }
+      Start(input, state, command);
+      break;
+    case WalkStage::kStarting:
+      if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
+      break;
+    case WalkStage::kUnloading:
+      if (time >= since_ + spec_.unload - kTimeTolerance) BeginSwing(input);
+      break;
+    case WalkStage::kSwinging:
+      if (swing_.Progress(time) < kRiseOver) {
+        touch_.Reset();
+      } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
+        Land(input, state, command);
+      }
+      break;
+    case WalkStage::kLoading:
+      if (time < since_ + spec_.load - kTimeTolerance) break;
+      moving_since_ = time;
+      Enter(final_ ? WalkStage::kStopping : WalkStage::kUnloading, time);
+      break;
+    case WalkStage::kStopping:
+      if (!AtRest(input, state)) break;
+      Enter(WalkStage::kStanding, time);
+      time_ = time;
+      return false;
+  }
+  state.in_contact = in_contact_;
+  PlanFrom(state);
+  if (stage_ == WalkStage::kSwinging) Adjust(input, state);
+  Lead(input, state);
+  time_ = time;
+  return true;
+}
+
+void Walk::Start(const StepInput& input, const StepState& state, const WalkCommand& command) {
+  command_ = Approach({}, command, spec_.acceleration * spec_.period(),
+                      spec_.turn_acceleration * spec_.period());
+  starting_ = true;
+  closing_ = final_ = false;
+  // The foot on the side that it goes or turns to steps first.
+  const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
+  stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
+  in_contact_ = {true, true};
+  standing_height_ = input.com_height - input.sole[0].translation().z();
+  height_.Begin(input.com_height);
+  start_yaw_ = state.yaw;
+  body_yaw_.Begin(0);
+  foothold_ = Next(Standing(state, stance_), 1 - stance_);
+  Enter(WalkStage::kStarting, input.time);
+  // From rest to the capture point and its velocity at lift-off; the centre of pressure is
+  // ξ − ξ̇/ω, above the stance foot then.
+  PlanFrom(state);
+  const CapturePlan::Point lift_off = plan_.At(0);
+  const Vector2d now = state.pendulum.capture_point();
+  const Vector2d speed =
+      state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
+  for (int i = 0; i < 2; ++i) {
+    start_[static_cast<size_t>(i)].Begin({now[i]}, {lift_off.capture_point[i], speed[i], 0},
+                                         input.time, spec_.start + spec_.unload);
+  }
+}
+
+void Walk::BeginSwing(const StepInput& input) {
+  const auto foot = static_cast<size_t>(1 - stance_);
+  in_contact_[foot] = false;
+  starting_ = false;
+  touch_down_ = input.time + spec_.swing;
+  const double ground = input.sole[1 - foot].translation().z();
+  swing_.Begin({.position = input.sole[foot].translation()}, input.sole[foot].linear(),
+               {foothold_.position.x(), foothold_.position.y(), ground},
+               Eigen::AngleAxisd(foothold_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
+               touch_down_, spec_.foot);
+  touch_.Reset();
+  Enter(WalkStage::kSwinging, input.time);
+}
+
+void Walk::Land(const StepInput& input, const StepState& state, const WalkCommand& command) {
+  ++num_steps_;
+  in_contact_ = {true, true};
+  from_cop_ = wanted_.cop;
+  stance_ = 1 - stance_;
+  double_since_ = input.time;
+  Enter(WalkStage::kLoading, input.time);
+  final_ = closing_ && FeetTogether(state);
+  command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
+                      spec_.turn_acceleration * spec_.period());
+  closing_ = !command_.stepping;
+  foothold_ = Next(Standing(state, stance_), 1 - stance_);
+}
+
+void Walk::PlanFrom(const StepState& state) {
+  const double between = spec_.load + spec_.unload, w = state.pendulum.frequency;
+  Footstep stance = Standing(state, stance_);
+  const bool both = !starting_ && stage_ != WalkStage::kSwinging;
+  plan_.Clear();
+  if (final_) {
+    const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
+    plan_.Append(from_cop_, middle, between);
+    plan_.Finish(w, middle);
+    return;
+  }
+  if (both) plan_.Append(from_cop_, stance.position, between);
+  plan_.Append(stance.position, stance.position, spec_.swing);
+  Footstep next = foothold_;
+  if (closing_) {
+    const Vector2d middle = 0.5 * (stance.position + next.position);
+    plan_.Append(stance.position, middle, between);
+    plan_.Finish(w, middle);
+    return;
+  }
+  int foot = stance_;
+  for (int i = 0; i < kAhead; ++i) {
+    plan_.Append(stance.position, next.position, between);
+    plan_.Append(next.position, next.position, spec_.swing);
+    stance = next;
+    next = Next(stance, foot);
+    foot = 1 - foot;
+  }
+  plan_.Finish(w, stance.position);
+}
+
+void Walk::Adjust(const StepInput& input, const StepState& state) {
+  const double left = touch_down_ - input.time;
+  if (left <= spec_.foot.freeze) return;
+  const auto s = static_cast<size_t>(stance_);
+  const double w = state.pendulum.frequency;
+  const Vector2d& stance = state.sole[s];
+  // The plan for the foothold that the command asks for.
+  const Vector2d moved = foothold_.position;
+  foothold_.position = Next(Standing(state, stance_), 1 - stance_).position;
+  PlanFrom(state);
+  const Vector2d planned = plan_.At(spec_.swing).capture_point;
+  const Vector2d now = state.pendulum.capture_point();
+  const Vector2d error = now - plan_.At(spec_.swing - left).capture_point;
+  const double size = error.norm();
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance_), choice_.limits().edge, stance, state.sole_yaw[s]);
+  // What the centre of pressure at the sole's edge leaves of the error at touch-down.
+  const Vector2d cop = balance::NearestPoint(sole, stance + (1 + spec_.gain) * error);
+  const Vector2d caught = CapturePointAfter(now, cop, w, left);
+  double beyond = 0;
+  if (size > 0) beyond = (caught - planned).dot(error) / size - spec_.adjust_from;
+  if (!(beyond > 0)) {
+    // Back to what is commanded, once the error is small enough.
+    if (!moved.isApprox(foothold_.position, 1e-12)) {
+      swing_.Move(foothold_.position, input.time, touch_down_);
+    }
+    return;
+  }
+  Vector2d foothold = foothold_.position + beyond / size * error;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
+  const Vector2d com = After(state.pendulum, cop, left).com;
+  const balance::ConvexPolygon footholds =
+      choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
+  if (footholds.num_corners > 0) {
+    const Vector2d offset = turn.transpose() * (foothold - stance);
+    foothold = stance + turn * balance::NearestPoint(footholds, offset);
+  }
+  foothold_.position = foothold;
+  PlanFrom(state);
+  swing_.Move(foothold, input.time, touch_down_);
+}
+
+balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
+  const double edge = choice_.limits().edge;
+  const auto s = static_cast<size_t>(stance_), o = 1 - s;
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance_), edge, state.sole[s], state.sole_yaw[s]);
+  if (stage_ == WalkStage::kSwinging) return sole;
+  const balance::ConvexPolygon other =
+      SoleAt(choice_.foot(1 - stance_), edge, state.sole[o], state.sole_yaw[o]);
+  if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
+  // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
+  const Vector2d way = state.sole[s] - state.sole[o];
+  const double free =
+      std::clamp((wanted_.cop - state.sole[o]).dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const bool loading = stage_ == WalkStage::kLoading;
+  const double ramp =
+      balance::SmoothStep((input.time - since_) / (loading ? spec_.load : spec_.unload));
+  const double share = loading ? ramp * free : free + ramp * (1 - free);
+  // Corner for corner: all of the sum of two equal soles, a part of it where one is turned.
+  const auto corners = std::min(sole.corners().size(), other.corners().size());
+  std::array<Vector2d, balance::ConvexPolygon::kMaxCorners> mixed;
+  for (size_t i = 0; i < corners; ++i) {
+    mixed[i] = share * sole.corner[i] + (1 - share) * other.corner[i];
+  }
+  return balance::ConvexHull({mixed.data(), corners});
+}
+
+Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
+  const double w = state.pendulum.frequency, time = input.time;
+  switch (stage_) {
+    case WalkStage::kStarting:
+    case WalkStage::kUnloading:
+      if (starting_) {
+        for (int i = 0; i < 2; ++i) {
+          const Quintic::Point point = start_[static_cast<size_t>(i)].At(time);
+          wanted_.capture_point[i] = point.position;
+          wanted_.cop[i] = point.position - point.velocity / w;
+        }
+        break;
+      }
+      [[fallthrough]];
+    case WalkStage::kLoading:
+    case WalkStage::kStopping:
+      wanted_ = plan_.At(time - double_since_);
+      break;
+    case WalkStage::kSwinging:
+      wanted_ = plan_.At(spec_.swing - std::max(touch_down_ - time, 0.0));
+      break;
+    case WalkStage::kStanding:
+      break;
+  }
+  const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
+  return balance::NearestPoint(Carrying(input, state), wanted_.cop + (1 + spec_.gain) * error);
+}
+
+void Walk::Lead(const StepInput& input, const StepState& state) {
+  const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  const auto s = static_cast<size_t>(stance_);
+  const double ground = input.sole[s].translation().z();
+  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
+  height_.Follow(ground + standing_height_ - lower, period);
+  // The body heads between the feet: where they stand, and where the one in the air will.
+  const bool swings = stage_ == WalkStage::kSwinging;
+  const double other = swings ? foothold_.yaw : state.sole_yaw[1 - s];
+  const double heading = state.sole_yaw[s] + 0.5 * Difference(other, state.sole_yaw[s]);
+  const double yaw = body_yaw_.point().position;
+  body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
+  const Vector2d cop = DesiredCop(input, state);
+  output_.cop = cop;
+  output_.com = LeadByCop(input, height_.point(), ground, cop);
+  output_.in_contact = in_contact_;
+  output_.searching = false;
+  if (swings) FollowSwing(swing_, spec_.foot, spec_.search_depth, input.time, &output_);
+  output_.transition = stage_ == WalkStage::kUnloading ? -1 : stage_ == WalkStage::kLoading ? 1 : 0;
+  output_.foot = stage_ == WalkStage::kLoading ? stance_ : 1 - stance_;
+  const double ramp = stage_ == WalkStage::kUnloading ? spec_.unload : spec_.load;
+  output_.progress =
+      output_.transition == 0 ? 0 : std::clamp((input.time - since_) / ramp, 0.0, 1.0);
+}
+
+void Walk::Archive(StateArchive* archive) {
+  archive->Show(stage_, command_.velocity, command_.turn_rate, command_.stepping, stance_,
+                num_steps_, in_contact_);
+  swing_.Archive(archive);
+  touch_.Archive(archive);
+  height_.Archive(archive);
+  body_yaw_.Archive(archive);
+  archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
+                start_yaw_, starting_, closing_, final_);
+  archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop);
+  for (Quintic& quintic : start_) quintic.Archive(archive);
+  output_.Archive(archive);
+}
+
+}  // namespace poise::stepping

@@ -1,0 +1,111 @@
+// Walking: footsteps from a commanded velocity, the capture point led from foot to foot.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/step_planner/stepping/capture_plan.h"
+#include "components/step_planner/stepping/footsteps.h"
+#include "components/step_planner/stepping/footwork.h"
+#include "components/step_planner/stepping/step_choice.h"
+#include "components/step_planner/stepping/swing.h"
+
+namespace poise::stepping {
+
+/// Numbers of the configuration, in m, s, N.
+struct WalkSpec {
+  double start = 0;   ///< s in which the COM leaves the middle for the first stance foot
+  double unload = 0;  ///< s of the ramp that unloads a foot
+  double swing = 0;   ///< s
+  double load = 0;    ///< s of the ramp that loads it again
+  FootstepLimits step;
+  double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
+  SwingSpec foot;
+  double touch_load = 0, touch_duration = 0;  ///< N, s
+  double search_depth = 0;                    ///< m below the foothold
+  double gain = 0;                            ///< of the capture point's error, > 0
+  double adjust_from = 0;  ///< m of error at touch-down below which the foothold stays
+  double lower = 0;        ///< m below standing at which it walks
+  double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
+  double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+
+  /// s from touch-down to touch-down.
+  double period() const { return unload + swing + load; }
+};
+
+enum class WalkStage { kStanding, kStarting, kUnloading, kSwinging, kLoading, kStopping };
+
+/// Pure function of its calls; never allocates.
+class Walk {
+ public:
+  Walk() = default;
+  Walk(const StepChoice& choice, const WalkSpec& spec)
+      : choice_(choice),
+        spec_(spec),
+        touch_(spec.touch_load, spec.touch_duration),
+        height_(spec.height_rate),
+        body_yaw_(spec.yaw_rate) {}
+
+  /// Once a tick. False: the robot stands, `output` is not to be used.
+  bool Update(const StepInput& input, const WalkCommand& command);
+  const StepOutput& output() const { return output_; }
+  bool active() const { return stage_ != WalkStage::kStanding; }
+  WalkStage stage() const { return stage_; }
+  int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
+  int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
+  /// Another planner has moved the feet.
+  void Stop() { stage_ = WalkStage::kStanding; }
+  const Footstep& foothold() const { return foothold_; }  ///< of the step under way
+  double touch_down() const { return touch_down_; }       ///< s, planned
+  /// What is walked now: the command, approached without haste.
+  const WalkCommand& command() const { return command_; }
+  /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
+  const Quintic::Point& body_yaw() const { return body_yaw_.point(); }
+  /// m, world: where the capture point shall be, before its error is fed back.
+  const CapturePlan::Point& wanted() const { return wanted_; }
+  void Archive(StateArchive* archive);
+
+ private:
+  void Enter(WalkStage stage, double time);
+  void Start(const StepInput& input, const StepState& state, const WalkCommand& command);
+  void BeginSwing(const StepInput& input);
+  void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
+  bool AtRest(const StepInput& input, const StepState& state);
+  Footstep Standing(const StepState& state, int foot) const;
+  Footstep Next(const Footstep& stance, int foot) const;
+  /// Of the plan, from the first piece that is not over; `stance`: the sole that carries.
+  void PlanFrom(const StepState& state);
+  /// The swing's foothold, moved by what the centre of pressure cannot correct.
+  void Adjust(const StepInput& input, const StepState& state);
+  /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
+  balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
+  Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
+  bool FeetTogether(const StepState& state) const;
+  void Lead(const StepInput& input, const StepState& state);
+
+  StepChoice choice_;
+  WalkSpec spec_;
+  WalkStage stage_ = WalkStage::kStanding;
+  WalkCommand command_;
+  int stance_ = 0, num_steps_ = 0;
+  std::array<bool, 2> in_contact_{true, true};
+  Swing swing_;
+  TouchTimer touch_;
+  HeightLead height_, body_yaw_;
+  double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
+  double double_since_ = 0, touch_down_ = 0;        // s: both feet down; planned
+  double standing_height_ = 0;                      // m
+  double start_yaw_ = 0;                            // rad
+  bool starting_ = false;                           // no foot has left the ground yet
+  bool closing_ = false;  // the step under way comes beside the other foot, the last one
+  bool final_ = false;    // it has
+  Footstep foothold_;
+  Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down
+  std::array<Quintic, 2> start_;                        // of the capture point while starting
+  CapturePlan plan_;                                    // made anew in every tick
+  CapturePlan::Point wanted_;
+  StepOutput output_;
+};
+
+}  // namespace poise::stepping

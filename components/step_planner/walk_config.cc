@@ -1,0 +1,129 @@
+#include "components/step_planner/walk_config.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/robot/posture.h"
+#include "components/robot/sole.h"
+
+namespace poise {
+namespace {
+
+void CheckWalk(bool holds, const char* name, const char* must) {
+  if (!holds) throw ConfigError(std::string("walk.") + name, must);
+}
+
+}  // namespace
+
+void CheckWalkConfig(const WalkConfig& config) {
+  const auto not_negative = [](double value, const char* name) {
+    CheckWalk(value >= 0 && std::isfinite(value), name, "must be a number, 0 or more");
+  };
+  const auto positive = [](double value, const char* name) {
+    CheckWalk(value > 0 && std::isfinite(value), name, "must be a number above 0");
+  };
+  double last = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < config.command_size(); ++i) {
+    const WalkCommandConfig& command = config.command(i);
+    const std::string field = fmt::format("walk.command[{}]", i);
+    for (const double value : {command.time(), command.vx(), command.vy(), command.wz()}) {
+      if (!std::isfinite(value)) throw ConfigError(field, "must be of numbers");
+    }
+    if (!(command.time() > last)) throw ConfigError(field + ".time", "must come after the last's");
+    last = command.time();
+  }
+  positive(config.start(), "start");
+  positive(config.unload(), "unload");
+  positive(config.swing(), "swing");
+  positive(config.load(), "load");
+  not_negative(config.longest(), "longest");
+  not_negative(config.widest(), "widest");
+  not_negative(config.most_turn(), "most_turn");
+  positive(config.acceleration(), "acceleration");
+  positive(config.turn_acceleration(), "turn_acceleration");
+  positive(config.clearance(), "clearance");
+  positive(config.touch_speed(), "touch_speed");
+  not_negative(config.touch_duration(), "touch_duration");
+  positive(config.freeze(), "freeze");
+  positive(config.gain(), "gain");
+  not_negative(config.adjust_from(), "adjust_from");
+  not_negative(config.edge(), "edge");
+  not_negative(config.lower(), "lower");
+  positive(config.reach_lower(), "reach_lower");
+  not_negative(config.joint_reserve(), "joint_reserve");
+  not_negative(config.gap(), "gap");
+  positive(config.height_rate(), "height_rate");
+  positive(config.yaw_rate(), "yaw_rate");
+  positive(config.rest_distance(), "rest_distance");
+  positive(config.rest_speed(), "rest_speed");
+  not_negative(config.rest_time(), "rest_time");
+}
+
+stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
+                        const robot::RobotModel& model) {
+  for (const robot::FootModel& foot : model.feet()) {
+    if (config.edge() < robot::InnerRadius(foot)) continue;
+    throw ConfigError("walk.edge",
+                      fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
+                                  config.edge(), foot.name, foot.length, foot.width));
+  }
+  const double height = robot::StandingHeight(model);
+  const stepping::Reach reach(model, height, config.reach_lower(), config.joint_reserve(),
+                              config.gap());
+  if (reach.empty()) {
+    throw ConfigError("walk.reach_lower",
+                      fmt::format("is {} m; robot '{}' cannot stand {} m lower than {} m with "
+                                  "joint_reserve {} rad: change one of them",
+                                  config.reach_lower(), model.name(), config.reach_lower(), height,
+                                  config.joint_reserve()));
+  }
+  stepping::StepLimits limits;
+  limits.edge = config.edge();
+  limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+
+  stepping::WalkSpec spec;
+  spec.start = config.start();
+  spec.unload = config.unload();
+  spec.swing = config.swing();
+  spec.load = config.load();
+  spec.step = {limits.spacing, reach.least_spacing(), config.longest(), config.widest(),
+               config.most_turn()};
+  spec.acceleration = config.acceleration();
+  spec.turn_acceleration = config.turn_acceleration();
+  spec.foot = {config.clearance(), config.touch_speed(), config.freeze()};
+  spec.touch_load = contact.touch_load();
+  spec.touch_duration = config.touch_duration();
+  spec.search_depth = contact.search_depth();
+  spec.gain = config.gain();
+  spec.adjust_from = config.adjust_from();
+  spec.lower = config.lower();
+  spec.height_rate = config.height_rate();
+  spec.yaw_rate = config.yaw_rate();
+  spec.rest_distance = config.rest_distance();
+  spec.rest_speed = config.rest_speed();
+  spec.rest_time = config.rest_time();
+  return {stepping::StepChoice(model, reach, limits), spec};
+}
+
+WalkCommands::WalkCommands(const WalkConfig& config) {
+  for (const WalkCommandConfig& command : config.command()) {
+    stepping::WalkCommand walk;
+    if (!command.stop()) walk = {{command.vx(), command.vy()}, command.wz(), true};
+    entry_.push_back({command.time(), walk});
+  }
+}
+
+stepping::WalkCommand WalkCommands::At(double time) const {
+  stepping::WalkCommand command;
+  for (const Entry& entry : entry_) {
+    if (entry.time > time) break;
+    command = entry.command;
+  }
+  return command;
+}
+
+}  // namespace poise

@@ -1,0 +1,36 @@
+// Walking's configuration, and what the robot makes of it.
+#pragma once
+
+#include <vector>
+
+#include "components/robot/robot_model.h"
+#include "components/step_planner/step_planner.pb.h"
+#include "components/step_planner/stepping/walk.h"
+
+namespace poise {
+
+/// Throws ConfigError "walk.unload" ...: not finite, beyond what can work, commands out of order.
+void CheckWalkConfig(const WalkConfig& config);
+
+/// Reach, spacing and thresholds for this robot, whose COM stands at its standing height. Throws
+/// ConfigError when its legs reach nothing or its soles are smaller than the edge.
+stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
+                        const robot::RobotModel& model);
+
+/// What is commanded at a time of the run.
+class WalkCommands {
+ public:
+  WalkCommands() = default;
+  explicit WalkCommands(const WalkConfig& config);
+  /// `time`: s, in any order. Standing before the first.
+  stepping::WalkCommand At(double time) const;
+
+ private:
+  struct Entry {
+    double time;  // s
+    stepping::WalkCommand command;
+  };
+  std::vector<Entry> entry_;
+};
+
+}  // namespace poise

@@ -1,0 +1,326 @@
+// Footsteps and the capture point between them, and walking in a world of its own: a point mass that
+// obeys the pendulum's equations, on feet that go where the swing says.
+#include "components/step_planner/stepping/walk.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "components/balance/contact_transition.h"
+#include "components/robot/posture.h"
+#include "components/step_planner/stepping/capture_plan.h"
+#include "components/step_planner/stepping/footsteps.h"
+#include "tests/robot/robot_test_support.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using robot::TestRobot;
+
+constexpr double kPeriod = 0.002;  // s
+
+CapturePlan ThreePieces(double w) {
+  CapturePlan plan;
+  plan.Append({0, 0.1}, {0.02, -0.1}, 0.4);
+  plan.Append({0.02, -0.1}, {0.02, -0.1}, 0.6);
+  plan.Append({0.02, -0.1}, {0.15, 0.1}, 0.5);
+  plan.Finish(w, {0.2, 0.08});
+  return plan;
+}
+
+TEST(CapturePlan, ObeysItsDifferentialEquation) {
+  const double w = 3.5, h = 1e-4;
+  const CapturePlan plan = ThreePieces(w);
+  // Forward by Runge and Kutta from where the plan begins: it ends where it was told to.
+  Vector2d point = plan.At(0).capture_point;
+  const auto rate = [&](double t, const Vector2d& x) -> Vector2d {
+    return w * (x - plan.At(t).cop);
+  };
+  for (int i = 0; i < 15000; ++i) {
+    const double t = i * h;
+    EXPECT_NEAR((point - plan.At(t).capture_point).norm(), 0, 1e-6) << t;
+    const Vector2d k1 = rate(t, point), k2 = rate(t + 0.5 * h, point + 0.5 * h * k1);
+    const Vector2d k3 = rate(t + 0.5 * h, point + 0.5 * h * k2), k4 = rate(t + h, point + h * k3);
+    point += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+  EXPECT_NEAR((point - Vector2d(0.2, 0.08)).norm(), 0, 1e-6);
+}
+
+TEST(CapturePlan, IsClosedFormOnOneFootAndHeldAtItsEnds) {
+  const double w = 3.5;
+  CapturePlan plan;
+  const Vector2d foot(0.1, -0.1), end(0.15, -0.02);
+  plan.Append(foot, foot, 0.6);
+  plan.Finish(w, end);
+  EXPECT_LT((plan.At(0).capture_point - (foot + std::exp(-w * 0.6) * (end - foot))).norm(), 1e-12);
+  EXPECT_LT((plan.At(9).capture_point - end).norm(), 1e-12);
+  EXPECT_LT((plan.At(-1).capture_point - plan.At(0).capture_point).norm(), 1e-12);
+}
+
+FootstepLimits Limits() { return {0.21, 0.17, 0.3, 0.15, 0.4}; }
+
+TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
+  // 16 pairs of steps, each a sixteenth of a turn.
+  const double turn = 2 * std::numbers::pi / 16;
+  for (const double sign : {1.0, -1.0}) {
+    WalkCommand command{{0, 0}, sign * 0.5 * turn, true};
+    Footstep stance{{0, -0.105}, 0};  // the right foot
+    const Footstep first = stance;
+    for (int i = 0; i < 32; ++i) {
+      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot, command, 1,
+                            Limits());
+    }
+    EXPECT_NEAR(stance.yaw - first.yaw, sign * 2 * std::numbers::pi, 1e-9);
+    EXPECT_LT((stance.position - first.position).norm(), 1e-9);
+  }
+}
+
+TEST(Footsteps, GoesAsFastAsCommanded) {
+  for (const Vector2d velocity : {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05),
+                                  Vector2d(0.1, -0.05)}) {
+    Footstep stance{{0, -0.105}, 0};
+    for (int i = 0; i < 20; ++i) {
+      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot,
+                            {velocity, 0, true}, 0.8, Limits());
+    }
+    EXPECT_LT((stance.position - Vector2d(0, -0.105) - 16 * velocity).norm(), 1e-9)
+        << velocity.transpose();
+  }
+}
+
+TEST(Footsteps, FeetNeverCrossOrTurnTowardsEachOther) {
+  for (const double vx : {-1.0, 0.0, 1.0}) {
+    for (const double vy : {-1.0, 0.0, 1.0}) {
+      for (const double wz : {-1.0, 0.0, 1.0}) {
+        Footstep stance{{0, 0.105}, 0.3};  // the left foot
+        for (int i = 0; i < 12; ++i) {
+          const int foot = i % 2 == 0 ? robot::kRightFoot : robot::kLeftFoot;
+          const double side = foot == robot::kLeftFoot ? 1 : -1;
+          const Footstep next = NextFootstep(stance, foot, {{vx, vy}, wz, true}, 1, Limits());
+          const Vector2d apart =
+              Eigen::Rotation2Dd(-stance.yaw) * (next.position - stance.position);
+          EXPECT_GE(side * apart.y(), Limits().least_spacing - 1e-12);
+          EXPECT_GE(side * (next.yaw - stance.yaw), -1e-12);
+          EXPECT_LE(std::abs(next.yaw - stance.yaw), Limits().most_turn + 1e-12);
+          stance = next;
+        }
+      }
+    }
+  }
+}
+
+TEST(Footsteps, ACommandIsApproachedWithoutHaste) {
+  WalkCommand now;
+  const WalkCommand wanted{{0.3, -0.4}, 0.5, true};
+  now = Approach(now, wanted, 0.1, 0.2);
+  EXPECT_NEAR(now.velocity.norm(), 0.1, 1e-12);
+  EXPECT_NEAR(now.turn_rate, 0.2, 1e-12);
+  for (int i = 0; i < 4; ++i) now = Approach(now, wanted, 0.1, 0.2);
+  EXPECT_LT((now.velocity - wanted.velocity).norm(), 1e-12);
+  // To a stand it slows down first.
+  now = Approach(now, {}, 0.1, 1);
+  EXPECT_TRUE(now.stepping);
+  for (int i = 0; i < 4; ++i) now = Approach(now, {}, 0.1, 1);
+  EXPECT_FALSE(now.stepping);
+}
+
+WalkSpec Spec(const Reach& reach, double spacing) {
+  WalkSpec spec;
+  spec.start = 0.8;
+  spec.unload = spec.load = 0.2;
+  spec.swing = 0.6;
+  spec.step = {spacing, reach.least_spacing(), 0.25, 0.12, 0.35};
+  spec.acceleration = 0.1;
+  spec.turn_acceleration = 0.2;
+  spec.foot = {0.04, 0.1, 0.1};
+  spec.touch_load = 10;
+  spec.touch_duration = 0.006;
+  spec.search_depth = 0.06;
+  spec.gain = 1;
+  spec.adjust_from = 0.01;
+  spec.lower = 0.02;
+  spec.height_rate = 6;
+  spec.yaw_rate = 5;
+  spec.rest_distance = 0.02;
+  spec.rest_speed = 0.04;
+  spec.rest_time = 0.3;
+  return spec;
+}
+
+constexpr double kEdge = 0.02;  // m
+
+class World {
+ public:
+  /// `rough`: m, by how much the ground is lower under every third foothold.
+  explicit World(TestRobot robot, double rough = 0)
+      : model_(robot::LoadTestRobot(robot)), rough_(rough) {
+    const double height = robot::StandingHeight(model_);
+    const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
+    StepLimits limits;
+    limits.edge = kEdge;
+    limits.spacing = std::max(robot::StandingSpacing(model_), reach.least_spacing());
+    walk_ = Walk(StepChoice(model_, reach, limits), Spec(reach, limits.spacing));
+    com_ = {0, 0, height};
+    for (size_t i = 0; i < 2; ++i) {
+      sole_[i] = Eigen::Translation3d(0, (i == 0 ? -0.5 : 0.5) * limits.spacing, 0) *
+                 Eigen::Isometry3d::Identity();
+    }
+  }
+
+  void Push(const Vector2d& velocity) { velocity_.head<2>() += velocity; }
+
+  void Run(double duration, const WalkCommand& command) {
+    for (const double end = time_ + duration; time_ < end - 0.5 * kPeriod;) Tick(command);
+  }
+
+  Walk& walk() { return walk_; }
+  const std::array<Eigen::Isometry3d, 2>& sole() const { return sole_; }
+  Vector2d middle() const {
+    return 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
+  }
+  double yaw() const { return 0.5 * (Yaw(sole_[0]) + Yaw(sole_[1])); }
+  const Vector3d& com() const { return com_; }
+  double largest_jump() const { return largest_jump_; }
+
+ private:
+  double Ground() const { return walk_.num_steps() % 3 == 1 ? -rough_ : 0; }
+
+  void Tick(const WalkCommand& command) {
+    StepInput input;
+    input.time = time_;
+    input.com = com_;
+    input.com_velocity = velocity_;
+    input.sole = sole_;
+    input.com_height = com_.z();
+    for (size_t i = 0; i < 2; ++i) {
+      const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground();
+      input.load[i] = down ? 200 : 0;
+    }
+    const bool was_active = walk_.active();
+    if (walk_.Update(input, command)) {
+      const StepOutput& output = walk_.output();
+      in_contact_ = output.in_contact;
+      if (was_active) {
+        largest_jump_ = std::max(largest_jump_, (output.cop - last_cop_).norm());
+      }
+      last_cop_ = output.cop;
+      Move(output);
+    }
+    time_ += kPeriod;
+  }
+
+  void Move(const StepOutput& output) {
+    balance::ConvexPolygon soles;
+    for (size_t i = 0; i < 2; ++i) {
+      if (in_contact_[i]) {
+        soles = HullOf(soles, SoleAt(model_.feet()[i], 0, sole_[i].translation().head<2>(),
+                                     Yaw(sole_[i])));
+        continue;
+      }
+      sole_[i].translation() = output.swing.position;
+      sole_[i].linear() = output.swing_rotation.rotation;
+      double& z = sole_[i].translation().z();
+      if (output.swing.velocity.z() < 0) z = std::max(z, Ground());
+    }
+    EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
+    const Vector3d& acceleration = output.com.acceleration;
+    for (int i = 0; i < 2; ++i) {
+      com_[i] += kPeriod * velocity_[i] + 0.5 * kPeriod * kPeriod * acceleration[i];
+      velocity_[i] += kPeriod * acceleration[i];
+    }
+    com_.z() = output.com.position.z();
+    velocity_.z() = output.com.velocity.z();
+  }
+
+  robot::RobotModel model_;
+  double rough_;
+  Walk walk_;
+  double time_ = 0;
+  Vector3d com_, velocity_ = Vector3d::Zero();
+  std::array<Eigen::Isometry3d, 2> sole_;
+  std::array<bool, 2> in_contact_{true, true};
+  Vector2d last_cop_ = Vector2d::Zero();
+  double largest_jump_ = 0;
+};
+
+constexpr WalkCommand kStand{};
+
+TEST(Walk, StandsUntilItIsTold) {
+  World world(TestRobot::kPaper);
+  world.Run(1, kStand);
+  EXPECT_FALSE(world.walk().active());
+}
+
+TEST(Walk, TenStepsAheadAndAStopSideBySide) {
+  World world(TestRobot::kPaper);
+  world.Run(11, {{0.1, 0}, 0, true});
+  EXPECT_GE(world.walk().num_steps(), 9);
+  world.Run(6, kStand);
+  EXPECT_FALSE(world.walk().active());
+  const Vector3d apart = world.sole()[1].translation() - world.sole()[0].translation();
+  EXPECT_NEAR(apart.x(), 0, 0.005);
+  EXPECT_GT(apart.y(), 0.15);
+  EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02);
+  EXPECT_GT(world.middle().x(), 0.8);
+  // No jump of the centre of pressure beyond what a tick of the fastest ramp moves it.
+  EXPECT_LT(world.largest_jump(), 0.012);
+}
+
+TEST(Walk, KeepsToTheCommandedVelocity) {
+  World world(TestRobot::kPaper);
+  const WalkCommand command{{0.15, 0}, 0, true};
+  world.Run(6, command);
+  const Vector2d from = world.middle();
+  world.Run(20, command);
+  EXPECT_NEAR((world.middle() - from).x() / 20, 0.15, 0.015);
+  EXPECT_NEAR((world.middle() - from).y(), 0, 0.01);
+}
+
+TEST(Walk, TurnsAndStepsAside) {
+  World world(TestRobot::kPaper);
+  world.Run(10, {{0, 0}, 0.1, true});
+  world.Run(5, kStand);
+  EXPECT_FALSE(world.walk().active());
+  EXPECT_GT(world.yaw(), 0.5);
+  EXPECT_NEAR(Yaw(world.sole()[0]), Yaw(world.sole()[1]), 0.01);
+  EXPECT_NEAR(world.walk().body_yaw().position, world.yaw(), 0.02);
+  World aside(TestRobot::kPaper);
+  aside.Run(10, {{0, -0.05}, 0, true});
+  aside.Run(5, kStand);
+  EXPECT_FALSE(aside.walk().active());
+  EXPECT_LT(aside.middle().y(), -0.25);
+}
+
+TEST(Walk, APushIsCaughtByTheNextFoothold) {
+  // More than the centre of pressure within the sole brings back, on the side of the foot in the
+  // air.
+  for (const Vector2d push : {Vector2d(0.25, 0), Vector2d(-0.25, 0), Vector2d(0, 0.12)}) {
+    World world(TestRobot::kPaper);
+    const WalkCommand command{{0, 0}, 0, true};
+    world.Run(3, command);
+    while (world.walk().stage() != WalkStage::kSwinging || world.walk().stepping_foot() != 1) {
+      world.Run(kPeriod, command);
+    }
+    world.Run(0.1, command);
+    world.Push(push);
+    world.Run(8, command);
+    world.Run(6, kStand);
+    EXPECT_FALSE(world.walk().active()) << push.transpose();
+    EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02) << push.transpose();
+  }
+}
+
+TEST(Walk, GoesOnWhereTheGroundIsLower) {
+  World world(TestRobot::kPaper, 0.02);
+  world.Run(20, {{0.1, 0}, 0, true});
+  EXPECT_GE(world.walk().num_steps(), 14);
+  world.Run(6, kStand);
+  EXPECT_FALSE(world.walk().active());
+}
+
+}  // namespace
+}  // namespace poise::stepping
