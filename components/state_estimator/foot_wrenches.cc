@@ -30,7 +30,7 @@ void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
   for (size_t f = 0; f < 2; ++f) check_[f].Read(reading[f].state, reading[f].wrench, dt);
   const bool needed = !check_[0].good() || !check_[1].good();
   observed_ = (needed || (observer_.torque_known() && tick % check_every_ == 0)) &&
-              observer_.Observe(correction);
+              observer_.Observe(correction, needed);
   if (observed_) {
     if (observer_.torque_known()) Compare();
     since_ = 0;
@@ -42,7 +42,8 @@ void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
     } else {
       const auto at = static_cast<Eigen::Index>(6 * f);
       wrench_[f] = observer_.wrenches().segment<6>(at);
-      deviation_[f] = observer_.covariance().diagonal().segment<6>(at).cwiseMax(0).cwiseSqrt();
+      deviation_[f] =
+          observer_.settled_covariance().diagonal().segment<6>(at).cwiseMax(0).cwiseSqrt();
     }
   }
 }

@@ -41,7 +41,8 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
       angular_(linear_),
       force_(linear_),
       moment_(linear_),
-      joint_torque_(Eigen::VectorXd::Zero(model_->num_joints())) {
+      joint_torque_(Eigen::VectorXd::Zero(model_->num_joints())),
+      errors_(0, {}) {
   for (int j = 0; j < model_->num_joints(); ++j) {
     std::array<bool, 2> supports{};
     for (size_t f = 0; f < 2; ++f) {
@@ -53,6 +54,10 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     leg_joints_.push_back(j);
     supports_.push_back(supports);
   }
+  errors_ = JointErrors(leg_joints_.size(),
+                        {settings_.friction_error, settings_.torque_error, settings_.mass_error});
+  torques_.assign(leg_joints_.size(), {});
+  residual_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
   bristle_ = bristle_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
   for (size_t k = 0; k < leg_joints_.size(); ++k) {
     bristle_error_[static_cast<Eigen::Index>(k)] =
@@ -205,11 +210,16 @@ void WrenchObserver::AddJointRows() {
                  torque = filter_.value()[6 + state_.joint_position.size() + joint];
     const double held = bristle_[static_cast<Eigen::Index>(k)];
     const double friction = held + motor.viscous_friction * speed;
-    const double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
-                            Square(settings_.friction_error * motor.viscous_friction * speed) +
-                            Square(settings_.torque_error * torque) +
-                            Square(settings_.mass_error * joint_torque_[joint]) + kLeastVariance;
-    const double known = torque - friction - joint_torque_[joint];
+    double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
+                      Square(settings_.friction_error * motor.viscous_friction * speed) +
+                      Square(settings_.torque_error * torque) +
+                      Square(settings_.mass_error * joint_torque_[joint]) + kLeastVariance;
+    double known = torque - friction - joint_torque_[joint];
+    torques_[k] = {held, torque, joint_torque_[joint]};
+    residual_[static_cast<Eigen::Index>(k)] = known;
+    const JointErrors::Corrected corrected = errors_.Correct(k, torques_[k], variance);
+    known -= corrected.error;
+    variance = std::max(corrected.variance, kLeastVariance);
     std::array<robot::Vector6d, 2> row;
     for (size_t f = 0; f < 2; ++f) {
       if (!supports_[k][f]) continue;
@@ -272,7 +282,29 @@ bool WrenchObserver::AddBaseRows() {
   return estimate_.allFinite();
 }
 
-bool WrenchObserver::Observe(const ObserverCorrection& correction) {
+// What a leg that swings seems to carry is its joints' error.
+void WrenchObserver::Learn(double dt) {
+  errors_.Age(dt);
+  const Vector3d between = sole_rotation_[0].transpose() * (sole_position_[1] - sole_position_[0]);
+  const double speed = observed_ ? (between - between_).norm() / dt : 0;
+  between_ = between;
+  for (size_t f = 0; f < 2; ++f) {
+    const auto at = static_cast<Eigen::Index>(6 * f);
+    const robot::Vector6d wrench = estimate_.segment<6>(at);
+    const Matrix6 spread = spread_.block<6, 6>(at, at);
+    const double excess = wrench.dot(spread.llt().solve(wrench));
+    const double press = -wrench[2] / std::sqrt(std::max(spread(2, 2), kLeastVariance));
+    const bool begins = free_foot_[f].Update(speed, excess, press, dt);
+    if (!free_foot_[f].free()) continue;
+    for (size_t k = 0; k < leg_joints_.size(); ++k) {
+      if (!supports_[k][f] || supports_[k][1 - f]) continue;
+      if (begins) errors_.Begin(k);
+      errors_.Learn(k, torques_[k], residual_[static_cast<Eigen::Index>(k)], press > 1, dt);
+    }
+  }
+}
+
+bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   mass_ = model_->total_mass();
   com_.setZero();
   ReadMotion(correction);
@@ -288,6 +320,7 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction) {
   // What the base carries, it carries alone: no joint's row knows of it.
   AddLoad(correction);
   if (!AddBaseRows()) return false;
+  if (learn && torque_known_ && since_ > 0) Learn(since_);
   if (observed_ && since_ > 0) {
     const double share = std::min(since_ / kRateTime, 1.0);
     rate_ += share * ((estimate_ - wrenches_) / since_ - rate_);
@@ -297,7 +330,7 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction) {
   since_ = 0;
   observed_ = true;
   wrenches_ = estimate_;
-  covariance_ = spread_;
+  covariance_ = settled_covariance_ = spread_;
   const Wrenches late = settings_.latency * rate_;
   covariance_.noalias() += late * late.transpose();
   return true;
@@ -307,7 +340,9 @@ void WrenchObserver::Archive(StateArchive* archive) {
   filter_.Archive(archive);
   archive->Show(input_, bristle_, bristle_error_, wrenches_, rate_, push_excess_, since_,
                 torque_known_, started_, observed_);
-  archive->Show(covariance_);
+  archive->Show(covariance_, settled_covariance_, between_);
+  errors_.Archive(archive);
+  for (FreeFoot& foot : free_foot_) foot.Archive(archive);
 }
 
 }  // namespace poise

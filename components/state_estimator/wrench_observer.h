@@ -19,6 +19,7 @@
 #include "components/framework/state_archive.h"
 #include "components/robot/dynamics.h"
 #include "components/state_estimator/base_sensors.h"
+#include "components/state_estimator/joint_errors.h"
 #include "components/state_estimator/low_pass.h"
 
 namespace poise {
@@ -53,12 +54,16 @@ class WrenchObserver {
   /// robot at rest. Allocates nothing, as Observe.
   void Track(const BaseSensors& sensors, double dt);
   /// Finds the wrenches from what has been read. False, and nothing changes, when it holds no
-  /// finite number.
-  bool Observe(const ObserverCorrection& correction);
+  /// finite number. `learn`: what a free foot's joints show is learnt.
+  bool Observe(const ObserverCorrection& correction, bool learn = false);
 
   /// Robot on environment, each in its sole's frame, N and N·m.
   const Wrenches& wrenches() const { return wrenches_; }
   const Covariance& covariance() const { return covariance_; }
+  /// The same without what the low-pass lags behind: of wrenches that do not change.
+  const Covariance& settled_covariance() const { return settled_covariance_; }
+  /// Whether the foot was seen to hang free at the last Observe that learns.
+  bool free(size_t foot) const { return free_foot_[foot].free(); }
   /// Whether a joint torque is known; without, the base's rows alone tell the sum of both feet.
   bool torque_known() const { return torque_known_; }
   /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
@@ -83,6 +88,7 @@ class WrenchObserver {
   void TrackFriction(double dt);
   void AddJointRows();
   bool AddBaseRows();
+  void Learn(double dt);
 
   std::shared_ptr<const robot::RobotModel> model_;
   WrenchObserverSettings settings_;
@@ -104,10 +110,16 @@ class WrenchObserver {
   std::array<Eigen::Matrix3d, 2> sole_rotation_;
   Wrenches wrenches_ = Wrenches::Zero(), rate_ = Wrenches::Zero(), estimate_ = Wrenches::Zero();
   Covariance covariance_ = Covariance::Identity(), spread_ = Covariance::Identity();
+  Covariance settled_covariance_ = Covariance::Identity();
   // By leg joint, N·m: what friction holds, which a joint that has slipped one way goes on doing
   // when it sticks, until it is bent back; and its standard deviation, before it has slipped for
   // the first time anything up to break-away.
   Eigen::VectorXd bristle_, bristle_error_;
+  JointErrors errors_;                         // by leg joint
+  std::vector<JointErrors::Torques> torques_;  // by leg joint, of this Observe
+  Eigen::VectorXd residual_;                   // N·m, by leg joint, of this Observe
+  std::array<FreeFoot, 2> free_foot_;
+  Eigen::Vector3d between_ = Eigen::Vector3d::Zero();  // m, from right to left sole, right's axes
   double push_excess_ = 0;
   double since_ = 0;  // s, since the last Observe
   bool torque_known_ = false, started_ = false, observed_ = false;

@@ -1,4 +1,5 @@
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
@@ -12,6 +13,8 @@ namespace {
 constexpr double kCopShare = 0.25;
 // A touch-down by the true load: as ContactConfirmation's defaults have it.
 constexpr double kTrueTouchLoad = 10, kTrueTouchTime = 0.02;  // N, s
+// N: below it, as long, nothing was touched (ContactConfirmation's release_load).
+constexpr double kNoLoad = 4;
 constexpr double kWrenchNeesBound = 21.026;  // chi-squared, 12 degrees of freedom, 5 %
 
 using Wrench = Eigen::Matrix<double, 6, 1>;
@@ -77,22 +80,28 @@ Answer ObserverNees(const RunRecord& run, int64_t tick) {
   return error.dot(factors.solve(error));
 }
 
-/// When the foot's true load has been above kTrueTouchLoad for kTrueTouchTime, the last time before
-/// `tick` or the first after it.
+/// When the foot's true load had been above kTrueTouchLoad for kTrueTouchTime, of the load at
+/// `tick` and since when it is that large; empty when it is not.
 std::optional<int64_t> TrueTouch(const RunRecord& run, size_t foot, int64_t tick) {
   const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
   const auto loaded = [&](int64_t t) {
     const ground_truth_t* truth = run.truth.at(t);
     return truth != nullptr && -truth->foot_wrench[foot].force[2] > kTrueTouchLoad;
   };
+  if (!loaded(tick)) return {};
   int64_t begin = tick;
-  if (loaded(tick)) {
-    while (begin > 0 && loaded(begin - 1)) --begin;
-  } else {
-    while (begin < run.num_ticks && !loaded(begin)) ++begin;
-    if (begin == run.num_ticks) return {};
-  }
+  while (begin > 0 && loaded(begin - 1)) --begin;
   return begin + lasts;
+}
+
+/// Whether the foot's true load was nowhere above kNoLoad in the kTrueTouchTime before `tick`.
+bool TouchedNothing(const RunRecord& run, size_t foot, int64_t tick) {
+  const auto lasts = static_cast<int64_t>(std::lround(kTrueTouchTime / run.spec.tick_period()));
+  for (int64_t t = std::max<int64_t>(tick - lasts, 0); t <= tick; ++t) {
+    const ground_truth_t* truth = run.truth.at(t);
+    if (truth == nullptr || -truth->foot_wrench[foot].force[2] > kNoLoad) return false;
+  }
+  return true;
 }
 
 // s: what the calibration is asked for at, and how long its figures are averaged.
@@ -196,33 +205,50 @@ void AddObserver(MetricList* list) {
                      if (count == 0) return {};
                      return Scaled(inside, 1.0 / static_cast<double>(count));
                    }});
-  list->push_back(
-      {"touch_down_delay_max", "ms",
-       "touch-downs as planned for, less when the true load had been above 10 N for 20 ms, "
-       "largest size",
-       [](const RunRecord& run) {
-         Answer worst;
-         for (const TouchDown& touch : TouchDowns(run)) {
-           const auto truth = TrueTouch(run, touch.foot, touch.tick);
-           if (!truth) continue;
-           const double late = run.duration(touch.tick - *truth);
-           worst = std::max(worst.value_or(0), kMilli * std::abs(late));
-         }
-         return worst;
-       }});
+  list->push_back({"touch_down_delay_max", "ms",
+                   "touch-downs as planned for, later than when the true load had been above 10 N "
+                   "for 20 ms, largest; 0 of those that came before",
+                   [](const RunRecord& run) -> Answer {
+                     Answer worst;
+                     for (const TouchDown& touch : TouchDowns(run)) {
+                       if (TouchedNothing(run, touch.foot, touch.tick)) continue;
+                       const auto truth = TrueTouch(run, touch.foot, touch.tick);
+                       const int64_t late = truth ? touch.tick - *truth : 0;
+                       worst = std::max(worst.value_or(0), kMilli * run.duration(late));
+                     }
+                     return worst;
+                   }});
+  list->push_back({"false_touch_downs", "",
+                   "touch-downs as planned for, of feet whose true load had not been above 4 N in "
+                   "the 20 ms before",
+                   [](const RunRecord& run) -> Answer {
+                     if (run.plan.empty() || run.truth.empty()) return {};
+                     int found = 0;
+                     for (const TouchDown& touch : TouchDowns(run)) {
+                       found += TouchedNothing(run, touch.foot, touch.tick) ? 1 : 0;
+                     }
+                     return found;
+                   }});
+  const auto broken = [](const RunRecord& run, int64_t t) -> std::optional<bool> {
+    const estimator_status_t* status = run.estimator.at(t);
+    if (status == nullptr) return {};
+    return std::ranges::any_of(status->foot_sensor, [](int8_t state) {
+      return state > estimator_status_t::SENSOR_ABSENT;
+    });
+  };
+  list->push_back({"foot_sensor_fault_first", "s",
+                   "first time at which a foot's sensor was taken for broken",
+                   [broken](const RunRecord& run) -> Answer {
+                     return Minimum(run, [&](int64_t t) -> Answer {
+                       if (!broken(run, t).value_or(false)) return {};
+                       return run.time(t);
+                     });
+                   }});
   list->push_back(
       {"foot_sensor_fault_time", "s",
        "time in which a foot's sensor was taken for broken (a robot without sensors has none)",
-       [](const RunRecord& run) {
-         return Scaled(CountTicks(run,
-                                  [&](int64_t t) -> std::optional<bool> {
-                                    const estimator_status_t* status = run.estimator.at(t);
-                                    if (status == nullptr) return {};
-                                    for (const int8_t state : status->foot_sensor) {
-                                      if (state > estimator_status_t::SENSOR_ABSENT) return true;
-                                    }
-                                    return false;
-                                  }),
+       [broken](const RunRecord& run) {
+         return Scaled(CountTicks(run, [&](int64_t t) { return broken(run, t); }),
                        run.spec.tick_period());
        }});
 }

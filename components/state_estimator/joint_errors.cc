@@ -1,0 +1,68 @@
+#include "components/state_estimator/joint_errors.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace poise {
+namespace {
+
+// s, within which a row's errors are one and the same: legs on gears ring at some 20 Hz.
+constexpr double kCorrelationTime = 0.05;
+// s, over which a free leg's errors are averaged; and while it may be pressed.
+constexpr double kLearnTime = 0.5, kPressedLearnTime = 5;
+// s, after which what was learnt is worth no more than what is assumed without.
+constexpr double kForgetTime = 10;
+// m/s, beyond which a sole does not stand: forty times what encoders leave of a standing one's.
+constexpr double kFreeSpeed = 0.02;
+// s, for which it must go so fast with no load: longer than the filter needs to show one.
+constexpr double kFreeTime = 0.05;
+// chi-squared with 6 degrees of freedom, exceeded once in a thousand times.
+constexpr double kFreeExcess = 22.46;
+// Standard deviations of the load at which it is free no longer, likewise.
+constexpr double kFreePress = 3.1;
+
+double Square(double x) { return x * x; }
+
+}  // namespace
+
+JointErrors::JointErrors(size_t num_joints, const Torques& share)
+    : share_(share), joint_(num_joints) {}
+
+void JointErrors::Age(double dt) {
+  for (Joint& joint : joint_) joint.age += dt;
+}
+
+void JointErrors::Learn(size_t joint, const Torques& torques, double residual, bool pressed,
+                        double dt) {
+  Joint& j = joint_[joint];
+  j.learnt = std::min(j.learnt + dt, kLearnTime);
+  j.age = 0;
+  // The mean of all until there are enough of them.
+  const double part = std::min(dt / (pressed ? kPressedLearnTime : j.learnt), 1.0);
+  j.mean += part * (residual - j.mean);
+  j.spread += part * (Square(residual - j.mean) - j.spread);
+  for (size_t i = 0; i < torques.size(); ++i) j.torques[i] += part * (torques[i] - j.torques[i]);
+}
+
+JointErrors::Corrected JointErrors::Correct(size_t joint, const Torques& torques,
+                                            double variance) const {
+  const Joint& j = joint_[joint];
+  if (!(j.learnt > 0)) return {0, variance};
+  double changed = j.spread;
+  for (size_t i = 0; i < torques.size(); ++i) {
+    changed += Square(share_[i] * (torques[i] - j.torques[i]));
+  }
+  changed += variance * (kCorrelationTime / j.learnt + j.age / kForgetTime);
+  // Two estimates of one error: what was learnt, and zero.
+  const double weight = variance / (variance + changed);
+  return {weight * j.mean, weight * changed};
+}
+
+bool FreeFoot::Update(double speed, double excess, double press, double dt) {
+  moving_ = excess < kFreeExcess && speed > kFreeSpeed ? moving_ + dt : 0;
+  const bool before = free_;
+  free_ = press < kFreePress && (free_ || moving_ >= kFreeTime);
+  return free_ && !before;
+}
+
+}  // namespace poise
