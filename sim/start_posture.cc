@@ -69,7 +69,8 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
 
   goal.foot[kRightFoot] = Isometry3d(Translation3d(0, -spacing / 2, 0));
   goal.foot[kLeftFoot] = Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));
-  goal.com_xy = {config.com_x(), config.com_y()};
+  const double above_right = config.left_foot_height() > 0 ? -spacing / 2 : 0;
+  goal.com_xy = {config.com_x(), config.has_com_y() ? config.com_y() : above_right};
   goal.com_height = com_height;
   try {
     return robot::SolvePosture(model, goal);

@@ -126,6 +126,20 @@ HalfPlanes EdgesOf(const ConvexPolygon& polygon) {
   return edges;
 }
 
+ConvexPolygon CornersOf(const HalfPlanes& edges) {
+  ConvexPolygon polygon;
+  if (edges.count < 3) return polygon;
+  for (size_t i = 0; i < edges.planes().size(); ++i) {
+    // Corner i is where edge i ends and the next one starts.
+    const HalfPlane &edge = edges.plane[i], &next = edges.plane[(i + 1) % edges.planes().size()];
+    Eigen::Matrix2d normals;
+    normals << edge.normal.transpose(), next.normal.transpose();
+    polygon.corner[i] = normals.inverse() * Eigen::Vector2d(edge.offset, next.offset);
+    ++polygon.num_corners;
+  }
+  return polygon;
+}
+
 ConvexPolygon Clip(const ConvexPolygon& polygon, const HalfPlane& plane) {
   // Each corner cut off leaves at most two: one more than there were.
   std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners + 1> kept;

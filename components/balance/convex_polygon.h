@@ -47,6 +47,9 @@ struct HalfPlanes {
 /// Empty for a polygon without an area.
 HalfPlanes EdgesOf(const ConvexPolygon& polygon);
 
+/// The polygon whose EdgesOf these are; empty of fewer than three.
+ConvexPolygon CornersOf(const HalfPlanes& edges);
+
 /// What lies inside the half-plane too; empty when that has no area.
 ConvexPolygon Clip(const ConvexPolygon& polygon, const HalfPlane& plane);
 

@@ -68,9 +68,50 @@ Bounds MomentBounds(const Vector6d& resultant, const std::array<Eigen::Vector3d,
   return bounds;
 }
 
+// m that a sole's reach is short of its edge, so that an area is left to MoveIntoSoles.
+constexpr double kReachReserve = 1e-5;
+
+/// The furthest that the sole, turned by `rotation` into O's plane, reaches along `normal`, m.
+double Reach(const ConvexPolygon& sole, const Eigen::Matrix3d& rotation,
+             const Eigen::Vector2d& normal) {
+  const Eigen::Vector2d in_sole = rotation.topLeftCorner<2, 2>().transpose() * normal;
+  double reach = -HUGE_VAL;
+  for (const Eigen::Vector2d& corner : sole.corners()) reach = std::max(reach, in_sole.dot(corner));
+  return reach - kReachReserve;
+}
+
+/// The same where each foot has a centre of pressure of its own: η S_r + (1 − η) S_l holds what
+/// both can have together, and along each edge of either sole that sum reaches as far as η h_r +
+/// (1 − η) h_l.
+Bounds FreeMomentBounds(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
+                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
+                        const std::array<ConvexPolygon, 2>& sole) {
+  const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
+  const double load = std::abs(resultant[2]);
+  Bounds bounds;
+  for (size_t foot = 0; foot < 2; ++foot) {
+    for (const HalfPlane& edge : limits[foot].edges.planes()) {
+      const Eigen::Vector2d normal =
+          (rotation[foot].topLeftCorner<2, 2>() * edge.normal).normalized();
+      const double right = Reach(sole[0], rotation[0], normal) * load,
+                   left = Reach(sole[1], rotation[1], normal) * load;
+      const Eigen::Vector2d turned(-normal.y(), normal.x());
+      bounds.AddBelow(turned.dot(moment.slope.head<2>()) - (right - left),
+                      turned.dot(moment.offset.head<2>()), left, "edge");
+    }
+    const Eigen::Matrix3d to_sole = rotation[foot].transpose();
+    bounds.AddBoth(to_sole.row(2).dot(moment.slope), to_sole.row(2).dot(moment.offset),
+                   limits[foot].yaw_friction * std::abs(to_sole.row(2).dot(resultant.head<3>())),
+                   "yaw");
+  }
+  return bounds;
+}
+
+/// `bounds`: of the moments, made once the force is known to press.
+template <class MakeBounds>
 RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
                         const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
-                        double eta_min, double eta_max) {
+                        double eta_min, double eta_max, const MakeBounds& bounds) {
   RatioInterval interval;
   const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
   const double optimal = -moment.offset.x() / moment.slope.x();
@@ -91,7 +132,7 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
     if (!(std::hypot(force.x(), force.y()) < limits[foot].friction * -force.z()))
       return infeasible("friction");
   }
-  for (const Bound& bound : MomentBounds(resultant, position, rotation, limits)) {
+  for (const Bound& bound : bounds()) {
     if (bound.a == 0) {
       if (!(bound.b < bound.c)) return infeasible(bound.name);
       continue;
@@ -105,6 +146,13 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
   }
   interval.feasible = true;
   return interval;
+}
+
+RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
+                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
+                        double eta_min, double eta_max) {
+  return Intersect(resultant, position, rotation, limits, eta_min, eta_max,
+                   [&] { return MomentBounds(resultant, position, rotation, limits); });
 }
 
 // m of centre of pressure that one ratio may be worse than another before it counts.
@@ -192,6 +240,15 @@ RatioInterval FeasibleRatio(const Vector6d& resultant,
   return Intersect(resultant, foot_in_o, Level(), {limits, limits}, eta_min, eta_max);
 }
 
+RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+                        const SoleLimits& limits, const std::array<ConvexPolygon, 2>& sole,
+                        double eta_min, double eta_max) {
+  const auto position = Positions(foot);
+  const auto rotation = Rotations(foot);
+  return Intersect(resultant, position, rotation, limits, eta_min, eta_max,
+                   [&] { return FreeMomentBounds(resultant, position, rotation, limits, sole); });
+}
+
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
                    const std::array<Eigen::Isometry3d, 2>& foot, const SoleLimits& limits,
                    double eta_min, double eta_max) {
@@ -223,6 +280,36 @@ std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,
     share[i].tail<3>() = foot[i].linear().transpose() * (moment * part);
   }
   return share;
+}
+
+void MoveIntoSoles(const std::array<Eigen::Isometry3d, 2>& foot,
+                   const std::array<ConvexPolygon, 2>& sole, std::array<Vector6d, 2>* share) {
+  std::array<Vector6d, 2>& wrench = *share;
+  if (!(wrench[0](2) < 0 && wrench[1](2) < 0)) return;
+  const size_t light = wrench[0](2) > wrench[1](2) ? 0 : 1, heavy = 1 - light;
+  const Eigen::Vector2d from = CenterOfPressure(wrench[light]),
+                        other = CenterOfPressure(wrench[heavy]);
+  if (!from.allFinite() || !other.allFinite()) return;
+  // (M_x, M_y) = F_z turn r. A moment that the lighter foot gets, the heavier one loses.
+  const Eigen::Matrix3d to_heavy = foot[heavy].linear().transpose() * foot[light].linear();
+  Eigen::Matrix2d turn;
+  turn << 0, 1, -1, 0;
+  const Eigen::Matrix2d follows =
+      wrench[light](2) / wrench[heavy](2) * turn * to_heavy.topLeftCorner<2, 2>() * turn;
+  ConvexPolygon both = sole[light];  // where the lighter's may be so that the heavier's is inside
+  for (const HalfPlane& edge : EdgesOf(sole[heavy]).planes()) {
+    const Eigen::Vector2d normal = follows.transpose() * edge.normal;
+    const double norm = normal.norm();
+    if (!(norm > 0)) continue;
+    const double offset = edge.offset - edge.normal.dot(other) + normal.dot(from);
+    both = Clip(both, {normal / norm, offset / norm});
+  }
+  const Eigen::Vector2d change =
+      NearestPoint(both.num_corners > 0 ? both : sole[light], from) - from;
+  const double force = wrench[light](2);
+  const Eigen::Vector3d moment(force * change.y(), -force * change.x(), 0);
+  wrench[light].tail<3>() += moment;
+  wrench[heavy].tail<3>() -= to_heavy * moment;
 }
 
 }  // namespace poise::balance

@@ -42,6 +42,13 @@ RatioInterval FeasibleRatio(const Vector6d& resultant,
                             const std::array<Eigen::Vector3d, 2>& foot_in_o,
                             const ContactLimits& limits, double eta_min, double eta_max);
 
+/// The same where each foot may have a centre of pressure of its own, as MoveIntoSoles gives it: of
+/// soles that are not alike more than of one that both have. `sole`: the polygons of `limits`'
+/// edges, which both have. Exact for soles parallel to O's plane.
+RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+                        const SoleLimits& limits, const std::array<ConvexPolygon, 2>& sole,
+                        double eta_min, double eta_max);
+
 /// The ratio to use: η* clipped to a feasible interval. Infeasible: η* clipped to the ratios in
 /// [eta_min, eta_max] whose largest violation a η + b − c (N·m, per unit of load share) of the
 /// moment conditions is the least, to a millimetre of centre of pressure. Always finite and within
@@ -61,5 +68,13 @@ double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
 std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,
                                             const std::array<Eigen::Isometry3d, 2>& foot,
                                             double eta);
+
+/// Where a share's centre of pressure is outside its sole: the lighter foot's moves to the nearest
+/// point from which both are inside, the heavier one's so that the resultant stays. Soles that are
+/// not alike can then do what their hull promises. Without such a point the lighter foot's goes
+/// into its own sole. `sole`: what of each the centre of pressure may be in, sole frame, not empty.
+/// Shares that do not press stay.
+void MoveIntoSoles(const std::array<Eigen::Isometry3d, 2>& foot,
+                   const std::array<ConvexPolygon, 2>& sole, std::array<Vector6d, 2>* share);
 
 }  // namespace poise::balance

@@ -78,7 +78,9 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
                                     sole_margin_, foot.name, foot.length, foot.width));
     }
   }
-  CutSoles();
+  for (size_t f = 0; f < 2; ++f) {
+    sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
+  }
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -366,24 +368,9 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
-void ContactWrenchMonitor::CutSoles() {
-  for (size_t f = 0; f < 2; ++f) sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
-  shared_sole_ = sole_;
-  if (model_->feet()[0].rectangular() && model_->feet()[1].rectangular()) return;
-  // The shares of (62)–(67) have one centre of pressure, each in its own sole's frame: of soles
-  // that mirror each other both can have what is common to them.
-  for (size_t f = 0; f < 2; ++f) {
-    for (const balance::HalfPlane& edge : balance::EdgesOf(sole_[1 - f]).planes()) {
-      shared_sole_[f] = balance::Clip(shared_sole_[f], edge);
-    }
-  }
-}
-
 balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
-  const balance::ContactGeometry& geometry = whole_body_->geometry();
-  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
-  return balance::WithFewerCorners(
-      balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
+  return balance::WithFewerCorners(balance::SupportPolygon(frame_o, whole_body_->geometry(), sole_),
+                                   kMostCorners);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {

@@ -59,8 +59,7 @@ class ContactWrenchMonitor : public Component {
   bool MoveForStep(const balance::ContactGeometry& geometry, const Bounds& bounds,
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
-  /// Of the soles in contact, `margin` (m) off their edges.
-  void CutSoles();
+  /// The hull of the soles in contact, sole_margin_ off their edges.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
   /// says of the tick before.
@@ -95,8 +94,7 @@ class ContactWrenchMonitor : public Component {
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull
   double sole_margin_ = 0;              // m
-  // Less sole_margin_, m, sole frames: alone on the ground, and with the other foot.
-  std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
+  std::array<balance::ConvexPolygon, 2> sole_;  // less sole_margin_, m, sole frames
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none

@@ -39,6 +39,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   const double margin = SoleMargin(*model_);
   double_support_ = ReadSoleLimits(config.double_support(), *model_, margin, "double_support");
   single_support_ = ReadSoleLimits(config.single_support(), *model_, margin, "single_support");
+  for (size_t i = 0; i < 2; ++i) sole_[i] = balance::CornersOf(double_support_[i].edges);
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
   CheckRatio(eta_min_, "eta_min");
@@ -136,8 +137,11 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
     sole_in_o[i] = frame_o.inverse() * whole_body_->data().foot_pose[i];
     wrench[i] = GetWrench(balance_torque_->foot_wrench[i]);
   }
-  const balance::RatioInterval interval =
-      KeepLanded(balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_));
+  const bool own_soles = sole_[0].num_corners > 0 && sole_[1].num_corners > 0;
+  const balance::RatioInterval interval = KeepLanded(
+      own_soles
+          ? balance::FreeRatio(resultant, sole_in_o, double_support_, sole_, eta_min_, eta_max_)
+          : balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_));
   const bool pressed = resultant[2] < 0;
   out.eta_feasible = interval.feasible && pressed ? 1 : 0;
   out.eta_min = interval.feasible ? interval.min : 0.0;
@@ -148,7 +152,8 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
         balance::SelectRatio(interval, resultant, sole_in_o, double_support_, eta_min_, eta_max_);
     out.eta =
         RampedRatio(ratio_moves_.Ratio(tick.time, interval, free_ratio), resultant, sole_in_o);
-    const Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
+    Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
+    if (own_soles) balance::MoveIntoSoles(sole_in_o, sole_, &desired);
     Eigen::Matrix<double, 12, 1> change;
     change << desired[0] - wrench[0], desired[1] - wrench[1];
     balance::RedistributionTorque(contact_jacobian_, change, torque_);

@@ -79,6 +79,8 @@ class Redistributor : public Component {
   // s, when readings tell of the distribution again.
   double learn_from_ = -std::numeric_limits<double>::infinity();
   balance::SoleLimits double_support_, single_support_;
+  // Of double_support_'s edges, sole frames; empty for rectangles, which both feet have alike.
+  std::array<balance::ConvexPolygon, 2> sole_;
   robot::RobotState state_;
   bool state_valid_ = false;
   Eigen::MatrixXd contact_jacobian_;  // 12×n

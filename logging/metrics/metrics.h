@@ -16,6 +16,8 @@ struct Metric {
   std::string description;
   std::function<Answer(const RunRecord& run)> compute;
   bool needs_other_estimates = false;  ///< RunRecord::other_estimates
+  /// The joint that the figure is of; none: it is of no single one.
+  std::function<std::string(const RunRecord& run)> joint = {};
 };
 
 /// Makes a metric known, before the first table; called by a module's POISE_MODULE. Throws

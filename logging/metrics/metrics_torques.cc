@@ -7,17 +7,31 @@
 namespace poise::logging {
 namespace {
 
-/// Over ticks and joints.
-Answer MaximumOverJoints(const RunRecord& run,
-                         const std::function<Answer(int64_t tick, size_t joint)>& value) {
-  return Maximum(run, [&](int64_t tick) {
-    Answer largest;
+using JointValue = std::function<Answer(const RunRecord& run, int64_t tick, size_t joint)>;
+
+/// Over ticks and joints. `of`: the joint it is of.
+Answer MaximumOverJoints(const RunRecord& run, const JointValue& value, size_t* of = nullptr) {
+  Answer largest;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     for (size_t joint = 0; joint < run.robot.joints().size(); ++joint) {
-      const Answer v = value(tick, joint);
-      if (v && (!largest || *v > *largest)) largest = v;
+      const Answer v = value(run, tick, joint);
+      if (!v || (largest && *v <= *largest)) continue;
+      largest = v;
+      if (of != nullptr) *of = joint;
     }
-    return largest;
-  });
+  }
+  return largest;
+}
+
+Metric LargestOfJoints(const char* name, const char* unit, const char* description,
+                       const JointValue& value) {
+  Metric metric{name, unit, description,
+                [value](const RunRecord& run) { return MaximumOverJoints(run, value); }};
+  metric.joint = [value](const RunRecord& run) -> std::string {
+    size_t joint = 0;
+    return MaximumOverJoints(run, value, &joint) ? run.robot.joints()[joint].name : "";
+  };
+  return metric;
 }
 
 Answer TorqueStepAtSwitch(const RunRecord& run) {
@@ -29,45 +43,83 @@ Answer TorqueStepAtSwitch(const RunRecord& run) {
   return largest;
 }
 
-/// None while the bridge does not follow: what a controller asks of a robot that has stopped moves
-/// nobody.
-const joint_command_t* FollowedCommand(const RunRecord& run, int64_t tick) {
+/// What a controller asks of a robot that has stopped moves nobody.
+bool Stopped(const RunRecord& run, int64_t tick) {
   const bridge_status_t* bridge = run.bridge.at(tick);
-  const bool stopped = bridge != nullptr && bridge->state > bridge_status_t::STATE_RUNNING;
-  return stopped ? nullptr : run.command.at(tick);
+  return bridge != nullptr && bridge->state > bridge_status_t::STATE_RUNNING;
+}
+
+/// None while the bridge does not follow.
+const joint_command_t* FollowedCommand(const RunRecord& run, int64_t tick) {
+  return Stopped(run, tick) ? nullptr : run.command.at(tick);
+}
+
+/// The true positions or velocities, else the estimated ones; none while the bridge does not
+/// follow.
+template <auto kTrue, auto kEstimated>
+Answer OfJoint(const RunRecord& run, int64_t tick, size_t joint) {
+  if (Stopped(run, tick)) return {};
+  if (const ground_truth_t* truth = run.truth.at(tick)) return (truth->*kTrue)[joint];
+  if (const robot_state_t* state = run.state.at(tick)) return (state->*kEstimated)[joint];
+  return {};
+}
+
+/// rad, negative inside.
+Answer PositionBeyond(const RunRecord& run, int64_t tick, size_t joint) {
+  const Answer q =
+      OfJoint<&ground_truth_t::joint_position, &robot_state_t::joint_position>(run, tick, joint);
+  if (!q) return {};
+  const robot::Joint& of = run.robot.joints()[joint];
+  return std::max(*q - of.upper, of.lower - *q);
+}
+
+/// %, none of a joint without a limit.
+Answer VelocityShare(const RunRecord& run, int64_t tick, size_t joint) {
+  const double limit = run.robot.joints()[joint].velocity_limit;
+  if (!(limit > 0)) return {};
+  return Scaled(
+      OfJoint<&ground_truth_t::joint_velocity, &robot_state_t::joint_velocity>(run, tick, joint),
+      100 / limit);
 }
 
 }  // namespace
 
 void AddTorques(MetricList* list) {
-  list->push_back({"joint_torque_max", "N·m",
-                   "largest joint torque commanded while the bridge follows",
-                   [](const RunRecord& run) {
-                     return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-                       const joint_command_t* command = FollowedCommand(run, t);
-                       if (command == nullptr) return {};
-                       return std::abs(command->torque[joint]);
-                     });
-                   }});
-  list->push_back({"joint_torque_share", "%",
-                   "largest joint torque commanded while the bridge follows, of its limit",
-                   [](const RunRecord& run) {
-                     return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-                       const joint_command_t* command = FollowedCommand(run, t);
-                       if (command == nullptr) return {};
-                       return 100 * std::abs(command->torque[joint]) / JointTorqueLimit(run, joint);
-                     });
-                   }});
-  list->push_back({"torque_step_max", "N·m",
-                   "largest change of a joint's command in one tick while the bridge follows",
-                   [](const RunRecord& run) {
-                     return MaximumOverJoints(run, [&](int64_t t, size_t joint) -> Answer {
-                       const joint_command_t* now = FollowedCommand(run, t);
-                       const joint_command_t* before = FollowedCommand(run, t - 1);
-                       if (now == nullptr || before == nullptr) return {};
-                       return std::abs(now->torque[joint] - before->torque[joint]);
-                     });
-                   }});
+  list->push_back(LargestOfJoints("joint_torque_max", "N·m",
+                                  "largest joint torque commanded while the bridge follows",
+                                  [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+                                    const joint_command_t* command = FollowedCommand(run, t);
+                                    if (command == nullptr) return {};
+                                    return std::abs(command->torque[joint]);
+                                  }));
+  list->push_back(LargestOfJoints(
+      "joint_torque_share", "%",
+      "largest joint torque commanded while the bridge follows, of its limit",
+      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+        const joint_command_t* command = FollowedCommand(run, t);
+        if (command == nullptr) return {};
+        return 100 * std::abs(command->torque[joint]) / JointTorqueLimit(run, joint);
+      }));
+  list->push_back(LargestOfJoints("joint_position_beyond", "rad",
+                                  "largest distance of a joint beyond its limit of position while "
+                                  "the bridge follows; negative: "
+                                  "no joint was nearer to one",
+                                  PositionBeyond));
+  list->push_back(LargestOfJoints("joint_velocity_share", "%",
+                                  "largest joint velocity while the bridge follows, of its limit",
+                                  [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+                                    const Answer share = VelocityShare(run, t, joint);
+                                    return share ? Answer(std::abs(*share)) : share;
+                                  }));
+  list->push_back(
+      LargestOfJoints("torque_step_max", "N·m",
+                      "largest change of a joint's command in one tick while the bridge follows",
+                      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+                        const joint_command_t* now = FollowedCommand(run, t);
+                        const joint_command_t* before = FollowedCommand(run, t - 1);
+                        if (now == nullptr || before == nullptr) return {};
+                        return std::abs(now->torque[joint] - before->torque[joint]);
+                      }));
   list->push_back({"torque_step_at_switch", "N·m",
                    "largest change of a joint's command in a tick in which the support changes",
                    TorqueStepAtSwitch});

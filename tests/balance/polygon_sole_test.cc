@@ -261,6 +261,120 @@ TEST(PolygonSole, RatiosAreThoseThatASearchFinds) {
   EXPECT_GT(feasible, 20);
 }
 
+TEST(PolygonSole, CornersAreThoseOfTheEdges) {
+  std::mt19937 random{TestSeed(64)};
+  for (int trial = 0; trial < 100; ++trial) {
+    const std::vector<Vector2d> corners = RandomSole(3 + trial % 14, &random);
+    const ConvexPolygon sole = ConvexHull(corners), again = CornersOf(EdgesOf(sole));
+    ASSERT_EQ(again.num_corners, sole.num_corners);
+    for (size_t i = 0; i < corners.size(); ++i) {
+      EXPECT_LT((again.corner[i] - sole.corner[i]).norm(), 1e-9);
+    }
+  }
+  EXPECT_EQ(CornersOf(HalfPlanes{}).num_corners, 0);
+}
+
+Vector6d Sum(const std::array<Vector6d, 2>& share, const std::array<Eigen::Isometry3d, 2>& foot) {
+  const Eigen::Isometry3d o = Eigen::Isometry3d::Identity();
+  return WrenchTransform(o, foot[0]) * share[0] + WrenchTransform(o, foot[1]) * share[1];
+}
+
+// Level parallel feet with soles of their own shapes: with a share η the common centre of pressure
+// can be what the sum of the polygons η S_r + (1 − η) S_l has, and nothing else.
+TEST(PolygonSole, SharesAreMovedIntoSolesWhereTheSumOfSolesHasThem) {
+  std::mt19937 random{TestSeed(65)};
+  std::uniform_real_distribution<double> x(-0.18, 0.18), y(-0.12, 0.12), ratio(0.02, 0.98);
+  int moved = 0, beyond = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    const std::array<ConvexPolygon, 2> sole{ConvexHull(RandomSole(5 + trial % 8, &random)),
+                                            ConvexHull(RandomSole(4 + trial % 5, &random))};
+    const double eta = ratio(random);
+    std::vector<Vector2d> sums;
+    for (const Vector2d& a : sole[0].corners()) {
+      for (const Vector2d& b : sole[1].corners()) sums.push_back(eta * a + (1 - eta) * b);
+    }
+    const auto can = [&](const Vector2d& cop) {  // inside every line along two of the sums' points
+      double least = HUGE_VAL;
+      for (int k = 0; k < 720; ++k) {
+        const Vector2d n(std::cos(pi * k / 360), std::sin(pi * k / 360));
+        double furthest = -HUGE_VAL;
+        for (const Vector2d& sum : sums) furthest = std::max(furthest, n.dot(sum));
+        least = std::min(least, furthest - n.dot(cop));
+      }
+      return least;
+    };
+    const Vector2d cop(x(random), y(random));
+    const double room = can(cop);
+    std::array<Eigen::Isometry3d, 2> foot{Eigen::Isometry3d::Identity(),
+                                          Eigen::Isometry3d::Identity()};
+    foot[0].translation() << 0.03, -0.1, 0;
+    foot[1].translation() << -0.02, 0.11, 0;
+    std::array<Vector6d, 2> share{Pressed(cop, 500 * eta), Pressed(cop, 500 * (1 - eta))};
+    const Vector6d before = Sum(share, foot);
+    MoveIntoSoles(foot, sole, &share);
+    EXPECT_LT((Sum(share, foot) - before).norm(), 1e-9);
+    const double inside = std::min(SignedDistance(sole[0], CenterOfPressure(share[0])),
+                                   SignedDistance(sole[1], CenterOfPressure(share[1])));
+    const bool both = Contains(sole[0], cop) && Contains(sole[1], cop);
+    if (both) {
+      EXPECT_EQ((share[0] - Pressed(cop, 500 * eta)).norm(), 0);
+    } else if (room > 1e-4) {
+      EXPECT_GT(inside, -1e-9) << "room " << room << ", eta " << eta;
+      ++moved;
+    } else if (room < -1e-4) {
+      EXPECT_LT(inside, 0);
+      ++beyond;
+    }
+  }
+  EXPECT_GT(moved, 100);
+  EXPECT_GT(beyond, 300);
+}
+
+// Every point of the hull of mirrored soles, less what a foot of 2 % load draws it inwards, can be
+// had, though each foot must then have a centre of pressure of its own.
+TEST(PolygonSole, MirroredSolesCanDoWhatTheirHullPromises) {
+  std::mt19937 random{TestSeed(66)};
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const double apart = 0.2, margin = 0.003;
+  int needed = 0, tried = 0;
+  for (int trial = 0; trial < 1500; ++trial) {
+    std::vector<Vector2d> left, right;
+    do {
+      left = RandomSole(6 + trial % 8, &random);
+    } while (robot::InnerRadius(Foot(left)) < 0.025);
+    for (auto corner = left.rbegin(); corner != left.rend(); ++corner) {
+      right.emplace_back(corner->x(), -corner->y());
+    }
+    Stand stand;
+    stand.foot = {Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};
+    stand.foot[0].translation().y() = -apart / 2;
+    stand.foot[1].translation().y() = apart / 2;
+    ContactGeometry geometry;
+    geometry.sole = stand.foot;
+    const double hull_margin = margin + 0.025 * (apart + 0.16);
+    const ConvexPolygon hull = SupportPolygon(
+        Eigen::Isometry3d::Identity(), geometry,
+        {SolePolygon(Foot(right), hull_margin), SolePolygon(Foot(left), hull_margin)});
+    const Vector2d cop = NearestPoint(hull, {0.2 * unit(random), 0.25 * unit(random)});
+    stand.resultant = Pressed(cop, 500);
+    const SoleLimits limits{Limits(Foot(right), margin), Limits(Foot(left), margin)};
+    const std::array<ConvexPolygon, 2> sole{CornersOf(limits[0].edges), CornersOf(limits[1].edges)};
+    const RatioInterval interval = FreeRatio(stand.resultant, stand.foot, limits, sole, 0.02, 0.98);
+    ASSERT_TRUE(interval.feasible) << interval.limiting_condition;
+    const double eta = SelectRatio(interval, stand.resultant, stand.foot, limits, 0.02, 0.98);
+    std::array<Vector6d, 2> share = DistributeResultant(stand.resultant, stand.foot, eta);
+    ++tried;
+    needed += !FeasibleRatio(stand.resultant, stand.foot, limits, 0.02, 0.98).feasible;
+    MoveIntoSoles(stand.foot, sole, &share);
+    for (size_t i = 0; i < 2; ++i) {
+      const double inside =
+          robot::DistanceInside(Foot(i == 0 ? right : left), CenterOfPressure(share[i])) - margin;
+      EXPECT_GT(inside, -1e-9) << "foot " << i << ", eta " << eta << ", cop " << cop.transpose();
+    }
+  }
+  EXPECT_GT(needed, tried / 20);
+}
+
 TEST(PolygonSole, RefusesWhatIsNoSole) {
   const auto says = [](const std::vector<Vector2d>& corners, const std::string& what) {
     const std::string problem = robot::SoleProblem(corners);

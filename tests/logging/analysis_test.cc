@@ -128,6 +128,28 @@ TEST_F(AnalysisTest, TorquesAndTheirSteps) {
   EXPECT_EQ(Measure("saturations"), 7);
 }
 
+TEST_F(AnalysisTest, JointsBeyondTheirLimitsAreNamed) {
+  const robot::RobotModel robot = Read().robot;
+  const robot::Joint &knee = robot.joints()[3], &hip = robot.joints()[8];
+  double nearest = -HUGE_VAL;  // at zero
+  for (const robot::Joint& joint : robot.joints()) {
+    nearest = std::max({nearest, joint.lower, -joint.upper});
+  }
+  EXPECT_EQ(Measure("joint_position_beyond"), nearest);
+  const auto named = [&](const char* metric) { return FindMetric(metric)->joint(Read()); };
+  truth_[30].joint_position[3] = knee.upper + 0.2;
+  truth_[31].joint_position[8] = hip.lower - 0.3;
+  EXPECT_NEAR(Measure("joint_position_beyond"), 0.3, 1e-12);
+  EXPECT_EQ(named("joint_position_beyond"), hip.name);
+  truth_[50].joint_velocity[3] = -1.5 * knee.velocity_limit;
+  EXPECT_NEAR(Measure("joint_velocity_share"), 150, 1e-9);
+  EXPECT_EQ(named("joint_velocity_share"), knee.name);
+  // What moves while the robot is being stopped is not the controller's.
+  for (size_t t = 31; t < kTicks; ++t) bridge_[t].state = bridge_status_t::STATE_DAMPING;
+  EXPECT_NEAR(Measure("joint_position_beyond"), 0.2, 1e-12);
+  EXPECT_EQ(Measure("joint_velocity_share"), 0);
+}
+
 TEST_F(AnalysisTest, PushPeakAndImpulse) {
   // A half sine of 25 samples' length: its integral is 2 peak T / pi.
   const double length = 0.05;

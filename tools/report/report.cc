@@ -27,6 +27,7 @@ void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, Chec
   result->unit = metric.unit;
   if (result->label.empty()) result->label = metric.description;
   result->measured = metric.compute(run);
+  if (metric.joint) result->joint = metric.joint(run);
   if (!result->limited()) return;
   result->passed = result->measured.has_value() &&
                    (!result->at_most || *result->measured <= *result->at_most) &&
@@ -109,6 +110,7 @@ Json ChecksJson(const std::vector<CheckResult>& checks) {
                     {"label", check.label},
                     {"measured", Optional(check.measured)},
                     {"unit", check.unit},
+                    {"joint", check.joint.empty() ? Json(nullptr) : Json(check.joint)},
                     {"limit", limit},
                     {"at_most", Optional(check.at_most)},
                     {"at_least", Optional(check.at_least)},
@@ -216,9 +218,9 @@ TableCell VerdictCell(const CheckResult& check) {
 
 std::string FormatMeasured(const CheckResult& check) {
   // A count is always known of a run that was seen; a time, of what never happened, is not.
-  return check.measured       ? FormatNumber(*check.measured, check.unit)
-         : check.unit.empty() ? "not known"
-                              : "none";
+  if (!check.measured) return check.unit.empty() ? "not known" : "none";
+  const std::string number = FormatNumber(*check.measured, check.unit);
+  return check.joint.empty() ? number : fmt::format("{}, {}", number, check.joint);
 }
 
 std::string FormatFaults(const RunOutcome& outcome) {

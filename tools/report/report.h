@@ -22,6 +22,7 @@ struct CheckResult {
   std::string name;  ///< the metric's
   std::string label;
   std::string unit;
+  std::string joint;  ///< that `measured` is of; empty: of no single one
   std::optional<double> measured;
   std::optional<double> at_most;
   std::optional<double> at_least;
@@ -44,7 +45,7 @@ std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging:
 
 /// Columns what, measured, limit, paper, verdict; every row.
 std::string FormatTable(const std::vector<CheckResult>& checks);
-/// "12.3 mm", or "none".
+/// "12.3 mm", "0.1 rad, left_knee_pitch", or "none".
 std::string FormatMeasured(const CheckResult& check);
 /// "≤ 45 mm", "0.35 … 0.6 s"; empty without a limit.
 std::string FormatLimit(const CheckResult& check);
