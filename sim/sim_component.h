@@ -46,6 +46,8 @@ class SimComponent : public Component {
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override;
   bool failed() const override { return !finished().empty(); }
+  /// For who runs the component in its own process; nullptr before Configure.
+  Simulation* simulation() { return simulation_.get(); }
 
  private:
   void Step(const Tick& tick);

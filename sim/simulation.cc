@@ -133,6 +133,7 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
   for (int i = 0; i < config.push_size(); ++i) {
     pushes_.emplace_back(config.push(i), model_, scale, "push[" + std::to_string(i) + "]");
   }
+  forces_.resize(model_.bodies().size());
   for (int i = 0; i < config.hand_size(); ++i) {
     hands_.emplace_back(config.hand(i), model_, step_, "hand[" + std::to_string(i) + "]");
   }
@@ -244,6 +245,10 @@ void Simulation::Delay() {
   measured_.push_point = truth_.push_point;
 }
 
+void Simulation::SetForce(int body, const Vector3d& force, const Vector3d& point) {
+  forces_[static_cast<size_t>(body)] = {force, point};
+}
+
 void Simulation::StepOnce() {
   if (broken_) return;
   const double from = time();
@@ -261,6 +266,11 @@ void Simulation::StepOnce() {
     if (!force.isZero(0)) {
       world_->AddForce(push.body(), force, world_->pose(push.body()) * push.point());
     }
+  }
+  for (size_t b = 0; b < forces_.size(); ++b) {
+    if (forces_[b].force.isZero(0)) continue;
+    const int body = static_cast<int>(b);
+    world_->AddForce(body, forces_[b].force, world_->pose(body) * forces_[b].point);
   }
   for (HandSpring& hand : hands_) {
     const Vector3d point = world_->pose(hand.body()) * hand.point();
@@ -390,6 +400,15 @@ void Simulation::ReadPush() {
     if (force.norm() > strongest) {
       strongest = force.norm();
       truth_.push_point = world_->pose(push.body()) * push.point();
+    }
+  }
+  for (size_t b = 0; b < forces_.size(); ++b) {
+    const Vector3d& force = forces_[b].force;
+    if (force.isZero(0)) continue;
+    truth_.push_force += force;
+    if (force.norm() > strongest) {
+      strongest = force.norm();
+      truth_.push_point = world_->pose(static_cast<int>(b)) * forces_[b].point;
     }
   }
   for (const HandSpring& hand : hands_) {

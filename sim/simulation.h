@@ -70,6 +70,10 @@ class Simulation {
   void Follow(bool follows) {
     if (crane_) crane_->Follow(follows);
   }
+  /// Beside the configured pushes: `force` (N, world axes) at `point` (m, body frame) of `body`
+  /// from the next step on, until set again for this body; zero takes it away. Indices and numbers
+  /// are the caller's to check.
+  void SetForce(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point);
   /// One step of the world.
   void Step();
   /// One tick period.
@@ -120,6 +124,11 @@ class Simulation {
   Terrain terrain_;
   std::unique_ptr<World> world_;
   std::vector<PushProfile> pushes_;
+  struct SetForceAt {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< N, world axes
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< m, body frame
+  };
+  std::vector<SetForceAt> forces_;  // by body
   std::vector<HandSpring> hands_;
   std::optional<CraneSpring> crane_;
   DriveTrain drive_train_;

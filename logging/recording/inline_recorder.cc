@@ -10,12 +10,16 @@ InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec, con
                                InlineRunner* runner, InlineRecord* kept)
     : writer_(path, spec, info), runner_(runner) {
   runner->set_tap([this, kept](int channel, const OutputPort& output, const Tick& tick) {
-    const auto size = static_cast<size_t>(output.encoded_size());
-    if (buffer_.size() < size) buffer_.resize(size);
-    output.Encode(buffer_.data(), static_cast<int>(size));
-    writer_.AddMessage(channel, tick.index, {buffer_.data(), size});
+    Add(channel, output, tick);
     if (kept != nullptr) kept->Add(channel, output, tick);
   });
+}
+
+void InlineRecorder::Add(int channel, const OutputPort& output, const Tick& tick) {
+  const auto size = static_cast<size_t>(output.encoded_size());
+  if (buffer_.size() < size) buffer_.resize(size);
+  output.Encode(buffer_.data(), static_cast<int>(size));
+  writer_.AddMessage(channel, tick.index, {buffer_.data(), size});
 }
 
 health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component) {

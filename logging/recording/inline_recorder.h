@@ -24,6 +24,9 @@ class InlineRecorder {
   InlineRecorder(const std::string& path, const RunSpec& spec, const run_info_t& info,
                  InlineRunner* runner, InlineRecord* kept = nullptr);
 
+  /// For who sets a tap of its own afterwards and calls Add in it.
+  void Add(int channel, const OutputPort& output, const Tick& tick);
+
   /// Writes the components' health as it stands, and closes. Throws LogError.
   void Close(const RunSpec& spec);
   const RunLogWriter& writer() const { return writer_; }

@@ -1,0 +1,54 @@
+// What the files of the extension module _poise share.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "components/messages/foreign_component.h"
+#include "python/message_layout.h"
+
+namespace poise::python {
+
+namespace py = pybind11;
+
+/// Numbers in C order; anything that numpy can turn into it is taken.
+using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Throws ValueError unless `array` is `count` × `shape`.
+void CheckShape(const Array& array, const char* name, py::ssize_t count,
+                std::initializer_list<py::ssize_t> shape);
+
+/// An array of a leaf's kind, `rows` × the leaf's shape; rows < 0: the leaf's shape alone. Owns its
+/// memory, which is not set.
+py::array NewArray(const Leaf& leaf, py::ssize_t rows);
+
+/// The unit of "foot_wrench.force" in a message type; empty: none.
+std::string UnitOfLeaf(std::string_view type, std::string_view path);
+
+/// One message, by itself.
+struct Message {
+  std::vector<uint8_t> bytes;
+  std::shared_ptr<const MessageLayout> layout;
+  std::string type;
+
+  /// The numbers of one field. Throws KeyError.
+  py::object Get(const std::string& path) const;
+};
+
+/// The functions of a Python object with `_configure(context, ports)` and `_step(tick, inputs,
+/// outputs)`.
+std::shared_ptr<ForeignFunctions> FunctionsOf(py::object component);
+
+void BindRun(py::module_* module);
+void BindSession(py::module_* module);
+void BindRobot(py::module_* module);
+void BindBalance(py::module_* module);
+void BindComponent(py::module_* module);
+
+}  // namespace poise::python

@@ -1,0 +1,199 @@
+#include "python/run_store.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <numeric>
+
+#include "components/framework/bus/packet_filter.h"
+#include "fmt/format.h"
+#include "logging/log_messages.h"
+
+namespace poise::python {
+
+using logging::LogError;
+
+namespace {
+
+int64_t ModifiedAt(const struct stat& info) {
+  return static_cast<int64_t>(info.st_mtim.tv_sec) * 1'000'000'000 + info.st_mtim.tv_nsec;
+}
+
+/// By ascending tick, the first of each.
+void SortByTick(StoredChannel* channel) {
+  if (std::ranges::adjacent_find(channel->ticks, std::greater_equal<>()) == channel->ticks.end()) {
+    return;
+  }
+  std::vector<size_t> order(channel->ticks.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::ranges::stable_sort(order, {}, [&](size_t i) { return channel->ticks[i]; });
+  std::vector<int64_t> ticks;
+  std::vector<uint64_t> offsets;
+  for (const size_t i : order) {
+    if (!ticks.empty() && ticks.back() == channel->ticks[i]) continue;
+    ticks.push_back(channel->ticks[i]);
+    offsets.push_back(channel->offsets[i]);
+  }
+  channel->ticks = std::move(ticks);
+  channel->offsets = std::move(offsets);
+}
+
+}  // namespace
+
+RunStore::RunStore(const std::string& log) : log_(log) {
+  fd_ = open(log.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat info {};
+  if (fd_ < 0 || fstat(fd_, &info) != 0) {
+    const int why = errno;
+    if (fd_ >= 0) close(fd_);
+    throw LogError(fmt::format("{}: {}", log, std::strerror(why)));
+  }
+  size_ = static_cast<uint64_t>(info.st_size);
+  modified_ = ModifiedAt(info);
+  if (size_ > 0) {
+    void* const at = mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd_, 0);
+    if (at == MAP_FAILED) {
+      const int why = errno;
+      close(fd_);
+      throw LogError(fmt::format("{}: {}", log, std::strerror(why)));
+    }
+    bytes_ = static_cast<const uint8_t*>(at);
+  }
+  try {
+    Index();
+  } catch (...) {
+    if (bytes_ != nullptr) munmap(const_cast<uint8_t*>(bytes_), size_);
+    close(fd_);
+    throw;
+  }
+}
+
+RunStore::~RunStore() {
+  if (fd_ < 0) return;
+  if (bytes_ != nullptr) munmap(const_cast<uint8_t*>(bytes_), size_);
+  close(fd_);
+}
+
+void RunStore::Index() {
+  logging::LogMessages messages(log_);
+  spec_ = messages.spec();
+  scenario_ = messages.info().scenario;
+  robot_ = messages.info().robot;
+  urdf_ = messages.info().urdf;
+  names_ = messages.names();
+  struct Lane {
+    StoredChannel* channel = nullptr;
+    std::optional<PacketFilter> filter;
+    bool external = false;
+  };
+  std::map<std::string, Lane, std::less<>> lanes;
+  for (const Channel& channel : spec_.graph().channel()) {
+    const MessageType* const type = FindMessageType(channel.type());
+    if (type == nullptr || type->has_strings) continue;
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    constexpr int64_t kMost = 1 << 20;  // bytes of a message: no robot needs more
+    if (type->encoded_size(counts) > kMost) {
+      throw LogError(fmt::format("{}: channel {}: its messages are said to have {} bytes", log_,
+                                 channel.name(), type->encoded_size(counts)));
+    }
+    channels_.push_back(std::make_unique<StoredChannel>(channel.name(), *type, counts));
+    lanes.emplace(channel.name(),
+                  Lane{channels_.back().get(),
+                       PacketFilter(type->fingerprint, static_cast<int>(type->encoded_size(counts)),
+                                    counts, spec_.run_id()),
+                       channel.external()});
+  }
+  logging::LogReader& reader = messages.reader();
+  logging::LogEvent event;
+  while (reader.Next(&event)) {
+    const auto found = lanes.find(event.channel);
+    if (found == lanes.end()) continue;
+    const Lane& lane = found->second;
+    if (lane.filter->Check(event.data.data(), event.data.size(), 0, INT64_MAX) !=
+        PacketVerdict::kAccepted) {
+      continue;
+    }
+    // Of the reader's bytes, which are those of this object's mapping.
+    const auto offset = static_cast<uint64_t>(event.data.data() - reader.bytes());
+    if (offset + lane.channel->layout.size() > size_) continue;
+    lane.channel->ticks.push_back(
+        lane.external ? static_cast<int64_t>(
+                            std::llround(static_cast<double>(event.utime) * 1e-6 / spec_.tick_period()))
+                      : lane.filter->tick(event.data.data()));
+    lane.channel->offsets.push_back(offset);
+  }
+  damages_ = reader.damages();
+  for (const auto& [name, lane] : lanes) {
+    if (!lane.external) SortByTick(lane.channel);
+  }
+  std::erase_if(channels_, [](const auto& channel) { return channel->ticks.empty(); });
+}
+
+RunStore::RunStore(const RunSpec& spec, std::string scenario)
+    : spec_(spec), scenario_(std::move(scenario)) {
+  for (const Resource& resource : spec.resource()) {
+    if (resource.name() == "robot") robot_ = resource.text();
+    if (resource.name() == "urdf") urdf_ = resource.text();
+  }
+  names_ = logging::ElementNames::OfSpec(spec);
+  for (const Channel& channel : spec.graph().channel()) {
+    const MessageType* const type = FindMessageType(channel.type());
+    of_graph_.push_back(nullptr);
+    if (type == nullptr || type->has_strings || channel.external()) continue;
+    const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
+    channels_.push_back(std::make_unique<StoredChannel>(channel.name(), *type, counts));
+    of_graph_.back() = channels_.back().get();
+  }
+}
+
+void RunStore::Add(int channel, int64_t tick, const OutputPort& output) {
+  StoredChannel* const to = of_graph_[static_cast<size_t>(channel)];
+  if (to == nullptr) return;
+  const size_t at = memory_.size();
+  memory_.resize(at + to->layout.size());
+  output.Encode(memory_.data() + at, static_cast<int>(to->layout.size()));
+  to->ticks.push_back(tick);
+  to->offsets.push_back(at);
+}
+
+void RunStore::Finish(std::optional<logging::RunRecord> record) {
+  bytes_ = memory_.data();
+  const std::lock_guard lock(record_mutex_);
+  record_ = std::move(record);
+  std::erase_if(channels_, [](const auto& channel) { return channel->ticks.empty(); });
+}
+
+const StoredChannel* RunStore::Find(std::string_view name) const {
+  for (const auto& channel : channels_) {
+    if (channel->name == name) return channel.get();
+  }
+  return nullptr;
+}
+
+void RunStore::CheckUnchanged() const {
+  if (fd_ < 0) return;
+  struct stat info {};
+  if (fstat(fd_, &info) == 0 && static_cast<uint64_t>(info.st_size) == size_ &&
+      ModifiedAt(info) == modified_) {
+    return;
+  }
+  throw LogError(
+      fmt::format("{}: has changed since it was opened; open the run again", log_));
+}
+
+logging::RunRecord& RunStore::record() const {
+  if (!record_) {
+    if (log_.empty()) throw LogError("the run keeps no record");
+    record_.emplace(logging::ReadRun(log_));
+  }
+  return *record_;
+}
+
+}  // namespace poise::python

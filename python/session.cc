@@ -1,0 +1,358 @@
+#include "python/session.h"
+
+#include <google/protobuf/text_format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "components/framework/modules.h"
+#include "components/framework/run.h"
+#include "components/robot_files/robot_files.h"
+#include "fmt/format.h"
+#include "sim/push.h"
+#include "tools/cli/output_place.h"
+#include "tools/scenario/registry.h"
+#include "tools/scenario/run_setup.h"
+
+namespace poise::python {
+
+using logging::LogError;
+
+namespace {
+
+/// The simulated robot's messages of a recorded run, tick by tick.
+class RecordedPlant : public ForeignFunctions {
+ public:
+  /// `channels`: by port, of the outputs.
+  RecordedPlant(std::shared_ptr<const RunStore> run, std::map<std::string, std::string> channels)
+      : run_(std::move(run)), channels_(std::move(channels)) {}
+
+  void Configure(const ComponentContext&, std::span<const ForeignPort> ports) override {
+    of_port_.clear();
+    for (const ForeignPort& port : ports) {
+      of_port_.push_back(nullptr);
+      if (port.port.input) continue;
+      const StoredChannel* const channel = run_->Find(channels_.at(port.port.name));
+      if (channel == nullptr) {
+        throw ConfigError(fmt::format("the recorded run has no messages on {}",
+                                      channels_.at(port.port.name)));
+      }
+      if (channel->type->name != port.port.type || channel->counts != port.counts) {
+        throw ConfigError(fmt::format("{} of the recorded run is of another type or robot",
+                                      channel->name));
+      }
+      of_port_.back() = channel;
+    }
+    run_->CheckUnchanged();
+  }
+  void Step(const Tick& tick, std::span<ForeignPort> ports) override {
+    for (size_t i = 0; i < ports.size(); ++i) {
+      const StoredChannel* const channel = of_port_[i];
+      if (channel == nullptr) continue;
+      const auto rows = channel->ticks.size();
+      const auto row = static_cast<size_t>(tick.index) % rows;
+      // The header is the new run's.
+      const size_t header = 8 + 4 * ports[i].counts.size() + 24;
+      std::memcpy(ports[i].bytes.data() + header, run_->Message(*channel, row) + header,
+                  ports[i].bytes.size() - header);
+    }
+  }
+
+ private:
+  std::shared_ptr<const RunStore> run_;
+  std::map<std::string, std::string> channels_;
+  std::vector<const StoredChannel*> of_port_;
+};
+
+}  // namespace
+
+/// Holds the session for one call.
+class Session::Lock {
+ public:
+  explicit Lock(Session* session) : session_(session) {
+    if (session->holder_.load() == std::this_thread::get_id()) {
+      throw ConfigError("a component may not call the environment that steps it");
+    }
+    session->mutex_.lock();
+    session->holder_.store(std::this_thread::get_id());
+  }
+  ~Lock() {
+    session_->holder_.store({});
+    session_->mutex_.unlock();
+  }
+  Lock(const Lock&) = delete;
+  Lock& operator=(const Lock&) = delete;
+
+ private:
+  Session* session_;
+};
+
+void Session::Replace(const SessionOptions& options, ComponentRegistry* registry) {
+  std::map<std::string, std::shared_ptr<ForeignFunctions>> replaced = options.replaced;
+  Graph& graph = *spec_.mutable_graph();
+  if (options.plant) {
+    for (ComponentInstance& instance : *graph.mutable_component()) {
+      if (Components().TraitsOf(TypeOf(instance)).engine.empty()) continue;
+      std::map<std::string, std::string> channels;
+      for (const auto& output : instance.output()) channels[output.port()] = output.channel();
+      replaced[instance.name()] = std::make_shared<RecordedPlant>(options.plant, channels);
+    }
+  }
+  for (const auto& [name, type] : Components().entries()) registry->Add(type);
+  std::string names;
+  for (const ComponentInstance& instance : graph.component()) {
+    names += (names.empty() ? "" : ", ") + instance.name();
+  }
+  for (const auto& [name, functions] : replaced) {
+    const auto same = [&, of = &name](const auto& instance) { return instance.name() == *of; };
+    auto* const all = graph.mutable_component();
+    const auto found = std::find_if(all->begin(), all->end(), same);
+    if (found == all->end()) {
+      throw ConfigError(fmt::format("graph {}: has no component '{}'; it has {}", graph.name(),
+                                    name, names));
+    }
+    const ComponentType* const former = registry->TypeNamed(TypeOf(*found));
+    ComponentType type = *former;
+    type.name = "foreign_" + name;
+    type.make = [ports = former->ports, functions] {
+      return std::make_unique<ForeignComponent>(ports, functions);
+    };
+    found->set_type(type.name);
+    registry->Add(std::move(type));
+  }
+}
+
+Session::Session(SessionOptions options) : keep_(options.keep) {
+  LoadModules();
+  Components();
+  const LoadedScenario loaded = LoadScenario(options.scenario, options.changes);
+  spec_ = MakeRunSpec(loaded, options.changes, &warnings_);
+  if (options.endless) spec_.set_num_ticks(0);
+  scenario_ = ScenarioText(loaded.scenario);
+  if (options.replaced.empty() && !options.plant) {
+    CheckRun(loaded, &spec_);  // which names file and line
+    registry_ = Components();
+  } else {
+    Replace(options, &registry_);
+    CheckGraph(spec_.graph(), registry_);
+  }
+  runner_ = std::make_unique<InlineRunner>(spec_, registry_);
+  FillPlan(runner_->plan(), spec_.mutable_graph());
+  names_ = logging::ElementNames::OfSpec(spec_);
+  for (int i = 0; i < runner_->graph().num_components(); ++i) {
+    Component* const component = runner_->graph().component(i).component.get();
+    if (auto* const foreign = dynamic_cast<ForeignComponent*>(component)) {
+      foreign_.push_back(foreign);
+    }
+    if (auto* const sim = dynamic_cast<SimComponent*>(component)) sim_ = sim;
+  }
+  std::string robot, urdf;
+  for (const Resource& resource : spec_.resource()) {
+    if (resource.name() == "robot") robot = resource.text();
+    if (resource.name() == "urdf") urdf = resource.text();
+  }
+  model_ = std::make_shared<robot::RobotModel>(robot::LoadRobotTexts(robot, urdf));
+  push_until_.assign(model_->bodies().size(), -1);
+  override_.assign(static_cast<size_t>(model_->num_joints()),
+                   std::numeric_limits<double>::quiet_NaN());
+  const GraphPlan& plan = runner_->plan();
+  for (size_t c = 0; c < plan.channels.size(); ++c) {
+    const MessageType* const type = FindMessageType(plan.channels[c].type);
+    layouts_.push_back(type == nullptr || type->has_strings
+                           ? nullptr
+                           : std::make_unique<MessageLayout>(*type, plan.channels[c].counts));
+    if (plan.channels[c].type == "joint_command_t" && command_channel_ < 0) {
+      command_channel_ = static_cast<int>(c);
+    }
+  }
+  const run_info_t info = logging::MakeRunInfo(spec_, scenario_);
+  if (keep_ == SessionOptions::Keep::kFolder) {
+    dir_.emplace(MakeRunDir(options.out, spec_.scenario(), options.force));
+    std::string text;
+    google::protobuf::TextFormat::PrintToString(spec_, &text);
+    WriteFile(dir_->path() / "run_spec.pbtxt", text);
+    WriteFile(dir_->path() / "scenario.pbtxt", scenario_);
+    log_ = dir_->path() / "run.lcm";
+    recorder_ = std::make_unique<logging::InlineRecorder>(log_, spec_, info, runner_.get());
+  } else if (keep_ == SessionOptions::Keep::kMemory) {
+    store_ = std::make_shared<RunStore>(spec_, scenario_);
+    record_ = std::make_unique<logging::InlineRecord>(spec_, info, runner_.get());
+  }
+  runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
+    if (overrides_ && channel == command_channel_) {
+      // The port's own message, which nobody has read yet.
+      auto& command = *const_cast<joint_command_t*>(
+          static_cast<const joint_command_t*>(output.message()));
+      for (size_t j = 0; j < override_.size() && j < command.torque.size(); ++j) {
+        if (!std::isnan(override_[j])) command.torque[j] = override_[j];
+      }
+    }
+    if (recorder_) recorder_->Add(channel, output, tick);
+    if (store_) store_->Add(channel, tick.index, output);
+    if (record_) record_->Add(channel, output, tick);
+  });
+}
+
+Session::~Session() = default;
+
+void Session::BeforeTick() {
+  const int64_t tick = runner_->ticks_completed();
+  for (size_t b = 0; b < push_until_.size(); ++b) {
+    if (push_until_[b] < 0 || tick < push_until_[b]) continue;
+    push_until_[b] = -1;
+    sim_->simulation()->SetForce(static_cast<int>(b), Eigen::Vector3d::Zero(),
+                                 Eigen::Vector3d::Zero());
+  }
+}
+
+int64_t Session::Step(int64_t ticks) {
+  const Lock lock(this);
+  if (finished_) throw ConfigError("the run is finished; make a new environment, or reset it");
+  int64_t done = 0;
+  while (done < ticks && !runner_->ended()) {
+    BeforeTick();
+    const int64_t before = runner_->ticks_completed();
+    runner_->Step();
+    done += runner_->ticks_completed() - before;
+    if (runner_->ticks_completed() == before) break;
+  }
+  for (ForeignComponent* const foreign : foreign_) {
+    if (foreign->error()) std::rethrow_exception(foreign->error());
+  }
+  return done;
+}
+
+void Session::Push(const std::string& body, const Eigen::Vector3d& force,
+                   const Eigen::Vector3d& point, int64_t ticks) {
+  const Lock lock(this);
+  if (sim_ == nullptr) throw ConfigError("nothing is simulated here that could be pushed");
+  if (!force.allFinite() || !point.allFinite()) {
+    throw ConfigError("push: force and point must be finite numbers");
+  }
+  const int index = body.empty() ? 0 : FindBody(*model_, body, "body");
+  sim_->simulation()->SetForce(index, force, point);
+  push_until_[static_cast<size_t>(index)] = ticks < 0 ? -1 : runner_->ticks_completed() + ticks;
+}
+
+void Session::OverrideTorque(int joint, std::optional<double> torque) {
+  const Lock lock(this);
+  if (joint < 0 || joint >= static_cast<int>(override_.size())) {
+    throw ConfigError(fmt::format("joint {}: the robot has joints 0 to {}", joint,
+                                  override_.size() - 1));
+  }
+  if (command_channel_ < 0) throw ConfigError("the graph has no joint_command_t");
+  if (torque && !std::isfinite(*torque)) throw ConfigError("torque: must be a finite number");
+  override_[static_cast<size_t>(joint)] =
+      torque.value_or(std::numeric_limits<double>::quiet_NaN());
+  overrides_ = std::ranges::any_of(override_, [](double t) { return !std::isnan(t); });
+}
+
+void Session::Inject(const std::string& channel, const std::vector<uint8_t>& bytes) {
+  const Lock lock(this);
+  if (!runner_->Inject(channel, bytes)) {
+    throw ConfigError(fmt::format("{}: is no external channel that a component reads, or the "
+                                  "message is not of its type",
+                                  channel));
+  }
+}
+
+int Session::FindChannel(const std::string& name) const {
+  const std::vector<GraphPlan::ChannelPlan>& channels = runner_->plan().channels;
+  const auto found = std::ranges::find(channels, name, &GraphPlan::ChannelPlan::name);
+  if (found == channels.end()) {
+    std::string names;
+    for (const auto& channel : channels) names += (names.empty() ? "" : ", ") + channel.name;
+    throw ConfigError(fmt::format("there is no channel '{}'; there are {}", name, names));
+  }
+  const auto index = static_cast<int>(found - channels.begin());
+  if (!layouts_[static_cast<size_t>(index)]) {
+    throw ConfigError(fmt::format("{}: its messages hold texts", name));
+  }
+  return index;
+}
+
+const OutputPort* Session::Writer(int channel) {
+  const GraphPlan::Endpoint& writer =
+      runner_->plan().channels[static_cast<size_t>(channel)].writer;
+  if (writer.component < 0) return nullptr;
+  return runner_->graph()
+      .component(writer.component)
+      .wiring.outputs()[static_cast<size_t>(writer.port)];
+}
+
+std::vector<uint8_t> Session::Message(const std::string& channel) {
+  const Lock lock(this);
+  const OutputPort* const port = Writer(FindChannel(channel));
+  if (port == nullptr) throw ConfigError(fmt::format("{}: nobody in the graph writes it", channel));
+  if (runner_->ticks_completed() == 0) {
+    throw ConfigError(fmt::format("{}: has no message before the first tick; call step", channel));
+  }
+  std::vector<uint8_t> bytes(static_cast<size_t>(port->encoded_size()));
+  port->Encode(bytes.data(), static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+const MessageLayout& Session::Layout(const std::string& channel) const {
+  return *layouts_[static_cast<size_t>(FindChannel(channel))];
+}
+
+const MessageType& Session::Type(const std::string& channel) const {
+  return *FindMessageType(runner_->plan().channels[static_cast<size_t>(FindChannel(channel))].type);
+}
+
+std::vector<std::string> Session::Channels() const {
+  std::vector<std::string> names;
+  for (size_t c = 0; c < layouts_.size(); ++c) {
+    const GraphPlan::ChannelPlan& channel = runner_->plan().channels[c];
+    if (layouts_[c] && !channel.external) names.push_back(channel.name);
+  }
+  return names;
+}
+
+std::shared_ptr<const RunStore> Session::Finish() {
+  const Lock lock(this);
+  if (!finished_) {
+    finished_ = true;
+    if (recorder_) {
+      recorder_->Close(spec_);
+      store_ = std::make_shared<RunStore>(log_);
+      dir_.reset();
+    } else if (record_) {
+      store_->Finish(record_->Take());
+    }
+    recorder_.reset();
+    record_.reset();
+  }
+  return store_;
+}
+
+int64_t Session::tick() {
+  const Lock lock(this);
+  return runner_->ticks_completed();
+}
+
+double Session::time() {
+  const Lock lock(this);
+  return MakeTick(std::max<int64_t>(runner_->ticks_completed() - 1, 0), spec_.tick_period(),
+                  spec_.lead_ticks())
+      .time;
+}
+
+bool Session::ended() {
+  const Lock lock(this);
+  return finished_ || runner_->ended();
+}
+
+bool Session::failed() {
+  const Lock lock(this);
+  return runner_->failed();
+}
+
+std::string Session::detail() {
+  const Lock lock(this);
+  return runner_->end_detail();
+}
+
+}  // namespace poise::python

@@ -1,0 +1,115 @@
+// A scenario that runs inside this process, step by step.
+#pragma once
+
+#include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "components/framework/runners/inline_runner.h"
+#include "components/messages/foreign_component.h"
+#include "logging/recording/inline_recorder.h"
+#include "python/run_store.h"
+#include "sim/sim_component.h"
+#include "tools/run/run_dir.h"
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise::python {
+
+struct SessionOptions {
+  std::string scenario;
+  RunChanges changes;
+  /// Components of the graph, by name, whose stage is a function given here: ports as the replaced
+  /// type's.
+  std::map<std::string, std::shared_ptr<ForeignFunctions>> replaced;
+  /// A run whose messages take the place of the simulated robot's; nullptr: it is simulated.
+  std::shared_ptr<const RunStore> plant;
+  enum class Keep { kNothing, kMemory, kFolder };
+  Keep keep = Keep::kNothing;
+  std::string out;  ///< of kFolder
+  bool force = false;
+  bool endless = false;  ///< goes on after the scenario's duration
+};
+
+/// All public functions may be called from several threads, one after the other; one that is called
+/// from within a step throws.
+class Session {
+ public:
+  /// Throws ConfigError, RobotError or LogError.
+  explicit Session(SessionOptions options);
+  ~Session();
+
+  /// Runs up to `ticks` ticks; returns those run, fewer when the run ends. Throws what a replaced
+  /// component threw, and LogError.
+  int64_t Step(int64_t ticks);
+
+  /// N, world axes, at `point` (m, body frame) of a body from the next tick on, for `ticks` ticks,
+  /// or until set again (-1). Throws ConfigError: no such body, numbers that are not finite, no
+  /// simulated robot.
+  void Push(const std::string& body, const Eigen::Vector3d& force, const Eigen::Vector3d& point,
+            int64_t ticks);
+  /// The joint's commanded torque (N·m) in place of the redistributor's; empty: no longer. Throws
+  /// ConfigError: no such joint, not finite.
+  void OverrideTorque(int joint, std::optional<double> torque);
+  /// Shows a message to the readers of an external channel. Throws ConfigError when it is refused.
+  void Inject(const std::string& channel, const std::vector<uint8_t>& bytes);
+  /// The last message of a channel. Throws ConfigError: no such channel, none yet.
+  std::vector<uint8_t> Message(const std::string& channel);
+  const MessageLayout& Layout(const std::string& channel) const;
+  const MessageType& Type(const std::string& channel) const;
+  std::vector<std::string> Channels() const;
+
+  /// Ends the run and gives its messages, of what was kept. A second call gives the same.
+  std::shared_ptr<const RunStore> Finish();
+
+  int64_t tick();         ///< ticks done
+  double time();          ///< s, of the scenario, of the last tick
+  bool ended();
+  bool failed();
+  std::string detail();
+  const RunSpec& spec() const { return spec_; }
+  const std::vector<std::string>& warnings() const { return warnings_; }
+  const logging::ElementNames& names() const { return names_; }
+  std::string scenario_text() const { return scenario_; }
+
+ private:
+  class Lock;
+  void Replace(const SessionOptions& options, ComponentRegistry* registry);
+  int FindChannel(const std::string& name) const;
+  const OutputPort* Writer(int channel);
+  void BeforeTick();
+
+  RunSpec spec_;
+  std::string scenario_;
+  std::vector<std::string> warnings_;
+  logging::ElementNames names_;
+  ComponentRegistry registry_;
+  std::unique_ptr<InlineRunner> runner_;
+  std::vector<ForeignComponent*> foreign_;
+  SimComponent* sim_ = nullptr;
+  std::shared_ptr<const robot::RobotModel> model_;
+  std::vector<std::unique_ptr<MessageLayout>> layouts_;  // by channel; nullptr: none
+  std::vector<int64_t> push_until_;                      // by body: tick; -1: none ends
+  std::vector<double> override_;                         // by joint; NaN: none
+  bool overrides_ = false;
+  int command_channel_ = -1;
+
+  SessionOptions::Keep keep_;
+  std::optional<RunDir> dir_;
+  std::string log_;
+  std::unique_ptr<logging::InlineRecorder> recorder_;
+  std::unique_ptr<logging::InlineRecord> record_;
+  std::shared_ptr<RunStore> store_;
+  bool finished_ = false;
+
+  std::mutex mutex_;
+  std::atomic<std::thread::id> holder_{};
+};
+
+}  // namespace poise::python

@@ -1,0 +1,63 @@
+#include "tools/scenario/described_components.h"
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/modules.h"
+#include "components/messages/foreign_component.h"
+#include "fmt/format.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+InputKind KindOf(const std::string& kind) {
+  if (kind == "same tick") return InputKind::kSameTick;
+  if (kind == "tick before") return InputKind::kPreviousTick;
+  if (kind == "latest") return InputKind::kLatest;
+  throw ConfigError(
+      fmt::format("kind '{}' of an input is none of: same tick, tick before, latest", kind));
+}
+
+}  // namespace
+
+ComponentType ReadDescription(const fs::path& file) {
+  try {
+    const Json json = Json::parse(ReadFile(file.string()));
+    std::vector<PortType> ports;
+    for (const Json& port : json.value("inputs", Json::array())) {
+      ports.push_back({port.at("name"), port.at("type"), true, KindOf(port.at("kind"))});
+    }
+    for (const Json& port : json.value("outputs", Json::array())) {
+      ports.push_back({port.at("name"), port.at("type"), false, InputKind::kSameTick});
+    }
+    if (ports.empty()) throw ConfigError("it has neither inputs nor outputs");
+    const std::string name = json.at("name");
+    if (name != file.stem()) {
+      throw ConfigError(fmt::format("it describes '{}': the file's name must be {}.json", name, name));
+    }
+    return ProgramType(name, json.value("summary", ""), std::move(ports));
+  } catch (const std::exception& error) {
+    throw ConfigError(fmt::format("{}: is no description of a component ({}); write it with: "
+                                  "NAME --describe",
+                                  file.string(), error.what()));
+  }
+}
+
+std::vector<ComponentType> DescribedComponents() {
+  std::vector<ComponentType> types;
+  for (const fs::path& folder : PoisePath()) {
+    std::set<fs::path> files;  // in one order everywhere
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder / "lib/poise/components", error)) {
+      if (entry.path().extension() == ".json") files.insert(entry.path());
+    }
+    for (const fs::path& file : files) types.push_back(ReadDescription(file));
+  }
+  return types;
+}
+
+}  // namespace poise
