@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 namespace poise {
 
@@ -18,9 +20,10 @@ Refusal CommandGate::Check(const joint_command_t& command, int64_t cycle) {
 
 Refusal CommandGate::Find(const joint_command_t& command, int64_t cycle) const {
   if (command.run_id != run_id_) return Refusal::kRun;
-  if (command.num_joints != num_joints_ ||
-      command.torque.size() != static_cast<size_t>(num_joints_)) {
-    return Refusal::kSize;
+  if (command.num_joints != num_joints_) return Refusal::kSize;
+  for (const std::vector<double>* values : {&command.torque, &command.position, &command.velocity,
+                                            &command.stiffness, &command.damping}) {
+    if (values->size() != static_cast<size_t>(num_joints_)) return Refusal::kSize;
   }
   if (command.tick <= last_tick_ || command.tick > cycle || command.utime < last_utime_) {
     return Refusal::kSequence;
@@ -28,9 +31,15 @@ Refusal CommandGate::Find(const joint_command_t& command, int64_t cycle) const {
   // With this status the tick is fresh but the torque is not: the controller has none.
   if (command.status == joint_command_t::STATUS_INVALID_INPUT) return Refusal::kStale;
   if (cycle - command.tick > max_age_) return Refusal::kStale;
-  const bool finite = std::all_of(command.torque.begin(), command.torque.end(),
-                                  [](double torque) { return std::isfinite(torque); });
-  return finite ? Refusal::kNone : Refusal::kNotFinite;
+  const auto finite = [](const std::vector<double>& values, double least) {
+    return std::all_of(values.begin(), values.end(),
+                       [least](double x) { return std::isfinite(x) && x >= least; });
+  };
+  constexpr double kAny = std::numeric_limits<double>::lowest();
+  const bool fit = finite(command.torque, kAny) && finite(command.position, kAny) &&
+                   finite(command.velocity, kAny) && finite(command.stiffness, 0) &&
+                   finite(command.damping, 0);
+  return fit ? Refusal::kNone : Refusal::kNotFinite;
 }
 
 }  // namespace poise

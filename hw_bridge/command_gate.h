@@ -12,10 +12,10 @@ namespace poise {
 enum class Refusal {
   kNone,
   kRun,        ///< of another run
-  kSize,       ///< not one torque per joint
+  kSize,       ///< not one torque, position, velocity, stiffness and damping per joint
   kSequence,   ///< not after the last accepted command, or for a cycle yet to come
   kStale,      ///< older than the allowed number of cycles, or one sent again for want of a new one
-  kNotFinite,  ///< a torque is NaN or infinite
+  kNotFinite,  ///< one of them is NaN or infinite, or a stiffness or damping is negative
 };
 inline constexpr int kNumRefusals = 6;
 

@@ -22,12 +22,15 @@ struct BusHealth {
   uint8_t al_status = 0;  ///< of all slaves, or-ed; 0x08: all in OP
   int64_t frames_sent = 0, frames_lost = 0, working_counter_errors = 0;  ///< since the first cycle
   int64_t refused_currents = 0;  ///< that were not finite, sent as zero
+  /// REASON_* that the robot stops for by itself, or that its remote asks for (an emergency stop).
+  int8_t stop = bridge_status_t::REASON_NONE;
 };
 
 /// What a drive says of itself beside its feedback.
 struct DriveReport {
   int8_t state = bridge_status_t::DRIVE_UNKNOWN;  ///< DRIVE_*, CiA 402
   bool sto = false;                               ///< its safe torque off is active
+  int8_t stop = bridge_status_t::REASON_NONE;  ///< REASON_*: it asks for a stop, with this reason
 };
 
 /// Sensors of the robot that a bus reads by itself, in its feedback.
@@ -57,8 +60,11 @@ class DriveBus {
   /// What the drives report in this cycle (sensors that are no drives are left out by a bus that
   /// has none); nullptr when not all of it arrived. Valid until the next call.
   virtual const drive_feedback_t* Receive() = 0;
-  /// Sends currents and enables for this cycle (sizes as in the feedback).
+  /// Sends currents and enables for this cycle (sizes as in the feedback), and stiffness and
+  /// damping where the drives close them.
   virtual void Send(const drive_command_t& command) = 0;
+  /// Whether the drives add stiffness and damping to the current's torque. Else both are sent as 0.
+  virtual bool impedance() const { return false; }
 
   virtual SensorsOfBus sensors() const { return {}; }
   /// By joint, as last received; empty: the feedback's drive_status is all there is.

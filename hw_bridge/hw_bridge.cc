@@ -11,6 +11,8 @@
 #include "hw_bridge/hw_bridge_type.h"
 #include "hw_bridge/robot_thresholds.h"
 #include "hw_bridge/simulated_drive_bus.h"
+#include "hw_bridge/unitree/dds_link.h"
+#include "hw_bridge/unitree/unitree_drive_bus.h"
 #include "hw_bridge/units.h"
 
 namespace poise {
@@ -75,6 +77,8 @@ void Validate(const HwBridgeConfig& config) {
   Require(config.overruns_in_100() >= 1, "overruns_in_100", "must be at least 1");
   Require(config.sense_deadline() >= 0 && config.sense_deadline() <= 1, "sense_deadline",
           "must be between 0 and 1");
+  Require(!(config.has_ethercat() && config.has_unitree()), "unitree",
+          "must be left out with ethercat: a robot has one bus");
   Require(config.command_deadline() >= config.sense_deadline() && config.command_deadline() <= 1,
           "command_deadline", "must be between sense_deadline and 1");
 }
@@ -156,6 +160,9 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
   result.hold_damping =
       ByJoint(config.has_hold_damping(), config.hold_damping(), derived.hold_damping);
   result.resume_cycles = Cycles(config.resume_time(), period);
+  result.drives_hold = config.drives_hold();
+  result.stiffness_limit = derived.stiffness_limit;
+  result.damping_limit = derived.damping_limit;
   result.slew_limit = config.has_slew_limit() ? config.slew_limit() : derived.slew_limit;
   result.overload_time = config.overload_time();
   result.overrun_lateness = config.overrun_lateness() * period;
@@ -226,10 +233,39 @@ class HwBridge::Ethercat {
   std::unique_ptr<ethercat::CaptureLink> capture_;
 };
 
+/// A Unitree robot's configuration and, once it is open, its link.
+class HwBridge::Unitree {
+ public:
+  Unitree(const unitree::UnitreeBusConfig& config, const robot::RobotModel& model, double period)
+      : config_(config), period_(period) {
+    try {
+      const unitree::UnitreeDriveBus checked(nullptr, config_, model, period_);
+    } catch (const unitree::UnitreeError& error) {
+      throw ConfigError("unitree", error.what());
+    }
+  }
+
+  std::unique_ptr<DriveBus> Open(const RobotLinkOpener& open_robot,
+                                 const robot::RobotModel& model) {
+    link_ = open_robot(config_.link());
+    return std::make_unique<unitree::UnitreeDriveBus>(link_.get(), config_, model, period_);
+  }
+
+ private:
+  unitree::UnitreeBusConfig config_;
+  double period_;
+  std::unique_ptr<unitree::RobotLink> link_;
+};
+
 HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal)
     : HwBridge(stop_signal, ethercat::OpenLink) {}
-HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal, LinkOpener open_link)
-    : stop_signal_(stop_signal), open_link_(std::move(open_link)) {}
+HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal, LinkOpener open_link,
+                   RobotLinkOpener open_robot)
+    : stop_signal_(stop_signal),
+      open_link_(std::move(open_link)),
+      open_robot_(open_robot ? std::move(open_robot) : [](const unitree::DdsLink& link) {
+        return std::make_unique<unitree::DdsRobotLink>(link);
+      }) {}
 HwBridge::~HwBridge() = default;
 
 void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
@@ -239,33 +275,18 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   const int n = model_->num_joints();
   const int feet = static_cast<int>(model_->feet().size());
 
-  wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
-  wiring->AddInput(&joint_command_, "joint_command", {n, feet});
-  wiring->AddInput(&emergency_stop_, "emergency_stop", {}, InputKind::kLatest);
-  wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
-  wiring->AddOutput(&drive_command_, "drive_command", {n});
-  wiring->AddOutput(&bridge_status_, "bridge_status", {n});
-  const ethercat::MasterConfig& master = config.ethercat().master();
-  const int drives = master.drive_size() > 0 ? master.drive_size() : n;
-  if (config.has_ethercat()) {
-    wiring->AddOutput(&bus_status_, "bus_status", {drives + master.other_size()});
-  }
-  wiring->AddStage(
-      "sense", {&drive_feedback_}, {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
-      config.sense_deadline());
-  std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
-  if (config.has_ethercat()) acts.push_back(&bus_status_);
-  wiring->AddStage(
-      "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
-      [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
-
-  supervisor_ =
-      std::make_unique<Supervisor>(MakeSupervisorConfig(config, *model_, context.tick_period));
+  AddPorts(config, wiring);
+  SupervisorConfig supervisor = MakeSupervisorConfig(config, *model_, context.tick_period);
+  supervisor.drive_impedance = !config.has_ethercat();  // cyclic synchronous torque alone
+  supervisor_ = std::make_unique<Supervisor>(supervisor);
   enable_at_start_ = config.enable_at_start();
   enable_cycles_ = config.enable_cycles();
   if (config.has_ethercat()) {
     ethercat_ = std::make_unique<Ethercat>(config.ethercat(), *model_, context.tick_period);
     simulated_time_ = config.ethercat().simulated_time();
+  } else if (config.has_unitree()) {
+    unitree_ = std::make_unique<Unitree>(config.unitree(), *model_, context.tick_period);
+    simulated_time_ = config.unitree().simulated_time();
   } else {
     bus_ = std::make_unique<SimulatedDriveBus>(&drive_feedback_);
   }
@@ -273,11 +294,39 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   MessageTraits<drive_feedback_t>::Resize(feedback_, MessageCounts{n, feet});
 }
 
+void HwBridge::AddPorts(const HwBridgeConfig& config, Wiring* wiring) {
+  const int n = model_->num_joints();
+  const int feet = static_cast<int>(model_->feet().size());
+  // A real robot's states bring all that is sensed; an emulated one's tick comes with the port.
+  const bool fed = !config.has_unitree() || !config.unitree().follow_robot();
+  if (fed) wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
+  wiring->AddInput(&joint_command_, "joint_command", {n, feet});
+  wiring->AddInput(&emergency_stop_, "emergency_stop", {}, InputKind::kLatest);
+  wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
+  wiring->AddOutput(&drive_command_, "drive_command", {n});
+  wiring->AddOutput(&bridge_status_, "bridge_status", {n});
+  const ethercat::MasterConfig& master = config.ethercat().master();
+  const int drives = master.drive_size() > 0 ? master.drive_size() : n;
+  const bool diagnosed = config.has_ethercat() || config.has_unitree();
+  if (diagnosed) wiring->AddOutput(&bus_status_, "bus_status", {drives + master.other_size()});
+  std::vector<InputPort*> senses;
+  if (fed) senses.push_back(&drive_feedback_);
+  wiring->AddStage(
+      "sense", std::move(senses), {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
+      config.sense_deadline());
+  std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
+  if (diagnosed) acts.push_back(&bus_status_);
+  wiring->AddStage(
+      "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
+      [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
+}
+
 void HwBridge::Open() {
   if (ethercat_) bus_ = ethercat_->Open(open_link_, *model_);
+  if (unitree_) bus_ = unitree_->Open(open_robot_, *model_);
   try {
     bus_->Start();
-    if (ethercat_ && enable_at_start_) EnableDrives();
+    if (has_bus() && enable_at_start_) EnableDrives();
   } catch (...) {
     bus_->Stop();  // what went wrong is said already
     throw;
@@ -297,7 +346,7 @@ void HwBridge::EnableDrives() {
   const auto num_joints = static_cast<size_t>(model_->num_joints());
   for (int cycle = 0; waiting() < num_joints; ++cycle) {
     if (cycle > enable_cycles_) {
-      throw ethercat::EthercatError(
+      throw std::runtime_error(
           fmt::format("the drive of joint \"{}\" is not enabled after {} cycles; is it powered, "
                       "without a fault "
                       "and safe torque off?",
@@ -321,7 +370,7 @@ void HwBridge::Idle() {
 std::string HwBridge::Close() {
   if (!open_) return {};
   supervisor_->Shutdown();
-  if (ethercat_) {
+  if (has_bus()) {
     // One cycle more than the ramp: it tells the drives to stop.
     for (bool last = false; !last;) {
       last = supervisor_->at_rest() || !bus_->health().usable;
@@ -348,9 +397,9 @@ void HwBridge::RunDown() {
 }
 
 const drive_feedback_t* HwBridge::ReadFeedback() {
-  if (!bus_) return nullptr;  // EtherCAT that nobody has opened: a replay
+  if (!bus_) return nullptr;  // that nobody has opened: a replay
   const drive_feedback_t* drives = bus_->Receive();
-  if (drives == nullptr || !ethercat_) return drives;
+  if (drives == nullptr || !has_bus()) return drives;
   feedback_.position_counts = drives->position_counts;
   feedback_.current = drives->current;
   feedback_.drive_status = drives->drive_status;
@@ -369,6 +418,7 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
   }
   if (own.feet) {
     feedback_.foot_wrench = drives->foot_wrench;
+    feedback_.foot_sensor = drives->foot_sensor;
   } else if (drive_feedback_.present()) {
     feedback_.foot_wrench = drive_feedback_->foot_wrench;
     feedback_.foot_sensor = drive_feedback_->foot_sensor;
@@ -395,9 +445,9 @@ void HwBridge::Sense(const Tick& tick) {
   for (size_t j = 0; j < motors.size(); ++j) {
     sensors.joint_position[j] = JointPositionOf(motors[j], feedback->position_counts[j]);
     // What was ordered a cycle ago, where the drive does not say what flows.
-    const double ordered = command_.enabled[j] != 0 ? command_.current[j] : 0;
-    sensors.joint_torque[j] =
-        JointTorque(motors[j], motors[j].current_sensor ? feedback->current[j] : ordered);
+    sensors.joint_torque[j] = motors[j].current_sensor
+                                  ? JointTorque(motors[j], feedback->current[j])
+                                  : supervisor_->OrderedTorque(j, command_);
   }
   std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),
             sensors.imu_angular_velocity);
@@ -446,6 +496,10 @@ void HwBridge::Actuate(const Tick& tick) {
   last_cycle_ = tick.index;
   drive_command_->current = command_.current;
   drive_command_->enabled = command_.enabled;
+  drive_command_->position = command_.position;
+  drive_command_->velocity = command_.velocity;
+  drive_command_->stiffness = command_.stiffness;
+  drive_command_->damping = command_.damping;
   if (!bus_) return;
   if (bus_->num_slaves() > 0) {
     bus_->Diagnose(&*bus_status_);
@@ -467,11 +521,14 @@ ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
                 {"hw_bridge.on_lost_command", "hw_bridge.on_lost_command=HOLD"},
                 // Until the controller follows, the robot's joints are held.
                 {"hw_bridge.hold_before_command", "hw_bridge.hold_before_command=true"}},
-           .drive_link = {.drives = false,
-                          .link = "hw_bridge.ethercat.link",
-                          .simulated_time = "hw_bridge.ethercat.simulated_time",
-                          .profile = "hw_bridge.ethercat.master.profile",
-                          .capture = "hw_bridge.ethercat.capture"}},
+           .drive_links = {{.group = "hw_bridge.ethercat",
+                            .link = "hw_bridge.ethercat.link",
+                            .simulated_time = "hw_bridge.ethercat.simulated_time",
+                            .profile = "hw_bridge.ethercat.master.profile",
+                            .capture = "hw_bridge.ethercat.capture"},
+                           {.group = "hw_bridge.unitree",
+                            .simulated_time = "hw_bridge.unitree.simulated_time",
+                            .tag = "hw_bridge.unitree.link.tag"}}},
           // With EtherCAT there is one more, bus_status: known once it is configured.
           {},
           HwBridgeConfig::descriptor(),

@@ -14,6 +14,7 @@ constexpr double kFrictionReserve = 4;       // times the largest break-away fri
 constexpr double kPendulumShare = 1.5;       // of m g h, a joint's stiffness
 constexpr double kGiveTo = 1.0 / 8;          // rad, at which a joint's limit holds no more
 constexpr double kRotorTime = 10e-3;         // s, rotor's inertia over the damping that holds it
+constexpr double kDriveTime = 1e-3;          // s, likewise, ten cycles of a drive's own loop
 constexpr double kStiffnessTime = 1.0 / 60;  // s, damping over stiffness without a rotor's inertia
 
 /// To two significant digits: what a person would write.
@@ -42,6 +43,10 @@ RobotThresholds DeriveThresholds(const robot::RobotModel& model) {
     result.hold_stiffness.push_back(stiffness);
     result.hold_damping.push_back(damping);
     result.damping.push_back(2 * damping);
+    result.stiffness_limit.push_back(limit / kGiveTo);
+    result.damping_limit.push_back(motor.reflected_inertia > 0
+                                       ? motor.reflected_inertia / kDriveTime
+                                       : kStiffnessTime * limit / kGiveTo);
   }
   result.slew_limit = Rounded(largest / kRiseTime);
   result.torque_error = Rounded(kErrorShare * largest);

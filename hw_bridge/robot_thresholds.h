@@ -16,6 +16,8 @@ struct RobotThresholds {
   std::vector<double> hold_stiffness;  ///< N·m/rad
   std::vector<double> hold_damping;    ///< N·m·s/rad
   std::vector<double> damping;         ///< N·m·s/rad, of the bridge's state DAMPING
+  /// N·m/rad and N·m·s/rad, the largest that a drive is told to close.
+  std::vector<double> stiffness_limit, damping_limit;
 };
 
 RobotThresholds DeriveThresholds(const robot::RobotModel& model);

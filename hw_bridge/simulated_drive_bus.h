@@ -16,6 +16,7 @@ class SimulatedDriveBus final : public DriveBus {
   }
   /// The message that the bridge publishes is the command.
   void Send(const drive_command_t&) override {}
+  bool impedance() const override { return true; }
   const BusHealth& health() const override { return health_; }
 
  private:

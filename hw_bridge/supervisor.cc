@@ -53,6 +53,8 @@ Supervisor::Supervisor(const SupervisorConfig& config)
       tilt_(config.upright, config.tilt_time),
       stop_ramp_cycles_(std::llround(std::ceil(config.stop_ramp / config.monitor.period - 1e-9))),
       torque_(config.motors.size(), 0.0),
+      impedance_(config.motors.size()),
+      current_(config.motors.size(), 0.0),
       applied_(config.motors.size(), 0.0),
       hold_torque_(config.motors.size(), 0.0),
       hold_counts_(config.motors.size(), 0),
@@ -100,6 +102,9 @@ void Supervisor::CheckDrives(const drive_feedback_t& feedback,
     drive_state_[j] = reported ? reports[j].state : DriveStateOf(status);
     enabled_[j] = status == drive_feedback_t::DRIVE_ENABLED ? 1 : 0;
     const bool sto = reported && reports[j].sto;
+    if (reported && reports[j].stop != Status::REASON_NONE) {
+      Latch(Status::STATE_STOPPING, reports[j].stop, static_cast<int>(j));
+    }
     const bool known =
         status == drive_feedback_t::DRIVE_DISABLED || status == drive_feedback_t::DRIVE_ENABLED;
     // After the start a drive that is no longer enabled has dropped its torque by itself.
@@ -136,6 +141,10 @@ void Supervisor::CheckMotion(const drive_feedback_t& feedback) {
 
 void Supervisor::ReadBus(const BusHealth& health) {
   bus_ = health;
+  if (health.stop != Status::REASON_NONE) {
+    const bool pressed = health.stop == Status::REASON_REMOTE_STOP;
+    Latch(pressed ? Status::STATE_ESTOP : Status::STATE_STOPPING, health.stop);
+  }
   if (!health.usable) {
     Latch(Status::STATE_STOPPING,
           health.link_lost ? Status::REASON_BUS_LINK : Status::REASON_BUS_INPUTS);
@@ -182,9 +191,12 @@ bool Supervisor::TakeReset() { return std::exchange(reset_, false); }
 
 void Supervisor::Reset(const joint_command_t* command) {
   if (!std::exchange(reset_requested_, false) || !at_rest()) return;
+  const auto none = [](const std::vector<double>& values) {
+    return std::all_of(values.begin(), values.end(), [](double value) { return value == 0; });
+  };
   const bool asks_torque =
-      command != nullptr && !std::all_of(command->torque.begin(), command->torque.end(),
-                                         [](double torque) { return torque == 0; });
+      command != nullptr &&
+      !(none(command->torque) && none(command->stiffness) && none(command->damping));
   if (asks_torque) return;
   state_ = Status::STATE_INIT;
   reason_ = last_refusal_ = Status::REASON_NO_COMMAND;
@@ -209,6 +221,12 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
       last_refusal_ = ReasonOf(refusal);
     } else if (!latched()) {
       std::copy(command->torque.begin(), command->torque.end(), torque_.begin());
+      for (size_t j = 0; j < impedance_.size(); ++j) {
+        impedance_[j] = {.stiffness = command->stiffness[j],
+                         .damping = command->damping[j],
+                         .position = command->position[j],
+                         .velocity = command->velocity[j]};
+      }
       last_refusal_ = Status::REASON_NO_COMMAND;
       accepted = true;
     }
@@ -302,6 +320,11 @@ double Supervisor::WantedTorque(size_t joint) const {
   switch (state_) {
     case Status::STATE_RUNNING: {
       double torque = torque_[joint];
+      if (impedance_[joint].active()) {
+        int8_t limits = 0;
+        torque +=
+            FollowedImpedance(joint, &limits).Torque(Position(joint), joint_velocity()[joint]);
+      }
       if (start_ramp_ < config_.first_command_ramp) {
         torque *= static_cast<double>(start_ramp_ + 1) / (config_.first_command_ramp + 1);
       }
@@ -329,6 +352,109 @@ double Supervisor::WantedTorque(size_t joint) const {
     default:
       return 0;
   }
+}
+
+/// Confined to what the robot bears.
+Impedance Supervisor::FollowedImpedance(size_t joint, int8_t* limits) const {
+  Impedance result = impedance_[joint];
+  bool confined = false;
+  if (!config_.stiffness_limit.empty()) {
+    confined |= Confine(0, config_.stiffness_limit[joint], &result.stiffness);
+  }
+  if (!config_.damping_limit.empty()) {
+    confined |= Confine(0, config_.damping_limit[joint], &result.damping);
+  }
+  if (!config_.lower.empty()) {
+    confined |= Confine(config_.lower[joint] - config_.position_margin,
+                        config_.upper[joint] + config_.position_margin, &result.position);
+  }
+  if (!config_.monitor.velocity_limit.empty()) {
+    const double most = config_.monitor.velocity_limit[joint];
+    confined |= Confine(-most, most, &result.velocity);
+  }
+  confined |=
+      result.LimitTorque(Position(joint), joint_velocity()[joint], config_.torque_limit[joint]);
+  if (confined) *limits = static_cast<int8_t>(*limits | Status::LIMIT_IMPEDANCE);
+  return result;
+}
+
+double Supervisor::FadeIn() const {
+  double share = 1;
+  if (start_ramp_ < config_.first_command_ramp) {
+    share = static_cast<double>(start_ramp_ + 1) / (config_.first_command_ramp + 1);
+  }
+  if (resume_left_ > 0) {
+    share *= 1 - static_cast<double>(resume_left_) / (config_.resume_cycles + 1);
+  }
+  return share;
+}
+
+Impedance Supervisor::WantedImpedance(size_t joint, int8_t* limits) const {
+  Impedance result;
+  if (!config_.drive_impedance) return result;
+  if (state_ == Status::STATE_RUNNING) {
+    if (!impedance_[joint].active()) return result;
+    result = FollowedImpedance(joint, limits);
+    result.Scale(FadeIn());
+    return result;
+  }
+  if (!config_.drives_hold) return result;
+  switch (state_) {
+    case Status::STATE_HOLDING:
+      result.stiffness = config_.hold_stiffness[joint];
+      result.damping = config_.hold_damping[joint];
+      result.position = JointPositionOf(config_.motors[joint], hold_counts_[joint]);
+      break;
+    case Status::STATE_DAMPING:
+      result.damping = config_.damping[joint];
+      break;
+    case Status::STATE_STOPPING:
+    case Status::STATE_ESTOP:
+      if (ramp_left_ > 0) {
+        result.damping = config_.damping[joint] * static_cast<double>(ramp_left_) /
+                         static_cast<double>(stop_ramp_cycles_);
+      }
+      break;
+    default:
+      break;
+  }
+  return result;
+}
+
+void Supervisor::Command(size_t joint, bool powered, drive_command_t* drives, int8_t* limits) {
+  const robot::MotorModel& motor = config_.motors[joint];
+  double torque = 0;
+  Impedance impedance;
+  if (powered) {
+    torque = Limit(joint, WantedTorque(joint), limits);
+    impedance = WantedImpedance(joint, limits);
+  }
+  applied_[joint] = torque;
+  current_[joint] =
+      std::clamp(MotorCurrent(motor, torque), -motor.peak_current, motor.peak_current);
+  drives->current[joint] = current_[joint];
+  if (impedance.active()) {
+    // What the drive adds by itself is taken from its torque: together they give what is applied.
+    // Holding and damping count a velocity that has been read in this cycle alone.
+    const bool read = state_ == Status::STATE_RUNNING || monitor_.updated();
+    const double own = impedance.Torque(Position(joint), read ? joint_velocity()[joint] : 0);
+    drives->current[joint] = std::clamp(MotorCurrent(motor, torque - own), -2 * motor.peak_current,
+                                        2 * motor.peak_current);
+  }
+  drives->position[joint] = impedance.position;
+  drives->velocity[joint] = impedance.velocity;
+  drives->stiffness[joint] = impedance.stiffness;
+  drives->damping[joint] = impedance.damping;
+  drives->enabled[joint] = powered ? 1 : 0;
+}
+
+double Supervisor::OrderedTorque(size_t joint, const drive_command_t& command) const {
+  if (command.enabled[joint] == 0) return 0;
+  const double torque = JointTorque(config_.motors[joint], command.current[joint]);
+  const Impedance impedance{command.stiffness[joint], command.damping[joint],
+                            command.position[joint], command.velocity[joint]};
+  if (!impedance.active()) return torque;
+  return torque + impedance.Torque(Position(joint), joint_velocity()[joint]);
 }
 
 /// Near a soft limit torque that leads further out fades to nothing at the limit.
@@ -368,16 +494,10 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
   const bool enabled = active() || ramp_left_ > 0;
   const bool follows = state_ == Status::STATE_RUNNING || state_ == Status::STATE_HOLDING;
   for (size_t j = 0; j < torque_.size(); ++j) {
-    const robot::MotorModel& motor = config_.motors[j];
-    const bool powered = enabled && faulted_[j] == 0;
     int8_t limits = 0;
-    const double torque = powered ? Limit(j, WantedTorque(j), &limits) : 0.0;
-    const double current =
-        std::clamp(MotorCurrent(motor, torque), -motor.peak_current, motor.peak_current);
-    drives->current[j] = current;
-    drives->enabled[j] = powered ? 1 : 0;
-    thermal_[j].Advance(current, config_.monitor.period);
-    status->applied_torque[j] = applied_[j] = torque;
+    Command(j, enabled && faulted_[j] == 0, drives, &limits);
+    thermal_[j].Advance(current_[j], config_.monitor.period);
+    status->applied_torque[j] = applied_[j];
     status->saturated[j] = follows ? limits : int8_t{0};
     saturations_ += status->saturated[j] != 0 ? 1 : 0;
     status->thermal_load[j] = thermal_[j].heat();
@@ -389,7 +509,7 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
     start_ramp_ = std::min(start_ramp_ + 1, config_.first_command_ramp);
     if (resume_left_ > 0) --resume_left_;
   }
-  monitor_.EndCycle(drives->current, drives->enabled);
+  monitor_.EndCycle(current_, drives->enabled);
   FillStatus(cycle, status);
 }
 

@@ -13,6 +13,7 @@
 #include "hw_bridge/command_gate.h"
 #include "hw_bridge/drive_bus.h"
 #include "hw_bridge/feedback_monitor.h"
+#include "hw_bridge/impedance.h"
 #include "hw_bridge/thermal_budget.h"
 #include "hw_bridge/tilt_filter.h"
 #include "poise/bridge_status_t.hpp"
@@ -50,6 +51,13 @@ struct SupervisorConfig {
   std::vector<double> hold_damping;    ///< N·m·s/rad, by joint
   int resume_cycles = 0;               ///< cycles in which a command that is back is faded in
 
+  /// The drives close stiffness and damping by themselves; else both become torque here.
+  bool drive_impedance = false;
+  /// Those of holding and damping too.
+  bool drives_hold = false;
+  /// N·m/rad, N·m·s/rad, greatest of a command, by joint; empty: not limited.
+  std::vector<double> stiffness_limit, damping_limit;
+
   double slew_limit = std::numeric_limits<double>::infinity();  ///< N·m/s, of a followed command
   double overload_time = 2;                                     ///< s at the peak current
   double overrun_lateness = std::numeric_limits<double>::infinity();  ///< s
@@ -68,6 +76,8 @@ struct SupervisorConfig {
 ///   STOPPING  latched: damping ramped out over stop_ramp
 ///   STOPPED   latched: motors free
 ///   ESTOP     both, by operator, STO or signal
+/// Limits hold for the drive's whole torque as of the last reading: stiffness and damping deviate
+/// from it only with the joint.
 /// A joint whose drive reports a fault is freed at once. Each cycle: Read, then Cycle. Never
 /// allocates after construction, never throws.
 class Supervisor {
@@ -112,6 +122,8 @@ class Supervisor {
   bool at_rest() const { return latched() && ramp_left_ == 0; }
   /// rad/s, filtered, from the encoder counts.
   const std::vector<double>& joint_velocity() const { return monitor_.velocity(); }
+  /// N·m that the drive of a joint gave at the last reading, as it was last commanded.
+  double OrderedTorque(size_t joint, const drive_command_t& command) const;
 
  private:
   bool latched() const { return state_ >= bridge_status_t::STATE_STOPPING; }
@@ -132,6 +144,13 @@ class Supervisor {
   double Position(size_t joint) const;
   double DampingTorque(size_t joint, double share) const;
   double WantedTorque(size_t joint) const;
+  /// What the drive is to close by itself in this state; adds LIMIT_IMPEDANCE to `limits`.
+  Impedance WantedImpedance(size_t joint, int8_t* limits) const;
+  Impedance FollowedImpedance(size_t joint, int8_t* limits) const;
+  /// Share of the command's stiffness and damping while it is faded in.
+  double FadeIn() const;
+  /// Limits what the drive of a joint gives and sets its command.
+  void Command(size_t joint, bool powered, drive_command_t* drives, int8_t* limits);
   /// The torque within all limits; adds to `limits` those that have changed it.
   double Limit(size_t joint, double wanted, int8_t* limits) const;
   double FadePosition(size_t joint, double torque) const;
@@ -144,6 +163,8 @@ class Supervisor {
   std::vector<ThermalBudget> thermal_;
   int64_t stop_ramp_cycles_;
   std::vector<double> torque_;           // N·m, last accepted command
+  std::vector<Impedance> impedance_;     // likewise
+  std::vector<double> current_;          // A, that the drives give as of the last reading
   std::vector<double> applied_;          // N·m, of the cycle before
   std::vector<double> hold_torque_;      // N·m
   std::vector<int64_t> hold_counts_;     // where joints are held

@@ -38,7 +38,8 @@ void Drivetrain::Place(double q, double qd, double torque) {
   rotor_velocity_ = qd;
 }
 
-JointRow Drivetrain::Begin(double h, double q, double qd, double motor_torque) {
+JointRow Drivetrain::Begin(double h, double q, double qd, double motor_torque,
+                           const DriveImpedance& drive) {
   const double speed = elastic_ ? rotor_velocity_ : qd;  // where inertia and friction are
   double gain = inertia_ / h + viscous_;
   double torque = inertia_ / h * speed;  // of the row at qd' = 0
@@ -57,6 +58,13 @@ JointRow Drivetrain::Begin(double h, double q, double qd, double motor_torque) {
     bristle_decay_ = 1 + slip * h * std::abs(speed) / slip_bristle;
     gain += stiffness_ * h / bristle_decay_;
     torque -= stiffness_ * bristle_ / bristle_decay_;
+  }
+
+  drive_ = drive;
+  if (drive.active()) {
+    motor_position_ = motor_position(q);
+    gain += drive.damping + h * drive.stiffness;
+    torque += drive.stiffness * (drive.position - motor_position_) + drive.damping * drive.velocity;
   }
 
   JointRow row;
@@ -136,6 +144,7 @@ void Drivetrain::End(double h, double qd) {
     const double longest = static_ / stiffness_;
     bristle_ = std::clamp(bristle_, -longest, longest);
   }
+  drive_torque_ = drive_.active() ? drive_.Torque(motor_position_ + h * speed, speed) : 0;
   stop_torque_ = at_stop_ ? -kStopStiffness * (position_ + h * qd - limit_) - kStopDamping * qd : 0;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "components/robot/robot_model.h"
+#include "sim/drive_impedance.h"
 #include "sim/world.h"
 
 namespace poise {
@@ -15,6 +16,9 @@ namespace poise {
 /// Friction is LuGre's bristle (Canudas de Wit et al., 1995) without its micro-damping, with the
 /// elasto-plastic rule of Dupont et al. (2002): below 70 % of the break-away torque the bristle is
 /// a pure spring, so that torque noise does not make a held posture creep.
+///
+/// What a drive adds by itself it adds at a rate far above the step's: stiffness and damping are
+/// implicit too, where inertia and friction are.
 ///
 /// With backlash or a compliant gear the rotor is a body of its own (angles reflected to the
 /// joint): motor torque, inertia and friction act on it, and between it and the link the gear's
@@ -42,8 +46,9 @@ class Drivetrain {
   /// Places the rotor where the gear carries `torque` (N·m) to a link at `q` (rad), both moving
   /// with `qd`.
   void Place(double q, double qd, double torque);
-  /// The row for a step of `h` s from position and velocity `q`, `qd` under the motor's `torque`.
-  JointRow Begin(double h, double q, double qd, double torque);
+  /// The row for a step of `h` s from position and velocity `q`, `qd` under the motor's `torque`
+  /// and what its drive adds by itself.
+  JointRow Begin(double h, double q, double qd, double torque, const DriveImpedance& drive = {});
   /// Moves rotor and bristle with the link's velocity that the step ended with.
   void End(double h, double qd);
 
@@ -56,6 +61,11 @@ class Drivetrain {
   /// N·m over the last step, viscous part included, on the joint or on the rotor of an elastic
   /// drivetrain; 0 before the first.
   double friction_torque() const { return friction_torque_; }
+  /// N·m that the drive added by itself over the last step.
+  double drive_torque() const { return drive_torque_; }
+  /// rad and rad/s that the drive closes on, of the joint or of an elastic drivetrain's rotor.
+  double motor_position(double q) const { return elastic_ ? rotor_position_ : q; }
+  double motor_velocity(double qd) const { return elastic_ ? rotor_velocity_ : qd; }
   /// N·m, of a joint stop over the last step.
   double stop_torque() const { return stop_torque_; }
 
@@ -71,6 +81,8 @@ class Drivetrain {
   double limit_ = 0;          // rad, of the stop that is hit
   double position_ = 0;
   bool at_stop_ = false;
+  DriveImpedance drive_;  // of the step under way
+  double motor_position_ = 0, drive_torque_ = 0;
   double friction_torque_ = 0, stop_torque_ = 0;
 
   double rotor_position_ = 0, rotor_velocity_ = 0, gear_torque_ = 0;

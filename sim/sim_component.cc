@@ -43,6 +43,8 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     current_sensor_.push_back(motor.current_sensor ? 1 : 0);
   }
 
+  impedance_.resize(model->motors().size());
+
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&drive_command_, "drive_command", {model->num_joints()},
                    InputKind::kPreviousTick);
@@ -64,6 +66,13 @@ void SimComponent::Step(const Tick& tick) {
   if (tick.index > 0) {
     if (drive_command_.present()) {
       simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);
+      for (size_t j = 0; j < impedance_.size(); ++j) {
+        impedance_[j] = {.stiffness = drive_command_->stiffness[j],
+                         .damping = drive_command_->damping[j],
+                         .position = drive_command_->position[j],
+                         .velocity = drive_command_->velocity[j]};
+      }
+      simulation_->SetImpedance(impedance_);
     } else {
       simulation_->SetCurrents({}, {});
     }

@@ -65,7 +65,8 @@ class SimComponent : public Component {
   std::unique_ptr<Sensors> sensors_;
   std::unique_ptr<FootSensors> foot_sensors_;
   std::unique_ptr<SensorReadings> readings_;
-  std::vector<int8_t> current_sensor_;  // by joint
+  std::vector<DriveImpedance> impedance_;  // by joint
+  std::vector<int8_t> current_sensor_;     // by joint
 };
 
 }  // namespace poise

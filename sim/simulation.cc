@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "components/robot/sole.h"
@@ -123,6 +124,8 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       current_(Eigen::VectorXd::Zero(model_.num_joints())),
       mean_current_(Eigen::VectorXd::Zero(model_.num_joints())),
       torque_(Eigen::VectorXd::Zero(model_.num_joints())),
+      impedance_(static_cast<size_t>(model_.num_joints())),
+      enabled_(static_cast<size_t>(model_.num_joints()), 0),
       truth_(model_.num_joints()),
       measured_(truth_),
       delayed_(DelaySteps(drive_train_, step_), truth_) {
@@ -202,23 +205,55 @@ void Simulation::SetState(const RobotState& state) {
   for (SimulationTruth& past : delayed_) past = truth_;
 }
 
+double Simulation::CurrentLimit(size_t joint) const {
+  if (!torque_limits_) return std::numeric_limits<double>::infinity();
+  const robot::MotorModel& motor = motors_[joint];
+  return std::min(motor.peak_current, model_.joints()[joint].effort / motor.torque_per_ampere());
+}
+
 void Simulation::SetCurrents(std::span<const double> current, std::span<const int8_t> enabled) {
   for (size_t j = 0; j < motors_.size(); ++j) {
-    const robot::MotorModel& motor = motors_[j];
     const auto i = static_cast<Eigen::Index>(j);
-    double amperes = j < current.size() && j < enabled.size() && enabled[j] != 0 ? current[j] : 0;
+    enabled_[j] = j < current.size() && j < enabled.size() && enabled[j] != 0 ? 1 : 0;
+    impedance_[j] = {};
+    double amperes = enabled_[j] != 0 ? current[j] : 0;
     if (!std::isfinite(amperes)) {
       ++refused_currents_;
       amperes = 0;
     }
     amperes = current_loop_.Quantise(amperes);
     if (torque_limits_) {
-      const double effort = model_.joints()[j].effort / motor.torque_per_ampere();
-      const double limit = std::min(motor.peak_current, effort);
+      const double limit = CurrentLimit(j);
       amperes = std::clamp(amperes, -limit, limit);
     }
     command_[i] = amperes;
   }
+}
+
+void Simulation::SetImpedance(std::span<const DriveImpedance> impedance) {
+  for (size_t j = 0; j < std::min(impedance.size(), impedance_.size()); ++j) {
+    const DriveImpedance& drive = impedance[j];
+    if (enabled_[j] == 0 || !drive.active()) continue;
+    if (!(drive.stiffness >= 0 && drive.damping >= 0) ||
+        !std::isfinite(drive.stiffness + drive.damping + drive.position + drive.velocity)) {
+      ++refused_currents_;
+      continue;
+    }
+    impedance_[j] = drive;
+  }
+}
+
+DriveImpedance Simulation::Drive(size_t joint, double* torque) const {
+  const DriveImpedance& drive = impedance_[joint];
+  if (!drive.active()) return drive;
+  const auto j = static_cast<int>(joint);
+  const Drivetrain& drivetrain = drivetrains_[joint];
+  const double sum = *torque + drive.Torque(drivetrain.motor_position(world_->joint_position(j)),
+                                            drivetrain.motor_velocity(world_->joint_velocity(j)));
+  const double limit = CurrentLimit(joint) * motors_[joint].torque_per_ampere();
+  if (std::abs(sum) <= limit) return drive;
+  *torque = std::clamp(sum, -limit, limit);
+  return {};
 }
 
 void Simulation::Step() {
@@ -258,8 +293,9 @@ void Simulation::StepOnce() {
     const double gain = motors_[static_cast<size_t>(j)].torque_per_ampere();
     mean_current_[j] = current_loop_.Advance(command_[j], &current_[j]);
     torque_[j] = mean_current_[j] * gain;
+    const DriveImpedance drive = Drive(static_cast<size_t>(j), &torque_[j]);
     world_->SetJoint(j, drivetrain.Begin(step_, world_->joint_position(j),
-                                         world_->joint_velocity(j), torque_[j]));
+                                         world_->joint_velocity(j), torque_[j], drive));
   }
   for (const PushProfile& push : pushes_) {
     const Vector3d force = push.MeanForce(from, to);
@@ -298,7 +334,11 @@ void Simulation::StepOnce() {
   if (!world_->Finite()) return Break("the state is no longer finite");
 
   for (int j = 0; j < model_.num_joints(); ++j) {
-    drivetrains_[static_cast<size_t>(j)].End(step_, world_->joint_velocity(j));
+    const auto i = static_cast<size_t>(j);
+    drivetrains_[i].End(step_, world_->joint_velocity(j));
+    if (!impedance_[i].active()) continue;
+    torque_[j] += drivetrains_[i].drive_torque();
+    mean_current_[j] = torque_[j] / motors_[i].torque_per_ampere();
   }
   ReadFootWrenches(sole, com);
   imu_acceleration_ = (ImuVelocity() - imu_velocity) / step_;

@@ -66,6 +66,10 @@ class Simulation {
   /// peak current and the joint's effort if the configuration says so; `enabled` 0: motor free. A
   /// current that is not finite counts as 0 A and is counted.
   void SetCurrents(std::span<const double> current, std::span<const int8_t> enabled);
+  /// Stiffness and damping that the enabled drives add from now on, by joint, after SetCurrents;
+  /// none: nothing. The same limits hold for the sum. One that is not finite, or negative, counts
+  /// as nothing and is counted with the refused currents.
+  void SetImpedance(std::span<const DriveImpedance> impedance);
   /// Once a tick: whether the bridge follows commands, which lets the crane go.
   void Follow(bool follows) {
     if (crane_) crane_->Follow(follows);
@@ -101,6 +105,11 @@ class Simulation {
 
  private:
   void StepOnce();
+  /// A that bounds a drive's current; infinite without limits.
+  double CurrentLimit(size_t joint) const;
+  /// The drive of a joint over the next step: its torque, and what it adds while that is within
+  /// limits.
+  DriveImpedance Drive(size_t joint, double* torque) const;
   int CollectContacts(size_t foot, bool add);
   void ReadFootWrenches(const std::array<Eigen::Isometry3d, 2>& sole,
                         const std::array<Eigen::Vector3d, 2>& com);
@@ -139,6 +148,8 @@ class Simulation {
   int64_t steps_ = 0;
   // By joint: A commanded, flowing now, mean of the last step, and N·m of that mean.
   Eigen::VectorXd command_, current_, mean_current_, torque_;
+  std::vector<DriveImpedance> impedance_;
+  std::vector<char> enabled_;
   Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
   SimulationTruth truth_, measured_;
   std::vector<SimulationTruth> delayed_;  // by step, a ring of sensor_delay

@@ -19,14 +19,16 @@ struct DefaultSetting {
   std::string set;
 };
 
-/// An end of the frames between a bridge and servo drives, which no channel carries. Empty: this
+/// An end of what passes between a bridge and servo drives, which no channel carries. Empty: this
 /// end has no such field.
 struct DriveLink {
+  std::string group = {};           ///< in use where a scenario has it
   bool drives = false;              ///< the drives' end; else the master's
   std::string link = {};            ///< group with `udp` (and its port) and `interface`
   std::string simulated_time = {};  ///< true or false
   std::string profile = {};         ///< group: the type of drives
   std::string capture = {};         ///< file that takes all frames
+  std::string tag = {};             ///< text that keeps emulated ends of other runs apart
 };
 
 struct ComponentTraits {
@@ -48,7 +50,7 @@ struct ComponentTraits {
   /// Of an estimator, which reads robot_sensors_t and writes robot_state_t and estimator_status_t:
   /// the settings that choose its methods, as estimator_status_t counts them.
   std::vector<std::string> methods = {};
-  DriveLink drive_link = {};
+  std::vector<DriveLink> drive_links = {};
 };
 
 }  // namespace poise

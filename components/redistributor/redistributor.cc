@@ -64,11 +64,13 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
     throw ConfigError("feedback.enabled", "needs redistribution: true");
   }
 
+  impedance_ = PlannedImpedance(config.impedance(), *model_, context.tick_period);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   state_ = robot::RobotState(model_->num_joints());
   contact_jacobian_ = Eigen::MatrixXd::Zero(12, model_->num_velocities());
   torque_ = Eigen::VectorXd::Zero(model_->num_joints());
+  acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
 
   const MessageCounts counts = JointAndFootCounts(*model_);
   wiring->AddInput(&robot_state_, "robot_state", counts);
@@ -108,10 +110,21 @@ void Redistributor::Redistribute(const Tick& tick) {
   for (size_t i = 0; i < 2; ++i) out.in_contact[i] = in_contact[i] ? 1 : 0;
   if (balance.status == balance_torque_t::STATUS_SINGULAR) {
     PassTorqueThrough();
+    ClearImpedance(&out);
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }
   out.status = in_contact[0] && in_contact[1] ? ComputeDouble(tick) : ComputeSingle(in_contact);
+  if (impedance_.enabled()) PlanImpedance(in_contact);
+}
+
+void Redistributor::PlanImpedance(const std::array<bool, 2>& in_contact) {
+  joint_command_t& out = *joint_command_;
+  if (!whole_body_->Update(state_, in_contact)) return ClearImpedance(&out);
+  torque_ = Eigen::Map<const Eigen::VectorXd>(out.torque.data(), model_->num_joints());
+  whole_body_->contact().Acceleration(torque_, acceleration_);
+  if (!acceleration_.allFinite()) return ClearImpedance(&out);
+  impedance_.Plan(state_, acceleration_.tail(model_->num_joints()), &out);
 }
 
 int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {

@@ -13,6 +13,7 @@
 #include "components/framework/component.h"
 #include "components/redistributor/internal_feedback.h"
 #include "components/redistributor/ratio_moves.h"
+#include "components/redistributor/shared_impedance.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/joint_command_t.hpp"
@@ -52,6 +53,8 @@ class Redistributor : public Component {
   /// Share of the feedback that acts at this ratio and in a transition: none without load, so that
   /// a change of support makes no step.
   double FeedbackShare(double eta) const;
+  /// Adds the motion that the command's torque is computed to cause, for the drives to hold.
+  void PlanImpedance(const std::array<bool, 2>& in_contact);
   void ForgetDistribution();
   void PassTorqueThrough();
   void Report(const Wrenches& wrench, const balance::SoleLimits& limits,
@@ -70,6 +73,7 @@ class Redistributor : public Component {
   int landed_foot_ = -1;  // -1: none
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
+  PlannedImpedance impedance_;
   double feedback_pause_ = 0;  // s
   double feedback_edge_ = 0;   // m
   // Of the last distribution, which a reading answers to; index −1: none.
@@ -85,6 +89,7 @@ class Redistributor : public Component {
   bool state_valid_ = false;
   Eigen::MatrixXd contact_jacobian_;  // 12×n
   Eigen::VectorXd torque_;            // k×1
+  Eigen::VectorXd acceleration_;      // n×1
 };
 
 }  // namespace poise

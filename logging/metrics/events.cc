@@ -503,6 +503,14 @@ std::string BridgeReasonName(int8_t reason) {
       return "signal";
     case bridge_status_t::REASON_SHUTDOWN:
       return "shutdown";
+    case bridge_status_t::REASON_REMOTE_STOP:
+      return "remote's stop button";
+    case bridge_status_t::REASON_MOTOR_TEMPERATURE:
+      return "motor too hot";
+    case bridge_status_t::REASON_SUPPLY_VOLTAGE:
+      return "supply voltage too low";
+    case bridge_status_t::REASON_ROBOT_MODE:
+      return "robot no longer under low-level commands";
     default:
       return fmt::format("reason {}", reason);
   }

@@ -53,7 +53,8 @@ bool Stopped(const bridge_status_t& status) { return status.state == bridge_stat
 bool StoppedByMessage(const bridge_status_t* before, const bridge_status_t& now) {
   return Stopped(now) && (before == nullptr || !Stopped(*before)) &&
          now.reason != bridge_status_t::REASON_DRIVE_STO &&
-         now.reason != bridge_status_t::REASON_SIGNAL;
+         now.reason != bridge_status_t::REASON_SIGNAL &&
+         now.reason != bridge_status_t::REASON_REMOTE_STOP;
 }
 
 bool Reset(const bridge_status_t* before, const bridge_status_t& now) {

@@ -40,8 +40,8 @@ struct Load {
   double inertia = kInertia, h = kStep;
   double q = 0, qd = 0;
 
-  void Step(double torque) {
-    const JointRow row = drivetrain.Begin(h, q, qd, torque);
+  void Step(double torque, const DriveImpedance& drive = {}) {
+    const JointRow row = drivetrain.Begin(h, q, qd, torque, drive);
     const double gain = row.active ? h / row.cfm : 0;
     qd = (inertia * qd + h * row.torque + gain * row.velocity) / (inertia + gain);
     q += h * qd;
@@ -63,6 +63,54 @@ TEST(Drivetrain, RotorInertiaAddsToTheLoad) {
   Load load{Drivetrain(FreeJoint(), Motor(0.25, 0, 0), {})};
   for (int i = 0; i < 1000; ++i) load.Step(3.0);
   EXPECT_NEAR(load.qd, 3.0 / (kInertia + 0.25) * 1.0, 1e-12);
+}
+
+// A mass on a spring and damper, let go at rest: x = a - a e^{-dt} (cos wt + d/w sin wt).
+TEST(Drivetrain, ADrivesImpedanceIsASpringAndADamper) {
+  const double inertia = kInertia + 0.2, stiffness = 400, damping = 8, target = 0.1;
+  const double decay = damping / (2 * inertia);
+  const double frequency = std::sqrt(stiffness / inertia - decay * decay);
+  double worst_before = 0;
+  for (const double h : {2e-4, 1e-4}) {
+    Load load{Drivetrain(FreeJoint(), Motor(0.2, 0, 0), {})};
+    load.h = h;
+    double worst = 0;
+    for (double t = h; t < 0.5; t += h) {
+      load.Step(0, {.stiffness = stiffness, .damping = damping, .position = target});
+      const double x =
+          target - target * std::exp(-decay * t) *
+                       (std::cos(frequency * t) + decay / frequency * std::sin(frequency * t));
+      worst = std::max(worst, std::abs(load.q - x));
+    }
+    EXPECT_LT(worst, 10 * h * target * frequency / 2);
+    if (worst_before > 0) EXPECT_NEAR(worst, worst_before / 2, worst_before / 20);  // first order
+    worst_before = worst;
+  }
+}
+
+TEST(Drivetrain, ADrivesImpedanceIsStableHoweverStiff) {
+  for (const bool elastic : {false, true}) {
+    Load load{Drivetrain(FreeJoint(), Motor(0.01, 0, 0),
+                         {.gear_stiffness = elastic ? 6e4 : 0.0, .gear_damping = 7})};
+    for (int i = 0; i < 2000; ++i) {
+      load.Step(0, {.stiffness = 1e7, .damping = 1e6, .position = 0.3});
+      ASSERT_LT(std::abs(load.q), 0.7);
+    }
+    EXPECT_NEAR(load.q, 0.3, 1e-3);
+  }
+}
+
+// Momentum: what the drive says it gave is what load and rotor have gained.
+TEST(Drivetrain, ADriveSaysWhatItGave) {
+  Load load{Drivetrain(FreeJoint(), Motor(0.2, 0, 0), {})};
+  double impulse = 0;
+  for (int i = 0; i < 300; ++i) {
+    load.Step(1.5, {.stiffness = 200, .damping = 5, .position = 0.2, .velocity = 0.7});
+    impulse += load.h * (1.5 + load.drivetrain.drive_torque());
+  }
+  EXPECT_NEAR(impulse, (kInertia + 0.2) * load.qd, 1e-12);
+  load.Step(1.5);
+  EXPECT_EQ(load.drivetrain.drive_torque(), 0);
 }
 
 TEST(Drivetrain, ViscousFrictionDecaysAsImplicitEuler) {

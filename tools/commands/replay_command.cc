@@ -96,8 +96,8 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogMessages messages(log);
   bool equal = true;
   for (const int index : Wanted(spec, options.components)) {
-    if (SpeaksEthercat(spec, index)) {
-      fmt::print("{}: left out: the log does not hold its EtherCAT frames\n",
+    if (SpeaksToDrives(spec, index)) {
+      fmt::print("{}: left out: the log does not hold what passes between bridge and drives\n",
                  spec.graph().component(index).name());
       continue;
     }

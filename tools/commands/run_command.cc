@@ -91,10 +91,12 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "last time of a fault, s of the scenario (default: its end)")
       ->needs(realtime);
   CLI::Option* drives =
-      run->add_option("--drives", options->changes.drives,
-                      "what moves the simulated robot's motors; ethercat: an emulated chain of "
-                      "servo drives, through real EtherCAT frames")
-          ->check(CLI::IsMember({"ethercat"}))
+      run->add_option(
+             "--drives", options->changes.drives,
+             "what moves the simulated robot's motors; ethercat: an emulated chain of "
+             "servo drives, through real EtherCAT frames; unitree: an emulated G1 or H1-2, "
+             "over DDS")
+          ->check(CLI::IsMember({"ethercat", "unitree"}))
           ->excludes(in_process);
   run->add_option("--link", options->changes.link,
                   "of EtherCAT: udp (default), or raw:MASTER,DRIVES, two network interfaces; see "

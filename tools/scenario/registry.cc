@@ -9,6 +9,7 @@
 #include "components/task_controller/task_controller_type.h"
 #include "hw_bridge/drive_emulator/drive_emulator_type.h"
 #include "hw_bridge/hw_bridge_type.h"
+#include "hw_bridge/unitree_emulator/unitree_emulator_type.h"
 #include "sim_mujoco/sim_mujoco_type.h"
 #include "sim_ode/sim_ode_type.h"
 #include "tools/scenario/described_components.h"
@@ -20,7 +21,7 @@ const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
     for (const ComponentType& type :
-         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), StateEstimatorType(),
+         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), UnitreeEmulatorType(), StateEstimatorType(),
           StepPlannerType(), TaskControllerType(), ContactWrenchMonitorType(),
           RedistributorType()}) {
       r.Add(type);

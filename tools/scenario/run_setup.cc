@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <random>
 
 #include "components/framework/build_info.h"
@@ -338,24 +339,59 @@ namespace {
 void SetEthercatPort(int port, RunSpec* spec) {
   for (const ComponentInstance& instance : spec->graph().component()) {
     const std::string& type = TypeOf(instance);
-    const std::string udp = Components().TraitsOf(type).drive_link.link + ".udp";
     const int config = ConfigIndex(*spec, instance);
-    if (udp.starts_with('.') || config < 0) continue;
-    Scenario own = ParseConfig(spec->config(config), type);
-    if (!HasField(own, udp) || HasField(own, udp + ".port")) continue;
-    SetField(&own, udp + ".port", std::to_string(port));
-    spec->mutable_config(config)->set_text(ConfigText(own, type));
+    if (config < 0) continue;
+    for (const DriveLink& end : Components().TraitsOf(type).drive_links) {
+      const std::string udp = end.link + ".udp";
+      if (end.link.empty()) continue;
+      Scenario own = ParseConfig(spec->config(config), type);
+      if (!HasField(own, udp) || HasField(own, udp + ".port")) continue;
+      SetField(&own, udp + ".port", std::to_string(port));
+      spec->mutable_config(config)->set_text(ConfigText(own, type));
+    }
   }
+}
+
+/// Calls `act` with each end of drives that a component of the run uses, and its configuration.
+void ForEachDriveLink(
+    const RunSpec& spec,
+    const std::function<void(int config, const std::string& type, const DriveLink&)>& act) {
+  for (const ComponentInstance& instance : spec.graph().component()) {
+    const std::string& type = TypeOf(instance);
+    const int config = ConfigIndex(spec, instance);
+    if (config < 0) continue;
+    for (const DriveLink& end : Components().TraitsOf(type).drive_links) {
+      if (HasField(ParseConfig(spec.config(config), type), end.group)) act(config, type, end);
+    }
+  }
+}
+
+/// A run whose drives are emulated keeps apart from others, and from robots.
+void SetDriveTags(RunSpec* spec) {
+  bool emulated = false;
+  ForEachDriveLink(*spec, [&](int, const std::string&, const DriveLink& end) {
+    emulated = emulated || end.drives;
+  });
+  if (!emulated) return;
+  ForEachDriveLink(*spec, [&](int config, const std::string& type, const DriveLink& end) {
+    if (end.tag.empty()) return;
+    Scenario own = ParseConfig(spec->config(config), type);
+    if (HasField(own, end.tag)) return;
+    SetField(&own, end.tag, fmt::format("poise-{}-{}", spec->run_id(), spec->first_port()));
+    spec->mutable_config(config)->set_text(ConfigText(own, type));
+  });
 }
 
 }  // namespace
 
-bool SpeaksEthercat(const RunSpec& spec, int component) {
+bool SpeaksToDrives(const RunSpec& spec, int component) {
   const ComponentInstance& instance = spec.graph().component(component);
-  const std::string& link = Components().TraitsOf(TypeOf(instance)).drive_link.link;
   const int config = ConfigIndex(spec, instance);
-  if (link.empty() || config < 0) return false;
-  return HasField(ParseConfig(spec.config(config), TypeOf(instance)), link);
+  if (config < 0) return false;
+  const Scenario own = ParseConfig(spec.config(config), TypeOf(instance));
+  const std::vector<DriveLink>& ends = Components().TraitsOf(TypeOf(instance)).drive_links;
+  return std::any_of(ends.begin(), ends.end(),
+                     [&](const DriveLink& end) { return HasField(own, end.group); });
 }
 
 void ChoosePorts(RunSpec* spec) {
@@ -367,6 +403,7 @@ void ChoosePorts(RunSpec* spec) {
     if (!PortsFree(port, count)) continue;
     spec->set_first_port(port);
     SetEthercatPort(port + count - 1, spec);
+    SetDriveTags(spec);
     return;
   }
   throw ConfigError(

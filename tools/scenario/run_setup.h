@@ -31,8 +31,9 @@ void CheckGraphFile(const std::string& path);
 /// Throws ConfigError.
 void ChangeConfiguration(const std::string& change, RunSpec* spec);
 
-/// Whether a component is at one of the ends of EtherCAT frames, which no log holds.
-bool SpeaksEthercat(const RunSpec& spec, int component);
+/// Whether a component is at one of the ends of what passes between a bridge and drives, which no log
+/// holds.
+bool SpeaksToDrives(const RunSpec& spec, int component);
 
 /// A block of free UDP ports for the run's channels. Throws ConfigError when none is found.
 void ChoosePorts(RunSpec* spec);

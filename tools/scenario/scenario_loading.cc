@@ -325,6 +325,17 @@ google::protobuf::Message* Group(Scenario* scenario, std::string_view path) {
   return group;
 }
 
+/// The ends of drives that the scenario uses.
+std::vector<DriveLink> DriveLinksOf(const Scenario& scenario) {
+  std::vector<DriveLink> result;
+  for (const auto& [type, entry] : Components().entries()) {
+    for (const DriveLink& end : entry.traits.drive_links) {
+      if (HasField(scenario, end.group)) result.push_back(end);
+    }
+  }
+  return result;
+}
+
 /// The drives' type, their link, and whose time they follow.
 void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   Scenario* const scenario = &loaded->scenario;
@@ -336,8 +347,18 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
         fmt::format("--link {}: must be udp, or raw:MASTER,DRIVES with the names of two interfaces",
                     changes.link));
   }
-  for (const auto& [type, entry] : Components().entries()) {
-    const DriveLink& end = entry.traits.drive_link;
+  const std::vector<DriveLink> ends = DriveLinksOf(*scenario);
+  if (!changes.link.empty() && std::none_of(ends.begin(), ends.end(), [](const DriveLink& end) {
+        return !end.link.empty();
+      })) {
+    throw ConfigError("--link: these drives have no frames; their network interface is a setting");
+  }
+  if (!changes.capture.empty() && std::none_of(ends.begin(), ends.end(), [](const DriveLink& end) {
+        return !end.capture.empty();
+      })) {
+    throw ConfigError("--capture: these drives have no frames");
+  }
+  for (const DriveLink& end : ends) {
     if (scenario->has_drive_profile() && !end.profile.empty()) {
       ReadTextProto(Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile()),
                     Group(scenario, end.profile));

@@ -1,0 +1,61 @@
+#include "components/redistributor/shared_impedance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/framework/configuration/configuration.h"
+
+namespace poise {
+namespace {
+
+// s. FITTED, see docs/gains.md.
+constexpr double kRotorTime = 3e-3;
+constexpr double kStiffnessTime = 0.1;
+
+double Positive(bool given, double value, double otherwise, const char* field) {
+  if (!given) return otherwise;
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw ConfigError(field, "must be a finite number of s above 0");
+  }
+  return value;
+}
+
+}  // namespace
+
+PlannedImpedance::PlannedImpedance(const SharedImpedance& config, const robot::RobotModel& model,
+                                   double period) {
+  if (!config.enabled()) return;
+  horizon_ = Positive(config.has_horizon(), config.horizon(),
+                      model.drive_train().sensor_delay + period / 2, "impedance.horizon");
+  const double rotor_time =
+      Positive(config.has_rotor_time(), config.rotor_time(), kRotorTime, "impedance.rotor_time");
+  const double stiffness_time = Positive(config.has_stiffness_time(), config.stiffness_time(),
+                                         kStiffnessTime, "impedance.stiffness_time");
+  for (const robot::MotorModel& motor : model.motors()) {
+    damping_.push_back(motor.reflected_inertia / rotor_time);
+    stiffness_.push_back(damping_.back() / stiffness_time);
+  }
+}
+
+void PlannedImpedance::Plan(const robot::RobotState& state,
+                            const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+                            joint_command_t* command) const {
+  for (size_t i = 0; i < damping_.size(); ++i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    const double gain = horizon_ * acceleration[j];
+    command->velocity[i] = state.joint_velocity[j] + gain;
+    command->position[i] =
+        state.joint_position[j] + horizon_ * (state.joint_velocity[j] + gain / 2);
+    command->stiffness[i] = stiffness_[i];
+    command->damping[i] = damping_[i];
+  }
+}
+
+void ClearImpedance(joint_command_t* command) {
+  for (std::vector<double>* values :
+       {&command->position, &command->velocity, &command->stiffness, &command->damping}) {
+    std::fill(values->begin(), values->end(), 0.0);
+  }
+}
+
+}  // namespace poise

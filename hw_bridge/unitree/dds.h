@@ -1,0 +1,82 @@
+// DDS by CycloneDDS's C interface: a participant, and readers and writers of a topic each.
+#pragma once
+
+#include <dds/dds.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "hw_bridge/unitree/messages.h"
+#include "hw_bridge/unitree/unitree.pb.h"
+
+namespace poise::unitree {
+
+/// ns, of a clock that only goes forward.
+int64_t MonotonicNow();
+
+/// Takes part in a domain, on one network interface, until it is destroyed. CYCLONEDDS_URI has no
+/// say. Participants of one process share a domain's configuration, which must be the same.
+class Participant {
+ public:
+  /// Throws UnitreeError.
+  explicit Participant(const DdsLink& link);
+  ~Participant();
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+
+  dds_entity_t entity() const { return entity_; }
+
+ private:
+  class Domain;
+  std::shared_ptr<Domain> domain_;
+  dds_entity_t entity_ = 0;
+};
+
+/// What readers and writers of any type have in common.
+class Endpoint {
+ public:
+  ~Endpoint();
+  Endpoint(const Endpoint&) = delete;
+  Endpoint& operator=(const Endpoint&) = delete;
+
+ protected:
+  enum class Kind { kReader, kWriter };
+  /// Reliable where writing; samples kept: `depth`. Throws UnitreeError.
+  Endpoint(const Participant& participant, Kind kind, const dds_topic_descriptor_t& type,
+           const char* topic, int32_t depth);
+  bool WriteSample(const void* sample);
+  bool TakeSample(void* sample);
+  /// Until a sample is there or the deadline of MonotonicNow.
+  bool AwaitSample(int64_t deadline);
+
+ private:
+  dds_entity_t topic_ = 0, entity_ = 0, waitset_ = 0;
+};
+
+/// Type descriptor of a message.
+template <class T>
+const dds_topic_descriptor_t& DescriptorOf();
+
+template <class T>
+class Writer : private Endpoint {
+ public:
+  Writer(const Participant& participant, const char* topic, int32_t depth = 1)
+      : Endpoint(participant, Kind::kWriter, DescriptorOf<T>(), topic, depth) {}
+  /// False when it could not be handed over within a millisecond.
+  bool Write(const T& sample) { return WriteSample(&sample); }
+};
+
+/// Of messages without strings and sequences, or with: those of `sample` are replaced.
+template <class T>
+class Reader : private Endpoint {
+ public:
+  Reader(const Participant& participant, const char* topic, int32_t depth = 1)
+      : Endpoint(participant, Kind::kReader, DescriptorOf<T>(), topic, depth) {}
+  /// The next sample that has come, if there is one.
+  bool Take(T* sample) { return TakeSample(sample); }
+  /// Whether there is one, at the latest at the deadline of MonotonicNow.
+  bool Await(int64_t deadline) { return AwaitSample(deadline); }
+};
+
+}  // namespace poise::unitree

@@ -1,0 +1,30 @@
+// RobotLink: messages to and from a robot, whatever carries them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "hw_bridge/unitree/messages.h"
+
+namespace poise::unitree {
+
+/// No call but ActiveMode and Release takes longer than its deadline; they block.
+class RobotLink {
+ public:
+  virtual ~RobotLink() = default;
+  virtual int64_t Now() const = 0;  ///< ns
+  /// False when it could not be handed over.
+  virtual bool Send(const LowCmd& command) = 0;
+  /// The newest state that has come since the last one; waits for one until the deadline.
+  virtual bool Receive(LowState* state, int64_t deadline) = 0;
+  /// The newest reading of the torso's IMU, if one has come.
+  virtual bool ReceiveTorsoImu(ImuState* imu) = 0;
+  /// The maker's controller that moves the robot; empty: none does; nullopt: no answer by the
+  /// deadline.
+  virtual std::optional<std::string> ActiveMode(int64_t deadline) = 0;
+  /// Whether the robot has taken the request to let go of it.
+  virtual bool Release(int64_t deadline) = 0;
+};
+
+}  // namespace poise::unitree

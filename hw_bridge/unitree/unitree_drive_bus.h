@@ -1,0 +1,83 @@
+// The drive bus of a Unitree humanoid: states and commands behind currents and counts by joint.
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "components/robot/robot_model.h"
+#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/unitree/robot_link.h"
+#include "hw_bridge/unitree/unitree.pb.h"
+
+namespace poise::unitree {
+
+/// Motors that are commanded enabled get torque (clamped to the motor's peak), position, velocity,
+/// stiffness and damping; others damp with rest_damping, and one that reports an error is free.
+/// Commands carry mode_machine as the robot says it, and the check sum. Receive gives counts of the
+/// positions, currents of the estimated torques and the IMU's readings, and nullptr in a cycle
+/// without a state that is new and whole. A motor's error is a drive's fault; its temperature and
+/// voltage, the remote's stop buttons and another mode_machine ask for a stop.
+class UnitreeDriveBus final : public DriveBus {
+ public:
+  /// `link` must outlive this. `period`, s, of a cycle. Throws UnitreeError.
+  UnitreeDriveBus(RobotLink* link, const UnitreeBusConfig& config, const robot::RobotModel& model,
+                  double period);
+
+  /// Waits for the robot's states and until no controller of the maker's moves it.
+  void Start() override;
+  /// Leaves the motors damping.
+  std::string Stop() override;
+  void Idle(bool enable) override;
+  void AwaitNextCycle() override;
+  const drive_feedback_t* Receive() override;
+  void Send(const drive_command_t& command) override;
+  bool impedance() const override { return true; }
+  /// The robot has an IMU; its feet have no sensors.
+  SensorsOfBus sensors() const override { return {.imu = true, .feet = true}; }
+  std::span<const DriveReport> reports() const override { return reports_; }
+  const BusHealth& health() const override { return health_; }
+  void RequestFaultReset() override;
+  int num_slaves() const override { return static_cast<int>(motors_.size()); }
+  void Diagnose(bus_status_t* status) const override;
+  int64_t cycle_correction() const override { return cycle_correction_; }
+
+ private:
+  struct Motor {
+    size_t slot = 0;
+    robot::MotorModel model;
+  };
+
+  void Release(int64_t deadline);
+  /// Takes states until one is whole and newer than the last.
+  bool ReceiveState(int64_t deadline);
+  bool TakeState();
+  void TakeMotors();
+  void TakeImu();
+  void Judge(bool complete);
+  void SendMotors(const drive_command_t* command);
+  MotorCmd CommandOf(size_t joint, const drive_command_t& command);
+
+  RobotLink* link_;
+  UnitreeBusConfig config_;
+  int64_t period_;  // ns
+  uint16_t stop_buttons_;
+  std::vector<Motor> motors_;  // by joint
+  std::vector<DriveReport> reports_;
+  drive_feedback_t feedback_;
+  LowState state_{};
+  LowCmd command_{};
+  ImuState torso_imu_{};
+  bool known_ = false;  // a state has come
+  uint32_t last_tick_ = 0;
+  uint8_t mode_machine_ = 0;
+  BusHealth health_;
+  std::bitset<100> bad_;  // by cycle, modulo 100
+  int64_t damaged_ = 0;   // states with a wrong check sum
+  int silent_in_a_row_ = 0;
+  bool fresh_ = false;
+  int64_t cycle_start_ = 0, cycle_correction_ = 0;
+};
+
+}  // namespace poise::unitree

@@ -1,0 +1,9 @@
+#pragma once
+
+#include "components/framework/component_type.h"
+
+namespace poise {
+
+ComponentType UnitreeEmulatorType();
+
+}  // namespace poise

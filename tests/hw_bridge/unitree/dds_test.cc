@@ -1,0 +1,97 @@
+// Both ends on DDS, on loopback: what one writes the other reads.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <thread>
+
+#include "hw_bridge/unitree/crc.h"
+#include "hw_bridge/unitree/dds_link.h"
+
+namespace poise::unitree {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000'000;
+
+DdsLink Loopback() {
+  DdsLink link;
+  link.set_tag(fmt::format("poise-test-{}", getpid()));
+  return link;
+}
+
+TEST(Dds, CarriesStatesCommandsAndRequests) {
+  Participant robot(Loopback());
+  Writer<LowState> states(robot, kStateTopic);
+  Reader<LowCmd> commands(robot, kCommandTopic, 16);
+  MotionSwitcherServer switcher(robot, "ai");
+  DdsRobotLink link(Loopback());
+
+  std::atomic<bool> over = false;
+  std::thread server([&] {
+    while (!over) {
+      switcher.Serve();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  EXPECT_EQ(link.ActiveMode(link.Now() + 10 * kSecond), "ai");
+  EXPECT_TRUE(link.Release(link.Now() + 10 * kSecond));
+  EXPECT_EQ(link.ActiveMode(link.Now() + 10 * kSecond), "");
+  over = true;
+  server.join();
+
+  // Whoever is new is not heard at first: the first state is said until it is.
+  LowState sent{}, state{};
+  sent.tick = 1;
+  sent.motor_state[34].q = 0.25F;
+  sent.wireless_remote[39] = 7;
+  sent.crc = CrcOf(sent);
+  bool heard = false;
+  for (int i = 0; i < 200 && !heard; ++i) {
+    states.Write(sent);
+    heard = link.Receive(&state, link.Now() + kSecond / 20);
+  }
+  ASSERT_TRUE(heard);
+  EXPECT_EQ(CrcOf(state), state.crc);
+  EXPECT_EQ(state.motor_state[34].q, 0.25F);
+
+  LowCmd command{}, told{};
+  command.motor_cmd[0].tau = 3;
+  command.crc = CrcOf(command);
+  heard = false;
+  for (int i = 0; i < 200 && !heard; ++i) {
+    EXPECT_TRUE(link.Send(command));
+    heard = commands.Await(MonotonicNow() + kSecond / 20) && commands.Take(&told);
+  }
+  ASSERT_TRUE(heard);
+  EXPECT_EQ(told.motor_cmd[0].tau, 3);
+  EXPECT_EQ(told.crc, CrcOf(told));
+}
+
+TEST(Dds, RunsOfOtherTagsAreNotHeard) {
+  DdsLink other = Loopback();
+  other.set_domain(1);
+  other.set_tag(other.tag() + "-other");
+  DdsLink one = Loopback();
+  one.set_domain(1);
+  Participant robot(one);
+  Writer<LowState> states(robot, kStateTopic);
+  EXPECT_THROW(DdsRobotLink link(other), UnitreeError) << "one process, one configuration";
+}
+
+TEST(Dds, SaysWhichInterfaceIsNone) {
+  DdsLink link = Loopback();
+  link.set_domain(2);
+  link.set_interface("nosuch0");
+  try {
+    const Participant participant(link);
+    FAIL();
+  } catch (const UnitreeError& error) {
+    EXPECT_NE(std::string(error.what()).find("nosuch0"), std::string::npos) << error.what();
+  }
+  link.set_interface("lo\"/><x");
+  EXPECT_THROW(Participant{link}, UnitreeError);
+}
+
+}  // namespace
+}  // namespace poise::unitree

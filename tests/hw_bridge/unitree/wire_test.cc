@@ -1,0 +1,189 @@
+// Check sums, layouts, slots and buttons, beside what others say of them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <boost/crc.hpp>
+#include <cstddef>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "hw_bridge/unitree/crc.h"
+#include "hw_bridge/unitree/motion_switcher.h"
+#include "hw_bridge/unitree/motor_slots.h"
+#include "hw_bridge/unitree/remote.h"
+
+namespace poise::unitree {
+namespace {
+
+using ::testing::ElementsAre;
+
+// Sizes and places that the makers' programs compute with: `sizeof(LowCmd) >> 2` less one words are
+// summed, and the sum is the last word (unitree_sdk2, low-level examples).
+static_assert(sizeof(MotorCmd) == 28 && sizeof(LowCmd) == 1004);
+static_assert(offsetof(LowCmd, motor_cmd) == 4 && offsetof(LowCmd, crc) == 1000);
+static_assert(sizeof(ImuState) == 56 && sizeof(MotorState) == 56 && sizeof(LowState) == 2092);
+static_assert(offsetof(LowState, tick) == 12 && offsetof(LowState, imu_state) == 16);
+static_assert(offsetof(LowState, motor_state) == 72 && offsetof(LowState, crc) == 2088);
+static_assert(offsetof(LowState, wireless_remote) == 2032);
+
+/// Boost's CRC of the words' bytes, the most significant first.
+uint32_t BoostCrc(const std::vector<uint32_t>& words) {
+  boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
+  for (const uint32_t word : words) {
+    for (int shift = 24; shift >= 0; shift -= 8) {
+      crc.process_byte(static_cast<unsigned char>(word >> shift));
+    }
+  }
+  return crc.checksum();
+}
+
+template <class T>
+std::vector<uint32_t> WordsOf(const T& message) {
+  std::vector<uint32_t> words(sizeof(T) / 4 - 1);
+  std::memcpy(words.data(), &message, words.size() * 4);
+  return words;
+}
+
+TEST(UnitreeCrc, IsThatOfAnotherLibrary) {
+  std::mt19937 random(3);
+  for (const size_t size : {0, 1, 2, 250, 522}) {
+    std::vector<uint32_t> words(size);
+    for (uint32_t& word : words) word = static_cast<uint32_t>(random());
+    EXPECT_EQ(Crc32(words), BoostCrc(words)) << size;
+  }
+}
+
+// CRC-32/MPEG-2 of "123456789" is 0x0376E6E7 (catalogue of parametrised CRC algorithms); here of
+// its first eight bytes as two words, and then of the ninth by Boost.
+TEST(UnitreeCrc, HasTheCataloguesParameters) {
+  boost::crc_optimal<32, 0x04C11DB7, 0xFFFFFFFF, 0, false, false> crc;
+  crc.process_bytes("123456789", 9);
+  EXPECT_EQ(crc.checksum(), 0x0376E6E7U);
+  crc.reset();
+  crc.process_bytes("12345678", 8);
+  const std::vector<uint32_t> words = {0x31323334, 0x35363738};
+  EXPECT_EQ(Crc32(words), crc.checksum());
+}
+
+/// Fields of all bytes; what C fills up between them stays zero.
+LowCmd AnyCommand(std::mt19937* random) {
+  LowCmd command;
+  std::memset(static_cast<void*>(&command), 0, sizeof command);
+  const auto any = [random] { return static_cast<float>((*random)() % 1000) - 500; };
+  command.mode_pr = 1;
+  command.mode_machine = 5;
+  for (MotorCmd& motor : command.motor_cmd) {
+    motor.mode = static_cast<uint8_t>((*random)());
+    motor.q = any();
+    motor.dq = any();
+    motor.tau = any();
+    motor.kp = any();
+    motor.kd = any();
+    motor.reserve = static_cast<uint32_t>((*random)());
+  }
+  for (uint32_t& word : command.reserve) word = static_cast<uint32_t>((*random)());
+  return command;
+}
+
+TEST(UnitreeCrc, IsOfTheMessageAsItLiesInMemory) {
+  std::mt19937 random(4);
+  for (int i = 0; i < 20; ++i) {
+    const LowCmd command = AnyCommand(&random);
+    EXPECT_EQ(CrcOf(command), BoostCrc(WordsOf(command)));
+  }
+  LowState state;
+  std::memset(static_cast<void*>(&state), 0, sizeof state);
+  state.version[1] = 7;
+  state.mode_machine = 5;
+  state.tick = 123456;
+  state.imu_state.quaternion[0] = 1;
+  state.imu_state.rpy[2] = -0.25F;
+  state.imu_state.temperature = -3;
+  for (MotorState& motor : state.motor_state) {
+    motor.mode = 1;
+    motor.q = 0.5F;
+    motor.temperature[1] = 41;
+    motor.sensor[1] = 9;
+    motor.motorstate = 0x80000000U;
+    motor.reserve[3] = 2;
+  }
+  state.wireless_remote[39] = 0xA5;
+  state.reserve[0] = 11;
+  EXPECT_EQ(CrcOf(state), BoostCrc(WordsOf(state)));
+}
+
+TEST(UnitreeCrc, DoesNotSumWhatLiesBetweenFields) {
+  std::mt19937 random(5);
+  LowCmd command = AnyCommand(&random);
+  const uint32_t clean = CrcOf(command);
+  reinterpret_cast<uint8_t*>(&command)[3] = 0xFF;  // after mode_machine
+  EXPECT_EQ(CrcOf(command), clean);
+}
+
+std::vector<size_t> SlotsOf(const std::vector<std::string>& joints,
+                            UnitreeBusConfig::Layout layout = UnitreeBusConfig::BY_ROBOT,
+                            const std::vector<std::pair<std::string, uint32_t>>& changes = {}) {
+  UnitreeBusConfig config;
+  for (const auto& [joint, slot] : changes) {
+    MotorSlot* change = config.add_slot();
+    change->set_joint(joint);
+    change->set_slot(slot);
+  }
+  return MotorSlots(joints, layout, config.slot());
+}
+
+// The numbers of G1JointIndex and H1_2_JointIndex in unitree_sdk2_python's low-level examples.
+TEST(MotorSlots, AreTheMakersNumbers) {
+  EXPECT_THAT(
+      SlotsOf({"left_hip_pitch_joint", "left_knee_joint", "right_hip_pitch_joint",
+               "right_ankle_roll_joint", "waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint",
+               "left_shoulder_pitch_joint", "left_elbow_joint", "left_wrist_yaw_joint",
+               "right_shoulder_pitch_joint", "right_wrist_yaw_joint"}),
+      ElementsAre(0, 3, 6, 11, 12, 13, 14, 15, 18, 21, 22, 28));
+  EXPECT_THAT(
+      SlotsOf({"torso_joint", "left_hip_yaw_joint", "left_hip_pitch_joint", "left_hip_roll_joint",
+               "right_hip_yaw_joint", "left_shoulder_pitch_joint", "left_elbow_pitch_joint",
+               "right_shoulder_pitch_joint", "right_wrist_yaw_joint"}),
+      ElementsAre(12, 0, 1, 2, 6, 13, 16, 20, 26));
+  EXPECT_THAT(
+      SlotsOf({"left_shoulder_pitch_joint", "right_shoulder_pitch_joint", "right_wrist_roll_joint"},
+              UnitreeBusConfig::G1_23_OLD),
+      ElementsAre(13, 18, 22));
+}
+
+TEST(MotorSlots, MayBeChangedAndRefuseWhatCannotBe) {
+  EXPECT_THAT(SlotsOf({"neck", "left_knee"}, UnitreeBusConfig::G1, {{"neck", 30}}),
+              ElementsAre(30, 3));
+  EXPECT_THROW(SlotsOf({"neck"}), UnitreeError);
+  EXPECT_THROW(SlotsOf({"left_knee"}, UnitreeBusConfig::G1, {{"left_knee", 35}}), UnitreeError);
+  EXPECT_THROW(SlotsOf({"left_knee"}, UnitreeBusConfig::G1, {{"tail", 1}}), UnitreeError);
+  EXPECT_THROW(SlotsOf({"left_knee", "right_knee"}, UnitreeBusConfig::G1, {{"left_knee", 9}}),
+               UnitreeError);
+  EXPECT_THROW(SlotsOf({"waist_roll_joint"}, UnitreeBusConfig::G1_23_OLD), UnitreeError);
+}
+
+// unitree_sdk2's gamepad: a head of two bytes, then the buttons, R1 in the lowest bit.
+TEST(Remote, ReadsButtons) {
+  std::array<uint8_t, 40> bytes{};
+  bytes[2] = 0x08;
+  EXPECT_EQ(Buttons(bytes), ButtonsOf({"select"}));
+  bytes[2] = 0x20;
+  bytes[3] = 0x02;
+  EXPECT_EQ(Buttons(bytes), ButtonsOf({"L2", "B"}));
+  SetButtons(ButtonsOf({"left", "R1"}), bytes);
+  EXPECT_EQ(bytes[2], 0x01);
+  EXPECT_EQ(bytes[3], 0x80);
+  EXPECT_THROW(ButtonsOf({"Z"}), UnitreeError);
+}
+
+TEST(MotionSwitcher, ReadsItsAnswersAndNothingElse) {
+  EXPECT_EQ(ModeOf(R"({"form":"0","name":"ai"})"), "ai");
+  EXPECT_EQ(ModeOf(R"({"form":"","name":""})"), "");
+  for (const char* broken : {"", "[]", "{", "null", R"({"name":3})", R"({"form":"0"})"}) {
+    EXPECT_EQ(ModeOf(broken), std::nullopt) << broken;
+  }
+}
+
+}  // namespace
+}  // namespace poise::unitree
