@@ -1,0 +1,197 @@
+"""Components written in Python: in this process, and as a program of a run of processes over LCM."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import poise
+from poise.components import description
+
+POISE = os.path.join(os.environ["POISE_BIN"], "poise")
+
+PROGRAM = '''#!{python}
+import sys
+import numpy as np
+import poise
+
+
+class Springs(poise.Component):
+    """Springs at the joints, and gravity compensation."""
+    inputs = {{"robot_state": "robot_state_t", "support_plan": "support_plan_t"}}
+    outputs = {{"task_torque": "task_torque_t"}}
+
+    def configure(self, context):
+        self.robot, self.start = context.robot, None
+
+    def step(self, tick, inputs, outputs):
+        state = inputs.robot_state
+        if self.start is None:
+            self.start = state.joint_position
+        gravity = self.robot.gravity_torque(state.joint_position, None, state.base_position, state.base_orientation)
+        outputs.task_torque.torque = gravity + 600 * (self.start - state.joint_position) - 30 * state.joint_velocity
+
+
+if __name__ == "__main__":
+    sys.exit(poise.main(Springs))
+'''
+
+
+class Player(poise.Component):
+    """Says again what a recorded run's task controller said."""
+
+    def __init__(self, run):
+        self.recorded = run["TASK_TORQUE"]
+
+    def step(self, tick, inputs, outputs):
+        assert inputs.robot_state.joint_position.shape == outputs.task_torque.torque.shape
+        for path in self.recorded.fields:
+            if path not in ("num_joints", "run_id", "tick", "utime"):
+                outputs.task_torque[path] = self.recorded[path][tick.index]
+
+
+class InProcess(unittest.TestCase):
+    def test_the_same_words_give_the_same_run(self):
+        whole = poise.run("push_double_support", duration=0.2)
+        again = poise.run("push_double_support", duration=0.2, components={"task_controller": Player(whole)})
+        for name in ("TASK_TORQUE", "JOINT_COMMAND", "GROUND_TRUTH"):
+            for path in whole[name].fields:
+                if path != "run_id":
+                    np.testing.assert_array_equal(again[name][path], whole[name][path], f"{name} {path}")
+
+    def test_it_is_told_what_it_must_know(self):
+        seen = {}
+
+        class Watch(Player):
+            def configure(self, context):
+                seen.update(name=context.name, period=context.tick_period, joints=context.robot.num_joints)
+
+            def step(self, tick, inputs, outputs):
+                seen.setdefault("ticks", []).append((tick.index, tick.utime, round(tick.time, 9)))
+                super().step(tick, inputs, outputs)
+
+        poise.run("stand", duration=0.01, components={"task_controller": Watch(poise.run("stand", duration=0.01))})
+        self.assertEqual((seen["name"], seen["period"], seen["joints"]), ("task_controller", 0.002, 12))
+        self.assertEqual(seen["ticks"], [(i, 2000 * i, round(0.002 * i, 9)) for i in range(5)])
+
+    def test_what_it_raises_ends_the_run_and_is_raised(self):
+        class Breaks(poise.Component):
+            def step(self, tick, inputs, outputs):
+                if tick.index == 3:
+                    raise ZeroDivisionError("of mine")
+
+        env = poise.Environment("stand", components={"task_controller": Breaks()})
+        with self.assertRaisesRegex(ZeroDivisionError, "of mine"):
+            env.step(10)
+        self.assertTrue(env.failed)
+        self.assertIn("of mine", env.detail)
+
+    def test_what_is_not_finite_ends_the_run(self):
+        class Bad(poise.Component):
+            def step(self, tick, inputs, outputs):
+                outputs.task_torque.torque = np.nan
+
+        env = poise.Environment("stand", components={"task_controller": Bad()})
+        env.step(10)
+        self.assertTrue(env.failed)
+        self.assertIn("task_torque is not finite", env.detail)
+
+    def test_wrong_use_is_told(self):
+        class Wrong(poise.Component):
+            def __init__(self, do):
+                self.do = do
+
+            def step(self, tick, inputs, outputs):
+                self.do(inputs, outputs)
+
+        holder = []
+        for do, error in ((lambda i, o: setattr(o.task_torque, "torque", np.zeros(3)), ValueError),
+                          (lambda i, o: setattr(o.task_torque, "no", 1), AttributeError),
+                          (lambda i, o: i.robot_state.no, AttributeError),
+                          (lambda i, o: setattr(o.task_torque, "tick", 1), AttributeError),
+                          (lambda i, o: o.task_torque.torque.resize(3, refcheck=False), poise.ConfigError),
+                          (lambda i, o: holder[0].step(), poise.ConfigError)):
+            env = poise.Environment("stand", components={"task_controller": Wrong(do)})
+            holder[:] = [env]
+            with self.assertRaises(error):
+                env.step(2)
+        with self.assertRaisesRegex(poise.ConfigError, "has no component 'no'"):
+            poise.Environment("stand", components={"no": Wrong(None)})
+        with self.assertRaises(poise.Error):  # two stages: a loop within a tick
+            poise.Environment("stand", components={"hw_bridge": Wrong(None)}).step()
+        with self.assertRaises(NotImplementedError):
+            poise.Environment("stand", components={"task_controller": poise.Component()}).step()
+
+
+class AsProcess(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.mkdtemp()
+        self.addCleanup(shutil.rmtree, self.folder)
+        for place in ("lib/poise/bin", "lib/poise/components", "share/poise/graphs", "share/poise/scenarios"):
+            os.makedirs(os.path.join(self.folder, place))
+        self.program = os.path.join(self.folder, "lib/poise/bin/springs")
+        with open(self.program, "w") as file:
+            file.write(PROGRAM.format(python=sys.executable))
+        os.chmod(self.program, 0o755)
+        self.told = subprocess.run([self.program, "--describe"], check=True, capture_output=True, text=True).stdout
+        self.describe(self.told)
+        with open(os.path.join(os.environ["POISE_GRAPHS"], "balance.pbtxt")) as file:
+            graph = file.read()
+        graph = graph.replace('name: "task_controller"\n  restart: true', 'name: "task_controller"\n  type: "springs"')
+        with open(os.path.join(self.folder, "share/poise/graphs/springs.pbtxt"), "w") as file:
+            file.write(graph)
+        with open(os.path.join(self.folder, "share/poise/scenarios/sprung.pbtxt"), "w") as file:
+            file.write('name: "sprung" description: "stands on springs" base: "stand" graph: "springs"')
+        self.environment = {**os.environ, "POISE_PATH": self.folder}
+
+    def describe(self, text):
+        with open(os.path.join(self.folder, "lib/poise/components/springs.json"), "w") as file:
+            file.write(text)
+
+    def poise(self, *arguments):
+        return subprocess.run([POISE, *arguments], cwd=self.folder, env=self.environment, capture_output=True, text=True,
+                              timeout=120)
+
+    def test_a_run_of_processes_in_lockstep(self):
+        done = self.poise("run", "sprung", "--set", "duration=0.4", "--out", "run")
+        self.assertIn(done.returncode, (0, 1), done.stdout + done.stderr)  # 1: a check of the scenario
+        processes = poise.open(os.path.join(self.folder, "run"))
+        # In this process the same class gives the same bits.
+        scope = {}
+        exec(compile(PROGRAM.format(python=""), "springs", "exec"), {"__name__": "springs"}, scope)
+        inline = poise.run("stand", duration=0.4, components={"task_controller": scope["Springs"]()})
+        self.assertEqual(len(processes["TASK_TORQUE"]), 200)
+        for name in ("TASK_TORQUE", "JOINT_COMMAND", "GROUND_TRUTH"):
+            for path in inline[name].fields:
+                if path != "run_id":
+                    np.testing.assert_array_equal(processes[name][path], inline[name][path], f"{name} {path}")
+        self.assertEqual(processes.metric("fallen"), 0)
+
+    def test_descriptions_are_read_and_refused(self):
+        listed = self.poise("list", "components")
+        self.assertIn("springs", listed.stdout)
+        self.assertIn("Springs at the joints, and gravity compensation.", listed.stdout)
+        inline = self.poise("run", "sprung", "--inline", "--set", "duration=0.1", "--out", "inline")
+        self.assertIn("springs is a program of its own", inline.stdout + inline.stderr)
+        for text in ("", "[]", '{"name": "other", "inputs": []}', '{"name": "springs"}',
+                     self.told.replace("same tick", "sometimes"), self.told.replace('"task_torque_t"', "3")):
+            self.describe(text)
+            refused = self.poise("run", "sprung")
+            self.assertEqual(refused.returncode, 2)
+            self.assertIn("springs.json: is no description of a component", refused.stderr)
+        self.describe(self.told.replace("task_torque_t", "health_t"))
+        self.assertEqual(self.poise("run", "sprung").returncode, 2)
+
+    def test_the_description_says_what_the_class_says(self):
+        scope = {}
+        exec(compile(PROGRAM.format(python=""), "springs", "exec"), {"__name__": "springs"}, scope)
+        told, said = json.loads(self.told), json.loads(description(scope["Springs"], "springs"))
+        for key in said:
+            self.assertEqual(told[key], said[key])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,135 @@
+"""A scenario stepped tick by tick: against the same scenario run as a whole, and against pushes that the scenario itself gives."""
+import threading
+import unittest
+
+import numpy as np
+import poise
+
+
+class Steps(unittest.TestCase):
+    def test_single_steps_give_the_bits_of_a_whole_run(self):
+        env = poise.Environment("push_double_support", duration=0.3, record=True)
+        while env.step():
+            pass
+        self.assertTrue(env.ended)
+        stepped, whole = env.finish(), poise.run("push_double_support", duration=0.3)
+        for name in whole:
+            for path in whole[name].fields:
+                if path != "run_id":
+                    np.testing.assert_array_equal(stepped[name][path], whole[name][path], f"{name} {path}")
+
+    def test_reset_begins_the_same_run_again(self):
+        env = poise.Environment("stand", seed=3)
+        env.step(60)
+        first = env["ROBOT_STATE"].q
+        env.push([0, 50, 0])
+        env.step(20)
+        env.reset()
+        self.assertEqual(env.tick, 0)
+        env.step(60)
+        np.testing.assert_array_equal(env["ROBOT_STATE"].q, first)
+        env.reset(seed=4)
+        env.step(60)
+        self.assertFalse(np.array_equal(env["ROBOT_STATE"].q, first))
+
+    def test_a_push_is_that_of_a_scenario(self):
+        ticks, length, force = 100, 50, 70.0
+        start = (ticks - 1) * 0.002  # tick i begins where tick i - 1 ended
+        given = {"sim.push": "", "sim.push[0].start": start, "sim.push[0].duration": length * 0.002, "sim.push[0].peak": force,
+                 "sim.push[0].direction_y": 1, "sim.push[0].profile": "RECTANGLE"}
+        del given["sim.push"]
+        configured = poise.Environment("stand", given)
+        pushed = poise.Environment("stand")
+        for env in (configured, pushed):
+            env.step(ticks)
+        pushed.push([0, force, 0], duration=length * 0.002)
+        for env in (configured, pushed):
+            env.step(length // 2)
+        np.testing.assert_allclose(pushed["GROUND_TRUTH"].push_force, [0, force, 0])
+        for env in (configured, pushed):
+            env.step(length)
+        np.testing.assert_array_equal(pushed["GROUND_TRUTH"].push_force, [0, 0, 0])
+        a, b = configured["GROUND_TRUTH"], pushed["GROUND_TRUTH"]
+        self.assertGreater(b.com_position[1], 1e-3)
+        np.testing.assert_allclose(b.com_position, a.com_position, atol=1e-7)
+
+    def test_a_torque_put_in_the_controllers_place_reaches_the_motor(self):
+        env = poise.Environment("stand")
+        env.step(50)
+        knee = next(name for name in env.joint_names if "knee" in name)
+        j = env.joint_names.index(knee)
+        before = env["JOINT_COMMAND"].torque[j], env["DRIVE_COMMAND"].current[j]
+        env.override_torque(knee, 0.5 * before[0])
+        env.step(1)
+        self.assertEqual(env["JOINT_COMMAND"].torque[j], 0.5 * before[0])
+        self.assertAlmostEqual(env["DRIVE_COMMAND"].current[j] / before[1], 0.5, places=2)  # (54) is linear
+        env.override_torque(knee, None)
+        env.step(1)
+        self.assertNotEqual(env["JOINT_COMMAND"].torque[j], 0.5 * before[0])
+
+    def test_a_fall_ends_it_and_is_no_error(self):
+        env = poise.Environment("stand")
+        env.push([0, 2000, 0])
+        ran = env.step(5000)
+        self.assertLess(ran, 5000)
+        self.assertTrue(env.ended and env.failed)
+        self.assertIn("fell", env.detail)
+        self.assertEqual(env.step(10), 0)
+
+    def test_played_sensors_give_the_recorded_commands(self):
+        run = poise.run("stand", duration=0.2)
+        env = poise.Environment("stand", plant=run)
+        for tick in range(60):
+            env.step()
+            np.testing.assert_array_equal(env["JOINT_COMMAND"].torque, run["JOINT_COMMAND"].torque[tick])
+        with self.assertRaisesRegex(poise.ConfigError, "nothing is simulated"):
+            env.push([1, 0, 0])
+
+    def test_a_thread_steps_and_others_look(self):
+        env = poise.Environment("stand")
+        env.step(1)
+        counts = []
+        threads = [threading.Thread(target=lambda: counts.append(sum(env.step(5) for _ in range(20)))) for _ in range(3)]
+        threads += [threading.Thread(target=lambda: [env["ROBOT_STATE"].q for _ in range(100)])]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(sum(counts), 300)
+        self.assertEqual(env.tick, 301)
+
+    def test_what_cannot_be_is_told_as_poise_run_tells_it(self):
+        with self.assertRaisesRegex(poise.ConfigError, "no scenario named 'no_such'"):
+            poise.Environment("no_such")
+        with self.assertRaisesRegex(poise.ConfigError, "sim.no_such_field"):
+            poise.Environment("stand", {"sim.no_such_field": 1})
+        with self.assertRaises(poise.Error):
+            poise.Environment("stand", robot="no_such")
+        env = poise.Environment("stand")
+        with self.assertRaisesRegex(poise.ConfigError, "no message before the first tick"):
+            env["ROBOT_STATE"]
+        env.step()
+        with self.assertRaisesRegex(poise.ConfigError, "no channel 'NO'"):
+            env["NO"]
+        with self.assertRaisesRegex(poise.ConfigError, "no moving link 'tail'"):
+            env.push([1, 0, 0], body="tail")
+        for force in ([np.nan, 0, 0], [np.inf, 0, 0]):
+            with self.assertRaisesRegex(poise.ConfigError, "finite"):
+                env.push(force)
+        with self.assertRaises((TypeError, ValueError)):
+            env.push([1, 2])
+        with self.assertRaisesRegex(poise.ConfigError, "no joint 'elbow'"):
+            env.override_torque("elbow", 1)
+        with self.assertRaises(poise.ConfigError):
+            env.override_torque(99, 1)
+        with self.assertRaises(poise.ConfigError):
+            env.override_torque(0, float("nan"))
+        with self.assertRaises(ValueError):
+            env.step(-1)
+        self.assertIsNone(env.finish())
+        with self.assertRaisesRegex(poise.ConfigError, "finished"):
+            env.step()
+
+
+if __name__ == "__main__":
+    unittest.main()
