@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
+#include "components/balance/tasks/centroidal_momentum.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
@@ -43,6 +46,44 @@ double SwingAcceleration(const robot::RobotModel& model, double share) {
   return least;
 }
 
+/// kg·m² about the COM, ahead and sideways the lesser, with which the body turns while soles and
+/// COM stay where they are.
+double TurningInertia(const robot::RobotModel& model) {
+  robot::RobotState state(model.num_joints());
+  state.joint_position = model.stance().joint_position;
+  robot::RobotData data(model);
+  robot::ComputeKinematics(model, state, &data);
+  robot::ComputeFeet(model, &data);
+  robot::ComputeDynamics(model, state, &data);
+  std::vector<int> moving{0, 1, 2, 3, 4, 5};
+  for (const robot::FootModel& foot : model.feet()) {
+    for (const int j : model.supporting_joints(foot.body)) moving.push_back(6 + j);
+  }
+  robot::Matrix6X body(6, model.num_velocities());
+  robot::ComputePointJacobian(model, data, model.body_task_body(), Eigen::Vector3d::Zero(), body);
+  Eigen::MatrixXd momentum = Eigen::MatrixXd::Zero(3, model.num_velocities());
+  Eigen::Vector3d bias;
+  balance::ComputeAngularMomentumRows(data, momentum, &bias);
+  const auto columns = static_cast<Eigen::Index>(moving.size());
+  Eigen::MatrixXd held(18, columns);
+  for (Eigen::Index c = 0; c < columns; ++c) {
+    const int from = moving[static_cast<size_t>(c)];
+    held.col(c) << data.foot_jacobian[0].col(from), data.foot_jacobian[1].col(from),
+        data.com_jacobian.col(from), body.col(from).tail<3>();
+  }
+  const auto solver = held.completeOrthogonalDecomposition();
+  double least = std::numeric_limits<double>::infinity();
+  for (const int axis : {0, 1}) {
+    Eigen::VectorXd wanted = Eigen::VectorXd::Zero(18);
+    wanted[15 + axis] = 1;
+    const Eigen::VectorXd velocity = solver.solve(wanted);
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(model.num_velocities());
+    for (Eigen::Index c = 0; c < columns; ++c) all[moving[static_cast<size_t>(c)]] = velocity[c];
+    least = std::min(least, std::abs(momentum.row(axis).dot(all)));
+  }
+  return least;
+}
+
 }  // namespace
 
 void CheckRecoveryConfig(const RecoveryConfig& config) {
@@ -61,6 +102,7 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   not_negative(config.again_after(), "again_after");
   check(config.max_steps() >= 1, "max_steps", "must be 1 or more");
   positive(config.unload(), "unload");
+  not_negative(config.momentum(), "momentum");
   positive(config.load(), "load");
   not_negative(config.edge(), "edge");
   not_negative(config.overshoot(), "overshoot");
@@ -76,6 +118,10 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   not_negative(config.joint_reserve(), "joint_reserve");
   not_negative(config.gap(), "gap");
   positive(config.gain(), "gain");
+  not_negative(config.lean_rate(), "lean_rate");
+  not_negative(config.swing_budget(), "swing_budget");
+  not_negative(config.catch_budget(), "catch_budget");
+  positive(config.far(), "far");
   positive(config.height_rate(), "height_rate");
   positive(config.rest_distance(), "rest_distance");
   positive(config.rest_speed(), "rest_speed");
@@ -114,12 +160,18 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   spec.beyond = config.beyond();
   spec.again_after = config.again_after();
   spec.max_steps = config.max_steps();
+  spec.momentum = config.momentum();
   spec.load = config.load();
   spec.swing = {config.clearance(), config.touch_speed(), config.freeze()};
   spec.touch_load = contact.touch_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
   spec.gain = config.gain();
+  spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
+  spec.lean_rate = config.lean_rate();
+  spec.swing_budget = config.swing_budget();
+  spec.catch_budget = config.catch_budget();
+  spec.far = config.far();
   spec.height_rate = config.height_rate();
   spec.rest_distance = config.rest_distance();
   spec.rest_speed = config.rest_speed();

@@ -222,6 +222,11 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 
   input.time = time;
   input.com = data.com;
   input.com_velocity = data.com_velocity;
+  input.angular_momentum = whole_body_->AngularMomentum() / data.total_mass;
+  const Eigen::AngleAxisd lean(data.body_rotation[static_cast<size_t>(model_->body_task_body())] *
+                               references_.body.rotation.transpose());
+  input.lean = lean.angle() * lean.axis();
+  input.turning = data.body_angular_velocity[static_cast<size_t>(model_->body_task_body())];
   input.sole = {data.foot_pose[0], data.foot_pose[1]};
   input.load = load;
   input.in_contact = in_contact_;

@@ -24,7 +24,7 @@ double Yaw(const Eigen::Isometry3d& pose) {
   return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
 }
 
-StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact) {
+StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact, double momentum) {
   StepState state;
   state.in_contact = in_contact;
   double ground = 0, feet = 0;
@@ -39,7 +39,8 @@ StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact)
   }
   state.yaw = std::atan2(heading.y(), heading.x());
   const double height = std::max(input.com.z() - ground / std::max(feet, 1.0), kLeastHeight);
-  state.pendulum = {input.com.head<2>(), input.com_velocity.head<2>(),
+  const Eigen::Vector2d turning(input.angular_momentum.y(), -input.angular_momentum.x());
+  state.pendulum = {input.com.head<2>(), input.com_velocity.head<2>() + momentum / height * turning,
                     std::sqrt(robot::kGravity / height)};
   return state;
 }

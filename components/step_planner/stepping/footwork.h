@@ -21,6 +21,9 @@ struct StepInput {
   double time = 0;  ///< s, not decreasing
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
   Eigen::Vector3d com_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  ///< about the COM per mass, m²/s
+  /// Of the body from where its orientation is to be, rad, and its angular velocity, rad/s.
+  Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
                                         Eigen::Isometry3d::Identity()};
   std::array<double, 2> load{0, 0};            ///< N
@@ -50,8 +53,11 @@ struct StepOutput {
 /// rad, of a frame's x axis about the vertical.
 double Yaw(const Eigen::Isometry3d& pose);
 
-/// The pendulum above the soles in contact.
-StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact);
+/// The pendulum above the soles in contact. `momentum`: share of the angular momentum that counts
+/// as the COM's own. All of it: what leg and body give each other and the COM changes nothing,
+/// since the momentum about the centre of pressure is gravity's alone.
+StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact,
+                  double momentum = 0);
 
 /// The COM's height, led without haste to where the legs want it.
 class HeightLead {

@@ -33,7 +33,7 @@ double Recovery::Beyond(const StepState& state) const {
 
 bool Recovery::Update(const StepInput& input) {
   const double time = input.time;
-  StepState state = Observe(input, active() ? in_contact_ : input.in_contact);
+  StepState state = Observe(input, active() ? in_contact_ : input.in_contact, spec_.momentum);
   const double beyond = Beyond(state);
   if (!(beyond > 0)) {
     beyond_since_ = -1;
@@ -51,7 +51,7 @@ bool Recovery::Update(const StepInput& input) {
       in_contact_ = input.in_contact;
       output_.cop = balance::NearestPoint(Soles(state, choice_.limits().edge),
                                           state.pendulum.capture_point());
-      BeginStep(input, state, need);
+      BeginStep(input, choice_.Choose(state), need);
       break;
     }
     case Stage::kUnloading:
@@ -73,7 +73,9 @@ bool Recovery::Update(const StepInput& input) {
     case Stage::kCatching:
       if (beyond_since_ >= 0 && time >= beyond_since_ + spec_.again_after - kTimeTolerance &&
           steps_now_ < spec_.max_steps) {
-        BeginStep(input, state, StepReason::kAgain);
+        BeginStep(input, choice_.Choose(state), StepReason::kAgain);
+      } else if (const int foot = FootToBring(state); foot >= 0 && steps_now_ < spec_.max_steps) {
+        BeginStep(input, choice_.Plan(state, foot), StepReason::kTogether);
       } else if (AtRest(input, state)) {
         stage_ = Stage::kIdle;
       }
@@ -106,8 +108,7 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
                                                                            : StepReason::kNone;
 }
 
-void Recovery::BeginStep(const StepInput& input, const StepState& state, StepReason reason) {
-  const StepPlan plan = choice_.Choose(state);
+void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
   if (plan.foot < 0) return;
   plan_ = plan;
   reason_ = reason;
@@ -167,10 +168,43 @@ Vector2d Recovery::Goal(const StepState& state) const {
   return 0.5 * (state.sole[0] + state.sole[1]);
 }
 
-Vector2d Recovery::CatchingPoint(const StepState& state) const {
+Vector2d Recovery::ForBody(const StepInput& input, double budget) const {
+  // L̇ = −J (λ² lean + 2 λ turning) about the COM takes a centre of pressure (−L̇_y, L̇_x)/(m g) off.
+  const Vector3d moment =
+      spec_.turn_share * spec_.lean_rate * (spec_.lean_rate * input.lean + 2 * input.turning);
+  const Vector2d offset(moment.y(), -moment.x());
+  const double length = offset.norm();
+  return length > budget ? Vector2d(budget / length * offset) : offset;
+}
+
+Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
+  const int stance = 1 - plan_.foot;
+  const auto s = static_cast<size_t>(stance);
+  const Vector2d body = ForBody(input, spec_.swing_budget);
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
+  return balance::NearestPoint(sole, state.pendulum.capture_point() + body) - body;
+}
+
+Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
   const Vector2d point = state.pendulum.capture_point();
+  const Vector2d body = ForBody(input, spec_.catch_budget);
   return balance::NearestPoint(Soles(state, choice_.limits().edge),
-                               point + spec_.gain * (point - Goal(state)));
+                               point + spec_.gain * (point - Goal(state)) + body) -
+         body;
+}
+
+int Recovery::FootToBring(const StepState& state) const {
+  const Vector2d point = state.pendulum.capture_point();
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
+  const std::array<Vector2d, 2> offset{turn * (state.sole[0] - point),
+                                       turn * (state.sole[1] - point)};
+  if (choice_.reach().LowerShare(offset) < spec_.far) return -1;
+  const int far = offset[0].norm() > offset[1].norm() ? 0 : 1;
+  const auto near = static_cast<size_t>(1 - far);
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(1 - far), choice_.limits().edge, state.sole[near], state.sole_yaw[near]);
+  return balance::Contains(sole, point) ? far : -1;
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
@@ -208,12 +242,12 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   switch (stage_) {
     case Stage::kUnloading:
     case Stage::kSwinging:
-      cop = choice_.BrakingPoint(state, 1 - plan_.foot);
+      cop = BrakingPoint(input, state);
       if (stage_ == Stage::kUnloading) share = (input.time - since_) / choice_.limits().unload;
       break;
     case Stage::kLoading:
     case Stage::kCatching:
-      cop = CatchingPoint(state);
+      cop = CatchingPoint(input, state);
       if (stage_ == Stage::kLoading) share = (input.time - since_) / spec_.load;
       break;
     case Stage::kIdle:

@@ -19,12 +19,19 @@ struct RecoverySpec {
   double beyond = 0;       ///< m beyond the soles from which it may not wait below `reserve`
   double again_after = 0;  ///< s beyond the soles of a step until the next one begins
   int max_steps = 0;
-  double load = 0;  ///< s of the ramp that loads a landed foot
+  double momentum = 1;  ///< share of the angular momentum that counts in the capture point
+  double load = 0;      ///< s of the ramp that loads a landed foot
   SwingSpec swing;
   double touch_load = 0, touch_duration = 0;  ///< N, s
   double search_depth = 0;                    ///< m below the foothold
-  double gain = 0;         ///< of the capture point's error in the centre of pressure, > 0
-  double height_rate = 0;  ///< 1/s, with which the COM's height follows what the legs ask for
+  double gain = 0;  ///< of the capture point's error in the centre of pressure, > 0
+  /// m·s²: the inertia with which the body turns, soles and COM at rest, over the robot's weight.
+  double turn_share = 0;
+  double lean_rate = 0;     ///< 1/s, critically damped, of the body's return to upright
+  double swing_budget = 0;  ///< m of centre of pressure that this may take while a foot swings
+  double catch_budget = 0;  ///< m, on both feet
+  double far = 1;           ///< share of `lower` from which the feet are too far apart to rest
+  double height_rate = 0;   ///< 1/s, with which the COM's height follows what the legs ask for
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
 };
 
@@ -67,14 +74,21 @@ class Recovery {
   /// m that the capture point is beyond the soles in contact; negative inside.
   double Beyond(const StepState& state) const;
   StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double beyond);
-  void BeginStep(const StepInput& input, const StepState& state, StepReason reason);
+  /// No effect without a foot.
+  void BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
   void LiftOff(const StepInput& input);
   /// The foothold where the capture point now says, and the foot on its way there.
   void Swings(const StepInput& input, const StepState& state);
   void Land(const StepInput& input);
   bool AtRest(const StepInput& input, const StepState& state);
-  /// Where the centre of pressure shall be on both soles.
-  Eigen::Vector2d CatchingPoint(const StepState& state) const;
+  /// What the body's return to upright takes of the centre of pressure, m, at most `budget`.
+  Eigen::Vector2d ForBody(const StepInput& input, double budget) const;
+  /// Where the COM's share of the centre of pressure shall be on the stance sole, and on both.
+  Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
+  Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
+  /// The foot that is to be brought beside the other one, which holds the capture point, since the
+  /// COM cannot rest there with the feet so far apart; −1: none.
+  int FootToBring(const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
   void LeadCom(const StepInput& input, const StepState& state);
   double LowerShare(const StepState& state) const;
