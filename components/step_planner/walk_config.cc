@@ -40,6 +40,7 @@ void CheckWalkConfig(const WalkConfig& config) {
   positive(config.unload(), "unload");
   positive(config.swing(), "swing");
   positive(config.load(), "load");
+  positive(config.settle(), "settle");
   not_negative(config.longest(), "longest");
   not_negative(config.widest(), "widest");
   not_negative(config.most_turn(), "most_turn");
@@ -89,6 +90,7 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
   spec.start = config.start();
   spec.unload = config.unload();
   spec.swing = config.swing();
+  spec.settle = config.settle();
   spec.load = config.load();
   spec.step = {limits.spacing, reach.least_spacing(), config.longest(), config.widest(),
                config.most_turn()};
