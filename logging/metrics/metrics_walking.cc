@@ -96,16 +96,15 @@ void AddWalking(MetricList* list) {
                      }
                      return fastest;
                    }});
-  list->push_back({"walk_velocity_error_rms", "mm/s",
-                   "walking, mean velocity of two steps less the commanded one, RMS",
-                   [](const RunRecord& run) {
-                     MeanSquare square;
-                     for (const Stride& stride : Strides(run)) {
-                       square.Add(((stride.way - stride.commanded) / stride.duration)
-                                      .squaredNorm());
-                     }
-                     return Scaled(square.Root(), kMilli);
-                   }});
+  list->push_back(
+      {"walk_velocity_error_rms", "mm/s",
+       "walking, mean velocity of two steps less the commanded one, RMS", [](const RunRecord& run) {
+         MeanSquare square;
+         for (const Stride& stride : Strides(run)) {
+           square.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
+         }
+         return Scaled(square.Root(), kMilli);
+       }});
   list->push_back({"walk_way", "m", "walking, way of the COM from step to step", Way});
   list->push_back({"walk_cost_of_transport", "",
                    "walking, positive work of the joints over weight and way", CostOfTransport});

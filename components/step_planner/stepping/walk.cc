@@ -11,9 +11,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kLongestTick = 0.02;   // s, counted at most for a tick after a gap
-constexpr double kRiseOver = 0.5;       // share of a swing before which no load is a landing
-constexpr double kTogether = 0.03;      // m, rad: the feet stand side by side
+constexpr double kLongestTick = 0.02;  // s, counted at most for a tick after a gap
+constexpr double kRiseOver = 0.5;      // share of a swing before which no load is a landing
+constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
 // Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
 constexpr int kAhead = 3;
 // Time constant, as a share of the settling, with which a foot that touches is let go.
@@ -121,8 +121,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   PlanFrom(state);
   const CapturePlan::Point lift_off = plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
-  const Vector2d speed =
-      state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
+  const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {
     start_[static_cast<size_t>(i)].Begin({now[i]}, {lift_off.capture_point[i], speed[i], 0},
                                          input.time, spec_.start + spec_.unload);
@@ -246,15 +245,18 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
     }
     return;
   }
+  // A foothold farther by d takes the plan's capture point at touch-down d (1 − e^{−ωB})/(ωB)
+  // farther, for the centre of pressure needs B to get there.
+  const double between = w * (spec_.load + spec_.unload);
+  beyond *= between / (1 - std::exp(-between));
   Vector2d foothold = foothold_.position + beyond / size * error;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const Vector2d com = After(state.pendulum, cop, left).com;
   const balance::ConvexPolygon footholds =
       choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
-  if (footholds.num_corners > 0) {
-    const Vector2d offset = turn.transpose() * (foothold - stance);
-    foothold = stance + turn * balance::NearestPoint(footholds, offset);
-  }
+  if (footholds.num_corners == 0) return;
+  const Vector2d offset = turn.transpose() * (foothold - stance);
+  foothold = stance + turn * balance::NearestPoint(footholds, offset);
   foothold_.position = foothold;
   PlanFrom(state);
   swing_.Move(foothold, input.time, touch_down_);
@@ -309,16 +311,15 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
     case WalkStage::kTouching:
       wanted_ = plan_.At(spec_.single() - std::max(due - time, 0.0));
       // Later than planned the capture point waits where it is, as far as the sole lets it.
-      wanted_.cop += balance::SmoothStep((time - due) / kWait) *
-                     (wanted_.capture_point - wanted_.cop);
+      wanted_.cop +=
+          balance::SmoothStep((time - due) / kWait) * (wanted_.capture_point - wanted_.cop);
       break;
     case WalkStage::kStanding:
       break;
   }
   const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
   const balance::ConvexPolygon carrying = Carrying(input, state);
-  const Vector2d asked =
-      balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
+  const Vector2d asked = balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);

@@ -37,7 +37,15 @@ struct WalkSpec {
   double single() const { return swing + settle; }
 };
 
-enum class WalkStage { kStanding, kStarting, kUnloading, kSwinging, kTouching, kLoading, kStopping };
+enum class WalkStage {
+  kStanding,
+  kStarting,
+  kUnloading,
+  kSwinging,
+  kTouching,
+  kLoading,
+  kStopping
+};
 
 /// Pure function of its calls; never allocates.
 class Walk {
@@ -55,7 +63,7 @@ class Walk {
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != WalkStage::kStanding; }
   WalkStage stage() const { return stage_; }
-  int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
+  int num_steps() const { return num_steps_; }       ///< feet that have landed, since the start
   int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
   /// Another planner has moved the feet.
   void Stop() { stage_ = WalkStage::kStanding; }

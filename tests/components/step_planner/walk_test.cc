@@ -1,5 +1,5 @@
-// Footsteps and the capture point between them, and walking in a world of its own: a point mass that
-// obeys the pendulum's equations, on feet that go where the swing says.
+// Footsteps and the capture point between them, and walking in a world of its own: a point mass
+// that obeys the pendulum's equations, on feet that go where the swing says.
 #include "components/step_planner/stepping/walk.h"
 
 #include <gtest/gtest.h>
@@ -80,8 +80,8 @@ TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
 }
 
 TEST(Footsteps, GoesAsFastAsCommanded) {
-  for (const Vector2d& velocity : {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05),
-                                  Vector2d(0.1, -0.05)}) {
+  for (const Vector2d& velocity :
+       {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05), Vector2d(0.1, -0.05)}) {
     Footstep stance{{0, -0.105}, 0};
     for (int i = 0; i < 20; ++i) {
       stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot,
@@ -222,8 +222,8 @@ class World {
     balance::ConvexPolygon soles;
     for (size_t i = 0; i < 2; ++i) {
       if (in_contact_[i]) {
-        soles = HullOf(soles, SoleAt(model_.feet()[i], 0, sole_[i].translation().head<2>(),
-                                     Yaw(sole_[i])));
+        soles = HullOf(
+            soles, SoleAt(model_.feet()[i], 0, sole_[i].translation().head<2>(), Yaw(sole_[i])));
         continue;
       }
       sole_[i].translation() = output.swing.position;
