@@ -357,7 +357,7 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     ++count;
     if (add) {
       world_->AddContact({body, p, surface.normal, depth, surface.velocity * surface.normal.z(),
-                          terrain_.material(surface.block, corners_[foot].size())});
+                          terrain_.material(surface, corners_[foot].size())});
     }
   }
   return count;

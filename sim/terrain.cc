@@ -17,7 +17,16 @@ using std::numbers::pi;
 namespace {
 
 constexpr double kMaxTilt = 0.8;  // rad
-constexpr uint64_t kTerrainStream = 1;
+constexpr uint64_t kTerrainStream = 1, kFieldStream = 101;
+constexpr int kMostRows = 64;
+constexpr double kLaneMiddle = 0.1;  // m from y = 0, about where feet come down
+
+Vector2d Slope(double roll, double pitch) {
+  // The normal is the z axis turned by roll about x, then by pitch about y.
+  const Vector3d normal(std::sin(pitch) * std::cos(roll), -std::sin(roll),
+                        std::cos(pitch) * std::cos(roll));
+  return -normal.head<2>() / normal.z();
+}
 
 }  // namespace
 
@@ -25,6 +34,7 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
   const Ground& ground = config.ground();
   RequireNotNegative(ground.friction(), "ground.friction");
   ground_material_.friction = ground.friction();
+  if (config.has_block_field()) ReadField(config.block_field(), seed);
   if (!config.has_block()) return;
 
   const SoftBlock& block = config.block();
@@ -52,11 +62,7 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
   height_ = block.height();
   start_ = block.start();
   rise_ = block.rise();
-  // The normal is the z axis turned by roll about x, then by pitch about y.
-  const Vector3d normal(std::sin(block.tilt_pitch()) * std::cos(block.tilt_roll()),
-                        -std::sin(block.tilt_roll()),
-                        std::cos(block.tilt_pitch()) * std::cos(block.tilt_roll()));
-  slope_ = -normal.head<2>() / normal.z();
+  slope_ = Slope(block.tilt_roll(), block.tilt_pitch());
   block_material_ = {block.friction(), block.stiffness(), block.damping()};
 
   RandomStream random(seed, kTerrainStream);
@@ -69,7 +75,65 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
   }
 }
 
+void Terrain::ReadField(const BlockField& field, uint64_t seed) {
+  RequireFinite(field.start(), "block_field.start");
+  RequirePositive(field.length(), "block_field.length");
+  RequireFinite(field.stagger(), "block_field.stagger");
+  RequireNotNegative(field.height(), "block_field.height");
+  RequirePositive(field.least_stiffness(), "block_field.least_stiffness");
+  RequirePositive(field.most_stiffness(), "block_field.most_stiffness");
+  RequireNotNegative(field.damping(), "block_field.damping");
+  RequireNotNegative(field.friction(), "block_field.friction");
+  RequireFinite(field.climb(), "block_field.climb");
+  if (field.rows() < 1 || field.rows() > kMostRows) {
+    throw ConfigError("block_field.rows", "must be 1 to 64");
+  }
+  if (!(field.tilt() >= 0 && field.tilt() <= kMaxTilt)) {
+    throw ConfigError("block_field.tilt", "must be 0 to 0.8 rad");
+  }
+  if (field.most_stiffness() < field.least_stiffness()) {
+    throw ConfigError("block_field.most_stiffness", "must be least_stiffness or more");
+  }
+  field_start_ = field.start();
+  field_length_ = field.length();
+  field_stagger_ = field.stagger();
+  RandomStream random(seed, kFieldStream);
+  const auto within = [&](double most) { return most * (2 * random.Uniform() - 1); };
+  for (const double lane : {0.0, 0.5}) {
+    for (int row = 0; row < field.rows(); ++row) {
+      Tile tile;
+      tile.height = within(field.height()) + field.climb() * (row + lane);
+      const double roll = within(field.tilt());
+      tile.slope = Slope(roll, within(field.tilt()));
+      const double stiffness =
+          field.least_stiffness() *
+          std::pow(field.most_stiffness() / field.least_stiffness(), random.Uniform());
+      tile.material = {field.friction(), stiffness, field.damping() * std::sqrt(stiffness)};
+      field_.push_back(tile);
+    }
+  }
+}
+
+int Terrain::FieldBlock(double x, double y) const {
+  const auto rows = static_cast<int>(field_.size() / 2);
+  const bool left = y > 0;
+  const double along = (x - field_start_ - (left ? field_stagger_ : 0)) / field_length_;
+  if (!(along >= 0 && along < rows)) return -1;
+  return static_cast<int>(along) + (left ? rows : 0);
+}
+
 Terrain::Surface Terrain::At(double x, double y, double time) const {
+  if (const int block = FieldBlock(x, y); block >= 0) {
+    const Tile& tile = field_[static_cast<size_t>(block)];
+    const int rows = static_cast<int>(field_.size() / 2), row = block % rows;
+    const double middle =
+        field_start_ + (row + 0.5) * field_length_ + (block >= rows ? field_stagger_ : 0);
+    // Tilted along y about where the feet come down, not about the lanes' common edge.
+    const double across = std::abs(y) - kLaneMiddle;
+    const double height =
+        tile.height + tile.slope.x() * (x - middle) + tile.slope.y() * (y > 0 ? across : -across);
+    return {height, 0, Vector3d(-tile.slope.x(), -tile.slope.y(), 1).normalized(), true, block};
+  }
   const Surface ground{0, 0, Vector3d::UnitZ(), false};
   // A block without a start is there from the beginning of the run, before time 0.
   if (!has_block_ || (start_ > 0 && time < start_)) return ground;
@@ -91,6 +155,14 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
   slope *= rise.position;
   if (height <= 0) return ground;
   return {height, velocity, Vector3d(-slope.x(), -slope.y(), 1).normalized(), true};
+}
+
+ContactMaterial Terrain::material(const Surface& surface, size_t corners) const {
+  if (surface.field < 0) return material(surface.block, corners);
+  ContactMaterial material = field_[static_cast<size_t>(surface.field)].material;
+  material.stiffness /= static_cast<double>(corners);
+  material.damping /= static_cast<double>(corners);
+  return material;
 }
 
 ContactMaterial Terrain::material(bool block, size_t corners) const {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "sim/sim.pb.h"
 #include "sim/world.h"
@@ -17,19 +18,26 @@ class Terrain {
     double height;           ///< m, world
     double velocity;         ///< m/s, upward, of a block that rises
     Eigen::Vector3d normal;  ///< unit, upward
-    bool block;              ///< of the block rather than of the ground
+    bool block;              ///< of a block rather than of the ground
+    int field = -1;          ///< index of the field's block; −1: none
   };
 
   /// The block's stiffness and damping are those of a whole sole, shared by its corners.
   /// Throws ConfigError: sizes, stiffness, friction or tilt out of range.
   Terrain(const SimConfig& config, uint64_t seed);
 
-  /// The higher of ground and block at (x, y) at time `time` (s).
+  /// The higher of ground and block at (x, y) at time `time` (s); in a field its block, be it
+  /// below the ground.
   Surface At(double x, double y, double time) const;
-  /// Of the contact of one of a sole's `corners`.
+  /// Of the contact of one of a sole's `corners` with the ground or a single block.
   ContactMaterial material(bool block, size_t corners) const;
+  ContactMaterial material(const Surface& surface, size_t corners) const;
 
  private:
+  void ReadField(const BlockField& field, uint64_t seed);
+  /// Of the field's blocks the one at (x, y); −1: none.
+  int FieldBlock(double x, double y) const;
+
   struct Wave {
     Eigen::Vector2d number;  // rad/m
     double phase;
@@ -44,6 +52,13 @@ class Terrain {
   Eigen::Vector2d slope_ = Eigen::Vector2d::Zero();  // dz/dx, dz/dy of the tilted top
   double wave_amplitude_ = 0;
   std::array<Wave, kWaves> waves_{};
+  struct Tile {
+    double height;          // m, of the top's middle
+    Eigen::Vector2d slope;  // dz/dx, dz/dy
+    ContactMaterial material;
+  };
+  std::vector<Tile> field_;  // right lane, then left, along x each
+  double field_start_ = 0, field_length_ = 1, field_stagger_ = 0;  // m
 };
 
 }  // namespace poise

@@ -68,6 +68,7 @@ int8_t WalkCode(stepping::WalkStage stage) {
     case stepping::WalkStage::kUnloading:
       return support_plan_t::STEPPING_UNLOADING;
     case stepping::WalkStage::kSwinging:
+    case stepping::WalkStage::kTouching:
       return support_plan_t::STEPPING_SWINGING;
     case stepping::WalkStage::kLoading:
       return support_plan_t::STEPPING_LOADING;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "components/framework/configuration/configuration.h"
@@ -12,6 +13,10 @@
 
 namespace poise {
 namespace {
+
+// Of a sole's inner radius: what friction of the ankles and errors of the model move the centre of
+// pressure by, and a reserve before the sole tips.
+constexpr double kEdgeShare = 1.0 / 3;
 
 void CheckWalk(bool holds, const char* name, const char* must) {
   if (!holds) throw ConfigError(std::string("walk.") + name, must);
@@ -40,6 +45,7 @@ void CheckWalkConfig(const WalkConfig& config) {
   positive(config.unload(), "unload");
   positive(config.swing(), "swing");
   positive(config.load(), "load");
+  positive(config.settle(), "settle");
   not_negative(config.longest(), "longest");
   not_negative(config.widest(), "widest");
   not_negative(config.most_turn(), "most_turn");
@@ -65,11 +71,16 @@ void CheckWalkConfig(const WalkConfig& config) {
 
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
                         const robot::RobotModel& model) {
+  double edge = config.edge();
+  if (!config.has_edge()) {
+    edge = kEdgeShare *
+           std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
+  }
   for (const robot::FootModel& foot : model.feet()) {
-    if (config.edge() < robot::InnerRadius(foot)) continue;
+    if (edge < robot::InnerRadius(foot)) continue;
     throw ConfigError("walk.edge",
                       fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
-                                  config.edge(), foot.name, foot.length, foot.width));
+                                  edge, foot.name, foot.length, foot.width));
   }
   const double height = robot::StandingHeight(model);
   const stepping::Reach reach(model, height, config.reach_lower(), config.joint_reserve(),
@@ -82,13 +93,14 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                                   config.joint_reserve()));
   }
   stepping::StepLimits limits;
-  limits.edge = config.edge();
+  limits.edge = edge;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
 
   stepping::WalkSpec spec;
   spec.start = config.start();
   spec.unload = config.unload();
   spec.swing = config.swing();
+  spec.settle = config.settle();
   spec.load = config.load();
   spec.step = {limits.spacing, reach.least_spacing(), config.longest(), config.widest(),
                config.most_turn()};

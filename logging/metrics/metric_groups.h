@@ -54,6 +54,7 @@ void AddDrives(MetricList* list);     ///< what the drives made of the torques, 
 void AddTransitions(MetricList* list);  ///< changes of support and touch-downs
 void AddSensors(MetricList* list);      ///< push
 void AddStepping(MetricList* list);     ///< steps that the planner decided on
+void AddWalking(MetricList* list);      ///< speed, error and cost of walking
 void AddEstimator(MetricList* list);    ///< errors of the base's estimate, and their covariance
 void AddObserver(MetricList* list);     ///< foot wrenches without sensors, and the sensors' faults
 void AddLog(MetricList* list);          ///< completeness of the log and of the bus

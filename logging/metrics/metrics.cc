@@ -24,6 +24,7 @@ MetricList MakeMetrics() {
   AddEstimator(&list);
   AddObserver(&list);
   AddStepping(&list);
+  AddWalking(&list);
   AddLog(&list);
   return list;
 }

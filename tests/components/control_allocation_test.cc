@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "tests/components/control_tick.h"
@@ -115,6 +116,32 @@ TEST(ControlAllocation, NoneWithAListOfTasks) {
       ASSERT_EQ(allocations - before, 0) << "tick " << tick;
       ASSERT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK) << tick;
     }
+  }
+}
+
+// Through all of a step's stages: the foot that should be in the air is reported where it stood, and
+// loaded when it should have come down.
+TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
+  for (const robot::TestRobot robot : {robot::TestRobot::kDyros, robot::TestRobot::kMantis}) {
+    const robot::RobotModel model = robot::LoadTestRobot(robot);
+    ControlContext context(robot);
+    Harness<StepPlanner> harness(&context,
+                                 "phase { support: DOUBLE } walk { enabled: true start: 0.2 "
+                                 "command { time: 0 vx: 0.1 wz: 0.1 } }");
+    robot_state_t state = StateMessage(model, StandingState(model));
+    harness.Bind("robot_state", &state);
+    std::set<int> stages;
+    for (int tick = 0; tick < 2000; ++tick) {
+      const double time_left = harness.output<support_plan_t>().touch_down_time;
+      for (auto& wrench : state.foot_wrench) wrench.force[2] = time_left > 0 ? 0 : -100;
+      const long before = allocations;
+      harness.Run(TickAt(tick));
+      ASSERT_EQ(allocations - before, 0) << "tick " << tick;
+      stages.insert(harness.output<support_plan_t>().stepping);
+    }
+    EXPECT_GE(harness.output<support_plan_t>().num_steps, 2);
+    EXPECT_EQ(stages.count(support_plan_t::STEPPING_SWINGING), 1u);
+    EXPECT_EQ(stages.count(support_plan_t::STEPPING_LOADING), 1u);
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <set>
 
 #include "components/framework/configuration/configuration.h"
 
@@ -99,6 +100,60 @@ TEST(Terrain, IrregularityIsSeededBoundedAndSmooth) {
   EXPECT_LE(largest, 0.01);
   EXPECT_GT(largest, 0.003);
   EXPECT_GT(difference, 0.003);
+}
+
+TEST(Terrain, AFieldsBlocksLieInTwoLanesWithinTheirBounds) {
+  const std::string text =
+      "start: 1 rows: 3 length: 0.4 stagger: 0.2 height: 0.05 tilt: 0.1 "
+      "least_stiffness: 3000 most_stiffness: 90000";
+  const Terrain terrain = Make("block_field { " + text + " }");
+  EXPECT_FALSE(terrain.At(0.99, -0.1, 0).block);
+  EXPECT_FALSE(terrain.At(1.19, 0.1, 0).block) << "the left lane begins later";
+  EXPECT_FALSE(terrain.At(2.21, -0.1, 0).block);
+  EXPECT_TRUE(terrain.At(2.39, 0.1, 0).block);
+  std::set<int> seen;
+  std::set<double> heights;
+  for (int row = 0; row < 3; ++row) {
+    for (const double side : {-1.0, 1.0}) {
+      const double x = 1.2 + 0.4 * row + (side > 0 ? 0.2 : 0);
+      const Terrain::Surface surface = terrain.At(x, 0.1 * side, 0);
+      ASSERT_TRUE(surface.block);
+      seen.insert(surface.field);
+      heights.insert(surface.height);
+      EXPECT_LE(std::abs(surface.height), 0.05);
+      EXPECT_NEAR(surface.normal.norm(), 1, 1e-12);
+      EXPECT_GE(surface.normal.z(), std::cos(0.1) * std::cos(0.1) - 1e-12);
+      // The normal is that of the plane whose heights are given.
+      const double h = 1e-3;
+      const double along = (terrain.At(x + h, 0.1 * side, 0).height - surface.height) / h;
+      const double across = (terrain.At(x, 0.1 * side + h, 0).height - surface.height) / h;
+      EXPECT_NEAR(surface.normal.x(), -along * surface.normal.z(), 1e-9);
+      EXPECT_NEAR(surface.normal.y(), -across * surface.normal.z(), 1e-9);
+      const ContactMaterial material = terrain.material(surface, 4);
+      EXPECT_GE(4 * material.stiffness, 3000);
+      EXPECT_LE(4 * material.stiffness, 90000);
+    }
+  }
+  EXPECT_EQ(seen.size(), 6u);
+  EXPECT_EQ(heights.size(), 6u);
+  const Terrain again = Make("block_field { " + text + " }"),
+                other = Make("block_field { " + text + " }", 2);
+  EXPECT_EQ(again.At(1.2, -0.1, 0).height, terrain.At(1.2, -0.1, 0).height);
+  EXPECT_NE(other.At(1.2, -0.1, 0).height, terrain.At(1.2, -0.1, 0).height);
+}
+
+TEST(Terrain, AFieldClimbsByHalfAStairALane) {
+  const Terrain terrain = Make("block_field { start: 1 height: 0 tilt: 0 climb: 0.2 rows: 4 }");
+  EXPECT_NEAR(terrain.At(1.2, -0.1, 0).height, 0, 1e-12);
+  EXPECT_NEAR(terrain.At(1.4, 0.1, 0).height, 0.1, 1e-12);
+  EXPECT_NEAR(terrain.At(1.6, -0.1, 0).height, 0.2, 1e-12);
+  EXPECT_NEAR(terrain.At(1.8, 0.1, 0).height, 0.3, 1e-12);
+}
+
+TEST(Terrain, AFieldThatCannotBeIsRefused) {
+  EXPECT_THROW(Make("block_field { rows: 0 }"), ConfigError);
+  EXPECT_THROW(Make("block_field { tilt: 2 }"), ConfigError);
+  EXPECT_THROW(Make("block_field { least_stiffness: 2e5 most_stiffness: 1e3 }"), ConfigError);
 }
 
 }  // namespace

@@ -21,11 +21,9 @@ Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& comma
   // Out by two steps, then none.
   const auto outwards = [&](double rate) { return rate * side > 0 ? 2 * rate * period : 0.0; };
   const Vector2d half(0, 0.5 * side * limits.spacing);
-  const double turn =
-      std::clamp(outwards(command.turn_rate), -limits.most_turn, limits.most_turn);
-  const Vector2d way(
-      std::clamp(period * command.velocity.x(), -limits.longest, limits.longest),
-      std::clamp(outwards(command.velocity.y()), -limits.widest, limits.widest));
+  const double turn = std::clamp(outwards(command.turn_rate), -limits.most_turn, limits.most_turn);
+  const Vector2d way(std::clamp(period * command.velocity.x(), -limits.longest, limits.longest),
+                     std::clamp(outwards(command.velocity.y()), -limits.widest, limits.widest));
   Footstep step;
   step.yaw = stance.yaw + turn;
   // The middle between the feet goes along the mean heading.

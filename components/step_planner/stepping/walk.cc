@@ -11,11 +11,15 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kLongestTick = 0.02;   // s, counted at most for a tick after a gap
-constexpr double kRiseOver = 0.5;       // share of a swing before which no load is a landing
-constexpr double kTogether = 0.03;      // m, rad: the feet stand side by side
+constexpr double kLongestTick = 0.02;  // s, counted at most for a tick after a gap
+constexpr double kRiseOver = 0.5;      // share of a swing before which no load is a landing
+constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
 // Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
 constexpr int kAhead = 3;
+// Time constant, as a share of the settling, with which a foot that touches is let go.
+constexpr double kLetGo = 0.25;
+constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
+constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
 
@@ -71,8 +75,11 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       if (swing_.Progress(time) < kRiseOver) {
         touch_.Reset();
       } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
-        Land(input, state, command);
+        Enter(WalkStage::kTouching, time);
       }
+      break;
+    case WalkStage::kTouching:
+      if (Settled(input)) Land(input, state, command);
       break;
     case WalkStage::kLoading:
       if (time < since_ + spec_.load - kTimeTolerance) break;
@@ -107,14 +114,14 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
   foothold_ = Next(Standing(state, stance_), 1 - stance_);
+  left_over_.setZero();
   Enter(WalkStage::kStarting, input.time);
   // From rest to the capture point and its velocity at lift-off; the centre of pressure is
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
   const CapturePlan::Point lift_off = plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
-  const Vector2d speed =
-      state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
+  const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {
     start_[static_cast<size_t>(i)].Begin({now[i]}, {lift_off.capture_point[i], speed[i], 0},
                                          input.time, spec_.start + spec_.unload);
@@ -135,6 +142,35 @@ void Walk::BeginSwing(const StepInput& input) {
   Enter(WalkStage::kSwinging, input.time);
 }
 
+double Walk::Loaded(const StepInput& input) const {
+  return std::clamp(input.load[static_cast<size_t>(1 - stance_)] / spec_.touch_load, 0.0, 1.0);
+}
+
+bool Walk::Settled(const StepInput& input) const {
+  // Not before the capture point is where both feet are to take it over.
+  const double since = std::max(since_, touch_down_);
+  return input.time >= since + spec_.settle - kTimeTolerance && Loaded(input) >= 1;
+}
+
+void Walk::LetGo(const StepInput& input) {
+  const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(1 - stance_)];
+  const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  const double share = period / (kLetGo * spec_.settle + period);
+  // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
+  const double loaded = Loaded(input);
+  output_.swing.position +=
+      share * Vector3d(1, 1, loaded).cwiseProduct(sole.translation() - output_.swing.position);
+  output_.swing.position.z() -= period * (1 - loaded) * spec_.foot.touch_speed;
+  output_.swing.velocity -= share * output_.swing.velocity;
+  output_.swing.acceleration.setZero();
+  RotationMotion& turn = output_.swing_rotation;
+  turn.rotation = Eigen::Quaterniond(turn.rotation)
+                      .slerp(share, Eigen::Quaterniond(sole.linear()))
+                      .toRotationMatrix();
+  turn.angular_velocity -= share * turn.angular_velocity;
+  turn.angular_acceleration.setZero();
+}
+
 void Walk::Land(const StepInput& input, const StepState& state, const WalkCommand& command) {
   ++num_steps_;
   in_contact_ = {true, true};
@@ -152,7 +188,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
 void Walk::PlanFrom(const StepState& state) {
   const double between = spec_.load + spec_.unload, w = state.pendulum.frequency;
   Footstep stance = Standing(state, stance_);
-  const bool both = !starting_ && stage_ != WalkStage::kSwinging;
+  const bool both = !starting_ && !OnOneFoot();
   plan_.Clear();
   if (final_) {
     const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
@@ -161,7 +197,7 @@ void Walk::PlanFrom(const StepState& state) {
     return;
   }
   if (both) plan_.Append(from_cop_, stance.position, between);
-  plan_.Append(stance.position, stance.position, spec_.swing);
+  plan_.Append(stance.position, stance.position, spec_.single());
   Footstep next = foothold_;
   if (closing_) {
     const Vector2d middle = 0.5 * (stance.position + next.position);
@@ -172,7 +208,7 @@ void Walk::PlanFrom(const StepState& state) {
   int foot = stance_;
   for (int i = 0; i < kAhead; ++i) {
     plan_.Append(stance.position, next.position, between);
-    plan_.Append(next.position, next.position, spec_.swing);
+    plan_.Append(next.position, next.position, spec_.single());
     stance = next;
     next = Next(stance, foot);
     foot = 1 - foot;
@@ -181,8 +217,9 @@ void Walk::PlanFrom(const StepState& state) {
 }
 
 void Walk::Adjust(const StepInput& input, const StepState& state) {
-  const double left = touch_down_ - input.time;
-  if (left <= spec_.foot.freeze) return;
+  // Until the foot carries.
+  const double left = touch_down_ + spec_.settle - input.time;
+  if (swing_.frozen(input.time)) return;
   const auto s = static_cast<size_t>(stance_);
   const double w = state.pendulum.frequency;
   const Vector2d& stance = state.sole[s];
@@ -190,9 +227,9 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   const Vector2d moved = foothold_.position;
   foothold_.position = Next(Standing(state, stance_), 1 - stance_).position;
   PlanFrom(state);
-  const Vector2d planned = plan_.At(spec_.swing).capture_point;
+  const Vector2d planned = plan_.At(spec_.single()).capture_point;
   const Vector2d now = state.pendulum.capture_point();
-  const Vector2d error = now - plan_.At(spec_.swing - left).capture_point;
+  const Vector2d error = now - plan_.At(spec_.single() - left).capture_point;
   const double size = error.norm();
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), choice_.limits().edge, stance, state.sole_yaw[s]);
@@ -208,15 +245,18 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
     }
     return;
   }
+  // A foothold farther by d takes the plan's capture point at touch-down d (1 − e^{−ωB})/(ωB)
+  // farther, for the centre of pressure needs B to get there.
+  const double between = w * (spec_.load + spec_.unload);
+  beyond *= between / (1 - std::exp(-between));
   Vector2d foothold = foothold_.position + beyond / size * error;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const Vector2d com = After(state.pendulum, cop, left).com;
   const balance::ConvexPolygon footholds =
       choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
-  if (footholds.num_corners > 0) {
-    const Vector2d offset = turn.transpose() * (foothold - stance);
-    foothold = stance + turn * balance::NearestPoint(footholds, offset);
-  }
+  if (footholds.num_corners == 0) return;
+  const Vector2d offset = turn.transpose() * (foothold - stance);
+  foothold = stance + turn * balance::NearestPoint(footholds, offset);
   foothold_.position = foothold;
   PlanFrom(state);
   swing_.Move(foothold, input.time, touch_down_);
@@ -227,7 +267,7 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
   const auto s = static_cast<size_t>(stance_), o = 1 - s;
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), edge, state.sole[s], state.sole_yaw[s]);
-  if (stage_ == WalkStage::kSwinging) return sole;
+  if (OnOneFoot()) return sole;
   const balance::ConvexPolygon other =
       SoleAt(choice_.foot(1 - stance_), edge, state.sole[o], state.sole_yaw[o]);
   if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
@@ -250,6 +290,7 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
 
 Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
   const double w = state.pendulum.frequency, time = input.time;
+  const double due = touch_down_ + spec_.settle;
   switch (stage_) {
     case WalkStage::kStarting:
     case WalkStage::kUnloading:
@@ -267,33 +308,49 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
       wanted_ = plan_.At(time - double_since_);
       break;
     case WalkStage::kSwinging:
-      wanted_ = plan_.At(spec_.swing - std::max(touch_down_ - time, 0.0));
+    case WalkStage::kTouching:
+      wanted_ = plan_.At(spec_.single() - std::max(due - time, 0.0));
+      // Later than planned the capture point waits where it is, as far as the sole lets it.
+      wanted_.cop +=
+          balance::SmoothStep((time - due) / kWait) * (wanted_.capture_point - wanted_.cop);
       break;
     case WalkStage::kStanding:
       break;
   }
   const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
-  return balance::NearestPoint(Carrying(input, state), wanted_.cop + (1 + spec_.gain) * error);
+  const balance::ConvexPolygon carrying = Carrying(input, state);
+  const Vector2d asked = balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
+  // A foot that lands at another time than planned makes no step of it.
+  if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
+  const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
+  return balance::NearestPoint(carrying, asked + left * left_over_);
 }
 
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
   const auto s = static_cast<size_t>(stance_);
-  const double ground = input.sole[s].translation().z();
+  // Above the lower foot: a straight leg reaches no farther down.
+  double ground = input.sole[s].translation().z();
+  const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
+  if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
   height_.Follow(ground + standing_height_ - lower, period);
   // The body heads between the feet: where they stand, and where the one in the air will.
-  const bool swings = stage_ == WalkStage::kSwinging;
+  const bool swings = OnOneFoot();
   const double other = swings ? foothold_.yaw : state.sole_yaw[1 - s];
   const double heading = state.sole_yaw[s] + 0.5 * Difference(other, state.sole_yaw[s]);
   const double yaw = body_yaw_.point().position;
   body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
   const Vector2d cop = DesiredCop(input, state);
   output_.cop = cop;
-  output_.com = LeadByCop(input, height_.point(), ground, cop);
+  output_.com = LeadByCop(input, height_.point(), input.sole[s].translation().z(), cop);
   output_.in_contact = in_contact_;
   output_.searching = false;
-  if (swings) FollowSwing(swing_, spec_.foot, spec_.search_depth, input.time, &output_);
+  if (stage_ == WalkStage::kSwinging) {
+    FollowSwing(swing_, spec_.foot, spec_.search_depth, input.time, &output_);
+  } else if (stage_ == WalkStage::kTouching) {
+    LetGo(input);
+  }
   output_.transition = stage_ == WalkStage::kUnloading ? -1 : stage_ == WalkStage::kLoading ? 1 : 0;
   output_.foot = stage_ == WalkStage::kLoading ? stance_ : 1 - stance_;
   const double ramp = stage_ == WalkStage::kUnloading ? spec_.unload : spec_.load;
@@ -310,7 +367,8 @@ void Walk::Archive(StateArchive* archive) {
   body_yaw_.Archive(archive);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_);
-  archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop);
+  archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
+                left_over_);
   for (Quintic& quintic : start_) quintic.Archive(archive);
   output_.Archive(archive);
 }

@@ -18,6 +18,7 @@ struct WalkSpec {
   double start = 0;   ///< s in which the COM leaves the middle for the first stance foot
   double unload = 0;  ///< s of the ramp that unloads a foot
   double swing = 0;   ///< s
+  double settle = 0;  ///< s from a touch until the foot counts as a contact
   double load = 0;    ///< s of the ramp that loads it again
   FootstepLimits step;
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
@@ -31,10 +32,20 @@ struct WalkSpec {
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
 
   /// s from touch-down to touch-down.
-  double period() const { return unload + swing + load; }
+  double period() const { return unload + swing + settle + load; }
+  /// s on one foot.
+  double single() const { return swing + settle; }
 };
 
-enum class WalkStage { kStanding, kStarting, kUnloading, kSwinging, kLoading, kStopping };
+enum class WalkStage {
+  kStanding,
+  kStarting,
+  kUnloading,
+  kSwinging,
+  kTouching,
+  kLoading,
+  kStopping
+};
 
 /// Pure function of its calls; never allocates.
 class Walk {
@@ -52,7 +63,7 @@ class Walk {
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != WalkStage::kStanding; }
   WalkStage stage() const { return stage_; }
-  int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
+  int num_steps() const { return num_steps_; }       ///< feet that have landed, since the start
   int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
   /// Another planner has moved the feet.
   void Stop() { stage_ = WalkStage::kStanding; }
@@ -70,7 +81,16 @@ class Walk {
   void Enter(WalkStage stage, double time);
   void Start(const StepInput& input, const StepState& state, const WalkCommand& command);
   void BeginSwing(const StepInput& input);
+  /// The foot is let go: its reference comes to where the sole stands, so that its task asks for
+  /// nothing when it becomes a contact, and the torque goes on without a step.
+  void LetGo(const StepInput& input);
+  /// Share of the touch's load on the foot that comes down, at most 1.
+  double Loaded(const StepInput& input) const;
+  bool Settled(const StepInput& input) const;
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
+  bool OnOneFoot() const {
+    return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
+  }
   bool AtRest(const StepInput& input, const StepState& state);
   Footstep Standing(const StepState& state, int foot) const;
   Footstep Next(const Footstep& stance, int foot) const;
@@ -94,7 +114,7 @@ class Walk {
   TouchTimer touch_;
   HeightLead height_, body_yaw_;
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
-  double double_since_ = 0, touch_down_ = 0;        // s: both feet down; planned
+  double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
   double standing_height_ = 0;                      // m
   double start_yaw_ = 0;                            // rad
   bool starting_ = false;                           // no foot has left the ground yet
@@ -105,6 +125,7 @@ class Walk {
   std::array<Quintic, 2> start_;                        // of the capture point while starting
   CapturePlan plan_;                                    // made anew in every tick
   CapturePlan::Point wanted_;
+  Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end
   StepOutput output_;
 };
 

@@ -1,0 +1,113 @@
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "components/messages/conversions.h"
+#include "components/robot/robot_model.h"
+#include "logging/metrics/contact_history.h"
+#include "logging/metrics/metric_groups.h"
+
+namespace poise::logging {
+namespace {
+
+using Eigen::Vector2d;
+
+bool Walks(const support_plan_t& plan) {
+  return plan.stepping != support_plan_t::STEPPING_NONE &&
+         plan.step_reason == support_plan_t::REASON_WALK;
+}
+
+/// From a foot's landing to its next: two steps.
+struct Stride {
+  Vector2d way = Vector2d::Zero();        ///< m, of the true COM, world
+  Vector2d commanded = Vector2d::Zero();  ///< m, the same as commanded along the true heading
+  double duration = 0;                    ///< s
+};
+
+double Heading(const ground_truth_t& truth) {
+  const double* q = truth.base_orientation;
+  const Eigen::Vector3d ahead =
+      Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Eigen::Vector3d::UnitX();
+  return std::atan2(ahead.y(), ahead.x());
+}
+
+std::vector<Stride> Strides(const RunRecord& run) {
+  std::vector<int64_t> landings;
+  for (int64_t t = run.first_tick + 1; t < run.num_ticks; ++t) {
+    const support_plan_t *before = run.plan.at(t - 1), *plan = run.plan.at(t);
+    if (before == nullptr || plan == nullptr || !Walks(*plan)) continue;
+    if (plan->stepping == support_plan_t::STEPPING_LOADING && before->stepping != plan->stepping) {
+      landings.push_back(t);
+    }
+  }
+  std::vector<Stride> strides;
+  for (size_t i = 0; i + 2 < landings.size(); i += 2) {
+    const int64_t begin = landings[i], end = landings[i + 2];
+    const ground_truth_t *from = run.truth.at(begin), *to = run.truth.at(end);
+    if (from == nullptr || to == nullptr) continue;
+    Stride stride;
+    stride.way = (GetVector3(to->com_position) - GetVector3(from->com_position)).head<2>();
+    stride.duration = run.duration(end - begin);
+    for (int64_t t = begin; t < end; ++t) {
+      const support_plan_t* plan = run.plan.at(t);
+      const ground_truth_t* truth = run.truth.at(t);
+      if (plan == nullptr || truth == nullptr) continue;
+      const Vector2d velocity(plan->walk_velocity[0], plan->walk_velocity[1]);
+      stride.commanded += run.duration(1) * (Eigen::Rotation2Dd(Heading(*truth)) * velocity);
+    }
+    strides.push_back(stride);
+  }
+  return strides;
+}
+
+/// Sum over the strides' ways, m; empty when there is none.
+Answer Way(const RunRecord& run) {
+  Answer way;
+  for (const Stride& stride : Strides(run)) way = way.value_or(0) + stride.way.norm();
+  return way;
+}
+
+Answer CostOfTransport(const RunRecord& run) {
+  const Answer way = Way(run);
+  if (!way || !(*way > 0)) return {};
+  double work = 0;
+  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+    const support_plan_t* plan = run.plan.at(t);
+    const ground_truth_t* truth = run.truth.at(t);
+    if (plan == nullptr || truth == nullptr || !Walks(*plan)) continue;
+    for (size_t j = 0; j < truth->joint_torque.size(); ++j) {
+      work += run.duration(1) * std::max(0.0, truth->joint_torque[j] * truth->joint_velocity[j]);
+    }
+  }
+  return work / (run.robot.total_mass() * robot::kGravity * *way);
+}
+
+}  // namespace
+
+void AddWalking(MetricList* list) {
+  list->push_back({"walk_speed_max", "m/s", "walking, fastest mean of two steps",
+                   [](const RunRecord& run) -> Answer {
+                     Answer fastest;
+                     for (const Stride& stride : Strides(run)) {
+                       const double speed = stride.way.norm() / stride.duration;
+                       fastest = std::max(fastest.value_or(0), speed);
+                     }
+                     return fastest;
+                   }});
+  list->push_back(
+      {"walk_velocity_error_rms", "mm/s",
+       "walking, mean velocity of two steps less the commanded one, RMS", [](const RunRecord& run) {
+         MeanSquare square;
+         for (const Stride& stride : Strides(run)) {
+           square.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
+         }
+         return Scaled(square.Root(), kMilli);
+       }});
+  list->push_back({"walk_way", "m", "walking, way of the COM from step to step", Way});
+  list->push_back({"walk_cost_of_transport", "",
+                   "walking, positive work of the joints over weight and way", CostOfTransport});
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,45 @@
+// A walk from start to stop in both engines, and its replay.
+#include <gtest/gtest.h>
+
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+double Measured(const nlohmann::json& summary, const std::string& name) {
+  for (const nlohmann::json& check : summary["checks"]) {
+    if (check["name"] == name) return check["measured"].get<double>();
+  }
+  ADD_FAILURE() << "no check " << name;
+  return 0;
+}
+
+/// Ten steps of 0.1 m and the one beside it.
+const std::vector<std::string> kTenSteps = {"--set",      "step_planner.walk.command[1].time=11",
+                                            "--set",      "step_planner.walk.command[1].stop=true",
+                                            "--set",      "step_planner.walk.command[2].stop=true",
+                                            "--duration", "17"};
+
+TEST(WalkRun, TenStepsAndAStopInEachEngine) {
+  for (const std::string engine : {"mujoco", "ode"}) {
+    const RunFolder folder;
+    std::vector<std::string> arguments = {"run",  "walk",  "--inline",    "--world",
+                                          engine, "--out", folder / "run"};
+    arguments.insert(arguments.end(), kTenSteps.begin(), kTenSteps.end());
+    const ProgramResult result = RunPoise(arguments);
+    EXPECT_EQ(result.exit_code, 0) << engine << result.output;
+    const nlohmann::json summary = ReadSummary(folder / "run");
+    EXPECT_EQ(Measured(summary, "fallen"), 0) << engine;
+    EXPECT_EQ(Measured(summary, "violated_ticks"), 0) << engine;
+    EXPECT_GE(Measured(summary, "steps"), 9) << engine;
+    EXPECT_LE(Measured(summary, "steps"), 12) << engine;
+    // Eight of the strides' steps at least, 0.1 m each.
+    EXPECT_GT(Measured(summary, "walk_way"), 0.6) << engine;
+    if (engine == "ode") continue;
+    const ProgramResult replay = RunPoise({"replay", folder / "run"});
+    EXPECT_EQ(replay.exit_code, 0) << replay.output;
+  }
+}
+
+}  // namespace
+}  // namespace poise
