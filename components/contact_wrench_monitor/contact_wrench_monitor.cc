@@ -68,19 +68,10 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   const double margin = HullMargin(*model_);
   double_support_ = ReadLimits(WithinSoles(double_support, *model_, margin), "double_support");
   single_support_ = ReadLimits(WithinSoles(single_support, *model_, margin), "single_support");
-  sole_margin_ = ReadNotNegative(config.has_sole_margin() ? config.sole_margin() : margin,
-                                 "sole_margin", "must be m, 0 or more");
-  for (const robot::FootModel& foot : model_->feet()) {
-    if (sole_margin_ >= robot::InnerRadius(foot)) {
-      throw ConfigError("sole_margin",
-                        fmt::format("is {} m and leaves nothing of the {} foot's "
-                                    "sole, {} x {} m",
-                                    sole_margin_, foot.name, foot.length, foot.width));
-    }
-  }
-  for (size_t f = 0; f < 2; ++f) {
-    sole_[f] = balance::SolePolygon(model_->feet()[f], sole_margin_);
-  }
+  // One foot needs no reserve for what the other one carries.
+  const bool given = config.has_sole_margin();
+  CutSoles(given ? config.sole_margin() : SoleMargin(*model_), &sole_);
+  CutSoles(given ? config.sole_margin() : margin, &shared_sole_);
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -368,9 +359,25 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
+void ContactWrenchMonitor::CutSoles(double margin,
+                                    std::array<balance::ConvexPolygon, 2>* soles) const {
+  ReadNotNegative(margin, "sole_margin", "must be m, 0 or more");
+  for (size_t f = 0; f < 2; ++f) {
+    const robot::FootModel& foot = model_->feet()[f];
+    if (margin >= robot::InnerRadius(foot)) {
+      throw ConfigError("sole_margin", fmt::format("is {} m and leaves nothing of the {} foot's "
+                                                   "sole, {} x {} m",
+                                                   margin, foot.name, foot.length, foot.width));
+    }
+    (*soles)[f] = balance::SolePolygon(foot, margin);
+  }
+}
+
 balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
-  return balance::WithFewerCorners(balance::SupportPolygon(frame_o, whole_body_->geometry(), sole_),
-                                   kMostCorners);
+  const balance::ContactGeometry& geometry = whole_body_->geometry();
+  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  return balance::WithFewerCorners(
+      balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {

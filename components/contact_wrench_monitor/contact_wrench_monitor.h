@@ -59,7 +59,9 @@ class ContactWrenchMonitor : public Component {
   bool MoveForStep(const balance::ContactGeometry& geometry, const Bounds& bounds,
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
-  /// The hull of the soles in contact, sole_margin_ off their edges.
+  /// Both soles less `margin` (m) on every side. ConfigError: nothing is left.
+  void CutSoles(double margin, std::array<balance::ConvexPolygon, 2>* soles) const;
+  /// The hull of the soles in contact, less the margin.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
   /// says of the tick before.
@@ -93,8 +95,8 @@ class ContactWrenchMonitor : public Component {
   balance::ContactLimits double_support_, single_support_;
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull
-  double sole_margin_ = 0;              // m
-  std::array<balance::ConvexPolygon, 2> sole_;  // less sole_margin_, m, sole frames
+  // Less the margin, m, sole frames: alone on the ground, and with the other foot.
+  std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none

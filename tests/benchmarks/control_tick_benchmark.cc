@@ -137,9 +137,8 @@ void Split(benchmark::State& state, const std::string& robot, bool both, const c
   }
 }
 
-constexpr const char* kAnchoredFeet = "";
-constexpr const char* kInvariantEkf =
-    "method: INVARIANT_EKF invariant_ekf { sensor_delay: 0.002 gear_stiffness: 7e4 }";
+constexpr const char* kAnchoredFeet = "method: ANCHORED_FEET";
+constexpr const char* kInvariantEkf = "method: INVARIANT_EKF";  // delay and gears: the robot's
 
 void Register(const std::string& name, const std::string& robot) {
   for (const bool split : {false, true}) {
@@ -166,6 +165,7 @@ void Register(const std::string& name, const std::string& robot) {
 int main(int argc, char** argv) {
   poise::Register("dyros", poise::robot::RobotPath(poise::robot::TestRobot::kDyros));
   poise::Register("mantis", poise::robot::RobotPath(poise::robot::TestRobot::kMantis));
+  poise::Register("heron", POISE_SOURCE_DIR "/deploy/robots/heron/heron.pbtxt");
   int left = 1;
   for (int i = 1; i < argc; ++i) {
     if (std::string_view(argv[i]) == "--robot" && i + 1 < argc) {
