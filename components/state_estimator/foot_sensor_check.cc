@@ -3,6 +3,13 @@
 #include <Eigen/Cholesky>
 
 namespace poise {
+namespace {
+
+// s: no sensor with noise reads the same six numbers for so long, whatever they are. Zero is what a
+// good one without noise reads in the air.
+constexpr double kStuckTime = 0.1;
+
+}  // namespace
 
 void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
   said_ = said;
@@ -25,7 +32,8 @@ void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covarian
   difference_ = difference;
   // What does not change by a bit has no noise: a little disagreement is then enough.
   const bool same = same_time_ >= settings_.frozen_time;
-  const bool wrong = difference > (same ? settings_.frozen_gate : settings_.gate);
+  const bool stuck = same_time_ >= kStuckTime && noise.minCoeff() > 0 && !measured_.isZero(0);
+  const bool wrong = stuck || difference > (same ? settings_.frozen_gate : settings_.gate);
   wrong_time_ = wrong ? wrong_time_ + dt : 0;
   right_time_ = !same && difference < settings_.agree_gate ? right_time_ + dt : 0;
   if (state_ == State::kOk) {

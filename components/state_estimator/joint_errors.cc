@@ -32,8 +32,8 @@ void JointErrors::Age(double dt) {
   for (Joint& joint : joint_) joint.age += dt;
 }
 
-void JointErrors::Learn(size_t joint, const Torques& torques, double residual, bool pressed,
-                        double dt) {
+void JointErrors::Learn(size_t joint, const Torques& torques, double residual, double variance,
+                        bool pressed, double dt) {
   Joint& j = joint_[joint];
   j.learnt = std::min(j.learnt + dt, kLearnTime);
   j.age = 0;
@@ -41,21 +41,32 @@ void JointErrors::Learn(size_t joint, const Torques& torques, double residual, b
   const double part = std::min(dt / (pressed ? kPressedLearnTime : j.learnt), 1.0);
   j.mean += part * (residual - j.mean);
   j.spread += part * (Square(residual - j.mean) - j.spread);
+  j.offset += part * (Offset(torques, variance) - j.offset);
   for (size_t i = 0; i < torques.size(); ++i) j.torques[i] += part * (torques[i] - j.torques[i]);
 }
 
+// The part of a row's variance that is no share of its torques: friction on its way over.
+double JointErrors::Offset(const Torques& torques, double variance) const {
+  for (size_t i = 0; i < torques.size(); ++i) variance -= Square(share_[i] * torques[i]);
+  return std::max(variance, 0.0);
+}
+
+// The conditional mean and variance of one normal number, given another that was seen.
 JointErrors::Corrected JointErrors::Correct(size_t joint, const Torques& torques,
                                             double variance) const {
   const Joint& j = joint_[joint];
   if (!(j.learnt > 0)) return {0, variance};
-  double changed = j.spread;
+  double seen = j.offset;
+  double common = std::min(Offset(torques, variance), j.offset);
+  common = std::max(common - Square(share_[0] * (torques[0] - j.torques[0])), 0.0);
   for (size_t i = 0; i < torques.size(); ++i) {
-    changed += Square(share_[i] * (torques[i] - j.torques[i]));
+    const double then = j.torques[i];
+    seen += Square(share_[i] * then);
+    // Less than a share's own covariance is cautious: nothing is magnified, nor its sign changed.
+    common += Square(share_[i]) * std::clamp(torques[i] * then, 0.0, then * then);
   }
-  changed += variance * (kCorrelationTime / j.learnt + j.age / kForgetTime);
-  // Two estimates of one error: what was learnt, and zero.
-  const double weight = variance / (variance + changed);
-  return {weight * j.mean, weight * changed};
+  seen += j.spread + variance * (kCorrelationTime / j.learnt + j.age / kForgetTime);
+  return {common / seen * j.mean, variance - common * common / seen};
 }
 
 bool FreeFoot::Update(double speed, double excess, double press, double dt) {

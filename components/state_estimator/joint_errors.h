@@ -11,9 +11,9 @@
 namespace poise {
 
 /// A free foot carries nothing: what its leg's rows say it carries is their error. Its average is
-/// taken off. It stays right as long as what makes it stays the same: what the joint's friction,
-/// its motor's torque and the model's demand have changed by since, each times the share by which
-/// it may be wrong, adds to the row's variance, and so does the time that goes by.
+/// taken off as far as the row's error is still the same: shares of friction, motor torque and the
+/// model's demand, each normal and independent, of which as much is known as these have in common
+/// with what they were; and less as time goes by.
 class JointErrors {
  public:
   /// N·m: (friction, motor torque, what the motion asks for by the model).
@@ -31,16 +31,19 @@ class JointErrors {
   /// From here on anew for this joint: its foot has been lifted.
   void Begin(size_t joint) { joint_[joint] = {}; }
   /// A reading of a free leg's joint, `dt` s after the last: its row's torque that no foot carries,
-  /// N·m. `pressed`: the ground
-  /// may have part in it, so that it counts little.
-  void Learn(size_t joint, const Torques& torques, double residual, bool pressed, double dt);
+  /// N·m; and the row's `variance`,
+  /// (N·m)². `pressed`: the ground may have part in it, so that it counts little.
+  void Learn(size_t joint, const Torques& torques, double residual, double variance, bool pressed,
+             double dt);
   /// What is known by now of the error of a row whose variance was `variance`, (N·m)², before.
   Corrected Correct(size_t joint, const Torques& torques, double variance) const;
   void Archive(StateArchive* archive) { archive->Show(joint_); }
 
  private:
+  double Offset(const Torques& torques, double variance) const;
   struct Joint {
     double mean = 0, spread = 0;  // N·m, (N·m)², of the residual
+    double offset = 0;            // (N·m)², of Offset
     Torques torques{};            // N·m, averaged alike
     double learnt = 0, age = 0;   // s, that the average covers, since then
   };

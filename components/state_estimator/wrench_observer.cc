@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "components/state_estimator/lie_group.h"
 
@@ -20,8 +21,12 @@ constexpr double kMaxPosition = 1e3, kMaxRate = 100, kMaxForce = 1e3, kMaxTorque
 constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts anew
 // Before any row: no foot carries more, shares of the weight, and of the weight at a metre.
 constexpr double kPriorForce = 2, kPriorMoment = 0.3;
-// (N·m)², of a joint's row at least: what encoder steps leave of its acceleration.
+// (N·m)², of a joint's row at least, beside what encoder steps leave of the rotor's acceleration.
 constexpr double kLeastVariance = 0.01;
+// s, over which what a free foot seems to carry is compared with its deviation, and for which that
+// holds when it is no longer free; and while it may be pressed.
+constexpr double kFitTime = 1, kPressedFitTime = 5;
+constexpr double kLeastFit = 0.1;  // a third of the deviation
 // s, over which the wrenches' rate of change is averaged.
 constexpr double kRateTime = 0.02;
 
@@ -57,11 +62,19 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
   errors_ = JointErrors(leg_joints_.size(),
                         {settings_.friction_error, settings_.torque_error, settings_.mass_error});
   torques_.assign(leg_joints_.size(), {});
-  residual_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
-  bristle_ = bristle_error_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
+  residual_ = variance_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
+  noise_ = bristle_ = bristle_error_ =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
   for (size_t k = 0; k < leg_joints_.size(); ++k) {
-    bristle_error_[static_cast<Eigen::Index>(k)] =
-        model_->motors()[static_cast<size_t>(leg_joints_[k])].static_friction / std::sqrt(3.0);
+    const auto i = static_cast<Eigen::Index>(k);
+    const robot::MotorModel& motor = model_->motors()[static_cast<size_t>(leg_joints_[k])];
+    bristle_error_[i] = motor.static_friction / std::sqrt(3.0);
+    // White noise passes to the low-pass's second derivative with ω², times 0.8 to 1.
+    const double count = 2 * std::numbers::pi / (motor.gear_ratio * motor.encoder_counts);
+    const double acceleration =
+        Square(2 * std::numbers::pi * settings.cutoff) * count / std::sqrt(12.0);
+    noise_[i] = kLeastVariance;
+    if (std::isfinite(acceleration)) noise_[i] += Square(motor.reflected_inertia * acceleration);
   }
   sole_position_.fill(Vector3d::Zero());
   sole_rotation_.fill(Matrix3d::Identity());
@@ -213,13 +226,15 @@ void WrenchObserver::AddJointRows() {
     double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
                       Square(settings_.friction_error * motor.viscous_friction * speed) +
                       Square(settings_.torque_error * torque) +
-                      Square(settings_.mass_error * joint_torque_[joint]) + kLeastVariance;
+                      Square(settings_.mass_error * joint_torque_[joint]) +
+                      noise_[static_cast<Eigen::Index>(k)];
     double known = torque - friction - joint_torque_[joint];
     torques_[k] = {held, torque, joint_torque_[joint]};
     residual_[static_cast<Eigen::Index>(k)] = known;
+    variance_[static_cast<Eigen::Index>(k)] = variance;
     const JointErrors::Corrected corrected = errors_.Correct(k, torques_[k], variance);
     known -= corrected.error;
-    variance = std::max(corrected.variance, kLeastVariance);
+    variance = std::max(corrected.variance, noise_[static_cast<Eigen::Index>(k)]);
     std::array<robot::Vector6d, 2> row;
     for (size_t f = 0; f < 2; ++f) {
       if (!supports_[k][f]) continue;
@@ -293,13 +308,21 @@ void WrenchObserver::Learn(double dt) {
     const robot::Vector6d wrench = estimate_.segment<6>(at);
     const Matrix6 spread = spread_.block<6, 6>(at, at);
     const double excess = wrench.dot(spread.llt().solve(wrench));
-    const double press = -wrench[2] / std::sqrt(std::max(spread(2, 2), kLeastVariance));
+    const double load = -wrench[2] / std::sqrt(std::max(spread(2, 2), kLeastVariance));
+    const double press = load / std::sqrt(fit_[f]);
     const bool begins = free_foot_[f].Update(speed, excess, press, dt);
-    if (!free_foot_[f].free()) continue;
+    const bool pressed = press > 1;
+    if (!free_foot_[f].free() || begins) {
+      fit_[f] += begins ? 1 - fit_[f] : std::min(dt / kFitTime, 1.0) * (1 - fit_[f]);
+      if (!begins) continue;
+    }
+    const double size = std::clamp(Square(load), kLeastFit, 1.0);
+    fit_[f] += std::min(dt / (pressed ? kPressedFitTime : kFitTime), 1.0) * (size - fit_[f]);
     for (size_t k = 0; k < leg_joints_.size(); ++k) {
       if (!supports_[k][f] || supports_[k][1 - f]) continue;
       if (begins) errors_.Begin(k);
-      errors_.Learn(k, torques_[k], residual_[static_cast<Eigen::Index>(k)], press > 1, dt);
+      errors_.Learn(k, torques_[k], residual_[static_cast<Eigen::Index>(k)],
+                    variance_[static_cast<Eigen::Index>(k)], pressed, dt);
     }
   }
 }
@@ -331,6 +354,9 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   observed_ = true;
   wrenches_ = estimate_;
   covariance_ = settled_covariance_ = spread_;
+  for (Eigen::Index f = 0; f < 2; ++f) {
+    settled_covariance_.block<6, 6>(6 * f, 6 * f) *= fit_[static_cast<size_t>(f)];
+  }
   const Wrenches late = settings_.latency * rate_;
   covariance_.noalias() += late * late.transpose();
   return true;
@@ -340,7 +366,7 @@ void WrenchObserver::Archive(StateArchive* archive) {
   filter_.Archive(archive);
   archive->Show(input_, bristle_, bristle_error_, wrenches_, rate_, push_excess_, since_,
                 torque_known_, started_, observed_);
-  archive->Show(covariance_, settled_covariance_, between_);
+  archive->Show(covariance_, settled_covariance_, between_, fit_);
   errors_.Archive(archive);
   for (FreeFoot& foot : free_foot_) foot.Archive(archive);
 }

@@ -60,7 +60,8 @@ class WrenchObserver {
   /// Robot on environment, each in its sole's frame, N and N·m.
   const Wrenches& wrenches() const { return wrenches_; }
   const Covariance& covariance() const { return covariance_; }
-  /// The same without what the low-pass lags behind: of wrenches that do not change.
+  /// The same without what the low-pass lags behind, of wrenches that do not change; and of a foot
+  /// that hangs free, or did a moment ago, as small as what it seemed to carry.
   const Covariance& settled_covariance() const { return settled_covariance_; }
   /// Whether the foot was seen to hang free at the last Observe that learns.
   bool free(size_t foot) const { return free_foot_[foot].free(); }
@@ -115,10 +116,13 @@ class WrenchObserver {
   // when it sticks, until it is bent back; and its standard deviation, before it has slipped for
   // the first time anything up to break-away.
   Eigen::VectorXd bristle_, bristle_error_;
-  JointErrors errors_;                         // by leg joint
+  Eigen::VectorXd noise_;  // (N·m)², by leg joint: the row's variance at least
+  JointErrors errors_;     // by leg joint
   std::vector<JointErrors::Torques> torques_;  // by leg joint, of this Observe
-  Eigen::VectorXd residual_;                   // N·m, by leg joint, of this Observe
+  Eigen::VectorXd residual_, variance_;        // N·m, (N·m)², by leg joint, of this Observe
   std::array<FreeFoot, 2> free_foot_;
+  // Square of what a free foot seems to carry over its variance, at most 1.
+  std::array<double, 2> fit_ = {1, 1};
   Eigen::Vector3d between_ = Eigen::Vector3d::Zero();  // m, from right to left sole, right's axes
   double push_excess_ = 0;
   double since_ = 0;  // s, since the last Observe
