@@ -74,9 +74,10 @@ Mimic ReadMimic(const TiXmlElement& mimic, const std::string& joint) {
 
 std::vector<std::string> CheckJoints(TiXmlElement* robot,
                                      const std::map<std::string, int>& link_line,
+                                     std::map<std::string, int>* joint_lines,
                                      std::map<std::string, Mimic>* mimics) {
   std::vector<std::string> order;
-  std::map<std::string, int> joint_line;
+  std::map<std::string, int>& joint_line = *joint_lines;
   std::map<std::string, std::string> parent_joint;
   for (TiXmlElement* joint = robot->FirstChildElement("joint"); joint;
        joint = joint->NextSiblingElement("joint")) {
@@ -201,7 +202,26 @@ class CapturedConsole : public console_bridge::OutputHandler {
   console_bridge::LogLevel level_;
 };
 
+// " line 12" of the link or joint that urdfdom names in brackets; empty when it names none.
+std::string LineOf(const std::string& text, const std::map<std::string, int>& link_line,
+                   const std::map<std::string, int>& joint_line) {
+  for (size_t open = text.find('['); open != std::string::npos; open = text.find('[', open + 1)) {
+    const size_t close = text.find(']', open);
+    if (close == std::string::npos) break;
+    const std::string name = text.substr(open + 1, close - open - 1);
+    const bool joint_first = std::string_view(text).substr(0, open).ends_with("oint ");
+    for (const auto* lines :
+         {joint_first ? &joint_line : &link_line, joint_first ? &link_line : &joint_line}) {
+      const auto line = lines->find(name);
+      if (line != lines->end()) return fmt::format(" line {}", line->second);
+    }
+  }
+  return "";
+}
+
 urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& xml,
+                                               const std::map<std::string, int>& link_line,
+                                               const std::map<std::string, int>& joint_line,
                                                std::vector<std::string>* warnings) {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
@@ -219,7 +239,8 @@ urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& xml,
     for (const std::string& error : console.errors) {
       if (text.size() < 300) text += (text.empty() ? "" : "; ") + error;
     }
-    throw RobotError(fmt::format("URDF: {}: correct that element",
+    throw RobotError(fmt::format("URDF{}: {}: correct that element",
+                                 LineOf(text, link_line, joint_line),
                                  text.empty() ? "refused by urdfdom" : OneLine(text)));
   }
   if (warnings) {
@@ -237,16 +258,16 @@ UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings)
   if (!robot) throw RobotError("URDF has no <robot> element: is it a URDF (xacro expanded)?");
 
   UrdfDocument result;
-  std::map<std::string, int> link_line;
+  std::map<std::string, int> link_line, joint_line;
   CheckLinks(robot, &link_line);
-  result.joint_order = CheckJoints(robot, link_line, &result.mimics);
+  result.joint_order = CheckJoints(robot, link_line, &joint_line, &result.mimics);
   CheckConnected(link_line, robot);
   RemoveForeign(robot);
   Strip(robot);
 
   TiXmlPrinter printer;
   robot->Accept(&printer);
-  result.model = ParseWithUrdfdom(printer.CStr(), warnings);
+  result.model = ParseWithUrdfdom(printer.CStr(), link_line, joint_line, warnings);
   return result;
 }
 

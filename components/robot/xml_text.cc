@@ -15,9 +15,13 @@ namespace {
 constexpr int kMaxNesting = 64;
 constexpr size_t kMaxBytes = 16u << 20;
 
-// Depth of open elements, before any parser sees the text.
-int Nesting(std::string_view xml) {
-  int depth = 0, deepest = 0;
+auto LineAt(std::string_view xml, size_t offset) {
+  return 1 + std::ranges::count(xml.substr(0, offset), '\n');
+}
+
+// Where elements are open too deep, before any parser sees the text; npos: nowhere.
+size_t TooDeep(std::string_view xml) {
+  int depth = 0;
   for (size_t i = xml.find('<'); i != std::string_view::npos; i = xml.find('<', i + 1)) {
     const std::string_view rest = xml.substr(i + 1);
     if (rest.starts_with("!--")) {
@@ -28,12 +32,10 @@ int Nesting(std::string_view xml) {
     } else if (!rest.empty() && (std::isalpha(static_cast<unsigned char>(rest[0])) ||
                                  rest[0] == '_' || static_cast<unsigned char>(rest[0]) >= 0x80)) {
       const size_t end = xml.find('>', i);
-      if (end == std::string_view::npos || xml[end - 1] != '/') {
-        deepest = std::max(deepest, ++depth);
-      }
+      if ((end == std::string_view::npos || xml[end - 1] != '/') && ++depth > kMaxNesting) return i;
     }
   }
-  return deepest;
+  return std::string_view::npos;
 }
 
 }  // namespace
@@ -58,11 +60,12 @@ void ParseXml(std::string_view xml, const char* format, TiXmlDocument* document)
   }
   if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
     throw RobotError(
-        fmt::format("{} has a NUL byte at offset {}: is it a text file?", format, nul));
+        fmt::format("{} line {} has a NUL byte: is it a text file?", format, LineAt(xml, nul)));
   }
-  if (Nesting(xml) > kMaxNesting) {
-    throw RobotError(fmt::format("{} nests elements more than {} deep: is an element not closed?",
-                                 format, kMaxNesting));
+  if (const size_t at = TooDeep(xml); at != std::string_view::npos) {
+    throw RobotError(
+        fmt::format("{} line {} nests elements more than {} deep: is an element not closed?",
+                    format, LineAt(xml, at), kMaxNesting));
   }
   document->Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document->Error()) {

@@ -4,57 +4,17 @@
 #include <tinyxml.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <cstdlib>
 #include <functional>
 
 #include "components/robot/robot_model.h"
 #include "components/robot/xml_text.h"
+#include "components/robot_files/mjcf_attributes.h"
 
 namespace poise::robot {
 namespace {
 
-using Names = std::vector<std::string_view>;
-
 constexpr size_t kMaxElements = 20000;
-constexpr double kMaxNumber = 1e6;  // in any unit that the file may use: beyond it, a mistake
-
-const Names kOrientation = {"quat", "axisangle", "xyaxes", "zaxis", "euler"};
-const Names kActuators = {"general",     "motor",  "position", "velocity",
-                          "intvelocity", "damper", "cylinder"};
-
-// Numeric attributes that reach MuJoCo, by element.
-const std::map<std::string_view, Names> kNumbers = {
-    {"joint", {"axis", "pos", "range", "ref", "armature", "damping", "frictionloss"}},
-    {"geom", {"size", "pos", "fromto", "mass", "density", "contype", "conaffinity", "group"}},
-    {"site", {"pos"}},
-    {"body", {"pos"}},
-    {"inertial", {"pos"}},
-    {"actuator", {"gear", "ctrlrange", "forcerange"}},
-    {"compiler", {"inertiagrouprange"}},
-};
-// Those whose value is one of a few words.
-const std::map<std::string_view, Names> kWords = {
-    {"type",
-     {"hinge", "slide", "ball", "free", "box", "sphere", "cylinder", "capsule", "ellipsoid"}},
-    {"limited", {"true", "false", "auto"}},
-    {"ctrllimited", {"true", "false", "auto"}},
-    {"forcelimited", {"true", "false", "auto"}},
-    {"angle", {"degree", "radian"}},
-    {"inertiafromgeom", {"true", "false", "auto"}},
-    {"autolimits", {"true", "false"}},
-};
-const std::map<std::string_view, Names> kWordsOf = {
-    {"joint", {"type", "limited"}},
-    {"geom", {"type"}},
-    {"actuator", {"ctrllimited", "forcelimited"}},
-    {"compiler", {"angle", "inertiafromgeom", "autolimits"}},
-};
-
-bool Has(const Names& names, std::string_view name) {
-  return std::ranges::find(names, name) != names.end();
-}
 
 // A class of defaults: what the reader itself must resolve.
 struct DefaultClass {
@@ -69,15 +29,19 @@ class Cleaner {
 
   void Clean(const TiXmlElement& root) {
     if (root.ValueStr() != "mujoco") {
-      Fail(root, "<{}> is no MJCF: its outermost element must be <mujoco>", Shown(root.Value()));
+      FailMjcf(root, "<{}> is no MJCF: its outermost element must be <mujoco>", Shown(root));
+    }
+    if (const TiXmlElement* const e = root.FirstChildElement("include")) {
+      FailMjcf(*e, "<include file='{}'> is not followed: import that file, if it has the robot",
+               Attribute(*e, "file"));
     }
     result_.model = Attribute(root, "model");
     Sections(root, "compiler", [&](const TiXmlElement& e) { Compiler(e); });
-    Sections(root, "asset", [&](const TiXmlElement& e) { Assets(e); });
     std::string xml = "<mujoco><compiler autolimits='true'" + compiler_ +
                       " balanceinertia='true' boundmass='1e-9' boundinertia='1e-12'/>"
                       "<size njmax='1' nconmax='1'/>";
     Sections(root, "default", [&](const TiXmlElement& e) { Defaults(e, "", &xml); });
+    Sections(root, "asset", [&](const TiXmlElement& e) { Assets(e); });
     const TiXmlElement& robot = RobotBody(root);
     xml += "<worldbody>";
     Body(robot, -1, "", &xml);
@@ -90,7 +54,6 @@ class Cleaner {
     Sections(root, "keyframe", [&](const TiXmlElement& e) { Keys(e); });
     for (const TiXmlElement* e = root.FirstChildElement(); e; e = e->NextSiblingElement()) {
       const std::string& name = e->ValueStr();
-      if (name == "include") Fail(*e, "<include> is not followed: give the file that it names");
       if (name == "tendon" || name == "extension" || name == "deformable") {
         Note(*e, "<{}> is left out", name);
       }
@@ -98,15 +61,6 @@ class Cleaner {
   }
 
  private:
-  static std::string Shown(const char* text) { return OneLine(text ? text : ""); }
-
-  template <typename... Args>
-  [[noreturn]] void Fail(const TiXmlElement& at, fmt::format_string<Args...> text,
-                         Args&&... args) const {
-    throw RobotError(
-        fmt::format("MJCF line {}: {}", at.Row(), fmt::format(text, std::forward<Args>(args)...)));
-  }
-
   template <typename... Args>
   void Note(const TiXmlElement& at, fmt::format_string<Args...> text, Args&&... args) {
     if (warnings_ == nullptr) return;
@@ -121,96 +75,34 @@ class Cleaner {
     }
   }
 
-  // The numbers of an attribute, all finite.
-  std::vector<double> Numbers(const TiXmlElement& element, std::string_view name) const {
-    std::vector<double> numbers;
-    const char* text = element.Attribute(std::string(name).c_str());
-    while (text != nullptr) {
-      while (std::isspace(static_cast<unsigned char>(*text))) ++text;
-      if (*text == '\0') break;
-      char* end = nullptr;
-      const double number = std::strtod(text, &end);
-      if (end == text || !std::isfinite(number) || std::abs(number) > kMaxNumber ||
-          (*end != '\0' && !std::isspace(static_cast<unsigned char>(*end)))) {
-        Fail(element, "{} of <{}> is '{}': numbers of at most {:g} must stand there", name,
-             Shown(element.Value()), Shown(element.Attribute(std::string(name).c_str())),
-             kMaxNumber);
-      }
-      numbers.push_back(number);
-      text = end;
-    }
-    return numbers;
-  }
-
-  template <size_t n>
-  std::array<double, n> Exactly(const TiXmlElement& element, const char* name) const {
-    const std::vector<double> numbers = Numbers(element, name);
-    if (numbers.size() != n) {
-      Fail(element, "{} of <{}> has {} numbers, it needs {}", name, Shown(element.Value()),
-           numbers.size(), n);
-    }
-    std::array<double, n> result;
-    std::ranges::copy(numbers, result.begin());
-    return result;
-  }
-
-  // What MuJoCo is to see of an element of this kind.
-  std::string Kept(const TiXmlElement& element, std::string_view kind) const {
-    std::string text;
-    const auto keep = [&](std::string_view name) {
-      const std::vector<double> numbers = Numbers(element, name);
-      if (numbers.empty()) return;
-      text += fmt::format(" {}='", name);
-      for (const double number : numbers) text += fmt::format("{:.17g} ", number);
-      text.back() = '\'';
-    };
-    for (const std::string_view name : kNumbers.at(kind)) keep(name);
-    if (kind != "joint" && kind != "actuator" && kind != "compiler") {
-      for (const std::string_view name : kOrientation) keep(name);
-    }
-    if (const auto words = kWordsOf.find(kind); words != kWordsOf.end()) {
-      for (const std::string_view name : words->second) {
-        const std::string value = Attribute(element, std::string(name).c_str());
-        if (value.empty()) continue;
-        if (!Has(kWords.at(name), value)) {
-          // Types that MuJoCo need not see are told by the reader.
-          if (kind == "geom") continue;
-          Fail(element, "{} of <{}> is '{}': it is unknown", name, Shown(element.Value()), value);
-        }
-        text += fmt::format(" {}='{}'", name, value);
-      }
-    }
-    return text;
-  }
-
   std::string ClassAttribute(const TiXmlElement& element, const char* name) const {
     const std::string value = Attribute(element, name);
     if (value.empty()) return "";
     const auto known = class_index_.find(value);
     if (known == class_index_.end()) {
-      Fail(element, "{} '{}' of <{}> is no class of <default>", name, value,
-           Shown(element.Value()));
+      FailMjcf(element, "{} '{}' of <{}> is no class of <default>", name, value, Shown(element));
     }
     return value == main_ ? fmt::format(" {}='main'", name)
                           : fmt::format(" {}='c{}'", name, known->second);
   }
 
   void Compiler(const TiXmlElement& element) {
-    compiler_ += Kept(element, "compiler");
+    compiler_ += KeptAttributes(element, "compiler");
     if (const size_t again = compiler_.find(" autolimits="); again != std::string::npos) {
       compiler_.erase(again, compiler_.find('\'', again + 13) + 1 - again);
     }
     if (Attribute(element, "coordinate") == "global") {
-      Fail(element, "coordinate='global' is not supported: save the file with local coordinates");
+      FailMjcf(element,
+               "coordinate='global' is not supported: save the file with local coordinates");
     }
     if (const std::string order = Attribute(element, "eulerseq"); !order.empty()) {
       if (order.size() != 3 || order.find_first_not_of("xyzXYZ") != std::string::npos) {
-        Fail(element, "eulerseq is '{}': three of x, y, z, X, Y, Z must stand there", order);
+        FailMjcf(element, "eulerseq is '{}': three of x, y, z, X, Y, Z must stand there", order);
       }
       compiler_ += fmt::format(" eulerseq='{}'", order);
     }
-    if (const auto total = Numbers(element, "settotalmass"); !total.empty() && total[0] > 0) {
-      Fail(element, "settotalmass is not supported: write the masses themselves");
+    if (const auto total = MjcfNumbers(element, "settotalmass"); !total.empty() && total[0] > 0) {
+      FailMjcf(element, "settotalmass is not supported: write the masses themselves");
     }
     if (const std::string folder = Attribute(element, "meshdir"); !folder.empty()) {
       result_.mesh_folder = folder;
@@ -229,7 +121,11 @@ class Cleaner {
       }
       CleanGeom& entry = meshes_[name];
       entry.mesh = file;
-      if (mesh.Attribute("scale")) entry.scale = Exactly<3>(mesh, "scale");
+      if (mesh.Attribute("scale")) {
+        entry.scale = MjcfNumbers<3>(mesh, "scale");
+      } else if (const auto* scale = Inherited(mesh_scale_, ClassOf(mesh, ""))) {
+        entry.scale = *scale;
+      }
     });
   }
 
@@ -237,11 +133,12 @@ class Cleaner {
     std::string name = Attribute(element, "class");
     const bool is_main = parent.empty();
     if (name.empty() && is_main) name = "main";
-    if (name.empty()) Fail(element, "<default> within another has no class: add class=\"...\"");
+    if (name.empty()) FailMjcf(element, "<default> within another has no class: add class=\"...\"");
     if (is_main && main_.empty()) main_ = name;
-    if (is_main && name != main_) Fail(element, "<default> '{}' stands beside '{}'", name, main_);
+    if (is_main && name != main_)
+      FailMjcf(element, "<default> '{}' stands beside '{}'", name, main_);
     const bool is_new = class_index_.emplace(name, class_index_.size()).second;
-    if (!is_new && !is_main) Fail(element, "class '{}' of <default> stands twice", name);
+    if (!is_new && !is_main) FailMjcf(element, "class '{}' of <default> stands twice", name);
     DefaultClass& own = classes_[name];
     own.parent = parent;
     // The outermost class is MuJoCo's "main".
@@ -257,11 +154,13 @@ class Cleaner {
           known[a->Name()] = OneLine(a->Value());
         }
         if (e->Attribute("actuatorfrcrange"))
-          force_range_[name] = Exactly<2>(*e, "actuatorfrcrange");
-        *xml += fmt::format("<{}{}/>", kind, Kept(*e, kind));
-      } else if (kind == "site" || Has(kActuators, kind)) {
-        *xml += kind == "site" ? fmt::format("<site{}/>", Kept(*e, "site"))
-                               : fmt::format("<motor{}/>", Kept(*e, "actuator"));
+          force_range_[name] = MjcfNumbers<2>(*e, "actuatorfrcrange");
+        *xml += fmt::format("<{}{}/>", kind, KeptAttributes(*e, kind));
+      } else if (kind == "mesh" && e->Attribute("scale")) {
+        mesh_scale_[name] = MjcfNumbers<3>(*e, "scale");
+      } else if (kind == "site" || IsActuator(kind)) {
+        *xml += kind == "site" ? fmt::format("<site{}/>", KeptAttributes(*e, "site"))
+                               : fmt::format("<motor{}/>", KeptAttributes(*e, "actuator"));
       }
     }
     *xml += "</default>";
@@ -272,6 +171,15 @@ class Cleaner {
     const std::string own = Attribute(element, "class");
     if (!own.empty()) return own;
     return child_class.empty() ? main_ : child_class;
+  }
+
+  // What a class or the nearest above it has; null where none has.
+  template <typename T>
+  const T* Inherited(const std::map<std::string, T>& known, const std::string& name) const {
+    for (auto c = classes_.find(name); c != classes_.end(); c = classes_.find(c->second.parent)) {
+      if (const auto found = known.find(c->first); found != known.end()) return &found->second;
+    }
+    return nullptr;
   }
 
   std::string Resolved(const TiXmlElement& element, const char* name,
@@ -314,8 +222,8 @@ class Cleaner {
         if (e->ValueStr() != "body") continue;
         if (HasFreeJoint(*e)) {
           if (robot != nullptr) {
-            Fail(*e, "body '{}' floats, and so does '{}': leave one in the file",
-                 Attribute(*e, "name"), Attribute(*robot, "name"));
+            FailMjcf(*e, "body '{}' floats, and so does '{}': leave one in the file",
+                     Attribute(*e, "name"), Attribute(*robot, "name"));
           }
           robot = e;
         } else if (first == nullptr && HasJoints(*e)) {
@@ -324,18 +232,18 @@ class Cleaner {
       }
     });
     if (robot != nullptr) return *robot;
-    if (first == nullptr) Fail(root, "no body of <worldbody> has joints: where is the robot?");
+    if (first == nullptr) FailMjcf(root, "no body of <worldbody> has joints: where is the robot?");
     Note(*first, "body '{}' has no free joint: it floats here", Attribute(*first, "name"));
     return *first;
   }
 
   // Elements that would put bodies where the reader sees none.
   void CheckStructure(const TiXmlElement& element) const {
-    static const Names kUnknown = {"frame",     "replicate", "attach",
-                                   "composite", "flexcomp",  "include"};
-    if (Has(kUnknown, element.ValueStr())) {
-      Fail(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
-           Shown(element.Value()));
+    static const std::set<std::string> kUnknown = {"frame",     "replicate", "attach",
+                                                   "composite", "flexcomp",  "include"};
+    if (kUnknown.contains(element.ValueStr())) {
+      FailMjcf(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
+               Shown(element));
     }
   }
 
@@ -344,14 +252,14 @@ class Cleaner {
     std::string name = Attribute(element, "name");
     if (name.empty()) name = fmt::format("{}_{}", kind, index);
     if (!taken->insert(name).second) {
-      Fail(element, "the name '{}' of a {} stands twice: rename one", name, kind);
+      FailMjcf(element, "the name '{}' of a {} stands twice: rename one", name, kind);
     }
     return name;
   }
 
   void Count(const TiXmlElement& element) {
     if (++elements_ > kMaxElements)
-      Fail(element, "more than {} elements: simplify it", kMaxElements);
+      FailMjcf(element, "more than {} elements: simplify it", kMaxElements);
   }
 
   void Body(const TiXmlElement& element, int parent, std::string child_class, std::string* xml) {
@@ -365,21 +273,21 @@ class Cleaner {
       child_class = Attribute(element, "childclass");
     }
     *xml += fmt::format("<body name='b{}'{}{}>", index, ClassAttribute(element, "childclass"),
-                        Kept(element, "body"));
+                        KeptAttributes(element, "body"));
     bool has_inertial = false;
     for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
       const std::string& kind = e->ValueStr();
       CheckStructure(*e);
       if (kind == "body") continue;
       if (kind == "inertial") {
-        if (has_inertial) Fail(*e, "body '{}' has two <inertial>", result_.bodies.back().name);
+        if (has_inertial) FailMjcf(*e, "body '{}' has two <inertial>", result_.bodies.back().name);
         has_inertial = true;
         Inertial(*e, &result_.bodies[static_cast<size_t>(index)], xml);
       } else if (kind == "joint" && !(parent < 0 && IsFree(*e))) {
         Joint(*e, index, child_class, xml);
       } else if (kind == "freejoint" && parent >= 0) {
-        Fail(*e, "body '{}' floats within another: move it to <worldbody>",
-             result_.bodies[static_cast<size_t>(index)].name);
+        FailMjcf(*e, "body '{}' floats within another: move it to <worldbody>",
+                 result_.bodies[static_cast<size_t>(index)].name);
       } else if (kind == "geom") {
         Geom(*e, index, child_class, xml);
       } else if (kind == "site") {
@@ -395,17 +303,17 @@ class Cleaner {
 
   void Inertial(const TiXmlElement& element, CleanBody* body, std::string* xml) {
     body->has_inertial = true;
-    body->mass = Exactly<1>(element, "mass")[0];
-    std::string place = Kept(element, "inertial");
+    body->mass = MjcfNumbers<1>(element, "mass")[0];
+    std::string place = KeptAttributes(element, "inertial");
     if (element.Attribute("fullinertia")) {
-      body->full = Exactly<6>(element, "fullinertia");
-      for (const std::string_view name : kOrientation) {
+      body->full = MjcfNumbers<6>(element, "fullinertia");
+      for (const std::string_view name : kOrientations) {
         if (element.Attribute(std::string(name).c_str())) {
-          Fail(element, "<inertial> has fullinertia and {}: leave one out", name);
+          FailMjcf(element, "<inertial> has fullinertia and {}: leave one out", name);
         }
       }
     } else if (element.Attribute("diaginertia")) {
-      body->diagonal = Exactly<3>(element, "diaginertia");
+      body->diagonal = MjcfNumbers<3>(element, "diaginertia");
     }
     *xml += "<inertial mass='1' diaginertia='1 1 1'" +
             (element.Attribute("pos") ? place : " pos='0 0 0'" + place) + "/>";
@@ -420,23 +328,20 @@ class Cleaner {
     joint.name = UniqueName(element, "joint", index, &joint_names_);
     joint.body = body;
     if (owner.joint >= 0) {
-      Fail(element, "body '{}' has two joints, '{}' and '{}': give each a body of its own",
-           owner.name, result_.joints[static_cast<size_t>(owner.joint)].name, joint.name);
+      FailMjcf(element, "body '{}' has two joints, '{}' and '{}': give each a body of its own",
+               owner.name, result_.joints[static_cast<size_t>(owner.joint)].name, joint.name);
     }
     if (body == 0) {
-      Fail(element,
-           "joint '{}' holds the root body '{}' to the world: a robot that balances floats",
-           joint.name, owner.name);
+      FailMjcf(element,
+               "joint '{}' holds the root body '{}' to the world: a robot that balances floats",
+               joint.name, owner.name);
     }
     owner.joint = static_cast<int>(index);
     if (element.Attribute("actuatorfrcrange")) {
-      joint.force_range = Exactly<2>(element, "actuatorfrcrange");
+      joint.force_range = MjcfNumbers<2>(element, "actuatorfrcrange");
     } else {
-      for (std::string c = ClassOf(element, child_class); !c.empty(); c = classes_[c].parent) {
-        const auto known = force_range_.find(c);
-        if (known == force_range_.end()) continue;
-        joint.force_range = known->second;
-        break;
+      if (const auto* range = Inherited(force_range_, ClassOf(element, child_class))) {
+        joint.force_range = *range;
       }
     }
     if (const auto k = Resolved(element, "stiffness", child_class, &DefaultClass::joint);
@@ -444,7 +349,7 @@ class Cleaner {
       Note(element, "the spring of joint '{}' is left out", joint.name);
     }
     *xml += fmt::format("<joint name='j{}'{}{}/>", index, ClassAttribute(element, "class"),
-                        Kept(element, "joint"));
+                        KeptAttributes(element, "joint"));
   }
 
   void Geom(const TiXmlElement& element, int body, const std::string& child_class,
@@ -458,16 +363,16 @@ class Cleaner {
       const auto known = meshes_.find(mesh);
       if (known == meshes_.end()) return;
       geom = known->second;
-    } else if (!type.empty() && !Has(kWords.at("type"), type)) {
+    } else if (!type.empty() && !IsGeomType(type)) {
       return;  // a plane, a height field
     }
     geom.body = body;
-    std::string kept = Kept(element, "geom");
+    std::string kept = KeptAttributes(element, "geom");
     if (is_mesh) {  // a sphere without mass holds its place
       kept.clear();
       for (const char* name : {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "contype",
                                "conaffinity", "group"}) {
-        const std::vector<double> numbers = Numbers(element, name);
+        const std::vector<double> numbers = MjcfNumbers(element, name);
         if (numbers.empty()) continue;
         kept += fmt::format(" {}='", name);
         for (const double number : numbers) kept += fmt::format("{:.17g} ", number);
@@ -490,7 +395,7 @@ class Cleaner {
     // A body may have the same name: the site then takes another.
     if (!links_.insert(site.name).second) site.name = UniqueSite(site.name);
     *xml += fmt::format("<site name='s{}'{}{}/>", index, ClassAttribute(element, "class"),
-                        Kept(element, "site"));
+                        KeptAttributes(element, "site"));
   }
 
   std::string UniqueSite(const std::string& name) {
@@ -512,14 +417,14 @@ class Cleaner {
       Count(*e);
       const std::string& kind = e->ValueStr();
       const int joint = JointIndex(Attribute(*e, "joint"));
-      if (!Has(kActuators, kind) || joint < 0) {
-        Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out",
-             Shown(e->Value()), Attribute(*e, "name"));
+      if (!IsActuator(kind) || joint < 0) {
+        Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out", Shown(*e),
+             Attribute(*e, "name"));
         continue;
       }
       // Of whatever kind: gear and ranges are the same attributes of all.
       *xml += fmt::format("<motor name='a{}' joint='j{}'{}{}/>", result_.actuators.size(), joint,
-                          ClassAttribute(*e, "class"), Kept(*e, "actuator"));
+                          ClassAttribute(*e, "class"), KeptAttributes(*e, "actuator"));
       result_.actuators.push_back({joint, kind == "motor"});
     }
   }
@@ -527,17 +432,17 @@ class Cleaner {
   void Equalities(const TiXmlElement& section) {
     for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
       if (e->ValueStr() != "joint") {
-        Note(*e, "equality <{}> '{}' closes a loop: it is left out", Shown(e->Value()),
+        Note(*e, "equality <{}> '{}' closes a loop: it is left out", Shown(*e),
              Attribute(*e, "name"));
         continue;
       }
       const int joint = JointIndex(Attribute(*e, "joint1"));
       if (joint < 0) {
-        Fail(*e, "equality names joint1 '{}', which the robot does not have",
-             Attribute(*e, "joint1"));
+        FailMjcf(*e, "equality names joint1 '{}', which the robot does not have",
+                 Attribute(*e, "joint1"));
       }
       const std::vector<double> coefficients =
-          e->Attribute("polycoef") ? Numbers(*e, "polycoef") : std::vector<double>{0, 1};
+          e->Attribute("polycoef") ? MjcfNumbers(*e, "polycoef") : std::vector<double>{0, 1};
       Mimic mimic;
       mimic.joint = Attribute(*e, "joint2");
       mimic.offset = coefficients.empty() ? 0 : coefficients[0];
@@ -550,14 +455,14 @@ class Cleaner {
     for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
       const std::string site = Attribute(*e, "site");
       if (site.empty()) continue;
-      const std::vector<double> noise = Numbers(*e, "noise");
-      result_.sensors.push_back({e->ValueStr(), site, noise.empty() ? 0 : noise[0]});
+      const std::vector<double> noise = MjcfNumbers(*e, "noise");
+      result_.sensors.push_back({Shown(*e), site, noise.empty() ? 0 : noise[0]});
     }
   }
 
   void Keys(const TiXmlElement& section) {
     Sections(section, "key", [&](const TiXmlElement& element) {
-      const std::vector<double> position = Numbers(element, "qpos");
+      const std::vector<double> position = MjcfNumbers(element, "qpos");
       const std::string name = Attribute(element, "name");
       const size_t joints = result_.joints.size();
       const bool floats = position.size() == joints + 7;
@@ -582,6 +487,7 @@ class Cleaner {
   std::map<std::string, DefaultClass> classes_;
   std::map<std::string, size_t> class_index_;
   std::map<std::string, std::array<double, 2>> force_range_;  // by class
+  std::map<std::string, std::array<double, 3>> mesh_scale_;   // by class
   std::map<std::string, CleanGeom> meshes_;
   std::set<std::string> links_, joint_names_;
   size_t elements_ = 0;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 
 #include "components/robot/robot_model.h"
 #include "components/robot/xml_text.h"
@@ -202,6 +203,33 @@ class Assembler {
   std::vector<Isometry3d> anchor_;
 };
 
+// A message of MuJoCo's with the file's names in place of those of the cleaned text.
+std::string WithNames(const std::string& problem, const CleanMjcf& clean) {
+  static const std::regex kObject("\\b([bjsga])([0-9]{1,6})\\b");
+  const auto name = [&](char kind, size_t i) -> std::string {
+    const auto body_of = [&](int b) { return clean.bodies[static_cast<size_t>(b)].name; };
+    if (kind == 'b' && i < clean.bodies.size()) return "'" + clean.bodies[i].name + "'";
+    if (kind == 'j' && i < clean.joints.size()) return "'" + clean.joints[i].name + "'";
+    if (kind == 's' && i < clean.sites.size()) return "'" + clean.sites[i].name + "'";
+    if (kind == 'g' && i < clean.geoms.size()) {
+      return "a geom of body '" + body_of(clean.geoms[i].body) + "'";
+    }
+    if (kind == 'a' && i < clean.actuators.size()) {
+      return "the actuator of '" +
+             clean.joints[static_cast<size_t>(clean.actuators[i].joint)].name + "'";
+    }
+    return "";
+  };
+  std::string text;
+  auto from = problem.begin();
+  for (std::sregex_iterator m(problem.begin(), problem.end(), kObject), end; m != end; ++m) {
+    const std::string known = name(*(*m)[1].first, std::stoul((*m)[2]));
+    text.append(from, (*m)[0].first).append(known.empty() ? m->str() : known);
+    from = (*m)[0].second;
+  }
+  return text.append(from, problem.end());
+}
+
 }  // namespace
 
 MjcfDocument ReadMjcf(std::string_view xml, std::vector<std::string>* warnings) {
@@ -209,7 +237,8 @@ MjcfDocument ReadMjcf(std::string_view xml, std::vector<std::string>* warnings) 
   std::string problem;
   const MujocoModel model = CompileMjcf(clean.xml, &problem);
   if (!model) {
-    throw RobotError("MJCF: MuJoCo refuses it: " + OneLine(problem) + ": correct that element");
+    throw RobotError("MJCF: MuJoCo refuses it: " + OneLine(WithNames(problem, clean)) +
+                     ": correct that element");
   }
   MjcfDocument result;
   Assembler(clean, *model, &result).Assemble();

@@ -172,6 +172,78 @@ TEST(Defects, FiveJointsInALegAreRefusedByName) {
   }
 }
 
+std::string Refusal(const ImportOptions& options) {
+  try {
+    ImportRobot(options);
+    return "taken";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+std::string RefusalOf(const std::string& text) {
+  ImportOptions options;
+  options.file = WriteMaker("refused", text);
+  return Refusal(options);
+}
+
+TEST(Defects, WhatIsNoRobotsFileIsNamedWithWhatToDo) {
+  ImportOptions folder;
+  folder.file = WriteMaker("within", SimpleBiped()).parent_path();
+  EXPECT_THAT(Refusal(folder), HasSubstr("is a folder: name the robot's file: it has within.urdf"));
+  EXPECT_THAT(RefusalOf(" \n"), HasSubstr("is empty"));
+  EXPECT_THAT(RefusalOf("<sdf version='1.6'><model name='x'/></sdf>"),
+              HasSubstr("SDF is not read"));
+  EXPECT_THAT(RefusalOf("<robot name='x' xmlns:xacro='http://wiki.ros.org/xacro'>\n<link name='a'>"
+                        "<xacro:inertia m='1'/></link></robot>"),
+              testing::AllOf(HasSubstr("line 2"), HasSubstr("<xacro:inertia>"),
+                             HasSubstr("xacro refused.urdf > robot.urdf")));
+  EXPECT_THAT(RefusalOf("<mujoco><include file='g1.xml'/><worldbody/></mujoco>"),
+              HasSubstr("import that file"));
+}
+
+TEST(Defects, ATypoIsFoundByLine) {
+  const std::string whole = SimpleBiped();
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = whole;
+    text.replace(text.find(from), from.size(), to);
+    return RefusalOf(text);
+  };
+  const auto line_of = [&](const std::string& what) {
+    return "line " +
+           std::to_string(
+               1 + std::count(whole.begin(),
+                              whole.begin() + static_cast<std::ptrdiff_t>(whole.find(what)), '\n'));
+  };
+  EXPECT_THAT(
+      with("<mass value='3'/>", "<mass value='3 kg'/>"),
+      testing::AllOf(HasSubstr(line_of("<link name='left_shin'>")), HasSubstr("left_shin")));
+  EXPECT_THAT(
+      with("<joint name='left_knee_joint' type='revolute'",
+           "<joint name='left_knee_joint' type='revolut'"),
+      testing::AllOf(HasSubstr(line_of("<joint name='left_knee_joint'")), HasSubstr("revolut")));
+  EXPECT_THAT(
+      with("<child link='left_shin'/>", "<child link='left_shinn'/>"),
+      testing::AllOf(HasSubstr(line_of("<joint name='left_knee_joint'")), HasSubstr("left_shinn")));
+}
+
+TEST(Defects, ARobotOnWheelsIsRefusedByItsWheels) {
+  std::string text =
+      "<robot name='cart'><link name='base'><inertial><mass value='9'/><inertia ixx='1' "
+      "ixy='0' ixz='0' iyy='1' iyz='0' izz='1'/></inertial></link>";
+  for (const auto& [side, y] : {std::pair{"left", 0.2}, std::pair{"right", -0.2}}) {
+    const std::string wheel = side + std::string("_wheel");
+    text += "<link name='" + wheel +
+            "'><inertial><mass value='1'/><inertia ixx='0.01' ixy='0' ixz='0' "
+            "iyy='0.01' iyz='0' izz='0.01'/></inertial></link><joint name='" +
+            wheel + "_joint' type='continuous'><parent link='base'/><child link='" + wheel +
+            "'/><origin xyz='0 " + std::to_string(y) +
+            " -0.3'/><axis xyz='0 1 0'/><limit effort='5' velocity='9'/></joint>";
+  }
+  EXPECT_THAT(RefusalOf(text + "</robot>"),
+              testing::AllOf(HasSubstr("_wheel' has 1 joint ("), HasSubstr("needs six")));
+}
+
 TEST(Defects, ABaseThatFacesElsewhereIsTheSameRobot) {
   const robot::RobotModel straight =
       robot::MakeRobot(ImportText("straight", SimpleBiped()).robot, SimpleBiped());

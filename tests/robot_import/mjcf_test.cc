@@ -11,6 +11,7 @@
 namespace poise::robot {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 constexpr char kText[] = R"(<mujoco model="arm">
@@ -119,6 +120,19 @@ std::string With(const std::string& from, const std::string& to) {
   return text.replace(at, from.size(), to);
 }
 
+TEST(Mjcf, AMeshTakesItsClassesScale) {
+  const std::string text = With("scale=\"0.001 0.001 0.001\"", "class=\"bigger\"");
+  const auto scale = [&](const std::string& in_default, const std::string& in_big) {
+    std::string scaled = text;
+    scaled.insert(scaled.find("<default class=\"big\">"), in_default);
+    scaled.insert(scaled.find("<joint range="), in_big);
+    return ReadMjcf(scaled, nullptr).shapes[0].size;
+  };
+  EXPECT_EQ(scale("", ""), Eigen::Vector3d(1, 1, 1));
+  EXPECT_EQ(scale("<mesh scale=\"2 3 4\"/>", ""), Eigen::Vector3d(2, 3, 4));
+  EXPECT_EQ(scale("<mesh scale=\"2 3 4\"/>", "<mesh scale=\"5 6 7\"/>"), Eigen::Vector3d(5, 6, 7));
+}
+
 TEST(Mjcf, IsRefusedByLineAndName) {
   const auto problem = [](const std::string& text) -> std::string {
     try {
@@ -133,13 +147,17 @@ TEST(Mjcf, IsRefusedByLineAndName) {
   EXPECT_THAT(problem(With("childclass=\"big\"", "childclass=\"huge\"")), HasSubstr("'huge'"));
   EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><frame/>")), HasSubstr("<frame>"));
   EXPECT_THAT(problem(With("<body name=\"fore\"", "<body name=\"upper\"")), HasSubstr("'upper'"));
-  EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 0 0\"")), HasSubstr("MuJoCo refuses it"));
+  // MuJoCo's own refusals name the file's objects, not those of the text that it was given.
+  EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 0 0\"")),
+              AllOf(HasSubstr("MuJoCo refuses it"), HasSubstr("'elbow'")));
+  EXPECT_THAT(problem(With("size=\"0.1 0.2 0.3\"", "size=\"0 0 0\"")),
+              AllOf(HasSubstr("MuJoCo refuses it"), HasSubstr("a geom of body 'fore'")));
   EXPECT_THAT(problem(With("<joint name=\"wrist\"",
                            "<joint name=\"second\" axis=\"0 0 1\"/><joint "
                            "name=\"wrist\"")),
               HasSubstr("two joints, 'second' and 'wrist'"));
   EXPECT_THAT(problem("<mujoco><worldbody/></mujoco>"), HasSubstr("where is the robot"));
-  EXPECT_THAT(problem("<mujoco><include file=\"x\"/></mujoco>"), HasSubstr("MJCF"));
+  EXPECT_THAT(problem("<mujoco><include file=\"x\"/></mujoco>"), HasSubstr("<include file='x'>"));
   EXPECT_THAT(problem("no xml"), HasSubstr("MJCF"));
 }
 

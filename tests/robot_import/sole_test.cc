@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "tests/robot_import/import_support.h"
-#include "tools/robot_import/mesh_points.h"
+#include "tools/robot/mesh_file.h"
 #include "tools/robot_import/sole_finder.h"
 
 namespace poise {
@@ -94,11 +94,8 @@ TEST(Sole, OfAnUprightCylinderIsItsRimAndOfALyingOneNone) {
   EXPECT_TRUE(FindSole(std::vector{lying}, kDown, kForward).polygon.empty());
 }
 
-TEST(Sole, OfAMesh) {
-  // A wedge whose lower face is a pentagon.
-  const std::vector<Vector2d> face = {
-      {-0.1, -0.04}, {0.08, -0.05}, {0.12, 0}, {0.08, 0.05}, {-0.1, 0.04}};
-  const auto file = WriteMaker("mesh", "").parent_path() / "foot.stl";
+/// A wedge whose lower face, 20 mm below the origin, is `face`, as STL in millimetres.
+void WriteWedge(const std::filesystem::path& file, const std::vector<Vector2d>& face) {
   std::ofstream stl(file);
   stl << "solid foot\n";
   const auto facet = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
@@ -113,18 +110,71 @@ TEST(Sole, OfAMesh) {
     facet({a.x(), a.y(), -20}, {b.x(), b.y(), -20}, top);
   }
   stl << "endsolid foot\n";
-  stl.close();
+}
+
+TEST(Sole, OfAMesh) {
+  const std::vector<Vector2d> face = {
+      {-0.1, -0.04}, {0.08, -0.05}, {0.12, 0}, {0.08, 0.05}, {-0.1, 0.04}};
+  const auto file = WriteMaker("mesh", "").parent_path() / "foot.stl";
+  WriteWedge(file, face);
   std::string problem;
   FootShape shape;
   shape.kind = Kind::kMesh;
-  shape.points = MeshPoints(file, Vector3d(1e-3, -1e-3, 1e-3), &problem);  // millimetres, mirrored
+  for (const Vector3d& p : MeshPoints(file, &problem)) shape.points.push_back(1e-3 * p);
   ASSERT_EQ(problem, "");
   const FoundSole sole = FindSole(std::vector{shape}, kDown, kForward);
   ASSERT_EQ(sole.polygon.size(), 5u);
   EXPECT_NEAR(Area(sole.polygon), Area(face), 1e-8);
   EXPECT_TRUE(sole.frame.translation().isApprox(Vector3d(0.01, 0, -0.02), 1e-6));
-  EXPECT_TRUE(MeshPoints(file.parent_path() / "none.stl", Vector3d::Ones(), &problem).empty());
+  EXPECT_TRUE(MeshPoints(file.parent_path() / "none.stl", &problem).empty());
   EXPECT_NE(problem, "");
+  std::ofstream(file) << "solid foot";
+  EXPECT_TRUE(MeshPoints(file, &problem).empty());
+  EXPECT_NE(problem, "");
+}
+
+// One mesh for both feet, mirrored by its scale, in a folder of its own.
+TEST(Sole, OfAMeshThatOneFootMirrors) {
+  const std::vector<Vector2d> face = {
+      {-0.1, -0.03}, {0.08, -0.06}, {0.12, 0.01}, {0.08, 0.05}, {-0.1, 0.04}};
+  std::string text = SimpleBiped();
+  const std::string box = "<box size='0.24 0.1 0.02'/>";
+  for (const char* scale : {"1e-3 1e-3 1e-3", "1e-3 -1e-3 1e-3"}) {  // left stands first
+    const size_t at = text.find(box);
+    ASSERT_NE(at, std::string::npos);
+    text.replace(at, box.size(),
+                 std::string("<mesh filename='package://maker/foot.stl' scale='") + scale + "'/>");
+  }
+  ImportOptions options;
+  options.file = WriteMaker("mirrored", text);
+  const RobotImport without = ImportRobot(options);
+  ASSERT_EQ(without.defects.size(), 1u);
+  EXPECT_NE(without.defects[0].what.find("package://maker/foot.stl"), std::string::npos);
+  EXPECT_NE(without.defects[0].done.find("--meshes"), std::string::npos);
+  const auto folder = options.file.parent_path() / "elsewhere";
+  std::filesystem::create_directories(folder);
+  WriteWedge(folder / "foot.stl", face);
+  options.meshes = {folder};
+  const RobotImport with = ImportRobot(options);
+  EXPECT_EQ(with.defects.size(), 0u);
+  std::array<std::vector<Vector2d>, 2> corners;  // right, left
+  for (int f = 0; f < 2; ++f) {
+    const Foot& foot = with.robot.foot(f);
+    ASSERT_EQ(foot.vertex_size(), 5) << f;
+    for (const SoleVertex& v : foot.vertex()) {
+      corners[static_cast<size_t>(f)].emplace_back(v.x() + foot.sole().x(),
+                                                   v.y() + foot.sole().y());
+    }
+  }
+  const auto has = [&](size_t f, const Vector2d& p) {
+    return std::ranges::any_of(corners[f],
+                               [&](const Vector2d& q) { return (p - q).norm() < 1e-5; });
+  };
+  for (const Vector2d& p : face) {
+    const Vector2d at(p.x() + 0.06, p.y());  // of the foot's <origin>
+    EXPECT_TRUE(has(1, at)) << at.transpose();
+    EXPECT_TRUE(has(0, {at.x(), -at.y()})) << at.transpose();
+  }
 }
 
 TEST(Sole, TheImportedBipedStandsOnItsBoxes) {

@@ -33,7 +33,7 @@ export const robot = {
   joints: [{name: 'hip_pitch', torque_limit: 50}, {name: 'ankle_roll', torque_limit: 20}],
   feet: ['right', 'left'].map((name, i) => ({name, body: [2, 0][i], sole: identity,
     corners: [[-0.15, -0.075], [0.15, -0.075], [0.15, 0.075], [-0.15, 0.075]]})),
-  visuals: [],
+  visuals: [], meshes: [], capsules: [0, 1, 2],
 };
 
 /** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. `more`: of its scenario. */

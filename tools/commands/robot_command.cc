@@ -2,6 +2,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "components/framework/configuration/configuration.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "tools/cli/output_style.h"
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 
 struct CheckOptions {
   std::string robot, page;
+  std::vector<std::string> meshes;
   bool json = false;
 };
 
@@ -32,8 +34,16 @@ int CheckOneRobot(const CheckOptions& options) {
     fmt::print("{}", FormatRobotCheck(check, ScreenStyle().columns));
   }
   if (!options.page.empty()) {
-    WriteRobotPage(options.page, check);
-    if (!options.json) fmt::print("\nThe robot in 3D: {}\n", FileAddress(options.page));
+    const RobotDrawing drawing =
+        DrawRobot(check.model, ReadFile(check.maker_file),
+                  {check.maker_file, "", {options.meshes.begin(), options.meshes.end()}});
+    WriteRobotPage(options.page, check, drawing);
+    if (options.json) return check.ok() ? kExitOk : kExitFailed;
+    fmt::print("\nThe robot in 3D: {}\n", FileAddress(options.page));
+    if (const std::string instead = WhatIsDrawnInstead(drawing); !instead.empty()) {
+      fmt::print("{}\n", Wrapped(instead + " --meshes FOLDER says where they lie.",
+                                 ScreenStyle().columns, 0));
+    }
   }
   return check.ok() ? kExitOk : kExitFailed;
 }
@@ -71,6 +81,13 @@ void AddRobotCommand(CLI::App* app, Command* command) {
   check->add_flag("--json", options->json, "everything in SI units, for programs");
   check->add_option("--page", options->page, "write the robot in 3D to this file")
       ->type_name("FILE");
+  check
+      ->add_option("--meshes", options->meshes,
+                   "folder of the maker's meshes, for the page; may be repeated; default: beside "
+                   "the maker's file and above it")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->check(CLI::ExistingDirectory);
   check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
   CLI::App* list = robot->add_subcommand("list", "the robots that there are");
   list->callback([command] { *command = ListRobots; });

@@ -20,6 +20,7 @@ struct ImportArguments {
   ImportOptions options;
   std::string to;
   std::vector<double> sole;
+  std::vector<std::string> meshes;
   bool force = false;
 };
 
@@ -48,6 +49,7 @@ void CopyFile(const fs::path& from, const fs::path& to) {
 int ImportIt(ImportArguments arguments) {
   ImportOptions& options = arguments.options;
   if (!arguments.sole.empty()) options.sole = {arguments.sole.at(0), arguments.sole.at(1)};
+  options.meshes.assign(arguments.meshes.begin(), arguments.meshes.end());
   RobotImport imported;
   try {
     imported = ImportRobot(options);
@@ -88,38 +90,40 @@ int ImportIt(ImportArguments arguments) {
 void AddRobotImport(CLI::App* robot, Command* command) {
   auto arguments = std::make_shared<ImportArguments>();
   ImportOptions* const options = &arguments->options;
-  CLI::App* import = robot->add_subcommand(
+  CLI::App* app = robot->add_subcommand(
       "import", "write a folder with a maker's URDF or MJCF file and the text that Poise needs");
-  import->footer(
+  app->footer(
       "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit "
       "code: "
       "0 written, 2 the file cannot be used, or the robot cannot balance.");
-  import->add_option("file", options->file, "URDF (xacro expanded) or MJCF")->required();
-  import->add_option("--to", arguments->to,
-                     "folder that is written; default: the robot's name in the current folder");
-  import->add_option("--name", options->name, "of the robot; default: the file's");
-  import->add_option("--srdf", options->srdf,
-                     "group states, among them how it stands; default: the .srdf beside the file");
-  import->add_option("--stance", options->stance,
-                     "keyframe or group state in which it stands; default: one named half_sitting, "
-                     "stand or home");
-  import->add_option("--right-foot", options->foot[0], "link, in place of the one that is found");
-  import->add_option("--left-foot", options->foot[1], "link, in place of the one that is found");
-  import->add_option("--sole", arguments->sole, "length and width, m, in place of what shapes show")
+  app->add_option("file", options->file, "URDF (xacro expanded) or MJCF")->required();
+  app->add_option("--to", arguments->to,
+                  "folder that is written; default: the robot's name in the current folder");
+  app->add_option("--name", options->name, "of the robot; default: the file's");
+  app->add_option("--srdf", options->srdf,
+                  "group states, among them how it stands; default: the .srdf beside the file");
+  app->add_option("--stance", options->stance,
+                  "keyframe or group state in which it stands; default: one named half_sitting, "
+                  "stand or home");
+  app->add_option("--right-foot", options->foot[0], "link, in place of the one that is found");
+  app->add_option("--left-foot", options->foot[1], "link, in place of the one that is found");
+  app->add_option("--sole", arguments->sole, "length and width, m, in place of what shapes show")
       ->expected(2)
       ->type_name("LENGTH WIDTH")
-      ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2;
-}));
-import->add_option("--imu", options->imu, "link or site that carries it");
-import->add_option("--body", options->body, "link whose orientation is controlled");
-import->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
-    ->allow_extra_args(false)
-    ->take_all();
-import->add_flag("--force", arguments->force, "replace a text that is there");
-  import->callback(
-      [arguments, command] { *command = [arguments] { return ImportIt(*arguments);
-  };  // namespace poise
-  });
-  }
+      ->check(Within("in (0, 2] m", [](double m) { return m > 0 && m <= 2; }));
+  app->add_option("--meshes", arguments->meshes,
+                  "folder of the maker's meshes; may be repeated; default: beside the file and "
+                  "above it")
+      ->allow_extra_args(false)
+      ->take_all()
+      ->check(CLI::ExistingDirectory);
+  app->add_option("--imu", options->imu, "link or site that carries it");
+  app->add_option("--body", options->body, "link whose orientation is controlled");
+  app->add_option("--lock", options->lock, "a joint that is to stand still; may be repeated")
+      ->allow_extra_args(false)
+      ->take_all();
+  app->add_flag("--force", arguments->force, "replace a text that is there");
+  app->callback([arguments, command] { *command = [arguments] { return ImportIt(*arguments); }; });
+}
 
-  }  // namespace poise
+}  // namespace poise

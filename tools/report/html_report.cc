@@ -342,17 +342,19 @@ void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs,
   });
 }
 
-void WriteRobotPage(const fs::path& file, const RobotCheck& check) {
+void WriteRobotPage(const fs::path& file, const RobotCheck& check, const RobotDrawing& drawing) {
   const robot::RobotState& stance = check.stance;
   const Eigen::Vector3d& at = stance.base_position;
   const Eigen::Quaterniond& turn = stance.base_orientation;
   Json json;
-  json["robot"] = RobotJson(check.model, check.urdf);
+  json["robot"] = RobotJson(check.model, drawing);
   json["stance"]["base"] = {{"position", {at.x(), at.y(), at.z()}},
                             {"orientation", {turn.w(), turn.x(), turn.y(), turn.z()}}};
   json["stance"]["joints"] = std::vector<double>(stance.joint_position.begin(),
                                                  stance.joint_position.end());
   json["check"] = RobotCheckJson(check);
+  json["drawn_instead"] = WhatIsDrawnInstead(drawing);
+  json["triangles"] = {drawing.triangles, drawing.file_triangles};
   WriteFile(file, "--page", [&](std::ostream* out) {
     WritePage(out, [&] {
       *out << "<script type=\"application/json\" class=\"poise-robot\">" << ScriptText(json)

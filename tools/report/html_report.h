@@ -10,6 +10,7 @@
 #include "logging/run_record.h"
 #include "tools/report/report.h"
 #include "tools/robot/robot_check.h"
+#include "tools/robot/robot_drawing.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -36,7 +37,8 @@ void WriteHtmlReport(const std::filesystem::path& file, const std::vector<Report
                      double megabytes = kPageSize);
 
 /// Writes the page of a robot that was checked. Throws ConfigError likewise.
-void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check);
+void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check,
+                    const RobotDrawing& drawing);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in
 /// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not

@@ -222,10 +222,10 @@ void FindDefects(RobotCheck* check) {
   }
   for (const LoopFacts& loop : check->loops) {
     if (loop.stable) continue;
-    check->defects.push_back(
-        fmt::format("on {} no gain of the rule holds it: gears or rotors ring at {:.0f} Hz; correct "
-                    "gear_stiffness, gear_damping, rotor_inertia or sensor_delay",
-                    loop.support, loop.frequency));
+    check->defects.push_back(fmt::format(
+        "on {} no gain of the rule holds it: gears or rotors ring at {:.0f} Hz; correct "
+        "gear_stiffness, gear_damping, rotor_inertia or sensor_delay",
+        loop.support, loop.frequency));
   }
   if (!check->stands_on_one_foot) {
     check->defects.push_back(
@@ -263,8 +263,8 @@ std::string FormatLoops(const RobotCheck& check, int columns) {
   std::vector<TableRow> rows{
       {"closed loop", "stable", "gain margin", "delay margin", "slowest", "least damped"}};
   for (const LoopFacts& loop : check.loops) {
-    rows.push_back({loop.support, TableCell(loop.stable ? "yes" : "no",
-                                            loop.stable ? Tone::kPlain : Tone::kBad),
+    rows.push_back({loop.support,
+                    TableCell(loop.stable ? "yes" : "no", loop.stable ? Tone::kPlain : Tone::kBad),
                     fmt::format("{:.2f}", loop.gain_margin),
                     fmt::format("{} ticks", loop.delay_margin),
                     fmt::format("{:.2g} 1/s", loop.slowest),
@@ -298,7 +298,7 @@ RobotCheck CheckRobot(const std::filesystem::path& file) {
   check.model = robot::LoadRobotFiles(check.file, &check.defects);
   Robot description;
   ReadTextProto(check.file, &description);
-  check.urdf = ReadFile(robot::MakerFile(description, check.file));
+  check.maker_file = robot::MakerFile(description, check.file);
   try {
     check.stance = SolveStart(check.model, StartPosture());
   } catch (const ConfigError& error) {
@@ -348,8 +348,8 @@ std::string FormatRobotCheck(const RobotCheck& check, int columns) {
                                  ? fmt::format("gears of {:.3g} N·m/rad", drive.gear_stiffness)
                                  : "rigid gears",
                              FormatNumber(1e3 * drive.sensor_delay)));
-  line("gains", fmt::format("by rule: COM {:.3g} 1/s², {:.3g} 1/s", check.gains.com.kp,
-                            check.gains.com.kd));
+  line("gains",
+       fmt::format("by rule: COM {:.3g} 1/s², {:.3g} 1/s", check.gains.com.kp, check.gains.com.kd));
   text += "\n\n" + FormatLoads(check, columns) + "\n" + FormatPushes(check, columns) + "\n" +
           FormatLoops(check, columns) + "\n";
   if (check.ok()) return text + Toned("no defect was found", Tone::kGood) + "\n";

@@ -47,7 +47,8 @@ struct PushLimit {
   double both = 0, right = 0, left = 0;  ///< by the feet in contact
 };
 
-/// The standing robot under its controller with the gains of the rule, on both feet or on the right.
+/// The standing robot under its controller with the gains of the rule, on both feet or on the
+/// right.
 struct LoopFacts {
   std::string support;
   bool stable = false;
@@ -60,7 +61,8 @@ struct LoopFacts {
 
 struct RobotCheck {
   robot::RobotModel model;
-  std::string file, urdf;   ///< the robot's text file, and what the file that it names holds
+  std::string file;         ///< the robot's text
+  std::string maker_file;   ///< that it names
   double com_height = 0;    ///< m above the soles, in the stance
   double frequency = 0;     ///< rad/s, ω = √(g / com_height)
   double foot_spacing = 0;  ///< m

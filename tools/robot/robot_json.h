@@ -1,20 +1,22 @@
 // A robot as JSON, for drawing it.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <nlohmann/json_fwd.hpp>
-#include <string_view>
 
 #include "components/robot/robot_model.h"
 #include "logging/run_record.h"
+#include "tools/robot/robot_drawing.h"
 
 namespace poise {
 
-/// A robot and the URDF that it was read from: bodies (parent, joint, origin in the parent, axis), joints with their limits,
-/// soles, and the boxes, cylinders and spheres of the URDF's visual elements in body frames. Poses
-/// are {"position" m, "orientation" w, x, y, z}. A visual that is a mesh, or that cannot be read,
-/// is left out: nothing but the drawing depends on it.
-nlohmann::ordered_json RobotJson(const robot::RobotModel& model, std::string_view urdf);
-/// The run's.
+/// {"position" m, "orientation" w, x, y, z}.
+nlohmann::ordered_json PoseJson(const Eigen::Isometry3d& pose);
+
+/// Bodies (parent, joint, origin in the parent, axis), joints with their limits, soles, and what is
+/// drawn of it.
+nlohmann::ordered_json RobotJson(const robot::RobotModel& model, const RobotDrawing& drawing);
+/// The run's, with meshes where the maker's file and they are still where the run found them.
 nlohmann::ordered_json RobotJson(const logging::RunRecord& run);
 
 }  // namespace poise

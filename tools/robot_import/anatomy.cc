@@ -49,11 +49,11 @@ void CheckLeg(const robot::LinkTree& tree, const Leg& leg) {
     names += (names.empty() ? "" : ", ") + tree.joints[static_cast<size_t>(j)].name;
   }
   throw robot::RobotError(
-      fmt::format("{}: the leg to '{}' has {} joints ({}): its foot cannot make a six-dimensional "
+      fmt::format("{}: the leg to '{}' has {} joint{} ({}): its foot cannot make a six-dimensional "
                   "contact, a leg that balances needs six; if another link is the foot, name both "
                   "with --right-foot and --left-foot",
                   tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
-                  names.empty() ? "none" : names));
+                  leg.joints.size() == 1 ? "" : "s", names.empty() ? "none" : names));
 }
 
 }  // namespace

@@ -35,8 +35,4 @@ struct MakerFile {
 /// ConfigError and robot::RobotError.
 MakerFile ReadMakerFile(const std::filesystem::path& path, const std::filesystem::path& srdf);
 
-/// The file of a mesh as the maker's file names it ("package://P/x.stl", "file:///x.stl", a
-/// relative path): beside the maker's file or above it. Empty when there is none.
-std::filesystem::path FindMesh(const MakerFile& maker, const std::string& name);
-
 }  // namespace poise

@@ -5,13 +5,15 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "tools/robot/maker_shapes.h"
+#include "tools/robot/mesh_file.h"
 #include "tools/robot_import/file_defects.h"
 #include "tools/robot_import/maker_file.h"
-#include "tools/robot_import/mesh_points.h"
 #include "tools/robot_import/motor_guess.h"
 #include "tools/robot_import/sole_finder.h"
 #include "tools/robot_import/stance_finder.h"
@@ -140,17 +142,22 @@ class Import {
       }
       FootShape shape{source.kind, place->second.pose * source.pose, source.size, {}};
       if (source.kind == robot::SourceShape::Kind::kMesh) {
-        const std::filesystem::path file = FindMesh(maker_, source.mesh);
-        std::string problem = "it is not there";
-        if (!file.empty() && !meshes_.contains(file.string())) {
-          meshes_[file.string()] = MeshPoints(file, source.size, &problem);
-        }
-        const auto points = meshes_.find(file.string());
-        if (points == meshes_.end() || points->second.empty()) {
-          missing_.insert(source.mesh);
+        const std::filesystem::path file =
+            FindMesh({options_.file, maker_.mesh_folder, options_.meshes}, source.mesh);
+        if (file.empty()) {
+          missing_[source.mesh] = "it is not there";
           continue;
         }
-        for (const Vector3d& p : points->second) shape.points.push_back(shape.pose * p);
+        const auto [known, is_new] = meshes_.try_emplace(file.string());
+        Mesh& mesh = known->second;
+        if (is_new) mesh.points = MeshPoints(file, &mesh.problem);
+        if (!mesh.problem.empty()) {
+          missing_[source.mesh] = mesh.problem;
+          continue;
+        }
+        for (const Vector3d& p : mesh.points) {
+          shape.points.push_back(shape.pose * source.size.cwiseProduct(p));
+        }
       }
       shapes.push_back(std::move(shape));
     }
@@ -241,9 +248,8 @@ class Import {
       if (sole.polygon.empty()) {
         sureness = Sureness::kGuess;
         frame = SoleFrame(tree, leg.body);
-        from = missing_.empty()
-                   ? "share of the leg's length"
-                   : "mesh not found (" + *missing_.begin() + "); share of the leg's length";
+        from = "share of the leg's length";
+        if (!missing_.empty()) TellMissing(*missing_.begin());
         sole = GuessedSole(tree, poses, leg, frame, down, forward);
       }
       if (options_.sole) {
@@ -260,6 +266,13 @@ class Import {
     }
     robot().set_force_noise(kForceNoise);
     robot().set_moment_noise(kMomentNoise);
+  }
+
+  void TellMissing(const std::pair<std::string, std::string>& mesh) {
+    if (std::exchange(told_missing_, true) || options_.sole) return;
+    result_.defects.push_back(
+        {fmt::format("the soles are meshes, and '{}' cannot be read: {}", mesh.first, mesh.second),
+         "guess: a share of the leg's length; --meshes FOLDER or --sole LENGTH WIDTH say better"});
   }
 
   static void SetRectangle(double length, double width, FoundSole* sole) {
@@ -522,8 +535,13 @@ class Import {
   RobotImport result_;
   std::map<std::string, double> rotor_;  // kg·m² by joint
   Anatomy anatomy_;
-  std::map<std::string, std::vector<Vector3d>> meshes_;
-  std::set<std::string> missing_;  // meshes
+  struct Mesh {
+    std::vector<Vector3d> points;  // in the file's unit
+    std::string problem;
+  };
+  std::map<std::string, Mesh> meshes_;          // by file
+  std::map<std::string, std::string> missing_;  // a foot's meshes that are not known, and why
+  bool told_missing_ = false;
 };
 
 }  // namespace

@@ -16,6 +16,7 @@ namespace poise {
 /// What the command line says in place of a guess; empty: guess.
 struct ImportOptions {
   std::filesystem::path file, srdf;
+  std::vector<std::filesystem::path> meshes;  ///< folders
   std::string name;                           ///< of the robot
   std::array<std::string, 2> foot;            ///< links, right first
   std::string imu, body;                      ///< links

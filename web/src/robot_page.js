@@ -141,7 +141,7 @@ function tables(check) {
     {numbers: [0, 1, 2, 3]})];
 }
 
-/** Fills the page with `data`: {robot, stance, check}. */
+/** Fills the page with `data`: {robot, stance, check, drawn_instead, triangles}. */
 export function robotPage(data) {
   const {check} = data;
   document.title = `${check.name} – Poise`;
@@ -153,7 +153,10 @@ export function robotPage(data) {
     change: (e) => still.show(name, e.target.checked)}), label);
   still.host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
     element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes')));
+  const [drawn, inFiles] = data.triangles;
+  const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);
   document.getElementById('side').append(element('h2', {}, 'Soles, from above'), solesPicture(check.soles),
+    ...(notes.length > 0 ? [element('h2', {}, 'Picture'), element('p', {class: 'note', role: 'note'}, notes.join(' '))] : []),
     ...(good ? [] : [element('h2', {}, 'Defects'), element('ul', {}, ...check.defects.map((d) => element('li', {}, d)))]));
   document.getElementById('tables').append(...tables(check));
   document.getElementById('player').hidden = true;

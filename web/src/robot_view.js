@@ -1,7 +1,7 @@
-// A robot of boxes, cylinders and spheres; a body that has none gets capsules between its joints.
+// A robot of its file's solids and meshes; a body that lacks some gets capsules between its joints.
 import {
-  BoxGeometry, CapsuleGeometry, CylinderGeometry, ExtrudeGeometry, Group, Mesh, MeshStandardMaterial, Quaternion, Shape,
-  SphereGeometry, Vector2, Vector3,
+  BoxGeometry, BufferGeometry, CapsuleGeometry, CylinderGeometry, DoubleSide, ExtrudeGeometry, Float32BufferAttribute, Group, Mesh,
+  MeshStandardMaterial, Quaternion, Shape, SphereGeometry, Vector2, Vector3,
 } from 'three';
 
 const LINK_RADIUS = 0.028;  // m, of capsules
@@ -14,9 +14,20 @@ export function place(object, pose) {
   object.quaternion.set(x, y, z, w);
 }
 
-function shapeGeometry(visual) {
+/** Corners are whole steps within the mesh's box. */
+function meshGeometry({low, size, steps, vertices, indices}) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new Float32BufferAttribute(vertices.map((v, i) => low[i % 3] + v * size[i % 3] / steps), 3));
+  geometry.setIndex(indices);
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+function shapeGeometry(visual, meshes) {
   if (visual.shape === 'box') return new BoxGeometry(...visual.size);
   if (visual.shape === 'sphere') return new SphereGeometry(visual.radius, 24, 16);
+  if (visual.shape === 'mesh') return meshes[visual.mesh];
+  if (visual.shape === 'capsule') return new CapsuleGeometry(visual.radius, visual.length, 8, 20).rotateX(Math.PI / 2);
   return new CylinderGeometry(visual.radius, visual.radius, visual.length, 24).rotateX(Math.PI / 2);  // along z
 }
 
@@ -37,6 +48,7 @@ export class RobotView {
     this.object = new Group();
     const look = ghost ? {transparent: true, opacity: 0.3, depthWrite: false} : {roughness: 0.75, metalness: 0.05};
     this.material = new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : 0x8fa3b8, ...look});
+    this.meshMaterial = new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : 0x8fa3b8, ...look, flatShading: true, side: DoubleSide});
     this.soleMaterials = robot.feet.map((_, f) =>
       new MeshStandardMaterial({color: ghost ? 0x8a6fd0 : [0x3f7fd6, 0xe08a2c][f], ...look}));
     this.groups = robot.bodies.map(() => new Group());
@@ -52,15 +64,17 @@ export class RobotView {
   }
 
   #addVisuals() {
-    const {bodies, feet, visuals} = this.robot;
+    const {bodies, feet, visuals, capsules} = this.robot;
+    const meshes = this.robot.meshes.map(meshGeometry);
     for (const visual of visuals) {
-      const mesh = new Mesh(shapeGeometry(visual), this.material);
+      const mesh = new Mesh(shapeGeometry(visual, meshes), visual.shape === 'mesh' ? this.meshMaterial : this.material);
       place(mesh, visual.pose);
+      if (visual.scale) mesh.scale.set(...visual.scale);
       this.groups[visual.body].add(mesh);
     }
     const zero = new Vector3();
     bodies.forEach((body, b) => {
-      if (visuals.some((v) => v.body === b)) return;
+      if (!capsules.includes(b)) return;
       const ends = [...bodies.filter((child) => child.parent === b).map((child) => child.origin.position),
         ...feet.filter((foot) => foot.body === b).map((foot) => foot.sole.position)];
       for (const end of ends) {
