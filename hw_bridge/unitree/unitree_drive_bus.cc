@@ -127,7 +127,7 @@ std::string UnitreeDriveBus::Stop() {
   return {};
 }
 
-bool UnitreeDriveBus::ReceiveState(int64_t deadline) {
+bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
   while (link_->Receive(&state_, deadline)) {
     if (state_.crc != CrcOf(state_)) {
       ++damaged_;
@@ -137,6 +137,8 @@ bool UnitreeDriveBus::ReceiveState(int64_t deadline) {
     if (known_ && static_cast<int32_t>(state_.tick - last_tick_) <= 0) continue;
     known_ = true;
     last_tick_ = state_.tick;
+    // An emulated robot numbers the states of the run's cycles; those before are none of it.
+    if (in_run && config_.simulated_time() && state_.reserve[0] == 0) continue;
     return true;
   }
   return false;
@@ -220,7 +222,7 @@ const drive_feedback_t* UnitreeDriveBus::Receive() {
   const int64_t damaged_before = damaged_;
   const int64_t wait = config_.simulated_time() ? int64_t{config_.state_timeout()} * kMillisecond
                                                 : int64_t{config_.input_wait()} * 1000;
-  fresh_ = ReceiveState(cycle_start_ + wait);
+  fresh_ = ReceiveState(cycle_start_ + wait, true);
   silent_in_a_row_ = fresh_ || damaged_ > damaged_before ? 0 : silent_in_a_row_ + 1;
   Judge(fresh_);
   health_.working_counter_errors = damaged_;
@@ -257,7 +259,7 @@ MotorCmd UnitreeDriveBus::CommandOf(size_t joint, const drive_command_t& command
   return result;
 }
 
-void UnitreeDriveBus::SendMotors(const drive_command_t* command) {
+void UnitreeDriveBus::SendMotors(const drive_command_t* command, bool enable) {
   command_ = {};
   command_.mode_machine = state_.mode_machine;
   const bool sized =
@@ -270,23 +272,23 @@ void UnitreeDriveBus::SendMotors(const drive_command_t* command) {
     if (feedback_.drive_status[j] == drive_feedback_t::DRIVE_FAULT) continue;  // free
     if (sized && command->enabled[j] != 0) {
       motor = CommandOf(j, *command);
-    } else if (config_.rest_damping() > 0) {
+    } else if (enable || config_.rest_damping() > 0) {
       motor.mode = kMotorEnabled;
       motor.kd = Finite(config_.rest_damping());
     }
   }
   // Says which state it answers where both ends wait for each other; a robot's are zero.
-  if (config_.simulated_time()) command_.reserve[0] = last_tick_;
+  if (config_.simulated_time()) command_.reserve[0] = state_.reserve[0];
   command_.crc = CrcOf(command_);
   ++health_.frames_sent;
   if (!link_->Send(command_)) ++health_.frames_lost;
 }
 
-void UnitreeDriveBus::Idle(bool) {
+void UnitreeDriveBus::Idle(bool enable) {
   cycle_start_ = link_->Now();
   fresh_ = ReceiveState(cycle_start_);
   if (fresh_) TakeState();
-  SendMotors(nullptr);
+  SendMotors(nullptr, enable);
 }
 
 void UnitreeDriveBus::Send(const drive_command_t& command) { SendMotors(&command); }

@@ -50,13 +50,14 @@ class UnitreeDriveBus final : public DriveBus {
   };
 
   void Release(int64_t deadline);
-  /// Takes states until one is whole and newer than the last.
-  bool ReceiveState(int64_t deadline);
+  /// Takes states until one is whole and newer than the last; in simulated time, `in_run`, one of
+  /// the run's cycles.
+  bool ReceiveState(int64_t deadline, bool in_run = false);
   bool TakeState();
   void TakeMotors();
   void TakeImu();
   void Judge(bool complete);
-  void SendMotors(const drive_command_t* command);
+  void SendMotors(const drive_command_t* command, bool enable = false);
   MotorCmd CommandOf(size_t joint, const drive_command_t& command);
 
   RobotLink* link_;

@@ -28,7 +28,7 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
       motors_(model.motors()),
       slots_(MotorSlots(model, config.layout(), config.slot())),
       period_(period),
-      watchdog_cycles_(static_cast<int64_t>(std::floor(config.watchdog() / period))) {
+      watchdog_cycles_(std::llround(config.watchdog() / period)) {
   if (config.state_delay() > kMostDelay) throw ConfigError("state_delay", "must be at most 100");
   if (config.command_delay() > kMostDelay) {
     throw ConfigError("command_delay", "must be at most 100");
@@ -126,15 +126,19 @@ void EmulatedRobot::ApplyTroubles() {
   if (Find(UnitreeTrouble::BAD_CRC) != nullptr) sent_.motor_state[slots_[0]].q += 1;
 }
 
-const LowState* EmulatedRobot::State(const drive_feedback_t& feedback, uint32_t tick) {
+const LowState* EmulatedRobot::State(const drive_feedback_t& feedback, uint32_t tick,
+                                     uint32_t cycle) {
   now_.mode_machine = static_cast<uint8_t>(config_.mode_machine());
   now_.imu_state.quaternion[0] = 1;
+  const bool first = !known_;
   FillMotors(feedback);
+  if (first) std::fill(states_.begin(), states_.end(), now_);
   states_[next_state_] = now_;
   next_state_ = (next_state_ + 1) % states_.size();
   sent_ = states_[next_state_];  // the oldest
   sent_.mode_machine = now_.mode_machine;
   sent_.tick = tick;
+  sent_.reserve[0] = cycle;
   ApplyTroubles();
   return Find(UnitreeTrouble::NO_STATE) != nullptr ? nullptr : &sent_;
 }

@@ -23,7 +23,8 @@ class EmulatedRobot {
   /// Begins, goes on with and ends the troubles of this time, s.
   void SetTime(double time);
   /// What the robot says `tick` ms after its start, of what the motors report. nullptr: nothing.
-  const LowState* State(const drive_feedback_t& feedback, uint32_t tick);
+  /// `cycle`: of the run, from 1, in simulated time; else 0.
+  const LowState* State(const drive_feedback_t& feedback, uint32_t tick, uint32_t cycle = 0);
   const ImuState& torso_imu() const { return sent_.imu_state; }
 
   /// Takes a command that has come. False, and it is as if none had: wrong check sum, another

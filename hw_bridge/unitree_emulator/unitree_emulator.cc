@@ -35,9 +35,9 @@ struct UnitreeEmulator::Ends {
 void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
   config_ = context.config<UnitreeEmulatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
-  period_ = context.tick_period;
+  period_ = static_cast<uint32_t>(std::max(1LL, std::llround(context.tick_period * 1e3)));
   try {
-    robot_ = std::make_unique<unitree::EmulatedRobot>(config_, *model, period_);
+    robot_ = std::make_unique<unitree::EmulatedRobot>(config_, *model, context.tick_period);
   } catch (const unitree::UnitreeError& error) {
     throw ConfigError("", error.what());
   }
@@ -61,10 +61,11 @@ void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring)
 
 void UnitreeEmulator::Open() { ends_ = std::make_unique<Ends>(config_); }
 
-void UnitreeEmulator::Publish(uint32_t tick) {
-  const unitree::LowState* state = robot_->State(last_feedback_, tick);
+void UnitreeEmulator::Publish() {
+  time_ += period_;
+  const unitree::LowState* state =
+      robot_->State(last_feedback_, time_, config_.simulated_time() ? cycle_ : 0);
   state_sent_ = state != nullptr;
-  state_tick_ = tick;
   if (!ends_ || !state_sent_) return;
   ends_->states.Write(*state);
   ends_->torso_imu.Write(robot_->torso_imu());
@@ -77,12 +78,13 @@ void UnitreeEmulator::TakeCommands() {
   while (ends_->commands.Take(&command_)) robot_->Take(command_);
 }
 
-/// Before the first tick the robot hangs still, at 0 ms, and answers whoever asks.
+/// Before the first tick and after the last the robot stays where it is, and answers whoever asks.
 void UnitreeEmulator::Idle() {
   if (!ends_) return;
   TakeCommands();
   robot_->Act(&*drive_command_);
-  Publish(state_tick_);
+  if (cycle_ > 0) ++cycle_;
+  Publish();
 }
 
 std::string UnitreeEmulator::Close() {
@@ -97,7 +99,8 @@ void UnitreeEmulator::Sense(const Tick& tick) {
     return;
   }
   last_feedback_ = *drive_feedback_;
-  Publish(static_cast<uint32_t>(std::llround(static_cast<double>(tick.index + 1) * period_ * 1e3)));
+  cycle_ = static_cast<uint32_t>(tick.index + 1);
+  Publish();
   drive_feedback_t& message = *sensor_feedback_;
   message.position_counts = last_feedback_.position_counts;
   message.current = last_feedback_.current;
@@ -116,7 +119,7 @@ void UnitreeEmulator::Act(const Tick&) {
     const int64_t deadline = unitree::MonotonicNow() + int64_t{config_.command_wait()} * 1'000'000;
     while (ends_->commands.Await(deadline)) {
       if (!ends_->commands.Take(&command_)) continue;
-      if (command_.reserve[0] < state_tick_) continue;  // of an earlier one
+      if (command_.reserve[0] < cycle_) continue;  // of an earlier one
       robot_->Take(command_);
       break;
     }

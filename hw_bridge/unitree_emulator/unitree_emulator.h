@@ -28,7 +28,7 @@ class UnitreeEmulator final : public Component {
   void Sense(const Tick& tick);
   void Act(const Tick& tick);
   void TakeCommands();
-  void Publish(uint32_t tick);
+  void Publish();
 
   Input<drive_feedback_t> drive_feedback_;
   Input<drive_command_t> bridge_command_;
@@ -40,8 +40,9 @@ class UnitreeEmulator final : public Component {
   std::unique_ptr<Ends> ends_;
   drive_feedback_t last_feedback_;
   unitree::LowCmd command_{};
-  double period_ = 0;        // s
-  uint32_t state_tick_ = 0;  // of the state that was sent last
+  uint32_t period_ = 0;  // ms, at least 1
+  uint32_t time_ = 0;    // ms, of the last state
+  uint32_t cycle_ = 0;   // of the run, from 1
   bool state_sent_ = false;
 };
 

@@ -83,7 +83,9 @@ TEST(Drivetrain, ADrivesImpedanceIsASpringAndADamper) {
       worst = std::max(worst, std::abs(load.q - x));
     }
     EXPECT_LT(worst, 10 * h * target * frequency / 2);
-    if (worst_before > 0) EXPECT_NEAR(worst, worst_before / 2, worst_before / 20);  // first order
+    if (worst_before > 0) {
+      EXPECT_NEAR(worst, worst_before / 2, worst_before / 20);  // first order
+    }
     worst_before = worst;
   }
 }

@@ -131,7 +131,7 @@ TEST(UnitreeCommands, StiffnessAndDampingBreakNoLimit) {
   rig.command.damping.assign(kMotors, 1e9);
   rig.command.position.assign(kMotors, 100);
   rig.command.velocity.assign(kMotors, -1e6);
-  rig.Run(100);
+  rig.Run(20);
   for (size_t j = 0; j < kMotors; ++j) {
     const robot::MotorModel& motor = rig.model->motors()[j];
     const double limit =

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "components/framework/configuration/configuration.h"
 #include "hw_bridge/units.h"
 #include "tests/hw_bridge/unitree/robot_rig.h"
@@ -59,7 +61,7 @@ TEST_F(EmulatedRobotTest, DelaysStatesAndCommands) {
     EXPECT_EQ(state->motor_state[rig_.slots[0]].q, static_cast<float>(q)) << cycle;
     ASSERT_TRUE(robot_->Take(Command(static_cast<float>(cycle))));
     robot_->Act(&motors_);
-    if (cycle > 0) EXPECT_NEAR(Torque(), static_cast<double>(cycle - 1), 1e-5);
+    EXPECT_NEAR(Torque(), static_cast<double>(std::max<int64_t>(0, cycle - 1)), 1e-5);
   }
 }
 
@@ -68,7 +70,7 @@ TEST_F(EmulatedRobotTest, DampsByItselfWithoutCommandsAndFollowsAgain) {
   ASSERT_TRUE(robot_->Take(Command(5)));
   int cycles = 0;
   for (; !robot_->damping() && cycles < 100; ++cycles) robot_->Act(&motors_);
-  // Nine cycles more than the one that the command came in are 20 ms; the next damps.
+  // The command's own cycle and ten more, which are 20 ms; the next damps.
   EXPECT_EQ(cycles, 12);
   EXPECT_EQ(motors_.current[0], 0);
   EXPECT_EQ(motors_.damping[0], 8);

@@ -16,7 +16,7 @@ namespace {
 /// POISE_FUZZ_SAMPLES, or enough to look at every kind of mutation.
 int Samples() {
   const char* const wanted = std::getenv("POISE_FUZZ_SAMPLES");
-  return wanted != nullptr ? std::atoi(wanted) : 20000;
+  return wanted != nullptr ? std::atoi(wanted) : 5000;
 }
 
 /// Changes some bytes anywhere, or a word into one of the numbers that are none.

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "components/messages/robot_resource.h"
+#include "hw_bridge/ethercat/links/socket_link.h"
 #include "hw_bridge/hw_bridge.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"

@@ -1,0 +1,84 @@
+// Runs through DDS, with an emulated robot: the same bits each time, troubles, G1.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "logging/metrics/metrics.h"
+#include "logging/replay/compare.h"
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+std::vector<std::string> Arguments(const std::string& out, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"run",     StandScenario(), "--drives",
+                                        "unitree", "--out",         out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+
+TEST(Unitree, StandsWithTheSameBitsEachTime) {
+  const RunFolder folder;
+  for (const char* name : {"first", "second"}) {
+    const ProgramResult result = RunPoise(Arguments(folder / name, {}));
+    ASSERT_EQ(result.exit_code, 0) << result.output;
+  }
+  const logging::LogComparison result =
+      logging::CompareLogs((folder / "first") + "/run.lcm", (folder / "second") + "/run.lcm");
+  EXPECT_TRUE(result.equal()) << result.earliest->tick << " " << result.earliest->channel << "."
+                              << result.earliest->field << ": " << result.earliest->first << " and "
+                              << result.earliest->second;
+  EXPECT_GT(result.messages, 0);
+}
+
+TEST(Unitree, TheRemotesButtonStopsTheRobotAndIsNamedInTheLog) {
+  const RunFolder folder;
+  const std::string run = folder / "run";
+  const ProgramResult result =
+      RunPoise(Arguments(run, {"--set", "unitree_emulator.trouble[0].kind=BUTTON", "--set",
+                               "unitree_emulator.trouble[0].button[0]=B", "--set",
+                               "unitree_emulator.trouble[0].from=0.2"}));
+  EXPECT_NE(ReadSummary(run)["events"].dump().find("remote's stop button"), std::string::npos)
+      << result.output;
+  const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
+  int64_t stopped = 0;
+  while (stopped < record.num_ticks &&
+         record.bridge.at(stopped)->state <= bridge_status_t::STATE_RUNNING) {
+    ++stopped;
+  }
+  EXPECT_EQ(stopped, 100);  // 0.2 s
+}
+
+TEST(Unitree, StandsAsG1) {
+  const char* const given = std::getenv("POISE_ROBOTS");
+  const std::filesystem::path robots =
+      given != nullptr ? given : POISE_SOURCE_DIR "/../shared/robots";
+  const std::filesystem::path urdf = robots / "g1_29dof_rev_1_0.urdf";
+  if (!std::filesystem::exists(urdf)) {
+    GTEST_SKIP() << urdf << " is not there: the maker's file is not part of Poise";
+  }
+  const RunFolder folder;
+  const std::filesystem::path g1 = folder / "g1";
+  std::filesystem::create_directories(g1);
+  std::filesystem::copy_file(urdf, g1 / urdf.filename());
+  std::filesystem::copy_file(POISE_SOURCE_DIR "/deploy/robots/g1/g1.pbtxt", g1 / "g1.pbtxt");
+  const ProgramResult result = RunPoise({"run", "stand", "--robot", g1.string(), "--drives",
+                                         "unitree", "--duration", "1", "--out", folder / "run"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+}
+
+TEST(Unitree, RefusesWhatCannotBe) {
+  const RunFolder folder;
+  ExpectUsageError({"run", StandScenario(), "--drives", "unitree", "--inline"},
+                   {"--inline", "--drives"});
+  ExpectUsageError(Arguments(folder / "a", {"--link", "udp"}), {"--link", "no frames"});
+  ExpectUsageError(Arguments(folder / "b", {"--capture", folder / "c.pcap"}),
+                   {"--capture", "no frames"});
+  ExpectUsageError(Arguments(folder / "d", {"--set", "hw_bridge.unitree.slot[0].joint=tail"}),
+                   {"hw_bridge.unitree", "tail"});
+}
+
+}  // namespace
+}  // namespace poise
