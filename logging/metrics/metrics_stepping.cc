@@ -1,3 +1,4 @@
+#include "components/messages/conversions.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
 
@@ -14,14 +15,21 @@ std::vector<Interval> Steps(const RunRecord& run) {
   });
 }
 
+// Share of the largest force from which a push counts: its measurement is noisy.
+constexpr double kPushShare = 0.05;
+
 /// The first tick that was pushed in.
 std::optional<int64_t> PushBegin(const RunRecord& run) {
+  double largest = 0;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    if (const external_push_t* push = run.push.at(tick)) {
+      largest = std::max(largest, GetVector3(push->force).norm());
+    }
+  }
+  if (!(largest > 0)) return {};
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     const external_push_t* push = run.push.at(tick);
-    if (push == nullptr) continue;
-    for (const double force : push->force) {
-      if (force != 0) return tick;
-    }
+    if (push != nullptr && GetVector3(push->force).norm() > kPushShare * largest) return tick;
   }
   return {};
 }

@@ -179,7 +179,7 @@ TEST_P(MonitorCase, InAStepBodyOrComGiveWayAndNothingElse) {
         &context_, "region: POLYGON sole_margin: 0.045 body_share: " + std::to_string(share));
     int active = 0;
     for (int trial = 0; trial < 60; ++trial) {
-      Draw(12);
+      Draw(plan_.in_contact[0] && plan_.in_contact[1] ? 60 : 12);
       Run(&harness);
       const auto& out = harness.output<balance_torque_t>();
       if (out.status != balance_torque_t::STATUS_OK || !(out.active_x || out.active_y)) continue;

@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace poise::stepping {
 namespace {
@@ -19,8 +18,6 @@ constexpr double kTimeTolerance = 2e-3;  // s: a tick
 constexpr double kMarginOfTime = 0.05;
 // m by which a step that does not catch the capture point must still come nearer than standing.
 constexpr double kLeastGain = 0.02;
-// Of the way to the capture point: beyond what legs reach.
-constexpr double kFarAlong = 3;
 
 }  // namespace
 
@@ -61,30 +58,17 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
   const double narrow = std::max(side * caught.y() + 0.5 * limits_.spacing, reach_.least_spacing());
   wanted.y() = side * std::max(side * wanted.y(), std::min(limits_.spacing, narrow));
   const balance::ConvexPolygon footholds = reach_.Footholds(foot, local(plan.com));
-  const balance::ConvexPolygon stands =
-      SoleAt(feet_[s], limits_.edge, state.sole[s], state.sole_yaw[s]);
-  const auto consider = [&](const Vector2d& foothold) {
-    const Vector2d centre = state.sole[s] + turn * foothold;
-    const double margin = balance::SignedDistance(
-        HullOf(stands, SoleAt(feet_[static_cast<size_t>(foot)], limits_.edge, centre, plan.yaw)),
-        plan.capture_point);
-    if (margin <= plan.margin) return;
-    plan.margin = margin;
-    plan.foothold = centre;
-  };
-  plan.margin = -std::numeric_limits<double>::infinity();
+  Vector2d foothold = wanted;
   if (footholds.num_corners > 0) {
-    consider(balance::NearestPoint(footholds, wanted));
-    // Nearer to the other foot, and as far as the leg reaches that way: the soles' hull may hold
-    // the capture point where no sole does.
-    if (plan.margin < limits_.enough) {
-      consider(balance::NearestPoint(footholds, caught));
-      consider(balance::NearestPoint(footholds, Vector2d(kFarAlong * caught)));
-      consider(balance::NearestPoint(footholds, Vector2d(kFarAlong * away)));
-    }
+    foothold = balance::NearestPoint(footholds, wanted);
   } else {
-    consider({0, side * limits_.spacing});
+    foothold = {0, side * limits_.spacing};
   }
+  plan.foothold = state.sole[s] + turn * foothold;
+  const balance::ConvexPolygon soles =
+      HullOf(SoleAt(feet_[s], limits_.edge, state.sole[s], state.sole_yaw[s]),
+             SoleAt(feet_[static_cast<size_t>(foot)], limits_.edge, plan.foothold, plan.yaw));
+  plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   const double follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-local(plan.com)));
   plan.margin = std::min(plan.margin, plan.margin + follows);

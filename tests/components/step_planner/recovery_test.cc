@@ -340,8 +340,7 @@ TEST_P(RecoveryCase, TheArchiveIsAllOfItsState) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Robots, RecoveryCase,
-                         testing::Values(TestRobot::kDyros));
+INSTANTIATE_TEST_SUITE_P(Robots, RecoveryCase, testing::Values(TestRobot::kDyros));
 
 }  // namespace
 }  // namespace poise::stepping
