@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/framework/run.h"
 #include "components/messages/conversions.h"
 #include "components/messages/robot_resource.h"
@@ -178,9 +179,12 @@ Eigen::Vector2d CenterOfPressure(const robot::Vector6d& wrench) {
 }  // namespace
 
 void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) {
-  const auto config = context.config<StateEstimatorConfig>();
-  const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
+  auto config = context.config<StateEstimatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
+  if (!config.has_joint_velocity_cutoff()) {
+    config.set_joint_velocity_cutoff(balance::VelocityCutoff(*model));
+  }
+  const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
   const InvariantEstimatorConfig invariant = ReadInvariantConfig(config, model->drive_train());
   wrenches_ = std::make_unique<FootWrenches>(model, ReadFootWrenchSettings(config));
   calibrator_ =

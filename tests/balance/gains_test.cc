@@ -92,6 +92,23 @@ TEST(GainRule, GivesEveryRobotOfOursAMargin) {
   }
 }
 
+// Soft gears: the low-pass stays below them, and the margin is there again.
+TEST(GainRule, FiltersBelowTheSlowestRotorOnItsGear) {
+  const auto heron = [] {
+    const std::string path = std::string(POISE_SOURCE_DIR) + "/deploy/robots/heron/heron.pbtxt";
+    return robot::LoadRobotFiles(path);
+  }();
+  // The knees' 1.1e-4 kg·m² behind 1:51, gears of 3e4 N·m/rad.
+  EXPECT_NEAR(VelocityCutoff(heron), 0.25 * std::sqrt(3e4 / (51 * 51 * 1.1e-4)) / (2 * M_PI), 1e-9);
+  EXPECT_EQ(VelocityCutoff(*Biped()), 20);
+  StandingGains gains = GainsByRule(heron, kPeriod);
+  for (const auto& in_contact : {kDouble, kRight}) {
+    EXPECT_GE(GainMargin(heron, gains, in_contact, kPeriod), 2);
+  }
+  gains.velocity_cutoff = gains.base_velocity_cutoff = 20;
+  EXPECT_LT(GainMargin(heron, gains, kRight, kPeriod), 1.5);
+}
+
 // What the low-pass on the base's velocity is for: gears that ring between motor and link.
 TEST(GainRule, FiltersWhatGearsWouldRingWith) {
   const auto model = Biped();

@@ -14,6 +14,9 @@ constexpr double kDamping = 0.7;        // of the COM and the body
 constexpr double kPhase = 1.0 / 3;      // rad at k_d that the loop's delay may cost
 constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
 constexpr double kVelocityCutoff = 20;  // Hz
+// Of the lowest frequency at which a rotor rings on its gear: a second-order low-pass leaves a
+// sixteenth of it.
+constexpr double kGearShare = 0.25;
 
 }  // namespace
 
@@ -32,7 +35,17 @@ double LimitHorizon(const robot::RobotModel& model, double period) {
   return kHorizon * LoopDelay(model, VelocityCutoff(model), period);
 }
 
-double VelocityCutoff(const robot::RobotModel&) { return kVelocityCutoff; }
+double VelocityCutoff(const robot::RobotModel& model) {
+  const double stiffness = model.drive_train().gear_stiffness;
+  double cutoff = kVelocityCutoff;
+  for (const robot::MotorModel& motor : model.motors()) {
+    if (!(stiffness > 0 && motor.reflected_inertia > 0)) continue;
+    const double gear =
+        std::sqrt(stiffness / motor.reflected_inertia) / (2 * std::numbers::pi);  // Hz
+    cutoff = std::min(cutoff, kGearShare * gear);
+  }
+  return cutoff;
+}
 
 StandingGains GainsByRule(const robot::RobotModel& model, double period) {
   StandingGains gains;

@@ -10,7 +10,7 @@ namespace poise::balance {
 /// rad/s, √(g/h) with h the COM's height in the stance.
 double PendulumFrequency(const robot::RobotModel& model);
 
-/// Hz, of the low-pass on joint velocities.
+/// Hz, of the low-pass on joint velocities: well below every rotor on its gear, √(k/J).
 double VelocityCutoff(const robot::RobotModel& model);
 
 /// s, from a joint's motion to the torque that answers it: velocity filter, delay, current loop,
