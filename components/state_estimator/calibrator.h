@@ -36,8 +36,11 @@ class Calibrator {
              double period);
 
   bool enabled() const { return settings_.enabled; }
-  /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
-  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt);
+  /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames; and
+  /// the accelerometer's bias as it is known, m/s². Nothing is learnt before that has settled: the
+  /// specific force is wrong by it, and what changes with the specific force is the COM's height.
+  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt,
+             const Eigen::Vector3d& accelerometer_bias = Eigen::Vector3d::Zero());
   /// With what the observer has found in this tick without any load; `usable`: both wrenches are
   /// measured.
   void Update(const WrenchObserver& observer, bool usable);
@@ -60,7 +63,9 @@ class Calibrator {
   double correlated_;  // samples that the filter makes one of
   Load estimate_ = Load::Zero(), applied_ = Load::Zero();
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();
-  double since_ = 0;  // s, since the last correction
+  double since_ = 0;                                // s, since the last correction
+  Eigen::Vector3d bias_ = Eigen::Vector3d::Zero();  // m/s², averaged
+  double settled_ = 0;                              // s, for which the bias has been its average
   bool running_ = false, started_ = false;
 };
 
