@@ -15,10 +15,6 @@ using Eigen::Vector3d;
 // anywhere, a COM off by 3 cm.
 constexpr double kStartMass = 0.15, kStartShift = 0.05;
 
-// m/s² and s: the accelerometer's bias has settled when it has stayed so near its average over this
-// time for as long.
-constexpr double kSettledBias = 0.01, kBiasTime = 0.2;
-
 double Square(double x) { return x * x; }
 
 }  // namespace
@@ -35,10 +31,7 @@ Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model,
       Vector3d::Constant(Square(kStartShift * mass));
 }
 
-void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt,
-                       const Vector3d& accelerometer_bias) {
-  bias_ += std::min(dt / kBiasTime, 1.0) * (accelerometer_bias - bias_);
-  settled_ = (accelerometer_bias - bias_).norm() < kSettledBias ? settled_ + dt : 0;
+void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt) {
   for (size_t f = 0; f < 2; ++f) input_.segment<6>(static_cast<Eigen::Index>(6 * f)) = wrench[f];
   if (started_) {
     filter_.Step(input_, dt);
@@ -58,7 +51,7 @@ void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt,
 void Calibrator::Update(const WrenchObserver& observer, bool usable) {
   const Vector3d& s = observer.specific_force();
   const Vector3d& w = observer.data().body_angular_velocity[0];
-  running_ = usable && settled_ >= kBiasTime && w.norm() < settings_.still_rate &&
+  running_ = usable && w.norm() < settings_.still_rate &&
              std::abs(s.norm() - robot::kGravity) < settings_.still_acceleration;
   if (!running_) return;
   // Environment on robot, base axes, about the base's origin.
@@ -82,7 +75,7 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
   const double mass = model_->total_mass();
   const double dt = std::max(since_, 0.0);
   since_ = 0;
-  covariance_.diagonal().array() += Square(settings_.walk * mass) * dt;
+  covariance_.diagonal().head<3>().array() += Square(settings_.walk * mass) * dt;
   const robot::Vector6d gap = measured - regressor * estimate_;
   Eigen::Matrix<double, 6, 1> noise;
   noise.head<3>().setConstant(correlated_ * Square(settings_.force_error));
@@ -97,14 +90,18 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
     running_ = false;
     return;
   }
-  const Eigen::Matrix<double, 6, 4> gain = factors.solve(cross.transpose());
-  estimate_ += gain.transpose() * gap;
-  covariance_ -= cross * gain;
+  Eigen::Matrix<double, 4, 6> gain = factors.solve(cross.transpose()).transpose();
+  gain.row(3).setZero();  // considered
+  estimate_ += gain * gap;
+  // Joseph's form, which holds for any gain.
+  const Eigen::Matrix4d left = Eigen::Matrix4d::Identity() - gain * regressor;
+  covariance_ =
+      left * covariance_ * left.transpose() + gain * noise.asDiagonal() * gain.transpose();
 }
 
 void Calibrator::Archive(StateArchive* archive) {
   filter_.Archive(archive);
-  archive->Show(estimate_, applied_, covariance_, since_, running_, started_, bias_, settled_);
+  archive->Show(estimate_, applied_, covariance_, since_, running_, started_);
 }
 
 }  // namespace poise

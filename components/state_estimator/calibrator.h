@@ -3,8 +3,9 @@
 // The soles' wrenches tell the resultant that the ground exerts; the model tells what the motion
 // asks for. What lies between is linear in four numbers, a mass and its moment (mass times place in
 // the base frame): a load, or an error of the model's COM, which is a moment without mass. A Kalman
-// filter of constant parameters with a slow walk. docs/estimation.md says what standing still, a
-// sway, and neither can tell.
+// filter of constant parameters with a slow walk. The moment along z, the COM's height, is
+// considered and not estimated (Schmidt): standing tells it by a sway whose own errors are as
+// large. docs/estimation.md says what standing still, a sway, and neither can tell.
 #pragma once
 
 #include <Eigen/Core>
@@ -36,11 +37,8 @@ class Calibrator {
              double period);
 
   bool enabled() const { return settings_.enabled; }
-  /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames; and
-  /// the accelerometer's bias as it is known, m/s². Nothing is learnt before that has settled: the
-  /// specific force is wrong by it, and what changes with the specific force is the COM's height.
-  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt,
-             const Eigen::Vector3d& accelerometer_bias = Eigen::Vector3d::Zero());
+  /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
+  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt);
   /// With what the observer has found in this tick without any load; `usable`: both wrenches are
   /// measured.
   void Update(const WrenchObserver& observer, bool usable);
@@ -63,9 +61,7 @@ class Calibrator {
   double correlated_;  // samples that the filter makes one of
   Load estimate_ = Load::Zero(), applied_ = Load::Zero();
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();
-  double since_ = 0;                                // s, since the last correction
-  Eigen::Vector3d bias_ = Eigen::Vector3d::Zero();  // m/s², averaged
-  double settled_ = 0;                              // s, for which the bias has been its average
+  double since_ = 0;  // s, since the last correction
   bool running_ = false, started_ = false;
 };
 

@@ -229,8 +229,7 @@ void StateEstimator::Estimate(const Tick& tick) {
     sensors.foot_cop[f] = CenterOfPressure(wrenches_->wrench(f));
   }
   if (calibrator_->enabled()) {
-    calibrator_->Track({wrenches_->wrench(0), wrenches_->wrench(1)}, dt,
-                       Correction().accelerometer_bias);
+    calibrator_->Track({wrenches_->wrench(0), wrenches_->wrench(1)}, dt);
     if (wrenches_->observed()) {
       calibrator_->Update(wrenches_->observer(), wrenches_->measured(0) && wrenches_->measured(1));
     }
