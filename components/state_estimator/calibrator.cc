@@ -75,7 +75,7 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
   const double mass = model_->total_mass();
   const double dt = std::max(since_, 0.0);
   since_ = 0;
-  covariance_.diagonal().array() += Square(settings_.walk * mass) * dt;
+  covariance_.diagonal().head<3>().array() += Square(settings_.walk * mass) * dt;
   const robot::Vector6d gap = measured - regressor * estimate_;
   Eigen::Matrix<double, 6, 1> noise;
   noise.head<3>().setConstant(correlated_ * Square(settings_.force_error));
@@ -90,9 +90,13 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
     running_ = false;
     return;
   }
-  const Eigen::Matrix<double, 6, 4> gain = factors.solve(cross.transpose());
-  estimate_ += gain.transpose() * gap;
-  covariance_ -= cross * gain;
+  Eigen::Matrix<double, 4, 6> gain = factors.solve(cross.transpose()).transpose();
+  gain.row(3).setZero();  // considered
+  estimate_ += gain * gap;
+  // Joseph's form, which holds for any gain.
+  const Eigen::Matrix4d left = Eigen::Matrix4d::Identity() - gain * regressor;
+  covariance_ =
+      left * covariance_ * left.transpose() + gain * noise.asDiagonal() * gain.transpose();
 }
 
 void Calibrator::Archive(StateArchive* archive) {

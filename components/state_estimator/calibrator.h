@@ -3,8 +3,9 @@
 // The soles' wrenches tell the resultant that the ground exerts; the model tells what the motion
 // asks for. What lies between is linear in four numbers, a mass and its moment (mass times place in
 // the base frame): a load, or an error of the model's COM, which is a moment without mass. A Kalman
-// filter of constant parameters with a slow walk. docs/estimation.md says what standing still, a
-// sway, and neither can tell.
+// filter of constant parameters with a slow walk. The moment along z, the COM's height, is
+// considered and not estimated (Schmidt): standing tells it by a sway whose own errors are as
+// large. docs/estimation.md says what standing still, a sway, and neither can tell.
 #pragma once
 
 #include <Eigen/Core>

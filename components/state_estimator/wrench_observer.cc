@@ -23,9 +23,9 @@ constexpr double kLongestStep = 0.1;  // s: after a longer gap the filter starts
 constexpr double kPriorForce = 2, kPriorMoment = 0.3;
 // (N·m)², of a joint's row at least, beside what encoder steps leave of the rotor's acceleration.
 constexpr double kLeastVariance = 0.01;
-// s, over which what a free foot seems to carry is compared with its deviation, and for which that
-// holds when it is no longer free; and while it may be pressed.
-constexpr double kFitTime = 1, kPressedFitTime = 5;
+// s, over which what a free foot seems to carry is compared with its deviation; while it may be
+// pressed; and for which that holds when it is no longer free.
+constexpr double kFitTime = 0.3, kPressedFitTime = 5, kFitHold = 1;
 constexpr double kLeastFit = 0.1;  // a third of the deviation
 // s, over which the wrenches' rate of change is averaged.
 constexpr double kRateTime = 0.02;
@@ -313,7 +313,7 @@ void WrenchObserver::Learn(double dt) {
     const bool begins = free_foot_[f].Update(speed, excess, press, dt);
     const bool pressed = press > 1;
     if (!free_foot_[f].free() || begins) {
-      fit_[f] += begins ? 1 - fit_[f] : std::min(dt / kFitTime, 1.0) * (1 - fit_[f]);
+      fit_[f] += begins ? 1 - fit_[f] : std::min(dt / kFitHold, 1.0) * (1 - fit_[f]);
       if (!begins) continue;
     }
     const double size = std::clamp(Square(load), kLeastFit, 1.0);

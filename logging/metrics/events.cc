@@ -23,6 +23,8 @@ double Tenths(double value) {
   return tenths == 0 ? 0 : tenths;
 }
 
+constexpr double kKnownHeight = 5;  // mm, standard deviation of a COM that is known
+
 class EventList {
  public:
   explicit EventList(const RunRecord& run) : run_(run) {}
@@ -218,6 +220,43 @@ void AddFootSensors(const RunRecord& run, EventList* events) {
                              SensorFaultText(run.estimator.at(tick)->foot_sensor[foot]));
         });
   }
+}
+
+// What calibration has found by the run's end, and what standing does not tell.
+void AddCalibration(const RunRecord& run, EventList* events) {
+  const estimator_status_t* last = nullptr;
+  bool ran = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const estimator_status_t* status = run.estimator.at(tick);
+    if (status == nullptr) continue;
+    last = status;
+    ran = ran || status->calibration == estimator_status_t::CALIBRATION_RUNNING;
+  }
+  if (last == nullptr || last->calibration == estimator_status_t::CALIBRATION_OFF) return;
+  if (!ran) {
+    events->Add(run.num_ticks, "calibration",
+                "found nothing: it needs sensors in both feet and a robot that stands still");
+    return;
+  }
+  // Places of load_mass and load_moment on the diagonal of a packed 6 x 6 triangle.
+  constexpr std::array<size_t, 4> kDiagonal = {0, 6, 11, 15};
+  const double mass = run.robot.total_mass();
+  std::array<double, 3> shift{}, deviation{};  // mm of the whole robot's COM
+  for (size_t i = 0; i < 3; ++i) {
+    shift[i] = kMilli * last->load_moment[i] / mass;
+    deviation[i] =
+        kMilli * std::sqrt(std::max(last->calibration_covariance[kDiagonal[i + 1]], 0.0)) / mass;
+  }
+  events->Add(
+      run.num_ticks, "calibration",
+      fmt::format(
+          "load {:.2f} ± {:.2f} kg, which moves the COM by {:.1f} ± {:.1f}, {:.1f} ± {:.1f}, "
+          "{:.1f} ± {:.1f} mm{}; IMU turned by {:.1f}, {:.1f} mrad, its "
+          "accelerometer's bias as an angle included",
+          last->load_mass, std::sqrt(std::max(last->calibration_covariance[0], 0.0)), shift[0],
+          deviation[0], shift[1], deviation[1], shift[2], deviation[2],
+          deviation[2] > kKnownHeight ? " (along z standing still does not tell it)" : "",
+          kMilli * last->imu_tilt[0], kMilli * last->imu_tilt[1]));
 }
 
 void AddBalancing(const RunRecord& run, EventList* events) {
@@ -530,6 +569,7 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddWaiting(run, &events);
   AddFeet(run, ended, &events);
   AddFootSensors(run, &events);
+  AddCalibration(run, &events);
   AddBalancing(run, &events);
   AddCapturePoint(run, &events);
   AddSteps(run, &events);
