@@ -86,11 +86,25 @@ class Cleaner {
                           : fmt::format(" {}='c{}'", name, known->second);
   }
 
-  void Compiler(const TiXmlElement& element) {
-    compiler_ += KeptAttributes(element, "compiler");
-    if (const size_t again = compiler_.find(" autolimits="); again != std::string::npos) {
-      compiler_.erase(again, compiler_.find('\'', again + 13) + 1 - again);
+  // Of several <compiler> the last one's attributes hold.
+  void Merge(const std::string& attributes) {
+    for (size_t at = 0; at < attributes.size();) {
+      const size_t value = attributes.find('\'', at) + 1;
+      Forget(attributes.substr(at, value - at));
+      at = attributes.find('\'', value) + 1;
     }
+    compiler_ += attributes;
+  }
+
+  void Forget(const std::string& beginning) {
+    const size_t at = compiler_.find(beginning);
+    if (at == std::string::npos) return;
+    compiler_.erase(at, compiler_.find('\'', at + beginning.size()) + 1 - at);
+  }
+
+  void Compiler(const TiXmlElement& element) {
+    Merge(KeptAttributes(element, "compiler"));
+    Forget(" autolimits='");  // ours is set
     if (Attribute(element, "coordinate") == "global") {
       FailMjcf(element,
                "coordinate='global' is not supported: save the file with local coordinates");
@@ -99,7 +113,7 @@ class Cleaner {
       if (order.size() != 3 || order.find_first_not_of("xyzXYZ") != std::string::npos) {
         FailMjcf(element, "eulerseq is '{}': three of x, y, z, X, Y, Z must stand there", order);
       }
-      compiler_ += fmt::format(" eulerseq='{}'", order);
+      Merge(fmt::format(" eulerseq='{}'", order));
     }
     if (const auto total = MjcfNumbers(element, "settotalmass"); !total.empty() && total[0] > 0) {
       FailMjcf(element, "settotalmass is not supported: write the masses themselves");

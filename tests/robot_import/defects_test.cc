@@ -192,6 +192,7 @@ TEST(Defects, WhatIsNoRobotsFileIsNamedWithWhatToDo) {
   folder.file = WriteMaker("within", SimpleBiped()).parent_path();
   EXPECT_THAT(Refusal(folder), HasSubstr("is a folder: name the robot's file: it has within.urdf"));
   EXPECT_THAT(RefusalOf(" \n"), HasSubstr("is empty"));
+  EXPECT_THAT(RefusalOf("name: \"x\""), HasSubstr("is no XML"));
   EXPECT_THAT(RefusalOf("<sdf version='1.6'><model name='x'/></sdf>"),
               HasSubstr("SDF is not read"));
   EXPECT_THAT(RefusalOf("<robot name='x' xmlns:xacro='http://wiki.ros.org/xacro'>\n<link name='a'>"

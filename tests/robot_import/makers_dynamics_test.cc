@@ -20,11 +20,11 @@ using Real = long double;
 using MatrixL = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
 constexpr int kStates = 40;
-// Of the largest entry. MuJoCo's own numbers: it keeps quaternions, and what an MJCF file gives as
-// fullinertia or with six digits of a quaternion comes back 1e-8 off.
-constexpr double kDynamics = 1e-10, kDynamicsOfMjcf = 1e-6;
-// Λ_c and W⁺ are inverses: they lose what the posture's condition costs.
-constexpr double kContact = 1e-7, kContactOfMjcf = 1e-4;
+// Of the largest entry. Seen are 7e-15 and 6e-10: MuJoCo diagonalises what an MJCF file gives as
+// fullinertia to some 1e-9 by itself.
+constexpr double kDynamics = 1e-12, kDynamicsOfMjcf = 1e-7;
+// Inverses lose what the posture's condition costs. Seen are 3e-13 and 3e-9.
+constexpr double kContact = 1e-9, kContactOfMjcf = 1e-5;
 
 class MakersDynamics : public testing::TestWithParam<const char*> {
  protected:

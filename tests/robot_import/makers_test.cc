@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "components/robot/posture.h"
 #include "components/robot_files/robot_files.h"
 #include "tests/robot/robot_test_support.h"
@@ -84,6 +86,30 @@ INSTANTIATE_TEST_SUITE_P(Files, Makers,
                            }
                            return name;
                          });
+
+// deploy/robots holds the texts that today's importer writes, and where the file is to be had.
+TEST(MakersFiles, TextsOfTheRepositoryAreTodays) {
+  const auto folder = MakersFolder();
+  if (folder.empty()) GTEST_SKIP() << "the makers' files are not in $POISE_ROBOTS";
+  for (const auto& [file, text] : {std::pair{"g1_29dof_rev_1_0.urdf", "g1/g1"},
+                                   std::pair{"g1_29dof_rev_1_0.xml", "g1/g1_mjcf"},
+                                   std::pair{"talos_reduced_box.urdf", "talos/talos"},
+                                   std::pair{"icub_reduced.urdf", "icub/icub"},
+                                   std::pair{"dyros_tocabi.urdf", "tocabi/tocabi"}}) {
+    if (!exists(folder / file)) continue;
+    const auto kept =
+        std::filesystem::path(POISE_SOURCE_DIR) / "deploy/robots" / (std::string(text) + ".pbtxt");
+    std::string expected;
+    std::ifstream in(kept);
+    for (std::string line; std::getline(in, line);) {
+      if (!line.starts_with("source:")) expected += line + "\n";
+    }
+    ImportOptions options;
+    options.file = folder / file;
+    options.name = kept.stem();
+    EXPECT_EQ(RobotText(ImportRobot(options)), expected) << kept;
+  }
+}
 
 constexpr double kSixDigits = 5e-6;  // half of the last digit that MJCF prints of 1 to 10
 

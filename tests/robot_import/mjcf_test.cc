@@ -120,6 +120,13 @@ std::string With(const std::string& from, const std::string& to) {
   return text.replace(at, from.size(), to);
 }
 
+TEST(Mjcf, OfSeveralCompilersTheLastHolds) {
+  const std::string again =
+      With("<option", "<compiler angle=\"radian\" autolimits=\"false\"/><option");
+  EXPECT_NEAR(ReadMjcf(again, nullptr).source.FindJoint("elbow")->lower, -90, 1e-12);
+  EXPECT_NEAR(ReadMjcf(kText, nullptr).source.FindJoint("elbow")->lower, -M_PI / 2, 1e-12);
+}
+
 TEST(Mjcf, AMeshTakesItsClassesScale) {
   const std::string text = With("scale=\"0.001 0.001 0.001\"", "class=\"bigger\"");
   const auto scale = [&](const std::string& in_default, const std::string& in_big) {

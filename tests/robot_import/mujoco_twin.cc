@@ -129,6 +129,7 @@ void MujocoTwin::TakeInertias(const Robot& robot, const std::string& text) {
     Vector3d::Map(m_->body_inertia + 3 * body) = principal.eigenvalues();
     const mjtNum quaternion[4] = {q.w(), q.x(), q.y(), q.z()};
     std::copy_n(quaternion, 4, m_->body_iquat + 4 * body);
+    m_->body_sameframe[body] = 0;  // the axes may not be the body's any more
   };
   TiXmlDocument document;
   document.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
@@ -206,7 +207,10 @@ MujocoTwin::Dynamics MujocoTwin::At(const robot::RobotState& state) const {
     const Matrix3d turn =
         Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d_->xmat + 9 * body);
     const Vector3d at = Vector3d::Map(d_->xpos + 3 * body);
-    found.sole = Eigen::Isometry3d(Eigen::Translation3d(at) * turn) * foot.sole;
+    found.sole = Eigen::Isometry3d::Identity();
+    found.sole.linear() = turn;
+    found.sole.translation() = at;
+    found.sole = found.sole * foot.sole;
     const Vector3d point = found.sole.translation();
     RowMajor linear(3, m_->nv), angular(3, m_->nv);
     mj_jac(m_.get(), d_.get(), linear.data(), angular.data(), point.data(), body);

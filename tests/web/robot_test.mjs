@@ -166,7 +166,8 @@ test('the solids of an MJCF file are drawn', async () => {
   const xml = heron('xml');
   const at = xml.search(/<geom [^>]*>/);  // of the root body
   writeFileSync(path('mjcf/heron.xml'), xml.slice(0, at) + capsule + xml.slice(at));
-  writeFileSync(path('mjcf/heron.pbtxt'), heron('pbtxt').replace('urdf: "heron.urdf"', 'mjcf: "heron.xml"'));
+  const imported = spawnSync(options.poise, ['robot', 'import', path('mjcf/heron.xml'), '--to', path('mjcf')], {encoding: 'utf8'});
+  assert.equal(imported.status, 0, imported.stderr);
   check(path('mjcf/heron.pbtxt'), '--page', path('mjcf.html'));
   const {page, problems} = await openPage(browser, path('mjcf.html'));
   const {visuals, root} = await page.evaluate(() => ({visuals: window.poise.data.robot.visuals, root: window.poise.data.robot.bodies[0].name}));

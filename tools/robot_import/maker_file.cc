@@ -133,13 +133,20 @@ MakerFile ReadMakerFile(const fs::path& path, const fs::path& srdf) {
   MakerFile maker;
   maker.path = path;
   maker.text = ReadFile(path.string());
-  if (maker.text.find_first_not_of(" \t\r\n") == std::string::npos) {
+  const size_t begin = maker.text.find_first_not_of("\xef\xbb\xbf \t\r\n");
+  if (begin == std::string::npos) {
     throw ConfigError(path.string() + ": is empty: a URDF or MJCF file is needed");
+  }
+  if (maker.text[begin] != '<') {
+    throw ConfigError(fmt::format(
+        "{}: is no XML: a URDF or MJCF file is needed{}", path.string(),
+        path.extension() == ".pbtxt" ? "; `poise robot check` takes a robot's text" : ""));
   }
   TiXmlDocument document;
   robot::ParseXml(maker.text, "the file", &document);
   const TiXmlElement* const root = document.RootElement();
-  const std::string kind = root ? robot::OneLine(root->ValueStr()) : "";
+  if (root == nullptr) throw ConfigError(path.string() + ": has no XML element");
+  const std::string kind = robot::OneLine(root->ValueStr());
   if (kind != "robot" && kind != "mujoco") {
     throw ConfigError(fmt::format(
         "{}: begins with <{}>; a URDF begins with <robot>, MJCF with <mujoco>{}", path.string(),
