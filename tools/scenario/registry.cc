@@ -11,7 +11,6 @@
 #include "hw_bridge/hw_bridge_type.h"
 #include "sim_mujoco/sim_mujoco_type.h"
 #include "sim_ode/sim_ode_type.h"
-#include "tools/scenario/described_components.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -30,8 +29,6 @@ const ComponentRegistry& Components() {
       r.Add(type);
       if (type.config != nullptr) AddField(*Scenario::descriptor(), type.name, *type.config);
     }
-    // Programs in other languages.
-    for (ComponentType& type : DescribedComponents()) r.Add(std::move(type));
     return r;
   }();
   return registry;
