@@ -22,6 +22,7 @@
 #include "tools/cli/command_line.h"
 #include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 
 namespace {
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
   std::exception_ptr modules;
   try {
     poise::LoadModules();
+    poise::LoadDescriptions();
     poise::Components();
   } catch (...) {
     modules = std::current_exception();

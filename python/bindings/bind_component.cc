@@ -137,8 +137,9 @@ std::shared_ptr<ForeignFunctions> FunctionsOf(py::object component) {
 
 void BindComponent(py::module_* module) {
   py::class_<Message>(*module, "Message")
-      .def("get", &Message::Get)
-      .def_readonly("type", &Message::type)
+      .def("get", [](const Message& message,
+                     const std::string& path) { return message.Get(path); })
+      .def_property_readonly("type", [](const Message& message) { return message.type; })
       .def("fields", [](const Message& message) {
         std::vector<std::pair<std::string, std::vector<int64_t>>> fields;
         for (const Leaf& leaf : message.layout->leaves()) fields.emplace_back(leaf.path, leaf.shape);

@@ -59,7 +59,7 @@ std::unique_ptr<Session> Make(const std::string& scenario, const py::dict& chang
   return std::make_unique<Session>(std::move(options));
 }
 
-int64_t Step(Session* session, int64_t ticks) {
+int64_t Step(Session& session, int64_t ticks) {
   int64_t done = 0;
   if (ticks < 0) throw py::value_error("step: the number of ticks must not be negative");
   while (done < ticks) {
@@ -67,7 +67,7 @@ int64_t Step(Session* session, int64_t ticks) {
     int64_t now = 0;
     {
       const py::gil_scoped_release released;
-      now = session->Step(asked);
+      now = session.Step(asked);
     }
     done += now;
     if (now < asked) break;
@@ -83,12 +83,12 @@ auto Unlocked(const Call& call) {
   return call();
 }
 
-Message MessageOf(Session* session, const std::string& channel) {
+Message MessageOf(Session& session, const std::string& channel) {
   Message message;
-  message.bytes = Unlocked([&] { return session->Message(channel); });
+  message.bytes = Unlocked([&] { return session.Message(channel); });
   // Not owned: the Python object keeps the session.
-  message.layout = {std::shared_ptr<const void>(), &session->Layout(channel)};
-  message.type = session->Type(channel).name;
+  message.layout = {std::shared_ptr<const void>(), &session.Layout(channel)};
+  message.type = session.Type(channel).name;
   return message;
 }
 
@@ -101,32 +101,32 @@ void BindSession(py::module_* module) {
            py::arg("endless"))
       .def("step", &Step)
       .def("push",
-           [](Session* session, const std::string& body, const std::array<double, 3>& force,
+           [](Session& session, const std::string& body, const std::array<double, 3>& force,
               const std::array<double, 3>& point, int64_t ticks) {
              Unlocked([&] {
-               session->Push(body, {force[0], force[1], force[2]}, {point[0], point[1], point[2]},
+               session.Push(body, {force[0], force[1], force[2]}, {point[0], point[1], point[2]},
                              ticks);
                return 0;
              });
            })
       .def("override_torque",
-           [](Session* session, int joint, std::optional<double> torque) {
+           [](Session& session, int joint, std::optional<double> torque) {
              Unlocked([&] {
-               session->OverrideTorque(joint, torque);
+               session.OverrideTorque(joint, torque);
                return 0;
              });
            })
       .def("inject",
-           [](Session* session, const std::string& channel, const py::bytes& bytes) {
+           [](Session& session, const std::string& channel, const py::bytes& bytes) {
              const std::string text = bytes;
              const std::vector<uint8_t> data(text.begin(), text.end());
              Unlocked([&] {
-               session->Inject(channel, data);
+               session.Inject(channel, data);
                return 0;
              });
            })
       .def("message", &MessageOf, py::keep_alive<0, 1>())
-      .def("channels", &Session::Channels)
+      .def("channels", [](const Session& session) { return session.Channels(); })
       .def("type", [](const Session& session,
                       const std::string& channel) { return session.Type(channel).name; })
       .def("fields",
@@ -146,24 +146,24 @@ void BindSession(py::module_* module) {
         return UnitOfLeaf(session.Type(channel).name, path);
       })
       .def("finish",
-           [](Session* session) {
-             return std::const_pointer_cast<RunStore>(Unlocked([&] { return session->Finish(); }));
+           [](Session& session) {
+             return std::const_pointer_cast<RunStore>(Unlocked([&] { return session.Finish(); }));
            })
       .def_property_readonly("tick",
-                             [](Session* s) { return Unlocked([&] { return s->tick(); }); })
+                             [](Session& s) { return Unlocked([&] { return s.tick(); }); })
       .def_property_readonly("time",
-                             [](Session* s) { return Unlocked([&] { return s->time(); }); })
+                             [](Session& s) { return Unlocked([&] { return s.time(); }); })
       .def_property_readonly("ended",
-                             [](Session* s) { return Unlocked([&] { return s->ended(); }); })
+                             [](Session& s) { return Unlocked([&] { return s.ended(); }); })
       .def_property_readonly("failed",
-                             [](Session* s) { return Unlocked([&] { return s->failed(); }); })
+                             [](Session& s) { return Unlocked([&] { return s.failed(); }); })
       .def_property_readonly("detail",
-                             [](Session* s) { return Unlocked([&] { return s->detail(); }); })
+                             [](Session& s) { return Unlocked([&] { return s.detail(); }); })
       .def_property_readonly("tick_period",
                              [](const Session& s) { return s.spec().tick_period(); })
       .def_property_readonly("num_ticks", [](const Session& s) { return s.spec().num_ticks(); })
       .def_property_readonly("scenario", [](const Session& s) { return s.spec().scenario(); })
-      .def_property_readonly("warnings", &Session::warnings)
+      .def_property_readonly("warnings", [](const Session& s) { return s.warnings(); })
       .def("robot_texts", [](const Session& s) {
         std::pair<std::string, std::string> texts;
         for (const Resource& resource : s.spec().resource()) {

@@ -7,6 +7,7 @@
 #include "logging/run_log_writer.h"
 #include "python/bindings/bindings.h"
 #include "tools/scenario/catalog.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 
 namespace poise::python {
@@ -93,6 +94,7 @@ PYBIND11_MODULE(_poise, m) {
   m.attr("__version__") = PoiseVersion();
   m.def("names", &Names, "names of the files of a kind: scenarios, robots, graphs, sweeps, drives");
   LoadModules();
+  LoadDescriptions();
   Components();
   BindRun(&m);
   BindComponent(&m);

@@ -81,12 +81,22 @@ class Environment:
 
     def reset(self, seed=None):
         """Begins anew; every component of `components` is configured again. Returns the environment."""
+        arguments = dict(self._arguments)
         if seed is not None:
-            self._arguments["changes"]["seed"] = seed
-        self._session = None  # lets go of the run's folder
-        self._session = _poise.Session(**self._arguments)
+            arguments["changes"] = {**arguments["changes"], "seed": int(seed)}
+        if arguments["out"]:
+            self._now = None  # lets go of the run's folder
+        self._now = _poise.Session(**arguments)
+        self._arguments = arguments
         self._robot = None
         return self
+
+    @property
+    def _session(self):
+        session = self.__dict__.get("_now")
+        if session is None:
+            raise _poise.ConfigError("the environment could not be made; make it anew")
+        return session
 
     def step(self, ticks=1):
         """Runs up to `ticks` ticks; returns those run: fewer when the run ends. Ctrl-C stops it between ticks."""

@@ -4,7 +4,7 @@
 // Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
-import {chmodSync, cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync} from 'node:fs';
+import {chmodSync, cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, symlinkSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {test} from 'node:test';
@@ -67,6 +67,8 @@ function sandbox() {
   chmodSync(join(folder, 'deploy/run'), 0o755);
   mkdirSync(join(folder, 'build/release'), {recursive: true});
   symlinkSync(dirname(resolve(options.poise)), join(folder, 'build/release/bin'));
+  const python = join(dirname(dirname(resolve(options.poise))), 'python');  // of a build with Python
+  if (existsSync(python)) symlinkSync(python, join(folder, 'build/release/python'));
   return folder;
 }
 

@@ -39,6 +39,8 @@ const BELOW = {
   'logging/metrics': [...BUS, 'logging'],
   'logging/export': [...BUS, 'logging'],
   'logging/replay': [...BUS, 'logging'],
+  'python': [...BUS, 'python', 'sim', 'logging', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/run'],
+  'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
 const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];

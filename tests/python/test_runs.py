@@ -72,9 +72,9 @@ class Runs(unittest.TestCase):
             for path in kept[name].fields:
                 if path != "run_id":
                     np.testing.assert_array_equal(kept[name][path], logged[name][path], f"{name} {path}")
-        for metric in ("push_peak", "com_error_y", "fallen"):
-            if metric in poise.metrics():
-                self.assertEqual(kept.metric(metric), logged.metric(metric), metric)
+        for metric in ("push_peak", "com_error_max_y", "fallen"):
+            self.assertIn(metric, poise.metrics())
+            self.assertEqual(kept.metric(metric), logged.metric(metric), metric)
         self.assertAlmostEqual(kept.metric("push_peak"), 120, delta=1)
 
     def test_pandas(self):

@@ -47,17 +47,18 @@ ComponentType ReadDescription(const fs::path& file) {
   }
 }
 
-std::vector<ComponentType> DescribedComponents() {
-  std::vector<ComponentType> types;
+void LoadDescriptions() {
+  static bool done = false;
+  if (done) return;
+  done = true;
   for (const fs::path& folder : PoisePath()) {
     std::set<fs::path> files;  // in one order everywhere
     std::error_code error;
     for (const auto& entry : fs::directory_iterator(folder / "lib/poise/components", error)) {
       if (entry.path().extension() == ".json") files.insert(entry.path());
     }
-    for (const fs::path& file : files) types.push_back(ReadDescription(file));
+    for (const fs::path& file : files) AddComponent(ReadDescription(file));
   }
-  return types;
 }
 
 }  // namespace poise

@@ -12,7 +12,6 @@
 #include "hw_bridge/unitree_emulator/unitree_emulator_type.h"
 #include "sim_mujoco/sim_mujoco_type.h"
 #include "sim_ode/sim_ode_type.h"
-#include "tools/scenario/described_components.h"
 #include "tools/scenario/scenario.pb.h"
 
 namespace poise {
@@ -31,8 +30,6 @@ const ComponentRegistry& Components() {
       r.Add(type);
       if (type.config != nullptr) AddField(*Scenario::descriptor(), type.name, *type.config);
     }
-    // Programs in other languages.
-    for (ComponentType& type : DescribedComponents()) r.Add(std::move(type));
     return r;
   }();
   return registry;
