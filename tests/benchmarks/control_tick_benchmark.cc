@@ -147,10 +147,9 @@ void Register(const std::string& name, const std::string& robot) {
         const std::string title = std::string(split ? "Split/" : "Tick/") + name +
                                   (both ? "_double" : "_single") +
                                   (method == kInvariantEkf ? "_ekf" : "");
-        benchmark::RegisterBenchmark(title.c_str(),
-                                     [=](benchmark::State& state) {
-                                       (split ? Split : Tick)(state, robot, both, method);
-                                     })
+        benchmark::RegisterBenchmark(
+            title.c_str(),
+            [=](benchmark::State& state) { (split ? Split : Tick)(state, robot, both, method); })
             ->Iterations(kNumStates)
             ->UseManualTime()
             ->Unit(benchmark::kMicrosecond);
