@@ -59,8 +59,8 @@ class Trial {
         what_, taken_ + refused_, taken_, told_, refused_, named_, slowest_, slowest_damage_);
     for (const auto& [reason, count] : unnamed_) fmt::print("  {} x {}\n", count, reason);
     if (taken_ + refused_ < 40) return;  // of a few files nothing follows
-    EXPECT_GT(taken_, (taken_ + refused_) / 20);
-    EXPECT_GT(refused_, (taken_ + refused_) / 20);
+    EXPECT_GT(taken_, (taken_ + refused_) / 50);
+    EXPECT_GT(refused_, (taken_ + refused_) / 50);
     EXPECT_GE(named_, refused_ * 9 / 10);
   }
 

@@ -4,6 +4,7 @@
 #include <tinyxml.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <map>
 #include <regex>
 #include <sstream>
