@@ -220,8 +220,9 @@ bool UnitreeDriveBus::TakeState() {
 const drive_feedback_t* UnitreeDriveBus::Receive() {
   cycle_start_ = link_->Now();
   const int64_t damaged_before = damaged_;
-  const int64_t wait = config_.simulated_time() ? int64_t{config_.state_timeout()} * kMillisecond
-                                                : int64_t{config_.input_wait()} * 1000;
+  int64_t wait = config_.simulated_time() ? int64_t{config_.state_timeout()} * kMillisecond
+                                          : int64_t{config_.input_wait()} * 1000;
+  if (!health_.usable) wait = 0;  // given up: nobody waits for it
   fresh_ = ReceiveState(cycle_start_ + wait, true);
   silent_in_a_row_ = fresh_ || damaged_ > damaged_before ? 0 : silent_in_a_row_ + 1;
   Judge(fresh_);

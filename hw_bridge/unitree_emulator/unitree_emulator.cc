@@ -32,6 +32,9 @@ struct UnitreeEmulator::Ends {
   unitree::MotionSwitcherServer switcher;
 };
 
+UnitreeEmulator::UnitreeEmulator() = default;
+UnitreeEmulator::~UnitreeEmulator() = default;
+
 void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
   config_ = context.config<UnitreeEmulatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);

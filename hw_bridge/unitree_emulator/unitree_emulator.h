@@ -16,6 +16,9 @@ namespace poise {
 /// has left; what the robot makes of it → drive_command. The motion switcher answers until then.
 class UnitreeEmulator final : public Component {
  public:
+  UnitreeEmulator();
+  ~UnitreeEmulator() override;
+
   /// Resources "robot", "urdf"; configuration UnitreeEmulatorConfig.
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   void Open() override;
