@@ -477,11 +477,10 @@ void StepPlanner::ReportFeet() {
   for (size_t i = 0; i < 2; ++i) {
     out.in_contact[i] = in_contact_[i] ? 1 : 0;
     out.next_in_contact[i] = then[i] ? 1 : 0;
-    out.foot_state[i] = in_contact_[i] ? support_plan_t::FOOT_SUPPORT
-                        : Steps() != nullptr
-                            ? (Steps()->searching ? support_plan_t::FOOT_SEARCHING
-                                                            : support_plan_t::FOOT_SWING)
-                            : FootCode(landing_[i].state());
+    out.foot_state[i] = in_contact_[i]       ? support_plan_t::FOOT_SUPPORT
+                        : Steps() != nullptr ? (Steps()->searching ? support_plan_t::FOOT_SEARCHING
+                                                                   : support_plan_t::FOOT_SWING)
+                                             : FootCode(landing_[i].state());
     SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
   }
 }

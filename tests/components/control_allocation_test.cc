@@ -119,8 +119,8 @@ TEST(ControlAllocation, NoneWithAListOfTasks) {
   }
 }
 
-// Through all of a step's stages: the foot that should be in the air is reported where it stood, and
-// loaded when it should have come down.
+// Through all of a step's stages: the foot that should be in the air is reported where it stood,
+// and loaded when it should have come down.
 TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
   for (const robot::TestRobot robot : {robot::TestRobot::kDyros, robot::TestRobot::kMantis}) {
     const robot::RobotModel model = robot::LoadTestRobot(robot);
