@@ -40,5 +40,6 @@ void AddEstopCommand(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
 void AddViewCommand(CLI::App* app, Command* command);
+void AddShellCommand(CLI::App* app, Command* command);
 
 }  // namespace poise

@@ -46,6 +46,22 @@ fs::path FindRun(const std::string& run) {
 
 }  // namespace
 
+namespace {
+
+/// For who stands where nothing can be written: $XDG_STATE_HOME/poise/runs, or below ~/.local/state;
+/// empty without a home.
+fs::path StateRuns() {
+  const char* const state = std::getenv("XDG_STATE_HOME");
+  if (state != nullptr && *state == '/') return fs::path(state) / "poise" / "runs";
+  const char* const home = std::getenv("HOME");
+  if (home != nullptr && *home == '/') return fs::path(home) / ".local/state/poise/runs";
+  return {};
+}
+
+bool Writable(const fs::path& folder) { return access(folder.c_str(), W_OK | X_OK) == 0; }
+
+}  // namespace
+
 fs::path RunsDir() {
   if (const char* const dir = std::getenv("POISE_RUNS_DIR"); dir != nullptr && *dir != '\0') {
     return fs::absolute(dir);
@@ -53,9 +69,14 @@ fs::path RunsDir() {
   std::error_code error;
   const fs::path here = fs::current_path();
   const fs::path home = fs::canonical(DeployDir(), error).parent_path();
-  if (error) return here / "runs";
-  const fs::path within = here.lexically_relative(home);
-  return (within.empty() || *within.begin() == ".." ? here : home) / "runs";
+  const fs::path within = error ? fs::path() : here.lexically_relative(home);
+  const bool inside = !within.empty() && *within.begin() != "..";
+  const fs::path runs = (inside ? home : here) / "runs";
+  if (const fs::path state = StateRuns();
+      !state.empty() && !Writable(fs::exists(runs, error) ? runs : runs.parent_path())) {
+    return state;
+  }
+  return runs;
 }
 
 RunDir::RunDir(fs::path path)

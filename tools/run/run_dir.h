@@ -10,7 +10,8 @@
 namespace poise {
 
 /// Where runs without --out go: $POISE_RUNS_DIR; else runs/ beside deploy/ for who stands in that
-/// checkout, and runs/ in the current folder for who stands elsewhere.
+/// checkout, and runs/ in the current folder for who stands elsewhere. Where that cannot be
+/// written: poise/runs in $XDG_STATE_HOME, or in ~/.local/state.
 std::filesystem::path RunsDir();
 
 /// A run's folder, locked against other runs for as long as this lives. Programs that the run
