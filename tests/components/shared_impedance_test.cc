@@ -14,9 +14,9 @@ namespace {
 using robot::TestRobot;
 
 // Planner, task controller, monitor and redistributor on two feet, for one tick.
-class Chain {
+class ImpedanceChain {
  public:
-  explicit Chain(const std::string& redistributor)
+  explicit ImpedanceChain(const std::string& redistributor)
       : model_(robot::LoadTestRobot(TestRobot::kDyros)),
         context_(TestRobot::kDyros),
         planner_(&context_, "phase { support: DOUBLE }"),
@@ -59,8 +59,8 @@ class Chain {
 // the torque stays what it is without them.
 TEST(SharedImpedanceTest, PlansTheMotionThatTheTorqueCauses) {
   std::mt19937 random{TestSeed(29)};
-  Chain alone(RedistributorText());
-  Chain shared(RedistributorText("impedance { enabled: true horizon: 0.007 }"));
+  ImpedanceChain alone(RedistributorText());
+  ImpedanceChain shared(RedistributorText("impedance { enabled: true horizon: 0.007 }"));
   const robot::RobotModel& model = alone.model();
   const robot::RobotState state = Disturbed(StandingState(model), 0.03, 0.2, &random);
   const joint_command_t& plain = alone.Run(state);
@@ -84,9 +84,9 @@ TEST(SharedImpedanceTest, PlansTheMotionThatTheTorqueCauses) {
 
 TEST(SharedImpedanceTest, RefusesTimesThatAreNone) {
   for (const char* field : {"horizon", "rotor_time", "stiffness_time"}) {
-    EXPECT_THROW(
-        Chain(RedistributorText(std::string("impedance { enabled: true ") + field + ": 0 }")),
-        ConfigError)
+    EXPECT_THROW(ImpedanceChain(RedistributorText(std::string("impedance { enabled: true ") +
+                                                  field + ": 0 }")),
+                 ConfigError)
         << field;
   }
 }

@@ -12,7 +12,8 @@
 namespace poise {
 namespace {
 
-std::vector<std::string> Arguments(const std::string& out, const std::vector<std::string>& more) {
+std::vector<std::string> UnitreeArguments(const std::string& out,
+                                          const std::vector<std::string>& more) {
   std::vector<std::string> arguments = {"run",     StandScenario(), "--drives",
                                         "unitree", "--out",         out};
   arguments.insert(arguments.end(), more.begin(), more.end());
@@ -22,7 +23,7 @@ std::vector<std::string> Arguments(const std::string& out, const std::vector<std
 TEST(Unitree, StandsWithTheSameBitsEachTime) {
   const RunFolder folder;
   for (const char* name : {"first", "second"}) {
-    const ProgramResult result = RunPoise(Arguments(folder / name, {}));
+    const ProgramResult result = RunPoise(UnitreeArguments(folder / name, {}));
     ASSERT_EQ(result.exit_code, 0) << result.output;
   }
   const logging::LogComparison result =
@@ -37,9 +38,9 @@ TEST(Unitree, TheRemotesButtonStopsTheRobotAndIsNamedInTheLog) {
   const RunFolder folder;
   const std::string run = folder / "run";
   const ProgramResult result =
-      RunPoise(Arguments(run, {"--set", "unitree_emulator.trouble[0].kind=BUTTON", "--set",
-                               "unitree_emulator.trouble[0].button[0]=B", "--set",
-                               "unitree_emulator.trouble[0].from=0.2"}));
+      RunPoise(UnitreeArguments(run, {"--set", "unitree_emulator.trouble[0].kind=BUTTON", "--set",
+                                      "unitree_emulator.trouble[0].button[0]=B", "--set",
+                                      "unitree_emulator.trouble[0].from=0.2"}));
   EXPECT_NE(ReadSummary(run)["events"].dump().find("remote's stop button"), std::string::npos)
       << result.output;
   const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
@@ -73,11 +74,12 @@ TEST(Unitree, RefusesWhatCannotBe) {
   const RunFolder folder;
   ExpectUsageError({"run", StandScenario(), "--drives", "unitree", "--inline"},
                    {"--inline", "--drives"});
-  ExpectUsageError(Arguments(folder / "a", {"--link", "udp"}), {"--link", "no frames"});
-  ExpectUsageError(Arguments(folder / "b", {"--capture", folder / "c.pcap"}),
+  ExpectUsageError(UnitreeArguments(folder / "a", {"--link", "udp"}), {"--link", "no frames"});
+  ExpectUsageError(UnitreeArguments(folder / "b", {"--capture", folder / "c.pcap"}),
                    {"--capture", "no frames"});
-  ExpectUsageError(Arguments(folder / "d", {"--set", "hw_bridge.unitree.slot[0].joint=tail"}),
-                   {"hw_bridge.unitree", "tail"});
+  ExpectUsageError(
+      UnitreeArguments(folder / "d", {"--set", "hw_bridge.unitree.slot[0].joint=tail"}),
+      {"hw_bridge.unitree", "tail"});
 }
 
 }  // namespace
