@@ -36,6 +36,10 @@ std::vector<uint8_t> Command(int64_t tick) {
   command.num_motors = 12;
   command.current.assign(12, static_cast<double>(tick));
   command.enabled.assign(12, 1);
+  command.position.assign(12, 0);
+  command.velocity.assign(12, 0);
+  command.stiffness.assign(12, 0);
+  command.damping.assign(12, 0);
   return Encode(command);
 }
 

@@ -68,6 +68,10 @@ drive_command_t Command(double current) {
   command.num_motors = 12;
   command.current.assign(12, current);
   command.enabled.assign(12, 1);
+  command.position.assign(12, 0);
+  command.velocity.assign(12, 0);
+  command.stiffness.assign(12, 0);
+  command.damping.assign(12, 0);
   return command;
 }
 

@@ -73,7 +73,7 @@ fs::path RunsDir() {
   const bool inside = !within.empty() && *within.begin() != "..";
   const fs::path runs = (inside ? home : here) / "runs";
   if (const fs::path state = StateRuns();
-      !state.empty() && !Writable(fs::exists(runs, error) ? runs : runs.parent_path())) {
+      !state.empty() && !Writable(fs::is_directory(runs, error) ? runs : runs.parent_path())) {
     return state;
   }
   return runs;

@@ -156,13 +156,13 @@ std::string LastName(const std::string& path) { return path.substr(path.rfind('.
 
 std::pair<std::string, std::string> SplitUnit(std::string_view comment) {
   // Longer ones first where one begins another.
-  static constexpr std::array<std::string_view, 44> kUnits = {
-      "rad/s/√s", "m/s^2/√s",  "N·m·s/rad", "N·m/rad", "N·m/A",  "N·m/s",  "N·s/m",   "m/(N·s)",
-      "N·m",      "N·s",       "N/m",       "kg·m^2",  "kg",     "m/√s",   "rad/√s",  "m/s^2",
-      "m/s",      "rad/s",     "rad",       "1/s^2",   "1/s",    "Hz",     "mN·m",    "mA",
-      "ms",       "us",        "ns",        "bits",    "ppm",    "N",      "A",       "s",
-      "m",        "per mille", "ticks",     "cycles",  "frames", "counts", "degrees", "%",
-      "runs",     "turns",     "bytes",     "W"};
+  static constexpr std::array<std::string_view, 47> kUnits = {
+      "rad/s/√s", "m/s^2/√s",  "N·m·s/rad", "N·m/rad", "N·m/A",   "N·m/s",  "N·s/m",   "m/(N·s)",
+      "N·m",      "N·s",       "N/m",       "kg·m^2",  "kg",      "m/√s",   "rad/√s",  "m/s^2",
+      "m/s",      "rad/s",     "rad",       "1/s^2",   "1/s",     "Hz",     "mN·m",    "mA",
+      "ms",       "us",        "ns",        "bits",    "ppm",     "N",      "A",       "s",
+      "m",        "per mille", "ticks",     "cycles",  "frames",  "counts", "degrees", "%",
+      "runs",     "turns",     "bytes",     "W",       "rad/s^2", "°C",     "V"};
   for (const std::string_view unit : kUnits) {
     if (!comment.starts_with(unit)) continue;
     std::string_view rest = comment.substr(unit.size());
