@@ -32,7 +32,7 @@ foreach(folder lcmtypes components sim sim_ode sim_mujoco hw_bridge logging)
           FILES_MATCHING PATTERN "*.h" PATTERN "*.proto")
   if(NOT folder STREQUAL lcmtypes)
     install(DIRECTORY ${PROJECT_BINARY_DIR}/${folder} DESTINATION ${_headers} COMPONENT dev
-            FILES_MATCHING PATTERN "*.pb.h" PATTERN "CMakeFiles" EXCLUDE)
+            FILES_MATCHING PATTERN "*.pb.h" PATTERN "unitree_hg.h" PATTERN "unitree_api.h" PATTERN "CMakeFiles" EXCLUDE)
   endif()
 endforeach()
 install(DIRECTORY ${PROJECT_BINARY_DIR}/poise DESTINATION ${_headers} COMPONENT dev FILES_MATCHING PATTERN "*.hpp")

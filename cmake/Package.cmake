@@ -27,7 +27,7 @@ set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_DESCRIPTION "Poise: for components, messages and metrics of one's own
  Headers, CMake package and an example project.")
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "poise (= ${PROJECT_VERSION}), cmake, g++, libeigen3-dev, liblcm-dev, liblcm-bin, \
-libprotobuf-dev, protobuf-compiler, libfmt-dev, nlohmann-json3-dev")
+libprotobuf-dev, protobuf-compiler, libfmt-dev, nlohmann-json3-dev, cyclonedds-dev, libode-dev, libmujoco-dev")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-poise)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION "Poise: the Python module

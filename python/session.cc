@@ -36,18 +36,19 @@ class RecordedPlant : public ForeignFunctions {
       if (port.port.input) continue;
       const StoredChannel* const channel = run_->Find(channels_.at(port.port.name));
       if (channel == nullptr) {
-        throw ConfigError(fmt::format("the recorded run has no messages on {}",
-                                      channels_.at(port.port.name)));
+        throw ConfigError(
+            fmt::format("the recorded run has no messages on {}", channels_.at(port.port.name)));
       }
       if (channel->type->name != port.port.type || channel->counts != port.counts) {
-        throw ConfigError(fmt::format("{} of the recorded run is of another type or robot",
-                                      channel->name));
+        throw ConfigError(
+            fmt::format("{} of the recorded run is of another type or robot", channel->name));
       }
       of_port_.back() = channel;
     }
     run_->CheckUnchanged();
   }
   void Step(const Tick& tick, std::span<ForeignPort> ports) override {
+    run_->CheckUnchanged();
     for (size_t i = 0; i < ports.size(); ++i) {
       const StoredChannel* const channel = of_port_[i];
       if (channel == nullptr) continue;
@@ -110,10 +111,14 @@ void Session::Replace(const SessionOptions& options, ComponentRegistry* registry
     auto* const all = graph.mutable_component();
     const auto found = std::find_if(all->begin(), all->end(), same);
     if (found == all->end()) {
-      throw ConfigError(fmt::format("graph {}: has no component '{}'; it has {}", graph.name(),
-                                    name, names));
+      throw ConfigError(
+          fmt::format("graph {}: has no component '{}'; it has {}", graph.name(), name, names));
     }
     const ComponentType* const former = registry->TypeNamed(TypeOf(*found));
+    if (former == nullptr) {
+      throw ConfigError(fmt::format("graph {}: component '{}' is of the unknown type '{}'",
+                                    graph.name(), name, TypeOf(*found)));
+    }
     ComponentType type = *former;
     type.name = "foreign_" + name;
     type.make = [ports = former->ports, functions] {
@@ -183,8 +188,8 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
     if (overrides_ && channel == command_channel_) {
       // The port's own message, which nobody has read yet.
-      auto& command = *const_cast<joint_command_t*>(
-          static_cast<const joint_command_t*>(output.message()));
+      auto& command =
+          *const_cast<joint_command_t*>(static_cast<const joint_command_t*>(output.message()));
       for (size_t j = 0; j < override_.size() && j < command.torque.size(); ++j) {
         if (!std::isnan(override_[j])) command.torque[j] = override_[j];
       }
@@ -239,22 +244,22 @@ void Session::Push(const std::string& body, const Eigen::Vector3d& force,
 void Session::OverrideTorque(int joint, std::optional<double> torque) {
   const Lock lock(this);
   if (joint < 0 || joint >= static_cast<int>(override_.size())) {
-    throw ConfigError(fmt::format("joint {}: the robot has joints 0 to {}", joint,
-                                  override_.size() - 1));
+    throw ConfigError(
+        fmt::format("joint {}: the robot has joints 0 to {}", joint, override_.size() - 1));
   }
   if (command_channel_ < 0) throw ConfigError("the graph has no joint_command_t");
   if (torque && !std::isfinite(*torque)) throw ConfigError("torque: must be a finite number");
-  override_[static_cast<size_t>(joint)] =
-      torque.value_or(std::numeric_limits<double>::quiet_NaN());
+  override_[static_cast<size_t>(joint)] = torque.value_or(std::numeric_limits<double>::quiet_NaN());
   overrides_ = std::ranges::any_of(override_, [](double t) { return !std::isnan(t); });
 }
 
 void Session::Inject(const std::string& channel, const std::vector<uint8_t>& bytes) {
   const Lock lock(this);
   if (!runner_->Inject(channel, bytes)) {
-    throw ConfigError(fmt::format("{}: is no external channel that a component reads, or the "
-                                  "message is not of its type",
-                                  channel));
+    throw ConfigError(
+        fmt::format("{}: is no external channel that a component reads, or the "
+                    "message is not of its type",
+                    channel));
   }
 }
 
@@ -274,8 +279,7 @@ int Session::FindChannel(const std::string& name) const {
 }
 
 const OutputPort* Session::Writer(int channel) {
-  const GraphPlan::Endpoint& writer =
-      runner_->plan().channels[static_cast<size_t>(channel)].writer;
+  const GraphPlan::Endpoint& writer = runner_->plan().channels[static_cast<size_t>(channel)].writer;
   if (writer.component < 0) return nullptr;
   return runner_->graph()
       .component(writer.component)

@@ -104,6 +104,7 @@ void Redistributor::Redistribute(const Tick& tick) {
   const std::array<bool, 2> in_contact{support_plan_->in_contact[0] != 0,
                                        support_plan_->in_contact[1] != 0};
   if (held || !state_valid_ || !AllFinite(balance.torque) || !(in_contact[0] || in_contact[1])) {
+    ClearImpedance(&out);  // its target is of another tick
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }

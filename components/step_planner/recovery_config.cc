@@ -13,6 +13,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
+#include "components/robot/sole.h"
 
 namespace poise {
 namespace {
@@ -131,7 +132,7 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
                                 const robot::RobotModel& model) {
   for (const robot::FootModel& foot : model.feet()) {
-    if (config.edge() < 0.5 * std::min(foot.length, foot.width)) continue;
+    if (config.edge() < robot::InnerRadius(foot)) continue;
     throw ConfigError("recovery.edge",
                       fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                   config.edge(), foot.name, foot.length, foot.width));

@@ -189,6 +189,7 @@ int8_t StepPlanner::Plan(double time) {
   if (walks_ && !recovery_.active()) {
     ReportWalking(walk_, time, Estimate().sole, &*support_plan_);
   }
+  support_plan_->num_steps = recovery_.num_steps() + walk_.num_begun();
   return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
                                                  : support_plan_t::STATUS_OK;
 }

@@ -45,8 +45,10 @@ int8_t ReasonCode(stepping::StepReason reason) {
 void ReportStepping(const stepping::Recovery& recovery, double time,
                     const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
   plan->stepping = SteppingCode(recovery.stage());
-  plan->num_steps = recovery.num_steps();
-  if (recovery.num_steps() == 0) return;
+  if (recovery.stage() == stepping::Stage::kIdle) {
+    plan->touch_down_time = 0;
+    return;
+  }
   const bool under_way = recovery.stage() == stepping::Stage::kUnloading ||
                          recovery.stage() == stepping::Stage::kSwinging;
   const stepping::StepPlan& step = recovery.plan();
@@ -85,12 +87,19 @@ int8_t WalkCode(stepping::WalkStage stage) {
 void ReportWalking(const stepping::Walk& walk, double time,
                    const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
   const stepping::StepOutput& steps = walk.output();
-  const bool swings = walk.stage() == stepping::WalkStage::kSwinging;
-  const auto foot = static_cast<size_t>(walk.stepping_foot());
-  const double ground = sole[1 - foot].translation().z();
-  const Eigen::Vector2d& foothold = walk.foothold().position;
   plan->stepping = WalkCode(walk.stage());
-  plan->num_steps = walk.num_steps();
+  if (!walk.active()) {
+    plan->touch_down_time = 0;
+    SetVector3(Eigen::Vector3d::Zero(), plan->walk_velocity);
+    return;
+  }
+  const bool swings = walk.stage() == stepping::WalkStage::kSwinging;
+  const bool landed = walk.stage() == stepping::WalkStage::kLoading ||
+                      walk.stage() == stepping::WalkStage::kStopping;
+  const auto foot = static_cast<size_t>(landed ? 1 - walk.stepping_foot() : walk.stepping_foot());
+  const double ground = sole[1 - foot].translation().z();
+  const Eigen::Vector2d foothold =
+      landed ? Eigen::Vector2d(sole[foot].translation().head<2>()) : walk.foothold().position;
   plan->step_reason = support_plan_t::REASON_WALK;
   plan->step_foot = static_cast<int8_t>(foot);
   SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);

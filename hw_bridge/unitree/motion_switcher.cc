@@ -82,7 +82,8 @@ void MotionSwitcherServer::Serve() {
         mode_.clear();
         break;
       case kCheckMode:
-        data = nlohmann::json{{"form", "0"}, {"name", mode_}}.dump();
+        data = nlohmann::json{{"form", "0"}, {"name", mode_}}.dump(
+            -1, ' ', false, nlohmann::json::error_handler_t::replace);
         break;
       default:
         response.header.status.code = kUnknownApi;

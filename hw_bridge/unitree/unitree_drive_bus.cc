@@ -24,8 +24,9 @@ constexpr double kMostPosition = 1e3;  // rad, beyond which a reading is none
 constexpr int64_t kCreep = 1000, kFallBack = 20'000, kMostFallBack = 100'000;
 
 const UnitreeBusConfig& Checked(const UnitreeBusConfig& config, double period) {
-  if (config.most_bad_in_a_row() < 1 || config.most_bad_in_100() < 1) {
-    throw UnitreeError("most_bad_in_a_row and most_bad_in_100 must be at least 1");
+  const auto cycles = [](uint32_t number) { return number >= 1 && number <= 100; };
+  if (!cycles(config.most_bad_in_a_row()) || !cycles(config.most_bad_in_100())) {
+    throw UnitreeError("most_bad_in_a_row and most_bad_in_100 must be between 1 and 100");
   }
   if (!config.simulated_time() && config.input_wait() * 1e-6 >= period) {
     throw UnitreeError("input_wait must be less than a cycle");
@@ -36,6 +37,7 @@ const UnitreeBusConfig& Checked(const UnitreeBusConfig& config, double period) {
     }
   };
   amount(config.start_timeout(), "start_timeout");
+  if (config.start_timeout() > 3600) throw UnitreeError("start_timeout must be at most 3600 s");
   amount(config.temperature_limit(), "temperature_limit");
   amount(config.least_voltage(), "least_voltage");
   amount(config.rest_damping(), "rest_damping");
@@ -94,6 +96,7 @@ void UnitreeDriveBus::Start() {
                   kStateTopic, link.domain(), link.interface(), config_.start_timeout()));
   }
   Release(deadline);
+  ours_ = true;
   mode_machine_ = state_.mode_machine;
   health_ = {};
   bad_.reset();
@@ -123,22 +126,23 @@ void UnitreeDriveBus::Release(int64_t deadline) {
 }
 
 std::string UnitreeDriveBus::Stop() {
-  SendMotors(nullptr);
+  if (ours_) SendMotors(nullptr);  // else the maker's controller may move the robot
   return {};
 }
 
 bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
-  while (link_->Receive(&state_, deadline)) {
-    if (state_.crc != CrcOf(state_)) {
+  while (link_->Receive(&incoming_, deadline)) {
+    if (incoming_.crc != CrcOf(incoming_)) {
       ++damaged_;
       continue;
     }
     // A state again, or one that others have overtaken, is none.
-    if (known_ && static_cast<int32_t>(state_.tick - last_tick_) <= 0) continue;
+    if (known_ && static_cast<int32_t>(incoming_.tick - last_tick_) <= 0) continue;
     known_ = true;
-    last_tick_ = state_.tick;
+    last_tick_ = incoming_.tick;
     // An emulated robot numbers the states of the run's cycles; those before are none of it.
-    if (in_run && config_.simulated_time() && state_.reserve[0] == 0) continue;
+    if (in_run && config_.simulated_time() && incoming_.reserve[0] == 0) continue;
+    state_ = incoming_;
     return true;
   }
   return false;
@@ -196,11 +200,14 @@ void UnitreeDriveBus::TakeMotors() {
 
 void UnitreeDriveBus::TakeImu() {
   const bool torso = config_.imu() == UnitreeBusConfig::TORSO;
-  if (torso) link_->ReceiveTorsoImu(&torso_imu_);
+  if (torso) torso_missed_ = link_->ReceiveTorsoImu(&torso_imu_) ? 0 : torso_missed_ + 1;
   const ImuState& imu = torso ? torso_imu_ : state_.imu_state;
+  // An old reading is none: the supervisor stops at what is no number.
+  const bool old = torso && torso_missed_ >= int64_t{config_.most_bad_in_a_row()};
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   for (size_t i = 0; i < 3; ++i) {
-    feedback_.imu_angular_velocity[i] = static_cast<double>(imu.gyroscope[i]);
-    feedback_.imu_acceleration[i] = static_cast<double>(imu.accelerometer[i]);
+    feedback_.imu_angular_velocity[i] = old ? kNone : static_cast<double>(imu.gyroscope[i]);
+    feedback_.imu_acceleration[i] = old ? kNone : static_cast<double>(imu.accelerometer[i]);
   }
 }
 

@@ -67,10 +67,12 @@ class UnitreeDriveBus final : public DriveBus {
   std::vector<Motor> motors_;  // by joint
   std::vector<DriveReport> reports_;
   drive_feedback_t feedback_;
-  LowState state_{};
+  LowState incoming_{}, state_{};  // as it came; the last that was whole and new
   LowCmd command_{};
   ImuState torso_imu_{};
-  bool known_ = false;  // a state has come
+  int64_t torso_missed_ = int64_t{1} << 40;  // states without a reading of the torso's IMU
+  bool ours_ = false;                        // no controller of the maker's moves the robot
+  bool known_ = false;                       // a state has come
   uint32_t last_tick_ = 0;
   uint8_t mode_machine_ = 0;
   BusHealth health_;

@@ -28,7 +28,7 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
       motors_(model.motors()),
       slots_(MotorSlots(model, config.layout(), config.slot())),
       period_(period),
-      watchdog_cycles_(std::llround(config.watchdog() / period)) {
+      watchdog_cycles_(0) {
   if (config.state_delay() > kMostDelay) throw ConfigError("state_delay", "must be at most 100");
   if (config.command_delay() > kMostDelay) {
     throw ConfigError("command_delay", "must be at most 100");
@@ -36,12 +36,19 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
   if (!(config.watchdog() >= 0 && config.watchdog() < 10)) {
     throw ConfigError("watchdog", "must be between 0 and 10 s");
   }
+  watchdog_cycles_ = std::llround(config.watchdog() / period);
+  if (!(std::abs(config.temperature()) <= 300)) {
+    throw ConfigError("temperature", "must be a number of °C, at most 300");
+  }
   if (!(config.watchdog_damping() >= 0) || !std::isfinite(config.watchdog_damping())) {
     throw ConfigError("watchdog_damping", "must be a finite number of N·m·s/rad, not negative");
   }
   for (int i = 0; i < config.trouble_size(); ++i) {
     Trouble& trouble = troubles_.emplace_back();
     trouble.config = config.trouble(i);
+    if (!(std::abs(trouble.config.value()) <= 10000)) {
+      throw ConfigError(fmt::format("trouble[{}].value", i), "must be a number, at most 10000");
+    }
     trouble.buttons = ButtonsOf({trouble.config.button().begin(), trouble.config.button().end()});
     const auto kind = trouble.config.kind();
     if (kind != UnitreeTrouble::HOT_MOTOR && kind != UnitreeTrouble::MOTOR_ERROR) continue;

@@ -70,8 +70,8 @@ void UnitreeEmulator::Publish() {
       robot_->State(last_feedback_, time_, config_.simulated_time() ? cycle_ : 0);
   state_sent_ = state != nullptr;
   if (!ends_ || !state_sent_) return;
+  ends_->torso_imu.Write(robot_->torso_imu());  // first: who has the state takes it
   ends_->states.Write(*state);
-  ends_->torso_imu.Write(robot_->torso_imu());
 }
 
 void UnitreeEmulator::TakeCommands() {

@@ -46,23 +46,38 @@ using Torque = const Eigen::Ref<const Eigen::VectorXd>&;
 
 const std::vector<Quantity>& Quantities() {
   static const std::vector<Quantity> all = {
-      {"foot_pose", Needs::kFeet, [](auto, auto) { return Shape{2, 4, 4}; },
+      {"foot_pose", Needs::kFeet,
+       [](auto, auto) {
+         return Shape{2, 4, 4};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          for (const Eigen::Isometry3d& pose : body.data().foot_pose) to = Put(pose.matrix(), to);
        }},
-      {"foot_jacobian", Needs::kFeet, [](auto k, auto) { return Shape{2, 6, k + 6}; },
+      {"foot_jacobian", Needs::kFeet,
+       [](auto k, auto) {
+         return Shape{2, 6, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          for (const auto& jacobian : body.data().foot_jacobian) to = Put(jacobian, to);
        }},
-      {"foot_velocity", Needs::kFeet, [](auto, auto) { return Shape{2, 6}; },
+      {"foot_velocity", Needs::kFeet,
+       [](auto, auto) {
+         return Shape{2, 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          for (const auto& velocity : body.data().foot_velocity) to = Put(velocity, to);
        }},
-      {"foot_bias_acceleration", Needs::kFeet, [](auto, auto) { return Shape{2, 6}; },
+      {"foot_bias_acceleration", Needs::kFeet,
+       [](auto, auto) {
+         return Shape{2, 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          for (const auto& bias : body.data().foot_bias_acceleration) to = Put(bias, to);
        }},
-      {"mass_matrix", Needs::kDynamics, [](auto k, auto) { return Shape{k + 6, k + 6}; },
+      {"mass_matrix", Needs::kDynamics,
+       [](auto k, auto) {
+         return Shape{k + 6, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.data().mass_matrix, to); }},
       {"bias", Needs::kDynamics, [](auto k, auto) { return Shape{k + 6}; },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.data().bias, to); }},
@@ -72,7 +87,10 @@ const std::vector<Quantity>& Quantities() {
        [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com, to); }},
       {"com_velocity", Needs::kDynamics, [](auto, auto) { return Shape{3}; },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com_velocity, to); }},
-      {"com_jacobian", Needs::kDynamics, [](auto k, auto) { return Shape{3, k + 6}; },
+      {"com_jacobian", Needs::kDynamics,
+       [](auto k, auto) {
+         return Shape{3, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.data().com_jacobian, to); }},
       {"com_bias_acceleration", Needs::kDynamics, [](auto, auto) { return Shape{3}; },
        [](const WholeBody& body, State, Torque, double* to) {
@@ -83,7 +101,10 @@ const std::vector<Quantity>& Quantities() {
          to = Put(body.data().total_mass * body.data().com_velocity, to);
          Put(balance::AngularMomentum(state, body.data()), to);
        }},
-      {"momentum_matrix", Needs::kDynamics, [](auto k, auto) { return Shape{6, k + 6}; },
+      {"momentum_matrix", Needs::kDynamics,
+       [](auto k, auto) {
+         return Shape{6, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          to = Put(body.data().total_mass * body.data().com_jacobian, to);
          Eigen::MatrixXd rows(3, body.model().num_velocities());
@@ -99,23 +120,40 @@ const std::vector<Quantity>& Quantities() {
          balance::ComputeAngularMomentumRows(body.data(), rows, &bias);
          Put(bias, to);
        }},
-      {"contact_jacobian", Needs::kContacts, [](auto k, auto m) { return Shape{m, k + 6}; },
+      {"contact_jacobian", Needs::kContacts,
+       [](auto k, auto m) {
+         return Shape{m, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          Put(body.contact().contact_jacobian(), to);
        }},
-      {"lambda_c", Needs::kContacts, [](auto, auto m) { return Shape{m, m}; },
-       [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().lambda_c(), to); }},
+      {"lambda_c", Needs::kContacts,
+       [](auto, auto m) {
+         return Shape{m, m};
+       },
+       [](const WholeBody& body, State, Torque, double* to) {
+         Put(body.contact().lambda_c(), to);
+       }},
       {"mu_c", Needs::kContacts, [](auto, auto m) { return Shape{m}; },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().mu_c(), to); }},
       {"p_c", Needs::kContacts, [](auto, auto m) { return Shape{m}; },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().p_c(), to); }},
-      {"jc_bar_transpose", Needs::kContacts, [](auto k, auto m) { return Shape{m, k + 6}; },
+      {"jc_bar_transpose", Needs::kContacts,
+       [](auto k, auto m) {
+         return Shape{m, k + 6};
+       },
        [](const WholeBody& body, State, Torque, double* to) {
          Put(body.contact().jc_bar_transpose(), to);
        }},
-      {"w", Needs::kContacts, [](auto k, auto) { return Shape{k, k}; },
+      {"w", Needs::kContacts,
+       [](auto k, auto) {
+         return Shape{k, k};
+       },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().w(), to); }},
-      {"w_pinv", Needs::kContacts, [](auto k, auto) { return Shape{k, k}; },
+      {"w_pinv", Needs::kContacts,
+       [](auto k, auto) {
+         return Shape{k, k};
+       },
        [](const WholeBody& body, State, Torque, double* to) { Put(body.contact().w_pinv(), to); }},
       {"gravity_torque", Needs::kContacts, [](auto k, auto) { return Shape{k}; },
        [](const WholeBody& body, State, Torque, double* to) {
@@ -155,6 +193,7 @@ py::dict Evaluate(const RobotHandle& robot, const std::vector<std::string>& name
   py::dict results;
   auto most = Needs::kFeet;
   for (const std::string& name : names) {
+    if (results.contains(name)) continue;  // its array would be freed, and written to
     const auto found = std::ranges::find(Quantities(), name, &Quantity::name);
     if (found == Quantities().end()) {
       throw py::key_error(fmt::format("there is no quantity '{}'", name));
@@ -240,8 +279,7 @@ py::array_t<double> FramePose(const RobotHandle& robot, const StateArrays& state
   RobotData data(robot.model());
   robot::RobotState state(robot.model().num_joints());
   for (py::ssize_t i = 0; i < count; ++i) {
-    Eigen::Matrix4d pose =
-        Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
+    Eigen::Matrix4d pose = Eigen::Matrix4d::Constant(std::numeric_limits<double>::quiet_NaN());
     if (pointers.Read(i, &state)) {
       robot::ComputeKinematics(robot.model(), state, &data);
       const auto b = static_cast<size_t>(found->body);
@@ -363,13 +401,13 @@ void BindRobot(py::module_* module) {
                                for (const auto& foot : r.model().feet()) names.push_back(foot.name);
                                return names;
                              })
-      .def_property_readonly(
-          "sole_size",
-          [](const RobotHandle& r) {
-            std::vector<std::pair<double, double>> sizes;
-            for (const auto& foot : r.model().feet()) sizes.emplace_back(foot.length, foot.width);
-            return sizes;
-          })
+      .def_property_readonly("sole_size",
+                             [](const RobotHandle& r) {
+                               std::vector<std::pair<double, double>> sizes;
+                               for (const auto& foot : r.model().feet())
+                                 sizes.emplace_back(foot.length, foot.width);
+                               return sizes;
+                             })
       .def_property_readonly("joint_lower",
                              [](const RobotHandle& r) {
                                return ByJoint(r, [](const auto& joint) { return joint.lower; });

@@ -26,7 +26,12 @@ class Reach {
   Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
         double gap);
 
-  bool empty() const { return leg_[0][0].num_corners < 3 || leg_[1][0].num_corners < 3; }
+  bool empty() const {
+    for (const auto& leg : leg_) {
+      if (leg[0].num_corners < 3 || leg[1].num_corners < 3) return true;
+    }
+    return false;
+  }
   /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lower`, 0 to 1.
   balance::ConvexPolygon Leg(int foot, double share) const;
   /// Least share of `lower` with which the soles stand at `offset` from the COM by foot; above 1,

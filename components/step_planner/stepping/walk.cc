@@ -160,7 +160,9 @@ void Walk::LetGo(const StepInput& input) {
   const double loaded = Loaded(input);
   output_.swing.position +=
       share * Vector3d(1, 1, loaded).cwiseProduct(sole.translation() - output_.swing.position);
-  output_.swing.position.z() -= period * (1 - loaded) * spec_.foot.touch_speed;
+  double& z = output_.swing.position.z();
+  const double lowest = std::min(z, swing_.foothold().z() - spec_.search_depth);
+  z = std::max(z - period * (1 - loaded) * spec_.foot.touch_speed, lowest);
   output_.swing.velocity -= share * output_.swing.velocity;
   output_.swing.acceleration.setZero();
   RotationMotion& turn = output_.swing_rotation;

@@ -63,7 +63,13 @@ class Walk {
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != WalkStage::kStanding; }
   WalkStage stage() const { return stage_; }
-  int num_steps() const { return num_steps_; }       ///< feet that have landed, since the start
+  int num_steps() const { return num_steps_; }  ///< feet that have landed, since the start
+  /// Steps begun since the start, the one under way too.
+  int num_begun() const {
+    const bool under_way =
+        active() && stage_ != WalkStage::kLoading && stage_ != WalkStage::kStopping;
+    return num_steps_ + (under_way ? 1 : 0);
+  }
   int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
   /// Another planner has moved the feet.
   void Stop() { stage_ = WalkStage::kStanding; }
