@@ -71,7 +71,7 @@ test('zsh reads its completion, which has each command and flag', {skip: has('zs
   const file = printed('zsh');
   assert.equal(spawnSync('zsh', ['-n', file], {encoding: 'utf8'}).stderr, '');
   for (const [path, flags] of commands) {
-    const table = spawnSync('zsh', ['-fc', `compdef() {}; source ${file} 2>/dev/null; f() { local -a commands flags kinds; _poise_table '${path}'; print -l $commands $flags; }; f`],
+    const table = spawnSync('zsh', ['-fc', `compdef() {}; source ${file} 2>/dev/null; f() { local -a commands flags kinds; _poise_table '${path}'; print -l -- $commands $flags; }; f`],
         {encoding: 'utf8', env: environment}).stdout;
     const offered = new Set(table.split('\n').map((line) => line.split(':')[0]));
     for (const name of [...flags, ...below(path)]) assert.ok(offered.has(name), `poise ${path}: ${name} is not offered`);
