@@ -17,6 +17,14 @@ namespace {
 // Of a sole's inner radius: what friction of the ankles and errors of the model move the centre of
 // pressure by, and a reserve before the sole tips.
 constexpr double kEdgeShare = 1.0 / 3;
+/// Of the smaller sole's inner radius: what the pendulum's offset is taken for at most. Chosen.
+constexpr double kOffsetShare = 0.67;
+/// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
+constexpr double kMostOffsetRate = 50;
+
+double LeastInnerRadius(const robot::RobotModel& model) {
+  return std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
+}
 
 void CheckWalk(bool holds, const char* name, const char* must) {
   if (!holds) throw ConfigError(std::string("walk.") + name, must);
@@ -56,6 +64,10 @@ void CheckWalkConfig(const WalkConfig& config) {
   not_negative(config.touch_duration(), "touch_duration");
   positive(config.freeze(), "freeze");
   positive(config.gain(), "gain");
+  not_negative(config.offset_rate(), "offset_rate");
+  if (config.offset_rate() > kMostOffsetRate) {
+    throw ConfigError("walk.offset_rate", fmt::format("must be at most {} 1/s", kMostOffsetRate));
+  }
   not_negative(config.adjust_from(), "adjust_from");
   not_negative(config.edge(), "edge");
   not_negative(config.lower(), "lower");
@@ -73,8 +85,7 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                         const robot::RobotModel& model) {
   double edge = config.edge();
   if (!config.has_edge()) {
-    edge = kEdgeShare *
-           std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
+    edge = kEdgeShare * LeastInnerRadius(model);
   }
   for (const robot::FootModel& foot : model.feet()) {
     if (edge < robot::InnerRadius(foot)) continue;
@@ -111,6 +122,8 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
   spec.gain = config.gain();
+  spec.offset_rate = config.offset_rate();
+  spec.most_offset = kOffsetShare * LeastInnerRadius(model);
   spec.adjust_from = config.adjust_from();
   spec.lower = config.lower();
   spec.height_rate = config.height_rate();

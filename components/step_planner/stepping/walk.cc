@@ -115,6 +115,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   body_yaw_.Begin(0);
   foothold_ = Next(Standing(state, stance_), 1 - stance_);
   left_over_.setZero();
+  offset_.setZero();
+  reckoned_ = state.pendulum.capture_point();
   Enter(WalkStage::kStarting, input.time);
   // From rest to the capture point and its velocity at lift-off; the centre of pressure is
   // ξ − ξ̇/ω, above the stance foot then.
@@ -328,6 +330,19 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
   return balance::NearestPoint(carrying, asked + left * left_over_);
 }
 
+Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double period) {
+  // Two poles at the rate.
+  const double rate = spec_.offset_rate;
+  const double w = state.pendulum.frequency;
+  const Vector2d error = state.pendulum.capture_point() - reckoned_;
+  const Vector2d asked = cop - offset_;
+  reckoned_ += period * (w * (reckoned_ + error - asked - offset_) + 2 * rate * error);
+  offset_ = (offset_ - period * rate * rate / w * error)
+                .cwiseMax(-spec_.most_offset)
+                .cwiseMin(spec_.most_offset);
+  return asked;
+}
+
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
   const auto s = static_cast<size_t>(stance_);
@@ -345,7 +360,8 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
   const Vector2d cop = DesiredCop(input, state);
   output_.cop = cop;
-  output_.com = LeadByCop(input, height_.point(), input.sole[s].translation().z(), cop);
+  output_.com = LeadByCop(input, height_.point(), input.sole[s].translation().z(),
+                          WithoutOffset(state, cop, period));
   output_.in_contact = in_contact_;
   output_.searching = false;
   if (stage_ == WalkStage::kSwinging) {
@@ -370,7 +386,7 @@ void Walk::Archive(StateArchive* archive) {
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
-                left_over_);
+                left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);
   output_.Archive(archive);
 }

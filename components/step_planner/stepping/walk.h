@@ -26,6 +26,8 @@ struct WalkSpec {
   double touch_load = 0, touch_duration = 0;  ///< N, s
   double search_depth = 0;                    ///< m below the foothold
   double gain = 0;                            ///< of the capture point's error, > 0
+  double offset_rate = 0;                     ///< 1/s, of the pendulum's observed offset; 0: none
+  double most_offset = 0;                     ///< m
   double adjust_from = 0;  ///< m of error at touch-down below which the foothold stays
   double lower = 0;        ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
@@ -104,6 +106,9 @@ class Walk {
   void PlanFrom(const StepState& state);
   /// The swing's foothold, moved by what the centre of pressure cannot correct.
   void Adjust(const StepInput& input, const StepState& state);
+  /// What to ask for so that the capture point moves as of `cop`, m: what legs that swing and a
+  /// body that turns add to the pendulum is observed, ξ̇ = ω (ξ − asked − offset), and taken off.
+  Eigen::Vector2d WithoutOffset(const StepState& state, const Eigen::Vector2d& cop, double period);
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
@@ -131,6 +136,8 @@ class Walk {
   std::array<Quintic, 2> start_;                        // of the capture point while starting
   CapturePlan plan_;                                    // made anew in every tick
   CapturePlan::Point wanted_;
+  Eigen::Vector2d reckoned_ = Eigen::Vector2d::Zero();   // m, capture point by the pendulum
+  Eigen::Vector2d offset_ = Eigen::Vector2d::Zero();     // m, of the centre of pressure it obeys
   Eigen::Vector2d left_over_ = Eigen::Vector2d::Zero();  // m, of the last stage's at its end
   StepOutput output_;
 };
