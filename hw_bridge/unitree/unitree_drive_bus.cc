@@ -230,7 +230,8 @@ const drive_feedback_t* UnitreeDriveBus::Receive() {
   int64_t wait = config_.simulated_time() ? int64_t{config_.state_timeout()} * kMillisecond
                                           : int64_t{config_.input_wait()} * 1000;
   if (!health_.usable) wait = 0;  // given up: nobody waits for it
-  fresh_ = ReceiveState(cycle_start_ + wait, true);
+  fresh_ = early_ || ReceiveState(cycle_start_ + wait, true);
+  early_ = false;
   silent_in_a_row_ = fresh_ || damaged_ > damaged_before ? 0 : silent_in_a_row_ + 1;
   Judge(fresh_);
   health_.working_counter_errors = damaged_;
@@ -288,15 +289,21 @@ void UnitreeDriveBus::SendMotors(const drive_command_t* command, bool enable) {
   // Says which state it answers where both ends wait for each other; a robot's are zero.
   if (config_.simulated_time()) command_.reserve[0] = state_.reserve[0];
   command_.crc = CrcOf(command_);
-  ++health_.frames_sent;
-  if (!link_->Send(command_)) ++health_.frames_lost;
+  // In lockstep the run's cycles alone count: how often both ends idle before depends on the
+  // machine.
+  const bool counts = command != nullptr || !config_.simulated_time();
+  health_.frames_sent += counts ? 1 : 0;
+  if (!link_->Send(command_) && counts) ++health_.frames_lost;
 }
 
 void UnitreeDriveBus::Idle(bool enable) {
   cycle_start_ = link_->Now();
+  if (early_) return;
   fresh_ = ReceiveState(cycle_start_);
   if (fresh_) TakeState();
-  SendMotors(nullptr, enable);
+  // In lockstep the robot may begin the run first: its first cycle's state is answered in the run.
+  early_ = fresh_ && config_.simulated_time() && health_.cycles == 0 && state_.reserve[0] != 0;
+  if (!early_) SendMotors(nullptr, enable);
 }
 
 void UnitreeDriveBus::Send(const drive_command_t& command) { SendMotors(&command); }

@@ -72,6 +72,7 @@ class UnitreeDriveBus final : public DriveBus {
   ImuState torso_imu_{};
   int64_t torso_missed_ = int64_t{1} << 40;  // states without a reading of the torso's IMU
   bool ours_ = false;                        // no controller of the maker's moves the robot
+  bool early_ = false;                       // the state of the first cycle came before the cycle
   bool known_ = false;                       // a state has come
   uint32_t last_tick_ = 0;
   uint8_t mode_machine_ = 0;
