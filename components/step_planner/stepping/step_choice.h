@@ -56,7 +56,7 @@ class StepChoice {
 
   /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
   /// sooner; none when standing still does as well. A foot that is not in contact swings at once,
-  /// from `swing_from` if it is in the air.
+  /// from where it is.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes.
   StepPlan Plan(const StepState& state, int foot) const;

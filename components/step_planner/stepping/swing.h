@@ -27,7 +27,7 @@ class Quintic {
 };
 
 struct SwingSpec {
-  double clearance = 0;    ///< m that the sole rises above the higher of its two ends
+  double clearance = 0;    ///< m above the foothold; a foot that begins higher rises no more
   double touch_speed = 0;  ///< m/s, downward, with which it meets the ground
   double freeze = 0;       ///< s before the end, from when on the foothold stays
 };
