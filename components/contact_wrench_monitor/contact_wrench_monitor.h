@@ -35,8 +35,8 @@ class ContactWrenchMonitor : public Component {
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
   int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
-  /// BalanceControl by the configured movers, within the joints' limits; in a step MoveForStep, which
-  /// does not keep them. torque_ on entry the task torque.
+  /// BalanceControl by the configured movers, within the joints' limits; in a step MoveForStep,
+  /// which does not keep them. torque_ on entry the task torque.
   template <class Bounds>
   balance::BalanceStatus Move(const balance::ContactGeometry& geometry, const Bounds& bounds,
                               balance::BalanceResult* result);
