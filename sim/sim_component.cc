@@ -6,6 +6,12 @@
 #include "components/messages/robot_resource.h"
 
 namespace poise {
+namespace {
+
+// Apart from those of terrain and sensors.
+constexpr uint64_t kLossStream = 0x6c6f7373;
+
+}  // namespace
 
 ComponentTraits SimTraits(const std::string& engine) {
   return {.sections = {"sim", engine},
@@ -34,6 +40,10 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
                                                context.seed, context.lead_ticks);
     sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, setup.sim), context.seed);
     foot_sensors_ = std::make_unique<FootSensors>(*model, setup.sim);
+    command_loss_ = setup.sim.command_loss();
+    if (!(command_loss_ >= 0 && command_loss_ < 1)) {
+      throw ConfigError("command_loss", "must be in [0, 1)");
+    }
   } catch (const ConfigError& error) {
     if (error.field().empty()) throw;
     throw ConfigError("sim." + error.field(), error.problem());
@@ -43,6 +53,7 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     current_sensor_.push_back(motor.current_sensor ? 1 : 0);
   }
 
+  losses_.emplace(context.seed, kLossStream);
   impedance_.resize(model->motors().size());
 
   const MessageCounts counts = JointAndFootCounts(*model);
@@ -62,9 +73,15 @@ std::string_view SimComponent::finished() const {
   return simulation_ ? simulation_->end_reason() : std::string_view{};
 }
 
+bool SimComponent::LosesCommand() {
+  return command_loss_ > 0 && losses_->Uniform() < command_loss_;
+}
+
 void SimComponent::Step(const Tick& tick) {
   if (tick.index > 0) {
-    if (drive_command_.present()) {
+    if (LosesCommand()) {
+      // The drives hold what they have.
+    } else if (drive_command_.present()) {
       simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);
       for (size_t j = 0; j < impedance_.size(); ++j) {
         impedance_[j] = {.stiffness = drive_command_->stiffness[j],

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "poise/external_push_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "sim/foot_sensors.h"
+#include "sim/random.h"
 #include "sim/sensors.h"
 #include "sim/simulation.h"
 
@@ -51,6 +53,8 @@ class SimComponent : public Component {
 
  private:
   void Step(const Tick& tick);
+  /// Whether this tick's command does not reach the drives.
+  bool LosesCommand();
   void PublishFeedback();
   void PublishPush();
   void PublishTruth();
@@ -65,6 +69,8 @@ class SimComponent : public Component {
   std::unique_ptr<Sensors> sensors_;
   std::unique_ptr<FootSensors> foot_sensors_;
   std::unique_ptr<SensorReadings> readings_;
+  double command_loss_ = 0;  // share of ticks
+  std::optional<RandomStream> losses_;
   std::vector<DriveImpedance> impedance_;  // by joint
   std::vector<int8_t> current_sensor_;     // by joint
 };
