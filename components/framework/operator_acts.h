@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,13 +19,13 @@ inline constexpr std::string_view kAnswerType = "operate.answer_t";
 
 /// A number of the configuration that may be set while the component runs.
 struct LiveSetting {
-  std::string field;    ///< path in the component's configuration, "com.kp"
-  double* value;        ///< in the unit of the field's comment
-  double least, most;   ///< range
-  double ramp;          ///< s in which a change is gone through, linearly; 0: at once
+  std::string field;   ///< path in the component's configuration, "com.kp"
+  double* value;       ///< in the unit of the field's comment
+  double least, most;  ///< range
+  double ramp;         ///< s in which a change is gone through, linearly; 0: at once
   double from = 0, to = 0;
-  int64_t begin = 0;    ///< tick of the change
-  int64_t ticks = 0;    ///< that it takes; 0: none is under way
+  int64_t begin = 0;  ///< tick of the change
+  int64_t ticks = 0;  ///< that it takes; 0: none is under way
 };
 
 /// All of a component. Declared in Configure; a change never makes a step that its ramp does not
@@ -71,16 +70,14 @@ class ActInput final : public InputPort {
   void Offer(const operate::act_t& act);
   /// A replay's: takes effect in `tick`.
   void Place(const operate::act_t& act, int64_t tick);
-  /// The oldest answer not yet taken; false: none. Its run_id is the caller's to set.
+  /// An answer that nobody has taken; false: none.
   bool TakeAnswer(operate::answer_t* answer);
 
   const char* type_name() const override;
   int64_t fingerprint() const override;
   std::span<const char* const> count_names() const override { return {}; }
   void* NewMessage() const override { return new operate::act_t(); }
-  void DeleteMessage(void* message) const override {
-    delete static_cast<operate::act_t*>(message);
-  }
+  void DeleteMessage(void* message) const override { delete static_cast<operate::act_t*>(message); }
   void CopyMessage(const void* from, void* to) const override {
     *static_cast<operate::act_t*>(to) = *static_cast<const operate::act_t*>(from);
   }
@@ -93,9 +90,11 @@ class ActInput final : public InputPort {
     operate::act_t act;
     int64_t tick;
   };
-  void Conclude();
-  void Say(const operate::act_t& act, int64_t tick, int8_t verdict, double value = 0);
-  bool Known(int64_t id) const;
+  struct Said {
+    operate::answer_t answer{};  // kind 0: none
+    bool untaken = false;
+  };
+  void Say(const operate::act_t& act, int8_t verdict, double value = 0);
 
   LiveSettings settings_;
   int component_ = -1;
@@ -104,9 +103,9 @@ class ActInput final : public InputPort {
   bool open_ = false;  // current_ has no answer yet
   int8_t verdict_ = 0;
   Tick now_;
-  int64_t done_ = -1;  // last tick that the component has asked for
-  std::vector<operate::answer_t> answers_;  // ring: those said, the oldest overwritten
-  int64_t said_ = 0, taken_ = 0;
+  int64_t done_ = -1;       // last tick that the component has asked for
+  std::vector<Said> said_;  // the oldest is overwritten
+  size_t next_said_ = 0;
 };
 
 /// A component with an ActInput shows it to tools by this.

@@ -32,11 +32,11 @@ std::vector<LiveField> LiveFields(const RunSpec& spec);
 /// What became of an act.
 struct ActOutcome {
   bool done = false;
-  int64_t tick = 0;   ///< in which it took effect
-  double time = 0;    ///< s of the scenario, of that tick
-  double value = 0;   ///< of a setting
-  int8_t verdict = 0; ///< operate::answer_t::VERDICT_*; 0: nobody has answered in time
-  std::string text;   ///< why it was refused, for a person
+  int64_t tick = 0;    ///< in which it took effect
+  double time = 0;     ///< s of the scenario, of that tick
+  double value = 0;    ///< of a setting
+  int8_t verdict = 0;  ///< operate::answer_t::VERDICT_*; 0: nobody has answered in time
+  std::string text;    ///< why it was refused, for a person
 };
 
 /// Sends acts, repeats what gets no answer, and moves to a later tick what came late. Not
@@ -44,7 +44,8 @@ struct ActOutcome {
 /// could take (unknown body, field, foot; not finite; a graph without operator's channels).
 class OperatorLine {
  public:
-  /// `run`: folder of a run that goes on as processes. Throws ConfigError or BusError.
+  /// `run`: folder of a run that goes on as processes; empty: the only one. Throws ConfigError or
+  /// BusError.
   explicit OperatorLine(const std::string& run);
   explicit OperatorLine(RunSpec spec);
 
@@ -86,7 +87,7 @@ class OperatorLine {
     std::optional<ActOutcome> outcome;
   };
   int64_t Add(operate::act_t act);
-  int ComponentWith(const std::string& what, const std::string& port_type) const;
+  int64_t Plan(operate::act_t act);
   const LiveField& Field(const std::string& path) const;
   void Send(Pending* pending, int64_t now);
   void Hear();
@@ -101,7 +102,6 @@ class OperatorLine {
   std::string tick_channel_;
   int64_t tick_offset_ = 0;  // bytes
   int64_t tick_ = -1, first_tick_ = -1, first_time_ = 0, tick_time_ = 0;
-  int64_t lead_ = 10;  // ticks
   int64_t next_id_ = 0;
   std::map<int64_t, Pending> pending_;
 };
