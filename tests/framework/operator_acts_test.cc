@@ -154,8 +154,7 @@ TEST_F(OperatorActsTest, ASettingOutOfRangeOrUnknownStays) {
   }
   EXPECT_EQ(gain, 10);
   for (const answer_t& answer : Answers(&input_)) {
-    EXPECT_EQ(answer.verdict,
-              answer.id <= 2 ? answer_t::VERDICT_RANGE : answer_t::VERDICT_UNKNOWN);
+    EXPECT_EQ(answer.verdict, answer.id <= 2 ? answer_t::VERDICT_RANGE : answer_t::VERDICT_UNKNOWN);
   }
   input_.Offer(Setting(7, 9, "kp", 20));
   act_t ask = Setting(8, 0, "kp", 0);

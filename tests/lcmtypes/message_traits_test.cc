@@ -259,8 +259,7 @@ TEST(MessageTable, VisitsEveryScalarByPath) {
   EXPECT_EQ(seen.reals.at("foot_wrench[1].moment[2]"), 4.5);
   EXPECT_EQ(seen.reals.at("frame_o.orientation[0]"), 1);
   // 8 bytes a real: what is not counted or integer is real.
-  EXPECT_EQ(seen.reals.size(),
-            3u + 3u + 7u + 2u + 2u + 2u + 6u + 6u + 2u * 6u + 5u + 2u * 16u);
+  EXPECT_EQ(seen.reals.size(), 3u + 3u + 7u + 2u + 2u + 2u + 6u + 6u + 2u * 6u + 5u + 2u * 16u);
   EXPECT_FALSE(type->visit(bytes.data(), static_cast<int64_t>(bytes.size()) - 1, &seen));
 
   health_t health{};
