@@ -167,6 +167,7 @@ class UnitreeFault : public testing::Test {
       const size_t colon = detail.find(": ");
       const std::string state = detail.substr(detail.find(" to ") + 4);
       if (state.starts_with("stopp") || state.starts_with("emergency")) {
+        fmt::print("  {:.3f} s: {}\n", event["time"].get<double>(), detail);
         return colon == std::string::npos ? "" : detail.substr(colon + 2);
       }
     }
