@@ -56,8 +56,7 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
   const double duration = end_ - start_;
   x_.Begin(point(0), {foothold.x()}, start_, duration);
   y_.Begin(point(1), {foothold.y()}, start_, duration);
-  // A foot that is higher than it has to be goes no higher.
-  apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z());
+  apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z() + spec.rise);
   rise_.Begin(point(2), {apex_height_}, start_, apex_ - start_);
   fall_.Begin({apex_height_}, {foothold.z(), -spec.touch_speed}, apex_, end_ - apex_);
   from_rotation_ = rotation;
