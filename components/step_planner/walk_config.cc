@@ -22,6 +22,9 @@ constexpr double kOffsetShare = 0.67;
 /// Of the clearance, by which a foot rises from where it stands though the other stands lower: the
 /// edges of tilted ground are higher than its middle. Chosen.
 constexpr double kRiseShare = 0.5;
+/// Of the swing, after which a foot is above its foothold where the ground is unknown: it comes down
+/// from above, not against a block's side. By then it has come down by a fifth of its height. Chosen.
+constexpr double kAcrossShare = 0.65;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
@@ -124,7 +127,7 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
   spec.acceleration = config.acceleration();
   spec.turn_acceleration = config.turn_acceleration();
   spec.foot = {config.clearance(), config.touch_speed(), config.freeze(),
-               kRiseShare * config.clearance()};
+               kRiseShare * config.clearance(), config.rests() ? kAcrossShare : 1};
   spec.touch_load = contact.touch_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
