@@ -22,8 +22,9 @@ constexpr double kOffsetShare = 0.67;
 /// Of the clearance, by which a foot rises from where it stands though the other stands lower: the
 /// edges of tilted ground are higher than its middle. Chosen.
 constexpr double kRiseShare = 0.5;
-/// Of the swing, after which a foot is above its foothold where the ground is unknown: it comes down
-/// from above, not against a block's side. By then it has come down by a fifth of its height. Chosen.
+/// Of the swing, after which a foot is above its foothold where the ground is unknown: it comes
+/// down from above, not against a block's side. By then it has come down by a fifth of its height.
+/// Chosen.
 constexpr double kAcrossShare = 0.65;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;

@@ -85,7 +85,8 @@ void Swing::Move(const Eigen::Vector2d& foothold, double time, double end) {
 }
 
 double Swing::Across(double time) const {
-  return std::max(start_ + spec_.across * (end_ - start_) - time, std::max(spec_.freeze, kLeastTime));
+  return std::max(start_ + spec_.across * (end_ - start_) - time,
+                  std::max(spec_.freeze, kLeastTime));
 }
 
 double Swing::Progress(double time) const {

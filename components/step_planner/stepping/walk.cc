@@ -18,15 +18,28 @@ constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
 constexpr int kAhead = 3;
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
-constexpr int kHalvings = 40;     // of [0, 1]
+constexpr int kHalvings = 40;           // of [0, 1]
 constexpr double kLongestLetGo = 0.06;  // s of settling that this counts of
-constexpr double kPressed = 0.8;  // share of the press' load that counts as such
-constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
+constexpr double kPressed = 0.8;        // share of the press' load that counts as such
+constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
 
+WalkSpec Pressing(WalkSpec spec) {
+  spec.press_load = std::max(spec.press_load, spec.touch_load);
+  return spec;
+}
+
 }  // namespace
+
+Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
+    : choice_(choice),
+      spec_(Pressing(spec)),
+      touch_(spec.touch_load, spec.touch_duration),
+      height_(spec.height_rate),
+      body_yaw_(spec.yaw_rate),
+      ramp_start_(RampStart(spec.press_share)) {}
 
 double RampStart(double share) {
   double low = 0, high = 1;
@@ -52,13 +65,14 @@ Footstep Walk::Next(const Footstep& stance, int foot) const {
 }
 
 Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
-  return Towards(Next(stance, foot), Next(way_, foot), spec_.line, stance, foot, spec_.step);
+  // At the end the feet come side by side, wherever that is.
+  const double most = closing_ ? 0 : spec_.line;
+  return Towards(Next(stance, foot), Next(way_, foot), most, stance, foot, spec_.step);
 }
 
 bool Walk::LiftsOff(const StepState& state, double time) const {
   if (time < since_ + spec_.unload - kTimeTolerance) return false;
-  const Vector2d off =
-      state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
+  const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
   return !spec_.rests || off.norm() < spec_.off_center;
 }
 
@@ -147,8 +161,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
   const Vector2d above = state.sole[static_cast<size_t>(stance_)];
-  const CapturePlan::Point lift_off =
-      spec_.rests ? CapturePlan::Point{above, above} : plan_.At(0);
+  const CapturePlan::Point lift_off = spec_.rests ? CapturePlan::Point{above, above} : plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {

@@ -32,11 +32,12 @@ struct WalkSpec {
   double lower = 0;        ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
-  bool rests = false;     ///< the capture point, above the sole that carries, until both do
-  double press_load = 0;  ///< N with which a foot that has touched is pressed down
-  double press_share = 0; ///< of the weight that this is; 0: it only has to touch
-  double off_center = 0;  ///< m of the capture point beside the sole's middle at lift-off, at most
-  double line = 0;        ///< m, rad by which a foothold comes back to the commanded way
+  bool rests = false;  ///< the capture point, above the sole that carries, until both do
+  double press_load =
+      0;  ///< N with which a foot that has touched is pressed down; at least touch_load
+  double press_share = 0;  ///< of the weight that this is; 0: it only has to touch
+  double off_center = 0;   ///< m of the capture point beside the sole's middle at lift-off, at most
+  double line = 0;         ///< m, rad by which a foothold comes back to the commanded way
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -61,13 +62,7 @@ double RampStart(double share);
 class Walk {
  public:
   Walk() = default;
-  Walk(const StepChoice& choice, const WalkSpec& spec)
-      : choice_(choice),
-        spec_(spec),
-        touch_(spec.touch_load, spec.touch_duration),
-        height_(spec.height_rate),
-        body_yaw_(spec.yaw_rate),
-        ramp_start_(RampStart(spec.press_share)) {}
+  Walk(const StepChoice& choice, const WalkSpec& spec);
 
   /// Once a tick. False: the robot stands, `output` is not to be used.
   bool Update(const StepInput& input, const WalkCommand& command);
