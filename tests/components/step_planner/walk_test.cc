@@ -138,7 +138,7 @@ TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
 }
 
 TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
-  const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.105}, 0}, far{{0.1, 0.5}, 1};
+  const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
   const Footstep moved = Towards(step, far, 0.03, stance, robot::kRightFoot, Limits());
   EXPECT_NEAR(moved.position.y(), 0.105 - Limits().least_spacing, 1e-12);
   EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
