@@ -38,7 +38,7 @@ endforeach()
 install(DIRECTORY ${PROJECT_BINARY_DIR}/poise DESTINATION ${_headers} COMPONENT dev FILES_MATCHING PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/poise_commit.h DESTINATION ${_headers} COMPONENT dev)
 
-foreach(folder scenarios graphs robots sweeps drives bits)
+foreach(folder scenarios graphs robots sweeps drives bits layouts)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/${folder} DESTINATION share/poise)
 endforeach()
 install(FILES ${POISE_LCM_FILES} DESTINATION share/poise/lcmtypes)
