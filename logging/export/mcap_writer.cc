@@ -158,7 +158,7 @@ void McapWriter::AddMetadata(const std::string& name, const Texts& metadata) {
 
 void McapWriter::AddAttachment(const std::string& name, const std::string& media_type,
                                std::string_view data) {
-  EndChunk();  // an attachment stands between chunks
+  EndChunk();                    // an attachment stands between chunks
   constexpr uint64_t kTime = 0;  // of no moment of the run
   Fields fields;
   fields.Add(kTime).Add(kTime).AddString(name).AddString(media_type);

@@ -64,7 +64,7 @@ export function schemaProblems({protobuf, schemas}, type, seen = new Set()) {
   const text = schemas.generateProto(published, enums).replace(/^import .*$/gm, '');
   const theirs = protobuf.parse(text, {keepCase: true}).root.lookupType(`foxglove.${type.name}`);
   const shape = (t) => t.fieldsArray.map((f) => `${f.id} ${f.repeated ? 'repeated ' : ''}${f.type.split('.').pop()} ${f.name}`).sort();
-  const values = (t) => t.nestedArray.filter((n) => n.values).map((n) => [n.name, n.values]);
+  const values = (t) => t.nestedArray.filter((n) => n.values).map((n) => [n.name, Object.entries(n.values).sort()]);
   const problems = [];
   try {
     assert.deepEqual(shape(type), shape(theirs));

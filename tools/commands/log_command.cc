@@ -9,11 +9,11 @@
 #include "logging/printable.h"
 #include "logging/replay/log_pack.h"
 #include "logging/run_info.h"
-#include "tools/foxglove/mcap_scene.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/foxglove/mcap_scene.h"
 #include "tools/run/remake.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/former_fields.h"
@@ -322,7 +322,8 @@ void AddExport(CLI::App* log, Command* command) {
   AddRun(app, &options->run);
   app->add_option("--csv", options->csv, "folder for one CSV file a channel, a row a message");
   app->add_option("--merged", options->merged, "one wide CSV file, a row a tick");
-  app->add_option("--mcap", options->mcap, "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
+  app->add_option("--mcap", options->mcap,
+                  "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
   app->add_flag("--force", options->force, "replace files of these names");
   app->callback([options, command] { *command = [options] { return Export(*options); }; });
 }

@@ -19,7 +19,7 @@ namespace {
 
 // Between looks at the bus: far from filling its buffer, and few wake-ups beside the run.
 constexpr std::chrono::milliseconds kRos2Pause{4};
-constexpr std::chrono::milliseconds kRos2Silence{500};     // then it is asked whether the run goes on
+constexpr std::chrono::milliseconds kRos2Silence{500};  // then it is asked whether the run goes on
 constexpr std::chrono::milliseconds kRos2Patience{60'000};  // until the run has begun
 constexpr int kMostDomain = 232;                            // of DDS
 

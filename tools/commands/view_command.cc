@@ -65,7 +65,11 @@ class Viewer {
         ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
                 &ring_),
-        status_((live->dir() / "run.lcm").string(), scenario) {}
+        status_((live->dir() / "run.lcm").string(), scenario) {
+    if (options.foxglove == 0) return;
+    foxglove_ = std::make_unique<LiveFoxglove>(options.foxglove, options.foxglove_origins, record,
+                                               scenario);
+  }
 
   int Run() {
     fmt::print(

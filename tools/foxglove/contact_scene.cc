@@ -21,8 +21,8 @@ constexpr double kLightShare = 0.01;  // of the weight: a foot that carries less
 constexpr double kLeastPush = 3;      // N: below it the sensor's noise
 constexpr double kPushScale = 1.5;    // of a push's arrow beside the ground's
 constexpr double kThick = 0.018, kThin = 0.011;  // m, of arrows
-constexpr double kLine = 0.004;       // m
-constexpr double kAbove = 1e-3;       // m that marks lie above what they lie on
+constexpr double kLine = 0.004;                  // m
+constexpr double kAbove = 1e-3;                  // m that marks lie above what they lie on
 
 constexpr double kComSize = 0.044, kMark = 0.022, kSmallMark = 0.015;  // m
 

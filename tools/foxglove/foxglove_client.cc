@@ -19,15 +19,15 @@ using ErrorCode = boost::system::error_code;
 using Json = nlohmann::json;
 
 constexpr const char* kProtocol = "foxglove.websocket.v1";
-constexpr uint32_t kMaxHeader = 16 << 10;         // bytes; browsers send about 1 KB
-constexpr size_t kMaxReceived = 64 << 10;         // bytes a message: some thousand subscriptions
-constexpr size_t kMaxQueue = 512;                 // messages
+constexpr uint32_t kMaxHeader = 16 << 10;  // bytes; browsers send about 1 KB
+constexpr size_t kMaxReceived = 64 << 10;  // bytes a message: some thousand subscriptions
+constexpr size_t kMaxQueue = 512;          // messages
 constexpr size_t kMaxQueuedBytes = size_t{8} << 20;
-constexpr int kSendBuffer = 256 << 10;            // bytes, in the system
+constexpr int kSendBuffer = 256 << 10;  // bytes, in the system
 constexpr std::chrono::seconds kPatience{5};
 constexpr std::chrono::seconds kTellAgain{1};
-constexpr uint8_t kMessageData = 1, kTime = 2;    // binary opcodes
-constexpr int kWarning = 1, kError = 2;           // levels of a status
+constexpr uint8_t kMessageData = 1, kTime = 2;  // binary opcodes
+constexpr int kWarning = 1, kError = 2;         // levels of a status
 
 std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 
@@ -75,13 +75,14 @@ void FoxgloveClient::Start() {
   Socket().socket().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
   parser_.header_limit(kMaxHeader);
   Socket().expires_after(kPatience);
-  http::async_read(Socket(), buffer_, parser_, [self = shared_from_this()](ErrorCode error, size_t) {
-    if (error) {
-      self->Close();
-    } else {
-      self->Answer();
-    }
-  });
+  http::async_read(Socket(), buffer_, parser_,
+                   [self = shared_from_this()](ErrorCode error, size_t) {
+                     if (error) {
+                       self->Close();
+                     } else {
+                       self->Answer();
+                     }
+                   });
 }
 
 void FoxgloveClient::Close() {
@@ -105,9 +106,9 @@ void FoxgloveClient::Answer() {
     Respond(http::status::forbidden,
             "not for pages of this origin; poise view --foxglove-origin allows one\n");
   } else if (!websocket::is_upgrade(request)) {
-    Respond(http::status::upgrade_required,
-            fmt::format("open ws://127.0.0.1:{} in Foxglove: \"Open connection\"\n",
-                        host_->port()));
+    Respond(
+        http::status::upgrade_required,
+        fmt::format("open ws://127.0.0.1:{} in Foxglove: \"Open connection\"\n", host_->port()));
   } else if (!Lists(View(request[http::field::sec_websocket_protocol]), kProtocol)) {
     Respond(http::status::bad_request, fmt::format("the subprotocol must be {}\n", kProtocol));
   } else {
@@ -193,8 +194,8 @@ void FoxgloveClient::Handle() {
   const char* const name = subscribe ? "subscriptions" : "subscriptionIds";
   const auto list = message.find(name);
   if (list == message.end() || !list->is_array()) {
-    Tell(kError, fmt::format("{}: {} must be an array", subscribe ? "subscribe" : "unsubscribe",
-                             name));
+    Tell(kError,
+         fmt::format("{}: {} must be an array", subscribe ? "subscribe" : "unsubscribe", name));
     return;
   }
   for (const Json& item : *list) {

@@ -91,7 +91,7 @@ class FoxgloveClient : public std::enable_shared_from_this<FoxgloveClient> {
   int64_t dropped_ = 0;
   int64_t dropped_told_ = 0;
   std::chrono::steady_clock::time_point told_;
-  std::map<uint32_t, size_t> channel_of_;  // by subscription
+  std::map<uint32_t, size_t> channel_of_;        // by subscription
   std::map<size_t, uint32_t> subscriptions_of_;  // by channel, which has one at most
 };
 

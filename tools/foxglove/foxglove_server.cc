@@ -105,9 +105,8 @@ class FoxgloveServer::Impl : public FoxgloveHost {
     });
   }
   bool Wants(size_t topic) const {
-    return keeps_[topic] || std::ranges::any_of(clients_, [&](const auto& client) {
-             return client->wants(topic);
-           });
+    return keeps_[topic] ||
+           std::ranges::any_of(clients_, [&](const auto& client) { return client->wants(topic); });
   }
   void Send(size_t topic, uint64_t time, std::string message) {
     if (!Wants(topic)) return;

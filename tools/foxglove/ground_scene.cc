@@ -12,14 +12,15 @@ using Eigen::Vector3d;
 
 constexpr SceneColor kFloor{0.30, 0.34, 0.40, 0.6};
 constexpr SceneColor kBlock{0.76, 0.62, 0.42};
-constexpr double kFloorSide = 8;         // m, of the floor about the origin
-constexpr double kFloorBeyond = 3;       // m, of it behind the last block
-constexpr double kFloorThickness = 0.02; // m
-constexpr double kFloorDepth = 1e-3;     // m that it lies below z = 0: what lies on it shows
-constexpr double kLaneWidth = 1;         // m, of a lane that has no edge
-constexpr double kBottom = -0.3;         // m, world, of a field's blocks
-constexpr double kInside = 1e-6;         // m from a block's edge, where its top is asked for
-constexpr int kPatch = 16;               // squares along a side of a block with relief
+constexpr double kFloorSide = 8;          // m, of the floor about the origin
+constexpr double kFloorBeyond = 3;        // m, of it behind the last block
+constexpr double kFloorThickness = 0.02;  // m
+constexpr double kFloorDepth = 1e-3;      // m that it lies below z = 0: what lies on it shows
+constexpr double kLaneWidth = 1;          // m, of a lane that has no edge
+constexpr double kBottom = -0.3;          // m, world, of a field's blocks
+constexpr double kInside = 1e-6;          // m from a block's edge, where its top is asked for
+constexpr double kAbsent = -1;            // stage of a block that is not there
+constexpr int kPatch = 16;                // squares along a side of a block with relief
 
 /// A top of the terrain over a rectangle, with walls down to `bottom`.
 void AddPatch(const Terrain& terrain, const Eigen::Vector2d& low, const Eigen::Vector2d& high,
@@ -66,6 +67,13 @@ void AddPatch(const Terrain& terrain, const Eigen::Vector2d& low, const Eigen::V
   }
 }
 
+/// How far a block has come: kAbsent, then 0 to 1 while it rises.
+double Stage(const SoftBlock& block, double time) {
+  // One without a start is there from the beginning, before time 0.
+  if (block.start() > 0 && time < block.start()) return kAbsent;
+  return block.rise() > 0 ? std::clamp((time - block.start()) / block.rise(), 0.0, 1.0) : 1;
+}
+
 }  // namespace
 
 GroundScene::GroundScene(const Scenario& scenario) : config_(scenario.sim()) {
@@ -105,15 +113,11 @@ void GroundScene::AddFloor(int64_t utime, foxglove::SceneUpdate* scene) const {
 
 std::optional<foxglove::SceneUpdate> GroundScene::Update(double time, int64_t utime) {
   const SoftBlock& block = config_.block();
-  const bool has_block = terrain_ != nullptr && config_.has_block();
-  // A block without a start is there from the beginning, before time 0.
-  const bool there = has_block && !(block.start() > 0 && time < block.start());
-  const double whole = block.start() + block.rise();
-  const bool changes = has_block && time >= block.start() && last_ <= whole;
+  const double stage = terrain_ != nullptr && config_.has_block() ? Stage(block, time) : kAbsent;
   const bool first = !begun_;
+  if (!first && stage == stage_) return {};
   begun_ = true;
-  last_ = time;
-  if (!first && !changes) return {};
+  stage_ = stage;
 
   foxglove::SceneUpdate scene;
   if (first) AddFloor(utime, &scene);
@@ -128,7 +132,7 @@ std::optional<foxglove::SceneUpdate> GroundScene::Update(double time, int64_t ut
       }
     }
   }
-  if (there) {
+  if (stage > kAbsent) {
     const Eigen::Vector2d centre(block.x(), block.y());
     const Eigen::Vector2d half(block.length() / 2, block.width() / 2);
     AddPatch(*terrain_, centre - half, centre + half, kPatch, time, 0,

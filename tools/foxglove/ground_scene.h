@@ -24,7 +24,7 @@ class GroundScene {
 
   SimConfig config_;
   std::unique_ptr<Terrain> terrain_;
-  double last_ = 0;  // s, of the call before
+  double stage_ = 0;  // of the block, as it was told last
   bool begun_ = false;
 };
 

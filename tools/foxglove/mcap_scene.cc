@@ -26,9 +26,9 @@ class Scene : public logging::McapTopics {
 
   void Begin(logging::McapWriter* writer) override {
     writer_ = writer;
-    writer->AddAttachment(run_.info.urdf.find("<mujoco") == std::string::npos ? "robot.urdf"
-                                                                              : "robot.xml",
-                          "application/xml", run_.info.urdf);
+    writer->AddAttachment(
+        run_.info.urdf.find("<mujoco") == std::string::npos ? "robot.urdf" : "robot.xml",
+        "application/xml", run_.info.urdf);
     writer->AddAttachment("robot.pbtxt", "text/plain", run_.info.robot);
     writer->AddAttachment("scenario.pbtxt", "text/plain", run_.info.scenario);
     for (const SceneTopic& topic : topics_.topics()) {

@@ -135,14 +135,13 @@ void RobotFrames::DrawCapsule(int body, foxglove::SceneEntity* entity) const {
     Isometry3d pose = Isometry3d::Identity();
     pose.translation() = end / 2;
     if (end.norm() > 0) {
-      pose.linear() =
-          Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), end).toRotationMatrix();
+      pose.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), end).toRotationMatrix();
     }
     AddCapsule(to_link * pose, kBone, end.norm(), entity);
     any = true;
   }
-  if (!any) AddSphere(to_link * model_.bodies()[static_cast<size_t>(body)].com, kBone, kSolid,
-                      entity);
+  if (!any)
+    AddSphere(to_link * model_.bodies()[static_cast<size_t>(body)].com, kBone, kSolid, entity);
 }
 
 foxglove::SceneUpdate RobotFrames::Picture(const RobotDrawing& drawing, int64_t utime) const {

@@ -105,8 +105,8 @@ void SceneTopics::Publish(Topic topic, int64_t utime, const Message& message) {
 }
 
 int64_t SceneTopics::Utime(double time) const {
-  const double ticks = std::round(time / run_.spec.tick_period()) +
-                       static_cast<double>(run_.spec.lead_ticks());
+  const double ticks =
+      std::round(time / run_.spec.tick_period()) + static_cast<double>(run_.spec.lead_ticks());
   return std::max<int64_t>(0, std::llround(1e6 * ticks * run_.spec.tick_period()));
 }
 
@@ -115,8 +115,7 @@ void SceneTopics::Begin() {
   for (const Resource& resource : run_.spec.resource()) {
     if (resource.name() == "urdf") places.maker_file = resource.file();
   }
-  const RobotDrawing drawing =
-      DrawRobot(run_.robot, run_.info.urdf, places, kSceneTriangles);
+  const RobotDrawing drawing = DrawRobot(run_.robot, run_.info.urdf, places, kSceneTriangles);
   Publish(kFixedFrames, 0, frames_.Fixed(0));
   Publish(kRobot, 0, frames_.Picture(drawing, 0));
   if (IsUrdf(run_.info.urdf)) {
@@ -139,14 +138,14 @@ void SceneTopics::End() {
 
 void SceneTopics::AddTick(const TickMessages& tick) {
   if (tick.utime < 0 || tick.utime >= INT64_MAX / 1'000) return;
-  const bool posed = tick.truth ? ReadTruth(*tick.truth, &state_)
-                                : tick.state && ReadState(*tick.state, &state_);
+  const bool posed =
+      tick.truth ? ReadTruth(*tick.truth, &state_) : tick.state && ReadState(*tick.state, &state_);
   if (posed) Publish(kFrames, tick.utime, frames_.Moving(state_, tick.utime));
   Publish(kForces, tick.utime, contacts_.Forces(tick));
   Publish(kSupport, tick.utime, contacts_.Support(tick));
   AddJointStates(tick);
-  const double time = 1e-6 * static_cast<double>(tick.utime) -
-                      run_.duration(run_.spec.lead_ticks());
+  const double time =
+      1e-6 * static_cast<double>(tick.utime) - run_.duration(run_.spec.lead_ticks());
   if (const auto ground = ground_.Update(time, tick.utime)) Publish(kGround, tick.utime, *ground);
 }
 

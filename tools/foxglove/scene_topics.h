@@ -19,10 +19,10 @@
 namespace poise {
 
 struct SceneTopic {
-  std::string name;              ///< "/tf"
-  std::string encoding;          ///< of the messages
-  std::string schema;            ///< its name
-  std::string schema_encoding;   ///< "protobuf", "ros2msg"
+  std::string name;             ///< "/tf"
+  std::string encoding;         ///< of the messages
+  std::string schema;           ///< its name
+  std::string schema_encoding;  ///< "protobuf", "ros2msg"
   std::string schema_data;
   bool kept = false;  ///< its last message is for whoever comes later, too
 };

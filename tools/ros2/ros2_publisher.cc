@@ -142,9 +142,8 @@ void Ros2Publisher::PublishBase(const robot_state_t& state, const foxglove::Fram
   message.pose.pose = {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
   // A twist is told in the child's axes.
   const Eigen::Quaterniond to_world(q.w(), q.x(), q.y(), q.z());
-  message.twist.twist = {
-      Vector(to_world.conjugate() * GetVector3(state.base_linear_velocity)),
-      Vector(to_world.conjugate() * GetVector3(state.base_angular_velocity))};
+  message.twist.twist = {Vector(to_world.conjugate() * GetVector3(state.base_linear_velocity)),
+                         Vector(to_world.conjugate() * GetVector3(state.base_angular_velocity))};
   Write(&odometry_, &message);
 }
 
@@ -181,9 +180,13 @@ void Ros2Publisher::AddEvent(double time, const std::string& name, const std::st
   if (!(at >= 0 && at < INT32_MAX)) return;
   const std::string text = logging::ForTerminal(detail.empty() ? name : detail);
   const std::string event = logging::ForTerminal(name);
-  const rcl_interfaces_msg_dds__Log_ message{
-      Stamp(std::llround(1e6 * at)), LogLevel(name), Text(kNode), Text(text), Text(""), Text(event),
-      0};
+  const rcl_interfaces_msg_dds__Log_ message{Stamp(std::llround(1e6 * at)),
+                                             LogLevel(name),
+                                             Text(kNode),
+                                             Text(text),
+                                             Text(""),
+                                             Text(event),
+                                             0};
   Write(&rosout_, &message);
 }
 

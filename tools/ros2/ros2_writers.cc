@@ -22,8 +22,7 @@ Ros2Writer::Ros2Writer(const unitree::Participant& participant, const dds_topic_
     throw unitree::UnitreeError(
         fmt::format("DDS topic {} cannot be opened ({})", dds_name, dds_strretcode(entity)));
   };
-  topic_ =
-      check(dds_create_topic(participant.entity(), &type, dds_name.c_str(), nullptr, nullptr));
+  topic_ = check(dds_create_topic(participant.entity(), &type, dds_name.c_str(), nullptr, nullptr));
   dds_qos_t* const qos = dds_create_qos();
   const int32_t depth = keeping == Keeping::kNone   ? kDefaultDepth
                         : keeping == Keeping::kLast ? 1

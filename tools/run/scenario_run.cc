@@ -71,8 +71,8 @@ void EndRos2(ChildProcess* ros2) {
   if (!early && ros2->ended() && ros2->succeeded()) return;
   const std::vector<std::string> last = LastLines(ros2->log_path(), 1);
   fmt::print(stderr, "warning: poise ros2 {}{}{}\n",
-             ros2->ended() ? ros2->HowItEnded() : "did not end in time",
-             last.empty() ? "" : ": ", last.empty() ? "" : logging::ForTerminal(last.front()));
+             ros2->ended() ? ros2->HowItEnded() : "did not end in time", last.empty() ? "" : ": ",
+             last.empty() ? "" : logging::ForTerminal(last.front()));
 }
 
 }  // namespace
