@@ -60,7 +60,9 @@ async function connectClient(wanted = () => true, headers = {}) {
     }
   });
   client.on('message', ({subscriptionId, timestamp, data}) => {
-    const {topic, decode} = topicOf.get(subscriptionId);
+    const channel = topicOf.get(subscriptionId);
+    if (!channel) return;  // a test's own
+    const {topic, decode} = channel;
     (seen.messages[topic] ??= []).push({time: timestamp, value: decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength))});
   });
   const closed = once(socket, 'close').then(() => { throw new Error(`closed: ${seen.errors}`); });
@@ -79,20 +81,23 @@ async function connectClient(wanted = () => true, headers = {}) {
 const count = (seen, topic) => seen.messages[topic]?.length ?? 0;
 
 test('every topic, decoded by its schema: the robot moves as the bus says', async () => {
-  const seen = await connectClient();
-  await seen.until((s) => count(s, '/tf') > 50 && count(s, '/joint_states') > 10 && count(s, '/events') > 0);
+  const everything = await connectClient();
+  const told = (s) => s.channels.map((c) => c.topic).filter((topic) => !count(s, topic));
+  await everything.until((s) => s.channels.length > 0 && told(s).every((topic) => topic === 'EMERGENCY_STOP'));
+  assert.deepEqual(everything.errors, []);
+  everything.client.close();
+  const seen = await connectClient((topic) => topic.startsWith('/') || topic === 'GROUND_TRUTH');
+  await seen.until((s) => count(s, '/tf') > 50);
   assert.match(seen.info.name, /push_double_support/);
   assert.deepEqual(seen.info.capabilities, ['time']);
   assert.deepEqual(seen.errors, []);
   for (const channel of seen.channels) {
     if (channel.schemaName.startsWith('foxglove.')) assert.deepEqual(schemaProblems(libraries, channel.decode.type), []);
   }
-  const silent = seen.channels.map((c) => c.topic).filter((topic) => !count(seen, topic));
-  assert.deepEqual(silent, ['EMERGENCY_STOP']);
   for (const [topic, messages] of Object.entries(seen.messages)) {
     assert.ok(messages.slice(1).every(({time}, i) => time >= messages[i].time), topic);
   }
-  assert.ok(seen.times.length > 100 && seen.times.slice(1).every((t, i) => t >= seen.times[i]));
+  assert.ok(seen.times.length > 50 && seen.times.slice(1).every((t, i) => t >= seen.times[i]));
 
   const urdf = seen.messages['/robot_description'][0].value.data;
   const truth = new Map(seen.messages.GROUND_TRUTH.map(({time, value}) => [time, value]));

@@ -134,7 +134,7 @@ test('odometry: the estimate, its twist in the base\'s axes', () => {
   assert.ok(all.length >= LEAST);
   for (const {header, child_frame_id: child, pose: {pose: p}, twist: {twist}} of all) {
     assert.equal(header.frame_id, 'odom');
-    assert.equal(child, 'pelvis');
+    assert.equal(child, 'upper_body');
     const s = state.get(nanoseconds(header.stamp));
     const [w, x, y, z] = s.base_orientation;
     assert.deepEqual(xyz(p.position), s.base_position);
