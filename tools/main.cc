@@ -70,6 +70,7 @@ int main(int argc, char** argv) {
   poise::AddWorldsCommand(&app, &command);
   poise::AddSweepCommand(&app, &command);
   poise::AddLimitCommand(&app, &command);
+  poise::AddBenchmarkCommand(&app, &command);
   poise::AddReportCommand(&app, &command);
   poise::AddBitsCommand(&app, &command);
   poise::AddCompareCommand(&app, &command);
@@ -83,6 +84,7 @@ int main(int argc, char** argv) {
   poise::AddDoctorCommand(&app, &command);
   poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
+  poise::AddOperatorCommands(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);
   poise::AddViewCommand(&app, &command);

@@ -21,6 +21,7 @@ void AddRunCommand(CLI::App* app, Command* command);
 void AddMatrixCommand(CLI::App* app, Command* command);
 void AddWorldsCommand(CLI::App* app, Command* command);
 void AddSweepCommand(CLI::App* app, Command* command);
+void AddBenchmarkCommand(CLI::App* app, Command* command);
 void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddBitsCommand(CLI::App* app, Command* command);
@@ -37,6 +38,8 @@ void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
 void AddDrivesCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
+/// push, set, step and walk: acts on a run that goes on.
+void AddOperatorCommands(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
 void AddViewCommand(CLI::App* app, Command* command);
