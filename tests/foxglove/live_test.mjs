@@ -87,7 +87,13 @@ test('every topic, decoded by its schema: the robot moves as the bus says', asyn
   assert.deepEqual(everything.errors, []);
   everything.client.close();
   const seen = await connectClient((topic) => topic.startsWith('/') || topic === 'GROUND_TRUTH');
-  await seen.until((s) => count(s, '/tf') > 50);
+  // Pictures of ticks whose truth came as well: a busy machine loses some of either.
+  const truths = new Map();
+  const pictures = (s) => {
+    for (const {time, value} of (s.messages.GROUND_TRUTH ?? []).slice(truths.size)) truths.set(time, value);
+    return (s.messages['/tf'] ?? []).filter(({time}) => truths.has(time));
+  };
+  await seen.until((s) => pictures(s).length >= 150);
   assert.match(seen.info.name, /push_double_support/);
   assert.deepEqual(seen.info.capabilities, ['time']);
   assert.deepEqual(seen.errors, []);
@@ -100,11 +106,8 @@ test('every topic, decoded by its schema: the robot moves as the bus says', asyn
   assert.ok(seen.times.length > 50 && seen.times.slice(1).every((t, i) => t >= seen.times[i]));
 
   const urdf = seen.messages['/robot_description'][0].value.data;
-  const truth = new Map(seen.messages.GROUND_TRUTH.map(({time, value}) => [time, value]));
-  let compared = 0;
-  for (const {time, value} of seen.messages['/tf']) {
-    const state = truth.get(time);
-    if (!state) continue;
+  for (const {time, value} of pictures(seen)) {
+    const state = truths.get(time);
     const [w, x, y, z] = state.base_orientation;
     const expected = forwardKinematics(urdf, {p: state.base_position, q: [x, y, z, w]}, state.joint_position);
     const world = {world: {p: [0, 0, 0], q: [0, 0, 0, 1]}};
@@ -113,9 +116,7 @@ test('every topic, decoded by its schema: the robot moves as the bus says', asyn
       world[t.child_frame_id] = pose.join(world[t.parent_frame_id], {p: [px, py, pz], q: [qx, qy, qz, qw]});
       assert.ok(pose.difference(world[t.child_frame_id], expected[t.child_frame_id])[0] < 1e-12);
     }
-    ++compared;
   }
-  assert.ok(compared > 5, `${compared}`);  // a busy machine drops some of both
 
   // Who comes later sees the robot too; an unsubscribed topic falls silent.
   const late = await connectClient((topic) => topic.startsWith('/'));

@@ -8,6 +8,7 @@ import {createRequire} from 'node:module';
 import {tmpdir} from 'node:os';
 import {join, resolve} from 'node:path';
 import {after, before, test} from 'node:test';
+import {setTimeout as sleep} from 'node:timers/promises';
 import {fileURLToPath} from 'node:url';
 import {parseArgs} from 'node:util';
 import {forwardKinematics, nanoseconds, packages, pose, readMcap} from '../foxglove/readers.mjs';
@@ -24,7 +25,8 @@ const TOPICS = {
   'rt/tf': ['tf2_msgs/TFMessage'], 'rt/tf_static': ['tf2_msgs/TFMessage', 'kept'], 'rt/robot_description': ['std_msgs/String', 'kept'],
   'rt/right_foot_wrench': ['geometry_msgs/WrenchStamped'], 'rt/left_foot_wrench': ['geometry_msgs/WrenchStamped'],
   'rt/rosout': ['rcl_interfaces/Log', 'kept']};
-const LEAST = 10;  // messages: of 300 in 3 s, what a busy machine leaves of them
+const LEAST = 250;  // messages of each topic that goes on: 2.5 s of a machine that loses none
+const PATIENCE = 60000;  // ms
 const seen = Object.fromEntries(Object.keys(TOPICS).map((name) => [name, []]));
 let log;
 
@@ -78,10 +80,15 @@ before(async () => {
   let text = '';
   reader.stdout.on('data', (data) => { text += data; });
   await once(reader.stderr, 'data');
-  const run = spawn(options.poise, ['run', 'push_double_support', '--ros2', '--realtime', '--duration', '3', '--quiet', '--out', join(folder, 'run')],
+  const run = spawn(options.poise, ['run', 'push_double_support', '--ros2', '--realtime', '--duration', '600', '--quiet', '--out', join(folder, 'run')],
     {env: {...process.env, ROS_DOMAIN_ID: String(domain)}, stdio: 'ignore'});
-  await once(run, 'exit');
-  await new Promise((done) => { setTimeout(done, 300); });
+  const ended = once(run, 'exit');
+  const goingOn = Object.keys(TOPICS).filter((name) => TOPICS[name].length === 1);
+  const counted = () => goingOn.every((name) => text.split(`${name} `).length > LEAST) && text.includes('rt/rosout ');
+  for (const end = Date.now() + PATIENCE; !counted() && run.exitCode === null && Date.now() < end;) await sleep(100);
+  run.kill('SIGINT');
+  await ended;
+  await sleep(300);
   reader.stdin.end();
   await once(reader, 'close');
   for (const line of text.split('\n').filter(Boolean)) {

@@ -243,7 +243,8 @@ void FoxgloveClient::Send(size_t channel, uint64_t time,
                           const std::shared_ptr<const std::string>& message) {
   const auto subscribed = subscriptions_of_.find(channel);
   if (!streaming_ || subscribed == subscriptions_of_.end()) return;
-  if (queue_.size() >= kMaxQueue || queued_bytes_ >= kMaxQueuedBytes) {
+  const size_t share = host_->HasPrecedence(channel) ? 1 : 2;
+  if (queue_.size() >= kMaxQueue / share || queued_bytes_ >= kMaxQueuedBytes / share) {
     ++dropped_;
     return;
   }

@@ -29,14 +29,16 @@ class FoxgloveHost {
     uint64_t time = 0;  ///< ns
     std::shared_ptr<const std::string> message;
   };
+  /// Whether a channel has a share of what may wait, which others leave to it.
+  virtual bool HasPrecedence(size_t channel) const = 0;
   /// The message of a channel that later subscribers get as well; null without one.
   virtual const Kept* KeptOf(size_t channel) const = 0;
 };
 
 /// A connection: one HTTP request, which must become the protocol's WebSocket. All that is received
 /// is bounded in size and time. What waits to be sent is bounded too: beyond it messages are
-/// dropped, counted, and the client is told; who takes nothing for 5 s is dropped itself. Reading
-/// pauses while answers wait. No error throws.
+/// dropped, counted, and the client is told; channels without precedence fill half of it at most.
+/// Who takes nothing for 5 s is dropped itself. Reading pauses while answers wait. No error throws.
 class FoxgloveClient : public std::enable_shared_from_this<FoxgloveClient> {
  public:
   /// `host` must outlive it.

@@ -65,7 +65,10 @@ class FoxgloveServer::Impl : public FoxgloveHost {
                   .dump(-1, ' ', false, Ordered::error_handler_t::replace)),
         advertisement_(std::make_shared<const std::string>(Advertisement(topics))),
         kept_(topics.size()) {
-    for (const SceneTopic& topic : topics) keeps_.push_back(topic.kept);
+    for (const SceneTopic& topic : topics) {
+      keeps_.push_back(topic.kept);
+      precedes_.push_back(topic.name.starts_with('/'));
+    }
     try {
       const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), static_cast<uint16_t>(port));
       acceptor_.open(endpoint.protocol());
@@ -91,6 +94,7 @@ class FoxgloveServer::Impl : public FoxgloveHost {
   size_t num_channels() const override { return keeps_.size(); }
   const std::string& server_info() const override { return info_; }
   std::shared_ptr<const std::string> advertisement() const override { return advertisement_; }
+  bool HasPrecedence(size_t channel) const override { return precedes_[channel]; }
   const Kept* KeptOf(size_t channel) const override {
     return kept_[channel].message ? &kept_[channel] : nullptr;
   }
@@ -147,8 +151,9 @@ class FoxgloveServer::Impl : public FoxgloveHost {
   const std::vector<std::string> origins_;
   const std::string info_;
   const std::shared_ptr<const std::string> advertisement_;
-  std::vector<bool> keeps_;  // by topic
-  std::vector<Kept> kept_;   // likewise
+  std::vector<bool> keeps_;     // by topic
+  std::vector<bool> precedes_;  // likewise: the scene's, few and small beside the bus's
+  std::vector<Kept> kept_;      // likewise
   std::vector<std::shared_ptr<FoxgloveClient>> clients_;
   int64_t dropped_ = 0;  // of clients that are gone
 };

@@ -138,13 +138,11 @@ void SceneTopics::End() {
 
 void SceneTopics::AddTick(const TickMessages& tick) {
   if (tick.utime < 0 || tick.utime >= INT64_MAX / 1'000) return;
-  const bool posed =
-      tick.truth ? ReadTruth(*tick.truth, &state_) : tick.state && ReadState(*tick.state, &state_);
-  if (posed) {
-    // Stamped as the message that it is of.
-    const int64_t utime = tick.truth ? tick.truth->utime : tick.state->utime;
-    if (utime >= 0) Publish(kFrames, utime, frames_.Moving(state_, utime));
-  }
+  truth_came_ = truth_came_ || tick.truth;
+  // Where the truth is lost now and then, the estimate would make the robot jump.
+  const bool posed = truth_came_ ? tick.truth && ReadTruth(*tick.truth, &state_)
+                                 : tick.state && ReadState(*tick.state, &state_);
+  if (posed) Publish(kFrames, tick.utime, frames_.Moving(state_, tick.utime));
   Publish(kForces, tick.utime, contacts_.Forces(tick));
   Publish(kSupport, tick.utime, contacts_.Support(tick));
   AddJointStates(tick);

@@ -75,6 +75,7 @@ class SceneTopics {
   GroundScene ground_;
   TickGatherer gatherer_;
   robot::RobotState state_;
+  bool truth_came_ = false;
   std::vector<std::string> joint_names_;
 };
 

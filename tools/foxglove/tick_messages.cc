@@ -1,5 +1,8 @@
 #include "tools/foxglove/tick_messages.h"
 
+#include <algorithm>
+#include <array>
+
 #include "components/framework/bus/packet_filter.h"
 #include "logging/channel_ticks.h"
 #include "poise/message_traits.hpp"
@@ -8,6 +11,17 @@ namespace poise {
 namespace {
 
 constexpr size_t kMostTicks = 8;  // that are gathered at a time
+
+bool IsPart(std::string_view type) {
+  static constexpr std::array kParts = {std::string_view(MessageTraits<robot_sensors_t>::kName),
+                                        std::string_view(MessageTraits<robot_state_t>::kName),
+                                        std::string_view(MessageTraits<support_plan_t>::kName),
+                                        std::string_view(MessageTraits<balance_torque_t>::kName),
+                                        std::string_view(MessageTraits<joint_command_t>::kName),
+                                        std::string_view(MessageTraits<external_push_t>::kName),
+                                        std::string_view(MessageTraits<ground_truth_t>::kName)};
+  return std::ranges::find(kParts, type) != kParts.end();
+}
 
 template <class T>
 bool Decode(std::string_view type, std::span<const uint8_t> data, std::optional<T>* message) {
@@ -35,6 +49,8 @@ void TickGatherer::Add(std::string_view channel, const MessageType& type,
   const int64_t tick = ReadInt64(data.data() + type.run_id_offset + 8);
   if (tick <= taken_) return;
   newest_ = std::max(newest_, tick);
+  if (!IsPart(type.name)) return;
+  if (!parts_.contains(std::string_view(type.name))) parts_.emplace(type.name);
   if (tick % every_ != 0) return;
   const auto [place, added] = ticks_.try_emplace(tick);
   TickMessages& messages = place->second;
@@ -49,7 +65,8 @@ void TickGatherer::Add(std::string_view channel, const MessageType& type,
 std::optional<TickMessages> TickGatherer::Take(bool end) {
   if (ticks_.empty()) return {};
   const auto oldest = ticks_.begin();
-  if (!end && newest_ < oldest->first + every_ && ticks_.size() <= kMostTicks) return {};
+  const bool due = newest_ >= oldest->first + every_ && oldest->second.num_parts() == parts_.size();
+  if (!end && !due && ticks_.size() <= kMostTicks) return {};
   TickMessages messages = std::move(oldest->second);
   taken_ = oldest->first;
   ticks_.erase(oldest);
