@@ -19,6 +19,7 @@ const {FoxgloveClient} = libraries.protocol;
 const PROTOCOL = 'foxglove.websocket.v1';
 const folder = mkdtempSync(join(tmpdir(), 'poise-foxglove-'));
 const PATIENCE = 60000;  // ms
+const PERSON = ['EMERGENCY_STOP', 'OPERATOR_ACT', 'OPERATOR_ANSWER'];  // channels on which nobody speaks here
 let port, run, view;
 
 async function freePort() {
@@ -82,8 +83,8 @@ const count = (seen, topic) => seen.messages[topic]?.length ?? 0;
 
 test('every topic, decoded by its schema: the robot moves as the bus says', async () => {
   const everything = await connectClient();
-  const told = (s) => s.channels.map((c) => c.topic).filter((topic) => !count(s, topic));
-  await everything.until((s) => s.channels.length > 0 && told(s).every((topic) => topic === 'EMERGENCY_STOP'));
+  const silent = (s) => s.channels.map((c) => c.topic).filter((topic) => !count(s, topic) && !PERSON.includes(topic));
+  await everything.until((s) => s.channels.length > 0 && silent(s).length === 0);
   assert.deepEqual(everything.errors, []);
   everything.client.close();
   const seen = await connectClient((topic) => topic.startsWith('/') || topic === 'GROUND_TRUTH');
@@ -234,7 +235,7 @@ test('the run knew nothing of it; its end ends nothing here', async () => {
   await late.until((s) => count(s, '/robot') === 1);
   const summary = JSON.parse(readFileSync(join(folder, 'run', 'summary.json'), 'utf8'));
   const defects = summary.checks.find((c) => c.name === 'log_defects');
-  assert.ok(!defects || defects.value === 0, JSON.stringify(defects));
+  assert.ok(defects?.measured === 0, JSON.stringify(defects));
   seen.client.close();
   late.client.close();
 });
