@@ -20,11 +20,9 @@ using std::chrono::steady_clock;
 constexpr size_t kScene = 0, kBus = 1;  // topics
 constexpr int kPictures = 5, kFlood = 1'000;
 
-/// A client's frame of RFC 6455, whose mask is 0; below 64 KiB.
+/// A client's frame of RFC 6455, whose mask is 0; below 126 bytes.
 std::string ClientFrame(const std::string& text) {
-  const size_t size = text.size();
-  return std::string{'\x81', '\xfe', static_cast<char>(size >> 8), static_cast<char>(size)} +
-         std::string(4, '\0') + text;
+  return std::string{'\x81', static_cast<char>(0x80 | text.size())} + std::string(4, '\0') + text;
 }
 
 class FoxgloveQueue : public testing::Test {
