@@ -88,6 +88,7 @@ int main(int argc, char** argv) {
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);
   poise::AddViewCommand(&app, &command);
+  poise::AddRos2Command(&app, &command);
   poise::AddShellCommand(&app, &command);
   try {
     std::vector<std::string> arguments(argv + 1, argv + argc);

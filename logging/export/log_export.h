@@ -6,6 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "logging/export/mcap_writer.h"
+#include "logging/log_messages.h"
+
 namespace poise::logging {
 
 struct ExportedChannel {
@@ -28,10 +31,23 @@ std::vector<ExportedChannel> ExportCsv(const std::string& log, const std::string
 /// unit}. Throws LogError.
 std::vector<ExportedChannel> ExportMergedCsv(const std::string& log, const std::string& file);
 
+/// Further topics of an MCAP file, made of the log's messages.
+class McapTopics {
+ public:
+  virtual ~McapTopics() = default;
+  /// Before the first message.
+  virtual void Begin(McapWriter* writer) = 0;
+  /// After the message itself. `type` is the event's, well formed.
+  virtual void Add(const MessageType& type, const LogEvent& event, McapWriter* writer) = 0;
+  /// After the last one.
+  virtual void End(McapWriter* writer) = 0;
+};
+
 /// An MCAP file with every message as Protobuf (ProtobufMessages), joints and feet by their names,
 /// a topic a channel, in the log's order; metadata "units": {type.field: unit}; times in ns of the
-/// run. Channels whose names are not printable UTF-8 are refused. Throws LogError, also for more
-/// channels than MCAP can hold.
-std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file);
+/// run; and the topics of `more`, if not null. Channels whose names are not printable UTF-8 are
+/// refused. Throws LogError, also for more channels than MCAP can hold.
+std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file,
+                                        McapTopics* more = nullptr);
 
 }  // namespace poise::logging

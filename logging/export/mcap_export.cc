@@ -43,12 +43,14 @@ McapWriter::Texts Units() {
 
 }  // namespace
 
-std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file) {
+std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::string& file,
+                                        McapTopics* more) {
   LogMessages messages(log, LogMessages::Run::kIfKnown);
   ProtobufMessages protobuf(messages.names());
   McapWriter writer(file, fmt::format("poise {}", PoiseVersion()));
   if (messages.run_known()) writer.AddMetadata("run", RunTexts(messages));
   writer.AddMetadata("units", Units());
+  if (more != nullptr) more->Begin(&writer);
   std::map<std::string, uint16_t> schemas;  // by type
   struct Topic {
     uint16_t id;
@@ -90,7 +92,9 @@ std::vector<ExportedChannel> ExportMcap(const std::string& log, const std::strin
     writer.AddMessage(topic->second.id, static_cast<uint32_t>(result.messages),
                       static_cast<uint64_t>(event.utime) * 1000, *bytes);
     ++result.messages;
+    if (more != nullptr) more->Add(*type, event, &writer);
   }
+  if (more != nullptr) more->End(&writer);
   writer.Close();
   return results;
 }

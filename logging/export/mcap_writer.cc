@@ -1,6 +1,7 @@
 #include "logging/export/mcap_writer.h"
 
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -15,6 +16,8 @@ namespace {
 
 constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 constexpr size_t kChunkSize = 1 << 20;  // bytes; what other writers take as well
+constexpr std::string_view kCompression = "zstd";
+constexpr int kLevel = 3;  // zstd's own default; 9 takes 3 times as long for 1.4 % less
 
 enum Opcode : uint8_t {
   kHeader = 0x01,
@@ -25,6 +28,8 @@ enum Opcode : uint8_t {
   kChunk = 0x06,
   kMessageIndex = 0x07,
   kChunkIndex = 0x08,
+  kAttachment = 0x09,
+  kAttachmentIndex = 0x0A,
   kStatistics = 0x0B,
   kMetadata = 0x0C,
   kMetadataIndex = 0x0D,
@@ -151,13 +156,44 @@ void McapWriter::AddMetadata(const std::string& name, const Texts& metadata) {
   Write(record);
 }
 
+void McapWriter::AddAttachment(const std::string& name, const std::string& media_type,
+                               std::string_view data) {
+  EndChunk();                    // an attachment stands between chunks
+  constexpr uint64_t kTime = 0;  // of no moment of the run
+  Fields fields;
+  fields.Add(kTime).Add(kTime).AddString(name).AddString(media_type);
+  fields.Add(static_cast<uint64_t>(data.size())).AddBytes(data);
+  const uint32_t crc = Crc32(0, fields.bytes());
+  fields.Add(crc);
+  const uint64_t start = position_;
+  WriteRecord(kAttachment, fields.bytes());
+  Fields index;
+  index.Add(start).Add(position_ - start).Add(kTime).Add(kTime);
+  index.Add(static_cast<uint64_t>(data.size())).AddString(name).AddString(media_type);
+  attachment_indexes_ += Record(kAttachmentIndex, index.bytes());
+  ++num_attachments_;
+}
+
+std::string_view McapWriter::Compress() {
+  compressed_.resize(ZSTD_compressBound(chunk_.size()));
+  const size_t size =
+      ZSTD_compress(compressed_.data(), compressed_.size(), chunk_.data(), chunk_.size(), kLevel);
+  if (ZSTD_isError(size) != 0) {
+    throw LogError(fmt::format("{}: zstd failed: {}", path_, ZSTD_getErrorName(size)));
+  }
+  compressed_.resize(size);
+  return compressed_;
+}
+
 void McapWriter::EndChunk() {
   if (chunk_.empty()) return;
   const auto size = static_cast<uint64_t>(chunk_.size());
   const uint64_t start = position_;
   Fields chunk;
   chunk.Add(chunk_times_.first).Add(chunk_times_.last).Add(size).Add(Crc32(0, chunk_));
-  chunk.AddString("").Add(size).AddBytes(chunk_);
+  const std::string_view compressed = Compress();
+  const auto compressed_size = static_cast<uint64_t>(compressed.size());
+  chunk.AddString(kCompression).Add(compressed_size).AddBytes(compressed);
   WriteRecord(kChunk, chunk.bytes());
   const uint64_t length = position_ - start;
 
@@ -172,7 +208,7 @@ void McapWriter::EndChunk() {
   Fields index;
   index.Add(chunk_times_.first).Add(chunk_times_.last).Add(start).Add(length);
   index.AddString(offsets.bytes()).Add(position_ - index_start);
-  index.AddString("").Add(size).Add(size);
+  index.AddString(kCompression).Add(compressed_size).Add(size);
   chunk_indexes_ += Record(kChunkIndex, index.bytes());
   ++num_chunks_;
   chunk_.clear();
@@ -190,7 +226,7 @@ void McapWriter::Close() {
   for (const auto& [channel, count] : message_counts_) counts.Add(channel).Add(count);
   Fields statistics;
   statistics.Add(num_messages_).Add(num_schemas_).Add(uint32_t{num_channels_});
-  statistics.Add(uint32_t{0}).Add(num_metadata_).Add(num_chunks_);
+  statistics.Add(num_attachments_).Add(num_metadata_).Add(num_chunks_);
   statistics.Add(times_.first).Add(times_.last).AddString(counts.bytes());
   std::string offsets;
   const std::pair<Opcode, std::string> groups[] = {
@@ -198,6 +234,7 @@ void McapWriter::Close() {
       {kChannel, channels_},
       {kStatistics, Record(kStatistics, statistics.bytes())},
       {kChunkIndex, chunk_indexes_},
+      {kAttachmentIndex, attachment_indexes_},
       {kMetadataIndex, metadata_indexes_}};
   for (const auto& [opcode, records] : groups) {
     if (records.empty()) continue;

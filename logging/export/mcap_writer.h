@@ -14,8 +14,8 @@
 
 namespace poise::logging {
 
-/// One file. Messages go into uncompressed chunks of about 1 MiB, each with its CRC-32, an index by
-/// channel and a place in the summary. All functions throw LogError when writing fails.
+/// One file. Messages go into chunks of about 1 MiB, compressed by zstd, each with its CRC-32, an
+/// index by channel and a place in the summary. All functions throw LogError when writing fails.
 class McapWriter {
  public:
   using Texts = std::map<std::string, std::string>;
@@ -33,6 +33,8 @@ class McapWriter {
   /// `time` in ns.
   void AddMessage(uint16_t channel, uint32_t sequence, uint64_t time, std::string_view data);
   void AddMetadata(const std::string& name, const Texts& metadata);
+  /// A file within the file. `media_type` e.g. "application/xml".
+  void AddAttachment(const std::string& name, const std::string& media_type, std::string_view data);
   /// Writes the summary. Nothing may be added afterwards.
   void Close();
 
@@ -48,6 +50,8 @@ class McapWriter {
   void Write(std::string_view bytes);
   void WriteRecord(uint8_t opcode, std::string_view content);
   void EndChunk();
+  /// The chunk as the file holds it. Throws LogError.
+  std::string_view Compress();
   void CheckFree(uint16_t used, const char* what) const;
 
   std::string path_;
@@ -56,6 +60,7 @@ class McapWriter {
   uint64_t position_ = 0;  // bytes written
   uint32_t crc_ = 0;       // of them, from the section's start
   std::string chunk_;
+  std::string compressed_;  // of the chunk that was written last
   Times chunk_times_;
   std::map<uint16_t, MessageIndex> chunk_index_;
   // Records for the summary, by kind.
@@ -63,10 +68,12 @@ class McapWriter {
   std::string channels_;
   std::string chunk_indexes_;
   std::string metadata_indexes_;
+  std::string attachment_indexes_;
   uint16_t num_schemas_ = 0;
   uint16_t num_channels_ = 0;
   uint32_t num_chunks_ = 0;
   uint32_t num_metadata_ = 0;
+  uint32_t num_attachments_ = 0;
   Times times_;
   std::map<uint16_t, uint64_t> message_counts_;
   uint64_t num_messages_ = 0;

@@ -1,6 +1,7 @@
-// What `poise view` costs a run: 99th percentiles of the components' latencies in real time, without a viewer, with one whose
-// stream is read, and with a page in a browser (which takes processor time of its own). Interleaved: load is the same for all.
-// Usage: node tests/benchmarks/view_latency.mjs [--poise PROGRAM] [--web DIR] [--duration S] [--repeat N] [--browser]
+// What `poise view` and `poise run --ros2` cost a run: 99th percentiles of the components' latencies in real time, without either, with a
+// viewer whose stream is read, with a page in a browser (which takes processor time of its own), and with ROS 2's topics. Interleaved: load
+// is the same for all.
+// Usage: node tests/benchmarks/view_latency.mjs [--poise PROGRAM] [--web DIR] [--duration S] [--repeat N] [--browser] [--ros2]
 import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
@@ -11,13 +12,13 @@ import {startRun, startView} from '../web/live_run.mjs';
 import {openStream} from '../web/raw_socket.mjs';
 
 const root = fileURLToPath(new URL('../../', import.meta.url));
-const USAGE = 'node tests/benchmarks/view_latency.mjs [--poise PROGRAM] [--web DIR] [--duration S] [--repeat N] [--browser]';
+const USAGE = 'node tests/benchmarks/view_latency.mjs [--poise PROGRAM] [--web DIR] [--duration S] [--repeat N] [--browser] [--ros2]';
 
 let options;
 try {
   ({values: options} = parseArgs({options: {
     poise: {type: 'string', default: join(root, 'build/release/bin/poise')}, web: {type: 'string', default: join(root, 'build/web')},
-    duration: {type: 'string', default: '5'}, repeat: {type: 'string', default: '5'}, browser: {type: 'boolean'},
+    duration: {type: 'string', default: '5'}, repeat: {type: 'string', default: '5'}, browser: {type: 'boolean'}, ros2: {type: 'boolean'},
     help: {type: 'boolean', short: 'h'}}}));
 } catch (error) {
   console.error(`${error.message}\nUsage: ${USAGE}`);
@@ -31,14 +32,14 @@ if (options.help || !(repeat >= 1) || !(Number(options.duration) > 0)) {
 
 const folder = mkdtempSync(join(tmpdir(), 'poise-view-latency-'));
 const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
-const WITH = ['without', 'stream', ...(options.browser ? ['browser'] : [])];
+const WITH = ['without', 'stream', ...(options.browser ? ['browser'] : []), ...(options.ros2 ? ['ros2'] : [])];
 let browser, run, view;
 
 /** p99 in us by component. */
 async function measure(what, out) {
-  run = startRun(options.poise, out, '--realtime', '--duration', options.duration);
+  run = startRun(options.poise, out, '--realtime', '--duration', options.duration, ...(what === 'ros2' ? ['--ros2'] : []));
   let stream, page;
-  if (what !== 'without') {
+  if (what === 'stream' || what === 'browser') {
     view = await startView(options.poise, run, out);
     if (what === 'stream') stream = await openStream(view.port);
     else ({page} = await openPage(browser, view.url));
@@ -51,6 +52,10 @@ async function measure(what, out) {
   await page?.context().close();
   await view?.stop();
   view = undefined;
+  if (what === 'ros2') {
+    const log = readFileSync(join(out, 'ros2.log'), 'utf8');
+    if (!(Number(/(\d+) messages published, 0 not/.exec(log)?.[1]) > 1000)) throw new Error(`poise ros2: ${log}`);
+  }
   if (stream && !(bytes > 1e5)) throw new Error(`the stream gave ${bytes} bytes`);
   // The recorder takes no part in a tick.
   return Object.fromEntries(summary.components.filter((c) => c.name !== 'recorder').map((c) => [c.name, c.latency_us.p99]));

@@ -43,6 +43,7 @@ void AddOperatorCommands(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
 void AddViewCommand(CLI::App* app, Command* command);
+void AddRos2Command(CLI::App* app, Command* command);
 void AddShellCommand(CLI::App* app, Command* command);
 
 }  // namespace poise

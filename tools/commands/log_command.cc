@@ -13,6 +13,7 @@
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/foxglove/mcap_scene.h"
 #include "tools/run/remake.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/former_fields.h"
@@ -227,7 +228,8 @@ int Export(const ExportOptions& options) {
     whole = PrintExport(options.merged, logging::ExportMergedCsv(log, options.merged)) && whole;
   }
   if (!options.mcap.empty()) {
-    whole = PrintExport(options.mcap, logging::ExportMcap(log, options.mcap)) && whole;
+    const std::unique_ptr<logging::McapTopics> scene = McapScene(log);
+    whole = PrintExport(options.mcap, logging::ExportMcap(log, options.mcap, scene.get())) && whole;
   }
   return whole ? kExitOk : kExitFailed;
 }
@@ -320,7 +322,8 @@ void AddExport(CLI::App* log, Command* command) {
   AddRun(app, &options->run);
   app->add_option("--csv", options->csv, "folder for one CSV file a channel, a row a message");
   app->add_option("--merged", options->merged, "one wide CSV file, a row a tick");
-  app->add_option("--mcap", options->mcap, "MCAP file, the messages as Protobuf");
+  app->add_option("--mcap", options->mcap,
+                  "MCAP file: the messages as Protobuf, and what shows the robot in Foxglove");
   app->add_flag("--force", options->force, "replace files of these names");
   app->callback([options, command] { *command = [options] { return Export(*options); }; });
 }

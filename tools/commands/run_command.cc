@@ -105,6 +105,9 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--capture", options->changes.capture,
                   "write every EtherCAT frame to this file, for Wireshark")
       ->needs(drives);
+  run->add_flag("--ros2", options->ros2,
+                "tell ROS 2 of the run over DDS: poise ros2 beside it, in domain ROS_DOMAIN_ID")
+      ->excludes(in_process);
   run->add_option("--variant", options->changes.variant,
                   "run this variant of the scenario (poise list scenarios)");
   run->add_option("--without", options->changes.without, "leave out a part of the controller")

@@ -1,26 +1,23 @@
-#include <sched.h>
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <thread>
+#include <string>
+#include <vector>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
-#include "logging/log_reader.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/foxglove/live_foxglove.h"
+#include "tools/live/live_start.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_server.h"
 #include "tools/report/html_report.h"
 #include "tools/run/live_run.h"
-#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
@@ -35,40 +32,14 @@ constexpr milliseconds kPicture{33};
 constexpr milliseconds kPause{4};
 constexpr milliseconds kViewSilence{500};  // then it is asked whether the run goes on
 constexpr milliseconds kViewPatience{5'000};
-constexpr int kNice = 10;
 
 struct ViewOptions {
   std::string run;
   int port = 0;
   double keep = 60;  // s
+  int foxglove = 0;  // port; 0: none
+  std::vector<std::string> foxglove_origins;
 };
-
-/// A process that wakes up then takes no core from one of the run; where all cores are busy this
-/// one waits.
-void StandBack() {
-  const sched_param none{};
-  if (sched_setscheduler(0, SCHED_BATCH, &none) != 0 || setpriority(PRIO_PROCESS, 0, kNice) != 0) {
-    fmt::print(stderr, "warning: this process runs at the run's own priority\n");
-  }
-}
-
-/// RUN_INFO, as soon as the recorder has written it. Throws LogError when it does not.
-logging::RunRecord ReadStart(const LiveRun& live) {
-  const std::string log = (live.dir() / "run.lcm").string();
-  const auto deadline = Clock::now() + kViewPatience;
-  while (true) {
-    try {
-      logging::LogReader reader(log);
-      logging::RunRecord record;
-      record.info = logging::ReadRunInfo(&reader, log, &record.spec);
-      record.robot = robot::LoadRobotTexts(record.info.robot, record.info.urdf);
-      return record;
-    } catch (const logging::LogError&) {
-      if (Clock::now() > deadline || !live.InProgress() || StopSignal() != 0) throw;
-    }
-    std::this_thread::sleep_for(kPause);
-  }
-}
 
 Json ChannelsJson(const TickRing& ring) {
   Json json = Json::array();
@@ -94,13 +65,18 @@ class Viewer {
         ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
                 &ring_),
-        status_((live->dir() / "run.lcm").string(), scenario) {}
+        status_((live->dir() / "run.lcm").string(), scenario) {
+    if (options.foxglove == 0) return;
+    foxglove_ = std::make_unique<LiveFoxglove>(options.foxglove, options.foxglove_origins, record,
+                                               scenario);
+  }
 
   int Run() {
     fmt::print(
         "{}: http://127.0.0.1:{}/  (the last {} s, {:.0f} MB; Ctrl-C ends)\n",
         live_->dir().string(), server_.port(), keep_,
         1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity()));
+    if (foxglove_) fmt::print("Foxglove: ws://127.0.0.1:{}\n", foxglove_->port());
     std::fflush(stdout);
     server_.SetState(State());
     auto next_picture = Clock::now();
@@ -109,6 +85,7 @@ class Viewer {
       server_.RunFor(live_ != nullptr ? kPause : kPicture);
       const auto now = Clock::now();
       if (live_ != nullptr) Listen(now);
+      if (foxglove_) foxglove_->Poll();
       if (now < next_picture) continue;
       SendStatus();
       server_.SendTicks();
@@ -130,6 +107,7 @@ class Viewer {
     const int64_t lost = ring_.lost();
     live_->Spin(0, [&](const LiveMessage& message) {
       ring_.Add(message);
+      if (foxglove_) foxglove_->Add(message);
       last_message_ = now;
     });
     if (now > last_message_ + kViewSilence) {
@@ -137,6 +115,7 @@ class Viewer {
       if (!live_->InProgress()) {
         ring_.Finish();
         status_.Finish();
+        if (foxglove_) foxglove_->Finish();
         fmt::print("the run has ended; its page stays until Ctrl-C; {} {} checks it\n", kLogCommand,
                    live_->dir().string());
         std::fflush(stdout);
@@ -149,6 +128,7 @@ class Viewer {
   void SendStatus() {
     std::optional<Json> status = status_.Take();
     if (!status) return;
+    if (foxglove_) foxglove_->AddStatus(*status);
     // Texts of a log may hold any bytes.
     server_.SetStatus(Json({{"run_id", run_id_}, {"status", std::move(*status)}})
                           .dump(-1, ' ', false, Json::error_handler_t::replace));
@@ -169,20 +149,15 @@ class Viewer {
   TickRing ring_;
   ViewServer server_;
   RunStatus status_;
+  std::unique_ptr<LiveFoxglove> foxglove_;  // null unless asked for
   Clock::time_point last_message_;
 };
 
 int View(const ViewOptions& options) {
   CatchStopSignals();
   LiveRun live(options.run, kLogCommand);
-  const logging::RunRecord record = ReadStart(live);
-  if (record.spec.run_id() != live.spec().run_id()) {
-    throw ConfigError(
-        fmt::format("{}: a new run is starting in this folder; try again", live.dir().string()));
-  }
-  Scenario scenario;
-  ParseScenario(record.info.scenario, (live.dir() / "run.lcm").string() + ": RUN_INFO.scenario",
-                &scenario);
+  const logging::RunRecord record = ReadStart(live, kViewPatience);
+  const Scenario scenario = ReadScenario(live, record);
   StandBack();
   return Viewer(options, &live, record, scenario).Run();
 }
@@ -199,6 +174,13 @@ void AddViewCommand(CLI::App* app, Command* command) {
   view->add_option("--keep", options->keep, "s of the run that the page can look back")
       ->check(Within("in [1, 600]", [](double s) { return s >= 1 && s <= 600; }))
       ->capture_default_str();
+  view->add_option("--foxglove", options->foxglove,
+                   "serve Foxglove's WebSocket on this port of 127.0.0.1 as well; its own is 8765")
+      ->check(CLI::Range(1, 65535));
+  view->add_option("--foxglove-origin", options->foxglove_origins,
+                   "origin of further pages that may connect there, e.g. https://viewer.example")
+      ->allow_extra_args(false)
+      ->take_all();
   view->callback([options, command] { *command = [options] { return View(*options); }; });
 }
 

@@ -2,13 +2,18 @@
 
 #include <google/protobuf/text_format.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <memory>
+#include <thread>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/cli/child_process.h"
 #include "tools/cli/signals.h"
 #include "tools/report/realtime_verdict.h"
 #include "tools/report/run_screen.h"
@@ -26,6 +31,9 @@ namespace fs = std::filesystem;
 
 constexpr char kSpecFile[] = "run_spec.pbtxt";
 constexpr char kScenarioFile[] = "scenario.pbtxt";
+constexpr char kRos2Log[] = "ros2.log";
+constexpr std::chrono::seconds kRos2End{5};  // that it may take to tell the run's last messages
+constexpr std::chrono::milliseconds kRos2Look{10};
 
 /// "7 processes", or "3 processes (controller: state_estimator, step_planner)".
 std::string ProcessesText(const Graph& graph) {
@@ -46,6 +54,25 @@ void PrintOutcome(const std::string& what, const RunOutcome& outcome) {
   fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
              outcome.message);
   for (const std::string& line : outcome.details) fmt::print(stderr, "  {}\n", line);
+}
+
+std::vector<std::string> Ros2Command(const fs::path& dir) {
+  return {fs::read_symlink("/proc/self/exe").string(), "ros2", dir.string()};
+}
+
+/// Lets it tell the run's last messages. What became of it changes nothing about the run.
+void EndRos2(ChildProcess* ros2) {
+  const bool early = ros2->ended();
+  if (!early) ros2->Signal(SIGINT);
+  const auto deadline = std::chrono::steady_clock::now() + kRos2End;
+  while (!ros2->ended() && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(kRos2Look);
+  }
+  if (!early && ros2->ended() && ros2->succeeded()) return;
+  const std::vector<std::string> last = LastLines(ros2->log_path(), 1);
+  fmt::print(stderr, "warning: poise ros2 {}{}{}\n",
+             ros2->ended() ? ros2->HowItEnded() : "did not end in time", last.empty() ? "" : ": ",
+             last.empty() ? "" : logging::ForTerminal(last.front()));
 }
 
 }  // namespace
@@ -198,8 +225,11 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   }
   std::optional<logging::RunRecord> kept;  // of what ran in this process
   if (StopSignal() == 0) {
+    std::optional<ChildProcess> ros2;
+    if (options_.ros2) ros2.emplace("ros2", Ros2Command(result.dir), result.dir / kRos2Log);
     summary.outcome =
         RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch, &kept);
+    if (ros2) EndRos2(&*ros2);
     PrintOutcome("run", summary.outcome);
     if (!options_.quiet && !summary.outcome.interrupted) {
       fmt::print("{}", FormatFaults(summary.outcome));

@@ -21,6 +21,7 @@ struct RunOptions {
   bool full = false;   ///< every figure, events, assumptions, processes
   bool force = false;  ///< replace what the folder holds; start where the log may not fit
   LaunchOptions launch;
+  bool ros2 = false;  ///< `poise ros2` listens to the run of processes, and ends with it
 };
 
 /// What `poise report` and the overview of several runs say of a run's scenario.

@@ -1,0 +1,176 @@
+#include "tools/foxglove/scene_topics.h"
+
+#include <google/protobuf/descriptor.pb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "components/messages/conversions.h"
+#include "fmt/format.h"
+#include "logging/printable.h"
+#include "tools/foxglove/event_level.h"
+#include "tools/foxglove/ros_messages.h"
+#include "tools/foxglove/scene_parts.h"
+
+namespace poise {
+namespace {
+
+namespace pb = google::protobuf;
+
+constexpr double kPictures = 100;  // Hz: beyond what a screen shows
+constexpr size_t kSceneTriangles = 40'000;
+
+/// A schema with all that it imports, serialised.
+std::string FileSet(const pb::Descriptor& type) {
+  pb::FileDescriptorSet set;
+  std::set<const pb::FileDescriptor*> done;
+  const auto add = [&](const auto& self, const pb::FileDescriptor* file) -> void {
+    if (!done.insert(file).second) return;
+    for (int i = 0; i < file->dependency_count(); ++i) self(self, file->dependency(i));
+    file->CopyTo(set.add_file());
+  };
+  add(add, type.file());
+  return set.SerializeAsString();
+}
+
+template <class Message>
+SceneTopic ProtobufTopic(const char* name, bool kept) {
+  const pb::Descriptor& type = *Message::descriptor();
+  return {name, "protobuf", type.full_name(), "protobuf", FileSet(type), kept};
+}
+
+SceneTopic RosTopic(const char* name, const char* schema, std::string_view definition, bool kept) {
+  return {name, "cdr", schema, "ros2msg", std::string(definition), kept};
+}
+
+int64_t PictureTicks(const RunSpec& spec) {
+  return std::max<int64_t>(1, std::llround(1 / (kPictures * spec.tick_period())));
+}
+
+foxglove::Log::Level LevelOf(std::string_view event) {
+  switch (LevelOfEvent(event)) {
+    case EventLevel::kError:
+      return foxglove::Log::ERROR;
+    case EventLevel::kWarning:
+      return foxglove::Log::WARNING;
+    default:
+      return foxglove::Log::INFO;
+  }
+}
+
+/// Texts of a log may hold any bytes.
+std::string Utf8(std::string_view text) {
+  return logging::IsUtf8(text) ? std::string(text) : logging::LinesForTerminal(text);
+}
+
+bool IsUrdf(const std::string& maker_text) {
+  return maker_text.find("<robot") != std::string::npos;
+}
+
+bool ReadTruth(const ground_truth_t& truth, robot::RobotState* state) {
+  robot_state_t message;
+  MessageTraits<robot_state_t>::Resize(message, std::array{truth.num_joints, truth.num_feet});
+  std::ranges::copy(truth.base_position, message.base_position);
+  std::ranges::copy(truth.base_orientation, message.base_orientation);
+  message.joint_position = truth.joint_position;
+  return ReadState(message, state);
+}
+
+}  // namespace
+
+SceneTopics::SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit)
+    : run_(run),
+      emit_(std::move(emit)),
+      topics_{ProtobufTopic<foxglove::FrameTransforms>("/tf", false),
+              ProtobufTopic<foxglove::FrameTransforms>("/tf_static", true),
+              ProtobufTopic<foxglove::SceneUpdate>("/robot", true),
+              ProtobufTopic<foxglove::SceneUpdate>("/ground", true),
+              ProtobufTopic<foxglove::SceneUpdate>("/forces", false),
+              ProtobufTopic<foxglove::SceneUpdate>("/support", false),
+              ProtobufTopic<foxglove::Log>("/events", false),
+              RosTopic("/joint_states", "sensor_msgs/msg/JointState", kJointStateDefinition, false),
+              RosTopic("/robot_description", "std_msgs/msg/String", kStringDefinition, true)},
+      frames_(run.robot),
+      contacts_(run.robot),
+      ground_(scenario),
+      gatherer_(run.spec, PictureTicks(run.spec)),
+      state_(run.robot.num_joints()) {
+  for (const robot::Joint& joint : run.robot.joints()) joint_names_.push_back(joint.name);
+}
+
+template <class Message>
+void SceneTopics::Publish(Topic topic, int64_t utime, const Message& message) {
+  emit_(topic, static_cast<uint64_t>(utime) * 1'000, message.SerializeAsString());
+}
+
+int64_t SceneTopics::Utime(double time) const {
+  const double ticks =
+      std::round(time / run_.spec.tick_period()) + static_cast<double>(run_.spec.lead_ticks());
+  return std::max<int64_t>(0, std::llround(1e6 * ticks * run_.spec.tick_period()));
+}
+
+void SceneTopics::Begin() {
+  MeshPlaces places;  // those of the machine that the run was on, if it is this one
+  for (const Resource& resource : run_.spec.resource()) {
+    if (resource.name() == "urdf") places.maker_file = resource.file();
+  }
+  const RobotDrawing drawing = DrawRobot(run_.robot, run_.info.urdf, places, kSceneTriangles);
+  Publish(kFixedFrames, 0, frames_.Fixed(0));
+  Publish(kRobot, 0, frames_.Picture(drawing, 0));
+  if (IsUrdf(run_.info.urdf)) {
+    emit_(kDescription, 0, StringCdr(Utf8(run_.info.urdf)));
+  }
+  if (const auto ground = ground_.Update(-run_.duration(run_.spec.lead_ticks()), 0)) {
+    Publish(kGround, 0, *ground);
+  }
+}
+
+void SceneTopics::Add(std::string_view channel, const MessageType& type,
+                      std::span<const uint8_t> data) {
+  gatherer_.Add(channel, type, data);
+  while (const std::optional<TickMessages> tick = gatherer_.Take(false)) AddTick(*tick);
+}
+
+void SceneTopics::End() {
+  while (const std::optional<TickMessages> tick = gatherer_.Take(true)) AddTick(*tick);
+}
+
+void SceneTopics::AddTick(const TickMessages& tick) {
+  if (tick.utime < 0 || tick.utime >= INT64_MAX / 1'000) return;
+  truth_came_ = truth_came_ || tick.truth;
+  // Where the truth is lost now and then, the estimate would make the robot jump.
+  const bool posed = truth_came_ ? tick.truth && ReadTruth(*tick.truth, &state_)
+                                 : tick.state && ReadState(*tick.state, &state_);
+  if (posed) Publish(kFrames, tick.utime, frames_.Moving(state_, tick.utime));
+  Publish(kForces, tick.utime, contacts_.Forces(tick));
+  Publish(kSupport, tick.utime, contacts_.Support(tick));
+  AddJointStates(tick);
+  const double time =
+      1e-6 * static_cast<double>(tick.utime) - run_.duration(run_.spec.lead_ticks());
+  if (const auto ground = ground_.Update(time, tick.utime)) Publish(kGround, tick.utime, *ground);
+}
+
+void SceneTopics::AddJointStates(const TickMessages& tick) {
+  if (!tick.state || tick.state->joint_position.size() != joint_names_.size()) return;
+  std::span<const double> effort;
+  if (tick.sensors && tick.sensors->joint_torque.size() == joint_names_.size()) {
+    effort = tick.sensors->joint_torque;
+  }
+  emit_(kJointStates, static_cast<uint64_t>(tick.utime) * 1'000,
+        JointStateCdr(tick.utime, joint_names_, tick.state->joint_position,
+                      tick.state->joint_velocity, effort));
+}
+
+void SceneTopics::AddEvent(double time, std::string_view name, std::string_view detail) {
+  if (!std::isfinite(time)) return;
+  foxglove::Log log;
+  const int64_t utime = Utime(time);
+  *log.mutable_timestamp() = SceneTime(utime);
+  log.set_level(LevelOf(name));
+  log.set_name(Utf8(name));
+  log.set_message(Utf8(detail.empty() ? name : detail));
+  Publish(kEvents, utime, log);
+}
+
+}  // namespace poise

@@ -1,0 +1,193 @@
+#include "tools/ros2/ros2_publisher.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/messages/conversions.h"
+#include "logging/printable.h"
+#include "tools/foxglove/event_level.h"
+#include "tools/ros2/ros2.h"
+
+namespace poise {
+namespace {
+
+// What stands still, as ROS 2's REP 105 names it for a pose that drifts and never jumps.
+constexpr const char* kOdometryFrame = "odom";
+constexpr const char* kNode = "poise";
+constexpr uint8_t kInfo = 20, kWarn = 30, kError = 40;  // levels of rcl_interfaces/msg/Log
+
+int64_t EveryTick(const RunSpec& spec, double rate) {
+  return std::max<int64_t>(1, std::llround(1 / (rate * spec.tick_period())));
+}
+
+/// The C types hold pointers that they do not write through.
+char* Text(const std::string& text) { return const_cast<char*>(text.c_str()); }
+char* Text(const char* text) { return const_cast<char*>(text); }
+
+builtin_interfaces_msg_dds__Time_ Stamp(int64_t utime) {
+  return {static_cast<int32_t>(utime / 1'000'000),
+          static_cast<uint32_t>(utime % 1'000'000) * 1'000};
+}
+std_msgs_msg_dds__Header_ Header(int64_t utime, char* frame) { return {Stamp(utime), frame}; }
+
+geometry_msgs_msg_dds__Vector3_ Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+dds_sequence_double Numbers(std::span<const double> values) {
+  const auto size = static_cast<uint32_t>(values.size());
+  return {size, size, const_cast<double*>(values.data()), false};
+}
+
+uint8_t LogLevel(std::string_view event) {
+  switch (LevelOfEvent(event)) {
+    case EventLevel::kError:
+      return kError;
+    case EventLevel::kWarning:
+      return kWarn;
+    default:
+      return kInfo;
+  }
+}
+
+}  // namespace
+
+Ros2Publisher::Ros2Publisher(const unitree::DdsLink& link, const logging::RunRecord& run,
+                             double rate)
+    : run_(run),
+      frames_(run.robot),
+      gatherer_(run.spec, EveryTick(run.spec, rate)),
+      state_(run.robot.num_joints()),
+      participant_(link),
+      clock_(participant_, rosgraph_msgs_msg_dds__Clock__desc, "clock", Keeping::kNone),
+      joints_(participant_, sensor_msgs_msg_dds__JointState__desc, "joint_states", Keeping::kNone),
+      odometry_(participant_, nav_msgs_msg_dds__Odometry__desc, "odom", Keeping::kNone),
+      tf_(participant_, tf2_msgs_msg_dds__TFMessage__desc, "tf", Keeping::kNone),
+      tf_static_(participant_, tf2_msgs_msg_dds__TFMessage__desc, "tf_static", Keeping::kLast),
+      description_(participant_, std_msgs_msg_dds__String__desc, "robot_description",
+                   Keeping::kLast),
+      rosout_(participant_, rcl_interfaces_msg_dds__Log__desc, "rosout", Keeping::kAll) {
+  for (const robot::Joint& joint : run.robot.joints()) joint_names_.push_back(joint.name);
+  for (const robot::FootModel& foot : run.robot.feet()) {
+    sole_frames_.push_back(foot.name + "_sole");
+    wrenches_.push_back(std::make_unique<Ros2Writer>(participant_,
+                                                     geometry_msgs_msg_dds__WrenchStamped__desc,
+                                                     foot.name + "_foot_wrench", Keeping::kNone));
+  }
+  PublishStatic();
+}
+
+void Ros2Publisher::Write(Ros2Writer* writer, const void* message) {
+  ++(writer->Write(message) ? written_ : failed_);
+}
+
+void Ros2Publisher::PublishStatic() {
+  foxglove::FrameTransforms frames = frames_.Fixed(0);
+  for (size_t f = 0; f < sole_frames_.size(); ++f) {
+    frames_.AddFixed(run_.robot.feet()[f].body, sole_frames_[f], run_.robot.feet()[f].sole,
+                     &frames);
+  }
+  PublishFrames(frames, &tf_static_);
+  if (run_.info.urdf.find("<robot") == std::string::npos) return;  // MJCF, which ROS 2 has not
+  const std_msgs_msg_dds__String_ description{Text(run_.info.urdf)};
+  Write(&description_, &description);
+}
+
+void Ros2Publisher::Add(std::string_view channel, const MessageType& type,
+                        std::span<const uint8_t> data) {
+  gatherer_.Add(channel, type, data);
+  while (const std::optional<TickMessages> tick = gatherer_.Take(false)) Publish(*tick);
+}
+
+void Ros2Publisher::Finish() {
+  while (const std::optional<TickMessages> tick = gatherer_.Take(true)) Publish(*tick);
+}
+
+void Ros2Publisher::Publish(const TickMessages& tick) {
+  // A stamp has 31 bits of seconds.
+  if (tick.utime < 0 || tick.utime / 1'000'000 > INT32_MAX) return;
+  const rosgraph_msgs_msg_dds__Clock_ clock{Stamp(tick.utime)};
+  Write(&clock_, &clock);
+  PublishJoints(tick);
+  PublishWrenches(tick);
+  if (!tick.state || !ReadState(*tick.state, &state_)) return;
+  foxglove::FrameTransforms frames = frames_.Moving(state_, tick.utime);
+  frames.mutable_transforms(0)->set_parent_frame_id(kOdometryFrame);
+  PublishFrames(frames, &tf_);
+  PublishBase(*tick.state, frames, tick.utime);
+}
+
+void Ros2Publisher::PublishJoints(const TickMessages& tick) {
+  if (!tick.state || tick.state->joint_position.size() != joint_names_.size()) return;
+  std::vector<char*> names;
+  for (const std::string& name : joint_names_) names.push_back(Text(name));
+  const auto size = static_cast<uint32_t>(names.size());
+  sensor_msgs_msg_dds__JointState_ message{};
+  message.header = Header(tick.utime, Text(""));
+  message.name = {size, size, names.data(), false};
+  message.position = Numbers(tick.state->joint_position);
+  message.velocity = Numbers(tick.state->joint_velocity);
+  if (tick.sensors && tick.sensors->joint_torque.size() == names.size()) {
+    message.effort = Numbers(tick.sensors->joint_torque);
+  }
+  Write(&joints_, &message);
+}
+
+void Ros2Publisher::PublishBase(const robot_state_t& state, const foxglove::FrameTransforms& frames,
+                                int64_t utime) {
+  const foxglove::FrameTransform& base = frames.transforms(0);
+  const auto& p = base.translation();
+  const auto& q = base.rotation();
+  nav_msgs_msg_dds__Odometry_ message{};
+  message.header = Header(utime, Text(kOdometryFrame));
+  message.child_frame_id = Text(frames_.link(0));
+  message.pose.pose = {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
+  // A twist is told in the child's axes.
+  const Eigen::Quaterniond to_world(q.w(), q.x(), q.y(), q.z());
+  message.twist.twist = {Vector(to_world.conjugate() * GetVector3(state.base_linear_velocity)),
+                         Vector(to_world.conjugate() * GetVector3(state.base_angular_velocity))};
+  Write(&odometry_, &message);
+}
+
+void Ros2Publisher::PublishWrenches(const TickMessages& tick) {
+  if (!tick.state) return;
+  const std::vector<wrench_t>& wrenches = tick.state->foot_wrench;
+  for (size_t f = 0; f < std::min(wrenches.size(), wrenches_.size()); ++f) {
+    // The bus tells what the robot does to the ground; here it is the other way round.
+    const geometry_msgs_msg_dds__WrenchStamped_ message{
+        Header(tick.utime, Text(sole_frames_[f])),
+        {Vector(-GetVector3(wrenches[f].force)), Vector(-GetVector3(wrenches[f].moment))}};
+    Write(wrenches_[f].get(), &message);
+  }
+}
+
+void Ros2Publisher::PublishFrames(const foxglove::FrameTransforms& frames, Ros2Writer* writer) {
+  std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms;
+  for (const foxglove::FrameTransform& frame : frames.transforms()) {
+    const auto& p = frame.translation();
+    const auto& q = frame.rotation();
+    transforms.push_back({{{static_cast<int32_t>(frame.timestamp().seconds()),
+                            static_cast<uint32_t>(frame.timestamp().nanos())},
+                           Text(frame.parent_frame_id())},
+                          Text(frame.child_frame_id()),
+                          {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}}});
+  }
+  const auto size = static_cast<uint32_t>(transforms.size());
+  const tf2_msgs_msg_dds__TFMessage_ message{{size, size, transforms.data(), false}};
+  Write(writer, &message);
+}
+
+void Ros2Publisher::AddEvent(double time, const std::string& name, const std::string& detail) {
+  const double at = time + run_.duration(run_.spec.lead_ticks());
+  if (!(at >= 0 && at < INT32_MAX)) return;
+  const std::string text = logging::ForTerminal(detail.empty() ? name : detail);
+  const std::string event = logging::ForTerminal(name);
+  const rcl_interfaces_msg_dds__Log_ message{Stamp(std::llround(1e6 * at)),
+                                             LogLevel(name),
+                                             Text(kNode),
+                                             Text(text),
+                                             Text(""),
+                                             Text(event),
+                                             0};
+  Write(&rosout_, &message);
+}
+
+}  // namespace poise
