@@ -15,8 +15,11 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/live/bus_operator.h"
+#include "tools/live/control_desk.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
+#include "tools/live/view_access.h"
 #include "tools/live/view_server.h"
 #include "tools/report/html_report.h"
 #include "tools/run/live_run.h"
@@ -41,6 +44,7 @@ struct ViewOptions {
   std::string run;
   int port = 0;
   double keep = 60;  // s
+  bool control = false;
 };
 
 /// A process that wakes up then takes no core from one of the run; where all cores are busy this
@@ -91,16 +95,19 @@ class Viewer {
       : live_(live),
         keep_(options.keep),
         run_id_(std::to_string(live->spec().run_id())),
+        operator_(options.control ? std::make_unique<BusOperator>(live->spec()) : nullptr),
+        desk_(operator_ ? std::make_unique<ControlDesk>(operator_.get()) : nullptr),
         ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
-                &ring_),
+                &ring_, Control()),
         status_((live->dir() / "run.lcm").string(), scenario) {}
 
   int Run() {
     fmt::print(
-        "{}: http://127.0.0.1:{}/  (the last {} s, {:.0f} MB; Ctrl-C ends)\n",
-        live_->dir().string(), server_.port(), keep_,
+        "{}: {}  (the last {} s, {:.0f} MB; Ctrl-C ends)\n", live_->dir().string(), server_.url(),
+        keep_,
         1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity()));
+    if (desk_) fmt::print("whoever has this address can push, change and stop the robot\n");
     std::fflush(stdout);
     server_.SetState(State());
     auto next_picture = Clock::now();
@@ -111,6 +118,7 @@ class Viewer {
       if (live_ != nullptr) Listen(now);
       if (now < next_picture) continue;
       SendStatus();
+      SendControl();
       server_.SendTicks();
       if (server_.dropped() != dropped_) {
         dropped_ = server_.dropped();
@@ -130,8 +138,10 @@ class Viewer {
     const int64_t lost = ring_.lost();
     live_->Spin(0, [&](const LiveMessage& message) {
       ring_.Add(message);
+      if (operator_) operator_->Hear(message);
       last_message_ = now;
     });
+    if (operator_) operator_->Update();
     if (now > last_message_ + kViewSilence) {
       last_message_ = now;
       if (!live_->InProgress()) {
@@ -154,6 +164,16 @@ class Viewer {
                           .dump(-1, ' ', false, Json::error_handler_t::replace));
   }
 
+  ViewControl Control() {
+    if (!desk_) return {};
+    return {MakeToken(), [this](std::string_view text) { return desk_->Receive(text); }};
+  }
+
+  void SendControl() {
+    if (!desk_ || live_ == nullptr) return;
+    if (const std::optional<std::string> text = desk_->Take(run_id_)) server_.SetControl(*text);
+  }
+
   std::string State() const {
     return Json({{"run_id", run_id_},
                  {"state", live_ != nullptr ? "live" : "ended"},
@@ -166,6 +186,8 @@ class Viewer {
   double keep_;    // s
   std::string run_id_;
   int64_t dropped_ = 0;
+  std::unique_ptr<BusOperator> operator_;  // nullptr: pages only look
+  std::unique_ptr<ControlDesk> desk_;
   TickRing ring_;
   ViewServer server_;
   RunStatus status_;
@@ -199,6 +221,8 @@ void AddViewCommand(CLI::App* app, Command* command) {
   view->add_option("--keep", options->keep, "s of the run that the page can look back")
       ->check(Within("in [1, 600]", [](double s) { return s >= 1 && s <= 600; }))
       ->capture_default_str();
+  view->add_flag("--control", options->control,
+                 "pages with the token of the printed address may push, change settings and stop");
   view->callback([options, command] { *command = [options] { return View(*options); }; });
 }
 
