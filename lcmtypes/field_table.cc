@@ -5,7 +5,8 @@
 
 namespace poise {
 
-MessageSet poise_messages();  // generated
+MessageSet poise_messages();    // generated
+MessageSet operate_messages();  // generated
 
 namespace {
 
@@ -13,6 +14,7 @@ struct Known {
   Known() {
     types.reserve(kMostTypes);  // pointers to them last
     Add(poise_messages());
+    Add(operate_messages());
   }
 
   void Add(const MessageSet& set) {

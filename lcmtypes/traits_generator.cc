@@ -278,8 +278,8 @@ void WriteTable(const std::string& set, const std::vector<Message>& messages,
     if (m.has_header) out << "      MessageTypeOf<" << type << ">(),\n";
   }
   out << "  };\n  return {types, kStructs, kDefinitions};\n}\n\n";
-  // Linked in as an object, it makes its messages known by itself.
-  if (set != "poise") {
+  // Linked in as an object, it makes its messages known by itself; Poise's own are in one library.
+  if (set != "poise" && set != "operate") {
     out << "namespace {\n[[maybe_unused]] const bool known = AddMessages(" << set
         << "_messages());\n}  // namespace\n\n";
   }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "components/framework/modules.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
@@ -120,8 +121,18 @@ void Session::Replace(const SessionOptions& options, ComponentRegistry* registry
                                     graph.name(), name, TypeOf(*found)));
     }
     ComponentType type = *former;
+    // An operator's acts are for who declares them.
+    std::erase_if(type.ports, [](const PortType& port) { return port.type == kActType; });
+    for (int i = found->input_size(); i-- > 0;) {
+      const auto is_acts = [&](const Channel& channel) {
+        return channel.name() == found->input(i).channel() && channel.type() == kActType;
+      };
+      if (std::any_of(graph.channel().begin(), graph.channel().end(), is_acts)) {
+        found->mutable_input()->DeleteSubrange(i, 1);
+      }
+    }
     type.name = "foreign_" + name;
-    type.make = [ports = former->ports, functions] {
+    type.make = [ports = type.ports, functions] {
       return std::make_unique<ForeignComponent>(ports, functions);
     };
     found->set_type(type.name);
@@ -151,7 +162,10 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     if (auto* const foreign = dynamic_cast<ForeignComponent*>(component)) {
       foreign_.push_back(foreign);
     }
-    if (auto* const sim = dynamic_cast<SimComponent*>(component)) sim_ = sim;
+    if (auto* const sim = dynamic_cast<SimComponent*>(component)) {
+      sim_ = sim;
+      sim_index_ = i;
+    }
   }
   std::string robot, urdf;
   for (const Resource& resource : spec_.resource()) {
@@ -159,7 +173,6 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     if (resource.name() == "urdf") urdf = resource.text();
   }
   model_ = std::make_shared<robot::RobotModel>(robot::LoadRobotTexts(robot, urdf));
-  push_until_.assign(model_->bodies().size(), -1);
   override_.assign(static_cast<size_t>(model_->num_joints()),
                    std::numeric_limits<double>::quiet_NaN());
   const GraphPlan& plan = runner_->plan();
@@ -202,22 +215,11 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
 
 Session::~Session() = default;
 
-void Session::BeforeTick() {
-  const int64_t tick = runner_->ticks_completed();
-  for (size_t b = 0; b < push_until_.size(); ++b) {
-    if (push_until_[b] < 0 || tick < push_until_[b]) continue;
-    push_until_[b] = -1;
-    sim_->simulation()->SetForce(static_cast<int>(b), Eigen::Vector3d::Zero(),
-                                 Eigen::Vector3d::Zero());
-  }
-}
-
 int64_t Session::Step(int64_t ticks) {
   const Lock lock(this);
   if (finished_) throw ConfigError("the run is finished; make a new environment, or reset it");
   int64_t done = 0;
   while (done < ticks && !runner_->ended()) {
-    BeforeTick();
     const int64_t before = runner_->ticks_completed();
     runner_->Step();
     done += runner_->ticks_completed() - before;
@@ -237,8 +239,32 @@ void Session::Push(const std::string& body, const Eigen::Vector3d& force,
     throw ConfigError("push: force and point must be finite numbers");
   }
   const int index = body.empty() ? 0 : FindBody(*model_, body, "body");
-  sim_->simulation()->SetForce(index, force, point);
-  push_until_[static_cast<size_t>(index)] = ticks < 0 ? -1 : runner_->ticks_completed() + ticks;
+  operate::act_t act{};
+  act.run_id = spec_.run_id();
+  act.tick = runner_->ticks_completed();
+  act.id = next_act_++;
+  act.component = sim_index_;
+  act.kind = operate::act_t::KIND_PUSH;
+  act.body = index;
+  for (int i = 0; i < 3; ++i) {
+    act.force[i] = force[i];
+    act.point[i] = point[i];
+  }
+  act.duration = ticks < 0 ? -1 : ticks;
+  std::vector<uint8_t> bytes(static_cast<size_t>(act.getEncodedSize()));
+  act.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  std::string channel;
+  for (const Connection& input : spec_.graph().component(sim_index_).input()) {
+    for (const Channel& each : spec_.graph().channel()) {
+      if (each.name() == input.channel() && each.type() == kActType) channel = each.name();
+    }
+  }
+  if (channel.empty()) {
+    throw ConfigError(fmt::format(
+        "graph {}: {} has no input of type {}; connect its port operator to an external channel",
+        spec_.graph().name(), spec_.graph().component(sim_index_).name(), kActType));
+  }
+  if (!runner_->Inject(channel, bytes)) throw ConfigError("push: the simulator refused it");
 }
 
 void Session::OverrideTorque(int joint, std::optional<double> torque) {

@@ -83,7 +83,6 @@ class Session {
   void Replace(const SessionOptions& options, ComponentRegistry* registry);
   int FindChannel(const std::string& name) const;
   const OutputPort* Writer(int channel);
-  void BeforeTick();
 
   RunSpec spec_;
   std::string scenario_;
@@ -95,7 +94,8 @@ class Session {
   SimComponent* sim_ = nullptr;
   std::shared_ptr<const robot::RobotModel> model_;
   std::vector<std::unique_ptr<MessageLayout>> layouts_;  // by channel; nullptr: none
-  std::vector<int64_t> push_until_;                      // by body: tick; -1: none ends
+  int sim_index_ = -1;                                   // in the graph
+  int64_t next_act_ = 1;
   std::vector<double> override_;                         // by joint; NaN: none
   bool overrides_ = false;
   int command_channel_ = -1;

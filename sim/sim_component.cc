@@ -6,6 +6,14 @@
 #include "components/messages/robot_resource.h"
 
 namespace poise {
+namespace {
+
+// What an operator may ask for: far beyond what any robot here stands, within what engines bear.
+constexpr double kMostForce = 1e5;                  // N
+constexpr double kFarthestPoint = 10;               // m from the body's origin
+constexpr int64_t kLongestPush = int64_t{1} << 40;  // ticks
+
+}  // namespace
 
 ComponentTraits SimTraits(const std::string& engine) {
   return {.sections = {"sim", engine},
@@ -22,7 +30,9 @@ ComponentTraits SimTraits(const std::string& engine) {
 std::vector<PortType> SimPorts() {
   return {Reads<drive_command_t>("drive_command", InputKind::kPreviousTick),
           Reads<bridge_status_t>("bridge_status", InputKind::kPreviousTick),
-          Writes<drive_feedback_t>("drive_feedback"), Writes<external_push_t>("external_push"),
+          Reads<operate::act_t>("operator", InputKind::kLatest),
+          Writes<drive_feedback_t>("drive_feedback"),
+          Writes<external_push_t>("external_push"),
           Writes<ground_truth_t>("ground_truth")};
 }
 
@@ -43,6 +53,7 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     current_sensor_.push_back(motor.current_sensor ? 1 : 0);
   }
 
+  push_until_.assign(model->bodies().size(), -1);
   impedance_.resize(model->motors().size());
 
   const MessageCounts counts = JointAndFootCounts(*model);
@@ -50,10 +61,11 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
                    InputKind::kPreviousTick);
   wiring->AddInput(&bridge_status_, "bridge_status", {model->num_joints()},
                    InputKind::kPreviousTick);
+  wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&drive_feedback_, "drive_feedback", counts);
   wiring->AddOutput(&external_push_, "external_push", {});
   wiring->AddOutput(&ground_truth_, "ground_truth", counts);
-  wiring->AddStage("step", {&drive_command_, &bridge_status_},
+  wiring->AddStage("step", {&drive_command_, &bridge_status_, &operator_},
                    {&drive_feedback_, &external_push_, &ground_truth_},
                    [this](const Tick& tick) { Step(tick); });
 }
@@ -62,7 +74,34 @@ std::string_view SimComponent::finished() const {
   return simulation_ ? simulation_->end_reason() : std::string_view{};
 }
 
+void SimComponent::TakeActs(const Tick& tick) {
+  using operate::answer_t;
+  for (size_t body = 0; body < push_until_.size(); ++body) {
+    if (push_until_[body] < 0 || tick.index < push_until_[body]) continue;
+    push_until_[body] = -1;
+    simulation_->SetForce(static_cast<int>(body), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  }
+  while (const operate::act_t* const act = operator_.Next(tick)) {
+    const bool known = act->kind == operate::act_t::KIND_PUSH && act->body >= 0 &&
+                       act->body < static_cast<int32_t>(push_until_.size());
+    if (!known) {
+      operator_.Answer(answer_t::VERDICT_UNKNOWN);
+      continue;
+    }
+    const Eigen::Map<const Eigen::Vector3d> force(act->force), point(act->point);
+    if (!(force.norm() <= kMostForce && point.norm() <= kFarthestPoint &&
+          act->duration <= kLongestPush)) {
+      operator_.Answer(answer_t::VERDICT_RANGE);
+      continue;
+    }
+    simulation_->SetForce(act->body, force, point);
+    push_until_[static_cast<size_t>(act->body)] =
+        act->duration < 0 ? -1 : tick.index + act->duration;
+  }
+}
+
 void SimComponent::Step(const Tick& tick) {
+  TakeActs(tick);
   if (tick.index > 0) {
     if (drive_command_.present()) {
       simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);

@@ -10,6 +10,7 @@
 #include "components/framework/component.h"
 #include "components/framework/component_traits.h"
 #include "components/framework/component_type.h"
+#include "components/framework/operator_acts.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
 #include "poise/drive_feedback_t.hpp"
@@ -40,16 +41,18 @@ std::vector<PortType> SimPorts();
 /// when bridge_status says that the bridge follows. Tick 0 reports the start posture at rest
 /// without stepping. Finishes, as failed, when the robot falls. A ConfigError's path begins with
 /// "sim.": the configuration of an engine's process has a field `sim` (SimConfig) beside its own.
-class SimComponent : public Component {
+class SimComponent : public Component, public Operated {
  public:
   explicit SimComponent(SimReader read) : read_(std::move(read)) {}
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   std::string_view finished() const override;
   bool failed() const override { return !finished().empty(); }
+  const LiveSettings& live_settings() const override { return operator_.settings(); }
   /// For who runs the component in its own process; nullptr before Configure.
   Simulation* simulation() { return simulation_.get(); }
 
  private:
+  void TakeActs(const Tick& tick);
   void Step(const Tick& tick);
   void PublishFeedback();
   void PublishPush();
@@ -58,6 +61,7 @@ class SimComponent : public Component {
   SimReader read_;
   Input<drive_command_t> drive_command_;
   Input<bridge_status_t> bridge_status_;
+  ActInput operator_;
   Output<drive_feedback_t> drive_feedback_;
   Output<external_push_t> external_push_;
   Output<ground_truth_t> ground_truth_;
@@ -65,6 +69,7 @@ class SimComponent : public Component {
   std::unique_ptr<Sensors> sensors_;
   std::unique_ptr<FootSensors> foot_sensors_;
   std::unique_ptr<SensorReadings> readings_;
+  std::vector<int64_t> push_until_;        // by body: tick; -1: no push ends
   std::vector<DriveImpedance> impedance_;  // by joint
   std::vector<int8_t> current_sensor_;     // by joint
 };

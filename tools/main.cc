@@ -83,6 +83,7 @@ int main(int argc, char** argv) {
   poise::AddDoctorCommand(&app, &command);
   poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);
+  poise::AddOperatorCommands(&app, &command);
   poise::AddEchoCommand(&app, &command);
   poise::AddTopCommand(&app, &command);
   poise::AddViewCommand(&app, &command);

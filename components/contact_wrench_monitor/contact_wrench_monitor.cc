@@ -20,6 +20,12 @@ namespace poise {
 std::string_view contact_wrench_monitor_proto_schema();  // generated
 namespace {
 
+// Shares of the start's region that an operator may go to: a quarter still lets the robot stand; at
+// one and a half it ends beyond the soles, and nothing is kept. Chosen.
+constexpr double kLeastRegion = 0.25, kMostRegion = 1.5;
+// s that a change takes, so that the torque makes no step.
+constexpr double kRegionRamp = 0.5;
+
 // The bound is reached to rounding: the centre of pressure is metres, its error some 1e-12.
 constexpr double kCopTolerance = 1e-6;
 
@@ -104,18 +110,44 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   torque_ = Eigen::VectorXd::Zero(num_joints);
   foot_wrench_ = Eigen::VectorXd::Zero(12);
 
+  AddSettings(context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model_);
   wiring->AddInput(&robot_state_, "robot_state", counts);
   wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
   wiring->AddInput(&task_torque_, "task_torque", JointCounts(*model_));
+  wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&balance_torque_, "balance_torque", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
-  wiring->AddStage("balance", {&robot_state_, &support_plan_, &task_torque_}, {&balance_torque_},
-                   [this](const Tick& tick) { Balance(tick); });
+  wiring->AddStage("balance", {&robot_state_, &support_plan_, &task_torque_, &operator_},
+                   {&balance_torque_}, [this](const Tick& tick) {
+                     TakeActs(tick);
+                     Balance(tick);
+                   });
   SetPose(Eigen::Isometry3d::Identity(), &balance_torque_->frame_o);
 }
 
+void ContactWrenchMonitor::AddSettings(double tick_period) {
+  LiveSettings& settings = operator_.settings() = LiveSettings(tick_period);
+  const auto add = [&](const char* field, double* length) {
+    settings.Add(field, length, kLeastRegion * *length, kMostRegion * *length, kRegionRamp);
+  };
+  if (!polygon_) {
+    add("double_support.half_length", &double_support_.half_length);
+    if (!beyond_soles_) add("double_support.half_width", &double_support_.half_width);
+    add("single_support.half_length", &single_support_.half_length);
+    add("single_support.half_width", &single_support_.half_width);
+  }
+  settings.Add("cop_feedback.share", &cop_feedback_, 0, 1, kRegionRamp);
+  if (body_share_ >= 0) settings.Add("body_share", &body_share_, 0, 1, kRegionRamp);
+}
+
+void ContactWrenchMonitor::TakeActs(const Tick& tick) {
+  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
+  operator_.settings().Advance(tick.index);
+}
+
 bool ContactWrenchMonitor::Archive(StateArchive* archive) {
+  operator_.Archive(archive);
   archive->Show(in_contact_);
   archive->Show(cop_error_, balanced_index_, balanced_time_);
   ArchiveMessage(&*balance_torque_, archive);
@@ -444,14 +476,16 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
 }
 
 ComponentType ContactWrenchMonitorType() {
-  return {"contact_wrench_monitor",
-          "expected wrenches and CoP control in the null space (39)",
-          [] { return std::make_unique<ContactWrenchMonitor>(); },
-          {.parts = {{"balancing", "contact_wrench_monitor.balancing"}}},
-          {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
-           Reads<task_torque_t>("task_torque"), Writes<balance_torque_t>("balance_torque")},
-          ContactWrenchMonitorConfig::descriptor(),
-          contact_wrench_monitor_proto_schema};
+  return {
+      "contact_wrench_monitor",
+      "expected wrenches and CoP control in the null space (39)",
+      [] { return std::make_unique<ContactWrenchMonitor>(); },
+      {.parts = {{"balancing", "contact_wrench_monitor.balancing"}}},
+      {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
+       Reads<task_torque_t>("task_torque"), Reads<operate::act_t>("operator", InputKind::kLatest),
+       Writes<balance_torque_t>("balance_torque")},
+      ContactWrenchMonitorConfig::descriptor(),
+      contact_wrench_monitor_proto_schema};
 }
 
 }  // namespace poise

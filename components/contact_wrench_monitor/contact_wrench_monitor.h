@@ -12,6 +12,7 @@
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/robot_state_t.hpp"
@@ -24,12 +25,15 @@ namespace poise {
 /// height. When the task torque is held from an earlier tick, or the dynamics do not exist, it is
 /// passed on without a balancing part and the status says so; the contact quantities are then those
 /// of the last good tick.
-class ContactWrenchMonitor : public Component {
+class ContactWrenchMonitor : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
+  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
+  void AddSettings(double tick_period);
+  void TakeActs(const Tick& tick);
   void Prepare();
   void Balance(const Tick& tick);
   /// Dynamics and protected task for these contacts; STATUS_*.
@@ -73,6 +77,7 @@ class ContactWrenchMonitor : public Component {
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
   Input<task_torque_t> task_torque_;
+  ActInput operator_;
   Output<balance_torque_t> balance_torque_;
 
   std::shared_ptr<const robot::RobotModel> model_;

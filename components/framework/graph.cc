@@ -8,6 +8,7 @@
 
 #include "components/framework/graph_order.h"
 #include "components/framework/modules.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 
@@ -187,6 +188,7 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
       if (port.input != is_input) continue;
       names.push_back(port.name);
       const int k = FindConnection(connections, port.name);
+      if (k < 0 && port.type == kActType) continue;
       if (k < 0) {
         problems->push_back({field, fmt::format("{0}{1} is not connected; add {2} {{ port: "
                                                 "\"{1}\" channel: ... }}",
@@ -311,6 +313,10 @@ GraphPlan ConnectPorts(const Graph& graph, const std::vector<const Wiring*>& wir
     auto& inputs = plan.input_channel.emplace_back();
     for (const InputPort* input : wiring.inputs()) {
       const int k = FindConnection(instance.input(), input->name());
+      if (k < 0) {  // an operator's acts, which this graph has not
+        inputs.push_back(-1);
+        continue;
+      }
       const int c = ChannelIndex(graph, instance.input(k).channel());
       GraphPlan::ChannelPlan& channel = plan.channels[static_cast<size_t>(c)];
       if (channel.external && channel.readers.empty()) {

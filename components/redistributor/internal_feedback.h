@@ -35,6 +35,8 @@ class InternalFeedback {
   explicit InternalFeedback(const WrenchFeedback& config);
 
   bool enabled() const { return enabled_; }
+  /// 1/s; may change between calls.
+  double* integral_rate() { return &rate_; }
   /// From zero again.
   void Reset() { integral_.setZero(); }
   /// `period`, s, since the last call. A `share` (0..1) of the answer is given, and integrated.

@@ -20,6 +20,12 @@ namespace {
 using balance::Vector6d;
 
 constexpr std::array<bool, 2> kBoth{true, true};
+// What an operator may ask of the lighter foot at most; at a half nothing would be left to choose.
+constexpr double kMostLightShare = 0.45;
+// s that an operator's change takes, so that the torque makes no step.
+constexpr double kRatioRamp = 0.5;
+// 1/s: half of what shakes a foot on something soft (redistributor.proto).
+constexpr double kMostIntegral = 40;
 
 void CheckRatio(double value, const char* field) {
   if (!(value >= 0 && value <= 1)) throw ConfigError(field, "must lie between 0 and 1");
@@ -72,17 +78,37 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   torque_ = Eigen::VectorXd::Zero(model_->num_joints());
   acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
 
+  AddSettings(context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model_);
   wiring->AddInput(&robot_state_, "robot_state", counts);
   wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
   wiring->AddInput(&balance_torque_, "balance_torque", counts);
+  wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&joint_command_, "joint_command", counts);
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
-  wiring->AddStage("redistribute", {&robot_state_, &support_plan_, &balance_torque_},
-                   {&joint_command_}, [this](const Tick& tick) { Redistribute(tick); });
+  wiring->AddStage("redistribute", {&robot_state_, &support_plan_, &balance_torque_, &operator_},
+                   {&joint_command_}, [this](const Tick& tick) {
+                     TakeActs(tick);
+                     Redistribute(tick);
+                   });
+}
+
+void Redistributor::AddSettings(double tick_period) {
+  LiveSettings& settings = operator_.settings() = LiveSettings(tick_period);
+  settings.Add("eta_min", &eta_min_, 0, kMostLightShare, kRatioRamp);
+  settings.Add("eta_max", &eta_max_, 1 - kMostLightShare, 1, kRatioRamp);
+  settings.Add("landed_share", &landed_share_, 0, kMostLightShare, kRatioRamp);
+  if (!feedback_.enabled()) return;
+  settings.Add("feedback.integral", feedback_.integral_rate(), 0, kMostIntegral, kRatioRamp);
+}
+
+void Redistributor::TakeActs(const Tick& tick) {
+  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
+  operator_.settings().Advance(tick.index);
 }
 
 bool Redistributor::Archive(StateArchive* archive) {
+  operator_.Archive(archive);
   feedback_.Archive(archive);
   archive->Show(last_index_, last_time_, last_eta_, learn_from_, landed_foot_);
   ArchiveMessage(&*joint_command_, archive);
@@ -293,7 +319,9 @@ ComponentType RedistributorType() {
           {.parts = {{"redistribution", "redistributor.redistribution"},
                      {"transition", "redistributor.transition"}}},
           {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
-           Reads<balance_torque_t>("balance_torque"), Writes<joint_command_t>("joint_command")},
+           Reads<balance_torque_t>("balance_torque"),
+           Reads<operate::act_t>("operator", InputKind::kLatest),
+           Writes<joint_command_t>("joint_command")},
           RedistributorConfig::descriptor(),
           redistributor_proto_schema};
 }

@@ -11,6 +11,7 @@
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/framework/operator_acts.h"
 #include "components/redistributor/internal_feedback.h"
 #include "components/redistributor/ratio_moves.h"
 #include "components/redistributor/shared_impedance.h"
@@ -27,14 +28,17 @@ namespace poise {
 /// command is sent again; when there is a fresh torque but no resultant, that torque
 /// passes through undistributed, with the same status. The hardware bridge refuses either as stale:
 /// it holds its last accepted command for a few cycles, then damps the joints, then stops.
-class Redistributor : public Component {
+class Redistributor : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
+  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   using Wrenches = std::array<balance::Vector6d, 2>;
 
+  void AddSettings(double tick_period);
+  void TakeActs(const Tick& tick);
   void Prepare();
   void Redistribute(const Tick& tick);
   int8_t ComputeDouble(const Tick& tick);
@@ -63,6 +67,7 @@ class Redistributor : public Component {
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
   Input<balance_torque_t> balance_torque_;
+  ActInput operator_;
   Output<joint_command_t> joint_command_;
 
   std::shared_ptr<const robot::RobotModel> model_;

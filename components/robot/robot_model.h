@@ -47,7 +47,7 @@ struct MotorModel {
   double rated_current = 0, peak_current = 0;  ///< A
   double reflected_inertia = 0;                ///< kg·m², H² J_m
   double coulomb_friction = 0, viscous_friction = 0, static_friction = 0, stribeck_velocity = 0;
-  int encoder_counts = 0;  ///< per motor revolution
+  int encoder_counts = 0;      ///< per motor revolution
   bool current_sensor = true;  ///< whether the drive reports its current
   double torque_per_ampere() const { return gear_ratio * torque_constant; }
 };

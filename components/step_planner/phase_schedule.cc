@@ -68,6 +68,21 @@ void PhaseSchedule::Hold(double time) {
   state_.phase_began = false;
 }
 
+bool PhaseSchedule::EndNow(double time) {
+  const Phase& p = phase();
+  if (!began_ || next() == PhaseGraph::kNone || (Unloads() && !transition_began_)) return false;
+  double moves = p.com().delay() + p.com().duration();
+  moves = std::max(moves, p.body().delay() + p.body().duration());
+  moves = std::max(moves, p.foot().delay() + p.foot().duration());
+  moves = std::max(moves, p.foot().turn().delay() + p.foot().turn().duration());
+  if (p.has_transition()) {
+    moves = std::max(moves, p.transition().delay() + p.transition().duration());
+  }
+  if (time < origin_ + moves - kTimeTolerance) return false;
+  origin_ = std::min(origin_, time - p.duration());
+  return true;
+}
+
 void PhaseSchedule::Postpone(double delay) {
   origin_ += delay;
   held_ += delay;

@@ -61,6 +61,10 @@ class PhaseSchedule {
   /// In place of Advance while another planner acts: all that is later comes later.
   void Hold(double time);
 
+  /// The phase ends now, as if its time were over. False, and nothing changes, when nothing follows
+  /// it or its moves are not over.
+  bool EndNow(double time);
+
   const Phase& phase() const { return config_.phase(state_.phase); }
   /// The phase that follows when this one is done; kNone: none.
   int next() const { return graph_.Follower(state_.phase, DONE); }

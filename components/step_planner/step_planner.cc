@@ -64,6 +64,11 @@ int8_t FootCode(Landing::State state) {
 // The paper's distance of the limits from the edges of its sole, m.
 constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 
+// m/s and rad/s that an operator may ask for at most; a step's length limits what is walked.
+constexpr double kFastestWalk = 1;
+// m/s to the left: far below what moves a foothold by a rounding that anyone could measure.
+constexpr double kLeftFirst = 1e-9;
+
 // s in which the COM's reference comes to rest between the feet after a recovery.
 constexpr double kSettleTime = 0.5;
 
@@ -114,9 +119,12 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   in_contact_ = ContactsOf(config.phase(0).support());
 
   wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
+  wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
-  wiring->AddStage("plan", {&robot_state_}, {&support_plan_},
-                   [this](const Tick& tick) { support_plan_->status = Plan(tick.time); });
+  wiring->AddStage("plan", {&robot_state_, &operator_}, {&support_plan_}, [this](const Tick& tick) {
+    TakeActs(tick);
+    support_plan_->status = Plan(tick.time);
+  });
   support_plan_t& out = *support_plan_;
   const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
   out.transition_foot = out.step_foot = -1;
@@ -152,6 +160,8 @@ void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
 }
 
 bool StepPlanner::Archive(StateArchive* archive) {
+  operator_.Archive(archive);
+  archive->Show(operator_walk_);
   schedule_->Archive(archive);
   generator_->Archive(archive);
   hip_strategy_->Archive(archive);
@@ -164,6 +174,58 @@ bool StepPlanner::Archive(StateArchive* archive) {
   walk_.Archive(archive);
   ArchiveMessage(&*support_plan_, archive);
   return true;
+}
+
+void StepPlanner::TakeActs(const Tick& tick) {
+  while (const operate::act_t* const act = operator_.Next(tick)) {
+    operator_.Answer(Act(*act, tick.time));
+  }
+}
+
+int8_t StepPlanner::Act(const operate::act_t& act, double time) {
+  using operate::act_t;
+  using operate::answer_t;
+  switch (act.kind) {
+    case act_t::KIND_WALK:
+      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      for (int i = 0; i < 3; ++i) {
+        if (!(std::abs(act.velocity[i]) <= kFastestWalk)) return answer_t::VERDICT_RANGE;
+      }
+      operator_walk_ = {.given = true, .stepping = true};
+      std::copy_n(act.velocity, 3, operator_walk_.velocity);
+      return answer_t::VERDICT_DONE;
+    case act_t::KIND_STAND:
+      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      operator_walk_ = {.given = true};
+      return answer_t::VERDICT_DONE;
+    case act_t::KIND_STEP: {
+      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      if (act.foot > robot::kLeftFoot) return answer_t::VERDICT_UNKNOWN;
+      const bool stands = in_contact_[0] && in_contact_[1] && last_controlled_;
+      if (!stands || walk_.active() || recovery_.active()) return answer_t::VERDICT_NOT_NOW;
+      operator_walk_ = {.given = true, .one_step = true, .steps_before = walk_.num_steps()};
+      // Walking begins with the foot of the side that it goes to.
+      if (act.foot == robot::kLeftFoot) operator_walk_.velocity[1] = kLeftFirst;
+      return answer_t::VERDICT_DONE;
+    }
+    case act_t::KIND_NEXT_PHASE:
+      return !Held() && schedule_->EndNow(time) ? answer_t::VERDICT_DONE
+                                                : answer_t::VERDICT_NOT_NOW;
+    default:
+      return answer_t::VERDICT_UNKNOWN;
+  }
+}
+
+stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
+  if (!operator_walk_.given) return walk_commands_.At(time);
+  const double* const v = operator_walk_.velocity;
+  bool stepping = operator_walk_.stepping;
+  if (operator_walk_.one_step && walk_.num_steps() == operator_walk_.steps_before) {
+    const stepping::WalkStage stage = walk_.stage();
+    stepping = stage != stepping::WalkStage::kSwinging && stage != stepping::WalkStage::kTouching;
+  }
+  if (!stepping) return {};
+  return {{v[0], v[1]}, v[2], true};
 }
 
 int8_t StepPlanner::Plan(double time) {
@@ -256,7 +318,7 @@ bool StepPlanner::Recover(const stepping::StepInput& input) {
 
 bool StepPlanner::WalkOn(const stepping::StepInput& input) {
   const bool was_active = walk_.active();
-  const bool acts = walk_.Update(input, walk_commands_.At(input.time));
+  const bool acts = walk_.Update(input, WalkCommandAt(input.time));
   if (acts) TakeContacts(walk_.output());
   if (was_active && !acts) {
     EndSteps(walk_.output(), input.time);
@@ -536,13 +598,15 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
 }
 
 ComponentType StepPlannerType() {
-  return {"step_planner",
-          "which feet carry, and where COM, body and feet go: phases, capture point",
-          [] { return std::make_unique<StepPlanner>(); },
-          {},
-          {Reads<robot_state_t>("robot_state"), Writes<support_plan_t>("support_plan")},
-          StepPlannerConfig::descriptor(),
-          step_planner_proto_schema};
+  return {
+      "step_planner",
+      "which feet carry, and where COM, body and feet go: phases, capture point",
+      [] { return std::make_unique<StepPlanner>(); },
+      {},
+      {Reads<robot_state_t>("robot_state"), Reads<operate::act_t>("operator", InputKind::kLatest),
+       Writes<support_plan_t>("support_plan")},
+      StepPlannerConfig::descriptor(),
+      step_planner_proto_schema};
 }
 
 }  // namespace poise

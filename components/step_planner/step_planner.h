@@ -9,6 +9,7 @@
 #include "components/balance/capture_point.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/contact_loss.h"
 #include "components/step_planner/hip_strategy.h"
@@ -25,10 +26,11 @@ namespace poise {
 
 /// ROBOT_STATE -> SUPPORT_PLAN. When a state is invalid the plan of the last good tick is sent
 /// again with the status set.
-class StepPlanner : public Component {
+class StepPlanner : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
+  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
   /// Where the COM can be brought to rest, seen from the soles in contact.
@@ -39,6 +41,11 @@ class StepPlanner : public Component {
   };
 
   void ConfigureLimits(const StepPlannerConfig& config);
+  void TakeActs(const Tick& tick);
+  /// VERDICT_* of an operator's act.
+  int8_t Act(const operate::act_t& act, double time);
+  /// The scenario's, until an operator has commanded another.
+  stepping::WalkCommand WalkCommandAt(double time) const;
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.
@@ -83,6 +90,7 @@ class StepPlanner : public Component {
   int8_t WaitingCode() const;
 
   Input<robot_state_t> robot_state_;
+  ActInput operator_;
   Output<support_plan_t> support_plan_;
 
   std::shared_ptr<const robot::RobotModel> model_;
@@ -99,6 +107,13 @@ class StepPlanner : public Component {
   bool walks_ = false;  // where it is told to
   stepping::Walk walk_;
   WalkCommands walk_commands_;
+  /// What an operator has told the robot to walk.
+  struct OperatorWalk {
+    bool given = false, stepping = false;
+    bool one_step = false;  // of each foot
+    int32_t steps_before = 0;
+    double velocity[3] = {0, 0, 0};  // m/s ahead, m/s to the left, rad/s
+  } operator_walk_;
   bool stands_otherwise_ = false;  // on both feet after steps, where the phase is on one
   double step_reach_ = 0;          // m
   bool angular_momentum_ = false;  // counts in the capture point that asks for a step

@@ -16,6 +16,12 @@ namespace poise {
 std::string_view task_controller_proto_schema();  // generated
 namespace {
 
+// Shares of the start's gains that an operator may go to: beyond, the delay of the drive train
+// makes them unstable, or they hold nothing up. Chosen.
+constexpr double kLeastGain = 0.25, kMostGain = 4;
+// s in which a gain is gone through: a standing error is answered by no more than this slowly.
+constexpr double kGainRamp = 0.5;
+
 /// Joints that are not between the base and a foot.
 int NumOthers(const robot::RobotModel& model) {
   return static_cast<int>(model.num_joints() -
@@ -48,11 +54,10 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   const auto config = context.config<TaskControllerConfig>();
   model_ = LoadRobot(context);
   const int num_joints = model_->num_joints();
-  const balance::StandingGains gains =
-      ReadStandingGains(config, balance::GainsByRule(*model_, context.tick_period));
-  tasks_.emplace(config, model_, gains);
-  posture_ = gains.posture;
-  base_share_ = balance::BaseVelocityShare(gains.base_velocity_cutoff, context.tick_period);
+  gains_ = ReadStandingGains(config, balance::GainsByRule(*model_, context.tick_period));
+  tasks_.emplace(config, model_, gains_);
+  base_share_ = balance::BaseVelocityShare(gains_.base_velocity_cutoff, context.tick_period);
+  AddSettings(context.tick_period);
   const int others = config.task_size() == 0 ? NumOthers(*model_) : 0;
   others_held_ = others > 0;
   for (const FeetInContact& feet : {FeetInContact{true, true}, {true, false}, {false, true}}) {
@@ -71,14 +76,39 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
 
   wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
   wiring->AddInput(&support_plan_, "support_plan", FootCounts(*model_));
+  wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&task_torque_, "task_torque", JointCounts(*model_));
   wiring->AddStage("prepare", {&robot_state_}, {}, [this](const Tick&) { Prepare(); });
-  wiring->AddStage("control", {&robot_state_, &support_plan_}, {&task_torque_},
-                   [this](const Tick&) { task_torque_->status = Control(); });
+  wiring->AddStage("control", {&robot_state_, &support_plan_, &operator_}, {&task_torque_},
+                   [this](const Tick& tick) {
+                     TakeActs(tick);
+                     task_torque_->status = Control();
+                   });
+}
+
+void TaskController::AddSettings(double tick_period) {
+  LiveSettings& settings = operator_.settings() = LiveSettings(tick_period);
+  const auto add = [&](const std::string& field, balance::TaskGains* gains) {
+    settings.Add(field + ".kp", &gains->kp, kLeastGain * gains->kp, kMostGain * gains->kp,
+                 kGainRamp);
+    settings.Add(field + ".kd", &gains->kd, kLeastGain * gains->kd, kMostGain * gains->kd,
+                 kGainRamp);
+  };
+  add("com", &gains_.com);
+  add("orientation", &gains_.orientation);
+  add("foot", &gains_.foot);
+  add("posture", &gains_.posture);
+}
+
+void TaskController::TakeActs(const Tick& tick) {
+  while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
+  if (operator_.settings().Advance(tick.index)) tasks_->SetGains(gains_);
 }
 
 bool TaskController::Archive(StateArchive* archive) {
   archive->Show(in_contact_, started_, posture_reference_, base_velocity_);
+  operator_.Archive(archive);
+  if (archive->restoring()) tasks_->SetGains(gains_);
   tasks_->Archive(archive);
   ArchiveMessage(&*task_torque_, archive);
   return true;
@@ -131,8 +161,8 @@ void TaskController::SmoothBase() {
 }
 
 void TaskController::ComputePosture() {
-  posture_acceleration_ = posture_.kp * (posture_reference_ - state_.joint_position) -
-                          posture_.kd * state_.joint_velocity;
+  posture_acceleration_ = gains_.posture.kp * (posture_reference_ - state_.joint_position) -
+                          gains_.posture.kd * state_.joint_velocity;
   if (!limits_) return;
   for (int j = 0; j < posture_acceleration_.size(); ++j) {
     const balance::AccelerationRange range =
@@ -206,14 +236,15 @@ bool TaskController::ComputeTorque(const balance::TaskState& state,
 }
 
 ComponentType TaskControllerType() {
-  return {"task_controller",
-          "the task torque (24) that follows the support plan",
-          [] { return std::make_unique<TaskController>(); },
-          {},
-          {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
-           Writes<task_torque_t>("task_torque")},
-          TaskControllerConfig::descriptor(),
-          task_controller_proto_schema};
+  return {
+      "task_controller",
+      "the task torque (24) that follows the support plan",
+      [] { return std::make_unique<TaskController>(); },
+      {},
+      {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
+       Reads<operate::act_t>("operator", InputKind::kLatest), Writes<task_torque_t>("task_torque")},
+      TaskControllerConfig::descriptor(),
+      task_controller_proto_schema};
 }
 
 }  // namespace poise

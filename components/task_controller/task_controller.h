@@ -8,6 +8,7 @@
 #include "components/balance/joint_limits.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
+#include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "components/task_controller/task_list.h"
 #include "poise/robot_state_t.hpp"
@@ -19,12 +20,15 @@ namespace poise {
 /// ROBOT_STATE, SUPPORT_PLAN -> TASK_TORQUE. When state or plan are invalid or the dynamics are
 /// singular the message of the last good tick is sent again with the status set: its torque is what
 /// held the robot a moment ago, and no better one is known.
-class TaskController : public Component {
+class TaskController : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;
   bool Archive(StateArchive* archive) override;
+  const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
+  void AddSettings(double tick_period);
+  void TakeActs(const Tick& tick);
   void Prepare();
   /// Fills the torque; STATUS_* of the message.
   int8_t Control();
@@ -41,6 +45,7 @@ class TaskController : public Component {
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
+  ActInput operator_;
   Output<task_torque_t> task_torque_;
 
   std::shared_ptr<const robot::RobotModel> model_;
@@ -53,7 +58,7 @@ class TaskController : public Component {
   FeetInContact in_contact_{true, true};  // of the last tick
   bool started_ = false;
   bool others_held_ = false;  // the joints that are no leg's have their posture alone
-  balance::TaskGains posture_;
+  balance::StandingGains gains_;
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;

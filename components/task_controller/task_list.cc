@@ -170,6 +170,8 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   const bool has_position = needed.position || needed.rotation || needed.joints;
   entry.task->set_gains(task.has_gains() ? ReadGains(task.gains(), field + ".gains", has_position)
                                          : GainsOf(needed, entry.reference, task.type(), gains));
+  entry.type = task.type();
+  entry.own_gains = task.has_gains();
   for (const int foot : {0, 1}) {
     const auto own = static_cast<TaskConfig::Foot>(foot);
     entry.rests[static_cast<size_t>(foot)] =
@@ -177,6 +179,13 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   }
   entry.held.joint_position = Eigen::VectorXd::Zero(model_->num_joints());
   entries_.push_back(std::move(entry));
+}
+
+void TaskList::SetGains(const balance::StandingGains& gains) {
+  for (Entry& entry : entries_) {
+    if (entry.own_gains) continue;
+    entry.task->set_gains(GainsOf(entry.task->needs(), entry.reference, entry.type, gains));
+  }
 }
 
 TaskList::Rows TaskList::CountRows(const FeetInContact& in_contact) const {

@@ -43,6 +43,8 @@ class TaskList {
   };
   Rows CountRows(const FeetInContact& in_contact) const;
 
+  /// Of tasks without their own, from now on.
+  void SetGains(const balance::StandingGains& gains);
   /// Tasks that follow no plan hold what they find at this state.
   void Hold(const balance::TaskState& state);
   /// Takes over the references of a plan.
@@ -73,6 +75,8 @@ class TaskList {
     TaskConfig::Reference reference = TaskConfig::START;
     std::array<bool, 2> rests{false, false};  // while this foot is in contact
     balance::TaskTarget held;
+    std::string type;
+    bool own_gains = false;
   };
 
   void Add(const TaskConfig& task, const std::string& field, const balance::StandingGains& gains);

@@ -13,6 +13,8 @@ InlineRecorder::InlineRecorder(const std::string& path, const RunSpec& spec, con
     Add(channel, output, tick);
     if (kept != nullptr) kept->Add(channel, output, tick);
   });
+  runner->set_external_tap(
+      [this](int channel, std::span<const uint8_t> data) { AddExternal(channel, data); });
 }
 
 void InlineRecorder::Add(int channel, const OutputPort& output, const Tick& tick) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,11 @@ class InlineRecorder {
 
   /// For who sets a tap of its own afterwards and calls Add in it.
   void Add(int channel, const OutputPort& output, const Tick& tick);
+
+  /// A message of an external channel; the constructor has the runner call it.
+  void AddExternal(int channel, std::span<const uint8_t> data) {
+    writer_.AddMessage(channel, -1, data);
+  }
 
   /// Writes the components' health as it stands, and closes. Throws LogError.
   void Close(const RunSpec& spec);

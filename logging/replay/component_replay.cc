@@ -7,6 +7,7 @@
 #include "components/framework/bus/owned_message.h"
 #include "components/framework/clock.h"
 #include "components/framework/graph.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/replay/message_difference.h"
@@ -116,8 +117,14 @@ class ReplayedStages {
         result.outputs.emplace_back().channel = spec_.graph().channel(output.channel).name();
       }
     }
+    result.external_messages = acts_;
+    result.unplaced_messages = unanswered_acts_;
     const int64_t start = NowNanoseconds();
+    size_t next_act = 0;
     for (int64_t t = 0; t < end_; ++t) {
+      for (; next_act < placed_acts_.size() && placed_acts_[next_act].tick <= t; ++next_act) {
+        act_input_->Place(placed_acts_[next_act].act, t);
+      }
       const Tick tick = MakeTick(t, spec_.tick_period(), spec_.lead_ticks());
       size_t first_output = 0;
       for (BoundStage& stage : stages_) {
@@ -170,6 +177,10 @@ class ReplayedStages {
   void Bind(const Stage& stage) {
     BoundStage bound{&stage, {}, {}, 0};
     for (InputPort* port : stage.inputs) {
+      if (auto* const acts = dynamic_cast<ActInput*>(port); acts != nullptr) {
+        PlaceActs(acts);
+        continue;
+      }
       const int channel = ChannelOf(instance_.input(), port->name());
       CheckSize(channel, port->encoded_size());
       bound.inputs.push_back({port, channel, OwnedMessage(port), External(port, channel)});
@@ -181,6 +192,52 @@ class ReplayedStages {
       end_ = std::max(end_, lane(channel).ticks.newest() + 1);
     }
     stages_.push_back(std::move(bound));
+  }
+
+  /// An operator's acts on this component, each in the tick that its answer tells: what was refused
+  /// has had no effect, and of what the log holds no answer it does not say.
+  void PlaceActs(ActInput* acts) {
+    int component = 0;
+    while (&spec_.graph().component(component) != &instance_) ++component;
+    std::map<int64_t, operate::answer_t> answers;
+    for (size_t c = 0; c < log_.lanes_.size(); ++c) {
+      if (log_.lanes_[c].type->name != kAnswerType) continue;
+      for (const ExternalMessage& message : log_.external_[c]) {
+        operate::answer_t answer;
+        if (!DecodeChecked(message.data.data(), static_cast<int64_t>(message.data.size()),
+                           &answer) ||
+            answer.component != component) {
+          continue;
+        }
+        answers.emplace(answer.id, answer);
+      }
+    }
+    std::set<int64_t> placed;
+    for (const Connection& connection : instance_.input()) {
+      if (connection.port() != acts->name()) continue;
+      const int channel = ChannelOf(instance_.input(), acts->name());
+      for (const ExternalMessage& message : log_.external_[static_cast<size_t>(channel)]) {
+        operate::act_t act;
+        if (static_cast<int>(message.data.size()) != acts->encoded_size() ||
+            !acts->Decode(message.data.data(), acts->encoded_size(), &act) ||
+            act.component != component || act.kind == operate::act_t::KIND_ASK ||
+            !placed.insert(act.id).second) {
+          continue;
+        }
+        ++acts_;
+        const auto answer = answers.find(act.id);
+        if (answer == answers.end()) {
+          // Without one it may have died with its process; the tick that it names is the best
+          // guess.
+          ++unanswered_acts_;
+          placed_acts_.push_back({act, act.tick});
+        } else if (answer->second.verdict == operate::answer_t::VERDICT_DONE) {
+          placed_acts_.push_back({act, answer->second.tick});
+        }
+      }
+    }
+    std::ranges::stable_sort(placed_acts_, {}, &PlacedAct::tick);
+    act_input_ = acts;
   }
 
   /// The messages of an external channel, placed in the ticks that the component itself tells.
@@ -310,9 +367,17 @@ class ReplayedStages {
     return data == nullptr ? std::span<const uint8_t>() : *data;
   }
 
+  struct PlacedAct {
+    operate::act_t act;
+    int64_t tick;
+  };
+
   const LogReplay& log_;
   const RunSpec& spec_;
   const ComponentInstance& instance_;
+  ActInput* act_input_ = nullptr;
+  std::vector<PlacedAct> placed_acts_;  // by tick
+  int64_t acts_ = 0, unanswered_acts_ = 0;
   SharedObjects shared_;  // of its own, as in a process
   ConfiguredComponent component_;
   std::vector<BoundStage> stages_;

@@ -12,10 +12,19 @@
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/component.h"
 #include "components/framework/run.h"
+#include "operate/message_traits.hpp"
 #include "tests/test_seed.h"
 
 namespace poise {
 namespace {
+
+/// Of the packages poise and operate.
+template <class F>
+void ForEveryType(F&& f) {
+  ForEachMessageType(f);
+  f.template operator()<operate::act_t>();
+  f.template operator()<operate::answer_t>();
+}
 
 constexpr int64_t kRun = 0x1234;
 
@@ -102,7 +111,7 @@ TEST(PacketFuzz, OnlyWhatReencodesToItselfIsAccepted) {
   int64_t total = 0;
   int64_t total_refused = 0;
   int64_t total_collected = 0;
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     T message{};
     MessageTraits<T>::Resize(message, SomeCounts<T>());

@@ -12,10 +12,19 @@
 #include <string>
 #include <vector>
 
+#include "operate/message_traits.hpp"
 #include "tests/test_seed.h"
 
 namespace poise {
 namespace {
+
+/// Of the packages poise and operate.
+template <class F>
+void ForEveryType(F&& f) {
+  ForEachMessageType(f);
+  f.template operator()<operate::act_t>();
+  f.template operator()<operate::answer_t>();
+}
 
 using ::testing::ElementsAre;
 
@@ -72,7 +81,7 @@ std::vector<uint8_t> Encode(const T& message) {
 TEST(MessageTraits, RoundTripOfEveryType) {
   std::mt19937_64 random(TestSeed(1));
   int types = 0;
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     ++types;
     const T message = RandomMessage<T>(&random);
@@ -89,7 +98,7 @@ TEST(MessageTraits, RoundTripOfEveryType) {
 
 TEST(MessageTraits, ResizeZeroesWhatWasThere) {
   std::mt19937_64 random(TestSeed(2));
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     T message = RandomMessage<T>(&random);
     const std::vector<int32_t> counts = SomeCounts<T>();
@@ -111,7 +120,7 @@ TEST(MessageTraits, ResizeZeroesWhatWasThere) {
 
 TEST(MessageTraits, AllFiniteFindsEveryBadNumber) {
   std::mt19937_64 random(TestSeed(3));
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     T message = RandomMessage<T>(&random);
     EXPECT_TRUE(MessageTraits<T>::AllFinite(message));
@@ -139,7 +148,7 @@ TEST(MessageTraits, AllFiniteFindsEveryBadNumber) {
 
 TEST(MessageTraits, SizesAgreeWithLiblcm) {
   std::mt19937_64 random(TestSeed(4));
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     using Traits = MessageTraits<T>;
     SCOPED_TRACE(Traits::kName);
     const std::vector<uint8_t> bytes = Encode(RandomMessage<T>(&random));
@@ -158,7 +167,7 @@ TEST(MessageTraits, SizesAgreeWithLiblcm) {
 
 TEST(MessageTraits, HostileCountsAndLengthsAreRefusedBeforeDecoding) {
   std::mt19937_64 random(TestSeed(5));
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     using Traits = MessageTraits<T>;
     SCOPED_TRACE(Traits::kName);
     const std::vector<uint8_t> bytes = Encode(RandomMessage<T>(&random));
@@ -185,7 +194,7 @@ TEST(MessageTraits, HostileCountsAndLengthsAreRefusedBeforeDecoding) {
 
 TEST(MessageTraits, HeaderStandsWhereTheTableSays) {
   std::mt19937_64 random(TestSeed(6));
-  ForEachMessageType([&]<class T>() {
+  ForEveryType([&]<class T>() {
     SCOPED_TRACE(MessageTraits<T>::kName);
     T message = RandomMessage<T>(&random);
     message.run_id = 0x0102030405060708;
@@ -250,8 +259,7 @@ TEST(MessageTable, VisitsEveryScalarByPath) {
   EXPECT_EQ(seen.reals.at("foot_wrench[1].moment[2]"), 4.5);
   EXPECT_EQ(seen.reals.at("frame_o.orientation[0]"), 1);
   // 8 bytes a real: what is not counted or integer is real.
-  EXPECT_EQ(seen.reals.size(),
-            3u + 3u + 7u + 2u + 2u + 2u + 6u + 6u + 2u * 6u + 5u + 2u * 16u);
+  EXPECT_EQ(seen.reals.size(), 3u + 3u + 7u + 2u + 2u + 2u + 6u + 6u + 2u * 6u + 5u + 2u * 16u);
   EXPECT_FALSE(type->visit(bytes.data(), static_cast<int64_t>(bytes.size()) - 1, &seen));
 
   health_t health{};

@@ -1,9 +1,14 @@
 """A scenario stepped tick by tick: against the same scenario run as a whole, and against pushes that the scenario itself gives."""
+import os
+import subprocess
+import tempfile
 import threading
 import unittest
 
 import numpy as np
 import poise
+
+POISE = os.path.join(os.environ["POISE_BIN"], "poise")
 
 
 class Steps(unittest.TestCase):
@@ -52,6 +57,21 @@ class Steps(unittest.TestCase):
         a, b = configured["GROUND_TRUTH"], pushed["GROUND_TRUTH"]
         self.assertGreater(b.com_position[1], 1e-3)
         np.testing.assert_allclose(b.com_position, a.com_position, atol=1e-7)
+
+    def test_a_replay_repeats_a_push_to_the_bit(self):
+        with tempfile.TemporaryDirectory() as folder:
+            run = os.path.join(folder, "run")
+            env = poise.Environment("stand", out=run, duration=0.4)
+            env.step(50)
+            env.push([0, 40, 0], duration=0.05)
+            env.push([15, 0, 0], point=[0, 0, 0.1])  # in its place, in the same tick
+            env.step(100)
+            env.push([0, 0, 0])
+            env.step()
+            env.finish()
+            done = subprocess.run([POISE, "replay", run], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertNotIn("DIFFERENT", done.stdout)
 
     def test_a_torque_put_in_the_controllers_place_reaches_the_motor(self):
         env = poise.Environment("stand")

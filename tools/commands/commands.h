@@ -37,6 +37,8 @@ void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
 void AddDrivesCommand(CLI::App* app, Command* command);
 void AddEstopCommand(CLI::App* app, Command* command);
+/// push, set, step and walk: acts on a run that goes on.
+void AddOperatorCommands(CLI::App* app, Command* command);
 void AddEchoCommand(CLI::App* app, Command* command);
 void AddTopCommand(CLI::App* app, Command* command);
 void AddViewCommand(CLI::App* app, Command* command);

@@ -7,6 +7,7 @@ namespace poise {
 
 Inbox::Inbox(InputPort* port, int64_t run_id, Join join, size_t component)
     : port_(port),
+      acts_(dynamic_cast<ActInput*>(port)),
       component_(component),
       join_(join),
       filter_(port->fingerprint(), port->encoded_size(), port->counts(), run_id),
@@ -24,6 +25,10 @@ PacketVerdict Inbox::Keep(const uint8_t* data, size_t size) {
     if (verdict != PacketVerdict::kAccepted) return verdict;
     if (!port_->Decode(data, static_cast<int>(size), scratch_.get()))
       return PacketVerdict::kNotFinite;
+    if (acts_ != nullptr) {
+      acts_->Offer(*static_cast<const operate::act_t*>(scratch_.get()));
+      return verdict;
+    }
     port_->CopyMessage(scratch_.get(), message_.get());
     ready_ = true;
     return verdict;

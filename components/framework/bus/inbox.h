@@ -6,6 +6,7 @@
 
 #include "components/framework/bus/owned_message.h"
 #include "components/framework/bus/packet_filter.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 
 namespace poise {
@@ -62,6 +63,7 @@ class Inbox {
   PacketVerdict Keep(const uint8_t* data, size_t size);
 
   InputPort* port_;
+  ActInput* acts_;  // nullptr: a message like others
   size_t component_;
   Join join_;
   PacketFilter filter_;

@@ -84,6 +84,13 @@ ProcessBus::ProcessBus(const RunSpec& spec, const std::string& process,
   stages_ = std::move(sorted);
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (size_t i = 0; i < links_.size(); ++i) poll_fds_.push_back({-1, POLLIN, 0});
+  for (int i = 0; i < spec.graph().channel_size() && !acts_.empty(); ++i) {
+    const Channel& channel = spec.graph().channel(i);
+    if (channel.type() != kAnswerType || !channel.external() || answer_sender_) continue;
+    answer_sender_.emplace(ChannelUrl(spec, i));
+    answer_channel_ = channel.name();
+    answer_bytes_.resize(static_cast<size_t>(operate::answer_t{}.getEncodedSize()));
+  }
   if (open) OpenInputs();
 }
 
@@ -122,6 +129,14 @@ void ProcessBus::BindStages(const RunSpec& spec, size_t component,
 
 void ProcessBus::BindInput(const RunSpec& spec, const ComponentInstance& instance, InputPort* input,
                            BoundStage* stage) {
+  if (auto* const acts = dynamic_cast<ActInput*>(input); acts != nullptr) {
+    const auto connected = [&](const Connection& c) { return c.port() == input->name(); };
+    if (std::ranges::none_of(instance.input(), connected)) return;
+    const auto is_this = [&](const ComponentInstance& c) { return &c == &instance; };
+    const auto& all = spec.graph().component();
+    acts->SetAddress(static_cast<int>(std::ranges::find_if(all, is_this) - all.begin()));
+    acts_.push_back(acts);
+  }
   const int channel = ChannelOf(spec.graph(), instance.name(), instance.input(), input->name());
   const auto writer =
       std::ranges::find_if(outboxes_, [&](const auto& o) { return o->channel() == channel; });
@@ -272,6 +287,19 @@ void ProcessBus::SendRest() {
     CountSend(unsent.outbox->Send(unsent.tick), unsent.outbox->component());
   }
   unsent_.clear();
+}
+
+void ProcessBus::SendAnswers() {
+  operate::answer_t answer;
+  for (ActInput* const acts : acts_) {
+    while (acts->TakeAnswer(&answer)) {
+      if (!answer_sender_) continue;
+      answer.encode(answer_bytes_.data(), 0, static_cast<int>(answer_bytes_.size()));
+      CountSend(
+          answer_sender_->Send(answer_channel_.c_str(), answer_bytes_.data(), answer_bytes_.size()),
+          0);
+    }
+  }
 }
 
 void ProcessBus::KeepDelayed() {

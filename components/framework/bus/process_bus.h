@@ -79,6 +79,8 @@ class ProcessBus {
   void Send(Outbox* outbox, int64_t tick);
   /// Sends what only the recorder and other listeners hear.
   void SendRest();
+  /// Sends what components have answered to an operator's acts.
+  void SendAnswers();
   /// Ends a tick: what its components wrote is now of the tick before.
   void KeepDelayed();
 
@@ -156,6 +158,10 @@ class ProcessBus {
   std::vector<std::unique_ptr<DataLink>> links_;
   std::vector<Delayed> delayed_;
   std::vector<BoundStage> stages_;
+  std::vector<ActInput*> acts_;
+  std::optional<BusSender> answer_sender_;  // none: the graph has no channel for answers
+  std::string answer_channel_;
+  std::vector<uint8_t> answer_bytes_;
   std::vector<Unsent> unsent_;  // as many at most as there are outputs
   std::vector<Counters> counters_;
   std::vector<Device*> devices_;

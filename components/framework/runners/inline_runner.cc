@@ -54,6 +54,11 @@ InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registr
     const std::vector<InputPort*>& inputs = graph_.component(i).wiring.inputs();
     for (size_t k = 0; k < inputs.size(); ++k) {
       const int channel = plan.input_channel[static_cast<size_t>(i)][k];
+      if (channel < 0) continue;
+      if (auto* const acts = dynamic_cast<ActInput*>(inputs[k]); acts != nullptr) {
+        acts->SetAddress(i);
+        acts_.push_back(acts);
+      }
       const auto same = [&](const auto& entry) { return entry.channel == channel; };
       if (inputs[k]->kind() == InputKind::kPreviousTick &&
           std::none_of(delayed_.begin(), delayed_.end(), same)) {
@@ -69,6 +74,11 @@ InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registr
       }
     }
   }
+  for (size_t c = 0; c < plan.channels.size(); ++c) {
+    if (plan.channels[c].type != kAnswerType || !plan.channels[c].external) continue;
+    answer_channel_ = static_cast<int>(c);
+    answer_bytes_.resize(static_cast<size_t>(operate::answer_t{}.getEncodedSize()));
+  }
   for (const GraphPlan::StageRef& ref : plan.order) {
     const auto c = static_cast<size_t>(ref.component);
     const Wiring& wiring = graph_.component(ref.component).wiring;
@@ -77,6 +87,7 @@ InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registr
       const auto k = std::find(wiring.inputs().begin(), wiring.inputs().end(), input) -
                      wiring.inputs().begin();
       const int channel = plan.input_channel[c][static_cast<size_t>(k)];
+      if (channel < 0) continue;
       const auto same = [&](const auto& entry) { return entry.channel == channel; };
       BoundStage::BoundInput bound_input{input, nullptr, 0};
       if (input->kind() == InputKind::kSameTick) {
@@ -146,6 +157,7 @@ bool InlineRunner::Step() {
   }
   for (Delayed& delayed : delayed_)
     delayed.port->CopyMessage(delayed.output, delayed.message.get());
+  TakeAnswers();
   ++next_tick_;
   if (num_ticks_ > 0 && next_tick_ >= num_ticks_) ended_ = true;
   tick_latency_.Add(NowNanoseconds() - start);
@@ -168,11 +180,30 @@ bool InlineRunner::Inject(const std::string& channel, std::span<const uint8_t> d
         !external.port->Decode(data.data(), static_cast<int>(data.size()), external.spare.get())) {
       return false;
     }
+    if (external_tap_) external_tap_(external.channel, data);
+    if (external.port->type_name() == kActType) {
+      for (ActInput* const acts : acts_) {
+        acts->Offer(*static_cast<const operate::act_t*>(external.spare.get()));
+      }
+      TakeAnswers();
+      return true;
+    }
     external.port->CopyMessage(external.spare.get(), external.shown.get());
     external.present = true;
     return true;
   }
   return false;
+}
+
+void InlineRunner::TakeAnswers() {
+  operate::answer_t answer;
+  for (ActInput* const acts : acts_) {
+    while (acts->TakeAnswer(&answer)) {
+      if (answer_channel_ < 0 || !external_tap_) continue;
+      answer.encode(answer_bytes_.data(), 0, static_cast<int>(answer_bytes_.size()));
+      external_tap_(answer_channel_, answer_bytes_);
+    }
+  }
 }
 
 const LatencyHistogram& InlineRunner::latency(int component) const {

@@ -11,6 +11,7 @@
 
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/graph.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/runners/latency_histogram.h"
 
 namespace poise {
@@ -28,6 +29,10 @@ class InlineRunner {
   ~InlineRunner();
 
   void set_tap(Tap tap) { tap_ = std::move(tap); }
+  /// Called for every message of an external channel: those injected, and components' answers to an
+  /// operator's acts.
+  using ExternalTap = std::function<void(int channel, std::span<const uint8_t> data)>;
+  void set_external_tap(ExternalTap tap) { external_tap_ = std::move(tap); }
 
   /// Runs one tick, all stages. False when the run has ended (before or in this tick).
   bool Step();
@@ -35,8 +40,8 @@ class InlineRunner {
   /// ticks run.
   int64_t Run(int64_t ticks, const std::atomic<bool>* stop = nullptr);
 
-  /// Shows an encoded message of an external channel to its readers from the next stage on. False
-  /// when it was refused.
+  /// Shows an encoded message of an external channel to its readers from the next stage on, an
+  /// operator's act in its tick. False when it was refused.
   bool Inject(const std::string& channel, std::span<const uint8_t> data);
 
   int64_t ticks_completed() const { return next_tick_; }
@@ -59,6 +64,7 @@ class InlineRunner {
 
   /// False when an output is not finite: the tick ends there.
   bool RunStage(BoundStage& stage, const Tick& tick);
+  void TakeAnswers();
 
   int64_t run_id_ = 0;
   double period_ = 0;
@@ -66,6 +72,10 @@ class InlineRunner {
   int64_t num_ticks_ = 0;
   BoundGraph graph_;
   Tap tap_;
+  ExternalTap external_tap_;
+  std::vector<ActInput*> acts_;
+  int answer_channel_ = -1;  // -1: the graph has none
+  std::vector<uint8_t> answer_bytes_;
   std::vector<BoundStage> stages_;
   std::vector<Delayed> delayed_;
   std::vector<External> external_;

@@ -497,6 +497,7 @@ bool ProcessRunner::Impl::EndTick() {
   // At once after the command has left: a death in between loses the tick's state.
   if (store_ != nullptr && can_be_taken_over_) KeepState();
   bus_.SendRest();
+  bus_.SendAnswers();
   bus_.KeepDelayed();
   EachHealth([&](health_t& health) {
     health.tick = tick.index;
@@ -558,6 +559,7 @@ void ProcessRunner::Impl::Close() {
 void ProcessRunner::Impl::Poll(int64_t deadline, int batch) {
   polled_ = true;
   bus_.SendRest();
+  bus_.SendAnswers();
   const int64_t now = NowNanoseconds();
   if (now >= next_health_) PublishHealth(now);
   if (timing_ == Timing::kFollower) {

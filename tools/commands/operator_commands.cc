@@ -1,0 +1,194 @@
+#include <charconv>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "components/framework/configuration/configuration.h"
+#include "fmt/format.h"
+#include "tools/cli/cli_checks.h"
+#include "tools/cli/terminal.h"
+#include "tools/cli/text_table.h"
+#include "tools/commands/commands.h"
+#include "tools/run/operator_line.h"
+
+namespace poise {
+namespace {
+
+constexpr char kRunHelp[] = "folder of the run; default: the one that goes on";
+
+double NumberIn(std::string_view text, const std::string& flag) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value);
+  if (result.ec != std::errc() || result.ptr != end || text.empty()) {
+    throw ConfigError(fmt::format("{}: '{}' is no number", flag, text));
+  }
+  return value;
+}
+
+/// "x,y,z".
+std::vector<double> NumbersIn(std::string_view text, size_t count, const std::string& flag) {
+  std::vector<double> numbers;
+  while (true) {
+    const size_t comma = text.find(',');
+    numbers.push_back(NumberIn(text.substr(0, comma), flag));
+    if (comma == std::string_view::npos) break;
+    text.remove_prefix(comma + 1);
+  }
+  if (numbers.size() != count) {
+    throw ConfigError(fmt::format("{}: needs {} numbers with commas between them, has {}", flag,
+                                  count, numbers.size()));
+  }
+  return numbers;
+}
+
+Eigen::Vector3d VectorIn(const std::string& text, const std::string& flag) {
+  const std::vector<double> numbers = NumbersIn(text, 3, flag);
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+/// Says what became of `what`; the exit code.
+int Report(OperatorLine& line, int64_t id, const std::string& what) {
+  const ActOutcome outcome = line.Wait(id);
+  if (outcome.done) {
+    fmt::print("{}: from tick {} on ({:.3f} s)\n", what, outcome.tick, outcome.time);
+    return kExitOk;
+  }
+  fmt::print(stderr, "poise: {}: {}\n", what, outcome.text);
+  return kExitFailed;
+}
+
+struct SetOptions {
+  std::string run;
+  std::vector<std::string> assignments;
+  bool list = false;
+};
+
+int List(OperatorLine& line) {
+  std::vector<TableRow> rows{{"field", "now", "unit", "from", "to", "meaning"}};
+  int exit_code = kExitOk;
+  for (const LiveField& field : line.fields()) {
+    const ActOutcome now = line.Wait(line.Ask(field.path));
+    if (!now.done) {
+      fmt::print(stderr, "poise: {}: {}\n", field.path, now.text);
+      exit_code = kExitFailed;
+      break;  // the others would be waited for as long
+    }
+    rows.push_back({field.path, FormatNumber(now.value), field.unit, FormatNumber(field.least),
+                    FormatNumber(field.most), field.meaning});
+  }
+  if (rows.size() > 1) fmt::print("{}", FormatColumns(rows));
+  return exit_code;
+}
+
+int Set(const SetOptions& options) {
+  if (options.list == !options.assignments.empty()) {
+    throw ConfigError("set: needs FIELD=VALUE, or --list");
+  }
+  OperatorLine line(options.run);
+  if (options.list) return List(line);
+  std::vector<std::pair<std::string, double>> values;
+  for (const std::string& assignment : options.assignments) {
+    const size_t equals = assignment.find('=');
+    if (equals == std::string::npos) {
+      throw ConfigError(fmt::format("set: '{}' is no FIELD=VALUE", assignment));
+    }
+    values.emplace_back(
+        assignment.substr(0, equals),
+        NumberIn(std::string_view(assignment).substr(equals + 1), assignment.substr(0, equals)));
+  }
+  std::vector<int64_t> ids;
+  for (const auto& [field, value] : values) ids.push_back(line.Set(field, value));
+  int exit_code = kExitOk;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    const int code = Report(line, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
+    if (code != kExitOk) exit_code = code;
+  }
+  return exit_code;
+}
+
+struct PushOptions {
+  std::string run, body, force, point = "0,0,0";
+  double duration = 0.1;  // s
+};
+
+int Push(const PushOptions& options) {
+  const Eigen::Vector3d force = VectorIn(options.force, "--force");
+  const Eigen::Vector3d point = VectorIn(options.point, "--point");
+  OperatorLine line(options.run);
+  const int64_t id = line.Push(options.body, force, point, options.duration);
+  return Report(line, id,
+                fmt::format("push of {:.4g} N for {:.4g} s", force.norm(), options.duration));
+}
+
+struct WalkOptions {
+  std::string run, velocity;
+  double turn = 0;  // rad/s
+  bool stop = false;
+};
+
+int Walk(const WalkOptions& options, bool turns) {
+  if (options.stop == (!options.velocity.empty() || turns)) {
+    throw ConfigError("walk: needs --velocity, --turn or both; or --stop alone");
+  }
+  std::vector<double> velocity{0, 0};
+  if (!options.velocity.empty()) velocity = NumbersIn(options.velocity, 2, "--velocity");
+  OperatorLine line(options.run);
+  if (options.stop) return Report(line, line.Stand(), "stop walking");
+  return Report(line, line.Walk(velocity[0], velocity[1], options.turn), "walk");
+}
+
+}  // namespace
+
+void AddOperatorCommands(CLI::App* app, Command* command) {
+  auto set_options = std::make_shared<SetOptions>();
+  CLI::App* set = app->add_subcommand("set", "change a setting of a run that goes on");
+  set->add_option("assignment", set_options->assignments,
+                  "FIELD=VALUE, as in task_controller.com.kp=200");
+  set->add_flag("--list", set_options->list,
+                "the fields that can be set, with range, present value and meaning");
+  set->add_option("--run", set_options->run, kRunHelp);
+  set->callback([set_options, command] { *command = [set_options] { return Set(*set_options); }; });
+
+  auto push_options = std::make_shared<PushOptions>();
+  CLI::App* push = app->add_subcommand("push", "push the simulated robot of a run that goes on");
+  push->add_option("--body", push_options->body, "link that a joint carries; default: the root");
+  push->add_option("--force", push_options->force, "N, world axes: x,y,z")->required();
+  push->add_option("--duration", push_options->duration,
+                   "s; below 0: until the next push of this body")
+      ->capture_default_str();
+  push->add_option("--point", push_options->point, "m, in the body's frame: x,y,z")
+      ->capture_default_str();
+  push->add_option("--run", push_options->run, kRunHelp);
+  push->callback(
+      [push_options, command] { *command = [push_options] { return Push(*push_options); }; });
+
+  auto run = std::make_shared<std::string>();
+  auto foot = std::make_shared<std::string>();
+  auto next = std::make_shared<bool>(false);
+  CLI::App* step = app->add_subcommand(
+      "step", "a step in place of a run that goes on: each foot once, then side by side");
+  step->add_option("--foot", *foot, "the one that steps first, e.g. left; default: right");
+  step->add_flag("--next-phase", *next, "end the scenario's phase, whose moves are over, instead");
+  step->add_option("--run", *run, kRunHelp);
+  step->callback([run, foot, next, command] {
+    *command = [run, foot, next] {
+      OperatorLine line(*run);
+      return *next ? Report(line, line.NextPhase(), "next phase")
+                   : Report(line, line.Step(*foot), "step");
+    };
+  });
+
+  auto walk_options = std::make_shared<WalkOptions>();
+  CLI::App* walk = app->add_subcommand("walk", "walk, in a run that goes on, or stop walking");
+  walk->add_option("--velocity", walk_options->velocity, "m/s ahead and to the left: x,y");
+  CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left");
+  walk->add_flag("--stop", walk_options->stop, "stand, with the feet side by side");
+  walk->add_option("--run", walk_options->run, kRunHelp);
+  walk->callback([walk_options, turn, command] {
+    const bool turns = turn->count() > 0;
+    *command = [walk_options, turns] { return Walk(*walk_options, turns); };
+  });
+}
+
+}  // namespace poise
