@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "tools/cli/cli_checks.h"
@@ -17,6 +15,7 @@
 #include "tools/commands/commands.h"
 #include "tools/live/bus_operator.h"
 #include "tools/live/control_desk.h"
+#include "tools/live/live_page.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_access.h"
@@ -62,30 +61,12 @@ logging::RunRecord ReadStart(const LiveRun& live) {
   const auto deadline = Clock::now() + kViewPatience;
   while (true) {
     try {
-      logging::LogReader reader(log);
-      logging::RunRecord record;
-      record.info = logging::ReadRunInfo(&reader, log, &record.spec);
-      record.robot = robot::LoadRobotTexts(record.info.robot, record.info.urdf);
-      return record;
+      return ReadRunStart(log);
     } catch (const logging::LogError&) {
       if (Clock::now() > deadline || !live.InProgress() || StopSignal() != 0) throw;
     }
     std::this_thread::sleep_for(kPause);
   }
-}
-
-Json ChannelsJson(const TickRing& ring) {
-  Json json = Json::array();
-  for (const TickRing::Lane& lane : ring.lanes()) {
-    Json item = {{"name", lane.name}, {"type", lane.type->name}, {"count", 0}};
-    if (lane.external) item["ticks"] = {{"value", nullptr}};
-    item["signals"] = Json::array();
-    for (const TickRing::Signal& signal : lane.signals) {
-      item["signals"].push_back({{"field", signal.field}, {"integer", signal.integer}});
-    }
-    json.push_back(std::move(item));
-  }
-  return json;
 }
 
 class Viewer {
@@ -97,7 +78,7 @@ class Viewer {
         run_id_(std::to_string(live->spec().run_id())),
         operator_(options.control ? std::make_unique<BusOperator>(live->spec()) : nullptr),
         desk_(operator_ ? std::make_unique<ControlDesk>(operator_.get()) : nullptr),
-        ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
+        ring_(live->spec(), TicksOf(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
                 &ring_, Control()),
         status_((live->dir() / "run.lcm").string(), scenario) {}
@@ -130,10 +111,6 @@ class Viewer {
   }
 
  private:
-  static int64_t Ticks(double seconds, double period) {
-    return std::max<int64_t>(1, std::llround(seconds / period));
-  }
-
   void Listen(Clock::time_point now) {
     const int64_t lost = ring_.lost();
     live_->Spin(0, [&](const LiveMessage& message) {

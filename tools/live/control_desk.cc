@@ -75,7 +75,7 @@ Json ControlDesk::EntryJson(const Entry& entry) {
   return json;
 }
 
-std::optional<std::string> ControlDesk::Take(std::string_view run_id) {
+std::optional<std::string> ControlDesk::Take(std::string_view run_id, const Json& run) {
   for (OperatorSink::Answer& answer : sink_->TakeAnswers()) {
     Entry* const entry = Find(answer.client, answer.id);
     if (entry == nullptr) continue;  // many have come since
@@ -84,6 +84,7 @@ std::optional<std::string> ControlDesk::Take(std::string_view run_id) {
     entry->reason = std::move(answer.reason);
   }
   Json control = sink_->Standing();
+  if (!run.is_null()) control["run"] = run;
   Json acts = Json::array();
   for (const Entry& entry : acts_) acts.push_back(EntryJson(entry));
   control["acts"] = std::move(acts);

@@ -21,7 +21,9 @@ class ControlDesk {
   /// A text of a page. False when it is no act: then its sender is none of our pages.
   bool Receive(std::string_view text);
   /// What all pages are to be told, when it has changed since the last call.
-  std::optional<std::string> Take(std::string_view run_id);
+  /// `run`: of an interactive run, its pace; null: of another.
+  std::optional<std::string> Take(std::string_view run_id,
+                                  const nlohmann::ordered_json& run = nullptr);
 
   int64_t received() const { return received_; }  ///< acts
   int64_t refused() const { return refused_; }    ///< texts that are none

@@ -46,10 +46,7 @@ std::string RefusalText(int8_t verdict) {
 }  // namespace
 
 LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
-    : spec_(spec),
-      pace_(std::move(pace)),
-      fields_(LiveFields(spec)),
-      push_limit_(PushLimit(spec)) {
+    : spec_(spec), pace_(std::move(pace)), fields_(LiveFields(spec)), push_limit_(PushLimit(spec)) {
   const Graph& graph = spec_.graph();
   for (int i = 0; i < graph.channel_size(); ++i) {
     if (graph.channel(i).type() == kActType) act_channel_ = graph.channel(i).name();
@@ -57,9 +54,10 @@ LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
     if (graph.channel(i).type() == "emergency_stop_t") stop_channel_ = graph.channel(i).name();
   }
   if (act_channel_.empty() || answer_channel_ < 0) {
-    throw ConfigError(fmt::format("graph {}: has no channels of type {} and {}; its runs take no "
-                                  "acts of an operator",
-                                  graph.name(), kActType, kAnswerType));
+    throw ConfigError(
+        fmt::format("graph {}: has no channels of type {} and {}; its runs take no "
+                    "acts of an operator",
+                    graph.name(), kActType, kAnswerType));
   }
   for (int i = 0; i < graph.component_size(); ++i) {
     const ComponentType* const type = Components().TypeNamed(TypeOf(graph.component(i)));
@@ -227,8 +225,8 @@ nlohmann::ordered_json LocalOperator::Standing() const {
     }
   }
   nlohmann::ordered_json json = StandingOf(fields_, in_force, push_limit_);
-  json["can"] = {"push", "set", "step", "walk", "stop_walking", "stop",
-                 "pause", "go", "tick", "speed", "back"};
+  json["can"] = {"push",  "set", "step", "walk",  "stop_walking", "stop",
+                 "pause", "go",  "tick", "speed", "back"};
   if (runner_->ticks_completed() < push_until_) {
     json["push"] = {{"body", push_.name},
                     {"force", {push_.force.x(), push_.force.y(), push_.force.z()}}};

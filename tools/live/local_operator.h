@@ -14,8 +14,8 @@
 
 namespace poise {
 
-/// Injects acts between ticks, each for the very next one, and keeps them, so that a fresh runner of
-/// the same spec that gets them again at the same ticks gives the same bits.
+/// Injects acts between ticks, each for the very next one, and keeps them, so that a fresh runner
+/// of the same spec that gets them again at the same ticks gives the same bits.
 class LocalOperator : public OperatorSink {
  public:
   /// What the page asks of the run itself: pause, go, tick, speed, back. Empty: it is done; else

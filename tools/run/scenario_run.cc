@@ -198,8 +198,11 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   }
   std::optional<logging::RunRecord> kept;  // of what ran in this process
   if (StopSignal() == 0) {
-    summary.outcome =
-        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch, &kept);
+    summary.outcome = options_.interactive
+                          ? options_.interactive(main_.spec, scenario, ScenarioText(scenario),
+                                                 result.dir / "run.lcm")
+                          : RunPart(main_, result.dir, options_.in_process, options_.quiet,
+                                    options_.launch, &kept);
     PrintOutcome("run", summary.outcome);
     if (!options_.quiet && !summary.outcome.interrupted) {
       fmt::print("{}", FormatFaults(summary.outcome));
