@@ -21,6 +21,7 @@ constexpr double kPushShare = 0.5;                   // of the robot's weight
 constexpr double kGravity = 9.81;                    // m/s²
 constexpr double kLongestPush = 2;                   // s: a page that wants more asks again
 constexpr double kFastestWalk = 0.5;                 // m/s and rad/s: what a page offers
+constexpr std::chrono::milliseconds kSettled{1000};  // ms, longer than a setting's ramp
 constexpr size_t kMostWaiting = 128;                 // acts without an answer
 
 int OperatorChannel(const Graph& graph, std::string_view type, bool external) {
@@ -155,7 +156,7 @@ void BusOperator::Hear(const LiveMessage& message) {
     operate::answer_t answer;
     if (DecodeChecked(message.data.data(), size, &answer) &&
         answer.kind == operate::act_t::KIND_SETTING) {
-      ask_again_ = true;  // perhaps of poise set
+      ask_at_ = Clock::now() + kSettled;  // perhaps of poise set
     }
   }
   if (message.index < 0 || message.index != status_channel_) return;
@@ -187,18 +188,32 @@ void BusOperator::UpdateStop() {
   }
 }
 
+/// A value within a ramp is none that is in force.
+void BusOperator::Heard(const std::string& field, double value) {
+  const auto before = in_force_.find(field), last = heard_.find(field);
+  if (before == in_force_.end() || (last != heard_.end() && last->second == value)) {
+    in_force_[field] = value;
+    heard_.erase(field);
+  } else if (before->second != value) {
+    heard_[field] = value;
+    ask_at_ = Clock::now() + kSettled;
+  } else {
+    heard_.erase(field);
+  }
+}
+
 void BusOperator::Update() {
   UpdateStop();
   line_.Update(0);
-  if (ask_again_ && asked_.empty()) {
-    ask_again_ = false;
+  if (ask_at_ && Clock::now() > *ask_at_ && asked_.empty()) {
+    ask_at_.reset();
     for (const LiveField& field : line_.fields()) Ask(field.path);
   }
   for (auto it = asked_.begin(); it != asked_.end();) {
     const std::optional<ActOutcome> outcome = line_.TakeOutcome(it->first);
-    if (outcome && outcome->done) in_force_[it->second] = outcome->value;
+    if (outcome && outcome->done) Heard(it->second, outcome->value);
     // Who says nothing while the run begins is asked again.
-    if (outcome && outcome->verdict == 0) ask_again_ = true;
+    if (outcome && outcome->verdict == 0) ask_at_ = Clock::now() + kSettled;
     it = outcome ? asked_.erase(it) : std::next(it);
   }
   for (auto it = waiting_.begin(); it != waiting_.end();) {

@@ -51,6 +51,7 @@ class BusOperator : public OperatorSink {
   };
   int64_t Pass(const OperatorAct& act);
   void Ask(const std::string& field);
+  void Heard(const std::string& field, double value);
   void UpdateStop();
   void SendStop(bool stop, bool reset);
   void Answered(const OperatorAct& act, int64_t tick, std::string reason);
@@ -67,7 +68,8 @@ class BusOperator : public OperatorSink {
   std::map<std::string, double> in_force_;  // by field, as its component has told
   OperatorAct push_;                        // the last that was accepted
   int64_t push_until_ = -1;                 // tick
-  bool ask_again_ = false;                  // another operator may have changed a setting
+  std::map<std::string, double> heard_;     // by field, once; twice is no ramp
+  std::optional<Clock::time_point> ask_at_;
   std::vector<Answer> answers_;
 };
 

@@ -26,7 +26,7 @@ export class Control extends EventTarget {
   act(what, more = {}) {
     const act = {client: this.#client, id: this.#next++, do: what, ...more};
     if (!this.feed.send(JSON.stringify(act))) return 0;
-    this.#waiting.set(act.id, act);
+    if (what !== 'push') this.#waiting.set(act.id, act);  // the last push stands for those before it
     this.dispatchEvent(new Event('change'));
     return act.id;
   }

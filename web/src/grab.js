@@ -37,7 +37,7 @@ export function grabbing(scene, control, hand, mayPush) {
   };
 
   const down = (event) => {
-    if (event.button !== 0 || !mayPush()) return;
+    if (event.button !== 0 || event.target !== canvas || !mayPush()) return;
     scene.renderNow();  // matrices of the pose that is seen
     aim(event);
     const hit = ray.intersectObject(robot.object, true)[0];
