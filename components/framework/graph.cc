@@ -218,6 +218,9 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
     }
     for (int k = 0; k < connections.size(); ++k) {
       if (std::find(names.begin(), names.end(), connections[k].port()) != names.end()) continue;
+      // An operator's acts reach who takes them: in such a place another type may stand.
+      const int at = ChannelIndex(graph, connections[k].channel());
+      if (is_input && at >= 0 && graph.channel(at).type() == kActType) continue;
       problems->push_back(
           {fmt::format("{}.{}[{}].port", field, direction, k),
            fmt::format("{}'{}' does not exist; it has: {}", prefix, connections[k].port(),

@@ -11,11 +11,13 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "components/framework/component.h"
+#include "components/framework/operator_acts.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_model.h"
 #include "poise/robot_state_t.hpp"
@@ -62,6 +64,16 @@ class Harness {
     for (const Stage& stage : wiring_.stages()) stage.run(tick);
   }
   T& component() { return component_; }
+  /// Its operator's input, address 0.
+  ActInput& acts() {
+    for (InputPort* input : wiring_.inputs()) {
+      if (auto* const acts = dynamic_cast<ActInput*>(input); acts != nullptr) {
+        acts->SetAddress(0);
+        return *acts;
+      }
+    }
+    throw std::logic_error("no operator's input");
+  }
   void RunStage(size_t index, const Tick& tick) { wiring_.stages()[index].run(tick); }
   /// The component's state, as bytes.
   std::vector<uint8_t> Save() {

@@ -200,6 +200,50 @@ TEST_P(TaskControllerCase, KeepsTheLastTorqueWhenTheStateIsUnusable) {
   EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
 }
 
+TEST_P(TaskControllerCase, AGainThatAnOperatorSetsIsThatOfAConfiguration) {
+  const std::string body = "orientation { kp: 100 kd: 20 } ";
+  Harness<TaskController> live(&context_, "com { kp: 80 kd: 18 } " + body);
+  ControlContext other(GetParam().robot);
+  Harness<TaskController> configured(&other, "com { kp: 120 kd: 15 } " + body);
+  const std::vector<std::pair<std::string, double>> settings = {{"com.kp", 120}, {"com.kd", 15}};
+  for (size_t i = 0; i < settings.size(); ++i) {
+    const auto& [field, value] = settings[i];
+    operate::act_t act{};
+    act.id = static_cast<int64_t>(i) + 1;
+    act.tick = 5;
+    act.kind = operate::act_t::KIND_SETTING;
+    std::copy(field.begin(), field.end(), act.field);
+    act.value = value;
+    live.acts().Offer(act);
+  }
+  const support_plan_t plan = HoldAt(
+      model_, Dynamics(model_, standing_, GetParam().in_contact).data, GetParam().in_contact);
+  const robot_state_t state = StateMessage(model_, Disturbed(standing_, 0.02, 0.1, &random_));
+  double largest_step = 0, whole_step = 0;
+  std::vector<double> last;
+  for (int64_t tick = 0; tick < 300; ++tick) {
+    for (Harness<TaskController>* each : {&live, &configured}) {
+      each->Bind("robot_state", &state);
+      each->Bind("support_plan", &plan);
+      each->Run(TickAt(tick));
+    }
+    const std::vector<double>& torque = live.output<task_torque_t>().torque;
+    const std::vector<double>& wanted = configured.output<task_torque_t>().torque;
+    double difference = 0;
+    for (size_t j = 0; j < torque.size(); ++j) {
+      difference = std::max(difference, std::abs(torque[j] - wanted[j]));
+      if (tick > 0) largest_step = std::max(largest_step, std::abs(torque[j] - last[j]));
+    }
+    last = torque;
+    if (tick == 4) whole_step = difference;
+    // 0.5 s after: the same bits.
+    if (tick >= 5 + 250) EXPECT_EQ(difference, 0) << tick;
+  }
+  EXPECT_GT(whole_step, 0);
+  // The torque is linear in the gains, which go in a straight line of 250 ticks.
+  EXPECT_NEAR(largest_step, whole_step / 250, 1e-6 * whole_step);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, TaskControllerCase,
                          testing::Values(Case{TestRobot::kDyros, "DOUBLE", {true, true}},
                                          Case{TestRobot::kDyros, "RIGHT", {true, false}},

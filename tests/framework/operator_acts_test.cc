@@ -13,7 +13,7 @@
 #include "tests/framework/toy_components.h"
 #include "tests/test_seed.h"
 
-namespace poise {
+namespace poise::operator_acts {
 namespace {
 
 using operate::act_t;
@@ -240,4 +240,4 @@ TEST_F(OperatorActsTest, HostilePacketsAndAFloodChangeNothingAndAllocateNothing)
 }
 
 }  // namespace
-}  // namespace poise
+}  // namespace poise::operator_acts

@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 
+#include "components/framework/operator_acts.h"
 #include "tests/sim/engine.h"
 #include "tests/sim/simulation_fixture.h"
 
@@ -53,6 +54,7 @@ class Bench {
   const ground_truth_t& truth() const { return Get<ground_truth_t>("ground_truth"); }
   const external_push_t& push() const { return Get<external_push_t>("external_push"); }
   const Wiring& wiring() const { return wiring_; }
+  ActInput& acts() { return *dynamic_cast<ActInput*>(wiring_.inputs().at(2)); }
   const Component& component() const { return *component_; }
 
  private:
@@ -78,12 +80,14 @@ drive_command_t Command(double current) {
 TEST(SimComponent, DeclaresItsPorts) {
   const Bench bench(StandingConfig());
   const Wiring& wiring = bench.wiring();
-  ASSERT_EQ(wiring.inputs().size(), 2u);
+  ASSERT_EQ(wiring.inputs().size(), 3u);
   EXPECT_EQ(wiring.inputs()[0]->name(), "drive_command");
   EXPECT_EQ(wiring.inputs()[0]->kind(), InputKind::kPreviousTick);
   EXPECT_THAT(wiring.inputs()[0]->counts(), ::testing::ElementsAre(12));
   EXPECT_EQ(wiring.inputs()[1]->name(), "bridge_status");
   EXPECT_EQ(wiring.inputs()[1]->kind(), InputKind::kPreviousTick);
+  EXPECT_EQ(wiring.inputs()[2]->name(), "operator");
+  EXPECT_EQ(wiring.inputs()[2]->kind(), InputKind::kLatest);
   ASSERT_EQ(wiring.stages().size(), 1u);
   EXPECT_EQ(wiring.stages()[0].outputs.size(), 3u);
   EXPECT_EQ(bench.feedback().position_counts.size(), 12u);
@@ -140,6 +144,64 @@ TEST(SimComponent, SensorReportsTheReactionOfTheTrueWrench) {
       EXPECT_LT(bench.truth().foot_wrench[f].force[2], 0) << "robot on environment presses down";
     }
   }
+}
+
+operate::act_t Push(int64_t id, int64_t tick, double force, int64_t duration) {
+  operate::act_t act{};
+  act.id = id;
+  act.tick = tick;
+  act.kind = operate::act_t::KIND_PUSH;
+  act.force[1] = force;
+  act.point[2] = 0.25;
+  act.duration = duration;
+  return act;
+}
+
+TEST(SimComponent, AnOperatorsPushIsThatOfAScenario) {
+  // A cycle's force acts from the tick before on: rectangles of the same impulse, motors free.
+  Bench scenario(StandingConfig(
+      "push { start: 0.018 duration: 0.02 peak: 50 direction_y: 1 profile: RECTANGLE "
+      "point { z: 0.25 } }"));
+  Bench person(StandingConfig());
+  person.acts().SetAddress(0);
+  person.acts().Offer(Push(1, 10, 50, 10));
+  for (int i = 0; i < 40; ++i) {
+    const drive_command_t command = Command(0);
+    for (Bench* bench : {&scenario, &person}) bench->Run(i == 0 ? nullptr : &command);
+    EXPECT_NEAR(person.truth().push_force[1], i >= 10 && i < 20 ? 50 : 0, 1e-9) << i;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(person.truth().base_position[k], scenario.truth().base_position[k], 1e-9) << i;
+    }
+  }
+}
+
+TEST(SimComponent, RefusesAPushThatCannotBe) {
+  using operate::answer_t;
+  Bench bench(StandingConfig());
+  bench.acts().SetAddress(0);
+  std::vector<operate::act_t> acts(6, Push(0, 2, 50, 10));
+  acts[0].body = -1;
+  acts[1].body = 1000;
+  acts[2].force[0] = 1e300;
+  acts[3].point[0] = -1e6;
+  acts[4].duration = INT64_MAX;
+  acts[5].kind = 99;
+  for (size_t i = 0; i < acts.size(); ++i) {
+    acts[i].id = static_cast<int64_t>(i) + 1;
+    bench.acts().Offer(acts[i]);
+  }
+  for (int i = 0; i < 5; ++i) {
+    bench.Run(nullptr);
+    EXPECT_EQ(bench.truth().push_force[1], 0);
+  }
+  answer_t answer;
+  int refused = 0;
+  while (bench.acts().TakeAnswer(&answer)) {
+    const bool range = answer.id >= 3 && answer.id <= 5;
+    EXPECT_EQ(answer.verdict, range ? answer_t::VERDICT_RANGE : answer_t::VERDICT_UNKNOWN);
+    ++refused;
+  }
+  EXPECT_EQ(refused, 6);
 }
 
 TEST(SimComponent, PushIsMeasuredWithNoise) {

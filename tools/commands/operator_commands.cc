@@ -14,9 +14,9 @@
 namespace poise {
 namespace {
 
-constexpr char kRunHelp[] = "folder of the run; default: the one that goes on";
+constexpr char kWhichRun[] = "folder of the run; default: the one that goes on";
 
-double NumberIn(std::string_view text, const std::string& flag) {
+double NumberOf(std::string_view text, const std::string& flag) {
   double value = 0;
   const char* const end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
@@ -27,11 +27,11 @@ double NumberIn(std::string_view text, const std::string& flag) {
 }
 
 /// "x,y,z".
-std::vector<double> NumbersIn(std::string_view text, size_t count, const std::string& flag) {
+std::vector<double> NumbersOf(std::string_view text, size_t count, const std::string& flag) {
   std::vector<double> numbers;
   while (true) {
     const size_t comma = text.find(',');
-    numbers.push_back(NumberIn(text.substr(0, comma), flag));
+    numbers.push_back(NumberOf(text.substr(0, comma), flag));
     if (comma == std::string_view::npos) break;
     text.remove_prefix(comma + 1);
   }
@@ -42,13 +42,13 @@ std::vector<double> NumbersIn(std::string_view text, size_t count, const std::st
   return numbers;
 }
 
-Eigen::Vector3d VectorIn(const std::string& text, const std::string& flag) {
-  const std::vector<double> numbers = NumbersIn(text, 3, flag);
+Eigen::Vector3d VectorOf(const std::string& text, const std::string& flag) {
+  const std::vector<double> numbers = NumbersOf(text, 3, flag);
   return {numbers[0], numbers[1], numbers[2]};
 }
 
 /// Says what became of `what`; the exit code.
-int Report(OperatorLine& line, int64_t id, const std::string& what) {
+int SayOutcome(OperatorLine& line, int64_t id, const std::string& what) {
   const ActOutcome outcome = line.Wait(id);
   if (outcome.done) {
     fmt::print("{}: from tick {} on ({:.3f} s)\n", what, outcome.tick, outcome.time);
@@ -58,13 +58,13 @@ int Report(OperatorLine& line, int64_t id, const std::string& what) {
   return kExitFailed;
 }
 
-struct SetOptions {
+struct LiveSetOptions {
   std::string run;
   std::vector<std::string> assignments;
   bool list = false;
 };
 
-int List(OperatorLine& line) {
+int ListLiveFields(OperatorLine& line) {
   std::vector<TableRow> rows{{"field", "now", "unit", "from", "to", "meaning"}};
   int exit_code = kExitOk;
   for (const LiveField& field : line.fields()) {
@@ -81,12 +81,12 @@ int List(OperatorLine& line) {
   return exit_code;
 }
 
-int Set(const SetOptions& options) {
+int SetLiveFields(const LiveSetOptions& options) {
   if (options.list == !options.assignments.empty()) {
     throw ConfigError("set: needs FIELD=VALUE, or --list");
   }
   OperatorLine line(options.run);
-  if (options.list) return List(line);
+  if (options.list) return ListLiveFields(line);
   std::vector<std::pair<std::string, double>> values;
   for (const std::string& assignment : options.assignments) {
     const size_t equals = assignment.find('=');
@@ -95,62 +95,64 @@ int Set(const SetOptions& options) {
     }
     values.emplace_back(
         assignment.substr(0, equals),
-        NumberIn(std::string_view(assignment).substr(equals + 1), assignment.substr(0, equals)));
+        NumberOf(std::string_view(assignment).substr(equals + 1), assignment.substr(0, equals)));
   }
   std::vector<int64_t> ids;
   for (const auto& [field, value] : values) ids.push_back(line.Set(field, value));
   int exit_code = kExitOk;
   for (size_t i = 0; i < ids.size(); ++i) {
-    const int code = Report(line, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
+    const int code =
+        SayOutcome(line, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
     if (code != kExitOk) exit_code = code;
   }
   return exit_code;
 }
 
-struct PushOptions {
+struct RobotPushOptions {
   std::string run, body, force, point = "0,0,0";
   double duration = 0.1;  // s
 };
 
-int Push(const PushOptions& options) {
-  const Eigen::Vector3d force = VectorIn(options.force, "--force");
-  const Eigen::Vector3d point = VectorIn(options.point, "--point");
+int PushRobot(const RobotPushOptions& options) {
+  const Eigen::Vector3d force = VectorOf(options.force, "--force");
+  const Eigen::Vector3d point = VectorOf(options.point, "--point");
   OperatorLine line(options.run);
   const int64_t id = line.Push(options.body, force, point, options.duration);
-  return Report(line, id,
-                fmt::format("push of {:.4g} N for {:.4g} s", force.norm(), options.duration));
+  return SayOutcome(line, id,
+                    fmt::format("push of {:.4g} N for {:.4g} s", force.norm(), options.duration));
 }
 
-struct WalkOptions {
+struct RobotWalkOptions {
   std::string run, velocity;
   double turn = 0;  // rad/s
   bool stop = false;
 };
 
-int Walk(const WalkOptions& options, bool turns) {
+int WalkRobot(const RobotWalkOptions& options, bool turns) {
   if (options.stop == (!options.velocity.empty() || turns)) {
     throw ConfigError("walk: needs --velocity, --turn or both; or --stop alone");
   }
   std::vector<double> velocity{0, 0};
-  if (!options.velocity.empty()) velocity = NumbersIn(options.velocity, 2, "--velocity");
+  if (!options.velocity.empty()) velocity = NumbersOf(options.velocity, 2, "--velocity");
   OperatorLine line(options.run);
-  if (options.stop) return Report(line, line.Stand(), "stop walking");
-  return Report(line, line.Walk(velocity[0], velocity[1], options.turn), "walk");
+  if (options.stop) return SayOutcome(line, line.Stand(), "stop walking");
+  return SayOutcome(line, line.Walk(velocity[0], velocity[1], options.turn), "walk");
 }
 
 }  // namespace
 
 void AddOperatorCommands(CLI::App* app, Command* command) {
-  auto set_options = std::make_shared<SetOptions>();
+  auto set_options = std::make_shared<LiveSetOptions>();
   CLI::App* set = app->add_subcommand("set", "change a setting of a run that goes on");
   set->add_option("assignment", set_options->assignments,
                   "FIELD=VALUE, as in task_controller.com.kp=200");
   set->add_flag("--list", set_options->list,
                 "the fields that can be set, with range, present value and meaning");
-  set->add_option("--run", set_options->run, kRunHelp);
-  set->callback([set_options, command] { *command = [set_options] { return Set(*set_options); }; });
+  set->add_option("--run", set_options->run, kWhichRun);
+  set->callback(
+      [set_options, command] { *command = [set_options] { return SetLiveFields(*set_options); }; });
 
-  auto push_options = std::make_shared<PushOptions>();
+  auto push_options = std::make_shared<RobotPushOptions>();
   CLI::App* push = app->add_subcommand("push", "push the simulated robot of a run that goes on");
   push->add_option("--body", push_options->body, "link that a joint carries; default: the root");
   push->add_option("--force", push_options->force, "N, world axes: x,y,z")->required();
@@ -159,9 +161,9 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
       ->capture_default_str();
   push->add_option("--point", push_options->point, "m, in the body's frame: x,y,z")
       ->capture_default_str();
-  push->add_option("--run", push_options->run, kRunHelp);
+  push->add_option("--run", push_options->run, kWhichRun);
   push->callback(
-      [push_options, command] { *command = [push_options] { return Push(*push_options); }; });
+      [push_options, command] { *command = [push_options] { return PushRobot(*push_options); }; });
 
   auto run = std::make_shared<std::string>();
   auto foot = std::make_shared<std::string>();
@@ -170,24 +172,24 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
       "step", "a step in place of a run that goes on: each foot once, then side by side");
   step->add_option("--foot", *foot, "the one that steps first, e.g. left; default: right");
   step->add_flag("--next-phase", *next, "end the scenario's phase, whose moves are over, instead");
-  step->add_option("--run", *run, kRunHelp);
+  step->add_option("--run", *run, kWhichRun);
   step->callback([run, foot, next, command] {
     *command = [run, foot, next] {
       OperatorLine line(*run);
-      return *next ? Report(line, line.NextPhase(), "next phase")
-                   : Report(line, line.Step(*foot), "step");
+      return *next ? SayOutcome(line, line.NextPhase(), "next phase")
+                   : SayOutcome(line, line.Step(*foot), "step");
     };
   });
 
-  auto walk_options = std::make_shared<WalkOptions>();
+  auto walk_options = std::make_shared<RobotWalkOptions>();
   CLI::App* walk = app->add_subcommand("walk", "walk, in a run that goes on, or stop walking");
   walk->add_option("--velocity", walk_options->velocity, "m/s ahead and to the left: x,y");
   CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left");
   walk->add_flag("--stop", walk_options->stop, "stand, with the feet side by side");
-  walk->add_option("--run", walk_options->run, kRunHelp);
+  walk->add_option("--run", walk_options->run, kWhichRun);
   walk->callback([walk_options, turn, command] {
     const bool turns = turn->count() > 0;
-    *command = [walk_options, turns] { return Walk(*walk_options, turns); };
+    *command = [walk_options, turns] { return WalkRobot(*walk_options, turns); };
   });
 }
 

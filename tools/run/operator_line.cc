@@ -46,13 +46,6 @@ std::string ActChannel(const Graph& graph, int component) {
   return {};
 }
 
-int ChannelIndexOf(const Graph& graph, const std::string& name) {
-  for (int i = 0; i < graph.channel_size(); ++i) {
-    if (graph.channel(i).name() == name) return i;
-  }
-  return -1;
-}
-
 int ChannelOfType(const Graph& graph, std::string_view type) {
   for (int i = 0; i < graph.channel_size(); ++i) {
     if (graph.channel(i).type() == type) return i;

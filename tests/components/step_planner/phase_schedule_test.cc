@@ -290,5 +290,31 @@ TEST(PhaseSchedule, TheFirstPhaseBeginsAtTheScenariosTimeZeroOrWithTheRun) {
   }
 }
 
+TEST(PhaseSchedule, EndsEarlyWhenAskedOnceItsMovesAreOver) {
+  PhaseSchedule schedule = Schedule(kThere);
+  const auto run = [&](int from, int to, const std::array<bool, 2>& confirmed) {
+    for (int tick = from; tick <= to; ++tick) {
+      Advance(&schedule, kTick * tick, kOverBoth, confirmed);
+    }
+  };
+  EXPECT_FALSE(schedule.EndNow(0)) << "before it has begun";
+  run(0, 350, kConfirmed);
+  EXPECT_FALSE(schedule.EndNow(kTick * 351)) << "the foot is being unloaded";
+  run(351, 640, kConfirmed);
+  ASSERT_EQ(schedule.state().phase, 1);
+  EXPECT_TRUE(schedule.EndNow(kTick * 641));
+  // The contact is waited for all the same.
+  run(641, 700, kUnconfirmed);
+  EXPECT_EQ(schedule.state().phase, 1);
+  EXPECT_EQ(schedule.state().waiting_for, WaitingFor::kContact);
+  run(701, 701, kConfirmed);
+  EXPECT_EQ(schedule.state().phase, 2);
+  EXPECT_EQ(schedule.state().began_by, DONE);
+  // What follows counts from there: the ramp 0.2 s later, 0.4 s long.
+  run(702, 701 + 200, kConfirmed);
+  EXPECT_NEAR(schedule.state().progress, 0.5, 0.01);
+  EXPECT_FALSE(schedule.EndNow(kTick * 1200)) << "nothing follows the last";
+}
+
 }  // namespace
 }  // namespace poise
