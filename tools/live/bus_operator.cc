@@ -33,7 +33,7 @@ int OperatorChannel(const Graph& graph, std::string_view type, bool external) {
 
 }  // namespace
 
-double PushLimit(const RunSpec& spec) {
+double PagePushLimit(const RunSpec& spec) {
   std::string robot, urdf;
   for (const Resource& resource : spec.resource()) {
     if (resource.name() == "robot") robot = resource.text();
@@ -85,7 +85,7 @@ BusOperator::BusOperator(const RunSpec& spec)
       stop_channel_(OperatorChannel(spec.graph(), "emergency_stop_t", true)),
       status_channel_(OperatorChannel(spec.graph(), "bridge_status_t", false)),
       answer_channel_(OperatorChannel(spec.graph(), kAnswerType, true)),
-      push_limit_(PushLimit(spec)) {
+      push_limit_(PagePushLimit(spec)) {
   if (stop_channel_ >= 0 && status_channel_ >= 0) {
     stop_sender_ = std::make_unique<BusSender>(ChannelUrl(spec, stop_channel_));
   }

@@ -19,7 +19,7 @@ namespace poise {
 
 /// N: what a page may push with at most, half of the robot's weight: more than any robot here
 /// stands, and no slip of a hand tears one apart.
-double PushLimit(const RunSpec& spec);
+double PagePushLimit(const RunSpec& spec);
 /// Keys of Standing that all sinks have: settings with the values in force by field, push and walk.
 nlohmann::ordered_json StandingOf(const std::vector<LiveField>& fields,
                                   const std::map<std::string, double>& in_force, double push_limit);
