@@ -46,7 +46,10 @@ std::string RefusalText(int8_t verdict) {
 }  // namespace
 
 LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
-    : spec_(spec), pace_(std::move(pace)), fields_(LiveFields(spec)), push_limit_(PagePushLimit(spec)) {
+    : spec_(spec),
+      pace_(std::move(pace)),
+      fields_(LiveFields(spec)),
+      push_limit_(PagePushLimit(spec)) {
   const Graph& graph = spec_.graph();
   for (int i = 0; i < graph.channel_size(); ++i) {
     if (graph.channel(i).type() == kActType) act_channel_ = graph.channel(i).name();
