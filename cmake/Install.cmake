@@ -39,7 +39,7 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/poise ${PROJECT_BINARY_DIR}/operate DEST
         FILES_MATCHING PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/poise_commit.h DESTINATION ${_headers} COMPONENT dev)
 
-foreach(folder scenarios graphs robots sweeps drives bits)
+foreach(folder scenarios graphs robots sweeps drives bits benchmarks)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/${folder} DESTINATION share/poise)
 endforeach()
 install(FILES ${POISE_LCM_FILES} DESTINATION share/poise/lcmtypes)

@@ -39,5 +39,6 @@ if(TARGET poise_python_module)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "poise (= ${PROJECT_VERSION}), python3 (>= 3.${_minor}), \
 python3 (<< 3.${_next}), python3-numpy")
 endif()
-set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib, python3-pandas")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "python3-matplotlib")  # the tutorial draws
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-pandas")
 include(CPack)

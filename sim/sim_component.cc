@@ -8,6 +8,8 @@
 namespace poise {
 namespace {
 
+// Apart from those of terrain and sensors.
+constexpr uint64_t kLossStream = 0x6c6f7373;
 // What an operator may ask for: far beyond what any robot here stands, within what engines bear.
 constexpr double kMostForce = 1e5;                  // N
 constexpr double kFarthestPoint = 10;               // m from the body's origin
@@ -44,6 +46,10 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
                                                context.seed, context.lead_ticks);
     sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, setup.sim), context.seed);
     foot_sensors_ = std::make_unique<FootSensors>(*model, setup.sim);
+    command_loss_ = setup.sim.command_loss();
+    if (!(command_loss_ >= 0 && command_loss_ < 1)) {
+      throw ConfigError("command_loss", "must be in [0, 1)");
+    }
   } catch (const ConfigError& error) {
     if (error.field().empty()) throw;
     throw ConfigError("sim." + error.field(), error.problem());
@@ -53,6 +59,7 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     current_sensor_.push_back(motor.current_sensor ? 1 : 0);
   }
 
+  losses_.emplace(context.seed, kLossStream);
   push_until_.assign(model->bodies().size(), -1);
   impedance_.resize(model->motors().size());
 
@@ -72,6 +79,10 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
 
 std::string_view SimComponent::finished() const {
   return simulation_ ? simulation_->end_reason() : std::string_view{};
+}
+
+bool SimComponent::LosesCommand() {
+  return command_loss_ > 0 && losses_->Uniform() < command_loss_;
 }
 
 void SimComponent::TakeActs(const Tick& tick) {
@@ -103,7 +114,9 @@ void SimComponent::TakeActs(const Tick& tick) {
 void SimComponent::Step(const Tick& tick) {
   TakeActs(tick);
   if (tick.index > 0) {
-    if (drive_command_.present()) {
+    if (LosesCommand()) {
+      // The drives hold what they have.
+    } else if (drive_command_.present()) {
       simulation_->SetCurrents(drive_command_->current, drive_command_->enabled);
       for (size_t j = 0; j < impedance_.size(); ++j) {
         impedance_[j] = {.stiffness = drive_command_->stiffness[j],

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "poise/external_push_t.hpp"
 #include "poise/ground_truth_t.hpp"
 #include "sim/foot_sensors.h"
+#include "sim/random.h"
 #include "sim/sensors.h"
 #include "sim/simulation.h"
 
@@ -54,6 +56,8 @@ class SimComponent : public Component, public Operated {
  private:
   void TakeActs(const Tick& tick);
   void Step(const Tick& tick);
+  /// Whether this tick's command does not reach the drives.
+  bool LosesCommand();
   void PublishFeedback();
   void PublishPush();
   void PublishTruth();
@@ -69,6 +73,8 @@ class SimComponent : public Component, public Operated {
   std::unique_ptr<Sensors> sensors_;
   std::unique_ptr<FootSensors> foot_sensors_;
   std::unique_ptr<SensorReadings> readings_;
+  double command_loss_ = 0;  // share of ticks
+  std::optional<RandomStream> losses_;
   std::vector<int64_t> push_until_;        // by body: tick; -1: no push ends
   std::vector<DriveImpedance> impedance_;  // by joint
   std::vector<int8_t> current_sensor_;     // by joint

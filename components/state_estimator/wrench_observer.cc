@@ -299,7 +299,6 @@ bool WrenchObserver::AddBaseRows() {
 
 // What a leg that swings seems to carry is its joints' error.
 void WrenchObserver::Learn(double dt) {
-  errors_.Age(dt);
   const Vector3d between = sole_rotation_[0].transpose() * (sole_position_[1] - sole_position_[0]);
   const double speed = observed_ ? (between - between_).norm() / dt : 0;
   between_ = between;
@@ -343,7 +342,12 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   // What the base carries, it carries alone: no joint's row knows of it.
   AddLoad(correction);
   if (!AddBaseRows()) return false;
-  if (learn && torque_known_ && since_ > 0) Learn(since_);
+  if (since_ > 0) errors_.Age(since_);
+  if (learn && torque_known_ && since_ > 0) {
+    Learn(since_);
+  } else {
+    for (double& fit : fit_) fit += std::min(since_ / kFitHold, 1.0) * (1 - fit);
+  }
   if (observed_ && since_ > 0) {
     const double share = std::min(since_ / kRateTime, 1.0);
     rate_ += share * ((estimate_ - wrenches_) / since_ - rate_);

@@ -169,7 +169,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
   for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
   step_.Archive(archive);
   references_.Archive(archive);
-  archive->Show(in_contact_, last_controlled_, stands_otherwise_);
+  archive->Show(in_contact_, last_controlled_, stands_otherwise_, untilted_);
   recovery_.Archive(archive);
   walk_.Archive(archive);
   ArchiveMessage(&*support_plan_, archive);
@@ -322,7 +322,7 @@ bool StepPlanner::WalkOn(const stepping::StepInput& input) {
   if (acts) TakeContacts(walk_.output());
   if (was_active && !acts) {
     EndSteps(walk_.output(), input.time);
-    generator_->HoldBody(references_.body.rotation);
+    generator_->HoldBody(untilted_);
   }
   return acts;
 }
@@ -394,6 +394,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
       references_.foot_rotation[i] = steps->swing_rotation;
     }
     if (walk_.active()) TurnBody();
+    untilted_ = references_.body.rotation;
     if (hip_strategy_->enabled()) TiltBody(time, capture);
     return;
   }

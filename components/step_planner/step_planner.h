@@ -118,6 +118,8 @@ class StepPlanner : public Component, public Operated {
   double step_reach_ = 0;          // m
   bool angular_momentum_ = false;  // counts in the capture point that asks for a step
   References references_;
+  Eigen::Matrix3d untilted_ =
+      Eigen::Matrix3d::Identity();  // the body's reference less the hip strategy's tilt
   robot::RobotState state_;
   std::array<bool, 2> in_contact_{true, true};
   bool last_controlled_ = false;  // the phase before had tasks

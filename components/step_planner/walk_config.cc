@@ -19,8 +19,16 @@ namespace {
 constexpr double kEdgeShare = 1.0 / 3;
 /// Of the smaller sole's inner radius: what the pendulum's offset is taken for at most. Chosen.
 constexpr double kOffsetShare = 0.67;
+/// Of the clearance, by which a foot rises from where it stands though the other stands lower: the
+/// edges of tilted ground are higher than its middle. Chosen.
+constexpr double kRiseShare = 0.5;
+/// Of the swing, after which a foot is above its foothold where the ground is unknown: it comes
+/// down from above, not against a block's side. By then it has come down by a fifth of its height.
+/// Chosen.
+constexpr double kAcrossShare = 0.65;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
+constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
 
 double LeastInnerRadius(const robot::RobotModel& model) {
   return std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
@@ -79,6 +87,8 @@ void CheckWalkConfig(const WalkConfig& config) {
   positive(config.rest_distance(), "rest_distance");
   positive(config.rest_speed(), "rest_speed");
   not_negative(config.rest_time(), "rest_time");
+  CheckWalk(config.press() >= 0 && config.press() <= kMostPress, "press", "must be 0 to 0.4");
+  not_negative(config.line(), "line");
 }
 
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
@@ -117,7 +127,8 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                config.most_turn()};
   spec.acceleration = config.acceleration();
   spec.turn_acceleration = config.turn_acceleration();
-  spec.foot = {config.clearance(), config.touch_speed(), config.freeze()};
+  spec.foot = {config.clearance(), config.touch_speed(), config.freeze(),
+               kRiseShare * config.clearance(), config.rests() ? kAcrossShare : 1};
   spec.touch_load = contact.touch_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
@@ -131,6 +142,12 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
   spec.rest_distance = config.rest_distance();
   spec.rest_speed = config.rest_speed();
   spec.rest_time = config.rest_time();
+  spec.rests = config.rests();
+  spec.press_share = config.press();
+  spec.press_load =
+      std::max(config.press() * robot::kGravity * model.total_mass(), spec.touch_load);
+  spec.off_center = 0.5 * (LeastInnerRadius(model) - edge);
+  spec.line = config.line();
   return {stepping::StepChoice(model, reach, limits), spec};
 }
 

@@ -128,12 +128,14 @@ bool Endpoint::WriteSample(const void* sample) {
   return dds_write(entity_, sample) == DDS_RETCODE_OK;
 }
 
-bool Endpoint::TakeSample(void* sample) {
+bool Endpoint::TakeSample(void* sample, int64_t* sent) {
   void* samples[1] = {sample};
   dds_sample_info_t info[1];
   // A sample that only tells of a writer's end is none.
   while (dds_take(entity_, samples, info, 1, 1) > 0) {
-    if (info[0].valid_data) return true;
+    if (!info[0].valid_data) continue;
+    if (sent != nullptr) *sent = info[0].source_timestamp;
+    return true;
   }
   return false;
 }

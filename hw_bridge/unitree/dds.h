@@ -46,7 +46,8 @@ class Endpoint {
   Endpoint(const Participant& participant, Kind kind, const dds_topic_descriptor_t& type,
            const char* topic, int32_t depth);
   bool WriteSample(const void* sample);
-  bool TakeSample(void* sample);
+  /// `sent`, unless null: when its writer gave it away, ns since the epoch by the writer's clock.
+  bool TakeSample(void* sample, int64_t* sent);
   /// Until a sample is there or the deadline of MonotonicNow.
   bool AwaitSample(int64_t deadline);
 
@@ -73,8 +74,9 @@ class Reader : private Endpoint {
  public:
   Reader(const Participant& participant, const char* topic, int32_t depth = 1)
       : Endpoint(participant, Kind::kReader, DescriptorOf<T>(), topic, depth) {}
-  /// The next sample that has come, if there is one.
-  bool Take(T* sample) { return TakeSample(sample); }
+  /// The next sample that has come, if there is one. `sent`, where given: when its writer gave it
+  /// away, ns since the epoch by the writer's clock.
+  bool Take(T* sample, int64_t* sent = nullptr) { return TakeSample(sample, sent); }
   /// Whether there is one, at the latest at the deadline of MonotonicNow.
   bool Await(int64_t deadline) { return AwaitSample(deadline); }
 };

@@ -22,6 +22,8 @@ class EmulatedRobot {
 
   /// Begins, goes on with and ends the troubles of this time, s.
   void SetTime(double time);
+  /// The robot is somewhere else from the next state on, and has not moved there.
+  void Place() { known_ = false; }
   /// What the robot says `tick` ms after its start, of what the motors report. nullptr: nothing.
   /// `cycle`: of the run, from 1, in simulated time; else 0.
   const LowState* State(const drive_feedback_t& feedback, uint32_t tick, uint32_t cycle = 0);

@@ -1,4 +1,9 @@
-"""Figures of the Python module, in processor time. Usage: PYTHONPATH=build/release/python /usr/bin/python3 tests/benchmarks/python_benchmark.py"""
+"""Figures of the Python module, in processor time. Usage, with build/release/bin on the PATH:
+PYTHONPATH=build/release/python /usr/bin/python3 tests/benchmarks/python_benchmark.py"""
+import json
+import os
+import pathlib
+import subprocess
 import tempfile
 import time
 
@@ -53,7 +58,67 @@ class Holds(poise.Component):
         outputs.task_torque.torque = 0 * inputs.robot_state.joint_position
 
 
-env = poise.Environment("stand", plant=run, components={"task_controller": Holds()})
-with_python = spent(env.step, 5000)
-env = poise.Environment("stand", plant=run)
-print(f"a component in Python: {1e6 * (with_python - spent(env.step, 5000)):.0f} us a tick more than its C++")
+def in_place(components):
+    env = poise.Environment("stand", plant=run, components=components)
+    env.step(500)
+    return spent(env.step, 5000)
+
+
+own, python = in_place(None), in_place({"task_controller": Holds()})
+print(f"a tick with task_controller in C++ {1e6 * own:.1f} us, with one in Python {1e6 * python:.1f} us: {python / own:.1f} times")
+
+# As processes: beside the C++ task_controller two in Python get the same messages in the same run, one that computes nothing, and the
+# springs of the tutorial. Each says how long it took from its last input to its outputs on the way.
+PROGRAM = """#!/usr/bin/python3
+import sys
+
+import poise
+
+
+class Beside(poise.Component):
+    \"\"\"Gets what task_controller gets.\"\"\"
+
+    inputs = {{"robot_state": "robot_state_t", "support_plan": "support_plan_t"}}
+    outputs = {{"task_torque": "task_torque_t"}}
+
+    def configure(self, context):
+        self.robot = context.robot
+        self.start = None
+
+    def step(self, tick, inputs, outputs):
+        state = inputs.robot_state
+        if not {computes}:
+            outputs.task_torque.torque = 0 * state.joint_position
+            return
+        self.start = state.joint_position if self.start is None else self.start
+        feet = inputs.support_plan.in_contact.astype(bool)
+        gravity = self.robot.gravity_torque(state.joint_position, None, state.base_position, state.base_orientation, in_contact=feet)
+        outputs.task_torque.torque = gravity + 600 * (self.start - state.joint_position) - 30 * state.joint_velocity
+
+
+sys.exit(poise.main(Beside))
+"""
+with tempfile.TemporaryDirectory() as folder:
+    place = pathlib.Path(folder)
+    for name in ("lib/poise/bin", "lib/poise/components"):
+        (place / name).mkdir(parents=True)
+    graph = 'name: "beside" base: "balance"\n'
+    names = {"py_nothing": False, "py_springs": True}
+    for name, computes in names.items():
+        program = place / "lib/poise/bin" / name
+        program.write_text(PROGRAM.format(computes=computes))
+        program.chmod(0o755)
+        (place / "lib/poise/components" / f"{name}.json").write_text(subprocess.check_output([program, "--describe"], text=True))
+        graph += f'''channel {{ name: "{name.upper()}" type: "task_torque_t" }}
+            component {{ name: "{name}" input {{ port: "robot_state" channel: "ROBOT_STATE" }}
+                         input {{ port: "support_plan" channel: "SUPPORT_PLAN" }} output {{ port: "task_torque" channel: "{name.upper()}" }} }}\n'''
+    (place / "beside.pbtxt").write_text(graph)
+    (place / "beside_scenario.pbtxt").write_text('name: "beside" base: "stand" graph: "beside"')
+    subprocess.run([os.environ.get("POISE", "poise"), "run", place / "beside_scenario.pbtxt", "--duration", "10", "--quiet", "--out", place / "run"],
+                   env={**os.environ, "POISE_PATH": folder}, check=True, stdout=subprocess.DEVNULL)
+    said = json.loads((place / "run/summary.json").read_text())
+    latency = {each["name"]: each["latency_us"] for each in said["components"]}
+    base = latency["task_controller"]["median"]
+    print(f"as processes, from the last input to the outputs, median: task_controller {base:.0f} us")
+    for name in names:
+        print(f"  {name}: {latency[name]['median']:.0f} us, {latency[name]['median'] / base:.1f} times; p99 {latency[name]['p99']:.0f} us")

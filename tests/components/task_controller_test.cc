@@ -237,7 +237,9 @@ TEST_P(TaskControllerCase, AGainThatAnOperatorSetsIsThatOfAConfiguration) {
     last = torque;
     if (tick == 4) whole_step = difference;
     // 0.5 s after: the same bits.
-    if (tick >= 5 + 250) EXPECT_EQ(difference, 0) << tick;
+    if (tick >= 5 + 250) {
+      EXPECT_EQ(difference, 0) << tick;
+    }
   }
   EXPECT_GT(whole_step, 0);
   // The torque is linear in the gains, which go in a straight line of 250 ticks.

@@ -9,7 +9,7 @@ import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {linesOf, programFacts, repositoryFiles, root} from './markdown.mjs';
+import {commandsOf, programFacts, repositoryFiles, root, untrueLines} from './markdown.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, page: {type: 'string'}}});
 const LIMIT = 400_000;  // ms for a page
@@ -28,35 +28,6 @@ function expectedExit(page, {text}) {
   if (rule === undefined) return 0;
   rule.used = true;
   return rule.kind.startsWith('exit') ? Number(rule.kind.slice(5)) : null;
-}
-
-/** Commands of a page's ```sh blocks: {line, text}; a here document and lines that end with \ belong to theirs. */
-function commandsOf(page) {
-  const commands = [];
-  let open = null;  // the command that goes on
-  let until = null;  // its here document's last line
-  for (const {number, text, code, mark} of linesOf(page)) {
-    if (mark || code !== 'sh') continue;
-    if (open) {
-      open.text += `\n${text}`;
-    } else {
-      if (text.trim() === '' || text.startsWith('#')) continue;
-      open = {line: number, text};
-      commands.push(open);
-    }
-    until ??= /<<\s*'?(\w+)'?/.exec(text)?.[1] ?? null;
-    if (until !== null ? text === until : !text.endsWith('\\')) open = until = null;
-  }
-  return commands;
-}
-
-/** A line without its numbers and its columns' widths, which depend on the machine. */
-const masked = (line) => line.replace(/[\d.]*\d/g, '#').replace(/─+/g, '─').replace(/\s+/g, ' ').trim();
-
-/** Lines of a page's ```text blocks that no line of its commands' output is like: {number, text}. */
-function untrueLines(page, output) {
-  const said = new Set(output.split('\n').map(masked));
-  return linesOf(page).filter(({text, code, mark}) => code === 'text' && !mark && !said.has(masked(text)));
 }
 
 /** A folder like a built checkout, but for the sources: deploy/run does without deploy/setup. */

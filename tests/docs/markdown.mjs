@@ -35,6 +35,35 @@ export function linesOf(file) {
   });
 }
 
+/** Commands of a page's ```sh blocks: {line, text}; a here document and lines that end with \ belong to theirs. */
+export function commandsOf(page) {
+  const commands = [];
+  let open = null;  // the command that goes on
+  let until = null;  // its here document's last line
+  for (const {number, text, code, mark} of linesOf(page)) {
+    if (mark || code !== 'sh') continue;
+    if (open) {
+      open.text += `\n${text}`;
+    } else {
+      if (text.trim() === '' || text.startsWith('#')) continue;
+      open = {line: number, text};
+      commands.push(open);
+    }
+    until ??= /<<\s*'?(\w+)'?/.exec(text)?.[1] ?? null;
+    if (until !== null ? text === until : !text.endsWith('\\')) open = until = null;
+  }
+  return commands;
+}
+
+/** A line without its numbers and its columns' widths, which depend on the machine. */
+const masked = (line) => line.replace(/[\d.]*\d/g, '#').replace(/─+/g, '─').replace(/\s+/g, ' ').trim();
+
+/** Lines of a page's ```text blocks that no line of its commands' output is like: {number, text}. */
+export function untrueLines(page, output) {
+  const said = new Set(output.split('\n').map(masked));
+  return linesOf(page).filter(({text, code, mark}) => code === 'text' && !mark && !said.has(masked(text)));
+}
+
 /** GitHub's anchors of a file's headings. */
 export function anchorsOf(file) {
   const seen = new Map();

@@ -1,17 +1,21 @@
-// examples/foot_load is built against an installed tree that was moved, and runs with the installed programs alone.
+// The tutorial of one's own component, followed literally: examples/foot_load is built against an installed tree that was moved, and runs
+// with the installed programs alone.
 // Usage: POISE_BUILD=build/release node --test installed_test.mjs
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
-import {cpSync, existsSync, mkdtempSync, readFileSync, renameSync, rmSync, writeFileSync} from 'node:fs';
+import {cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, renameSync, rmSync, symlinkSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {fileURLToPath} from 'node:url';
+import {commandsOf, untrueLines} from '../docs/markdown.mjs';
 
 const root = join(dirname(fileURLToPath(import.meta.url)), '../..');
 const build = process.env.POISE_BUILD ?? join(root, 'build/release');
 const folder = mkdtempSync(join(tmpdir(), 'poise-installed-'));
-const prefix = join(folder, 'poise'), project = join(folder, 'lab'), own = join(folder, 'lab-build');
+const home = join(folder, 'home'), checkout = join(folder, 'checkout');
+const prefix = join(home, 'poise'), project = join(home, 'foot_load'), own = join(project, 'build');  // as the tutorial has them
+const page = 'docs/tutorials/own_component.md';
 
 /** What a command prints; only the environment given, so that nothing of this checkout is found by it. */
 function run(command, args, {env = {}, exit = 0} = {}) {
@@ -25,12 +29,25 @@ function run(command, args, {env = {}, exit = 0} = {}) {
 const poise = (args, options = {}) =>
   run(join(prefix, 'bin/poise'), args, {env: {POISE_PATH: own}, ...options});
 
+/** The tutorial's commands, in a folder like a built checkout; what they print. */
+function follow(commands, HOME) {
+  const script = commands.map(({line, text}) => `${text} || { echo "${page}:${line} ended with $?"; exit 1; }\n`).join('');
+  const result = spawnSync('bash', ['-c', `exec 2>&1\n${script}`], {
+    encoding: 'utf8', cwd: checkout, timeout: 280_000, maxBuffer: 1 << 27,
+    env: {PATH: '/usr/local/bin:/usr/bin:/bin', HOME, LANG: 'C.UTF-8'},
+  });
+  assert.equal(result.status, 0, `${result.stdout}${result.error ?? ''}`);
+  return result.stdout;
+}
+
 before(() => {
-  run('cmake', ['--install', build, '--prefix', join(folder, 'elsewhere')]);
-  renameSync(join(folder, 'elsewhere'), prefix);
-  cpSync(join(prefix, 'share/poise/examples/foot_load'), project, {recursive: true});
-  run('cmake', ['-S', project, '-B', own, '-G', 'Ninja', `-DCMAKE_PREFIX_PATH=${prefix}`]);
-  run('cmake', ['--build', own]);
+  for (const made of [home, join(checkout, 'build'), join(folder, 'elsewhere')]) mkdirSync(made, {recursive: true});
+  symlinkSync(build, join(checkout, 'build/release'));
+  const [install, ...others] = commandsOf(page);
+  assert.match(install.text, /^cmake --install/);
+  follow([install], join(folder, 'elsewhere'));
+  renameSync(join(folder, 'elsewhere/poise'), prefix);  // the tree may be moved
+  assert.deepEqual(untrueLines(page, follow(others, home)), []);
 });
 after(() => rmSync(folder, {recursive: true, force: true}));
 

@@ -103,7 +103,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   // Wrong before anything is sent.
   for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"set", "task_controller.orientation.kp=1e9"}, "is outside"},
-           {{"set", "task_controller.com.kq=1"}, "did you mean task_controller.com.kp"},
+           {{"set", "task_controller.com.kq=1"}, "did you mean task_controller.com.k"},
            {{"set", "task_controller.com.kp"}, "is no FIELD=VALUE"},
            {{"push", "--force", "1,2"}, "--force: needs 3 numbers"},
            {{"push", "--force", "nan,0,0"}, "must be finite"},

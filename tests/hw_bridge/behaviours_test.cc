@@ -418,6 +418,25 @@ TEST_F(Behaviour, AfterAResetAFaultyDriveComesUpAgain) {
   EXPECT_EQ(rig.slave(4).drive().state(), ethercat::DriveState::kOperationEnabled);
 }
 
+TEST_F(Behaviour, ASecondFaultNeedsASecondReset) {
+  BridgeRig rig;
+  rig.Start(7.5);
+  for (const int64_t round : {1, 2}) {
+    rig.slave(4).drive().TriggerFault(ethercat::kErrorOverCurrent);
+    rig.Run(100);
+    ASSERT_EQ(rig.status().state, Status::STATE_STOPPED) << round;
+    rig.command.torque.assign(kDrives, 0);
+    rig.stop.reset = 1;
+    rig.Step();
+    EXPECT_EQ(rig.status().resets, round);
+    rig.stop.reset = 0;
+    rig.command.torque.assign(kDrives, 7.5);
+    rig.CyclesUntil([&] { return rig.status().state == Status::STATE_RUNNING; });
+    rig.Run(3);
+    for (size_t i = 0; i < kDrives; ++i) EXPECT_EQ(rig.wire.torque(i), 100) << round;
+  }
+}
+
 TEST_F(Behaviour, LateCyclesStop) {
   BridgeRig rig;
   rig.Start(7.5);

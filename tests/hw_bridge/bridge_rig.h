@@ -2,19 +2,15 @@
 #pragma once
 
 #include <array>
-#include <fstream>
-#include <map>
 #include <memory>
-#include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "components/robot_files/robot_files.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
 #include "hw_bridge/ethercat/links/faulty_link.h"
 #include "hw_bridge/ethercat/links/memory_link.h"
-#include "hw_bridge/hw_bridge.h"
+#include "tests/hw_bridge/bridge_bench.h"
 
 namespace poise {
 
@@ -24,13 +20,6 @@ inline constexpr double kGear = 50;
 inline constexpr double kGravity = 9.80665;
 /// Joint torque, N·m, of one per mille: 50 × 1.5 N·m / 1000.
 inline constexpr double kStep = 0.075;
-
-inline std::string ReadText(const std::string& name) {
-  std::ifstream file(std::string(POISE_SOURCE_DIR "/deploy/") + name);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// A shaft that the test places; keeps the torque it was told.
 struct Shaft final : ethercat::MotorLoad {
@@ -74,14 +63,13 @@ class WireSpy {
   int64_t frames_ = 0;
 };
 
-class BridgeRig {
+class BridgeRig : public BridgeBench {
  public:
   explicit BridgeRig(const std::string& config = "") : config_(config) {
     for (int i = 0; i < kDrives; ++i) chain_config.add_drive();
     MessageTraits<drive_feedback_t>::Resize(sensors, MessageCounts{kDrives, 2});
     sensors.imu_acceleration[2] = kGravity;
     MessageTraits<joint_command_t>::Resize(command, MessageCounts{kDrives, 2});
-    command.run_id = stop.run_id = kRunId;
   }
 
   /// With chain_config as it is then; the drives are in OP, disabled.
@@ -96,17 +84,10 @@ class BridgeRig {
     bridge = std::make_unique<HwBridge>(&signal, [this](const ethercat::LinkConfig&) {
       return std::make_unique<Tap>(faulty.get(), &wire);
     });
-    resources_ = {{"robot", ReadText("robots/dyros/dyros_legs.pbtxt")},
-                  {"urdf", ReadText("robots/dyros/dyros_legs.urdf")}};
-    ComponentContext context;
-    context.name = "hw_bridge";
-    context.config_text = "ethercat { link { udp {} } " + bus + " master { " + master +
-                          " drift_frames: 200 profile {" + ReadText("drives/elmo_gold.pbtxt") +
-                          "} } } " + config_;
-    context.tick_period = 0.002;
-    context.resources = &resources_;
-    context.shared = &shared_;
-    bridge->Configure(context, &wiring_);
+    Configure(Context("ethercat { link { udp {} } " + bus + " master { " + master +
+                      " drift_frames: 200 profile {" + ReadDeployed("drives/elmo_gold.pbtxt") +
+                      "} } } " + config_),
+              kDrives);
     bridge->Open();
   }
 
@@ -114,20 +95,9 @@ class BridgeRig {
   void Step(bool with_command = true, double speed = 0, double lateness = 0) {
     for (size_t j = 0; j < kDrives; ++j) Place(j, shafts[j].angle / kGear + speed * 0.002);
     const int64_t start = link->Now();
-    command.tick = tick_;
-    command.utime = 2000 * tick_;
-    Port("drive_feedback")->Bind(&sensors);
-    Port("joint_command")->Bind(with_command ? &command : nullptr);
-    Port("emergency_stop")->Bind(stop.stop != 0 || stop.reset != 0 || stop_seen_ ? &stop : nullptr);
-    stop_seen_ = stop_seen_ || stop.stop != 0;
-    const Tick tick{.index = tick_, .utime = 2000 * tick_, .time = 0, .lateness = lateness};
-    for (const Stage& stage : wiring_.stages()) {
-      for (OutputPort* output : stage.outputs) output->Stamp(kRunId, tick.index, tick.utime);
-      stage.run(tick);
-      for (OutputPort* output : stage.outputs) withheld_ = output->TakeWithheld() || withheld_;
-    }
+    FindInput("drive_feedback")->Bind(&sensors);
+    RunCycle(with_command, lateness);
     link->AdvanceTo(start + kPeriod);
-    ++tick_;
   }
   void Run(int cycles, double speed = 0) {
     for (int i = 0; i < cycles; ++i) Step(true, speed);
@@ -144,38 +114,21 @@ class BridgeRig {
   template <class Condition>
   int CyclesUntil(Condition condition, bool with_command = true, double speed = 0,
                   double lateness = 0) {
-    for (int cycles = 0; cycles < 2000; ++cycles) {
-      Step(with_command, speed, lateness);
-      if (condition()) return cycles;
-    }
-    return -1;
+    return Count([&] { Step(with_command, speed, lateness); }, condition);
   }
 
   void Place(size_t joint, double angle) { shafts[joint].angle = angle * kGear; }
-  const bridge_status_t& status() const {
-    return *static_cast<const bridge_status_t*>(Find("bridge_status")->message());
-  }
-  const robot_sensors_t& readings() const {
-    return *static_cast<const robot_sensors_t*>(Find("robot_sensors")->message());
-  }
   ethercat::EmulatedSlave& slave(size_t i) { return chain->slave(i); }
-  /// Whether an output was withheld since the last call.
-  bool TakeWithheld() { return std::exchange(withheld_, false); }
 
-  static constexpr int64_t kRunId = 5;
   std::string bus = "attend: false";  // fields of hw_bridge.ethercat
   std::string master;                 // and of its master
-  volatile std::sig_atomic_t signal = 0;
   ethercat::EmulatedChainConfig chain_config;
   std::array<Shaft, kDrives + 1> shafts;  // one more than joints, for a drive too many
   std::unique_ptr<ethercat::EmulatedChain> chain;
   std::unique_ptr<ethercat::MemoryLink> link;
   std::unique_ptr<ethercat::FaultyLink> faulty;
   WireSpy wire;
-  std::unique_ptr<HwBridge> bridge;
   drive_feedback_t sensors;
-  joint_command_t command;
-  emergency_stop_t stop{};
 
  private:
   class Tap final : public ethercat::Link {
@@ -195,25 +148,7 @@ class BridgeRig {
     WireSpy* spy_;
   };
 
-  InputPort* Port(const std::string& name) const {
-    for (InputPort* input : wiring_.inputs()) {
-      if (input->name() == name) return input;
-    }
-    throw std::logic_error("no input " + name);
-  }
-  OutputPort* Find(const std::string& name) const {
-    for (OutputPort* output : wiring_.outputs()) {
-      if (output->name() == name) return output;
-    }
-    throw std::logic_error("no output " + name);
-  }
-
   std::string config_;
-  std::map<std::string, std::string> resources_;
-  SharedObjects shared_;
-  Wiring wiring_;
-  int64_t tick_ = 0;
-  bool stop_seen_ = false, withheld_ = false;
 };
 
 }  // namespace poise

@@ -25,7 +25,7 @@ constexpr int kJoints = 12;
 constexpr int64_t kRun = 9;
 constexpr double kPeriod = 0.002;
 
-std::string ReadText(const std::string& name) {
+std::string ReadDeployed(const std::string& name) {
   std::ifstream file(std::string(POISE_SOURCE_DIR "/deploy/") + name);
   std::stringstream text;
   text << file.rdbuf();
@@ -42,8 +42,8 @@ const robot::RobotModel& Model() {
 template <class T>
 struct Configured {
   void Configure(const std::string& config) {
-    resources = {{"robot", ReadText("robots/dyros/dyros_legs.pbtxt")},
-                 {"urdf", ReadText("robots/dyros/dyros_legs.urdf")}};
+    resources = {{"robot", ReadDeployed("robots/dyros/dyros_legs.pbtxt")},
+                 {"urdf", ReadDeployed("robots/dyros/dyros_legs.urdf")}};
     ComponentContext context;
     context.name = "component";
     context.config_text = config;
@@ -95,7 +95,7 @@ class Pair {
     bridge.Configure(
         fmt::format("ethercat {{ {} simulated_time: true master {{ drift_frames: 100 profile {{ {} "
                     "}} {} }} }} {}",
-                    link, ReadText("drives/elmo_gold.pbtxt"), drives, bridge_config));
+                    link, ReadDeployed("drives/elmo_gold.pbtxt"), drives, bridge_config));
     emulator.Configure(fmt::format("{} simulated_time: true {} {}", link, emulator_config, wiring));
     emulator.component.Open();
     device_ = emulator.component.devices()[0];

@@ -19,7 +19,7 @@ using testing::HasSubstr;
 constexpr int kMotors = 12;
 constexpr int64_t kRunId = 5;
 
-std::string ReadText(const std::string& name) {
+std::string ReadDeployed(const std::string& name) {
   std::ifstream file(POISE_SOURCE_DIR "/deploy/robots/dyros/" + name);
   std::stringstream text;
   text << file.rdbuf();
@@ -29,8 +29,8 @@ std::string ReadText(const std::string& name) {
 class Bridge {
  public:
   explicit Bridge(const std::string& config = "",
-                  const std::string& robot = ReadText("dyros_legs.pbtxt")) {
-    resources_ = {{"robot", robot}, {"urdf", ReadText("dyros_legs.urdf")}};
+                  const std::string& robot = ReadDeployed("dyros_legs.pbtxt")) {
+    resources_ = {{"robot", robot}, {"urdf", ReadDeployed("dyros_legs.urdf")}};
     ComponentContext context;
     context.name = "hw_bridge";
     context.config_text = config;
@@ -252,7 +252,7 @@ INSTANTIATE_TEST_SUITE_P(
                     ConfigCase{"velocity_cutoff: 0", "velocity_cutoff"}));
 
 TEST(HwBridge, AJointWithoutTorqueIsNamed) {
-  std::string robot = ReadText("dyros_legs.pbtxt");
+  std::string robot = ReadDeployed("dyros_legs.pbtxt");
   const std::string peak = "peak_current: 30";
   const size_t at = robot.find(peak);
   ASSERT_NE(at, std::string::npos);

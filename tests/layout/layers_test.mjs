@@ -43,7 +43,7 @@ const BELOW = {
   'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
-const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'live', 'sweep', 'maps', 'commands'];
+const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'live', 'sweep', 'maps', 'benchmark', 'commands'];
 /** Folders that one file may name although it is not below them: where all processes are listed. */
 const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "components/framework/operator_acts.h"
 #include "tests/sim/engine.h"
@@ -130,6 +131,35 @@ TEST(SimComponent, AppliesTheCommandOfTheTickBefore) {
   EXPECT_EQ(bench.feedback().current[3], 0) << "no command: motors free";
 }
 
+// Each command is another, so that the current tells which one the drives have: the new one, or the
+// last one that reached them. How many are lost is binomial.
+TEST(SimComponent, ALostCommandLeavesTheLastOne) {
+  constexpr int kTicks = 200;
+  constexpr double kLoss = 0.3;
+  const auto lost = [](uint64_t seed) {
+    Bench bench(StandingConfig("sensor_noise: false command_loss: 0.3"), seed);
+    std::vector<int> ticks;
+    double held = 0;
+    for (int i = 0; i < kTicks; ++i) {
+      const double current = 0.01 * i;
+      const drive_command_t command = Command(current);
+      bench.Run(i == 0 ? nullptr : &command);
+      const double seen = bench.feedback().current[3];
+      if (i > 0 && seen != current) {
+        EXPECT_EQ(seen, held) << i;
+        ticks.push_back(i);
+      }
+      held = seen;
+    }
+    return ticks;
+  };
+  const std::vector<int> first = lost(1);
+  const double deviation = std::sqrt(kTicks * kLoss * (1 - kLoss));
+  EXPECT_NEAR(static_cast<double>(first.size()), kTicks * kLoss, 4 * deviation);
+  EXPECT_EQ(lost(1), first);
+  EXPECT_NE(lost(2), first);
+}
+
 TEST(SimComponent, SensorReportsTheReactionOfTheTrueWrench) {
   Bench bench(StandingConfig("sensor_noise: false"));
   for (int i = 0; i < 5; ++i) {
@@ -234,7 +264,8 @@ TEST(SimComponent, AFallFailsTheRun) {
 }
 
 TEST(SimComponent, RefusesBadConfigurations) {
-  for (const char* const problem : {"step: 0.003", "push_sensor_noise: -1"}) {
+  for (const char* const problem :
+       {"step: 0.003", "push_sensor_noise: -1", "command_loss: 1", "command_loss: nan"}) {
     try {
       Bench bench(StandingConfig(problem));
       FAIL() << problem;

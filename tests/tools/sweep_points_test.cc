@@ -175,6 +175,14 @@ TEST(SweepPoints, ADrawDependsOnSeedAndRunAlone) {
   }
 }
 
+TEST(SweepPoints, ExpressionsKnowConstants) {
+  const SweepPoints points(
+      Parse("constant { name: 'mass' value: 4 } vary { name: 'a' value: 3 value: 5 } "
+            "assign { field: 'x' value: 'a*mass' }"));
+  EXPECT_EQ(points.Changes(0, {}), std::vector<std::string>{"x=12"});
+  EXPECT_EQ(points.Changes(1, {}), std::vector<std::string>{"x=20"});
+}
+
 TEST(SweepPoints, NamesTheFieldThatIsWrong) {
   EXPECT_EQ(ProblemOf("vary { name: 'a' from: 0 to: 1 steps: 2 }"), "");
   EXPECT_EQ(ProblemOf("random: 5 vary { name: 'a' from: 0 to: 1 }"), "");
@@ -205,6 +213,12 @@ TEST(SweepPoints, NamesTheFieldThatIsWrong) {
       "vary");
   starts("vary { name: 'a' value: 1 } assign { field: 'x' value: 'b' }", "assign[0].value");
   starts("vary { name: 'a' value: 1 } assign { value: 'a' }", "assign[0]");
+  starts("constant { name: 'sin' value: 1 } vary { name: 'a' value: 1 }", "constant[0].name");
+  starts("constant { name: 'c' } vary { name: 'a' value: 1 }", "constant[0].value");
+  starts(
+      "constant { name: 'c' value: 1 } constant { name: 'c' value: 2 } vary { name: 'a' value: 1 }",
+      "constant[1].name");
+  starts("constant { name: 'a' value: 1 } vary { name: 'a' value: 1 }", "vary[0]");
   starts("", "limit.field", true);
   starts("limit { name: 'f' max: 1 }", "limit.min", true);
   starts("limit { name: 'f' min: 2 max: 1 }", "limit.max", true);

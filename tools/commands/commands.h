@@ -21,6 +21,7 @@ void AddRunCommand(CLI::App* app, Command* command);
 void AddMatrixCommand(CLI::App* app, Command* command);
 void AddWorldsCommand(CLI::App* app, Command* command);
 void AddSweepCommand(CLI::App* app, Command* command);
+void AddBenchmarkCommand(CLI::App* app, Command* command);
 void AddLimitCommand(CLI::App* app, Command* command);
 void AddReportCommand(CLI::App* app, Command* command);
 void AddBitsCommand(CLI::App* app, Command* command);

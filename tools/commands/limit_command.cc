@@ -1,75 +1,24 @@
 // `poise limit`: the largest survivable value of a field, for each point of a grid.
-#include <deque>
 #include <memory>
 
 #include "fmt/format.h"
 #include "tools/commands/commands.h"
 #include "tools/maps/sweep_output.h"
-#include "tools/sweep/limit_search.h"
 #include "tools/sweep/sweep_session.h"
 
 namespace poise {
 namespace {
-
-/// The search at one point, and what of it is going on.
-struct PointSearch {
-  int64_t run;
-  LimitSearch search;
-  std::vector<double> asked;  // not answered yet
-
-  /// The next value that is wanted and not asked for.
-  std::optional<double> Next() {
-    for (const double value : search.Wanted()) {
-      if (std::find(asked.begin(), asked.end(), value) != asked.end()) continue;
-      asked.push_back(value);
-      return value;
-    }
-    return {};
-  }
-};
 
 int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
   const SweepDefinition definition(arguments, /*limit=*/true);
   const Limit& limit = definition.sweep().limit();
   const auto [first, end] = SelectedRuns(options, definition.points().size());
   SweepSession session(definition, kKindLimit, options);
-  std::vector<PointSearch> searches;
-  for (int64_t run = first; run < end; ++run) searches.push_back({run, LimitSearch(limit), {}});
-  const auto add = [&, first = first, end = end](const SweepRow& row) {
-    if (row.run < first || row.run >= end) return;
-    searches[static_cast<size_t>(row.run - first)].search.Add(*row.limit, row.stands());
-  };
-  for (const auto& [key, row] : session.rows()) add(row);
   fmt::print("{}: the largest {} of {} to {} at {} points{}, {} runs at a time; {}\n",
              definition.name(), NameOf(limit), limit.min(), limit.max(), end - first,
              session.found() > 0 ? fmt::format(", {} runs done before", session.found()) : "",
              options.jobs, session.folder().string());
-  size_t open = 0;  // first search that is not finished
-  const bool complete = session.Run(
-      [&]() -> std::optional<SweepSession::Request> {
-        while (open < searches.size() && searches[open].search.Wanted().empty()) ++open;
-        for (size_t i = open; i < searches.size(); ++i) {
-          if (const std::optional<double> value = searches[i].Next()) {
-            return SweepSession::Request{searches[i].run, value};
-          }
-        }
-        return {};
-      },
-      add,
-      [&, per_point = LimitSearch::ExpectedRuns(limit)] {
-        SweepSession::Progress progress{0, 0, ""};
-        size_t finished = 0;
-        for (const PointSearch& point : searches) {
-          const bool is_finished = point.search.Wanted().empty();
-          finished += is_finished ? 1 : 0;
-          progress.done += point.search.tried();
-          progress.total +=
-              is_finished ? point.search.tried() : std::max(per_point, point.search.tried() + 1);
-        }
-        progress.text = fmt::format("{} of {} points known, {} runs done", finished,
-                                    searches.size(), static_cast<int64_t>(progress.done));
-        return progress;
-      });
+  const bool complete = RunLimits(PointRange(first, end), &session);
   if (!complete) {
     fmt::print(stderr, "poise: interrupted after {} runs; --resume --out {} goes on\n",
                session.rows().size(), session.folder().string());

@@ -34,7 +34,7 @@ int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
                  : "",
              before > 0 ? fmt::format(", {} done before", before) : "", options.jobs,
              session.folder().string());
-  if (!RunPoints(first, end, &session)) {
+  if (!RunPoints(PointRange(first, end), &session)) {
     fmt::print(stderr, "poise: interrupted; {} of {} runs are done; --resume --out {} goes on\n",
                CountDone(first, end, session.rows()), end - first, session.folder().string());
     return kExitFailed;

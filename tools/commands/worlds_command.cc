@@ -200,7 +200,7 @@ bool SweepWorlds(const std::string& sweep, const WorldsArguments& arguments,
     SweepSession session(definition, kKindSweep, session_options);
     fmt::print("{}: {} runs, {} at a time\n", engine, end - first, session_options.jobs);
     std::fflush(stdout);
-    if (!RunPoints(first, end, &session)) {
+    if (!RunPoints(PointRange(first, end), &session)) {
       fmt::print(stderr, "poise: interrupted\n");
       return false;
     }

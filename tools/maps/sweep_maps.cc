@@ -290,6 +290,11 @@ std::vector<std::string> Maps::OfLimits() const {
          if (p.at_limit == nullptr || !p.at_limit->push) return {};
          return p.at_limit->push->impulse;
        }},
+      {"impulse over the robot's mass [N·s/kg]",
+       [](const LimitPoint& p) -> std::optional<double> {
+         if (p.at_limit == nullptr || !p.at_limit->push) return {};
+         return p.at_limit->push->impulse / p.at_limit->push->mass;
+       }},
       {"share of the pendulum's impulse m w d",
        [](const LimitPoint& p) { return share(p, &PushBound::lip_impulse); }},
       {"share of the pendulum's impulse for the push's duration",

@@ -132,7 +132,8 @@ void PrintOutput(const fs::path& folder, const SweepHeader& header, const SweepR
   std::fflush(stdout);
 }
 
-/// True when no row is kInvalid or kCrashed; else says on stderr which are.
+}  // namespace
+
 bool AllRan(const SweepRows& rows) {
   int problems = 0;
   for (const auto& [key, row] : rows) {
@@ -148,7 +149,11 @@ bool AllRan(const SweepRows& rows) {
   return problems == 0;
 }
 
-}  // namespace
+void WriteSweepFiles(const fs::path& folder, const SweepHeader& header, const SweepRows& rows) {
+  WriteFile(folder / kTableFile, SweepCsv(header, rows));
+  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
+  WriteFile(folder / kMapsFile, MapsPage(header, rows, MapCharts(header, rows)));
+}
 
 bool Deliver(const fs::path& folder, const SweepHeader& header, const SweepRows& rows,
              bool all_pictures) {

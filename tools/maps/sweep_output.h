@@ -7,6 +7,14 @@
 
 namespace poise {
 
+/// Writes table.csv, maps.html, and limits.csv of a search for limits, of the rows there are.
+/// Throws ConfigError.
+void WriteSweepFiles(const std::filesystem::path& folder, const SweepHeader& header,
+                     const SweepRows& rows);
+
+/// False when a row is kInvalid or kCrashed; says on stderr which are.
+bool AllRan(const SweepRows& rows);
+
 /// Writes table.csv, maps.html, each map as map_N.svg, and limits.csv of a search for limits, of
 /// the rows there are. Prints what they came to and which files there are, while the maps that the
 /// sweep asks for and those of survival, or with `all_pictures` every map, become map_N.png; says

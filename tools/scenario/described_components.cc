@@ -14,6 +14,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
+std::set<std::string>& Described() {
+  static std::set<std::string> names;
+  return names;
+}
+
 InputKind KindOf(const std::string& kind) {
   if (kind == "same tick") return InputKind::kSameTick;
   if (kind == "tick before") return InputKind::kPreviousTick;
@@ -37,13 +42,15 @@ ComponentType ReadDescription(const fs::path& file) {
     if (ports.empty()) throw ConfigError("it has neither inputs nor outputs");
     const std::string name = json.at("name");
     if (name != file.stem()) {
-      throw ConfigError(fmt::format("it describes '{}': the file's name must be {}.json", name, name));
+      throw ConfigError(
+          fmt::format("it describes '{}': the file's name must be {}.json", name, name));
     }
     return ProgramType(name, json.value("summary", ""), std::move(ports));
   } catch (const std::exception& error) {
-    throw ConfigError(fmt::format("{}: is no description of a component ({}); write it with: "
-                                  "NAME --describe",
-                                  file.string(), error.what()));
+    throw ConfigError(
+        fmt::format("{}: is no description of a component ({}); write it with: "
+                    "NAME --describe",
+                    file.string(), error.what()));
   }
 }
 
@@ -57,8 +64,14 @@ void LoadDescriptions() {
     for (const auto& entry : fs::directory_iterator(folder / "lib/poise/components", error)) {
       if (entry.path().extension() == ".json") files.insert(entry.path());
     }
-    for (const fs::path& file : files) AddComponent(ReadDescription(file));
+    for (const fs::path& file : files) {
+      ComponentType type = ReadDescription(file);
+      Described().insert(type.name);
+      AddComponent(std::move(type));
+    }
   }
 }
+
+bool IsDescribed(const std::string& type) { return Described().contains(type); }
 
 }  // namespace poise

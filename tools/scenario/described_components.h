@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "components/framework/component_type.h"
 
@@ -11,6 +12,9 @@ namespace poise {
 /// `lib/poise/bin/NAME --describe` prints (name, summary, inputs, outputs). Once, after LoadModules
 /// and before Components. Throws ConfigError naming the file: it is no such description.
 void LoadDescriptions();
+
+/// Whether the type is one of them: it cannot run in another's process.
+bool IsDescribed(const std::string& type);
 
 /// One of them. Throws ConfigError.
 ComponentType ReadDescription(const std::filesystem::path& file);

@@ -1,6 +1,7 @@
 #include "tools/sweep/sweep_definition.h"
 
 #include <google/protobuf/text_format.h>
+#include <link.h>
 
 #include <algorithm>
 #include <boost/uuid/name_generator_sha1.hpp>
@@ -149,6 +150,21 @@ Assignment ParseExpression(const std::string& text) {
   return assign;
 }
 
+/// Shared libraries of this process that are Poise's or a user's, in the order they were loaded.
+std::vector<fs::path> OwnLibraries() {
+  std::vector<fs::path> files;
+  dl_iterate_phdr(
+      [](dl_phdr_info* info, size_t, void* to) {
+        const fs::path file(info->dlpi_name);
+        const bool own = file.filename().string().starts_with("libpoise") ||
+                         file.parent_path().filename() == "modules";
+        if (own) static_cast<std::vector<fs::path>*>(to)->push_back(file);
+        return 0;
+      },
+      &files);
+  return files;
+}
+
 bool ParsesAsScenario(const std::string& file) {
   try {
     ScenarioFiles files{fs::path(file)};
@@ -185,6 +201,7 @@ SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(st
   for (const std::string& flag : arguments.expression) {
     *sweep.add_assign() = ParseExpression(flag);
   }
+  for (const Constant& constant : arguments.constant) *sweep.add_constant() = constant;
   for (const std::string& name : arguments.column) sweep.add_column(name);
   if (arguments.random) sweep.set_random(*arguments.random);
   if (arguments.seed) sweep.set_seed(*arguments.seed);
@@ -377,8 +394,10 @@ RunChanges SweepDefinition::ChangesOf(int64_t run, const std::optional<double>& 
 }
 
 std::string ProgramDigest() {
-  return Digest(
-      fmt::format("{} {}", ReadFile("/proc/self/exe"), fmt::join(LibraryVersions(), " ")));
+  std::string all = ReadFile("/proc/self/exe");
+  // Most of the program is in Poise's library; users' components are in modules.
+  for (const fs::path& file : OwnLibraries()) all += Digest(ReadFile(file.string()));
+  return Digest(fmt::format("{} {}", all, fmt::join(LibraryVersions(), " ")));
 }
 
 }  // namespace poise

@@ -19,9 +19,10 @@ struct SweepArguments {
   std::vector<std::string> expression;  ///< FIELD=EXPRESSION
   std::vector<std::string> column;
   std::optional<int64_t> random;
-  std::optional<uint64_t> seed;  ///< of what is drawn
-  RunChanges changes;            ///< of every run: variant, without, ideal, set, duration
-  std::optional<Limit> limit;    ///< poise limit alone: fields that are given replace the file's
+  std::optional<uint64_t> seed;    ///< of what is drawn
+  RunChanges changes;              ///< of every run: variant, without, ideal, set, duration
+  std::optional<Limit> limit;      ///< poise limit alone: fields that are given replace the file's
+  std::vector<Constant> constant;  ///< after the file's
 };
 
 /// A sweep that has been checked as far as can be without running it.
@@ -58,7 +59,7 @@ class SweepDefinition {
   std::string digest_;
 };
 
-/// A digest of this program's file and the ODE library's version.
+/// A digest of this program's file, Poise's library, the modules, and the libraries' versions.
 std::string ProgramDigest();
 
 }  // namespace poise

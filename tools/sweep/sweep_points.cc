@@ -182,6 +182,7 @@ std::vector<std::string> SweepPoints::Changes(int64_t run,
                                               const std::optional<double>& limit) const {
   std::vector<std::string> changes;
   std::map<std::string, double> numbers;
+  for (const Constant& constant : sweep_.constant()) numbers[constant.name()] = constant.value();
   std::string where = fmt::format("run {}", run);
   const auto add_number = [&](const std::string& name, const std::string& field, double number) {
     if (IsExpressionName(name)) numbers[name] = number;
@@ -218,6 +219,24 @@ std::optional<SweepProblem> CheckVariables(const Sweep& sweep, bool limit) {
   std::map<std::string, double> numbers;
   std::set<std::string> names;
   double runs = 1;
+  for (int i = 0; i < sweep.constant_size(); ++i) {
+    const Constant& constant = sweep.constant(i);
+    const std::string path = fmt::format("constant[{}].", i);
+    if (!IsExpressionName(constant.name())) {
+      return SweepProblem{path + "name",
+                          fmt::format("is '{}'; use letters, digits and _, and not the name of a "
+                                      "function or constant",
+                                      constant.name())};
+    }
+    if (!constant.has_value() || !std::isfinite(constant.value())) {
+      return SweepProblem{path + "value", "must be a finite number"};
+    }
+    if (!names.insert(constant.name()).second) {
+      return SweepProblem{path + "name",
+                          fmt::format("is '{}', as another constant's is", constant.name())};
+    }
+    numbers[constant.name()] = constant.value();
+  }
   for (int i = 0; i < sweep.vary_size(); ++i) {
     const Variable& v = sweep.vary(i);
     const std::string path = fmt::format("vary[{}]", i);

@@ -1,11 +1,14 @@
 #include "tools/sweep/sweep_run.h"
 
 #include <google/protobuf/text_format.h>
+#include <stdlib.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/runners/inline_runner.h"
@@ -20,6 +23,8 @@
 #include "tools/report/run_story.h"
 #include "tools/run/estimates.h"
 #include "tools/run/run_dir.h"
+#include "tools/run/scenario_run.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -33,6 +38,51 @@ struct Prepared {
   LoadedScenario loaded;
   RunSpec spec;
 };
+
+/// A folder that goes with what is done in it.
+class TemporaryDir {
+ public:
+  TemporaryDir() {
+    std::string name = (fs::temp_directory_path() / "poise-sweep-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw std::system_error(errno, std::generic_category(), name);
+    }
+    path_ = name;
+  }
+  ~TemporaryDir() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryDir(const TemporaryDir&) = delete;
+  TemporaryDir& operator=(const TemporaryDir&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Whether one process cannot hold the run.
+bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
+  if (!changes.drives.empty()) return true;
+  const auto& components = spec.graph().component();
+  return std::any_of(components.begin(), components.end(),
+                     [](const ComponentInstance& each) { return IsDescribed(TypeOf(each)); });
+}
+
+/// Runs as processes and reads the log.
+logging::RunRecord RecordOfProcesses(const std::string& scenario, const RunChanges& changes,
+                                     const std::string& log_dir, std::string* end_detail) {
+  std::optional<TemporaryDir> temporary;
+  if (log_dir.empty()) temporary.emplace();
+  const fs::path folder = temporary ? temporary->path() / "run" : fs::path(log_dir);
+  RunOptions options;
+  options.changes = changes;
+  options.quiet = true;
+  options.force = true;
+  const RunOutcome outcome = ScenarioRun(scenario, options).RunOnly(folder.string());
+  if (!outcome.completed) *end_detail = outcome.message;
+  return logging::ReadRun(folder / "run.lcm");
+}
 
 /// Runs to the end and takes the record, from memory or from the log in `log_dir`.
 logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
@@ -108,7 +158,9 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
     return row;
   }
   const Scenario& merged = prepared->loaded.scenario;
-  logging::RunRecord run = Record(*prepared, log_dir, &row.reason);
+  logging::RunRecord run = NeedsProcesses(prepared->spec, changes)
+                               ? RecordOfProcesses(scenario, changes, log_dir, &row.reason)
+                               : Record(*prepared, log_dir, &row.reason);
   run.first_tick = FirstCheckedTick(merged, run);
   ReadEvents(run, &row);
   const bool whole = run.num_ticks >= run.spec.num_ticks() && row.reason.empty();

@@ -42,8 +42,10 @@ struct SweepRow {
 };
 
 /// Runs `scenario` with `changes` in this process, without a log, or with a run's folder in
-/// `log_dir`. What cannot be run is kInvalid. `row`: its run and limit are taken from it. Throws
-/// what only the machine can be blamed for: memory, disk.
+/// `log_dir`; as processes, in lockstep, where drives are emulated or a component is a program of
+/// its own (described_components.h): the row is the same. What cannot be run is kInvalid. `row`:
+/// its run and limit are taken from it. Throws what only the machine can be blamed for: memory,
+/// disk.
 SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
                   const std::vector<std::string>& metrics, const std::string& log_dir,
                   SweepRow row);

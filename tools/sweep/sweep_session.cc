@@ -5,6 +5,7 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
+#include <numeric>
 #include <stdexcept>
 #include <thread>
 
@@ -18,6 +19,7 @@
 #include "tools/scenario/ablations.h"
 #include "tools/scenario/run_setup.h"
 #include "tools/scenario/scenario_loading.h"
+#include "tools/sweep/limit_search.h"
 #include "tools/sweep/sweep_workers.h"
 
 namespace poise {
@@ -165,19 +167,86 @@ int64_t CountDone(int64_t first, int64_t end, const SweepRows& rows) {
   });
 }
 
-bool RunPoints(int64_t first, int64_t end, SweepSession* session) {
-  int64_t done = CountDone(first, end, session->rows());
-  int64_t next = first;
+std::vector<int64_t> PointRange(int64_t first, int64_t end) {
+  std::vector<int64_t> points(static_cast<size_t>(end - first));
+  std::iota(points.begin(), points.end(), first);
+  return points;
+}
+
+bool RunPoints(const std::vector<int64_t>& points, SweepSession* session) {
+  auto done = std::count_if(points.begin(), points.end(), [&](int64_t point) {
+    return session->rows().contains({point, 0});
+  });
+  auto next = points.begin();
   return session->Run(
       [&]() -> std::optional<SweepSession::Request> {
-        while (next < end && session->rows().contains({next, 0})) ++next;
-        if (next >= end) return {};
-        return SweepSession::Request{next++, {}};
+        while (next != points.end() && session->rows().contains({*next, 0})) ++next;
+        if (next == points.end()) return {};
+        return SweepSession::Request{*next++, {}};
       },
       [&](const SweepRow&) { ++done; },
       [&] {
-        return SweepSession::Progress{static_cast<double>(done), static_cast<double>(end - first),
-                                      fmt::format("{} of {} runs done", done, end - first)};
+        return SweepSession::Progress{static_cast<double>(done), static_cast<double>(points.size()),
+                                      fmt::format("{} of {} runs done", done, points.size())};
+      });
+}
+
+namespace {
+
+/// The search at one point, and what of it is going on.
+struct PointSearch {
+  int64_t run;
+  LimitSearch search;
+  std::vector<double> asked;  // not answered yet
+
+  /// The next value that is wanted and not asked for.
+  std::optional<double> Next() {
+    for (const double value : search.Wanted()) {
+      if (std::find(asked.begin(), asked.end(), value) != asked.end()) continue;
+      asked.push_back(value);
+      return value;
+    }
+    return {};
+  }
+};
+
+}  // namespace
+
+bool RunLimits(const std::vector<int64_t>& points, SweepSession* session) {
+  const Limit& limit = session->header().sweep.limit();
+  std::vector<PointSearch> searches;
+  for (const int64_t run : points) searches.push_back({run, LimitSearch(limit), {}});
+  const auto add = [&](const SweepRow& row) {
+    const auto found = std::find_if(searches.begin(), searches.end(),
+                                    [&](const PointSearch& each) { return each.run == row.run; });
+    if (found != searches.end()) found->search.Add(*row.limit, row.stands());
+  };
+  for (const auto& [key, row] : session->rows()) add(row);
+  size_t open = 0;  // first search that is not finished
+  return session->Run(
+      [&]() -> std::optional<SweepSession::Request> {
+        while (open < searches.size() && searches[open].search.Wanted().empty()) ++open;
+        for (size_t i = open; i < searches.size(); ++i) {
+          if (const std::optional<double> value = searches[i].Next()) {
+            return SweepSession::Request{searches[i].run, value};
+          }
+        }
+        return {};
+      },
+      add,
+      [&, per_point = LimitSearch::ExpectedRuns(limit)] {
+        SweepSession::Progress progress{0, 0, ""};
+        size_t finished = 0;
+        for (const PointSearch& point : searches) {
+          const bool is_finished = point.search.Wanted().empty();
+          finished += is_finished ? 1 : 0;
+          progress.done += point.search.tried();
+          progress.total +=
+              is_finished ? point.search.tried() : std::max(per_point, point.search.tried() + 1);
+        }
+        progress.text = fmt::format("{} of {} points known, {} runs done", finished,
+                                    searches.size(), static_cast<int64_t>(progress.done));
+        return progress;
       });
 }
 

@@ -85,9 +85,16 @@ class SweepSession {
   std::optional<SweepResultsWriter> writer_;
 };
 
-/// Runs points `first` to `end` - 1 of a sweep that have no row yet, with progress. False when a
-/// signal ended it. Throws as SweepSession::Run does.
-bool RunPoints(int64_t first, int64_t end, SweepSession* session);
+/// Points `first` to `end` - 1.
+std::vector<int64_t> PointRange(int64_t first, int64_t end);
+
+/// Runs the points of a sweep that have no row yet, with progress. False when a signal ended it.
+/// Throws as SweepSession::Run does.
+bool RunPoints(const std::vector<int64_t>& points, SweepSession* session);
+
+/// Searches the limit at these points, from what is known, with progress. `session`: of a search
+/// for limits. As RunPoints.
+bool RunLimits(const std::vector<int64_t>& points, SweepSession* session);
 
 /// How many of these points have a row.
 int64_t CountDone(int64_t first, int64_t end, const SweepRows& rows);

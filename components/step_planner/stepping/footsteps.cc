@@ -33,6 +33,20 @@ Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& comma
   return step;
 }
 
+Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
+                 int foot, const FootstepLimits& limits) {
+  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  Vector2d way = wanted.position - step.position;
+  const double size = way.norm();
+  if (size > most) way *= most / size;
+  const double turn = std::remainder(wanted.yaw - step.yaw, 2 * M_PI);
+  Footstep moved{step.position + way, step.yaw + std::clamp(turn, -most, most)};
+  Vector2d beside = Turned(-stance.yaw, moved.position - stance.position);
+  beside.y() = side * std::max(side * beside.y(), limits.least_spacing);
+  moved.position = stance.position + Turned(stance.yaw, beside);
+  return moved;
+}
+
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn) {
   WalkCommand next = command;

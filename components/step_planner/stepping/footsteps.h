@@ -34,6 +34,11 @@ struct FootstepLimits {
 Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits);
 
+/// `step`, beside `stance`, moved towards `wanted` by at most `most`, m and rad; the soles do not
+/// touch.
+Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
+                 int foot, const FootstepLimits& limits);
+
 /// `command` approached from `from` by at most `speed`, m/s, and `turn`, rad/s.
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,
                      double turn);

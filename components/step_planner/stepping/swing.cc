@@ -53,11 +53,10 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
   const auto point = [&](int i) {
     return Quintic::Point{from.position[i], from.velocity[i], from.acceleration[i]};
   };
-  const double duration = end_ - start_;
+  const double duration = spec.across < 1 ? Across(start_) : end_ - start_;
   x_.Begin(point(0), {foothold.x()}, start_, duration);
   y_.Begin(point(1), {foothold.y()}, start_, duration);
-  // A foot that is higher than it has to be goes no higher.
-  apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z());
+  apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z() + spec.rise);
   rise_.Begin(point(2), {apex_height_}, start_, apex_ - start_);
   fall_.Begin({apex_height_}, {foothold.z(), -spec.touch_speed}, apex_, end_ - apex_);
   from_rotation_ = rotation;
@@ -70,8 +69,9 @@ void Swing::Move(const Eigen::Vector2d& foothold, double time, double end) {
   end = std::max(end, time + std::max(spec_.freeze, kLeastTime));
   const Quintic::Point x = x_.At(time), y = y_.At(time);
   foothold_.head<2>() = foothold;
-  x_.Begin(x, {foothold.x()}, time, end - time);
-  y_.Begin(y, {foothold.y()}, time, end - time);
+  const double duration = spec_.across < 1 ? Across(time) : end - time;
+  x_.Begin(x, {foothold.x()}, time, duration);
+  y_.Begin(y, {foothold.y()}, time, duration);
   if (end == end_) return;
   if (time < apex_) {
     const Quintic::Point z = rise_.At(time);
@@ -82,6 +82,11 @@ void Swing::Move(const Eigen::Vector2d& foothold, double time, double end) {
     fall_.Begin(fall_.At(time), {foothold_.z(), -spec_.touch_speed}, time, end - time);
   }
   end_ = end;
+}
+
+double Swing::Across(double time) const {
+  return std::max(start_ + spec_.across * (end_ - start_) - time,
+                  std::max(spec_.freeze, kLeastTime));
 }
 
 double Swing::Progress(double time) const {

@@ -27,9 +27,11 @@ class Quintic {
 };
 
 struct SwingSpec {
-  double clearance = 0;    ///< m above the foothold; a foot that begins higher rises no more
+  double clearance = 0;    ///< m above the foothold; a foot that begins higher rises by `rise`
   double touch_speed = 0;  ///< m/s, downward, with which it meets the ground
   double freeze = 0;       ///< s before the end, from when on the foothold stays
+  double rise = 0;         ///< m above where it begins that the foot rises at least
+  double across = 1;       ///< share of the time after which the foot is above its foothold
 };
 
 /// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,
@@ -39,8 +41,7 @@ struct SwingSpec {
 class Swing {
  public:
   /// From the motion `from`, turned by `rotation`, to rest (but for touch_speed) at `foothold`, m,
-  /// world, `level` its sole's rotation there, at `end`, s. A foot that is higher than it has to be
-  /// goes no higher.
+  /// world, `level` its sole's rotation there, at `end`, s.
   void Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
              const Eigen::Vector3d& foothold, const Eigen::Matrix3d& level, double time, double end,
              const SwingSpec& spec);
@@ -60,6 +61,9 @@ class Swing {
   SwingSpec spec_;
   Quintic x_, y_, rise_, fall_;
   Eigen::Vector3d foothold_ = Eigen::Vector3d::Zero();
+  /// s until it is above the foothold.
+  double Across(double time) const;
+
   double start_ = 0, apex_ = 0, end_ = 0;  // s
   double apex_height_ = 0;                 // m
   Eigen::Matrix3d from_rotation_ = Eigen::Matrix3d::Identity();

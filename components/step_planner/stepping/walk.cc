@@ -18,12 +18,37 @@ constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
 constexpr int kAhead = 3;
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
-constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
+constexpr int kHalvings = 40;           // of [0, 1]
+constexpr double kLongestLetGo = 0.06;  // s of settling that this counts of
+constexpr double kPressed = 0.8;        // share of the press' load that counts as such
+constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
 
+WalkSpec Pressing(WalkSpec spec) {
+  spec.press_load = std::max(spec.press_load, spec.touch_load);
+  return spec;
+}
+
 }  // namespace
+
+Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
+    : choice_(choice),
+      spec_(Pressing(spec)),
+      touch_(spec.touch_load, spec.touch_duration),
+      height_(spec.height_rate),
+      body_yaw_(spec.yaw_rate),
+      ramp_start_(RampStart(spec.press_share)) {}
+
+double RampStart(double share) {
+  double low = 0, high = 1;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (balance::SmoothStep(middle) < share ? low : high) = middle;
+  }
+  return low;
+}
 
 void Walk::Enter(WalkStage stage, double time) {
   stage_ = stage;
@@ -37,6 +62,18 @@ Footstep Walk::Standing(const StepState& state, int foot) const {
 
 Footstep Walk::Next(const Footstep& stance, int foot) const {
   return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
+}
+
+Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
+  // At the end the feet come side by side, wherever that is.
+  const double most = closing_ ? 0 : spec_.line;
+  return Towards(Next(stance, foot), Next(way_, foot), most, stance, foot, spec_.step);
+}
+
+bool Walk::LiftsOff(const StepState& state, double time) const {
+  if (time < since_ + spec_.unload - kTimeTolerance) return false;
+  const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
+  return !spec_.rests || off.norm() < spec_.off_center;
 }
 
 bool Walk::FeetTogether(const StepState& state) const {
@@ -69,12 +106,13 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
       break;
     case WalkStage::kUnloading:
-      if (time >= since_ + spec_.unload - kTimeTolerance) BeginSwing(input);
+      if (LiftsOff(state, time)) BeginSwing(input);
       break;
     case WalkStage::kSwinging:
       if (swing_.Progress(time) < kRiseOver) {
         touch_.Reset();
       } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
+        settled_since_ = time;
         Enter(WalkStage::kTouching, time);
       }
       break;
@@ -94,7 +132,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
   }
   state.in_contact = in_contact_;
   PlanFrom(state);
-  if (stage_ == WalkStage::kSwinging) Adjust(input, state);
+  if (stage_ == WalkStage::kSwinging && !spec_.rests) Adjust(input, state);
   Lead(input, state);
   time_ = time;
   return true;
@@ -113,7 +151,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   height_.Begin(input.com_height);
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
-  foothold_ = Next(Standing(state, stance_), 1 - stance_);
+  way_ = Standing(state, stance_);
+  foothold_ = Next(way_, 1 - stance_);
   left_over_.setZero();
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
@@ -121,7 +160,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   // From rest to the capture point and its velocity at lift-off; the centre of pressure is
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
-  const CapturePlan::Point lift_off = plan_.At(0);
+  const Vector2d above = state.sole[static_cast<size_t>(stance_)];
+  const CapturePlan::Point lift_off = spec_.rests ? CapturePlan::Point{above, above} : plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {
@@ -145,10 +185,20 @@ void Walk::BeginSwing(const StepInput& input) {
 }
 
 double Walk::Loaded(const StepInput& input) const {
-  return std::clamp(input.load[static_cast<size_t>(1 - stance_)] / spec_.touch_load, 0.0, 1.0);
+  return std::clamp(input.load[static_cast<size_t>(1 - stance_)] / spec_.press_load, 0.0, 1.0);
 }
 
-bool Walk::Settled(const StepInput& input) const {
+double Walk::Missing(const StepInput& input) const {
+  const double load = input.load[static_cast<size_t>(1 - stance_)];
+  return std::clamp(1 - load / spec_.press_load, -1.0, 1.0);
+}
+
+bool Walk::Settled(const StepInput& input) {
+  if (spec_.rests) {
+    // The sole has lain under its load for as long.
+    if (Loaded(input) < kPressed) settled_since_ = input.time;
+    return input.time >= settled_since_ + spec_.settle - kTimeTolerance;
+  }
   // Not before the capture point is where both feet are to take it over.
   const double since = std::max(since_, touch_down_);
   return input.time >= since + spec_.settle - kTimeTolerance && Loaded(input) >= 1;
@@ -157,14 +207,16 @@ bool Walk::Settled(const StepInput& input) const {
 void Walk::LetGo(const StepInput& input) {
   const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(1 - stance_)];
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
-  const double share = period / (kLetGo * spec_.settle + period);
+  const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
   const double loaded = Loaded(input);
+  const double pulled = spec_.press_share > 0 ? 0 : loaded;
   output_.swing.position +=
-      share * Vector3d(1, 1, loaded).cwiseProduct(sole.translation() - output_.swing.position);
+      share * Vector3d(1, 1, pulled).cwiseProduct(sole.translation() - output_.swing.position);
   double& z = output_.swing.position.z();
   const double lowest = std::min(z, swing_.foothold().z() - spec_.search_depth);
-  z = std::max(z - period * (1 - loaded) * spec_.foot.touch_speed, lowest);
+  const double missing = spec_.press_share > 0 ? Missing(input) : 1 - loaded;
+  z = std::max(z - period * missing * spec_.foot.touch_speed, lowest);
   output_.swing.velocity -= share * output_.swing.velocity;
   output_.swing.acceleration.setZero();
   RotationMotion& turn = output_.swing_rotation;
@@ -179,6 +231,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   ++num_steps_;
   in_contact_ = {true, true};
   from_cop_ = wanted_.cop;
+  way_ = Next(way_, 1 - stance_);
   stance_ = 1 - stance_;
   double_since_ = input.time;
   Enter(WalkStage::kLoading, input.time);
@@ -186,7 +239,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   closing_ = !command_.stepping;
-  foothold_ = Next(Standing(state, stance_), 1 - stance_);
+  foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
 }
 
 void Walk::PlanFrom(const StepState& state) {
@@ -229,7 +282,7 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   const Vector2d& stance = state.sole[s];
   // The plan for the foothold that the command asks for.
   const Vector2d moved = foothold_.position;
-  foothold_.position = Next(Standing(state, stance_), 1 - stance_).position;
+  foothold_.position = NextOnWay(Standing(state, stance_), 1 - stance_).position;
   PlanFrom(state);
   const Vector2d planned = plan_.At(spec_.single()).capture_point;
   const Vector2d now = state.pendulum.capture_point();
@@ -266,6 +319,13 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   swing_.Move(foothold, input.time, touch_down_);
 }
 
+double Walk::Progress(double time) const {
+  const double past = time - since_;
+  if (stage_ == WalkStage::kUnloading) return std::clamp(past / spec_.unload, 0.0, 1.0);
+  // From what the press carries.
+  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / spec_.load, 0.0, 1.0);
+}
+
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
   const double edge = choice_.limits().edge;
   const auto s = static_cast<size_t>(stance_), o = 1 - s;
@@ -280,8 +340,7 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
   const double free =
       std::clamp((wanted_.cop - state.sole[o]).dot(way) / way.squaredNorm(), 0.0, 1.0);
   const bool loading = stage_ == WalkStage::kLoading;
-  const double ramp =
-      balance::SmoothStep((input.time - since_) / (loading ? spec_.load : spec_.unload));
+  const double ramp = balance::SmoothStep(Progress(input.time));
   const double share = loading ? ramp * free : free + ramp * (1 - free);
   // Corner for corner: all of the sum of two equal soles, a part of it where one is turned.
   const auto corners = std::min(sole.corners().size(), other.corners().size());
@@ -290,6 +349,19 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
     mixed[i] = share * sole.corner[i] + (1 - share) * other.corner[i];
   }
   return balance::ConvexHull({mixed.data(), corners});
+}
+
+CapturePlan::Point Walk::Resting(const StepState& state, double time) const {
+  const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
+  if (OnOneFoot()) return {stance, stance};
+  const Vector2d& other = state.sole[static_cast<size_t>(1 - stance_)];
+  const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
+  // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, beyond the next middle at last.
+  const double s = std::clamp((time - double_since_) / Transfer(), 0.0, 1.0);
+  const double share = s * s * s * (10 + s * (-15 + 6 * s));
+  const double rate = 30 * s * s * (1 - s) * (1 - s) / Transfer();
+  const Vector2d point = other + share * way;
+  return {point, point - rate / state.pendulum.frequency * way};
 }
 
 Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
@@ -309,10 +381,14 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
       [[fallthrough]];
     case WalkStage::kLoading:
     case WalkStage::kStopping:
-      wanted_ = plan_.At(time - double_since_);
+      wanted_ = spec_.rests ? Resting(state, time) : plan_.At(time - double_since_);
       break;
     case WalkStage::kSwinging:
     case WalkStage::kTouching:
+      if (spec_.rests) {
+        wanted_ = Resting(state, time);
+        break;
+      }
       wanted_ = plan_.At(spec_.single() - std::max(due - time, 0.0));
       // Later than planned the capture point waits where it is, as far as the sole lets it.
       wanted_.cop +=
@@ -371,9 +447,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   }
   output_.transition = stage_ == WalkStage::kUnloading ? -1 : stage_ == WalkStage::kLoading ? 1 : 0;
   output_.foot = stage_ == WalkStage::kLoading ? stance_ : 1 - stance_;
-  const double ramp = stage_ == WalkStage::kUnloading ? spec_.unload : spec_.load;
-  output_.progress =
-      output_.transition == 0 ? 0 : std::clamp((input.time - since_) / ramp, 0.0, 1.0);
+  output_.progress = output_.transition == 0 ? 0 : Progress(input.time);
 }
 
 void Walk::Archive(StateArchive* archive) {
@@ -384,7 +458,7 @@ void Walk::Archive(StateArchive* archive) {
   height_.Archive(archive);
   body_yaw_.Archive(archive);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
-                start_yaw_, starting_, closing_, final_);
+                start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);

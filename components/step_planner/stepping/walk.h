@@ -32,6 +32,12 @@ struct WalkSpec {
   double lower = 0;        ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+  bool rests = false;  ///< the capture point, above the sole that carries, until both do
+  double press_load =
+      0;  ///< N with which a foot that has touched is pressed down; at least touch_load
+  double press_share = 0;  ///< of the weight that this is; 0: it only has to touch
+  double off_center = 0;   ///< m of the capture point beside the sole's middle at lift-off, at most
+  double line = 0;         ///< m, rad by which a foothold comes back to the commanded way
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -49,16 +55,14 @@ enum class WalkStage {
   kStopping
 };
 
+/// Where the ramp (61) has risen to `share`.
+double RampStart(double share);
+
 /// Pure function of its calls; never allocates.
 class Walk {
  public:
   Walk() = default;
-  Walk(const StepChoice& choice, const WalkSpec& spec)
-      : choice_(choice),
-        spec_(spec),
-        touch_(spec.touch_load, spec.touch_duration),
-        height_(spec.height_rate),
-        body_yaw_(spec.yaw_rate) {}
+  Walk(const StepChoice& choice, const WalkSpec& spec);
 
   /// Once a tick. False: the robot stands, `output` is not to be used.
   bool Update(const StepInput& input, const WalkCommand& command);
@@ -94,7 +98,11 @@ class Walk {
   void LetGo(const StepInput& input);
   /// Share of the touch's load on the foot that comes down, at most 1.
   double Loaded(const StepInput& input) const;
-  bool Settled(const StepInput& input) const;
+  /// What is missing of the press' load, as a share of it, −1 to 1.
+  double Missing(const StepInput& input) const;
+  bool Settled(const StepInput& input);
+  /// Of the ramp that is under way, 0 to 1.
+  double Progress(double time) const;
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
     return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
@@ -102,6 +110,13 @@ class Walk {
   bool AtRest(const StepInput& input, const StepState& state);
   Footstep Standing(const StepState& state, int foot) const;
   Footstep Next(const Footstep& stance, int foot) const;
+  /// The same, brought back to the commanded way.
+  Footstep NextOnWay(const Footstep& stance, int foot) const;
+  /// The plan of a walk that rests: from above one sole to above the other while both carry.
+  CapturePlan::Point Resting(const StepState& state, double time) const;
+  /// The foot may leave the ground.
+  bool LiftsOff(const StepState& state, double time) const;
+  double Transfer() const { return spec_.load + spec_.unload; }  ///< s
   /// Of the plan, from the first piece that is not over; `stance`: the sole that carries.
   void PlanFrom(const StepState& state);
   /// The swing's foothold, moved by what the centre of pressure cannot correct.
@@ -126,12 +141,15 @@ class Walk {
   HeightLead height_, body_yaw_;
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
+  double settled_since_ = 0;                        // s: pressed down
+  double ramp_start_ = 0;                           // of the loading ramp: what the press carries
   double standing_height_ = 0;                      // m
   double start_yaw_ = 0;                            // rad
   bool starting_ = false;                           // no foot has left the ground yet
   bool closing_ = false;  // the step under way comes beside the other foot, the last one
   bool final_ = false;    // it has
   Footstep foothold_;
+  Footstep way_;  ///< where the stance sole would stand if every step came down as commanded
   Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down
   std::array<Quintic, 2> start_;                        // of the capture point while starting
   CapturePlan plan_;                                    // made anew in every tick

@@ -113,6 +113,43 @@ TEST(Footsteps, FeetNeverCrossOrTurnTowardsEachOther) {
   }
 }
 
+TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
+  // Every landing is 10 mm beside its foothold and 5 mrad turned: the way is left by one landing's
+  // error, not by the sum of 40.
+  const WalkCommand command{{0.2, 0}, 0, true};
+  const Vector2d error(0.004, 0.01);
+  Footstep way{{0, -0.105}, 0}, stance = way, adrift = way;
+  for (int i = 0; i < 40; ++i) {
+    const int foot = i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot;
+    const auto next = [&](const Footstep& from) {
+      return NextFootstep(from, foot, command, 1, Limits());
+    };
+    stance = Towards(next(stance), next(way), 0.03, stance, foot, Limits());
+    adrift = Towards(next(adrift), next(way), 0, adrift, foot, Limits());
+    way = next(way);
+    for (Footstep* step : {&stance, &adrift}) {
+      step->position += error;
+      step->yaw += 0.005;
+    }
+    EXPECT_NEAR((stance.position - way.position).norm(), error.norm(), 1e-12) << i;
+    EXPECT_NEAR(stance.yaw - way.yaw, 0.005, 1e-12) << i;
+  }
+  EXPECT_GT((adrift.position - way.position).norm(), 0.4);
+}
+
+TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
+  const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
+  const Footstep moved = Towards(step, far, 0.03, stance, robot::kRightFoot, Limits());
+  EXPECT_NEAR(moved.position.y(), 0.105 - Limits().least_spacing, 1e-12);
+  EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
+}
+
+TEST(Walk, TheRampBeginsWhereItCarriesWhatThePressDoes) {
+  for (const double share : {0.0, 0.1, 0.4}) {
+    EXPECT_NEAR(balance::SmoothStep(RampStart(share)), share, 1e-9);
+  }
+}
+
 TEST(Footsteps, ACommandIsApproachedWithoutHaste) {
   WalkCommand now;
   const WalkCommand wanted{{0.3, -0.4}, 0.5, true};
@@ -158,7 +195,8 @@ class World {
  public:
   /// `rough`: m, by how much the ground is lower under every third foothold.
   /// `patient`: s more for each ramp of the load.
-  explicit World(TestRobot robot, double rough = 0, double patient = 0)
+  /// `rests`: the capture point, above the sole that carries.
+  explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false)
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
     const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
@@ -168,6 +206,9 @@ class World {
     WalkSpec spec = Spec(reach, limits.spacing);
     spec.load += patient;
     spec.unload += patient;
+    spec.rests = rests;
+    spec.off_center = 0.02;
+    spec.line = 0.03;
     walk_ = Walk(StepChoice(model_, reach, limits), spec);
     com_ = {0, 0, height};
     for (size_t i = 0; i < 2; ++i) {
@@ -189,6 +230,9 @@ class World {
   }
   double yaw() const { return 0.5 * (Yaw(sole_[0]) + Yaw(sole_[1])); }
   const Vector3d& com() const { return com_; }
+  Vector2d capture_point() const {
+    return com_.head<2>() + std::sqrt(com_.z() / robot::kGravity) * velocity_.head<2>();
+  }
   double largest_jump() const { return largest_jump_; }
 
  private:
@@ -329,6 +373,26 @@ TEST(Walk, GoesOnWhereTheGroundIsLower) {
     world.Run(10, kStand);
     EXPECT_FALSE(world.walk().active());
   }
+}
+
+TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
+  // The ground is 55 mm lower under every third foothold: half a second late at 0.1 m/s.
+  World world(TestRobot::kDyros, 0.055, 0.5, true);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  bool rested = false;
+  for (int i = 0; i < 20000; ++i) {
+    world.Run(kPeriod, command);
+    const Walk& walk = world.walk();
+    if (walk.stage() != WalkStage::kTouching) continue;
+    const auto stance = static_cast<size_t>(1 - walk.stepping_foot());
+    const Vector2d off = world.capture_point() - world.sole()[stance].translation().head<2>();
+    EXPECT_LT(off.norm(), 0.02) << i;
+    rested = true;
+  }
+  EXPECT_TRUE(rested);
+  EXPECT_GE(world.walk().num_steps(), 12);
+  world.Run(15, kStand);
+  EXPECT_FALSE(world.walk().active());
 }
 
 }  // namespace

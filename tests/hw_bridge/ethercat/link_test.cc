@@ -1,6 +1,10 @@
 // Real sockets: EtherCAT over UDP on the loopback, raw Ethernet over a veth pair where permitted.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/if_packet.h>
+#include <net/if.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -183,6 +187,46 @@ TEST(RawLink, CarriesTwelveDrivesOverAVethPair) {
   RawLink master(pair.a(), RawLink::Side::kMaster);
   RawLink slaves(pair.b(), RawLink::Side::kSlaves);
   RunDrives(&master, &slaves);
+}
+
+// IEEE 802: bit 1 of the first byte says that an address is locally administered; many network
+// cards of masters have such ones, all virtual ones do. The slaves answer them, too.
+TEST(RawLink, AnswersAMasterWithALocallyAdministeredAddress) {
+  VethPair pair;
+  if (!pair.created()) {
+    GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
+  }
+  RawLink slaves(pair.b(), RawLink::Side::kSlaves);
+  const int master = socket(AF_PACKET, SOCK_RAW, htons(0x88A4));
+  ASSERT_GE(master, 0);
+  sockaddr_ll address{};
+  address.sll_family = AF_PACKET;
+  address.sll_protocol = htons(0x88A4);
+  address.sll_ifindex = static_cast<int>(if_nametoindex(pair.a().c_str()));
+  ASSERT_EQ(bind(master, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  for (const uint8_t first : {uint8_t{0x02}, uint8_t{0x00}}) {
+    std::array<uint8_t, 60> sent{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, first,
+                                 0x12, 0x34, 0x56, 0x78, 0x9A, 0x88, 0xA4};
+    sent[14] = 0x2E;  // 46 bytes of datagrams
+    sent[15] = 0x10;
+    ASSERT_EQ(send(master, sent.data(), sent.size(), 0), static_cast<ssize_t>(sent.size()));
+    std::array<uint8_t, 1500> frame{};
+    ASSERT_EQ(slaves.Receive(frame, slaves.Now() + kSecond), 46U) << int{first};
+    EXPECT_EQ(frame[1], 0x10);
+    ASSERT_TRUE(slaves.Send(std::span(frame).first(46)));
+    // What comes back says that a slave had it: the same address with that bit set.
+    std::array<uint8_t, 1500> back{};
+    sockaddr_ll from{};
+    do {
+      socklen_t size = sizeof(from);
+      ASSERT_GT(
+          recvfrom(master, back.data(), back.size(), 0, reinterpret_cast<sockaddr*>(&from), &size),
+          0);
+    } while (from.sll_pkttype == PACKET_OUTGOING);
+    EXPECT_EQ(back[6], 0x02);
+    EXPECT_EQ(back[7], 0x12);
+  }
+  close(master);
 }
 
 TEST(RawLink, SaysThatAnInterfaceIsDown) {

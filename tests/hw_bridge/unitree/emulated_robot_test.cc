@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "components/framework/configuration/configuration.h"
 #include "hw_bridge/units.h"
@@ -49,6 +50,19 @@ TEST_F(EmulatedRobotTest, SaysWhatIsSensedTo32Bits) {
   EXPECT_EQ(state->imu_state.accelerometer[2], 9.80665F);
   EXPECT_EQ(state->crc, unitree::CrcOf(*state));
   EXPECT_EQ(state->tick, 4U);
+}
+
+TEST_F(EmulatedRobotTest, PlacedSomewhereElseHasNoSpeed) {
+  const auto speed = [&](int64_t counts) {
+    feedback_.position_counts[0] = counts;
+    return robot_->State(feedback_, 0)->motor_state[rig_.slots[0]].dq;
+  };
+  EXPECT_EQ(speed(0), 0);
+  // A turn of the motor has 8192 counts, the gear 50, a cycle 2 ms.
+  EXPECT_NEAR(std::abs(speed(8192)), 2 * 3.14159265 / 50 / 0.002, 1e-3);
+  robot_->Place();
+  EXPECT_EQ(speed(50 * 8192), 0);
+  EXPECT_NE(speed(51 * 8192), 0);
 }
 
 TEST_F(EmulatedRobotTest, DelaysStatesAndCommands) {

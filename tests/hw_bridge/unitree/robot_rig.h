@@ -1,38 +1,28 @@
 // The whole bridge on a robot in memory, with every command that goes to it in view.
 #pragma once
 
-#include <array>
 #include <cmath>
-#include <fstream>
 #include <functional>
-#include <map>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <utility>
 
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
-#include "hw_bridge/hw_bridge.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
+#include "tests/hw_bridge/bridge_bench.h"
 
 namespace poise {
 
 inline constexpr int kMotors = 12;
-
-inline std::string ReadDeployed(const std::string& name) {
-  std::ifstream file(std::string(POISE_SOURCE_DIR "/deploy/") + name);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// A robot that says what the test puts in `state`, once a cycle, and keeps what it is told.
 struct RobotInMemory {
   unitree::LowState state{};
   unitree::LowCmd command{};
   int commands = 0;
+  bool torque_seen = false;  // in any of them
   bool silent = false;
   bool own_crc = false;  // the test has set crc
   std::string mode;      // of the maker's controller
@@ -48,6 +38,9 @@ class MemoryRobotLink final : public unitree::RobotLink {
   bool Send(const unitree::LowCmd& command) override {
     robot_->command = command;
     ++robot_->commands;
+    for (const unitree::MotorCmd& motor : command.motor_cmd) {
+      robot_->torque_seen = robot_->torque_seen || motor.tau != 0 || motor.kp != 0;
+    }
     return true;
   }
   bool Receive(unitree::LowState* state, int64_t deadline) override {
@@ -74,19 +67,12 @@ class MemoryRobotLink final : public unitree::RobotLink {
   mutable int64_t now_ = 0;
 };
 
-class RobotRig {
+class RobotRig : public BridgeBench {
  public:
   explicit RobotRig(const std::string& config = "", const std::string& bus = "") {
     robot.state.mode_machine = 5;
     robot.state.imu_state.accelerometer[2] = 9.80665F;
-    resources_ = {{"robot", ReadDeployed("robots/dyros/dyros_legs.pbtxt")},
-                  {"urdf", ReadDeployed("robots/dyros/dyros_legs.urdf")}};
-    ComponentContext context;
-    context.name = "hw_bridge";
-    context.config_text = "unitree { " + bus + " } " + config;
-    context.tick_period = 0.002;
-    context.resources = &resources_;
-    context.shared = &shared_;
+    const ComponentContext context = Context("unitree { " + bus + " } " + config);
     model = LoadRobot(context);
     slots = unitree::MotorSlots(*model, unitree::UnitreeBusConfig::G1, {});
     for (size_t j = 0; j < kMotors; ++j) {
@@ -100,33 +86,21 @@ class RobotRig {
     bridge = std::make_unique<HwBridge>(
         &signal, ethercat::OpenLink,
         [this](const unitree::DdsLink&) { return std::make_unique<MemoryRobotLink>(&robot); });
-    MessageTraits<joint_command_t>::Resize(command, MessageCounts{kMotors, 2});
-    command.run_id = stop.run_id = kRunId;
-    bridge->Configure(context, &wiring_);
+    Configure(context, kMotors);
   }
 
   void Open() {
     NextState();
     bridge->Open();
   }
-  void Step(bool with_command = true, double speed = 0) {
+  /// One cycle. `speed`: every joint turns on, rad/s.
+  void Step(bool with_command = true, double speed = 0, double lateness = 0) {
     for (size_t j = 0; j < kMotors; ++j) {
-      robot.state.motor_state[slots[j]].q += static_cast<float>(speed * 0.002);
+      state_of(j).q += static_cast<float>(speed * 0.002);
       Follow(j);
     }
     NextState();
-    command.tick = tick_;
-    command.utime = 2000 * tick_;
-    Port("joint_command")->Bind(with_command ? &command : nullptr);
-    Port("emergency_stop")->Bind(stop.stop != 0 || stop.reset != 0 || stop_seen_ ? &stop : nullptr);
-    stop_seen_ = stop_seen_ || stop.stop != 0;
-    const Tick tick{.index = tick_, .utime = 2000 * tick_, .time = 0, .lateness = 0};
-    for (const Stage& stage : wiring_.stages()) {
-      for (OutputPort* output : stage.outputs) output->Stamp(kRunId, tick.index, tick.utime);
-      stage.run(tick);
-      for (OutputPort* output : stage.outputs) static_cast<void>(output->TakeWithheld());
-    }
-    ++tick_;
+    RunCycle(with_command, lateness);
   }
   void Run(int cycles) {
     for (int i = 0; i < cycles; ++i) Step();
@@ -139,12 +113,9 @@ class RobotRig {
     Run(3);
   }
   /// Cycles until `condition` holds after the first: 0, the very next command shows it; -1: never.
-  int CyclesUntil(const std::function<bool()>& condition, bool with_command = true) {
-    for (int cycles = 0; cycles < 2000; ++cycles) {
-      Step(with_command);
-      if (condition()) return cycles;
-    }
-    return -1;
+  int CyclesUntil(const std::function<bool()>& condition, bool with_command = true,
+                  double speed = 0, double lateness = 0) {
+    return Count([&] { Step(with_command, speed, lateness); }, condition);
   }
 
   unitree::MotorState& state_of(size_t joint) { return robot.state.motor_state[slots[joint]]; }
@@ -168,58 +139,23 @@ class RobotRig {
     }
     return true;
   }
-  const bridge_status_t& status() const {
-    return *static_cast<const bridge_status_t*>(Find("bridge_status")->message());
-  }
-  const bus_status_t& bus_status() const {
-    return *static_cast<const bus_status_t*>(Find("bus_status")->message());
-  }
-  const robot_sensors_t& readings() const {
-    return *static_cast<const robot_sensors_t*>(Find("robot_sensors")->message());
-  }
-  bool HasInput(const std::string& name) const {
-    for (InputPort* input : wiring_.inputs()) {
-      if (input->name() == name) return true;
-    }
-    return false;
-  }
-
-  static constexpr int64_t kRunId = 5;
-  volatile std::sig_atomic_t signal = 0;
   RobotInMemory robot;
   std::shared_ptr<const robot::RobotModel> model;
   std::vector<size_t> slots;
-  std::unique_ptr<HwBridge> bridge;
-  joint_command_t command;
-  emergency_stop_t stop{};
   bool motors_follow = true;  // their estimated torque is the commanded one
+  bool motors_enable = true;  // as they are told; else they say that they are off
 
  private:
   void NextState() {
+    for (size_t j = 0; j < kMotors; ++j) {
+      if (!motors_enable) state_of(j).mode = 0;
+    }
     robot.state.tick += 2;
     robot.fresh = true;
   }
   void Follow(size_t joint) {
     if (motors_follow) state_of(joint).tau_est = static_cast<float>(TorqueOf(joint));
   }
-  InputPort* Port(const std::string& name) const {
-    for (InputPort* input : wiring_.inputs()) {
-      if (input->name() == name) return input;
-    }
-    throw std::logic_error("no input " + name);
-  }
-  OutputPort* Find(const std::string& name) const {
-    for (OutputPort* output : wiring_.outputs()) {
-      if (output->name() == name) return output;
-    }
-    throw std::logic_error("no output " + name);
-  }
-
-  std::map<std::string, std::string> resources_;
-  SharedObjects shared_;
-  Wiring wiring_;
-  int64_t tick_ = 0;
-  bool stop_seen_ = false;
 };
 
 }  // namespace poise

@@ -133,23 +133,132 @@ std::vector<size_t> SlotsOf(const std::vector<std::string>& joints,
   return MotorSlots(joints, layout, config.slot());
 }
 
-// The numbers of G1JointIndex and H1_2_JointIndex in unitree_sdk2_python's low-level examples.
-TEST(MotorSlots, AreTheMakersNumbers) {
-  EXPECT_THAT(
-      SlotsOf({"left_hip_pitch_joint", "left_knee_joint", "right_hip_pitch_joint",
-               "right_ankle_roll_joint", "waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint",
-               "left_shoulder_pitch_joint", "left_elbow_joint", "left_wrist_yaw_joint",
-               "right_shoulder_pitch_joint", "right_wrist_yaw_joint"}),
-      ElementsAre(0, 3, 6, 11, 12, 13, 14, 15, 18, 21, 22, 28));
-  EXPECT_THAT(
-      SlotsOf({"torso_joint", "left_hip_yaw_joint", "left_hip_pitch_joint", "left_hip_roll_joint",
-               "right_hip_yaw_joint", "left_shoulder_pitch_joint", "left_elbow_pitch_joint",
-               "right_shoulder_pitch_joint", "right_wrist_yaw_joint"}),
-      ElementsAre(12, 0, 1, 2, 6, 13, 16, 20, 26));
-  EXPECT_THAT(
-      SlotsOf({"left_shoulder_pitch_joint", "right_shoulder_pitch_joint", "right_wrist_roll_joint"},
-              UnitreeBusConfig::G1_23_OLD),
-      ElementsAre(13, 18, 22));
+struct MakersIndex {
+  const char* joint;  // of the makers' URDF
+  size_t slot;
+};
+
+/// Whole robots, all joints at once.
+void ExpectSlots(const std::vector<MakersIndex>& table,
+                 UnitreeBusConfig::Layout layout = UnitreeBusConfig::BY_ROBOT) {
+  std::vector<std::string> joints;
+  std::vector<size_t> slots;
+  for (const MakersIndex& row : table) {
+    joints.emplace_back(row.joint);
+    slots.push_back(row.slot);
+  }
+  EXPECT_EQ(SlotsOf(joints, layout), slots);
+}
+
+// enum G1JointIndex of unitree_sdk2_python, example/g1/low_level/g1_low_level_example.py (commit
+// 21e44b7c), beside the joints of g1_29dof_rev_1_0.urdf.
+const std::vector<MakersIndex> kG1 = {{"left_hip_pitch_joint", 0},
+                                      {"left_hip_roll_joint", 1},
+                                      {"left_hip_yaw_joint", 2},
+                                      {"left_knee_joint", 3},
+                                      {"left_ankle_pitch_joint", 4},
+                                      {"left_ankle_roll_joint", 5},
+                                      {"right_hip_pitch_joint", 6},
+                                      {"right_hip_roll_joint", 7},
+                                      {"right_hip_yaw_joint", 8},
+                                      {"right_knee_joint", 9},
+                                      {"right_ankle_pitch_joint", 10},
+                                      {"right_ankle_roll_joint", 11},
+                                      {"waist_yaw_joint", 12},
+                                      {"waist_roll_joint", 13},
+                                      {"waist_pitch_joint", 14},
+                                      {"left_shoulder_pitch_joint", 15},
+                                      {"left_shoulder_roll_joint", 16},
+                                      {"left_shoulder_yaw_joint", 17},
+                                      {"left_elbow_joint", 18},
+                                      {"left_wrist_roll_joint", 19},
+                                      {"left_wrist_pitch_joint", 20},
+                                      {"left_wrist_yaw_joint", 21},
+                                      {"right_shoulder_pitch_joint", 22},
+                                      {"right_shoulder_roll_joint", 23},
+                                      {"right_shoulder_yaw_joint", 24},
+                                      {"right_elbow_joint", 25},
+                                      {"right_wrist_roll_joint", 26},
+                                      {"right_wrist_pitch_joint", 27},
+                                      {"right_wrist_yaw_joint", 28}};
+
+TEST(MotorSlots, OfAG1With29JointsAreTheMakersNumbers) {
+  ExpectSlots(kG1);
+  ExpectSlots(kG1, UnitreeBusConfig::G1);
+}
+
+// The same file: 13, 14, 20, 21, 27 and 28 are "INVALID for g1 23dof".
+TEST(MotorSlots, OfAG1With23JointsLeaveTheMakersGaps) {
+  std::vector<MakersIndex> table;
+  for (const MakersIndex& row : kG1) {
+    const bool invalid = row.slot == 13 || row.slot == 14 || row.slot == 20 || row.slot == 21 ||
+                         row.slot == 27 || row.slot == 28;
+    if (!invalid) table.push_back(row);
+  }
+  ASSERT_EQ(table.size(), 23U);
+  ExpectSlots(table);
+}
+
+// enum G1JointIndex of unitree_sdk2, example/g1/low_level/g1_23dof_example.cpp (commit 5dd20b58).
+TEST(MotorSlots, OfAnOldG1With23JointsHaveNoGaps) {
+  ExpectSlots({{"left_hip_pitch_joint", 0},
+               {"left_hip_roll_joint", 1},
+               {"left_hip_yaw_joint", 2},
+               {"left_knee_joint", 3},
+               {"left_ankle_pitch_joint", 4},
+               {"left_ankle_roll_joint", 5},
+               {"right_hip_pitch_joint", 6},
+               {"right_hip_roll_joint", 7},
+               {"right_hip_yaw_joint", 8},
+               {"right_knee_joint", 9},
+               {"right_ankle_pitch_joint", 10},
+               {"right_ankle_roll_joint", 11},
+               {"waist_yaw_joint", 12},
+               {"left_shoulder_pitch_joint", 13},
+               {"left_shoulder_roll_joint", 14},
+               {"left_shoulder_yaw_joint", 15},
+               {"left_elbow_joint", 16},
+               {"left_wrist_roll_joint", 17},
+               {"right_shoulder_pitch_joint", 18},
+               {"right_shoulder_roll_joint", 19},
+               {"right_shoulder_yaw_joint", 20},
+               {"right_elbow_joint", 21},
+               {"right_wrist_roll_joint", 22}},
+              UnitreeBusConfig::G1_23_OLD);
+}
+
+// class H1_2_JointIndex of unitree_sdk2_python, example/h1_2/low_level/h1_2_low_level_example.py
+// (commit 21e44b7c), beside the joints of h1_2_handless.urdf (unitree_ros, commit c817a6ad).
+TEST(MotorSlots, OfAnH12AreTheMakersNumbers) {
+  const std::vector<MakersIndex> table = {{"left_hip_yaw_joint", 0},
+                                          {"left_hip_pitch_joint", 1},
+                                          {"left_hip_roll_joint", 2},
+                                          {"left_knee_joint", 3},
+                                          {"left_ankle_pitch_joint", 4},
+                                          {"left_ankle_roll_joint", 5},
+                                          {"right_hip_yaw_joint", 6},
+                                          {"right_hip_pitch_joint", 7},
+                                          {"right_hip_roll_joint", 8},
+                                          {"right_knee_joint", 9},
+                                          {"right_ankle_pitch_joint", 10},
+                                          {"right_ankle_roll_joint", 11},
+                                          {"torso_joint", 12},
+                                          {"left_shoulder_pitch_joint", 13},
+                                          {"left_shoulder_roll_joint", 14},
+                                          {"left_shoulder_yaw_joint", 15},
+                                          {"left_elbow_joint", 16},
+                                          {"left_wrist_roll_joint", 17},
+                                          {"left_wrist_pitch_joint", 18},
+                                          {"left_wrist_yaw_joint", 19},
+                                          {"right_shoulder_pitch_joint", 20},
+                                          {"right_shoulder_roll_joint", 21},
+                                          {"right_shoulder_yaw_joint", 22},
+                                          {"right_elbow_joint", 23},
+                                          {"right_wrist_roll_joint", 24},
+                                          {"right_wrist_pitch_joint", 25},
+                                          {"right_wrist_yaw_joint", 26}};
+  ExpectSlots(table);
+  ExpectSlots(table, UnitreeBusConfig::H1_2);
 }
 
 TEST(MotorSlots, MayBeChangedAndRefuseWhatCannotBe) {

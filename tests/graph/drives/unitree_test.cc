@@ -52,23 +52,43 @@ TEST(Unitree, TheRemotesButtonStopsTheRobotAndIsNamedInTheLog) {
   EXPECT_EQ(stopped, 100);  // 0.2 s
 }
 
-TEST(Unitree, StandsAsG1) {
+/// A folder with the maker's file of the G1 and the texts that go with it; empty: it is not there.
+std::string G1Folder(const RunFolder& folder) {
   const char* const given = std::getenv("POISE_ROBOTS");
   const std::filesystem::path robots =
       given != nullptr ? given : POISE_SOURCE_DIR "/../shared/robots";
   const std::filesystem::path urdf = robots / "g1_29dof_rev_1_0.urdf";
-  if (!std::filesystem::exists(urdf)) {
-    GTEST_SKIP() << urdf << " is not there: the maker's file is not part of Poise";
-  }
-  const RunFolder folder;
+  if (!std::filesystem::exists(urdf)) return {};
   const std::filesystem::path g1 = folder / "g1";
   std::filesystem::create_directories(g1);
   std::filesystem::copy_file(urdf, g1 / urdf.filename());
-  std::filesystem::copy_file(POISE_SOURCE_DIR "/deploy/robots/g1/g1.pbtxt", g1 / "g1.pbtxt");
-  const ProgramResult result = RunPoise({"run", "stand", "--robot", g1.string(), "--drives",
-                                         "unitree", "--duration", "1", "--out", folder / "run"});
+  for (const char* text : {"g1.pbtxt", "g1_23.pbtxt"}) {
+    std::filesystem::copy_file(std::string(POISE_SOURCE_DIR "/deploy/robots/g1/") + text,
+                               g1 / text);
+  }
+  return g1.string();
+}
+
+class UnitreeG1 : public testing::TestWithParam<const char*> {};
+
+TEST_P(UnitreeG1, Stands) {
+  const RunFolder folder;
+  const std::string g1 = G1Folder(folder);
+  if (g1.empty()) {
+    GTEST_SKIP() << "g1_29dof_rev_1_0.urdf is not there: the maker's file is not part of Poise";
+  }
+  const ProgramResult result =
+      RunPoise({"run", "stand", "--robot", g1 + "/" + GetParam(), "--world", "mujoco", "--drives",
+                "unitree", "--duration", "1", "--out", folder / "run"});
   EXPECT_EQ(result.exit_code, 0) << result.output;
 }
+
+INSTANTIATE_TEST_SUITE_P(Joints, UnitreeG1, testing::Values("g1.pbtxt", "g1_23.pbtxt"),
+                         [](const auto& each) {
+                           return std::string(each.param).find("23") == std::string::npos
+                                      ? "TwentyNine"
+                                      : "TwentyThree";
+                         });
 
 TEST(Unitree, RefusesWhatCannotBe) {
   const RunFolder folder;

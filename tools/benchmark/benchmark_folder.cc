@@ -1,0 +1,126 @@
+#include "tools/benchmark/benchmark_folder.h"
+
+#include <gnu/libc-version.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "components/framework/build_info.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/modules.h"
+#include "fmt/format.h"
+#include "tools/cli/output_place.h"
+#include "tools/maps/sweep_charts.h"
+#include "tools/maps/sweep_maps.h"
+#include "tools/maps/sweep_page.h"
+#include "tools/scenario/library_versions.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+/// Name and hash, without the folder, which is this machine's.
+ordered_json FileJson(const fs::path& file) {
+  return {{"file", file.filename().string()}, {"sha1", Sha1(ReadFile(file.string()))}};
+}
+
+/// Users' modules and programs, any of which may be the controller.
+ordered_json ModulesJson() {
+  ordered_json modules = ordered_json::array();
+  for (const fs::path& folder : PoisePath()) {
+    for (const char* place : {"lib/poise/modules", "lib/poise/components", "lib/poise/bin"}) {
+      if (folder == InstalledPrefix()) continue;  // Poise's own, which the program's digest has
+      std::set<fs::path> files;
+      std::error_code error;
+      for (const auto& entry : fs::directory_iterator(folder / place, error)) {
+        if (entry.is_regular_file()) files.insert(entry.path());
+      }
+      for (const fs::path& file : files) modules.push_back(FileJson(file));
+    }
+  }
+  return modules;
+}
+
+ordered_json SubjectJson(const BenchmarkSet& set) {
+  const BenchmarkSubject& subject = set.subject();
+  const BenchmarkRobot& robot = set.robot();
+  ordered_json json = {{"robot",
+                        {{"name", robot.name},
+                         {"text", FileJson(robot.file)},
+                         {"maker's", FileJson(robot.maker_file)},
+                         {"mass", robot.mass},
+                         {"com_height", robot.height}}},
+                       {"engine", set.engine()}};
+  ordered_json controller = {{"graph", {{"sha1", Sha1(set.graph_text())}}}};
+  if (!subject.controller.empty()) controller["file"] = subject.controller;
+  if (!subject.variant.empty()) controller["variant"] = subject.variant;
+  if (!subject.drives.empty()) controller["drives"] = subject.drives;
+  controller["set"] = subject.set;
+  controller["without"] = subject.without;
+  controller["modules"] = ModulesJson();
+  json["controller"] = controller;
+  return json;
+}
+
+ordered_json PartJson(const BenchmarkResult& result) {
+  const Sweep& sweep = result.header.sweep;
+  ordered_json json = {{"name", result.part.name()},
+                       {"definition", result.header.digest},
+                       {"runs", result.rows.size()}};
+  json["scenario_seed"] = result.part.scenario().seed();
+  if (sweep.has_random()) json["sweep_seed"] = sweep.seed();
+  std::string rows;
+  for (const auto& [key, row] : result.rows) rows += SweepRow::RowText(row) + "\n";
+  json["rows_sha1"] = Sha1(rows);
+  return json;
+}
+
+}  // namespace
+
+fs::path SetFolder(const fs::path& folder) { return folder / "set"; }
+
+fs::path PartFolder(const fs::path& folder, const BenchmarkPart& part) {
+  return folder / "parts" / part.name();
+}
+
+std::string WriteBenchmark(const fs::path& folder, const BenchmarkSet& set,
+                           const std::vector<BenchmarkResult>& results, bool quick,
+                           const std::string& command) {
+  const std::string csv = BenchmarkCsv(results);
+  const std::string sha1 = Sha1(csv);
+  WriteFile(folder / kBenchmarkCsv, csv);
+  ordered_json json = {
+      {"benchmark", {{"name", set.benchmark().name()}, {"sha1", Sha1(set.text())}}},
+      {"points", quick ? "quick" : "all"},
+      {"command", command},
+      {"poise",
+       {{"version", PoiseVersion()},
+        {"commit", PoiseCommit()},
+        {"instruction_set", InstructionSet()}}},
+      {"libraries", LibraryVersions()},
+      {"glibc", gnu_get_libc_version()}};
+  json.update(SubjectJson(set));
+  for (const BenchmarkResult& result : results) json["parts"].push_back(PartJson(result));
+  json["table_sha1"] = sha1;
+  WriteFile(folder / kBenchmarkJson, json.dump(1) + "\n");
+
+  MapsPageContent page;
+  page.title = fmt::format("{}: {}", set.benchmark().name(), set.robot().name);
+  page.description = set.benchmark().description();
+  page.tables.push_back(FormatBenchmark(results));
+  fs::create_directories(folder / "maps");
+  for (const BenchmarkResult& result : results) {
+    const std::vector<std::string> charts = MapCharts(result.header, result.rows).all();
+    for (size_t i = 0; i < charts.size(); ++i) {
+      const std::string name = fmt::format("{}_{}.svg", result.part.name(), i + 1);
+      WriteFile(folder / "maps" / name, StandaloneSvg(charts[i]));
+    }
+    page.survival.insert(page.survival.end(), charts.begin(), charts.end());
+  }
+  WriteFile(folder / kBenchmarkPage, FormatMapsPage(page));
+  return sha1;
+}
+
+}  // namespace poise

@@ -1,0 +1,194 @@
+// `poise benchmark`: how well a controller balances, by a fixed set of disturbances.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <thread>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
+#include "fmt/format.h"
+#include "tools/benchmark/benchmark_folder.h"
+#include "tools/cli/output_place.h"
+#include "tools/cli/signals.h"
+#include "tools/commands/commands.h"
+#include "tools/maps/sweep_output.h"
+#include "tools/run/run_dir.h"
+#include "tools/scenario/ablations.h"
+#include "tools/sweep/sweep_session.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct BenchmarkArguments {
+  std::string set = "balance_1";
+  BenchmarkSubject subject;
+  std::vector<std::string> parts;  // empty: all
+  SessionOptions session;
+  bool quick = false;
+};
+
+/// What was typed.
+std::string CommandLine() {
+  std::ifstream file("/proc/self/cmdline", std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string command = "poise";
+  for (size_t at = text.find('\0'); at != std::string::npos && at + 1 < text.size();) {
+    const size_t end = text.find('\0', at + 1);
+    const std::string word = text.substr(at + 1, end - at - 1);
+    const bool plain = word.find_first_of(" '\"$&|;<>()[]*?\\") == std::string::npos;
+    command += plain && !word.empty() ? " " + word : " '" + word + "'";
+    at = end;
+  }
+  return command;
+}
+
+void CheckParts(const Benchmark& benchmark, const std::vector<std::string>& wanted) {
+  std::vector<std::string> names;
+  for (const BenchmarkPart& part : benchmark.part()) names.push_back(part.name());
+  for (const std::string& name : wanted) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    throw ConfigError(fmt::format("--part {}: the set {} has no such part; {}", name,
+                                  benchmark.name(), Suggest(name, names)));
+  }
+}
+
+/// The folder of the results: new, empty, or with --resume that of a benchmark.
+fs::path MakeFolder(const BenchmarkArguments& arguments, const std::string& name) {
+  const SessionOptions& session = arguments.session;
+  if (session.out.empty()) return MakeRunDir("", "benchmark-" + name, false).path();
+  const fs::path folder = fs::absolute(session.out);
+  if (!session.resume) CheckFolderFree("--out", session.out, session.force);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw ConfigError(fmt::format("--out {}: cannot be made", session.out));
+  }
+  if (session.force && !session.resume) fs::remove_all(folder / "parts");
+  return folder;
+}
+
+int RunBenchmark(const BenchmarkArguments& arguments) {
+  const BenchmarkSet set(arguments.set, arguments.subject);
+  const Benchmark& benchmark = set.benchmark();
+  CheckParts(benchmark, arguments.parts);
+  const fs::path folder = MakeFolder(arguments, benchmark.name());
+  set.Write(SetFolder(folder));
+  // All of them, before an hour's work begins.
+  std::vector<SweepDefinition> definitions;
+  std::vector<BenchmarkPart> parts;
+  for (int i = 0; i < benchmark.part_size(); ++i) {
+    const std::vector<std::string>& wanted = arguments.parts;
+    const std::string& name = benchmark.part(i).name();
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), name) == wanted.end()) continue;
+    definitions.push_back(set.Definition(i, SetFolder(folder)));
+    parts.push_back(benchmark.part(i));
+  }
+  fmt::print("{}: {} ({:.1f} kg, COM at {:.3f} m) in {}{}; {}\n", benchmark.name(),
+             set.robot().name, set.robot().mass, set.robot().height, set.engine(),
+             arguments.quick ? ", quick" : "", folder.string());
+  std::vector<BenchmarkResult> results;
+  bool all_ran = true;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const bool limit = parts[i].sweep().has_limit();
+    SessionOptions options = arguments.session;
+    options.out = PartFolder(folder, parts[i]).string();
+    options.resume = arguments.session.resume;
+    SweepSession session(definitions[i], limit ? kKindLimit : kKindSweep, options);
+    const std::vector<int64_t> points =
+        BenchmarkPoints(parts[i], definitions[i].points().size(), arguments.quick);
+    fmt::print("{} of {}, {}: {} points{}\n", i + 1, parts.size(), parts[i].name(), points.size(),
+               session.found() > 0 ? fmt::format(", {} runs done before", session.found()) : "");
+    std::fflush(stdout);
+    if (!(limit ? RunLimits(points, &session) : RunPoints(points, &session))) {
+      fmt::print(stderr, "poise: interrupted; the same command with --resume --out {} goes on\n",
+                 folder.string());
+      return kExitFailed;
+    }
+    // With --resume more points than these may be there.
+    SweepRows rows;
+    for (const auto& [key, row] : session.rows()) {
+      if (std::find(points.begin(), points.end(), row.run) != points.end()) rows[key] = row;
+    }
+    WriteSweepFiles(session.folder(), session.header(), rows);
+    all_ran = AllRan(rows) && all_ran;
+    results.push_back({parts[i], session.header(), std::move(rows)});
+  }
+  const std::string sha1 = WriteBenchmark(folder, set, results, arguments.quick, CommandLine());
+  fmt::print("\n{}\n", FormatBenchmark(results));
+  for (const char* file : {kBenchmarkCsv, kBenchmarkPage, kBenchmarkJson}) {
+    fmt::print("{}\n", (folder / file).string());
+  }
+  fmt::print("{} has the SHA-1 {}\n", kBenchmarkCsv, sha1);
+  return all_ran ? kExitOk : kExitFailed;
+}
+
+}  // namespace
+
+void AddBenchmarkCommand(CLI::App* app, Command* command) {
+  auto arguments = std::make_shared<BenchmarkArguments>();
+  BenchmarkSubject* const subject = &arguments->subject;
+  SessionOptions* const session = &arguments->session;
+  session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  CLI::App* benchmark = app->add_subcommand(
+      "benchmark", "measure how well a controller balances, by a fixed set of disturbances");
+  benchmark->add_option("set", arguments->set, "of deploy/benchmarks, or a .pbtxt file")
+      ->capture_default_str();
+  benchmark
+      ->add_option("--robot", subject->robot,
+                   "a name (poise list robots), a robot's folder or its .pbtxt file")
+      ->capture_default_str();
+  benchmark->add_option("--world", subject->engine, "engine: ode or mujoco; default: the graph's");
+  CLI::Option* const graph = benchmark->add_option(
+      "--graph", subject->graph,
+      "the controller's graph (poise list graphs) or a .pbtxt file; default: balance, Poise's own");
+  benchmark->add_option(
+      "--controller", subject->controller,
+      "a scenario's .pbtxt file with nothing but `graph` and the fields of its components");
+  benchmark->add_option("--variant", subject->variant, "of the controller's file");
+  const auto list = [&](const char* flag, std::vector<std::string>* to, const char* text,
+                        const char* type) {
+    return benchmark->add_option(flag, *to, text)
+        ->type_name(type)
+        ->allow_extra_args(false)
+        ->take_all();
+  };
+  list("--set", &subject->set, "change a field of a component (poise list fields)", "FIELD=VALUE");
+  list("--without", &subject->without, "leave out a part of Poise's controller", "PART")
+      ->check(CLI::IsMember(RemovableParts()));
+  benchmark
+      ->add_option("--drives", subject->drives,
+                   "emulated drives between bridge and robot, as of poise run; runs as processes")
+      ->check(CLI::IsMember({"ethercat", "unitree"}))
+      ->excludes(graph);
+  list("--part", &arguments->parts, "only this part of the set, repeatable", "PART");
+  benchmark->add_flag("--quick", arguments->quick,
+                      "a few of the same points: minutes; --resume without it goes on to all");
+  benchmark->add_option("--out", session->out,
+                        "folder of the results, new or empty; default: a dated one under runs/");
+  benchmark->add_option("--jobs", session->jobs, "runs at a time; default: the processor's cores")
+      ->check(CLI::Range(1, 1024));
+  CLI::Option* const resume =
+      benchmark->add_flag("--resume", session->resume, "go on with the benchmark in --out");
+  resume->needs(benchmark->get_option("--out"));
+  benchmark->add_flag("--force", session->force, "replace what --out holds")->excludes(resume);
+  benchmark->add_flag("--quiet", session->quiet, "no progress");
+  benchmark->footer(
+      "The controller is any graph of components that speaks Poise's messages: Poise's own, "
+      "modules "
+      "and programs on POISE_PATH; one that has\na program of its own runs as processes, in "
+      "lockstep. Robot, engine and controller are yours, everything else is the set's. OUT has\n"
+      "benchmark.csv (a row a point; its SHA-1 is the same on every machine of one build), "
+      "benchmark.html (table and maps), benchmark.json\n(what is needed to repeat it), set/ (what "
+      "was run) and parts/ (every run). docs/benchmark.md says what is measured and why.\n"
+      "Exit code: 0 measured, whatever fell; 1 interrupted, or a run could not be made; 2 wrong "
+      "usage or configuration.");
+  benchmark->callback(
+      [arguments, command] { *command = [arguments] { return RunBenchmark(*arguments); }; });
+}
+
+}  // namespace poise
