@@ -161,6 +161,28 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
   assert.equal((await standing(page)).run.speed, 0.5);
   await drag(page, 'interactive_after', -15);
 
+  // A stop is taken when the bridge says so: not while the run waits.
+  await page.click('#go');
+  await until(page, () => window.poise.control.standing.run.paused);
+  await page.click('#estop');
+  const stop = () => window.poise.control.standing.acts.findLast((act) => act.do === 'stop');
+  await until(page, () => window.poise.control.standing.acts.some((act) => act.do === 'stop'));
+  assert.equal((await page.evaluate(stop)).state, 'sent');
+  assert.equal((await standing(page)).stopped, false);
+  await page.click('#one-tick');
+  await page.click('#one-tick');
+  await until(page, () => window.poise.control.standing.stopped);
+  const {state, tick: stoppedAt} = await page.evaluate(stop);
+  assert.equal(state, 'accepted');
+  // The log's own word, at the tick that was told: 0 to 4 are no stop.
+  const bridge = (at) => page.evaluate((t) => {
+    const {run: r} = window.poise;
+    return r.signals.get('BRIDGE_STATUS.state').values[t - r.firstTick];
+  }, at);
+  assert.ok(await bridge(stoppedAt) > 4);
+  assert.ok(await bridge(stoppedAt - 1) <= 4);
+  await page.click('#go');
+
   // Narrow, by keyboard alone.
   await page.setViewportSize({width: 390, height: 800});
   await page.keyboard.press('p');

@@ -90,10 +90,12 @@ class InteractiveRun {
     operator_.SetRunner(runner_.get());
     runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
       recorder_->Add(channel, output, tick);
-      if (tick.index < shown_from_) return;
+      const bool shown = tick.index >= shown_from_;
+      if (!shown && !operator_.Hears(channel)) return;
       bytes_.resize(static_cast<size_t>(output.encoded_size()));
       output.Encode(bytes_.data(), static_cast<int>(bytes_.size()));
-      Show(channel, tick.index, bytes_);
+      operator_.Hear(channel, bytes_);
+      if (shown) Show(channel, tick.index, bytes_);
     });
     runner_->set_external_tap([this](int channel, std::span<const uint8_t> data) {
       recorder_->AddExternal(channel, data);

@@ -9,6 +9,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "poise/bridge_status_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"
 #include "tools/live/bus_operator.h"
@@ -17,6 +18,7 @@
 namespace poise {
 namespace {
 
+constexpr size_t kMostStops = 32;          // that wait, as while the run is paused
 constexpr size_t kMostInjected = 200'000;  // acts of a run; an hour of dragging has 108,000
 
 int IndexOf(const std::vector<std::string>& names, const std::string& name, const char* what) {
@@ -55,6 +57,7 @@ LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
     if (graph.channel(i).type() == kActType) act_channel_ = graph.channel(i).name();
     if (graph.channel(i).type() == kAnswerType) answer_channel_ = i;
     if (graph.channel(i).type() == "emergency_stop_t") stop_channel_ = graph.channel(i).name();
+    if (graph.channel(i).type() == "bridge_status_t") status_channel_ = i;
   }
   if (act_channel_.empty() || answer_channel_ < 0) {
     throw ConfigError(
@@ -154,9 +157,13 @@ void LocalOperator::Do(const OperatorAct& act) {
     emergency_stop_t message{};
     message.run_id = spec_.run_id();
     message.stop = 1;
-    const bool taken = !stop_channel_.empty() && Inject(stop_channel_, message);
-    return Answered(act, runner_->ticks_completed(),
-                    taken ? "" : "this graph has no bridge that could stop");
+    if (stop_channel_.empty() || status_channel_ < 0) {
+      return Answered(act, -1, "this graph has no bridge that could stop");
+    }
+    if (stops_.size() >= kMostStops) return Answered(act, -1, "too many stops wait already");
+    if (!Inject(stop_channel_, message)) return Answered(act, -1, "the run does not take it");
+    stops_.push_back(act);  // the bridge's status answers it
+    return;
   }
   const std::string beyond = BeyondPage(act, push_limit_);
   if (!beyond.empty()) return Answered(act, -1, beyond);
@@ -178,6 +185,7 @@ void LocalOperator::Do(const OperatorAct& act) {
 }
 
 void LocalOperator::Hear(int channel, std::span<const uint8_t> data) {
+  if (channel >= 0 && channel == status_channel_) return HearStatus(data);
   operate::answer_t answer;
   if (channel != answer_channel_ ||
       !DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &answer)) {
@@ -195,6 +203,18 @@ void LocalOperator::Hear(int channel, std::span<const uint8_t> data) {
   Answered(act, answer.tick, done ? "" : RefusalText(answer.verdict));
 }
 
+void LocalOperator::HearStatus(std::span<const uint8_t> data) {
+  bridge_status_t status;
+  if (!DecodeChecked(data.data(), static_cast<int64_t>(data.size()), &status)) return;
+  stopped_ = status.state >= bridge_status_t::STATE_STOPPING;
+  if (stopped_) AnswerStops(status.tick, {});
+}
+
+void LocalOperator::AnswerStops(int64_t tick, const std::string& reason) {
+  for (const OperatorAct& act : stops_) Answered(act, tick, reason);
+  stops_.clear();
+}
+
 void LocalOperator::Repeat(int64_t tick) {
   for (; next_repeat_ < done_.size() && done_[next_repeat_].tick <= tick; ++next_repeat_) {
     const Injected& injected = done_[next_repeat_];
@@ -207,10 +227,13 @@ void LocalOperator::Forget(int64_t tick) {
   next_repeat_ = 0;
   for (const auto& [id, act] : waiting_) Answered(act, -1, "the run went back before its tick");
   waiting_.clear();
+  AnswerStops(-1, "the run went back before its tick");
   push_until_ = -1;
+  stopped_ = false;
 }
 
 std::vector<OperatorSink::Answer> LocalOperator::TakeAnswers() {
+  if (runner_->ended()) AnswerStops(-1, "the run ended before the bridge told of it");
   return std::exchange(answers_, {});
 }
 
@@ -230,6 +253,7 @@ nlohmann::ordered_json LocalOperator::Standing() const {
   nlohmann::ordered_json json = StandingOf(fields_, in_force, push_limit_);
   json["can"] = {"push",  "set", "step", "walk",  "stop_walking", "stop",
                  "pause", "go",  "tick", "speed", "back"};
+  json["stopped"] = stopped_;
   if (runner_->ticks_completed() < push_until_) {
     json["push"] = {{"body", push_.name},
                     {"force", {push_.force.x(), push_.force.y(), push_.force.z()}}};

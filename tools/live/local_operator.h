@@ -27,7 +27,8 @@ class LocalOperator : public OperatorSink {
 
   /// The runner that acts are for from now on: answers come by Hear.
   void SetRunner(InlineRunner* runner) { runner_ = runner; }
-  /// A message of an external channel: answers are taken from it.
+  /// It wants the messages of this channel: answers, and what the bridge does.
+  bool Hears(int channel) const { return channel == answer_channel_ || channel == status_channel_; }
   void Hear(int channel, std::span<const uint8_t> data);
   /// Before a tick of a fresh runner: injects what was injected before that tick.
   void Repeat(int64_t tick);
@@ -50,12 +51,14 @@ class LocalOperator : public OperatorSink {
   /// Throws ConfigError with what is wrong.
   void Fill(const OperatorAct& act, operate::act_t* message) const;
   void Answered(const OperatorAct& act, int64_t tick, std::string reason);
+  void AnswerStops(int64_t tick, const std::string& reason);
+  void HearStatus(std::span<const uint8_t> data);
 
   RunSpec spec_;
   Pace pace_;
   std::vector<LiveField> fields_;
   std::vector<std::string> bodies_, feet_;
-  int simulator_ = -1, planner_ = -1, answer_channel_ = -1;
+  int simulator_ = -1, planner_ = -1, answer_channel_ = -1, status_channel_ = -1;
   std::string act_channel_, stop_channel_;
   double push_limit_;  // N
   InlineRunner* runner_ = nullptr;
@@ -63,6 +66,8 @@ class LocalOperator : public OperatorSink {
   size_t next_repeat_ = 0;
   std::vector<Injected> done_;  // ticks ascending
   std::map<int64_t, OperatorAct> waiting_;
+  std::vector<OperatorAct> stops_;  // sent, which the bridge has not told of
+  bool stopped_ = false;            // as the bridge told last
   OperatorAct push_;
   int64_t push_until_ = -1;  // tick
   std::vector<Answer> answers_;
