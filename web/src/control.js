@@ -17,6 +17,9 @@ export class Control extends EventTarget {
     feed.addEventListener('control', () => this.#tell(feed.control));
   }
 
+  /** What was told before anyone listened: the server tells changes alone. */
+  catchUp() { if (this.feed.control) this.#tell(this.feed.control); }
+
   can(what) { return this.standing?.can?.includes(what) ?? false; }
   setting(field) { return this.standing?.settings?.find((s) => s.field === field); }
   /** Acts of this page that nobody has answered. */

@@ -132,8 +132,9 @@ async function start() {
     document.getElementById('side').append(controlPanel(control, shared));
     const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
     player.addEventListener('time', pull);
+    control.catchUp();
   }
-  const keys = run.meta.live?.control ? [...KEYS, ...CONTROL_KEYS] : KEYS;
+  const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
   document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
     eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
