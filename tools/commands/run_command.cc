@@ -70,10 +70,12 @@ void AddRunCommand(CLI::App* app, Command* command) {
       run->add_flag("--interactive", arguments->interactive,
                     "in one process at wall speed with a page in control: push, change settings, "
                     "pause, single ticks, slow motion, back; Ctrl-C ends")
-          ->excludes(in_process);
+          ->excludes(in_process)
+          ->group("");  // not shown: its page hung when it paused, cause not known
   run->add_option("--port", arguments->page.port, "of that page, on 127.0.0.1; default: a free one")
       ->check(CLI::Range(1, 65535))
-      ->needs(interactive);
+      ->needs(interactive)
+      ->group("");
   run->add_flag("--hosted", options->changes.hosted,
                 "the whole controller in one process: what the graph marks restart: true passes "
                 "its messages in memory, and sends them to all others as ever")
