@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "components/framework/bus/packet_filter.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "poise/message_traits.hpp"
@@ -211,6 +212,8 @@ void Sort(ChannelColumns* channel) {
 
 bool IsSignal(const MessageType& type, std::string_view path) {
   if (path == "run_id" || path == "tick") return false;
+  // The letters of a setting's name: 64 signals that nobody plots.
+  if (type.name == kActType && path.starts_with("field[")) return false;
   return std::ranges::find(type.count_names, path) == type.count_names.end();
 }
 

@@ -12,8 +12,8 @@
 
 namespace poise::logging {
 
-/// True when the scalar at `path` of such a message is a signal: no count, not run_id or tick.
-/// Texts are none either.
+/// True when the scalar at `path` of such a message is a signal: no count, not run_id or tick, no
+/// letter of an act's field. Texts are none either.
 bool IsSignal(const MessageType& type, std::string_view path);
 
 /// One scalar field over the messages of its channel.

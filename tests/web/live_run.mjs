@@ -42,6 +42,13 @@ export const startRun = (poise, folder, ...more) => new Program(poise, ['run', '
 export async function startView(poise, run, folder, ...more) {
   await run.prints(/run \d+/);
   const view = new Program(poise, ['view', folder, ...more]);
-  const [, url, port] = await view.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/)/);
+  const [, url, port] = await view.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/\S*)/);
   return Object.assign(view, {url, port: Number(port)});
+}
+
+/** `poise run stand --interactive`; has `port` and `url`. */
+export async function startInteractive(poise, folder, ...more) {
+  const run = new Program(poise, ['run', 'stand', '--interactive', '--out', folder, ...more]);
+  const [, url, port] = await run.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/\S*)/);
+  return Object.assign(run, {url, port: Number(port)});
 }

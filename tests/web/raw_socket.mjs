@@ -29,6 +29,6 @@ export async function openStream(port, options) {
   const stream = open(port);
   const first = new Promise((done) => { stream.socket.once('data', done); });
   stream.socket.write(upgrade(port, options));
-  stream.answer = (await first).toString('latin1').split('\r\n')[0];
+  stream.answer = (await Promise.race([first, stream.closed])).toString('latin1').split('\r\n')[0];
   return stream;
 }

@@ -1,9 +1,11 @@
 #include <cstdio>
 #include <memory>
 
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/commands/commands.h"
+#include "tools/live/interactive_run.h"
 #include "tools/run/scenario_run.h"
 #include "tools/run/several_runs.h"
 #include "tools/scenario/ablations.h"
@@ -16,9 +18,22 @@ struct RunArguments {
   std::string out;
   RunOptions options;
   bool no_reference = false;
+  bool interactive = false;
+  InteractiveOptions page;
 };
 
 int Run(RunArguments arguments) {
+  if (arguments.interactive) {
+    if (arguments.scenarios.size() != 1 || arguments.scenarios.front() == kAllScenarios) {
+      throw ConfigError("--interactive: one scenario at a time");
+    }
+    arguments.options.in_process = true;
+    arguments.options.interactive = [page = arguments.page](
+                                        const RunSpec& spec, const Scenario& scenario,
+                                        const std::string& text, const std::string& log) {
+      return RunInteractive(spec, scenario, text, log, page);
+    };
+  }
   arguments.options.changes.reference = !arguments.no_reference;
   const std::string& capture = arguments.options.changes.capture;
   if (!capture.empty()) CheckFileFree("--capture", capture, arguments.options.force);
@@ -51,20 +66,33 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "dated one under runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
+  CLI::Option* const interactive =
+      run->add_flag("--interactive", arguments->interactive,
+                    "in one process at wall speed with a page in control: push, change settings, "
+                    "pause, single ticks, slow motion, back; Ctrl-C ends")
+          ->excludes(in_process)
+          ->group("");  // not shown: its page hung when it paused, cause not known
+  run->add_option("--port", arguments->page.port, "of that page, on 127.0.0.1; default: a free one")
+      ->check(CLI::Range(1, 65535))
+      ->needs(interactive)
+      ->group("");
   run->add_flag("--hosted", options->changes.hosted,
                 "the whole controller in one process: what the graph marks restart: true passes "
                 "its messages in memory, and sends them to all others as ever")
-      ->excludes(in_process);
+      ->excludes(in_process)
+      ->excludes(interactive);
   run->add_option("--host", options->changes.host,
                   "put these components of the graph into one process of that name")
       ->type_name("PROCESS=A,B,...")
       ->allow_extra_args(false)
       ->take_all()
-      ->excludes(in_process);
-  CLI::Option* const realtime = run->add_flag(
-      "--realtime", options->changes.realtime,
-      "the bridge owns the clock and holds the last command; processes that die are replaced. "
-      "With --inline: pace the ticks with the wall clock");
+      ->excludes(in_process)
+      ->excludes(interactive);
+  CLI::Option* const realtime = run->add_flag("--realtime", options->changes.realtime,
+                                              "the bridge owns the clock and holds the last "
+                                              "command; processes that die are replaced. "
+                                              "With --inline: pace the ticks with the wall clock")
+                                    ->excludes(interactive);
   run->add_option(
          "--kill", options->launch.kills.count,
          "faults to inject: as often a controller process is killed, or stopped for 100 ms")
@@ -97,7 +125,8 @@ void AddRunCommand(CLI::App* app, Command* command) {
              "servo drives, through real EtherCAT frames; unitree: an emulated G1 or H1-2, "
              "over DDS")
           ->check(CLI::IsMember({"ethercat", "unitree"}))
-          ->excludes(in_process);
+          ->excludes(in_process)
+          ->excludes(interactive);
   run->add_option("--link", options->changes.link,
                   "of EtherCAT: udp (default), or raw:MASTER,DRIVES, two network interfaces; see "
                   "deploy/veth")
@@ -141,11 +170,13 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))
-      ->excludes(in_process);
+      ->excludes(in_process)
+      ->excludes(interactive);
   run->add_flag(
          "!--no-log", options->launch.log,
          "write no log, for a run of hours: nothing is checked but that it stands to the end")
-      ->excludes(in_process);
+      ->excludes(in_process)
+      ->excludes(interactive);
   run->add_flag("--force", options->force,
                 "replace the run that --out holds, or the file of --capture; start though the log "
                 "may not fit the disk");

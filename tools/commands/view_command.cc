@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -12,9 +11,13 @@
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/foxglove/live_foxglove.h"
+#include "tools/live/bus_operator.h"
+#include "tools/live/control_desk.h"
+#include "tools/live/live_page.h"
 #include "tools/live/live_start.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
+#include "tools/live/view_access.h"
 #include "tools/live/view_server.h"
 #include "tools/report/html_report.h"
 #include "tools/run/live_run.h"
@@ -39,21 +42,8 @@ struct ViewOptions {
   double keep = 60;  // s
   int foxglove = 0;  // port; 0: none
   std::vector<std::string> foxglove_origins;
+  bool control = false;
 };
-
-Json ChannelsJson(const TickRing& ring) {
-  Json json = Json::array();
-  for (const TickRing::Lane& lane : ring.lanes()) {
-    Json item = {{"name", lane.name}, {"type", lane.type->name}, {"count", 0}};
-    if (lane.external) item["ticks"] = {{"value", nullptr}};
-    item["signals"] = Json::array();
-    for (const TickRing::Signal& signal : lane.signals) {
-      item["signals"].push_back({{"field", signal.field}, {"integer", signal.integer}});
-    }
-    json.push_back(std::move(item));
-  }
-  return json;
-}
 
 class Viewer {
  public:
@@ -62,9 +52,11 @@ class Viewer {
       : live_(live),
         keep_(options.keep),
         run_id_(std::to_string(live->spec().run_id())),
-        ring_(live->spec(), Ticks(options.keep, live->spec().tick_period())),
+        operator_(options.control ? std::make_unique<BusOperator>(live->spec()) : nullptr),
+        desk_(operator_ ? std::make_unique<ControlDesk>(operator_.get()) : nullptr),
+        ring_(live->spec(), TicksOf(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
-                &ring_),
+                &ring_, Control()),
         status_((live->dir() / "run.lcm").string(), scenario) {
     if (options.foxglove == 0) return;
     foxglove_ = std::make_unique<LiveFoxglove>(options.foxglove, options.foxglove_origins, record,
@@ -73,10 +65,11 @@ class Viewer {
 
   int Run() {
     fmt::print(
-        "{}: http://127.0.0.1:{}/  (the last {} s, {:.0f} MB; Ctrl-C ends)\n",
-        live_->dir().string(), server_.port(), keep_,
+        "{}: {}  (the last {} s, {:.0f} MB; Ctrl-C ends)\n", live_->dir().string(), server_.url(),
+        keep_,
         1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity()));
     if (foxglove_) fmt::print("Foxglove: ws://127.0.0.1:{}\n", foxglove_->port());
+    if (desk_) fmt::print("whoever has this address can push, change and stop the robot\n");
     std::fflush(stdout);
     server_.SetState(State());
     auto next_picture = Clock::now();
@@ -88,6 +81,7 @@ class Viewer {
       if (foxglove_) foxglove_->Poll();
       if (now < next_picture) continue;
       SendStatus();
+      SendControl();
       server_.SendTicks();
       if (server_.dropped() != dropped_) {
         dropped_ = server_.dropped();
@@ -99,17 +93,15 @@ class Viewer {
   }
 
  private:
-  static int64_t Ticks(double seconds, double period) {
-    return std::max<int64_t>(1, std::llround(seconds / period));
-  }
-
   void Listen(Clock::time_point now) {
     const int64_t lost = ring_.lost();
     live_->Spin(0, [&](const LiveMessage& message) {
       ring_.Add(message);
       if (foxglove_) foxglove_->Add(message);
+      if (operator_) operator_->Hear(message);
       last_message_ = now;
     });
+    if (operator_) operator_->Update();
     if (now > last_message_ + kViewSilence) {
       last_message_ = now;
       if (!live_->InProgress()) {
@@ -134,6 +126,16 @@ class Viewer {
                           .dump(-1, ' ', false, Json::error_handler_t::replace));
   }
 
+  ViewControl Control() {
+    if (!desk_) return {};
+    return {MakeToken(), [this](std::string_view text) { return desk_->Receive(text); }};
+  }
+
+  void SendControl() {
+    if (!desk_ || live_ == nullptr) return;
+    if (const std::optional<std::string> text = desk_->Take(run_id_)) server_.SetControl(*text);
+  }
+
   std::string State() const {
     return Json({{"run_id", run_id_},
                  {"state", live_ != nullptr ? "live" : "ended"},
@@ -146,6 +148,8 @@ class Viewer {
   double keep_;    // s
   std::string run_id_;
   int64_t dropped_ = 0;
+  std::unique_ptr<BusOperator> operator_;  // nullptr: pages only look
+  std::unique_ptr<ControlDesk> desk_;
   TickRing ring_;
   ViewServer server_;
   RunStatus status_;
@@ -181,6 +185,8 @@ void AddViewCommand(CLI::App* app, Command* command) {
                    "origin of further pages that may connect there, e.g. https://viewer.example")
       ->allow_extra_args(false)
       ->take_all();
+  view->add_flag("--control", options->control,
+                 "pages with the token of the printed address may push, change settings and stop");
   view->callback([options, command] { *command = [options] { return View(*options); }; });
 }
 

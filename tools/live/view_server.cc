@@ -6,13 +6,13 @@
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
-#include <charconv>
 #include <optional>
 #include <set>
 #include <string_view>
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/live/view_access.h"
 
 namespace poise {
 namespace {
@@ -26,8 +26,13 @@ using Clock = std::chrono::steady_clock;
 using ErrorCode = boost::system::error_code;
 
 constexpr size_t kMaxConnections = 32;
-constexpr uint32_t kMaxHeader = 16 << 10;      // bytes; browsers send about 1 KB
-constexpr size_t kMaxReceived = 1 << 10;       // bytes a WebSocket message; pages send none
+constexpr size_t kMaxStreams = 16;         // the other places are for those who come
+constexpr uint32_t kMaxHeader = 16 << 10;  // bytes; browsers send about 1 KB
+constexpr size_t kMaxReceived = 1 << 10;   // bytes a WebSocket message; acts have about 200
+constexpr double kActRate = 60;            // texts/s of a client; a dragged robot's are 30
+constexpr double kActBurst = 60;           // texts at once
+constexpr int kMaxAccepts = 200;           // in each kAcceptWindow: 2,000/s
+constexpr std::chrono::milliseconds kAcceptWindow{100};
 constexpr size_t kMaxBatch = size_t{1} << 20;  // bytes
 constexpr int kSendBuffer = 256 << 10;         // bytes, in the system
 constexpr std::chrono::seconds kRequestPatience{5};
@@ -37,55 +42,30 @@ constexpr std::chrono::milliseconds kAcceptPause{100};  // when the system has n
 std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 beast::string_view BeastView(std::string_view text) { return {text.data(), text.size()}; }
 
-/// "127.0.0.1:PORT" or "localhost:PORT": a page of another site that has its name resolve to this
-/// machine sends its own.
-bool IsHere(std::string_view host, int port) {
-  for (const char* name : {"127.0.0.1", "localhost"}) {
-    if (beast::iequals(BeastView(host), fmt::format("{}:{}", name, port))) return true;
-    if (port == 80 && beast::iequals(BeastView(host), name)) return true;
-  }
-  return false;
-}
-
-bool IsOriginHere(std::string_view origin, int port) {
-  constexpr std::string_view kScheme = "http://";
-  return origin.starts_with(kScheme) && IsHere(origin.substr(kScheme.size()), port);
-}
-
-/// "/stream?from=TICK": the tick that a client wants first; 0 without.
-std::optional<int64_t> StreamTarget(std::string_view target) {
-  constexpr std::string_view kPath = "/stream";
-  constexpr std::string_view kFrom = "?from=";
-  if (!target.starts_with(kPath)) return {};
-  target.remove_prefix(kPath.size());
-  if (target.empty()) return 0;
-  if (!target.starts_with(kFrom)) return {};
-  target.remove_prefix(kFrom.size());
-  int64_t tick = 0;
-  const char* const end = target.data() + target.size();
-  const auto [parsed, error] = std::from_chars(target.data(), end, tick);
-  if (error != std::errc() || parsed != end || tick < 0) return {};
-  return tick;
-}
-
 }  // namespace
 
 class ViewServer::Impl {
  public:
-  Impl(int port, std::string page, const TickRing* ring);
+  Impl(int port, std::string page, const TickRing* ring, ViewControl control);
   ~Impl();
 
   int port() const { return port_; }
+  std::string url() const;
   int64_t dropped() const { return dropped_; }
   void RunFor(std::chrono::milliseconds duration) { io_.run_for(duration); }
   void SendTicks();
   void SetState(std::string json);
   void SetStatus(std::string json);
+  void SetControl(std::string json);
+  void Restart();
 
  private:
   class Client;
 
   void Accept();
+  void Wait(std::chrono::milliseconds duration);
+  void Admit(tcp::socket socket);
+  size_t streams() const;
   std::shared_ptr<const std::string> Batch(int64_t from, int64_t to);
 
   asio::io_context io_{1};
@@ -94,8 +74,12 @@ class ViewServer::Impl {
   int port_ = 0;
   const std::string page_;
   const TickRing* ring_;
+  const ViewControl control_;
+  Clock::time_point window_{};
+  int accepted_ = 0;  // since window_
   std::shared_ptr<const std::string> state_ = std::make_shared<std::string>();
   std::shared_ptr<const std::string> status_;
+  std::shared_ptr<const std::string> acts_;
   // The batch made last: clients that keep up want the same.
   std::shared_ptr<const std::string> batch_;
   int64_t batch_from_ = -1;
@@ -134,6 +118,10 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     }
   }
 
+  bool streaming() const { return streaming_; }
+  Clock::time_point came() const { return came_; }
+  void Restart() { next_ = 0; }
+
   /// Ends it at once.
   void Close() {
     ErrorCode ignored;
@@ -156,23 +144,27 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
 
   void Answer() {
     const auto& request = parser_.get();
-    const std::string_view target = View(request.target());
     const auto origin = request.find(http::field::origin);
     const bool foreign =
         origin != request.end() && !IsOriginHere(View(origin->value()), server_->port_);
+    const std::optional<ViewTarget> target = ReadTarget(View(request.target()));
+    const std::string& token = server_->control_.token;
     if (!IsHere(View(request[http::field::host]), server_->port_) || foreign) {
       Respond(http::status::forbidden,
               fmt::format("only for http://127.0.0.1:{}/\n", server_->port_));
+    } else if (!token.empty() && (!target || !SameToken(target->token, token))) {
+      Respond(http::status::forbidden, "the address that poise printed has a token\n");
     } else if (websocket::is_upgrade(request)) {
-      const std::optional<int64_t> from = StreamTarget(target);
-      if (from) {
-        Upgrade(*from);
-      } else {
+      if (!target || target->path != "/stream") {
         Respond(http::status::not_found, "the stream is /stream or /stream?from=TICK\n");
+      } else if (server_->streams() >= kMaxStreams) {
+        Respond(http::status::service_unavailable, "too many pages are open\n");
+      } else {
+        Upgrade(target->from);
       }
     } else if (request.method() != http::verb::get && request.method() != http::verb::head) {
       Respond(http::status::method_not_allowed, "only GET\n");
-    } else if (target == "/" || target.starts_with("/?")) {
+    } else if (target && target->path == "/") {
       Respond(http::status::ok, server_->page_, "text/html; charset=utf-8");
     } else {
       Respond(http::status::not_found, "there is only /\n");
@@ -194,6 +186,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     response_.set(http::field::x_frame_options, "DENY");
     response_.set("X-Content-Type-Options", "nosniff");
     response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.set("Referrer-Policy", "no-referrer");  // the address may hold a token
     if (status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, HEAD");
     response_.body() = beast::span<const char>(body.data(), body.size());
     response_.content_length(body.size());
@@ -233,9 +226,30 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     });
   }
 
-  /// Pings and the end; a message is none of a page of ours.
+  /// Acts, pings and the end. A page that only looks sends no message.
   void Receive() {
-    stream_.async_read(buffer_, [self = shared_from_this()](ErrorCode, size_t) { self->Close(); });
+    stream_.async_read(buffer_, [self = shared_from_this()](ErrorCode error, size_t) {
+      if (error || !self->Take()) {
+        self->Close();
+        return;
+      }
+      self->buffer_.clear();
+      self->Receive();
+    });
+  }
+
+  /// False: no page of ours sends this, or this much.
+  bool Take() {
+    const ViewControl& control = server_->control_;
+    if (control.token.empty() || !streaming_ || !stream_.got_text()) return false;
+    const auto now = Clock::now();
+    const double passed = std::chrono::duration<double>(now - refilled_).count();
+    allowance_ = std::min(kActBurst, allowance_ + kActRate * passed);
+    refilled_ = now;
+    if (allowance_ < 1) return false;
+    --allowance_;
+    const auto bytes = buffer_.cdata();
+    return control.receive({static_cast<const char*>(bytes.data()), bytes.size()});
   }
 
   void Send() {
@@ -246,6 +260,9 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
       stream_.text(true);
     } else if (sent_status_ != server_->status_) {
       sent_status_ = outgoing_ = server_->status_;
+      stream_.text(true);
+    } else if (sent_acts_ != server_->acts_) {
+      sent_acts_ = outgoing_ = server_->acts_;
       stream_.text(true);
     } else if (next_ < ring.end_tick()) {
       next_ = std::max(next_, ring.first_tick());
@@ -273,7 +290,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   bool Behind() const {
     const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
     return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
-           ticks >= static_cast<int64_t>(BatchTicks());
+           sent_acts_ != server_->acts_ || ticks >= static_cast<int64_t>(BatchTicks());
   }
   size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
 
@@ -291,10 +308,14 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   std::shared_ptr<const std::string> outgoing_;
   std::shared_ptr<const std::string> sent_state_;
   std::shared_ptr<const std::string> sent_status_;
+  std::shared_ptr<const std::string> sent_acts_;
+  const Clock::time_point came_ = Clock::now();
+  double allowance_ = kActBurst;  // texts
+  Clock::time_point refilled_ = came_;
 };
 
-ViewServer::Impl::Impl(int port, std::string page, const TickRing* ring)
-    : page_(std::move(page)), ring_(ring) {
+ViewServer::Impl::Impl(int port, std::string page, const TickRing* ring, ViewControl control)
+    : page_(std::move(page)), ring_(ring), control_(std::move(control)) {
   try {
     const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), static_cast<uint16_t>(port));
     acceptor_.open(endpoint.protocol());
@@ -315,20 +336,54 @@ ViewServer::Impl::~Impl() {
   for (const auto& client : clients) client->Close();
 }
 
+std::string ViewServer::Impl::url() const {
+  return fmt::format("http://127.0.0.1:{}/{}{}", port_,
+                     control_.token.empty() ? "" : "?token=", control_.token);
+}
+
+void ViewServer::Impl::Wait(std::chrono::milliseconds duration) {
+  accept_timer_.expires_after(duration);
+  accept_timer_.async_wait([this](ErrorCode) { Accept(); });
+}
+
 void ViewServer::Impl::Accept() {
   acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
     if (error) {
-      accept_timer_.expires_after(kAcceptPause);
-      accept_timer_.async_wait([this](ErrorCode) { Accept(); });
+      Wait(kAcceptPause);
       return;
     }
-    if (clients_.size() < kMaxConnections) {  // else the socket closes
-      const auto client = std::make_shared<Client>(std::move(socket), this);
-      clients_.insert(client);
-      client->Start();
+    Admit(std::move(socket));
+    const auto now = Clock::now();
+    if (now > window_ + kAcceptWindow) {
+      window_ = now;
+      accepted_ = 0;
     }
-    Accept();
+    if (++accepted_ < kMaxAccepts) {
+      Accept();
+    } else {
+      Wait(kAcceptWindow);
+    }
   });
+}
+
+size_t ViewServer::Impl::streams() const {
+  return static_cast<size_t>(std::count_if(clients_.begin(), clients_.end(),
+                                           [](const auto& c) { return c->streaming(); }));
+}
+
+/// Where all places are taken, the one that has been there longest without streaming makes room.
+void ViewServer::Impl::Admit(tcp::socket socket) {
+  while (clients_.size() >= kMaxConnections) {
+    std::shared_ptr<Client> oldest;
+    for (const auto& client : clients_) {
+      if (!client->streaming() && (!oldest || client->came() < oldest->came())) oldest = client;
+    }
+    if (!oldest) return;  // the socket closes
+    oldest->Close();
+  }
+  const auto client = std::make_shared<Client>(std::move(socket), this);
+  clients_.insert(client);
+  client->Start();
 }
 
 void ViewServer::Impl::SendTicks() {
@@ -344,6 +399,15 @@ void ViewServer::Impl::SetStatus(std::string json) {
   status_ = std::make_shared<const std::string>(std::move(json));
 }
 
+void ViewServer::Impl::SetControl(std::string json) {
+  acts_ = std::make_shared<const std::string>(std::move(json));
+}
+
+void ViewServer::Impl::Restart() {
+  batch_from_ = batch_to_ = -1;
+  for (const auto& client : clients_) client->Restart();
+}
+
 std::shared_ptr<const std::string> ViewServer::Impl::Batch(int64_t from, int64_t to) {
   if (from != batch_from_ || to != batch_to_) {
     batch_ = std::make_shared<const std::string>(ring_->Encode(from, to));
@@ -353,10 +417,13 @@ std::shared_ptr<const std::string> ViewServer::Impl::Batch(int64_t from, int64_t
   return batch_;
 }
 
-ViewServer::ViewServer(int port, std::string page, const TickRing* ring)
-    : impl_(std::make_unique<Impl>(port, std::move(page), ring)) {}
+ViewServer::ViewServer(int port, std::string page, const TickRing* ring, ViewControl control)
+    : impl_(std::make_unique<Impl>(port, std::move(page), ring, std::move(control))) {}
 ViewServer::~ViewServer() = default;
 int ViewServer::port() const { return impl_->port(); }
+std::string ViewServer::url() const { return impl_->url(); }
+void ViewServer::SetControl(std::string json) { impl_->SetControl(std::move(json)); }
+void ViewServer::Restart() { impl_->Restart(); }
 void ViewServer::RunFor(std::chrono::milliseconds duration) { impl_->RunFor(duration); }
 int64_t ViewServer::dropped() const { return impl_->dropped(); }
 void ViewServer::SendTicks() { impl_->SendTicks(); }

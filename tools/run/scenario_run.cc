@@ -227,8 +227,11 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   if (StopSignal() == 0) {
     std::optional<ChildProcess> ros2;
     if (options_.ros2) ros2.emplace("ros2", Ros2Command(result.dir), result.dir / kRos2Log);
-    summary.outcome =
-        RunPart(main_, result.dir, options_.in_process, options_.quiet, options_.launch, &kept);
+    summary.outcome = options_.interactive
+                          ? options_.interactive(main_.spec, scenario, ScenarioText(scenario),
+                                                 result.dir / "run.lcm")
+                          : RunPart(main_, result.dir, options_.in_process, options_.quiet,
+                                    options_.launch, &kept);
     if (ros2) EndRos2(&*ros2);
     PrintOutcome("run", summary.outcome);
     if (!options_.quiet && !summary.outcome.interrupted) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,11 @@ struct RunOptions {
   bool force = false;  ///< replace what the folder holds; start where the log may not fit
   LaunchOptions launch;
   bool ros2 = false;  ///< `poise ros2` listens to the run of processes, and ends with it
+  /// Runs in this process in place of RunInline, into the log named; empty: none does. For who
+  /// lets a page control it.
+  std::function<RunOutcome(const RunSpec& spec, const Scenario& scenario,
+                           const std::string& scenario_text, const std::string& log)>
+      interactive;
 };
 
 /// What `poise report` and the overview of several runs say of a run's scenario.

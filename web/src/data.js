@@ -70,6 +70,9 @@ export class Signal {
     this.#column.append(values, dropped, this.channel.run.keep);
   }
 
+  /** Lets go of all values, of a run that starts anew. */
+  clear() { this.#start(); }
+
   /** There is nothing to load. */
   #start() {
     this.#column = new Column(this.integer ? new Float64Array(0) : new Float32Array(0));
@@ -204,6 +207,13 @@ export class Run extends EventTarget {
     this.numRows += count - dropped;
     for (const signal of derived) signal.grow(dropped);
     this.dispatchEvent(new Event('append'));
+  }
+
+  /** A live run lets go of all its ticks; others come. Fires 'restart'. */
+  restart() {
+    for (const signal of this.signals.values()) signal.clear();
+    this.numRows = 0;
+    this.dispatchEvent(new Event('restart'));
   }
 }
 

@@ -205,6 +205,12 @@ class DerivedSignal {
     this.#column.append(rows, held + rows.length - this.run.numRows, this.run.keep);
   }
 
+  /** Its run starts anew. */
+  clear() {
+    this.#memory = {};
+    if (this.#column) this.#column = new Column(new Float32Array(0));
+  }
+
   #rows(from) {
     const arrays = this.#signals.map((s) => s.values);
     const rows = new Float32Array(this.run.numRows - from);
@@ -266,6 +272,11 @@ class Phases {
 
   constructor(run) {
     this.run = run;
+    run.addEventListener('restart', () => {
+      this.#balancing = new Stretches();
+      this.#support = new Stretches();
+      this.#next = 0;
+    });
     const get = (type, field) => run.find(type, field);
     this.#active = [get('balance_torque_t', 'active_x'), get('balance_torque_t', 'active_y')].filter(Boolean);
     this.#contact = run.robot.feet.map((_, f) => get('support_plan_t', `in_contact[${f}]`)).filter(Boolean);

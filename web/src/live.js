@@ -46,9 +46,12 @@ export function addBatch(run, {first, count, values}) {
 
 /**
  * Fires 'state': it or the messages lost by the server have changed; 'status': checks, events and components' health have
- * come. A lost connection is made again.
+ * come; 'restart': the run went back, its ticks come anew. A lost connection is made again.
  */
 export class LiveFeed extends EventTarget {
+  control;     // what may be done and is in force, of a page that may act; with the event 'control'
+  #socket;
+  #branch = 0;  // of an interactive run: how often it went back
   state = 'connecting';  // then 'live', 'ended', or 'waiting' for a lost connection
   lost = 0;
   status = {ended: false, checks: [], events: [], components: [], checked_ticks: 0, problem: ''};
@@ -62,9 +65,12 @@ export class LiveFeed extends EventTarget {
 
   #connect() {
     const {run} = this;
-    const url = new URL(`stream?from=${run.firstTick + run.numRows}`, location.href);
+    const url = new URL('stream', location.href);
+    url.searchParams.set('from', run.firstTick + run.numRows);
+    const token = new URL(location.href).searchParams.get('token');
+    if (token) url.searchParams.set('token', token);
     url.protocol = 'ws:';
-    const socket = new WebSocket(url);
+    const socket = this.#socket = new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     socket.addEventListener('message', ({data}) => {
       if (typeof data === 'string') this.#tell(JSON.parse(data));
@@ -77,13 +83,30 @@ export class LiveFeed extends EventTarget {
     });
   }
 
-  #tell({run_id: id, state, lost, end_tick: ticks, status}) {
+  /** A text to the server. False: there is no connection. */
+  send(text) {
+    if (this.#socket?.readyState !== WebSocket.OPEN) return false;
+    this.#socket.send(text);
+    return true;
+  }
+
+  #tell({run_id: id, state, lost, end_tick: ticks, status, control, branch}) {
     if (id !== this.run.meta.run.run_id) return location.reload();  // another run is served here
     if (status) {
       Object.assign(this.status, {problem: ''}, status);
       if (status.run) Object.assign(this.run.meta.run, status.run);
       this.dispatchEvent(new Event('status'));
       return;
+    }
+    if (control) {
+      this.control = control;
+      this.dispatchEvent(new Event('control'));
+      return;
+    }
+    if (branch !== undefined && branch !== this.#branch) {
+      if (this.run.numRows > 0) this.run.restart();
+      this.#branch = branch;
+      this.dispatchEvent(new Event('restart'));
     }
     this.lost = lost;
     if (state === 'ended') this.#ticks = ticks;

@@ -1,9 +1,12 @@
 // Builds the page from the run that it holds.
 import {KEYS, playerBar} from './bar.js';
+import {Control, Hand} from './control.js';
+import {CONTROL_KEYS, controlPanel} from './control_panel.js';
 import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
 import {figuresFor} from './figures.js';
+import {grabbing} from './grab.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
@@ -124,9 +127,17 @@ async function start() {
   const printer = new Printer(grid, scene);
   const readout = new Readout(run);
   const eventPlace = element('div', {}, eventList(events, player));
+  const control = feed && new Control(feed);
+  if (control) {
+    document.getElementById('side').append(controlPanel(control, shared));
+    const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
+    player.addEventListener('time', pull);
+    control.catchUp();
+  }
+  const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
   document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
     eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
-      ...KEYS.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
+      ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
     element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
     element('li', {}, element('span', {class: 'area single'}), 'single support'),
@@ -180,7 +191,7 @@ async function start() {
   if (!feed) printer.drawWhenIdle(run);
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
-  window.poise = {run, overlay, player, view, grid, scene, feed, printer};
+  window.poise = {run, overlay, player, view, grid, scene, feed, printer, control};
 }
 
 start().catch((error) => {

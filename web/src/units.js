@@ -79,6 +79,9 @@ export function quantity(values, unit, digits = 4) {
   return shown.unit ? `${texts.join(', ')} ${shown.unit}` : texts.join(', ');
 }
 
+/** "42 N" of a vector: whole newtons, which hold still to read. */
+export const formatForce = (vector) => vector.every(Number.isFinite) ? `${Math.round(Math.hypot(...vector))} N` : '– N';
+
 const EXPONENT = 1e-3;  // numbers below it are shorter with another prefix
 
 /** A metric's value in its own unit, which its limit has too, unless it is too small to be read in it. */

@@ -1,0 +1,132 @@
+// A page that acts on a run of processes (`poise view --control`). A replay repeats what it did.
+// Usage: node control_test.mjs --poise PROGRAM --web DIR, where DIR is build/web. POISE_PICTURES=FOLDER keeps pictures.
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
+import {startRun, startView} from './live_run.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
+const folder = mkdtempSync(join(tmpdir(), 'poise-control-'));
+const path = (name) => join(folder, name);
+const programs = [];
+const pictures = process.env.POISE_PICTURES;
+let browser;
+
+before(async () => {
+  if (pictures) mkdirSync(pictures, {recursive: true});
+  browser = await launchBrowser(options.web);
+});
+after(async () => {
+  await browser?.close();
+  for (const program of programs) await program.stop();
+  rmSync(folder, {recursive: true, force: true});
+});
+
+const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: PATIENCE});
+const standing = (page) => page.evaluate(() => window.poise.control.standing);
+const picture = async (page, name) => { if (pictures) await page.screenshot({path: join(pictures, `${name}.png`)}); };
+
+/** Where a body's frame is seen, CSS pixels. */
+const seen = (page, body) => page.evaluate((b) => {
+  const {scene} = window.poise;
+  scene.renderNow();
+  const at = scene.controls.target.clone();
+  scene.robotView.groups[b].getWorldPosition(at);
+  at.project(scene.camera);
+  const box = scene.renderer.domElement.getBoundingClientRect();
+  return {x: box.left + (at.x + 1) / 2 * box.width, y: box.top + (1 - at.y) / 2 * box.height};
+}, body);
+
+/** Presses on the first body that is hit where its frame is seen; gives the place. */
+async function grab(page) {
+  const bodies = await page.evaluate(() => window.poise.run.robot.bodies.length);
+  for (let body = 0; body < bodies; ++body) {
+    const at = await seen(page, body);
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    if (await page.locator('canvas.grabbing').count() > 0) return at;
+    await page.mouse.up();
+  }
+  throw new Error('no body could be grabbed');
+}
+
+/** Drags the robot by some pixels, checks what is shown, and lets go. */
+async function drag(page, name, pixels = 25) {
+  await page.locator('#scene').scrollIntoViewIfNeeded();
+  const turned = await page.evaluate(() => window.poise.scene.camera.position.toArray());
+  const at = await grab(page);
+  await page.mouse.move(at.x + pixels, at.y, {steps: 4});
+  // In force, as the receiver said, and measured by the simulator's own sensor.
+  await until(page, () => {
+    const {control, scene} = window.poise;
+    const force = control.standing.push?.force;
+    return force && Math.hypot(...scene.samples.vector('push', scene.row)) > 0.5 * Math.hypot(...force) && Math.hypot(...force) > 5;
+  });
+  assert.match(await page.locator('output.force').innerText(), /asked \d+ N, in force \d+ N, measured \d+ N/);
+  const {push, push_limit: limit} = await standing(page);
+  assert.ok(Math.hypot(...push.force) <= limit * (1 + 1e-9));
+  await picture(page, name);
+  await page.mouse.up();
+  await until(page, () => !window.poise.control.standing.push);
+  assert.ok(await page.locator('output.force').isHidden());
+  assert.deepEqual(await page.evaluate(() => window.poise.scene.camera.position.toArray()), turned, 'the view has turned');
+}
+
+/** Moves a slider, and takes it back. */
+async function change(page, name) {
+  const setting = (await standing(page)).settings[0];
+  // The browser keeps 15 digits of it.
+  const wanted = await page.locator('.setting input[type=range]').first().evaluate((slider, value) => {
+    slider.value = value;
+    slider.dispatchEvent(new Event('change'));
+    return Number(slider.value);
+  }, setting.value + 0.5 * (setting.high - setting.value));
+  const value = (field) => window.poise.control.setting(field).value;
+  await until(page, ([field, asked]) => window.poise.control.setting(field).value === asked, [setting.field, wanted]);
+  await picture(page, name);
+  await page.click('#undo');
+  await until(page, ([field, asked]) => window.poise.control.setting(field).value === asked, [setting.field, setting.value]);
+  assert.equal(await page.evaluate(value, setting.field), setting.value);
+  assert.equal(await page.locator('#undo').isDisabled(), true);
+  // What is out of range is refused, and nothing changes.
+  await page.evaluate(([field, high]) => window.poise.control.act('set', {field, value: 2 * high + 1}), [setting.field, setting.high]);
+  await until(page, () => window.poise.control.standing.acts.at(-1).state === 'refused');
+  assert.equal(await page.evaluate(value, setting.field), setting.value);
+}
+
+/** As the log of a run of processes in real time, which lacks ticks that a busy machine skipped: all that can be compared. */
+function replaysInPart(log) {
+  const replay = spawnSync(options.poise, ['replay', log], {encoding: 'utf8'});
+  assert.doesNotMatch(replay.stdout, /DIFFERENT|differ/);
+  assert.match(replay.stdout, /sim: .* equal/, replay.stderr);
+  if (replay.status !== 0) assert.match(replay.stderr, /cannot be replayed: the log lacks/);
+}
+
+test('a page pushes, changes, takes back and stops a run of processes, and a replay repeats it', async () => {
+  const run = startRun(options.poise, path('bus'), '--realtime', '--duration', '600');
+  programs.push(run);
+  const view = await startView(options.poise, run, path('bus'), '--control');
+  programs.push(view);
+  const {page, problems} = await openPage(browser, view.url);
+  await until(page, () => window.poise.control.standing?.settings.length > 0 && !document.getElementById('control').hidden);
+  await drag(page, 'bus_drag');
+  await change(page, 'bus_setting');
+  await page.click('#estop');
+  await until(page, () => window.poise.control.standing.stopped);
+  await picture(page, 'bus_stopped');
+  // A page without the token neither reads nor acts.
+  for (const wrong of [view.url.replace(/token=.*/, ''), view.url.replace(/.$/, 'x')]) {
+    const answer = await fetch(wrong);
+    assert.equal(answer.status, 403);
+  }
+  assert.deepEqual(problems, []);
+  await page.context().close();
+  await run.stop();
+  await view.stop();
+  replaysInPart(path('bus'));
+});

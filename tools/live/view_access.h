@@ -1,0 +1,31 @@
+// Who may read and who may act: the checks of a request to the page of a run.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace poise {
+
+/// "127.0.0.1:PORT" or "localhost:PORT": a page of another site that has its name resolve to this
+/// machine sends its own.
+bool IsHere(std::string_view host, int port);
+/// "http://" before one of these.
+bool IsOriginHere(std::string_view origin, int port);
+
+/// A request's target, "/PATH?KEY=VALUE&...". Other keys are passed over.
+struct ViewTarget {
+  std::string_view path;
+  std::string_view token;  ///< empty: none
+  int64_t from = 0;        ///< the tick that a client wants first
+};
+/// None when it is malformed.
+std::optional<ViewTarget> ReadTarget(std::string_view target);
+
+/// 128 random bits from the system, in hexadecimal digits. Throws std::system_error.
+std::string MakeToken();
+/// In a time that tells nothing of where they differ.
+bool SameToken(std::string_view given, std::string_view token);
+
+}  // namespace poise
