@@ -21,6 +21,11 @@ std::vector<std::string> FlagsOf(const CLI::Option& option) {
   return flags;
 }
 
+/// Those that --help shows.
+std::vector<const CLI::Option*> OptionsOf(const CLI::App& app) {
+  return app.get_options([](const CLI::Option* each) { return !each->get_group().empty(); });
+}
+
 bool TakesValue(const CLI::Option& option) { return option.get_items_expected_max() > 0; }
 
 /// What a value or positional is a name of, "scenarios"; empty: a file, or nothing known.
@@ -81,7 +86,7 @@ std::string Short(const std::string& text) {
 }
 
 void AppendOptions(const CLI::App& app, std::string* text) {
-  for (const CLI::Option* option : app.get_options()) {
+  for (const CLI::Option* option : OptionsOf(app)) {
     const std::vector<std::string> flags = FlagsOf(*option);
     std::string head;
     for (const std::string& flag : flags) {
@@ -137,7 +142,7 @@ std::string BashCompletion(const CLI::App& app) {
   ForEachCommand(app, "", [&](const std::string& path, const CLI::App& each) {
     std::vector<std::string> words;
     for (const CLI::App* command : CommandsOf(each)) words.push_back(command->get_name());
-    for (const CLI::Option* option : each.get_options()) {
+    for (const CLI::Option* option : OptionsOf(each)) {
       const std::vector<std::string> flags = FlagsOf(*option);
       words.insert(words.end(), flags.begin(), flags.end());
       const std::string kind = KindOf(*option);
@@ -188,7 +193,7 @@ std::string ZshCompletion(const CLI::App& app) {
       commands += fmt::format(" {}", Quoted(command->get_name() + ":" +
                                             Short(command->get_description())));
     }
-    for (const CLI::Option* option : each.get_options()) {
+    for (const CLI::Option* option : OptionsOf(each)) {
       for (const std::string& flag : FlagsOf(*option)) {
         flags += fmt::format(" {}", Quoted(flag + ":" + Short(option->get_description())));
       }
@@ -245,7 +250,7 @@ std::string FishCompletion(const CLI::App& app) {
       text += fmt::format("complete -c poise -f -n {} -a {} -d {}\n", Quoted(when),
                           command->get_name(), Quoted(Short(command->get_description())));
     }
-    for (const CLI::Option* option : each.get_options()) {
+    for (const CLI::Option* option : OptionsOf(each)) {
       const std::string kind = KindOf(*option);
       const std::string names =
           kind.empty() ? "" : fmt::format(" -a '(poise shell names {} 2>/dev/null)'", kind);

@@ -71,7 +71,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
                     "in one process at wall speed with a page in control: push, change settings, "
                     "pause, single ticks, slow motion, back; Ctrl-C ends")
           ->excludes(in_process)
-          ->group("");  // not shown: its page hung when it paused, cause not known
+          ->group("");  // not shown: its browser test once waited for ever after a pause
   run->add_option("--port", arguments->page.port, "of that page, on 127.0.0.1; default: a free one")
       ->check(CLI::Range(1, 65535))
       ->needs(interactive)
