@@ -273,6 +273,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     } else {
       return;
     }
+    sends_text_ = stream_.text();
     sending_ = true;
     send_start_ = Clock::now();
     stream_.async_write(asio::buffer(*outgoing_),
@@ -286,11 +287,12 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
                         });
   }
 
-  /// By a whole batch: then it does not wait for the next picture.
+  /// By a whole batch, or by what a text has kept waiting: then it does not wait for the next
+  /// picture, which may begin with a text again.
   bool Behind() const {
     const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
     return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
-           sent_acts_ != server_->acts_ || ticks >= static_cast<int64_t>(BatchTicks());
+           sent_acts_ != server_->acts_ || ticks >= (sends_text_ ? 1 : static_cast<int64_t>(BatchTicks()));
   }
   size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
 
@@ -303,6 +305,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   std::string text_;
   bool streaming_ = false;
   bool sending_ = false;
+  bool sends_text_ = false;  // or sent last
   Clock::time_point send_start_;
   int64_t next_ = 0;  // tick
   std::shared_ptr<const std::string> outgoing_;
@@ -392,7 +395,7 @@ void ViewServer::Impl::SendTicks() {
 }
 
 void ViewServer::Impl::SetState(std::string json) {
-  state_ = std::make_shared<const std::string>(std::move(json));
+  if (json != *state_) state_ = std::make_shared<const std::string>(std::move(json));
 }
 
 void ViewServer::Impl::SetStatus(std::string json) {

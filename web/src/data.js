@@ -209,10 +209,11 @@ export class Run extends EventTarget {
     this.dispatchEvent(new Event('append'));
   }
 
-  /** A live run lets go of all its ticks; others come. Fires 'restart'. */
+  /** A live run lets go of all its ticks; others come; `restarts` counts. Fires 'restart'. */
   restart() {
     for (const signal of this.signals.values()) signal.clear();
     this.numRows = 0;
+    this.restarts = (this.restarts ?? 0) + 1;
     this.dispatchEvent(new Event('restart'));
   }
 }

@@ -156,6 +156,7 @@ export class Panel {
 
   #readAll() {
     this.firstTick = this.shared.run.firstTick;
+    this.restarts = this.shared.run.restarts;
     this.data = [timesOf(this.shared.run), ...this.#columns()];
   }
 
@@ -164,8 +165,9 @@ export class Panel {
     const {run, overlay} = this.shared;
     const dropped = run.firstTick - this.firstTick;
     const held = this.data[0].length - dropped;
-    if (dropped === 0 && held === run.numRows) return;
-    if (held <= 0 || overlay) {
+    const restarted = run.restarts !== this.restarts;  // the ticks that it holds are others
+    if (!restarted && dropped === 0 && held === run.numRows) return;
+    if (restarted || held <= 0 || overlay) {
       this.#readAll();
     } else {
       const columns = this.data.slice(1);
