@@ -1,4 +1,4 @@
-// A page that acts on a run of processes (`poise view --control`). A replay repeats what it did.
+// Pages that act: on a run of processes (`poise view --control`) and on an interactive one. Replays repeat what they did.
 // Usage: node control_test.mjs --poise PROGRAM --web DIR, where DIR is build/web. POISE_PICTURES=FOLDER keeps pictures.
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -8,7 +8,7 @@ import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {startRun, startView} from './live_run.mjs';
+import {startInteractive, startRun, startView} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-control-'));
@@ -107,6 +107,14 @@ function replaysInPart(log) {
   if (replay.status !== 0) assert.match(replay.stderr, /cannot be replayed: the log lacks/);
 }
 
+/** Every component of the log, fed with what stands in it, gives the same bits. */
+function replays(log) {
+  const replay = spawnSync(options.poise, ['replay', log], {encoding: 'utf8'});
+  assert.equal(replay.status, 0, replay.stdout + replay.stderr);
+  assert.doesNotMatch(replay.stdout, /DIFFERENT|differ/);
+  assert.ok(replay.stdout.match(/the same bits/g).length >= 6, replay.stdout);
+}
+
 test('a page pushes, changes, takes back and stops a run of processes, and a replay repeats it', async () => {
   const run = startRun(options.poise, path('bus'), '--realtime', '--duration', '600');
   programs.push(run);
@@ -129,4 +137,71 @@ test('a page pushes, changes, takes back and stops a run of processes, and a rep
   await run.stop();
   await view.stop();
   replaysInPart(path('bus'));
+});
+
+test('an interactive run waits, steps, slows, goes back, goes on changed, and its log replays', async () => {
+  const run = await startInteractive(options.poise, path('stand'), '--duration', '600');
+  programs.push(run);
+  const {page, problems} = await openPage(browser, run.url);
+  await until(page, () => window.poise.control.standing?.settings.length > 0);
+  await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 300);
+  await drag(page, 'interactive_drag', 15);
+  await change(page, 'interactive_setting');
+
+  await page.click('#go');
+  await until(page, () => window.poise.control.standing.run.paused);
+  const {run: {tick}} = await standing(page);
+  await until(page, (t) => window.poise.run.firstTick + window.poise.run.numRows === t, tick);
+  await page.click('#one-tick');
+  await until(page, (t) => window.poise.control.standing.run.tick === t + 1, tick);
+
+  // Back, to a tick at which nothing had been done; what was left stays, and is whole.
+  const base = await page.evaluate(() => window.poise.run.signals.get('GROUND_TRUTH.base_position[1]').values[250 - window.poise.run.firstTick]);
+  await page.evaluate(() => window.poise.player.seek(window.poise.run.timeOfTick(251)));
+  await page.click('#back');
+  await until(page, () => window.poise.control.standing.run.branch === 1 && window.poise.control.standing.run.tick === 251);
+  await until(page, () => window.poise.run.firstTick + window.poise.run.numRows === 251);
+  assert.equal(await page.evaluate(() => window.poise.run.signals.get('GROUND_TRUTH.base_position[1]').values[250 - window.poise.run.firstTick]), base);
+  await picture(page, 'interactive_back');
+  await page.selectOption('#run-speed', '0.5');
+  await page.click('#live');
+  await page.click('#go');
+  await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 400);
+  assert.equal((await standing(page)).run.speed, 0.5);
+  await drag(page, 'interactive_after', -15);
+
+  // A stop is taken when the bridge says so: not while the run waits.
+  await page.click('#go');
+  await until(page, () => window.poise.control.standing.run.paused);
+  await page.click('#estop');
+  const stop = () => window.poise.control.standing.acts.findLast((act) => act.do === 'stop');
+  await until(page, () => window.poise.control.standing.acts.some((act) => act.do === 'stop'));
+  assert.equal((await page.evaluate(stop)).state, 'sent');
+  assert.equal((await standing(page)).stopped, false);
+  await page.click('#one-tick');
+  await page.click('#one-tick');
+  await until(page, () => window.poise.control.standing.stopped);
+  const {state, tick: stoppedAt} = await page.evaluate(stop);
+  assert.equal(state, 'accepted');
+  // The log's own word, at the tick that was told: 0 to 4 are no stop.
+  const bridge = (at) => page.evaluate((t) => {
+    const {run: r} = window.poise;
+    return r.signals.get('BRIDGE_STATUS.state').values[t - r.firstTick];
+  }, at);
+  assert.ok(await bridge(stoppedAt) > 4);
+  assert.ok(await bridge(stoppedAt - 1) <= 4);
+  await page.click('#go');
+
+  // Narrow, by keyboard alone.
+  await page.setViewportSize({width: 390, height: 800});
+  await page.keyboard.press('p');
+  await until(page, () => window.poise.control.standing.run.paused);
+  await picture(page, 'interactive_narrow');
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), 'wider than the window');
+  assert.deepEqual(problems, []);
+  await page.context().close();
+  await run.stop();
+  assert.match(run.output, /of \d+ checks/);  // the report
+  replays(path('stand/run.lcm'));
+  replays(path('stand/branch_1.lcm'));
 });

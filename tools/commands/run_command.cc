@@ -70,12 +70,10 @@ void AddRunCommand(CLI::App* app, Command* command) {
       run->add_flag("--interactive", arguments->interactive,
                     "in one process at wall speed with a page in control: push, change settings, "
                     "pause, single ticks, slow motion, back; Ctrl-C ends")
-          ->excludes(in_process)
-          ->group("");  // not shown: its browser test once waited for ever after a pause
+          ->excludes(in_process);
   run->add_option("--port", arguments->page.port, "of that page, on 127.0.0.1; default: a free one")
       ->check(CLI::Range(1, 65535))
-      ->needs(interactive)
-      ->group("");
+      ->needs(interactive);
   run->add_flag("--hosted", options->changes.hosted,
                 "the whole controller in one process: what the graph marks restart: true passes "
                 "its messages in memory, and sends them to all others as ever")
