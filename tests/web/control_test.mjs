@@ -62,14 +62,15 @@ async function drag(page, name, pixels = 25) {
   const at = await grab(page);
   await page.mouse.move(at.x + pixels, at.y, {steps: 4});
   // In force, as the receiver said, and measured by the simulator's own sensor.
-  await until(page, () => {
+  const seenThen = await until(page, () => {
     const {control, scene} = window.poise;
     const force = control.standing.push?.force;
-    return force && Math.hypot(...scene.samples.vector('push', scene.row)) > 0.5 * Math.hypot(...force) && Math.hypot(...force) > 5;
+    return force && Math.hypot(...scene.samples.vector('push', scene.row)) > 0.5 * Math.hypot(...force) && Math.hypot(...force) > 5
+      && {force, limit: control.standing.push_limit, text: document.querySelector('output.force').innerText};
   });
-  assert.match(await page.locator('output.force').innerText(), /asked \d+ N, in force \d+ N, measured \d+ N/);
-  const {push, push_limit: limit} = await standing(page);
-  assert.ok(Math.hypot(...push.force) <= limit * (1 + 1e-9));
+  const {force, limit, text} = await seenThen.jsonValue();
+  assert.match(text, /asked \d+ N, in force \d+ N, measured \d+ N/);
+  assert.ok(Math.hypot(...force) <= limit * (1 + 1e-9));
   await picture(page, name);
   await page.mouse.up();
   await until(page, () => !window.poise.control.standing.push);
