@@ -8,7 +8,7 @@ import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {startInteractive, startRun, startView} from './live_run.mjs';
+import {startInteractive, startStanding, startView} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-control-'));
@@ -117,7 +117,7 @@ function replays(log) {
 }
 
 test('a page pushes, changes, takes back and stops a run of processes, and a replay repeats it', async () => {
-  const run = startRun(options.poise, path('bus'), '--realtime', '--duration', '600');
+  const run = startStanding(options.poise, path('bus'), '--realtime', '--duration', '600');
   programs.push(run);
   const view = await startView(options.poise, run, path('bus'), '--control');
   programs.push(view);

@@ -38,6 +38,9 @@ class Program {
 
 export const startRun = (poise, folder, ...more) => new Program(poise, ['run', 'push_double_support', '--out', folder, ...more]);
 
+/** Of a robot that only stands: whenever a test pushes it, nothing else does. */
+export const startStanding = (poise, folder, ...more) => new Program(poise, ['run', 'stand', '--out', folder, ...more]);
+
 /** `poise view` of a run in `folder` that is starting; has `port` and `url`. */
 export async function startView(poise, run, folder, ...more) {
   await run.prints(/run \d+/);
