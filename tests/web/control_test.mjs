@@ -8,7 +8,7 @@ import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {startInteractive, startStanding, startView} from './live_run.mjs';
+import {replaysInPart, startInteractive, startStanding, startView} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-control-'));
@@ -100,14 +100,6 @@ async function change(page, name) {
   assert.equal(await page.evaluate(value, setting.field), setting.value);
 }
 
-/** As the log of a run of processes in real time, which lacks ticks that a busy machine skipped: all that can be compared. */
-function replaysInPart(log) {
-  const replay = spawnSync(options.poise, ['replay', log], {encoding: 'utf8'});
-  assert.doesNotMatch(replay.stdout, /DIFFERENT|differ/);
-  assert.match(replay.stdout, /sim: .* equal/, replay.stderr);
-  if (replay.status !== 0) assert.match(replay.stderr, /cannot be replayed: the log lacks/);
-}
-
 /** Every component of the log, fed with what stands in it, gives the same bits. */
 function replays(log) {
   const replay = spawnSync(options.poise, ['replay', log], {encoding: 'utf8'});
@@ -137,7 +129,7 @@ test('a page pushes, changes, takes back and stops a run of processes, and a rep
   await page.context().close();
   await run.stop();
   await view.stop();
-  replaysInPart(path('bus'));
+  replaysInPart(options.poise, path('bus'));
 });
 
 test('an interactive run waits, steps, slows, goes back, goes on changed, and its log replays', async () => {

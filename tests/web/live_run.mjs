@@ -1,5 +1,6 @@
 // A run in progress and `poise view` of it.
-import {spawn} from 'node:child_process';
+import assert from 'node:assert/strict';
+import {spawn, spawnSync} from 'node:child_process';
 import {once} from 'node:events';
 
 const ENDS = 20000;  // ms that a program may take to end
@@ -54,4 +55,18 @@ export async function startInteractive(poise, folder, ...more) {
   const run = new Program(poise, ['run', 'stand', '--interactive', '--out', folder, ...more]);
   const [, url, port] = await run.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/\S*)/);
   return Object.assign(run, {url, port: Number(port)});
+}
+
+/**
+ * The log of a run in real time replays to the same bits, as far as it can be compared: a busy machine skips ticks, whose messages the log
+ * then lacks, and hw_bridge goes by the clock, which a replay has not.
+ */
+export function replaysInPart(poise, log) {
+  const {status, stdout, stderr} = spawnSync(poise, ['replay', log], {encoding: 'utf8'});
+  const verdicts = new Map([...stdout.matchAll(/^(\w+): \d+ ticks in .*: (\w+)$/gm)].map(([, name, verdict]) => [name, verdict]));
+  assert.equal(verdicts.get('sim'), 'equal', stdout + stderr);
+  const clock = verdicts.get('hw_bridge');
+  verdicts.delete('hw_bridge');
+  assert.deepEqual([...new Set(verdicts.values())], ['equal'], stdout);
+  if (status !== 0 && clock !== 'DIFFERENT') assert.match(stderr, /cannot be replayed: the log lacks/);
 }
