@@ -77,6 +77,8 @@ T Decoded(const std::vector<uint8_t>& data) {
 
 TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   Start();
+  // The scenario's own push, until tick 100, is over: a tick is some 10 kB.
+  ASSERT_TRUE(WaitForLog(run_, 2'000'000));
   const ProgramResult push =
       Poise({"push", "--force", "0,-30,0", "--duration", "0.1", "--point", "0,0,0.1"});
   EXPECT_EQ(push.exit_code, 0) << push.output;
@@ -122,7 +124,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   EXPECT_EQ(replay.output.find("DIFFERENT"), std::string::npos) << replay.output;
 
   // The force that the truth shows is the one asked for, for as many ticks; the scenario's own push
-  // goes the other way.
+  // went the other way.
   Messages log(run_ + "/run.lcm");
   int pushed = 0;
   for (const auto& [tick, data] : log.by_tick["GROUND_TRUTH"]) {
