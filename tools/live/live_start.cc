@@ -7,10 +7,9 @@
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
-#include "logging/log_reader.h"
 #include "tools/cli/signals.h"
+#include "tools/live/live_page.h"
 #include "tools/scenario/former_fields.h"
 
 namespace poise {
@@ -35,10 +34,7 @@ logging::RunRecord ReadStart(const LiveRun& live, std::chrono::milliseconds pati
   const auto deadline = std::chrono::steady_clock::now() + patience;
   while (true) {
     try {
-      logging::LogReader reader(log);
-      logging::RunRecord record;
-      record.info = logging::ReadRunInfo(&reader, log, &record.spec);
-      record.robot = robot::LoadRobotTexts(record.info.robot, record.info.urdf);
+      logging::RunRecord record = ReadRunStart(log);
       if (record.spec.run_id() != live.spec().run_id()) {
         throw ConfigError(fmt::format("{}: a new run is starting in this folder; try again",
                                       live.dir().string()));
