@@ -112,7 +112,8 @@ RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
     socket_ = -1;
     throw EthercatError(fmt::format("EtherCAT on interface \"{}\": {}", interface, problem));
   };
-  socket_ = socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(kEtherType));
+  // Protocol 0 until bind(): a socket with one takes the frames of every interface meanwhile.
+  socket_ = socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (socket_ < 0) {
     fail(fmt::format("{}; run as root or with CAP_NET_RAW, or use EtherCAT over UDP",
                      std::strerror(errno)));

@@ -157,8 +157,8 @@ TEST(RawLink, NamesInterfacesThatCannotBe) {
 /// Two ends of a virtual cable, gone at the end.
 class VethPair {
  public:
-  VethPair() {
-    const std::string id = std::to_string(getpid() % 100000);
+  explicit VethPair(const std::string& tag = "") {
+    const std::string id = std::to_string(getpid() % 100000) + tag;
     a_ = "ecm" + id;
     b_ = "ecs" + id;
     created_ = Ip("link add " + a_ + " type veth peer name " + b_) &&
@@ -197,7 +197,8 @@ TEST(RawLink, AnswersAMasterWithALocallyAdministeredAddress) {
     GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
   }
   RawLink slaves(pair.b(), RawLink::Side::kSlaves);
-  const int master = socket(AF_PACKET, SOCK_RAW, htons(0x88A4));
+  // Protocol 0 until bind(): packet(7) takes the frames of every interface otherwise.
+  const int master = socket(AF_PACKET, SOCK_RAW, 0);
   ASSERT_GE(master, 0);
   sockaddr_ll address{};
   address.sll_family = AF_PACKET;
@@ -227,6 +228,28 @@ TEST(RawLink, AnswersAMasterWithALocallyAdministeredAddress) {
     EXPECT_EQ(back[7], 0x12);
   }
   close(master);
+}
+
+// Two chains on one machine: a link that opens beside a busy one takes nothing of that one's.
+TEST(RawLink, TakesFramesOfItsOwnInterfaceAlone) {
+  VethPair busy("x");
+  VethPair quiet("y");
+  if (!busy.created() || !quiet.created()) {
+    GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
+  }
+  RawLink sender(busy.a(), RawLink::Side::kMaster);
+  std::atomic<bool> stop{false};
+  std::thread traffic([&] {
+    const std::array<uint8_t, 46> frame{};
+    while (!stop) static_cast<void>(sender.Send(frame));
+  });
+  for (int i = 0; i < 200; ++i) {
+    RawLink slaves(quiet.b(), RawLink::Side::kSlaves);
+    std::array<uint8_t, 64> frame{};
+    EXPECT_EQ(slaves.Receive(frame, slaves.Now()), 0U) << "opened for the " << i << "th time";
+  }
+  stop = true;
+  traffic.join();
 }
 
 TEST(RawLink, SaysThatAnInterfaceIsDown) {
