@@ -20,8 +20,14 @@ set(CMAKE_CXX_FLAGS_RELEASE "-O3")  # assertions stay on
 # The commit, for logs and --version: written anew with each commit, and by deploy/setup.
 execute_process(COMMAND ${CMAKE_COMMAND} -DSOURCE=${PROJECT_SOURCE_DIR} -DOUTPUT=${PROJECT_BINARY_DIR}/poise_commit.h
                         -P ${PROJECT_SOURCE_DIR}/cmake/WriteCommit.cmake)
-if(EXISTS ${PROJECT_SOURCE_DIR}/.git/logs/HEAD)
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/.git/logs/HEAD)
+# Git tells where its log is: a worktree's is elsewhere.
+execute_process(COMMAND git rev-parse --git-path logs/HEAD WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+                OUTPUT_VARIABLE _git_log OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+if(_git_log)
+  get_filename_component(_git_log ${_git_log} ABSOLUTE BASE_DIR ${PROJECT_SOURCE_DIR})
+endif()
+if(_git_log AND EXISTS ${_git_log})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${_git_log})
 endif()
 
 # One set of code-generation flags for all targets: Eigen's alignment depends on them.
