@@ -1,6 +1,6 @@
 // `poise view --control` under attack: requests and frames that no page of ours sends, wrong tokens, foreign origins, too many and too
 // slow clients. Usage: node hostile_test.mjs --poise PROGRAM
-//   POISE_HOSTILE_REQUESTS: how many in all (default 3000); with POISE_HOSTILE_ROUNDS=N the run's ticks are timed with and without
+//   POISE_HOSTILE_REQUESTS: how many in all (default 30000); with POISE_HOSTILE_ROUNDS=N the run's ticks are timed with and without
 //   the attack in turn, N times each, and the p99 of each is printed.
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -13,7 +13,7 @@ import {replaysInPart, startRun, startView} from './live_run.mjs';
 import {open, openStream, upgrade} from './raw_socket.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}}});
-const requests = Number(process.env.POISE_HOSTILE_REQUESTS ?? 3000);
+const requests = Number(process.env.POISE_HOSTILE_REQUESTS ?? 30000);
 const rounds = Number(process.env.POISE_HOSTILE_ROUNDS ?? 0);
 const AT_ONCE = 24;
 const FRAMES = 40;  // of a connection that has the token
@@ -121,7 +121,10 @@ async function control(port, token) {
 async function attack(port, token, count, share, going = () => true) {
   let done = 0;
   const worker = async () => {
-    while (done < count && going()) done += random(100) >= 100 * share ? await outsider(port, token) : await insider(port, token);
+    while (done < count && going()) {
+      const sent = await (random(100) >= 100 * share ? outsider(port, token) : insider(port, token));
+      done += sent;  // not `done += await ...`, which reads `done` before it waits
+    }
   };
   // Beside these, clients that say nothing and one that never reads.
   const idle = Array.from({length: 8}, () => open(port));
