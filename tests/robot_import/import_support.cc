@@ -69,9 +69,28 @@ std::string SimpleBiped(const Biped& changes) {
   return text + changes.more_links + "</robot>\n";
 }
 
+namespace {
+
+/// Of this process; goes with it.
+class MakersTemporaryFolder {
+ public:
+  MakersTemporaryFolder()
+      : path_(fs::path(testing::TempDir()) / fmt::format("poise_import_{}", getpid())) {}
+  ~MakersTemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+}  // namespace
+
 fs::path WriteMaker(const std::string& name, const std::string& text) {
-  const fs::path folder =
-      fs::path(testing::TempDir()) / fmt::format("poise_import_{}_{}", getpid(), name);
+  static const MakersTemporaryFolder temporary;
+  const fs::path folder = temporary.path() / name;
   fs::create_directories(folder);
   const fs::path file = folder / (name + (text.find("<mujoco") < 200 ? ".xml" : ".urdf"));
   std::ofstream(file, std::ios::binary) << text;

@@ -36,3 +36,27 @@ export async function openPage(browser, file, options = {}) {
     || document.querySelector('[role=alert]'), null, {timeout: PATIENCE});
   return {page, problems};
 }
+
+/** Where a body's frame is seen, CSS pixels. */
+const seen = (page, body) => page.evaluate((b) => {
+  const {scene} = window.poise;
+  scene.renderNow();
+  const at = scene.controls.target.clone();
+  scene.robotView.groups[b].getWorldPosition(at);
+  at.project(scene.camera);
+  const box = scene.renderer.domElement.getBoundingClientRect();
+  return {x: box.left + (at.x + 1) / 2 * box.width, y: box.top + (1 - at.y) / 2 * box.height};
+}, body);
+
+/** Presses on the first body that is hit where its frame is seen; gives the place. */
+export async function grab(page) {
+  const bodies = await page.evaluate(() => window.poise.run.robot.bodies.length);
+  for (let body = 0; body < bodies; ++body) {
+    const at = await seen(page, body);
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    if (await page.locator('canvas.grabbing').count() > 0) return at;
+    await page.mouse.up();
+  }
+  throw new Error('no body could be grabbed');
+}

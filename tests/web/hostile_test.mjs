@@ -158,6 +158,7 @@ test('an attack has no effect on the run', async () => {
   done += await attack(view.port, token, Math.floor(requests / 2), 0.25);
   const took = (performance.now() - began) / 1000;
   assert.ok(done >= requests);
+  assert.equal(run.child.exitCode, null, run.output);  // it goes on
   // Acts were read, and each refused.
   const told = await control(view.port, token);
   assert.match(told, /"state":"refused"/);

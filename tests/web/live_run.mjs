@@ -70,3 +70,11 @@ export function replaysInPart(poise, log) {
   assert.deepEqual([...new Set(verdicts.values())], ['equal'], stdout);
   if (status !== 0 && clock !== 'DIFFERENT') assert.match(stderr, /cannot be replayed: the log lacks/);
 }
+
+/** Every component of the log, fed with what stands in it, gives the same bits. */
+export function replays(poise, log) {
+  const replay = spawnSync(poise, ['replay', log], {encoding: 'utf8'});
+  assert.equal(replay.status, 0, replay.stdout + replay.stderr);
+  assert.doesNotMatch(replay.stdout, /DIFFERENT|differ/);
+  assert.ok(replay.stdout.match(/the same bits/g).length >= 6, replay.stdout);
+}

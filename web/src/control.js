@@ -7,6 +7,8 @@ const FULL_REACH = 0.4;   // m from the grabbed point to the cursor at which a d
 export class Control extends EventTarget {
   /** As the server told it last; undefined: this page only looks. */
   standing;
+  /** The last act, if there was no connection to send it by. A stop is sent once there is one again. */
+  unsent;
   #client = crypto.getRandomValues(new Uint32Array(1))[0];
   #next = 1;
   #waiting = new Map();  // by id: act
@@ -15,6 +17,10 @@ export class Control extends EventTarget {
     super();
     this.feed = feed;
     feed.addEventListener('control', () => this.#tell(feed.control));
+    // A stop that nobody has answered when the connection is lost may be lost with it.
+    feed.addEventListener('state', () => {
+      if (feed.state === 'waiting') this.unsent ??= this.waiting.find((act) => act.do === 'stop');
+    });
   }
 
   /** What was told before anyone listened: the server tells changes alone. */
@@ -28,7 +34,12 @@ export class Control extends EventTarget {
   /** Sends an act; its id, or 0 without a connection. It is in force when the receiver says so, not before. */
   act(what, more = {}) {
     const act = {client: this.#client, id: this.#next++, do: what, ...more};
-    if (!this.feed.send(JSON.stringify(act))) return 0;
+    const sent = this.feed.send(JSON.stringify(act));
+    this.unsent = sent ? undefined : act;
+    if (!sent) {
+      this.dispatchEvent(new Event('change'));
+      return 0;
+    }
     if (what !== 'push') this.#waiting.set(act.id, act);  // the last push stands for those before it
     this.dispatchEvent(new Event('change'));
     return act.id;
@@ -36,6 +47,7 @@ export class Control extends EventTarget {
 
   #tell(standing) {
     this.standing = standing;
+    if (this.unsent?.do === 'stop') this.act('stop');
     for (const act of standing.acts) {
       if (act.client !== this.#client || act.state === 'sent' || !this.#waiting.delete(act.id)) continue;
       this.dispatchEvent(new CustomEvent('answer', {detail: act}));

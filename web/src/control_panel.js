@@ -119,7 +119,7 @@ function actText(act) {
   const what = {push: () => `push ${act.name}, ${formatNumber(Math.hypot(...act.force), 3)} N`, set: () => `${act.name} = ${formatNumber(act.value)}`,
     walk: () => `walk ${act.velocity.map((v) => formatNumber(v, 2)).join(', ')}`, step: () => `step, ${act.name}`,
     tick: () => `${act.ticks} tick`, speed: () => `speed ${act.value}×`, back: () => `back to tick ${act.ticks}`}[act.do];
-  const state = {sent: 'sent, no answer yet', accepted: act.tick === undefined ? 'done' : `from tick ${act.tick}`, refused: `refused: ${act.reason}`}[act.state];
+  const state = {unsent: `not sent: no connection${act.do === 'stop' ? '; it will be as soon as there is one' : ''}`, sent: 'sent, no answer yet', accepted: act.tick === undefined ? 'done' : `from tick ${act.tick}`, refused: `refused: ${act.reason}`}[act.state];
   return [what ? what() : act.do.replaceAll('_', ' '), state];
 }
 
@@ -162,7 +162,8 @@ export function controlPanel(control, shared) {
       tempo?.update();
       undoButton.disabled = !undo.next;
       undoButton.textContent = undo.next ? `undo ${undo.next.field}` : 'undo';
-      acts.replaceChildren(...control.standing.acts.slice(-6).reverse().map((act) => {
+      const unsent = control.unsent ? [{...control.unsent, name: control.unsent.field ?? control.unsent.foot ?? control.unsent.body, state: 'unsent'}] : [];
+      acts.replaceChildren(...[...control.standing.acts.slice(-6), ...unsent].reverse().map((act) => {
         const [what, state] = actText(act);
         return element('li', {class: act.state}, what, element('span', {class: 'text'}, ` ${state}`));
       }));
