@@ -27,6 +27,9 @@ constexpr double kRiseShare = 0.5;
 /// down from above, not against a block's side. By then it has come down by a fifth of its height.
 /// Chosen.
 constexpr double kAcrossShare = 0.65;
+/// Of the swing, in which a foot only rises there: else its toe meets the side of the block ahead
+/// on its way up, which fells the robot. Chosen.
+constexpr double kWaitShare = 0.15;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
@@ -151,8 +154,12 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                config.most_turn()};
   spec.acceleration = config.acceleration();
   spec.turn_acceleration = config.turn_acceleration();
-  spec.foot = {config.clearance(), config.touch_speed(), config.freeze(),
-               kRiseShare * config.clearance(), config.rests() ? kAcrossShare : 1};
+  spec.foot = {config.clearance(),
+               config.touch_speed(),
+               config.freeze(),
+               kRiseShare * config.clearance(),
+               config.rests() ? kAcrossShare : 1,
+               config.rests() ? kWaitShare : 0};
   spec.touch_load = contact.touch_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();

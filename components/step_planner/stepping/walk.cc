@@ -21,7 +21,7 @@ constexpr double kLetGo = 0.25;
 constexpr int kHalvings = 40;           // of [0, 1]
 constexpr double kLongestLetGo = 0.06;  // s of settling that this counts of
 constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge to be risen over
-constexpr double kWaitShare = 0.25;     // of the swing, in which the foot only rises then. Chosen.
+constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
 constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
 constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
@@ -192,7 +192,7 @@ void Walk::BeginSwing(const StepInput& input) {
   SwingSpec way = spec_.foot;
   // Up before an edge that it is told of, not against it.
   if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeAhead) {
-    way.wait = kWaitShare;
+    way.wait = std::max(way.wait, kEdgeWait);
   }
   swing_.Begin({.position = input.sole[foot].translation()}, input.sole[foot].linear(),
                {foothold_.position.x(), foothold_.position.y(), ground},
