@@ -275,8 +275,11 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
 bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
   if (!recovers_ && !walks_) return false;
   const stepping::StepInput input = SeeSteps(time, load);
-  return (recovers_ && !walk_.active() && Recover(input)) || (walks_ && WalkOn(input)) ||
-         stands_otherwise_;
+  if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
+    walk_.Stop();
+    return true;
+  }
+  return (walks_ && WalkOn(input)) || stands_otherwise_;
 }
 
 stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 2>& load) {
@@ -291,6 +294,7 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 
   input.lean = lean.angle() * lean.axis();
   input.turning = data.body_angular_velocity[static_cast<size_t>(model_->body_task_body())];
   input.sole = {data.foot_pose[0], data.foot_pose[1]};
+  for (size_t i = 0; i < 2; ++i) input.sole_turning[i] = data.foot_velocity[i].tail<3>();
   input.load = load;
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -26,6 +27,9 @@ constexpr double kRiseShare = 0.5;
 /// down from above, not against a block's side. By then it has come down by a fifth of its height.
 /// Chosen.
 constexpr double kAcrossShare = 0.65;
+/// Of the swing, in which a foot only rises there: else its toe meets the side of the block ahead
+/// on its way up, which fells the robot. Chosen.
+constexpr double kWaitShare = 0.15;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
@@ -89,6 +93,29 @@ void CheckWalkConfig(const WalkConfig& config) {
   not_negative(config.rest_time(), "rest_time");
   CheckWalk(config.press() >= 0 && config.press() <= kMostPress, "press", "must be 0 to 0.4");
   not_negative(config.line(), "line");
+  CheckWalk(config.places() >= 0 && config.places() <= stepping::kMostPlaces, "places",
+            "must be 0 to 4");
+  not_negative(config.place_shift(), "place_shift");
+  positive(config.patience(), "patience");
+  not_negative(config.roll_damping(), "roll_damping");
+  not_negative(config.give_up(), "give_up");
+  CheckWalk(config.most_tilt() > 0 && config.most_tilt() < 0.5 * M_PI, "most_tilt",
+            "must be above 0 and below pi/2 rad");
+  std::array<double, 2> from{-std::numeric_limits<double>::infinity(),
+                             -std::numeric_limits<double>::infinity()};
+  for (int i = 0; i < config.ground_size(); ++i) {
+    const KnownGroundConfig& ground = config.ground(i);
+    const std::string field = fmt::format("walk.ground[{}]", i);
+    if (!ground.has_foot()) throw ConfigError(field + ".foot", "is missing: whose lane is it?");
+    if (!(std::isfinite(ground.from()) && std::isfinite(ground.height()))) {
+      throw ConfigError(field, "must be of numbers");
+    }
+    double& last_from = from[static_cast<size_t>(ground.foot())];
+    if (!(ground.from() > last_from)) {
+      throw ConfigError(field + ".from", "must come after the last one's of this foot");
+    }
+    last_from = ground.from();
+  }
 }
 
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
@@ -127,8 +154,12 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                config.most_turn()};
   spec.acceleration = config.acceleration();
   spec.turn_acceleration = config.turn_acceleration();
-  spec.foot = {config.clearance(), config.touch_speed(), config.freeze(),
-               kRiseShare * config.clearance(), config.rests() ? kAcrossShare : 1};
+  spec.foot = {config.clearance(),
+               config.touch_speed(),
+               config.freeze(),
+               kRiseShare * config.clearance(),
+               config.rests() ? kAcrossShare : 1,
+               config.rests() ? kWaitShare : 0};
   spec.touch_load = contact.touch_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
@@ -148,6 +179,15 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
       std::max(config.press() * robot::kGravity * model.total_mass(), spec.touch_load);
   spec.off_center = 0.5 * (LeastInnerRadius(model) - edge);
   spec.line = config.line();
+  spec.places = config.places();
+  spec.place_shift = config.place_shift();
+  spec.patience = config.patience();
+  spec.roll_damping = config.roll_damping() / (robot::kGravity * model.total_mass());
+  spec.give_up = config.give_up();
+  spec.most_tilt = config.most_tilt();
+  for (const KnownGroundConfig& edge : config.ground()) {
+    spec.ground.Add(edge.foot(), edge.from(), edge.height());
+  }
   return {stepping::StepChoice(model, reach, limits), spec};
 }
 

@@ -26,6 +26,8 @@ struct StepInput {
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
                                         Eigen::Isometry3d::Identity()};
+  /// rad/s, of the soles, world.
+  std::array<Eigen::Vector3d, 2> sole_turning{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, 2> load{0, 0};            ///< N
   std::array<bool, 2> in_contact{true, true};  ///< of the plan; while no step is under way
   PointMotion free_foot;                       ///< reference of a foot in the air; likewise

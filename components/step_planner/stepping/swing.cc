@@ -53,9 +53,10 @@ void Swing::Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
   const auto point = [&](int i) {
     return Quintic::Point{from.position[i], from.velocity[i], from.acceleration[i]};
   };
-  const double duration = spec.across < 1 ? Across(start_) : end_ - start_;
-  x_.Begin(point(0), {foothold.x()}, start_, duration);
-  y_.Begin(point(1), {foothold.y()}, start_, duration);
+  const double wait = spec.wait * (end_ - start_);
+  const double duration = (spec.across < 1 ? Across(start_) : end_ - start_) - wait;
+  x_.Begin(point(0), {foothold.x()}, start_ + wait, duration);
+  y_.Begin(point(1), {foothold.y()}, start_ + wait, duration);
   apex_height_ = std::max(foothold.z() + spec.clearance, from.position.z() + spec.rise);
   rise_.Begin(point(2), {apex_height_}, start_, apex_ - start_);
   fall_.Begin({apex_height_}, {foothold.z(), -spec.touch_speed}, apex_, end_ - apex_);

@@ -32,6 +32,7 @@ struct SwingSpec {
   double freeze = 0;       ///< s before the end, from when on the foothold stays
   double rise = 0;         ///< m above where it begins that the foot rises at least
   double across = 1;       ///< share of the time after which the foot is above its foothold
+  double wait = 0;         ///< share in which it only rises, from rest; below `across`
 };
 
 /// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,

@@ -20,6 +20,9 @@ constexpr int kAhead = 3;
 constexpr double kLetGo = 0.25;
 constexpr int kHalvings = 40;           // of [0, 1]
 constexpr double kLongestLetGo = 0.06;  // s of settling that this counts of
+constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge to be risen over
+constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
+constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
 constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
@@ -114,10 +117,16 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
         settled_since_ = time;
         Enter(WalkStage::kTouching, time);
+      } else if (Leaves(input, false)) {
+        Retreat(input, state);
       }
       break;
     case WalkStage::kTouching:
-      if (Settled(input)) Land(input, state, command);
+      if (const bool settled = Settled(input); Leaves(input, settled)) {
+        Retreat(input, state);
+      } else if (settled) {
+        Land(input, state, command);
+      }
       break;
     case WalkStage::kLoading:
       if (time < since_ + spec_.load - kTimeTolerance) break;
@@ -147,7 +156,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
   stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
   in_contact_ = {true, true};
-  standing_height_ = input.com_height - input.sole[0].translation().z();
+  if (!lowered_) standing_height_ = input.com_height - input.sole[0].translation().z();
+  lowered_ = false;
   height_.Begin(input.com_height);
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
@@ -175,9 +185,58 @@ void Walk::BeginSwing(const StepInput& input) {
   in_contact_[foot] = false;
   starting_ = false;
   touch_down_ = input.time + spec_.swing;
-  const double ground = input.sole[1 - foot].translation().z();
+  attempt_ = 0;
+  first_ = foothold_;
+  home_ = {input.sole[foot].translation().head<2>(), Yaw(input.sole[foot])};
+  const double ground = GroundAt(input, foothold_);
+  SwingSpec way = spec_.foot;
+  // Up before an edge that it is told of, not against it.
+  if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeAhead) {
+    way.wait = std::max(way.wait, kEdgeWait);
+  }
   swing_.Begin({.position = input.sole[foot].translation()}, input.sole[foot].linear(),
                {foothold_.position.x(), foothold_.position.y(), ground},
+               Eigen::AngleAxisd(foothold_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
+               touch_down_, way);
+  touch_.Reset();
+  Enter(WalkStage::kSwinging, input.time);
+}
+
+double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
+  const Vector3d stance = input.sole[static_cast<size_t>(stance_)].translation();
+  if (spec_.ground.empty()) return stance.z();
+  // From sole to sole: what the estimator's height drifts by does not count.
+  return stance.z() + spec_.ground.At(1 - stance_, foothold.position.x()) -
+         spec_.ground.At(stance_, stance.x());
+}
+
+bool Walk::Leaves(const StepInput& input, bool settled) const {
+  // Only while the capture point stays above the other sole, and but for the last place, which has
+  // carried before.
+  if (!spec_.rests || attempt_ > spec_.places || spec_.places == 0) return false;
+  if (stage_ == WalkStage::kSwinging) {
+    const double end = swing_.end() + spec_.search_depth / spec_.foot.touch_speed;
+    return input.time >= end + kNothing - kTimeTolerance;
+  }
+  if (!settled) return input.time >= since_ + spec_.patience - kTimeTolerance;
+  return input.sole[static_cast<size_t>(1 - stance_)].linear()(2, 2) < std::cos(spec_.most_tilt);
+}
+
+void Walk::Retreat(const StepInput& input, const StepState& state) {
+  ++attempt_;
+  ++num_left_;
+  const Footstep stance = Standing(state, stance_);
+  if (attempt_ > spec_.places) {
+    foothold_ = home_;
+  } else {
+    const Eigen::Rotation2Dd turn(stance.yaw);
+    const Vector2d com = turn.inverse() * (input.com.head<2>() - stance.position);
+    foothold_ = AnotherPlace(first_, attempt_, spec_.place_shift, stance, 1 - stance_,
+                             choice_.reach().Footholds(1 - stance_, com));
+  }
+  touch_down_ = input.time + spec_.swing;
+  swing_.Begin(output_.swing, output_.swing_rotation.rotation,
+               {foothold_.position.x(), foothold_.position.y(), GroundAt(input, foothold_)},
                Eigen::AngleAxisd(foothold_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
                touch_down_, spec_.foot);
   touch_.Reset();
@@ -399,11 +458,34 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
   }
   const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
   const balance::ConvexPolygon carrying = Carrying(input, state);
-  const Vector2d asked = balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
+  const Vector2d asked = balance::NearestPoint(
+      carrying, wanted_.cop + (1 + spec_.gain) * error + AgainstRolling(input));
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
   return balance::NearestPoint(carrying, asked + left * left_over_);
+}
+
+Vector2d Walk::AgainstRolling(const StepInput& input) const {
+  // Of both, each by what it carries.
+  Vector2d cop = Vector2d::Zero();
+  const double all = input.load[0] + input.load[1];
+  for (size_t i = 0; i < 2; ++i) {
+    if (!in_contact_[i] || !(all > spec_.touch_load)) continue;
+    const double share = std::clamp(input.load[i] / all, 0.0, 1.0);
+    const Vector3d& turning = input.sole_turning[i];
+    cop += share * spec_.roll_damping * Vector2d(-turning.y(), turning.x());
+  }
+  return cop;
+}
+
+bool Walk::Lost(const StepInput& input) const {
+  if (!OnOneFoot() || !spec_.rests) return false;
+  const StepState state = Observe(input, in_contact_);
+  const auto s = static_cast<size_t>(stance_);
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance_), 0, state.sole[s], state.sole_yaw[s]);
+  return -balance::SignedDistance(sole, state.pendulum.capture_point()) > spec_.give_up;
 }
 
 Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double period) {
@@ -459,6 +541,8 @@ void Walk::Archive(StateArchive* archive) {
   body_yaw_.Archive(archive);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
+  archive->Show(lowered_, attempt_, num_left_, first_.position, first_.yaw, home_.position,
+                home_.yaw);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);

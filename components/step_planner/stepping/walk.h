@@ -5,6 +5,7 @@
 #include <array>
 
 #include "components/framework/state_archive.h"
+#include "components/step_planner/stepping/another_place.h"
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
@@ -38,6 +39,14 @@ struct WalkSpec {
   double press_share = 0;  ///< of the weight that this is; 0: it only has to touch
   double off_center = 0;   ///< m of the capture point beside the sole's middle at lift-off, at most
   double line = 0;         ///< m, rad by which a foothold comes back to the commanded way
+  int places = 0;          ///< others that are tried for a step; 0: a foot waits where it is
+  double place_shift = 0;  ///< m between them
+  double patience = 0;     ///< s of a press until a place is left that does not take it
+  double most_tilt = 0;    ///< rad of a sole that is stood on
+  KnownGround ground;
+  /// m of the centre of pressure for each rad/s with which the sole that carries turns.
+  double roll_damping = 0;
+  double give_up = 0;  ///< m beyond the sole that carries, from which another planner may step
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -77,8 +86,18 @@ class Walk {
     return num_steps_ + (under_way ? 1 : 0);
   }
   int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
+  /// The foot in the air has left a place that does not carry, for another one.
+  bool retreating() const { return stage_ == WalkStage::kSwinging && attempt_ > 0; }
+  int num_left() const { return num_left_; }  ///< places left so, since the start
+  /// On one foot that rests, the capture point is so far beyond its sole that the walk does not
+  /// bring it back.
+  bool Lost(const StepInput& input) const;
   /// Another planner has moved the feet.
-  void Stop() { stage_ = WalkStage::kStanding; }
+  void Stop() {
+    num_steps_ = num_begun();
+    lowered_ = lowered_ || active();
+    stage_ = WalkStage::kStanding;
+  }
   const Footstep& foothold() const { return foothold_; }  ///< of the step under way
   double touch_down() const { return touch_down_; }       ///< s, planned
   /// What is walked now: the command, approached without haste.
@@ -101,6 +120,12 @@ class Walk {
   /// What is missing of the press' load, as a share of it, −1 to 1.
   double Missing(const StepInput& input) const;
   bool Settled(const StepInput& input);
+  /// The place cannot be stood on, as far as the foot has felt it, and another one may be tried.
+  bool Leaves(const StepInput& input, bool settled) const;
+  /// Up from there, to another place; the last one is where the foot stood before the step.
+  void Retreat(const StepInput& input, const StepState& state);
+  /// m, world: what is told of the ground, from where the other sole stands.
+  double GroundAt(const StepInput& input, const Footstep& foothold) const;
   /// Of the ramp that is under way, 0 to 1.
   double Progress(double time) const;
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
@@ -124,6 +149,9 @@ class Walk {
   /// What to ask for so that the capture point moves as of `cop`, m: what legs that swing and a
   /// body that turns add to the pendulum is observed, ξ̇ = ω (ξ − asked − offset), and taken off.
   Eigen::Vector2d WithoutOffset(const StepState& state, const Eigen::Vector2d& cop, double period);
+  /// What brakes the sole that carries, m: on soft ground it rolls on a spring, with the ankle's
+  /// rotor as its mass, and gravity makes that spring softer yet.
+  Eigen::Vector2d AgainstRolling(const StepInput& input) const;
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
@@ -144,11 +172,14 @@ class Walk {
   double settled_since_ = 0;                        // s: pressed down
   double ramp_start_ = 0;                           // of the loading ramp: what the press carries
   double standing_height_ = 0;                      // m
-  double start_yaw_ = 0;                            // rad
-  bool starting_ = false;                           // no foot has left the ground yet
-  bool closing_ = false;  // the step under way comes beside the other foot, the last one
-  bool final_ = false;    // it has
+  bool lowered_ = false;            // stopped while it walked: it has not stood up since
+  double start_yaw_ = 0;            // rad
+  bool starting_ = false;           // no foot has left the ground yet
+  bool closing_ = false;            // the step under way comes beside the other foot, the last one
+  bool final_ = false;              // it has
+  int attempt_ = 0, num_left_ = 0;  // places left: of this step, of all
   Footstep foothold_;
+  Footstep first_, home_;  // foothold of the step's first attempt; where the foot stood before
   Footstep way_;  ///< where the stance sole would stand if every step came down as commanded
   Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down
   std::array<Quintic, 2> start_;                        // of the capture point while starting

@@ -189,14 +189,17 @@ WalkSpec Spec(const Reach& reach, double spacing) {
   return spec;
 }
 
-constexpr double kEdge = 0.02;  // m
+constexpr double kEdge = 0.02;          // m
+constexpr double kRollDamping = 0.007;  // m/(rad/s)
 
 class World {
  public:
   /// `rough`: m, by how much the ground is lower under every third foothold.
   /// `patient`: s more for each ramp of the load.
   /// `rests`: the capture point, above the sole that carries.
-  explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false)
+  /// `places`: of WalkSpec.
+  explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false,
+                 int places = 0)
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
     const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
@@ -209,12 +212,33 @@ class World {
     spec.rests = rests;
     spec.off_center = 0.02;
     spec.line = 0.03;
+    spec.places = places;
+    spec.place_shift = 0.15;
+    spec.patience = 1;
+    spec.most_tilt = 0.4;
+    spec.roll_damping = kRollDamping;
     walk_ = Walk(StepChoice(model_, reach, limits), spec);
     com_ = {0, 0, height};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, (i == 0 ? -0.5 : 0.5) * limits.spacing, 0) *
                  Eigen::Isometry3d::Identity();
     }
+  }
+
+  /// No ground under a sole whose centre is from `from` to `to`, m, along x.
+  void Dig(double from, double to) { hole_ = {from, to}; }
+  /// The centre of pressure asked for in the next tick if the soles turned like this.
+  Vector2d AskedFor(const Vector3d& turning, const WalkCommand& command) const {
+    StepInput input = See();
+    input.sole_turning = {turning, turning};
+    Walk walk = walk_;
+    walk.Update(input, command);
+    return walk.output().cop;
+  }
+  bool Lost(const Vector2d& push) const {
+    StepInput input = See();
+    input.com_velocity.head<2>() += push;
+    return walk_.Lost(input);
   }
 
   void Push(const Vector2d& velocity) { velocity_.head<2>() += velocity; }
@@ -236,9 +260,13 @@ class World {
   double largest_jump() const { return largest_jump_; }
 
  private:
-  double Ground() const { return walk_.num_steps() % 3 == 1 ? -rough_ : 0; }
+  double Ground(const Eigen::Isometry3d& sole) const {
+    const double x = sole.translation().x();
+    if (x > hole_[0] && x < hole_[1]) return -1;
+    return walk_.num_steps() % 3 == 1 ? -rough_ : 0;
+  }
 
-  void Tick(const WalkCommand& command) {
+  StepInput See() const {
     StepInput input;
     input.time = time_;
     input.com = com_;
@@ -246,9 +274,14 @@ class World {
     input.sole = sole_;
     input.com_height = com_.z();
     for (size_t i = 0; i < 2; ++i) {
-      const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground();
+      const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground(sole_[i]);
       input.load[i] = down ? 200 : 0;
     }
+    return input;
+  }
+
+  void Tick(const WalkCommand& command) {
+    const StepInput input = See();
     const bool was_active = walk_.active();
     if (walk_.Update(input, command)) {
       const StepOutput& output = walk_.output();
@@ -273,7 +306,7 @@ class World {
       sole_[i].translation() = output.swing.position;
       sole_[i].linear() = output.swing_rotation.rotation;
       double& z = sole_[i].translation().z();
-      if (output.swing.velocity.z() < 0) z = std::max(z, Ground());
+      if (output.swing.velocity.z() < 0) z = std::max(z, Ground(sole_[i]));
     }
     EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
     const Vector3d& acceleration = output.com.acceleration;
@@ -287,6 +320,7 @@ class World {
 
   robot::RobotModel model_;
   double rough_;
+  std::array<double, 2> hole_{0, 0};
   Walk walk_;
   double time_ = 0;
   Vector3d com_, velocity_ = Vector3d::Zero();
@@ -393,6 +427,153 @@ TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
   EXPECT_GE(world.walk().num_steps(), 12);
   world.Run(15, kStand);
   EXPECT_FALSE(world.walk().active());
+}
+
+TEST(Swing, RisesBeforeItGoesAcrossWhereItIsToldTo) {
+  Swing swing;
+  const SwingSpec spec{
+      .clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1, .across = 0.65, .wait = 0.25};
+  const Vector3d from(0.1, 0.2, 0), to(0.5, 0.22, 0.2);
+  swing.Begin({.position = from}, Eigen::Matrix3d::Identity(), to, Eigen::Matrix3d::Identity(), 2,
+              3, spec);
+  Vector3d last = from;
+  for (int i = 0; i <= 1000; ++i) {
+    const double time = 2 + 1e-3 * i;
+    const PointMotion at = swing.At(time);
+    if (time <= 2.25) {
+      EXPECT_EQ(at.position.x(), from.x());
+      EXPECT_EQ(at.velocity.x(), 0);
+    }
+    // Its velocity is its position's rate.
+    if (i > 0) {
+      EXPECT_NEAR(at.position.x() - last.x(), 1e-3 * at.velocity.x(), 1e-5) << time;
+      EXPECT_NEAR(at.position.z() - last.z(), 1e-3 * at.velocity.z(), 1e-5) << time;
+    }
+    if (time >= 2.65) {
+      EXPECT_NEAR(at.position.x(), to.x(), 1e-12);
+    }
+    last = at.position;
+  }
+  EXPECT_GT(swing.At(2.25).position.z(), 0.1);
+  EXPECT_NEAR(last.z(), to.z(), 1e-9);
+}
+
+TEST(AnotherPlace, LiesAroundTheFirstOneWhereTheFootReaches) {
+  const double yaw = 0.4, shift = 0.15;
+  const Footstep stance{{1, 2}, yaw};
+  const Eigen::Rotation2Dd turn(yaw);
+  const Footstep first{stance.position + turn * Vector2d(0.1, 0.2), yaw + 0.1};
+  const std::array<Vector2d, 4> expected{Vector2d(0.25, 0.2), Vector2d(-0.05, 0.2),
+                                         Vector2d(0.1, 0.35), Vector2d(0.1, 0.05)};
+  for (int i = 1; i <= kMostPlaces; ++i) {
+    const Footstep place = AnotherPlace(first, i, shift, stance, robot::kLeftFoot, {});
+    const Vector2d seen = turn.inverse() * (place.position - stance.position);
+    EXPECT_LT((seen - expected[static_cast<size_t>(i - 1)]).norm(), 1e-12) << i;
+    EXPECT_EQ(place.yaw, first.yaw);
+  }
+  // A reach of 0.15 m ahead and 0.1 to 0.3 m aside.
+  const std::array<Vector2d, 4> corners{Vector2d(-0.2, 0.1), Vector2d(0.15, 0.1),
+                                        Vector2d(0.15, 0.3), Vector2d(-0.2, 0.3)};
+  const balance::ConvexPolygon reach = balance::ConvexHull(corners);
+  const Footstep near = AnotherPlace(first, 1, shift, stance, robot::kLeftFoot, reach);
+  EXPECT_LT((turn.inverse() * (near.position - stance.position) - Vector2d(0.15, 0.2)).norm(),
+            1e-12);
+}
+
+TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
+  KnownGround ground;
+  EXPECT_TRUE(ground.empty());
+  ground.Add(robot::kLeftFoot, 0.6, 0.1);
+  ground.Add(robot::kRightFoot, 0.8, 0.2);
+  ground.Add(robot::kLeftFoot, 1.0, 0.3);
+  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.5), 0);
+  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.6), 0.1);
+  EXPECT_EQ(ground.At(robot::kRightFoot, 0.7), 0);
+  EXPECT_EQ(ground.At(robot::kRightFoot, 5), 0.2);
+  EXPECT_EQ(ground.At(robot::kLeftFoot, 1.2), 0.3);
+}
+
+/// Until the second foot has come down, the capture point above the sole that carries meanwhile.
+void WalkOverAHole(World* world, const WalkCommand& command) {
+  for (int i = 0; i < 15000 && world->walk().num_steps() < 2; ++i) {
+    world->Run(kPeriod, command);
+    if (!world->walk().retreating()) continue;
+    const auto stance = static_cast<size_t>(1 - world->walk().stepping_foot());
+    const Vector2d off = world->capture_point() - world->sole()[stance].translation().head<2>();
+    EXPECT_LT(off.norm(), 0.02) << i;
+  }
+}
+
+TEST(Walk, LeavesAPlaceWithoutGroundForAnother) {
+  // The first step is to x = 0.06 m or so: nothing is there, nor 0.15 m farther ahead.
+  World world(TestRobot::kDyros, 0, 0.5, true, 4);
+  world.Dig(0.02, 0.3);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  WalkOverAHole(&world, command);
+  EXPECT_GE(world.walk().num_left(), 2);
+  ASSERT_EQ(world.walk().num_steps(), 2);
+  for (const Eigen::Isometry3d& sole : world.sole()) {
+    const double x = sole.translation().x();
+    EXPECT_TRUE(x <= 0.02 || x >= 0.3) << x;
+    EXPECT_NEAR(sole.translation().z(), 0, 0.002);
+  }
+}
+
+TEST(Walk, AFootThatFindsNoPlaceComesBackToWhereItStood) {
+  World world(TestRobot::kDyros, 0, 0.5, true, 2);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  while (world.walk().stage() != WalkStage::kSwinging) world.Run(kPeriod, command);
+  const auto foot = static_cast<size_t>(world.walk().stepping_foot());
+  const Vector3d home = world.sole()[foot].translation();
+  // All but where it stands: ahead now, and behind once that was left.
+  world.Dig(home.x() + 0.02, 1);
+  while (world.walk().num_left() < 2) world.Run(kPeriod, command);
+  world.Dig(-1, home.x() - 0.02);
+  for (int i = 0; i < 5000 && world.walk().num_steps() == 0; ++i) world.Run(kPeriod, command);
+  EXPECT_EQ(world.walk().num_left(), 3);
+  ASSERT_EQ(world.walk().num_steps(), 1);
+  EXPECT_LT((world.sole()[foot].translation() - home).norm(), 0.005);
+}
+
+TEST(Walk, WithoutOtherPlacesAFootWaitsWhereItIs) {
+  World world(TestRobot::kDyros, 0, 0.5, true, 0);
+  world.Dig(0.02, 1);
+  WalkOverAHole(&world, {{0.05, 0}, 0, true});
+  EXPECT_EQ(world.walk().num_left(), 0);
+  EXPECT_EQ(world.walk().num_steps(), 0);
+}
+
+TEST(Walk, BrakesASoleThatTurns) {
+  World world(TestRobot::kDyros, 0, 0.5, true);
+  const WalkCommand command{{0, 0}, 0, true};
+  while (world.walk().stage() != WalkStage::kSwinging) world.Run(kPeriod, command);
+  world.Run(0.2, command);
+  const Vector2d still = world.AskedFor(Vector3d::Zero(), command);
+  for (const Vector3d& turning :
+       {Vector3d(0.5, 0, 0), Vector3d(0, -0.8, 0), Vector3d(0.4, 0.3, 2)}) {
+    const Vector2d moved = world.AskedFor(turning, command) - still;
+    // The ankle turns the sole as the ground's force at the centre of pressure turns it back: of
+    // a unit weight that force's moment is this, and the ankle's the opposite.
+    const Vector3d ground = Vector3d(moved.x(), moved.y(), 0).cross(Vector3d::UnitZ());
+    const Vector3d about = Vector3d(turning.x(), turning.y(), 0);
+    EXPECT_LT((-ground + kRollDamping * about).norm(), 1e-9) << turning.transpose();
+    EXPECT_LT(-ground.dot(turning), 0);
+  }
+}
+
+TEST(Walk, IsLostOnceTheCapturePointHasLeftTheSoleThatCarries) {
+  World world(TestRobot::kDyros, 0, 0.5, true);
+  const WalkCommand command{{0, 0}, 0, true};
+  EXPECT_FALSE(world.Lost({1, 0}));  // it stands
+  while (world.walk().stage() != WalkStage::kSwinging) world.Run(kPeriod, command);
+  world.Run(0.2, command);
+  // The sole is 0.3 m long and 0.15 m wide; a velocity v moves the capture point by v sqrt(z/g).
+  const double time = std::sqrt(world.com().z() / robot::kGravity);
+  EXPECT_FALSE(world.Lost({0, 0}));
+  EXPECT_FALSE(world.Lost({0.12 / time, 0}));
+  EXPECT_TRUE(world.Lost({0.18 / time, 0}));
+  EXPECT_FALSE(world.Lost({0, 0.05 / time}));
+  EXPECT_TRUE(world.Lost({0, 0.1 / time}));
 }
 
 }  // namespace
