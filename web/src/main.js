@@ -6,6 +6,7 @@ import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
 import {figuresFor} from './figures.js';
+import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './grab.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
@@ -15,6 +16,7 @@ import {robotPage} from './robot_page.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
+import {TRACE} from './steps_view.js';
 import {liveTables, stateBadges, tables} from './table.js';
 import {quantity} from './units.js';
 
@@ -49,19 +51,29 @@ function sceneToolbar(scene) {
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: scene.show[name],
     change: (e) => scene.setShow(name, e.target.checked)}), label);
   return element('div', {class: 'toolbar'}, ...['free', 'front', 'side', 'top'].map(button),
-    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'));
+    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
+}
+
+/** What the regions about the standing foot mean, and what they leave out. */
+function regionsKey(run, entry) {
+  if (!run.find(FOOTSTEPS, 'stance')) return [];
+  const note = element('span', {class: 'soft'}, 'Approximated: a pendulum of the COM\'s height, the legs\' reach with the COM above the '
+    + 'sole and the feet parallel, each step of its least or planned time from beside that sole; the hull of 16 directions.');
+  return [entry('reach', '⬠', ['0, ╌ 1 and 2 steps: from inside, so many bring the capture point to rest. ', note])];
 }
 
 function sceneKey(run, overlay) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
-    return element('li', {}, mark, text);
+    return element('li', {}, mark, ...[text].flat());
   };
   return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
     entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
-    entry('capture', '●', 'capture point; ○ a step needed there'),
+    entry('capture', '●', `capture point; ─ its last ${TRACE} s; ○ a step needed there`),
+    entry('support', '▰', 'footprints and when the foot came down: right blue, left orange; ╌ planned'),
+    ...regionsKey(run, entry),
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
     run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
