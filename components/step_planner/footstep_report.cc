@@ -87,15 +87,25 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
   const bool walks = walk != nullptr && (walk->active() || recovery == nullptr);
   const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(stance)];
   const double height = std::max(input.com_height - sole.translation().z(), kLeastHeight);
-  const stepping::RegionInput seen{.stance = stance,
-                                   .sole = sole.translation().head<2>(),
-                                   .yaw = stepping::Yaw(sole),
-                                   .frequency = std::sqrt(robot::kGravity / height),
-                                   .step_time = walks ? walk->period() : 0};
-  const stepping::CaptureRegions regions =
-      stepping::RegionsAbout(walks ? walk->choice() : recovery->choice(), seen);
+  const stepping::StepChoice& choice = walks ? walk->choice() : recovery->choice();
+  stepping::RegionInput seen{.stance = stance,
+                             .sole = sole.translation().head<2>(),
+                             .yaw = stepping::Yaw(sole),
+                             .frequency = std::sqrt(robot::kGravity / height),
+                             .step_time = walks ? walk->period() : 0};
+  if (out->planned > 0) {
+    seen.under_way = true;
+    seen.foothold = {out->x[0], out->y[0]};
+    seen.left = out->touch_down[0];
+    // A walk is counted on where it is planned.
+    if (!walks && recovery->stage() == Stage::kSwinging) {
+      const double metre = stepping::SwingTime(1, choice.limits().acceleration);
+      seen.movable = seen.left * seen.left / (metre * metre);
+    }
+  }
+  const stepping::CaptureRegions regions = stepping::RegionsAbout(choice, seen);
   out->frequency = seen.frequency;
-  out->step_time[0] = regions.shortest;
+  out->step_time[0] = regions.first;
   out->step_time[1] = regions.longest;
   out->height = sole.translation().z();
   for (size_t n = 0; n < regions.region.size(); ++n) {

@@ -96,7 +96,7 @@ export const plannedSignals = () => ({
   planned: [FOOTSTEPS, 'planned'],
   ...Object.assign({}, ...['foot', 'x', 'y', 'z', 'yaw', 'touch_down'].map((field) => vector(`planned_${field}`, FOOTSTEPS, field, PLANNED))),
   stance: [FOOTSTEPS, 'stance'], region_height: [FOOTSTEPS, 'height'],
-  ...vector('step_time', FOOTSTEPS, 'step_time', 2), ...vector('region_corners', FOOTSTEPS, 'corners', REGIONS),
+  ...vector('region_corners', FOOTSTEPS, 'corners', REGIONS),
   ...vector('region_x', FOOTSTEPS, 'region_x', REGIONS * CORNERS), ...vector('region_y', FOOTSTEPS, 'region_y', REGIONS * CORNERS),
 });
 

@@ -54,26 +54,26 @@ function sceneToolbar(scene) {
     box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
 }
 
-/** What the regions about the standing foot mean, and what they leave out. */
-function regionsKey(run, entry) {
-  if (!run.find(FOOTSTEPS, 'stance')) return [];
-  const note = element('span', {class: 'soft'}, 'Approximated: a pendulum of the COM\'s height, the legs\' reach with the COM above the '
-    + 'sole and the feet parallel, each step of its least or planned time from beside that sole; the hull of 16 directions.');
-  return [entry('reach', '⬠', ['0, ╌ 1 and 2 steps: from inside, so many bring the capture point to rest. ', note])];
+/** What the regions about the standing foot leave out. */
+function regionsNote(run) {
+  if (!run.find(FOOTSTEPS, 'stance')) return '';
+  return element('p', {class: 'soft regions-note'}, 'Regions of 0, 1, 2 steps about the standing foot (Koolen et al. 2012). Approximated: a '
+    + 'pendulum of the COM\'s height; the legs\' reach with the COM above the sole; feet parallel; each step in its least or planned time '
+    + 'from beside the sole, the one under way to where it is planned, as far as that can still be moved; the hull of 16 directions.');
 }
 
 function sceneKey(run, overlay) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
-    return element('li', {}, mark, ...[text].flat());
+    return element('li', {}, mark, text);
   };
   return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
     entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
     entry('capture', '●', `capture point; ─ its last ${TRACE} s; ○ a step needed there`),
     entry('support', '▰', 'footprints and when the foot came down: right blue, left orange; ╌ planned'),
-    ...regionsKey(run, entry),
+    run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'from inside, 0, ╌ 1, 2 steps bring it to rest (approximate)') : '',
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
     run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
@@ -147,7 +147,7 @@ async function start() {
     control.catchUp();
   }
   const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
-  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
+  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element, regionsNote(run),
     eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},

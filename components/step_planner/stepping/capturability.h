@@ -19,12 +19,17 @@ struct RegionInput {
   double yaw = 0;                                  ///< rad, of that sole
   double frequency = 1;                            ///< 1/s, of the pendulum
   double step_time = 0;                            ///< s a step; 0: what each swing takes
+  /// The step under way, if any: where its foot comes down, m, in how many s, and by how many m
+  /// that place can still be moved.
+  bool under_way = false;
+  Eigen::Vector2d foothold = Eigen::Vector2d::Zero();
+  double left = 0, movable = 0;
 };
 
 struct CaptureRegions {
   /// By number of steps, m, world.
   std::array<balance::ConvexPolygon, kMostRegionSteps + 1> region;
-  double shortest = 0, longest = 0;  ///< s, of the steps counted with; 0: no foothold in reach
+  double first = 0, longest = 0;  ///< s, of the first step, and of any; 0: no foothold in reach
 };
 
 /// The regions of Koolen et al. 2012 (d_N = r + (l − r + d_{N−1}) e^{−ωT}) with polygons for r and

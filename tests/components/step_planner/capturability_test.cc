@@ -24,7 +24,7 @@ using robot::TestRobot;
 constexpr double kEdge = 0.02;  // m
 
 StepChoice Choice() {
-  const robot::RobotModel& model = TestRobot();
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   const Reach reach(model, robot::StandingHeight(model), 0.05, 0.1, 0.02);
   StepLimits limits;
   limits.edge = kEdge;
@@ -49,7 +49,7 @@ TEST(CaptureRegions, AreTheClosedFormAheadAndBack) {
   const Vector2d sole(0.3, -0.2);
   for (int stance = 0; stance < 2; ++stance) {
     const CaptureRegions regions = RegionsAbout(choice, {stance, sole, yaw, frequency, time});
-    EXPECT_EQ(regions.shortest, time);
+    EXPECT_EQ(regions.first, time);
     EXPECT_EQ(regions.longest, time);
     for (const double sign : {1.0, -1.0}) {
       const Vector2d along(sign, 0), direction = Eigen::Rotation2Dd(yaw) * along;
@@ -106,20 +106,47 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
   }
 }
 
+// Of a step under way whose foothold is fixed, from a corner the pendulum ends on the edge of the
+// new sole or beyond it, of one step the same sole's.
+TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
+  const StepChoice choice = Choice();
+  const double frequency = 3.4, left = 0.2, yaw = -0.3;
+  const Vector2d sole(1, 2), foothold = sole + Eigen::Rotation2Dd(yaw) * Vector2d(0.15, 0.25);
+  RegionInput input{robot::kRightFoot, sole, yaw, frequency, 0.5};
+  input.under_way = true;
+  input.foothold = foothold;
+  input.left = left;
+  const CaptureRegions regions = RegionsAbout(choice, input);
+  EXPECT_EQ(regions.first, left);
+  const double half = 0.5 * choice.foot(robot::kLeftFoot).length - kEdge;
+  const Vector2d ahead = Eigen::Rotation2Dd(yaw) * Vector2d(1, 0);
+  const double edge = Farthest(regions.region[1], ahead);
+  const Vector2d cop = sole + half * ahead;
+  const Vector2d end = CapturePointAfter(edge * ahead, cop, frequency, left);
+  EXPECT_NEAR((end - foothold).dot(ahead), half, 1e-6);
+  // What can be moved in time catches more.
+  input.movable = 0.1;
+  const double more = Farthest(RegionsAbout(choice, input).region[1], ahead);
+  EXPECT_GT(more, edge + 1e-3);
+  EXPECT_LE(more, edge + 0.1 * std::exp(-frequency * left) + 1e-9);
+}
+
 TEST(CaptureRegions, GrowWithTheStepsAndStepsTakeWhatTheSwingTakes) {
   const StepChoice choice = Choice();
   const CaptureRegions regions = RegionsAbout(choice, {robot::kLeftFoot, {0, 0}, 0, 3.6, 0});
-  EXPECT_GE(regions.shortest, choice.limits().unload + choice.limits().least_swing - 1e-12);
-  EXPECT_GT(regions.longest, regions.shortest);
-  for (size_t steps = 1; steps < regions.region.size(); ++steps) {
-    for (const Vector2d& corner : regions.region[steps - 1].corners()) {
-      EXPECT_GT(balance::SignedDistance(regions.region[steps], corner), -1e-6);
-    }
-  }
+  EXPECT_GE(regions.first, choice.limits().unload + choice.limits().least_swing - 1e-12);
+  EXPECT_GE(regions.longest, regions.first);
   // Quicker steps catch more.
   const CaptureRegions slow = RegionsAbout(choice, {robot::kLeftFoot, {0, 0}, 0, 3.6, 0.8});
-  for (const Vector2d& corner : slow.region[2].corners()) {
-    EXPECT_GT(balance::SignedDistance(regions.region[2], corner), -1e-3);
+  EXPECT_GT(slow.first, regions.longest);
+  for (int k = 0; k < kRegionDirections; ++k) {
+    const double angle = 2 * std::numbers::pi * k / kRegionDirections;
+    const Vector2d u(std::cos(angle), std::sin(angle));
+    for (size_t steps = 1; steps < regions.region.size(); ++steps) {
+      const double reached = Farthest(regions.region[steps], u);
+      EXPECT_GE(reached, Farthest(regions.region[steps - 1], u) - 1e-9);
+      EXPECT_GE(reached, Farthest(slow.region[steps], u) - 1e-9);
+    }
   }
 }
 
