@@ -65,7 +65,7 @@ const shown = (page) => page.evaluate(async () => {
   });
   const centre = run.robot.feet.map((foot) => [0, 1].map((i) => foot.corners.reduce((sum, c) => sum + c[i], 0) / foot.corners.length));
   return {stood, drawn, centre, prints: scene.steps.footprints.list.map(({foot, from, to}) => ({foot, from, to: to ?? run.end})),
-    steps: (await column('SUPPORT_PLAN.num_steps')).at(-1), labels: scene.steps.labels.filter((l) => l.object.visible).map((l) => l.shown)};
+    steps: Math.max(...(await column('SUPPORT_PLAN.num_steps')).filter(Number.isFinite)), labels: scene.steps.labels.filter((l) => l.object.visible).map((l) => l.shown)};
 });
 
 function compare({stood, drawn, prints, centre}, tolerance) {

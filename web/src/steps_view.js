@@ -74,10 +74,10 @@ class TimeLabel {
     Object.assign(this, {shown: text, dark});
     const pen = this.canvas.getContext('2d');
     pen.clearRect(0, 0, LABEL.width, LABEL.height);
-    pen.font = '26px system-ui, sans-serif';
+    pen.font = 'bold 28px system-ui, sans-serif';
     pen.textAlign = 'center';
     pen.textBaseline = 'middle';
-    pen.lineWidth = 5;
+    pen.lineWidth = 3;
     pen.strokeStyle = dark ? '#14171c' : '#ffffff';
     pen.fillStyle = dark ? '#f2f2f2' : '#1d1d1f';
     pen.strokeText(text, LABEL.width / 2, LABEL.height / 2);
