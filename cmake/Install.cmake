@@ -35,7 +35,8 @@ foreach(folder lcmtypes components sim sim_ode sim_mujoco hw_bridge logging)
             FILES_MATCHING PATTERN "*.pb.h" PATTERN "unitree_hg.h" PATTERN "unitree_api.h" PATTERN "CMakeFiles" EXCLUDE)
   endif()
 endforeach()
-install(DIRECTORY ${PROJECT_BINARY_DIR}/poise ${PROJECT_BINARY_DIR}/operate DESTINATION ${_headers} COMPONENT dev
+install(DIRECTORY ${PROJECT_BINARY_DIR}/poise ${PROJECT_BINARY_DIR}/operate ${PROJECT_BINARY_DIR}/steps
+        DESTINATION ${_headers} COMPONENT dev
         FILES_MATCHING PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/poise_commit.h DESTINATION ${_headers} COMPONENT dev)
 
@@ -43,7 +44,8 @@ foreach(folder scenarios graphs robots sweeps drives bits benchmarks layouts)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/${folder} DESTINATION share/poise)
 endforeach()
 install(FILES ${POISE_LCM_FILES} DESTINATION share/poise/lcmtypes)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/lcmtypes/operate DESTINATION share/poise/lcmtypes)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/lcmtypes/operate ${PROJECT_SOURCE_DIR}/lcmtypes/steps
+        DESTINATION share/poise/lcmtypes)
 # The manual page and completion, of the program's own option tables.
 set(_shell ${PROJECT_BINARY_DIR}/shell)
 add_custom_command(

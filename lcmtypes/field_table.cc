@@ -7,6 +7,7 @@ namespace poise {
 
 MessageSet poise_messages();    // generated
 MessageSet operate_messages();  // generated
+MessageSet steps_messages();    // generated
 
 namespace {
 
@@ -15,6 +16,7 @@ struct Known {
     types.reserve(kMostTypes);  // pointers to them last
     Add(poise_messages());
     Add(operate_messages());
+    Add(steps_messages());
   }
 
   void Add(const MessageSet& set) {

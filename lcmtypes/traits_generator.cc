@@ -279,7 +279,7 @@ void WriteTable(const std::string& set, const std::vector<Message>& messages,
   }
   out << "  };\n  return {types, kStructs, kDefinitions};\n}\n\n";
   // Linked in as an object, it makes its messages known by itself; Poise's own are in one library.
-  if (set != "poise" && set != "operate") {
+  if (set != "poise" && set != "operate" && set != "steps") {
     out << "namespace {\n[[maybe_unused]] const bool known = AddMessages(" << set
         << "_messages());\n}  // namespace\n\n";
   }

@@ -3,6 +3,7 @@
 #include <google/protobuf/descriptor.h>
 
 #include "components/framework/configuration/field_reference.h"
+#include "components/framework/optional_outputs.h"
 
 namespace poise {
 namespace {
@@ -40,6 +41,10 @@ Json DescriptionOf(const ComponentType& type) {
     Json entry = {{"name", port.name}, {"type", port.type}};
     if (port.input) entry["kind"] = KindName(port.kind);
     description[port.input ? "inputs" : "outputs"].push_back(entry);
+  }
+  for (const OptionalOutput& output : OptionalOutputsOf(type.name)) {
+    description["outputs"].push_back(
+        {{"name", output.port}, {"type", output.type}, {"when", output.when}});
   }
   if (type.config != nullptr) description["configuration"] = type.config->full_name();
   description["settings"] = Json::array();

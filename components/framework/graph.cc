@@ -9,6 +9,7 @@
 #include "components/framework/graph_order.h"
 #include "components/framework/modules.h"
 #include "components/framework/operator_acts.h"
+#include "components/framework/optional_outputs.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 
@@ -229,6 +230,18 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
   }
 }
 
+/// The declared ports, with those outputs that not every run has where `has` says so of their name.
+template <class Has>
+std::vector<PortType> WithOptional(const std::string& component, std::vector<PortType> declared,
+                                   const Has& has) {
+  for (const OptionalOutput& output : OptionalOutputsOf(component)) {
+    const bool declares = std::ranges::any_of(
+        declared, [&](const PortType& port) { return !port.input && port.name == output.port; });
+    if (!declares && has(output.port)) declared.push_back({output.port, output.type, false});
+  }
+  return declared;
+}
+
 /// What a component declares of itself is what it is.
 void CheckDeclared(const Graph& graph, int component, const std::vector<PortType>& declared,
                    const Wiring& wiring, Problems* problems) {
@@ -245,7 +258,12 @@ void CheckDeclared(const Graph& graph, int component, const std::vector<PortType
     std::sort(lines.begin(), lines.end());
     return fmt::format("{}", fmt::join(lines, ", "));
   };
-  const std::string says = describe(declared);
+  const auto writes = [&](const std::string& port) {
+    return std::ranges::any_of(wiring.outputs(),
+                               [&](const OutputPort* output) { return output->name() == port; });
+  };
+  const std::string says =
+      describe(WithOptional(TypeOf(graph.component(component)), declared, writes));
   const std::string is = describe(PortsOf(wiring));
   if (says == is) return;
   problems->push_back(
@@ -416,7 +434,11 @@ void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   CheckConnections(graph, &problems);
   for (int i = 0; i < graph.component_size(); ++i) {
     const ComponentType* const type = registry.TypeNamed(TypeOf(graph.component(i)));
-    if (type != nullptr && !type->ports.empty()) CheckPorts(graph, i, type->ports, &problems);
+    if (type == nullptr || type->ports.empty()) continue;
+    const auto connected = [&](const std::string& port) {
+      return FindConnection(graph.component(i).output(), port) >= 0;
+    };
+    CheckPorts(graph, i, WithOptional(type->name, type->ports, connected), &problems);
   }
   Throw(graph, std::move(problems));
 }

@@ -64,8 +64,20 @@ void PhaseSchedule::Hold(double time) {
   const double delay = std::max(0.0, time - time_);
   time_ = time;
   origin_ += delay;
-  if (transition_began_) transition_start_ += delay;
   state_.phase_began = false;
+  state_.transition = TransitionKind::kNone;
+  state_.transition_foot = -1;
+  state_.progress = 0;
+  if (!phase().has_transition()) return;
+  // Steps end with both feet loaded: an unloading begins anew from there, a loading is over.
+  const ContactTransition& transition = phase().transition();
+  if (!Unloads()) {
+    transition_began_ = true;
+    transition_start_ = time - transition.duration() - kTimeTolerance;
+  } else if (transition_began_) {
+    transition_start_ = time;
+    origin_ = time - transition.delay();
+  }
 }
 
 bool PhaseSchedule::EndNow(double time) {

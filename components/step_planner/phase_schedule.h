@@ -58,7 +58,8 @@ class PhaseSchedule {
   /// DONE that leads somewhere counts.
   const ScheduleState& Advance(const ScheduleInput& input);
 
-  /// In place of Advance while another planner acts: all that is later comes later.
+  /// In place of Advance while another planner acts: all that is later comes later. What acts ends
+  /// with both feet loaded: an unloading begins anew after it, a loading is over.
   void Hold(double time);
 
   /// The phase ends now, as if its time were over. False, and nothing changes, when nothing follows

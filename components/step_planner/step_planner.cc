@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "components/balance/support_polygon.h"
+#include "components/framework/optional_outputs.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
@@ -121,10 +122,17 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   wiring->AddInput(&robot_state_, "robot_state", JointAndFootCounts(*model_));
   wiring->AddInput(&operator_, "operator", {}, InputKind::kLatest);
   wiring->AddOutput(&support_plan_, "support_plan", FootCounts(*model_));
-  wiring->AddStage("plan", {&robot_state_, &operator_}, {&support_plan_}, [this](const Tick& tick) {
-    TakeActs(tick);
-    support_plan_->status = Plan(tick.time);
-  });
+  std::vector<OutputPort*> outputs{&support_plan_};
+  if (recovers_ || walks_) {
+    wiring->AddOutput(&footsteps_, "footsteps", {});
+    footsteps_->stance = -1;
+    outputs.push_back(&footsteps_);
+  }
+  wiring->AddStage("plan", {&robot_state_, &operator_}, std::move(outputs),
+                   [this](const Tick& tick) {
+                     TakeActs(tick);
+                     support_plan_->status = Plan(tick.time);
+                   });
   support_plan_t& out = *support_plan_;
   const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
   out.transition_foot = out.step_foot = -1;
@@ -172,7 +180,9 @@ bool StepPlanner::Archive(StateArchive* archive) {
   archive->Show(in_contact_, last_controlled_, stands_otherwise_, untilted_);
   recovery_.Archive(archive);
   walk_.Archive(archive);
+  footstep_report_.Archive(archive);
   ArchiveMessage(&*support_plan_, archive);
+  if (recovers_ || walks_) ArchiveMessage(&*footsteps_, archive);
   return true;
 }
 
@@ -252,6 +262,7 @@ int8_t StepPlanner::Plan(double time) {
     ReportWalking(walk_, time, Estimate().sole, &*support_plan_);
   }
   support_plan_->num_steps = recovery_.num_steps() + walk_.num_begun();
+  if (recovers_ || walks_) ReportFootsteps(time);
   return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
                                                  : support_plan_t::STATUS_OK;
 }
@@ -496,6 +507,15 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
   return over;
 }
 
+void StepPlanner::ReportFootsteps(double time) {
+  const FootstepInput input{.time = time,
+                            .com_height = whole_body_->data().com.z(),
+                            .sole = Estimate().sole,
+                            .in_contact = in_contact_};
+  footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,
+                          &*footsteps_);
+}
+
 int8_t StepPlanner::WaitingCode() const {
   switch (schedule_->state().waiting_for) {
     case WaitingFor::kCom:
@@ -603,6 +623,10 @@ void StepPlanner::ReportCapture(double time, const Capture& capture) {
 }
 
 ComponentType StepPlannerType() {
+  AddOptionalOutput({"step_planner",
+                     "footsteps",
+                     MessageTraits<::steps::footsteps_t>::kName,
+                     {"step_planner.recovery.enabled", "step_planner.walk.enabled"}});
   return {
       "step_planner",
       "which feet carry, and where COM, body and feet go: phases, capture point",

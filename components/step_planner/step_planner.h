@@ -12,6 +12,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/contact_loss.h"
+#include "components/step_planner/footstep_report.h"
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/landing.h"
 #include "components/step_planner/phase_schedule.h"
@@ -21,10 +22,11 @@
 #include "components/step_planner/walk_config.h"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
+#include "steps/message_traits.hpp"
 
 namespace poise {
 
-/// ROBOT_STATE -> SUPPORT_PLAN. When a state is invalid the plan of the last good tick is sent
+/// ROBOT_STATE -> SUPPORT_PLAN, and FOOTSTEPS where it makes steps. When a state is invalid the plan of the last good tick is sent
 /// again with the status set.
 class StepPlanner : public Component, public Operated {
  public:
@@ -87,11 +89,13 @@ class StepPlanner : public Component, public Operated {
   void ReportFeet();
   void ReportReferences();
   void ReportCapture(double time, const Capture& capture);
+  void ReportFootsteps(double time);
   int8_t WaitingCode() const;
 
   Input<robot_state_t> robot_state_;
   ActInput operator_;
   Output<support_plan_t> support_plan_;
+  Output<::steps::footsteps_t> footsteps_;  // where it makes steps
 
   std::shared_ptr<const robot::RobotModel> model_;
   std::shared_ptr<balance::WholeBody> whole_body_;
@@ -107,6 +111,7 @@ class StepPlanner : public Component, public Operated {
   bool walks_ = false;  // where it is told to
   stepping::Walk walk_;
   WalkCommands walk_commands_;
+  FootstepReport footstep_report_;
   /// What an operator has told the robot to walk.
   struct OperatorWalk {
     bool given = false, stepping = false;

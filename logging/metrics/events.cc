@@ -343,11 +343,15 @@ void AddSteps(const RunRecord& run, EventList* events) {
     const support_plan_t* plan = run.plan.at(tick);
     if (plan == nullptr) continue;
     if (before != nullptr && plan->num_steps > before->num_steps && plan->step_foot >= 0) {
+      // A walk's foot is unloaded before its touch-down is timed.
+      const std::string in_time = plan->touch_down_time > 0
+                                      ? fmt::format(" in {:.2f} s", plan->touch_down_time)
+                                      : std::string();
       events->Add(
           tick, "step_begins",
-          fmt::format("{} to ({:.2f}, {:.2f}) m in {:.2f} s: {}",
+          fmt::format("{} to ({:.2f}, {:.2f}) m{}: {}",
                       FootName(run, static_cast<size_t>(plan->step_foot)), plan->foothold[0],
-                      plan->foothold[1], plan->touch_down_time, StepReason(plan->step_reason)));
+                      plan->foothold[1], in_time, StepReason(plan->step_reason)));
     }
     if (before != nullptr && plan->stepping != before->stepping) {
       if (plan->stepping == support_plan_t::STEPPING_LOADING) {

@@ -21,6 +21,7 @@ bool Walks(const support_plan_t& plan) {
 
 /// From a foot's landing to its next: two steps.
 struct Stride {
+  int64_t begin = 0, end = 0;             ///< ticks
   Vector2d way = Vector2d::Zero();        ///< m, of the true COM, world
   Vector2d commanded = Vector2d::Zero();  ///< m, the same as commanded along the true heading
   double duration = 0;                    ///< s
@@ -31,6 +32,14 @@ double Heading(const ground_truth_t& truth) {
   const Eigen::Vector3d ahead =
       Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Eigen::Vector3d::UnitX();
   return std::atan2(ahead.y(), ahead.x());
+}
+
+bool StandsBetween(const RunRecord& run, int64_t begin, int64_t end) {
+  for (int64_t t = begin; t < end; ++t) {
+    const support_plan_t* plan = run.plan.at(t);
+    if (plan != nullptr && !Walks(*plan)) return true;
+  }
+  return false;
 }
 
 std::vector<Stride> Strides(const RunRecord& run) {
@@ -47,7 +56,9 @@ std::vector<Stride> Strides(const RunRecord& run) {
     const int64_t begin = landings[i], end = landings[i + 2];
     const ground_truth_t *from = run.truth.at(begin), *to = run.truth.at(end);
     if (from == nullptr || to == nullptr) continue;
-    Stride stride;
+    // Between two walks the robot stands.
+    if (StandsBetween(run, begin, end)) continue;
+    Stride stride{begin, end};
     stride.way = (GetVector3(to->com_position) - GetVector3(from->com_position)).head<2>();
     stride.duration = run.duration(end - begin);
     for (int64_t t = begin; t < end; ++t) {
@@ -69,19 +80,21 @@ Answer Way(const RunRecord& run) {
   return way;
 }
 
+/// Of the same ticks: what starting and stopping take is in neither.
 Answer CostOfTransport(const RunRecord& run) {
-  const Answer way = Way(run);
-  if (!way || !(*way > 0)) return {};
-  double work = 0;
-  for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
-    const support_plan_t* plan = run.plan.at(t);
-    const ground_truth_t* truth = run.truth.at(t);
-    if (plan == nullptr || truth == nullptr || !Walks(*plan)) continue;
-    for (size_t j = 0; j < truth->joint_torque.size(); ++j) {
-      work += run.duration(1) * std::max(0.0, truth->joint_torque[j] * truth->joint_velocity[j]);
+  double work = 0, way = 0;
+  for (const Stride& stride : Strides(run)) {
+    way += stride.way.norm();
+    for (int64_t t = stride.begin; t < stride.end; ++t) {
+      const ground_truth_t* truth = run.truth.at(t);
+      if (truth == nullptr) continue;
+      for (size_t j = 0; j < truth->joint_torque.size(); ++j) {
+        work += run.duration(1) * std::max(0.0, truth->joint_torque[j] * truth->joint_velocity[j]);
+      }
     }
   }
-  return work / (run.robot.total_mass() * robot::kGravity * *way);
+  if (!(way > 0)) return {};
+  return work / (run.robot.total_mass() * robot::kGravity * way);
 }
 
 }  // namespace

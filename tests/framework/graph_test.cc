@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "components/framework/optional_outputs.h"
 #include "components/framework/run.h"
 #include "tests/framework/toy_components.h"
 
@@ -380,6 +381,20 @@ TEST_F(DeclaredPortsTest, AreWhatTheComponentIs) {
   std::vector<PortType> ports = Right();
   ports[0].kind = InputKind::kPreviousTick;
   EXPECT_THAT(ProblemsWith(ports, true), HasSubstr("make them equal"));
+}
+
+// Another type's: a graph may have it or not, but the component must be as the graph says.
+TEST_F(DeclaredPortsTest, AnOutputThatNotEveryRunHasMayBeThere) {
+  std::vector<PortType> ports = Right();
+  const PortType output = ports.back();
+  ASSERT_FALSE(output.input);
+  ports.pop_back();
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("does not exist; it has"));
+  AddOptionalOutput({"toy_filter", output.name, output.type, {"toy.enabled"}});
+  EXPECT_EQ(ProblemsWith(ports, false), "");
+  EXPECT_EQ(ProblemsWith(ports, true), "");
+  AddOptionalOutput({"toy_filter", "more", output.type, {"toy.enabled"}});
+  EXPECT_EQ(ProblemsWith(ports, true), "");
 }
 
 }  // namespace

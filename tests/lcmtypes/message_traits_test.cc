@@ -13,17 +13,19 @@
 #include <vector>
 
 #include "operate/message_traits.hpp"
+#include "steps/message_traits.hpp"
 #include "tests/test_seed.h"
 
 namespace poise {
 namespace {
 
-/// Of the packages poise and operate.
+/// Of the packages poise, operate and steps.
 template <class F>
 void ForEveryType(F&& f) {
   ForEachMessageType(f);
   f.template operator()<operate::act_t>();
   f.template operator()<operate::answer_t>();
+  f.template operator()<steps::footsteps_t>();
 }
 
 using ::testing::ElementsAre;

@@ -5,8 +5,9 @@ import {Run} from '../../web/src/data.js';
 import {addDerivedSignals} from '../../web/src/derived.js';
 
 const lcm = new URL('../../lcmtypes/', import.meta.url);
-export const messages = Object.fromEntries(readdirSync(lcm).filter((f) => f.endsWith('.lcm'))
-  .map((f) => parseMessage(readFileSync(new URL(f, lcm), 'utf8'))).map((m) => [m.name, m]));
+const files = [...readdirSync(lcm).filter((f) => f.endsWith('.lcm')), 'steps/footsteps_t.lcm'];
+const sources = new Map(files.map((f) => readFileSync(new URL(f, lcm), 'utf8')).map((text) => [parseMessage(text).name, text]));
+export const messages = Object.fromEntries([...sources.values()].map(parseMessage).map((m) => [m.name, m]));
 
 const identity = {position: [0, 0, 0], orientation: [1, 0, 0, 0]};
 const COUNTS = {num_joints: 2, num_motors: 2, num_feet: 2};
@@ -19,10 +20,10 @@ function paths(type, source) {
     return messages[fieldType] ? names.flatMap((n) => paths(fieldType, sourceOf(fieldType)).map((p) => `${n}.${p}`)) : names;
   });
 }
-const sourceOf = (type) => readFileSync(new URL(`${type}.lcm`, lcm), 'utf8');
+const sourceOf = (type) => sources.get(type);
 
 const TYPES = ['drive_feedback_t', 'robot_sensors_t', 'robot_state_t', 'estimator_status_t', 'support_plan_t', 'task_torque_t', 'balance_torque_t',
-  'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t'];
+  'joint_command_t', 'bridge_status_t', 'external_push_t', 'ground_truth_t', 'steps.footsteps_t'];
 
 /** A robot with a pitch and a roll joint in the right leg, none in the left. */
 export const robot = {

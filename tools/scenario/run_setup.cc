@@ -15,6 +15,7 @@
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/optional_outputs.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot.pb.h"
 #include "components/robot_files/robot_files.h"
@@ -96,6 +97,58 @@ std::string ScenarioPath(const std::string& type, const std::string& field) {
   const std::vector<std::string> sections = SectionsOf(type);
   if (sections.size() > 1) return field;
   return field.empty() ? sections[0] : sections[0] + "." + field;
+}
+
+/// Whether a setting, "step_planner.walk.enabled", is there and true.
+bool IsTrue(const google::protobuf::Message& message, const std::string& path) {
+  const size_t dot = path.find('.');
+  const FieldDescriptor* field = FindField(*message.GetDescriptor(), path.substr(0, dot));
+  if (field == nullptr || field->is_repeated()) return false;
+  const google::protobuf::Reflection& reflection = *message.GetReflection();
+  if (dot == std::string::npos) {
+    return field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL && reflection.GetBool(message, field);
+  }
+  return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE &&
+         IsTrue(reflection.GetMessage(message, field), path.substr(dot + 1));
+}
+
+std::string InCapitals(std::string name) {
+  for (char& c : name) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  return name;
+}
+
+/// Gives the outputs that not every run has a channel, or takes it away.
+void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* graph) {
+  for (const OptionalOutput& optional : OptionalOutputsOf(TypeOf(*instance))) {
+    const bool wanted = std::ranges::any_of(
+        optional.when, [&](const std::string& path) { return IsTrue(scenario, path); });
+    const auto& outputs = instance->output();
+    const auto& channels = graph->channel();
+    const auto channel_named = [&](const std::string& name) {
+      return std::find_if(channels.begin(), channels.end(),
+                          [&](const Channel& channel) { return channel.name() == name; });
+    };
+    const auto output = std::find_if(outputs.begin(), outputs.end(), [&](const Connection& each) {
+      return each.port() == optional.port;
+    });
+    if (wanted && output == outputs.end()) {
+      const std::string name = InCapitals(optional.port);
+      if (channel_named(name) == channels.end()) {
+        Channel* const channel = graph->add_channel();
+        channel->set_name(name);
+        channel->set_type(optional.type);
+      }
+      Connection* const connection = instance->add_output();
+      connection->set_port(optional.port);
+      connection->set_channel(name);
+    } else if (!wanted && output != outputs.end()) {
+      const auto channel = channel_named(output->channel());
+      if (channel != channels.end()) {
+        graph->mutable_channel()->DeleteSubrange(static_cast<int>(channel - channels.begin()), 1);
+      }
+      instance->mutable_output()->DeleteSubrange(static_cast<int>(output - outputs.begin()), 1);
+    }
+  }
 }
 
 /// Puts the engine that the scenario names in the place of the graph's.
@@ -265,6 +318,9 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   ChooseEngine(loaded, spec.mutable_graph());
   CheckEngineOf(changes.set, spec.graph());
   HostComponents(changes, spec.mutable_graph());
+  for (int i = 0; i < spec.graph().component_size(); ++i) {
+    ConnectWhere(scenario, spec.mutable_graph()->mutable_component(i), spec.mutable_graph());
+  }
   spec.set_tick_period(1 / scenario.tick_rate());
   spec.set_seed(scenario.seed());
   spec.set_lead_ticks(std::llround(scenario.lead() * scenario.tick_rate()));
@@ -331,7 +387,7 @@ void ChangeConfiguration(const std::string& change, RunSpec* spec) {
   if (equals == std::string::npos || equals == 0) {
     throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
   }
-  for (const ComponentInstance& instance : spec->graph().component()) {
+  for (ComponentInstance& instance : *spec->mutable_graph()->mutable_component()) {
     const std::string& type = TypeOf(instance);
     const std::vector<std::string> sections = SectionsOf(type);
     names.insert(names.end(), sections.begin(), sections.end());
@@ -349,6 +405,7 @@ void ChangeConfiguration(const std::string& change, RunSpec* spec) {
       throw ConfigError(fmt::format("--set {}", error.what()));
     }
     spec->mutable_config(config)->set_text(ConfigText(own, type));
+    ConnectWhere(own, &instance, spec->mutable_graph());
     changed = true;
   }
   if (!changed) {

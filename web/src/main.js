@@ -6,6 +6,7 @@ import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
 import {figuresFor} from './figures.js';
+import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './grab.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
 import {Player} from './player.js';
@@ -15,6 +16,7 @@ import {robotPage} from './robot_page.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
 import {eventList, Readout} from './side.js';
+import {TRACE} from './steps_view.js';
 import {liveTables, stateBadges, tables} from './table.js';
 import {quantity} from './units.js';
 
@@ -49,7 +51,15 @@ function sceneToolbar(scene) {
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: scene.show[name],
     change: (e) => scene.setShow(name, e.target.checked)}), label);
   return element('div', {class: 'toolbar'}, ...['free', 'front', 'side', 'top'].map(button),
-    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'));
+    box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
+}
+
+/** What the regions about the standing foot leave out. */
+function regionsNote(run) {
+  if (!run.find(FOOTSTEPS, 'stance')) return '';
+  return element('p', {class: 'soft regions-note'}, 'Regions of 0, 1, 2 steps about the standing foot (Koolen et al. 2012). Approximated: a '
+    + 'pendulum of the COM\'s height; the legs\' reach with the COM above the sole; feet parallel; each step in its least or planned time '
+    + 'from beside the sole, the one under way to where it is planned, as far as that can still be moved; the hull of 16 directions.');
 }
 
 function sceneKey(run, overlay) {
@@ -61,7 +71,9 @@ function sceneKey(run, overlay) {
   return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
     entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
     entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
-    entry('capture', '●', 'capture point; ○ a step needed there'),
+    entry('capture', '●', `capture point; ─ its last ${TRACE} s; ○ a step needed there`),
+    entry('support', '▰', 'footprints and when the foot came down: right blue, left orange; ╌ planned'),
+    run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'from inside, 0, ╌ 1, 2 steps bring it to rest (approximate)') : '',
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
     run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
@@ -135,7 +147,7 @@ async function start() {
     control.catchUp();
   }
   const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
-  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element,
+  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element, regionsNote(run),
     eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},

@@ -11,7 +11,9 @@ import {element} from './dom.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
 import {place, RobotView} from './robot_view.js';
 import {isDark} from './palette.js';
+import {Samples, pose, vector} from './samples.js';
 import {add, blockRise, convexHull, rotate} from './spatial.js';
+import {StepsView} from './steps_view.js';
 
 const METRES_PER_NEWTON = 1 / 900;
 const METRES_PER_NEWTON_METRE = 1 / 100;
@@ -31,41 +33,17 @@ const PIECE = 5;       // squares
 const FOG = [3.2, 6];  // m, where the ground begins to fade and where it ends
 const REGION_CORNERS = 16;  // of a message, at the most
 const GROUND_LAYER = 1;  // what the view from above shows
+const FOLLOW = 0.4;      // m that the robot goes from the middle before the view goes with it
 
 export const COLORS = {
   computed: {light: '#1f5fd0', dark: '#6ea8ff'}, measured: {light: '#1d1d1f', dark: '#f2f2f2'},
   limit: {light: '#d11f1f', dark: '#ff6b6b'}, com: {light: '#0f8a4b', dark: '#3ecf8e'},
-  capture: {light: '#8a6d00', dark: '#e6c84d'},
+  capture: {light: '#8a6d00', dark: '#e6c84d'}, reach: {light: '#0e7490', dark: '#5fd3ea'},
   desired: {light: '#a11fb0', dark: '#e58cff'}, push: {light: '#c2410c', dark: '#ff9a4d'},
   support: {light: '#5b6675', dark: '#9fb0c5'},
 };
 
 const VIEWS = {front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1], free: [0.75, -0.62, 0.28]};
-
-/** Numbers by row that the picture needs, all loaded; a name that the run lacks is NaN. */
-class Samples {
-  #signals = new Map();
-
-  async load(run, wanted) {
-    const found = Object.entries(wanted).map(([name, [type, field]]) =>
-      [name, type === 'derived' ? run.signals.get(`derived.${field}`) : run.find(type, field)]);
-    await Promise.all(found.filter(([, s]) => s).map(([name, s]) => {
-      this.#signals.set(name, s);
-      return s.load();
-    }));
-  }
-
-  at(name, row) { return this.#signals.get(name)?.values?.[row] ?? NaN; }
-  vector(name, row, n = 3) { return Array.from({length: n}, (_, i) => this.at(`${name}[${i}]`, row)); }
-  pose(name, row) {
-    return {position: this.vector(`${name}.position`, row), orientation: this.vector(`${name}.orientation`, row, 4)};
-  }
-}
-
-const vector = (key, type, field, n = 3) =>
-  Object.fromEntries(Array.from({length: n}, (_, i) => [`${key}[${i}]`, [type, `${field}[${i}]`]]));
-const pose = (key, type, field) => ({...vector(`${key}.position`, type, `${field}.position`),
-  ...vector(`${key}.orientation`, type, `${field}.orientation`, 4)});
 
 /** Squares of GRID on the ground, of short pieces: software renderers drop lines that reach behind the camera. */
 function gridGeometry() {
@@ -121,7 +99,7 @@ export class SceneView {
     this.row = 0;
     this.visible = true;
     this.leastLoad = lightLoad(run);
-    this.show = {forces: true, moments: false, pressure: true, com: true};
+    this.show = {forces: true, moments: false, pressure: true, com: true, steps: true};
     this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
     this.#setRatio(FINEST);
     host.append(this.renderer.domElement);
@@ -147,6 +125,7 @@ export class SceneView {
   async load() {
     await Promise.all([
       this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
+      this.steps.load(),
       this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
     ]);
     this.setRow(this.run.meta.live ? this.run.numRows - 1 : 0);
@@ -203,6 +182,7 @@ export class SceneView {
     this.soles = this.run.robot.feet.map((foot) => outline('support', foot.corners.length));
     this.polygon = outline('support', this.run.robot.feet.reduce((sum, foot) => sum + foot.corners.length, 0));
     this.region = outline('limit', REGION_CORNERS, true);
+    this.steps = new StepsView(this.run, colored);
     this.capture = flat('disc', 'capture', 0.011);
     this.step = flat('ring', 'capture', 0.045);
     this.frame = new Group();
@@ -216,11 +196,11 @@ export class SceneView {
     this.com.renderOrder = 9;
     colored(this.com.material, 'com');
     scene.add(this.frame, this.measuredFrame, this.comMark, this.com, this.capture, this.step, this.polygon.object, this.region.object,
-      this.pushArrow.object, this.crane.object,
+      this.pushArrow.object, this.crane.object, this.steps.object,
       ...this.soles.map((s) => s.object),
       ...this.arrows.flatMap((a) => [a.computed, a.measured, a.computedMoment, a.measuredMoment].map((x) => x.object)));
     for (const object of [this.frame, this.measuredFrame, this.comMark, this.capture, this.step, this.polygon.object, this.region.object,
-      ...this.soles.map((s) => s.object)]) {
+      ...this.soles.map((s) => s.object), ...this.steps.flat]) {
       object.traverse((o) => o.layers.enable(GROUND_LAYER));
     }
   }
@@ -260,6 +240,7 @@ export class SceneView {
     const posed = this.robotView.setPose(samples.pose('base', row),
       samples.vector('joint', row, this.run.robot.joints.length));
     if (posed) this.posedAt = this.run.timeAt(row);
+    if (posed) this.#follow();
     this.note.hidden = posed;
     this.note.textContent = this.posedAt === undefined ? 'no message tells the robot\'s pose'
       : `no message tells the pose at this time: it is that of ${this.posedAt.toFixed(3)} s`;
@@ -284,7 +265,26 @@ export class SceneView {
     this.crane.set(samples.vector('crane', row), samples.vector('crane_force', row), samples.at('crane_share', row));
     this.#setFeet(row);
     this.#setPressure(row);
+    this.steps.shown = show.steps;
+    this.steps.setRow(row);
     this.draw();
+  }
+
+  /** The view, the ground and its grid go with a robot that walks away. */
+  #follow() {
+    const {x, y} = this.robotView.object.position;
+    const {target} = this.controls;
+    const away = Math.hypot(x - target.x, y - target.y);
+    if (away > FOLLOW) {
+      const share = 1 - FOLLOW / away;
+      const move = new Vector3((x - target.x) * share, (y - target.y) * share, 0);
+      target.add(move);
+      this.camera.position.add(move);
+      this.controls.update();
+    }
+    const square = GRID * PIECE;
+    this.ground.position.set(x, y, 0);
+    this.grid.position.set(Math.round(x / square) * square, Math.round(y / square) * square, 0);
   }
 
   #groundHeight(row) {

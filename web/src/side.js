@@ -1,5 +1,6 @@
 // What holds at the time cursor, and the events.
 import {element} from './dom.js';
+import {FOOTSTEPS, plannedSignals, regionsAt, stepsThatCatch} from './footsteps.js';
 import {formatNumber, quantity} from './units.js';
 
 const DIGITS = 3;
@@ -30,6 +31,8 @@ export class Readout {
     const status = find('task_torque_t', 'status');
     const bridge = find('bridge_status_t', 'state');
     const phase = find('support_plan_t', 'phase');
+    const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('support_plan_t', field));
+    const feet = run.robot.feet.map((foot) => foot.name);
     return [
       ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
       ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
@@ -38,9 +41,30 @@ export class Readout {
       ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],
       ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), metres],
       ['push', [derived('push_magnitude')], newton],
+      ['step', step, (v) => (v[0] > 0 ? `${feet[v[2]]}, ${step[0].valueNames[v[0]]}: ${step[1].valueNames[v[1]]}` : 'none')],
+      ...this.#stepRows(),
       ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
         [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
     ].filter(([, signals]) => signals.every(Boolean));
+  }
+
+  /** Of a run whose planner makes steps. */
+  #stepRows() {
+    const {run} = this;
+    if (!run.find(FOOTSTEPS, 'stance')) return [];
+    const names = Object.entries(plannedSignals());
+    const capture = ['0', '1'].map((i) => run.find('support_plan_t', `capture_point[${i}]`));
+    const caught = (values) => {
+      const byName = new Map(names.map(([name], i) => [name, values[i]]));
+      const regions = regionsAt({at: (name) => byName.get(name) ?? NaN}, 0);
+      if (regions.every((region) => region.length === 0)) return 'on both feet';
+      const steps = stepsThatCatch(regions, values.slice(names.length));
+      return steps === undefined ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`;
+    };
+    const signals = names.map(([, [type, field]]) => run.find(type, field));
+    const touchDown = run.find(FOOTSTEPS, 'touch_down[0]'), planned = run.find(FOOTSTEPS, 'planned');
+    return [['capture point within', [...signals, ...capture], caught],
+      ['next touch-down in', [planned, touchDown], ([count, time]) => (count > 0 ? quantity([time], 's', DIGITS) : 'none planned')]];
   }
 
   async load() { await Promise.all(this.rows.flatMap(([, signals]) => signals).map((s) => s.load())); }

@@ -66,6 +66,7 @@ class Recovery {
   int num_steps() const { return num_steps_; }       ///< since the start
   const StepPlan& plan() const { return plan_; }     ///< of the step under way
   double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
+  const StepChoice& choice() const { return choice_; }
   void Archive(StateArchive* archive);
 
  private:

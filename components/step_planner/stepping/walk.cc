@@ -15,7 +15,7 @@ constexpr double kLongestTick = 0.02;  // s, counted at most for a tick after a 
 constexpr double kRiseOver = 0.5;      // share of a swing before which no load is a landing
 constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
 // Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
-constexpr int kAhead = 3;
+constexpr int kAhead = Walk::kPlannedSteps;
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
 constexpr int kHalvings = 40;           // of [0, 1]
@@ -299,6 +299,34 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
                       spec_.turn_acceleration * spec_.period());
   closing_ = !command_.stepping;
   foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
+}
+
+int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
+  if (!active() || final_) return 0;
+  double due = touch_down_;  // of a foot that swings
+  switch (stage_) {
+    case WalkStage::kStarting:
+      due = since_ + spec_.start + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kUnloading:
+      due = since_ + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kLoading:
+      due = since_ + spec_.load + spec_.unload + spec_.swing;
+      break;
+    default:
+      break;
+  }
+  Footstep next = foothold_;
+  int foot = stepping_foot(), count = 0;
+  for (PlannedStep& step : *steps) {
+    step = {next, foot, due + count * spec_.period()};
+    ++count;
+    if (closing_) break;
+    foot = 1 - foot;
+    next = Next(next, foot);
+  }
+  return count;
 }
 
 void Walk::PlanFrom(const StepState& state) {

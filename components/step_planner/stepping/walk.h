@@ -99,7 +99,17 @@ class Walk {
     stage_ = WalkStage::kStanding;
   }
   const Footstep& foothold() const { return foothold_; }  ///< of the step under way
-  double touch_down() const { return touch_down_; }       ///< s, planned
+  struct PlannedStep {
+    Footstep at;
+    int foot = 0;
+    double touch_down = 0;  ///< s, planned
+  };
+  static constexpr int kPlannedSteps = 3;
+  /// The step under way or next, and those that the plan counts with after it; how many there are.
+  int Planned(std::array<PlannedStep, kPlannedSteps>* steps) const;
+  const StepChoice& choice() const { return choice_; }
+  double period() const { return spec_.period(); }   ///< s from touch-down to touch-down
+  double touch_down() const { return touch_down_; }  ///< s, planned
   /// What is walked now: the command, approached without haste.
   const WalkCommand& command() const { return command_; }
   /// rad, rad/s, rad/s² about the vertical, of the body since it stood.

@@ -65,6 +65,43 @@ TEST(PhaseSchedule, FollowsTheScenarioToTheTick) {
   }
 }
 
+// Steps end with both feet loaded: whatever share of a ramp was done, the load goes on without a
+// jump from there.
+TEST(PhaseSchedule, ARampThatStepsInterruptBeginsAnew) {
+  PhaseSchedule schedule = Schedule(kThere);
+  int tick = 0;
+  for (; tick < 400; ++tick) Advance(&schedule, kTick * tick, kOverBoth, kConfirmed);
+  EXPECT_NEAR(schedule.state().progress, (kTick * 399 - 0.5) / 0.5, 1e-6);
+  for (; tick < 700; ++tick) {
+    schedule.Hold(kTick * tick);
+    ASSERT_EQ(schedule.state().transition, TransitionKind::kNone);
+  }
+  double last = 0;
+  int phase_ticks = 0;
+  for (; schedule.state().phase == 0; ++tick) {
+    const ScheduleState& state = Advance(&schedule, kTick * tick, kOverBoth, kConfirmed);
+    if (state.phase != 0) break;
+    ASSERT_EQ(state.transition, TransitionKind::kUnloading);
+    ASSERT_LE(state.progress - last, 1.001 * kTick / 0.5);
+    last = state.progress;
+    ASSERT_LT(++phase_ticks, 300);
+  }
+  EXPECT_GT(last, 1 - 1.5 * kTick / 0.5);  // the foot leaves the ground with its load gone
+}
+
+TEST(PhaseSchedule, ALoadingThatStepsInterruptIsOver) {
+  PhaseSchedule schedule = Schedule(kThere);
+  int tick = 0;
+  for (; tick < 1150; ++tick) Advance(&schedule, kTick * tick, kOverBoth, kConfirmed);
+  ASSERT_EQ(schedule.state().transition, TransitionKind::kLoading);
+  for (; tick < 1200; ++tick) schedule.Hold(kTick * tick);
+  for (; tick < 1300; ++tick) {
+    ASSERT_EQ(Advance(&schedule, kTick * tick, kOverBoth, kConfirmed).transition,
+              TransitionKind::kNone);
+  }
+  EXPECT_EQ(schedule.state().phase, 2);
+}
+
 TEST(PhaseSchedule, UnloadingAndAllThatFollowsWaitForTheCom) {
   PhaseSchedule schedule = Schedule(kThere);
   // The COM stands above the left foot only: the foot that is to be lifted does not count.

@@ -1,0 +1,123 @@
+#include "components/step_planner/footstep_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/footwork.h"
+
+namespace poise {
+namespace {
+
+using stepping::Stage;
+using stepping::Walk;
+using stepping::WalkStage;
+using Report = ::steps::footsteps_t;
+
+constexpr int kCorners = stepping::kRegionDirections;
+constexpr double kRegionPeriod = 0.02;  // s: what looks on draws no faster
+constexpr double kLeastHeight = 0.1;    // m, of the COM above the sole: below, it has fallen
+
+static_assert(sizeof(Report::x) / sizeof(double) >= Walk::kPlannedSteps);
+static_assert(sizeof(Report::region_x) / sizeof(double) ==
+              (stepping::kMostRegionSteps + 1) * kCorners);
+
+bool UnderWay(const stepping::Recovery& recovery) {
+  return recovery.stage() == Stage::kUnloading || recovery.stage() == Stage::kSwinging;
+}
+
+/// The foot that carries, or is to while the other steps; −1: both do.
+int Stance(const FootstepInput& input, const stepping::Recovery* recovery, const Walk* walk) {
+  if (walk != nullptr && walk->active()) {
+    return walk->stage() == WalkStage::kStopping ? -1 : 1 - walk->stepping_foot();
+  }
+  if (recovery != nullptr && UnderWay(*recovery)) return 1 - recovery->plan().foot;
+  if (input.in_contact[0] == input.in_contact[1]) return -1;
+  return input.in_contact[0] ? robot::kRightFoot : robot::kLeftFoot;
+}
+
+void Put(int i, int foot, const Eigen::Vector2d& at, double yaw, double ground, double left,
+         Report* out) {
+  out->foot[i] = static_cast<int8_t>(foot);
+  out->x[i] = at.x();
+  out->y[i] = at.y();
+  out->z[i] = ground;
+  out->yaw[i] = yaw;
+  out->touch_down[i] = std::max(0.0, left);
+}
+
+void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recovery, const Walk* walk,
+                   Report* out) {
+  int count = 0;
+  if (walk != nullptr && walk->active()) {
+    std::array<Walk::PlannedStep, Walk::kPlannedSteps> planned;
+    const int all = walk->Planned(&planned);
+    const double ground =
+        input.sole[static_cast<size_t>(1 - walk->stepping_foot())].translation().z();
+    for (const Walk::PlannedStep& step : planned) {
+      if (count == all) break;
+      Put(count++, step.foot, step.at.position, step.at.yaw, ground, step.touch_down - input.time,
+          out);
+    }
+  } else if (recovery != nullptr && UnderWay(*recovery)) {
+    const stepping::StepPlan& plan = recovery->plan();
+    const double ground = input.sole[plan.foot == robot::kRightFoot ? 1 : 0].translation().z();
+    Put(count++, plan.foot, plan.foothold, plan.yaw, ground, recovery->touch_down() - input.time,
+        out);
+  }
+  out->planned = static_cast<int8_t>(count);
+  for (int i = count; i < Walk::kPlannedSteps; ++i) Put(i, 0, {0, 0}, 0, 0, 0, out);
+}
+
+}  // namespace
+
+void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery* recovery,
+                            const Walk* walk, Report* out) {
+  ReportPlanned(input, recovery, walk, out);
+  const int stance = Stance(input, recovery, walk);
+  if (stance == stance_ && input.time < since_ + kRegionPeriod - stepping::kTimeTolerance) return;
+  since_ = input.time;
+  stance_ = stance;
+  out->stance = static_cast<int8_t>(stance);
+  std::fill(std::begin(out->corners), std::end(out->corners), int8_t{0});
+  std::fill(std::begin(out->region_x), std::end(out->region_x), 0.0);
+  std::fill(std::begin(out->region_y), std::end(out->region_y), 0.0);
+  out->frequency = out->step_time[0] = out->step_time[1] = out->height = 0;
+  if (stance < 0) return;
+  const bool walks = walk != nullptr && (walk->active() || recovery == nullptr);
+  const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(stance)];
+  const double height = std::max(input.com_height - sole.translation().z(), kLeastHeight);
+  const stepping::StepChoice& choice = walks ? walk->choice() : recovery->choice();
+  stepping::RegionInput seen{.stance = stance,
+                             .sole = sole.translation().head<2>(),
+                             .yaw = stepping::Yaw(sole),
+                             .frequency = std::sqrt(robot::kGravity / height),
+                             .step_time = walks ? walk->period() : 0};
+  if (out->planned > 0) {
+    seen.under_way = true;
+    seen.foothold = {out->x[0], out->y[0]};
+    seen.left = out->touch_down[0];
+    // A walk is counted on where it is planned.
+    if (!walks && recovery->stage() == Stage::kSwinging) {
+      const double metre = stepping::SwingTime(1, choice.limits().acceleration);
+      seen.movable = seen.left * seen.left / (metre * metre);
+    }
+  }
+  const stepping::CaptureRegions regions = stepping::RegionsAbout(choice, seen);
+  out->frequency = seen.frequency;
+  out->step_time[0] = regions.first;
+  out->step_time[1] = regions.longest;
+  out->height = sole.translation().z();
+  for (size_t n = 0; n < regions.region.size(); ++n) {
+    const balance::ConvexPolygon& region = regions.region[n];
+    const int corners = std::min(region.num_corners, kCorners);
+    out->corners[n] = static_cast<int8_t>(corners);
+    for (int k = 0; k < corners; ++k) {
+      const auto at = n * kCorners + static_cast<size_t>(k);
+      out->region_x[at] = region.corner[static_cast<size_t>(k)].x();
+      out->region_y[at] = region.corner[static_cast<size_t>(k)].y();
+    }
+  }
+}
+
+}  // namespace poise

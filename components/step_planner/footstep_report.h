@@ -1,0 +1,37 @@
+// What step_planner plans of the feet, and from where steps bring the COM to rest: FOOTSTEPS.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+
+#include "components/framework/state_archive.h"
+#include "components/step_planner/stepping/capturability.h"
+#include "components/step_planner/stepping/recovery.h"
+#include "components/step_planner/stepping/walk.h"
+#include "steps/footsteps_t.hpp"
+
+namespace poise {
+
+/// The robot of one tick.
+struct FootstepInput {
+  double time = 0;        ///< s
+  double com_height = 0;  ///< m, world
+  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
+                                        Eigen::Isometry3d::Identity()};  ///< world, right first
+  std::array<bool, 2> in_contact{true, true};
+};
+
+/// Regions are made anew when the foot that carries changes, and every 20 ms. Never allocates.
+class FootstepReport {
+ public:
+  /// `recovery`, `walk`: null where they are not enabled.
+  void Update(const FootstepInput& input, const stepping::Recovery* recovery,
+              const stepping::Walk* walk, ::steps::footsteps_t* out);
+  void Archive(StateArchive* archive) { archive->Show(since_, stance_); }
+
+ private:
+  double since_ = -1e9;  // s, last time that regions were made
+  int stance_ = -1;
+};
+
+}  // namespace poise

@@ -1,0 +1,175 @@
+// Footprints, planned footholds and regions of a walk and of a recovery step, in a browser: drawn where the log's soles were.
+// Usage: node steps_test.mjs --poise PROGRAM --web DIR, where DIR is build/web
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {mkdtempSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {after, before, test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
+import {startRun, startView} from './live_run.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
+const folder = mkdtempSync(join(tmpdir(), 'poise-steps-'));
+const path = (name) => join(folder, name);
+let browser;
+
+function poise(...parameters) {
+  const {status, stdout, stderr} = spawnSync(options.poise, parameters, {encoding: 'utf8'});
+  assert.ok(status === 0 || status === 1, stdout + stderr);  // a check of a shorter run may fail
+  return stdout;
+}
+
+before(async () => {
+  poise('run', 'walk', '--inline', '--duration', '7', '--out', path('walk'));
+  poise('run', 'push_double_support', '--variant', 'step', '--inline', '--duration', '3', '--out', path('step'));
+  browser = await launchBrowser(options.web);
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, {recursive: true, force: true});
+});
+
+/**
+ * What the picture shows at the run's end, and what the log says: by foot the ticks in which its measured load was above half of the
+ * weight, with the true place of its sole.
+ */
+const shown = (page) => page.evaluate(async () => {
+  const {run, scene, player} = window.poise;
+  player.seek(run.end);
+  const column = async (name) => {
+    const signal = run.signals.get(name);
+    await signal.load();
+    return signal.values;
+  };
+  const half = 0.5 * 9.80665 * run.robot.mass;
+  const stood = [[], []];
+  for (const foot of [0, 1]) {
+    const load = await column(`ROBOT_SENSORS.foot_wrench[${foot}].force[2]`);
+    const place = await Promise.all([0, 1, 2].map((i) => column(`GROUND_TRUTH.foot_pose[${foot}].position[${i}]`)));
+    load.forEach((force, row) => {
+      if (-force > half && Number.isFinite(place[0][row] + place[1][row])) stood[foot].push([run.timeAt(row), ...place.map((values) => values[row])]);
+    });
+  }
+  // Corners of the drawn soles: a pair each edge, an edge a corner.
+  const drawn = scene.steps.prints.map((view, f) => {
+    const corners = run.robot.feet[f].corners.length;
+    const count = view.edges.geometry.drawRange.count / 2 / corners;
+    return Array.from({length: count}, (_, k) => [0, 1, 2].map((axis) => {
+      let sum = 0;
+      for (let i = 0; i < corners; ++i) sum += view.edge.array[3 * 2 * (k * corners + i) + axis];
+      return sum / corners;
+    }));
+  });
+  const centre = run.robot.feet.map((foot) => [0, 1].map((i) => foot.corners.reduce((sum, c) => sum + c[i], 0) / foot.corners.length));
+  return {stood, drawn, centre, prints: scene.steps.footprints.list.map(({foot, from, to}) => ({foot, from, to: to ?? run.end})),
+    steps: Math.max(...(await column('SUPPORT_PLAN.num_steps')).filter(Number.isFinite)), labels: scene.steps.labels.filter((l) => l.object.visible).map((l) => l.shown)};
+});
+
+function compare({stood, drawn, prints, centre}, tolerance) {
+  for (const foot of [0, 1]) {
+    const own = prints.filter((print) => print.foot === foot);
+    assert.equal(drawn[foot].length, own.length);
+    for (const [time, x, y] of stood[foot]) {
+      const k = own.findIndex((print) => print.from <= time && time <= print.to);
+      assert.ok(k >= 0, `foot ${foot} carries the robot at ${time} s, without a footprint`);
+      const [dx, dy] = centre[foot];
+      const away = Math.hypot(drawn[foot][k][0] - x - dx, drawn[foot][k][1] - y - dy);
+      assert.ok(away < tolerance, `foot ${foot} stands ${away} m from its footprint at ${time} s`);
+    }
+    for (const print of own.filter((p) => p.to - p.from > 0.2)) {
+      assert.ok(stood[foot].some(([time]) => print.from <= time && time <= print.to), `nothing stood at ${JSON.stringify(print)}`);
+    }
+  }
+}
+
+test('the footprints of a walk are where its soles were, and the planned footholds where they came down', async () => {
+  poise('report', path('walk'));
+  const {page, problems} = await openPage(browser, path('walk/report.html'));
+  const seen = await shown(page);
+  compare(seen, 0.02);
+  assert.ok(seen.steps >= 5, `${seen.steps} steps`);
+  assert.ok(seen.prints.length >= seen.steps && seen.prints.length <= seen.steps + 2);
+  assert.ok(seen.labels.length >= 6 && seen.labels.every((text) => /^\d+\.\d\d s$/.test(text)), seen.labels.join());
+
+  // Planned as the foot is about to land, and where it then stood; the regions hold the standing sole.
+  const planned = await page.evaluate(() => {
+    const {run, scene, player} = window.poise;
+    return scene.steps.footprints.list.filter((print) => print.from > 2).map((print) => {
+      player.seek(print.from - 0.05);
+      const outlines = scene.steps.planned.filter((outline) => outline.object.visible);
+      const first = outlines[0].positions.array;
+      const corners = run.robot.feet[print.foot].corners.length;
+      const middle = [0, 1].map((axis) => Array.from({length: corners}, (_, i) => first[3 * i + axis]).reduce((a, b) => a + b) / corners);
+      const sizes = scene.steps.regions.map((region) => region.object.geometry.drawRange.count);
+      return {count: outlines.length, sizes, away: Math.hypot(middle[0] - print.pose.position[0], middle[1] - print.pose.position[1])};
+    });
+  });
+  assert.ok(planned.length >= 4);
+  for (const {count, sizes, away} of planned) {
+    assert.ok(count >= 1 && count <= 3);
+    assert.ok(away < 0.04, `a foot came down ${away} m from its planned foothold`);
+    assert.ok(sizes.every((corners) => corners >= 4), `regions with ${sizes} corners`);
+  }
+  assert.match(await page.locator('.key').first().innerText(), /footprints[\s\S]*approximate/);
+  assert.match(await page.locator('.regions-note').innerText(), /legs' reach/);
+  await page.evaluate(() => window.poise.player.seek(4));
+  assert.match(await page.locator('.readout').innerText(), /step\s.*walk/);
+
+  // The view goes with the robot.
+  const away = await page.evaluate(() => {
+    const {scene, run, player} = window.poise;
+    player.seek(run.end);
+    const {x, y} = scene.robotView.object.position;
+    return Math.hypot(x - scene.controls.target.x, y - scene.controls.target.y);
+  });
+  assert.ok(away < 0.41, `the robot is ${away} m from the picture's middle`);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('the footprints of a step that catches a push are where its soles were, and the event says why it was made', async () => {
+  poise('report', path('step'));
+  const {page, problems} = await openPage(browser, path('step/report.html'));
+  const seen = await shown(page);
+  compare(seen, 0.03);
+  assert.ok(seen.steps >= 1);
+  assert.match(await page.locator('.events').innerText(),
+    /step begins[\s\S]*(the capture point stays beyond the soles|than balancing brings back|out of reach)/);
+  // Steps are known to catch it, from the decision until the foot comes down.
+  const caught = await page.evaluate(async () => {
+    const {run, player} = window.poise;
+    const stepping = run.signals.get('SUPPORT_PLAN.stepping');
+    await stepping.load();
+    const [unloads, lands] = [1, 3].map((stage) => run.timeAt(stepping.values.findIndex((x) => x === stage)));
+    return [unloads, 0.5 * (unloads + lands), lands - 0.02].map((time) => {
+      player.seek(time);
+      return document.querySelector('.readout').innerText;
+    });
+  });
+  for (const text of caught) assert.match(text, /capture point within\s+(1 step|2 steps)/);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a page that follows a run draws the same', async () => {
+  const run = startRun(options.poise, path('live'), '--variant', 'step', '--duration', '2');
+  const view = await startView(options.poise, run, path('live'));
+  const {page, problems} = await openPage(browser, view.url);
+  await page.waitForFunction(() => window.poise?.feed?.state === 'ended', undefined, {timeout: PATIENCE});
+  const seen = await shown(page);
+  compare(seen, 0.03);
+  assert.ok(seen.steps >= 1);
+  const regions = await page.evaluate(async () => {
+    const {run: r, scene, player} = window.poise;
+    player.seek(r.timeAt(r.signals.get('SUPPORT_PLAN.stepping').values.indexOf(2)));
+    return scene.steps.regions.map((region) => region.object.geometry.drawRange.count);
+  });
+  assert.ok(regions.every((corners) => corners >= 4), `regions with ${regions} corners`);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+  await view.stop();
+  await run.stop();
+});

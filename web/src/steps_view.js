@@ -1,0 +1,171 @@
+// Footprints with the time of their touch-down, planned footholds, the capture point's trace, and the regions of 0, 1 and 2 steps.
+import {
+  BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, DynamicDrawUsage, Group, Line, LineBasicMaterial, LineSegments, Mesh,
+  MeshBasicMaterial, Sprite, SpriteMaterial,
+} from 'three';
+import {Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsAt} from './footsteps.js';
+import {Outline} from './markers.js';
+import {isDark} from './palette.js';
+import {Samples, vector} from './samples.js';
+import {add, rotate} from './spatial.js';
+
+export const FOOT_COLORS = [0x3f7fd6, 0xe08a2c];  // right, left, as the robot's soles
+const SHOWN = 60;     // footprints, the last ones
+const LABELLED = 8;   // of them
+const LIFT = 0.002;   // m above the ground
+export const TRACE = 3;  // s
+const TRACE_POINTS = 400;
+const AHEAD = [1, 0.55, 0.35];        // opacity of the step under way and of those after it
+const WITHIN = [1, 0.75, 0.5];        // of the regions of 0, 1, 2 steps
+const LABEL = {width: 128, height: 36, size: 0.16};  // pixels, pixels, m wide
+
+/** A point's place that changes in every frame. */
+const growing = (count) => new BufferAttribute(new Float32Array(3 * count), 3).setUsage(DynamicDrawUsage);
+
+/** The soles of one foot on the ground: filled, with their edges. */
+class Prints {
+  constructor(color, corners) {
+    this.corners = corners;
+    this.fill = growing(SHOWN * 3 * (corners.length - 2));
+    this.edge = growing(SHOWN * 2 * corners.length);
+    const geometry = (positions) => new BufferGeometry().setAttribute('position', positions);
+    this.faces = new Mesh(geometry(this.fill), new MeshBasicMaterial({color, transparent: true, opacity: 0.22, depthWrite: false,
+      side: DoubleSide}));
+    this.edges = new LineSegments(geometry(this.edge), new LineBasicMaterial({color}));
+    this.object = new Group();
+    this.object.add(this.faces, this.edges);
+    for (const part of this.object.children) part.frustumCulled = false;
+  }
+
+  set(prints) {
+    let face = 0, edge = 0;
+    for (const {pose} of prints) {
+      const at = this.corners.map(([x, y]) => add(add(pose.position, rotate(pose.orientation, [x, y, 0])), [0, 0, LIFT]));
+      at.forEach((point, i) => {
+        this.edge.setXYZ(edge++, ...point);
+        this.edge.setXYZ(edge++, ...at[(i + 1) % at.length]);
+        if (i < 2) return;
+        for (const corner of [at[0], at[i - 1], point]) this.fill.setXYZ(face++, ...corner);
+      });
+    }
+    this.fill.needsUpdate = this.edge.needsUpdate = true;
+    this.faces.geometry.setDrawRange(0, face);
+    this.edges.geometry.setDrawRange(0, edge);
+  }
+}
+
+/** A time beside a footprint. */
+class TimeLabel {
+  constructor() {
+    this.canvas = Object.assign(document.createElement('canvas'), {width: LABEL.width, height: LABEL.height});
+    this.texture = new CanvasTexture(this.canvas);
+    this.object = new Sprite(new SpriteMaterial({map: this.texture, transparent: true, depthTest: false}));
+    this.object.scale.set(LABEL.size, LABEL.size * LABEL.height / LABEL.width, 1);
+    this.object.renderOrder = 12;
+  }
+
+  set(print, dark) {
+    this.object.visible = print !== undefined;
+    if (!print) return;
+    const [x, y, z] = print.pose.position;
+    this.object.position.set(x, y, z + 0.03);
+    const text = `${print.from.toFixed(2)} s`;
+    if (this.shown === text && this.dark === dark) return;
+    Object.assign(this, {shown: text, dark});
+    const pen = this.canvas.getContext('2d');
+    pen.clearRect(0, 0, LABEL.width, LABEL.height);
+    pen.font = 'bold 28px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    pen.lineWidth = 3;
+    pen.strokeStyle = dark ? '#14171c' : '#ffffff';
+    pen.fillStyle = dark ? '#f2f2f2' : '#1d1d1f';
+    pen.strokeText(text, LABEL.width / 2, LABEL.height / 2);
+    pen.fillText(text, LABEL.width / 2, LABEL.height / 2);
+    this.texture.needsUpdate = true;
+  }
+}
+
+export class StepsView {
+  /** `colored(material, name)` gives a material its colour of the theme. */
+  constructor(run, colored) {
+    this.run = run;
+    this.footprints = new Footprints(run);
+    this.samples = new Samples();
+    this.shown = true;
+    const {feet} = run.robot;
+    this.prints = feet.map((foot, f) => new Prints(FOOT_COLORS[f], foot.corners));
+    this.labels = Array.from({length: LABELLED}, () => new TimeLabel());
+    this.planned = AHEAD.map((opacity) => {
+      const outline = new Outline(0, Math.max(...feet.map((foot) => foot.corners.length)) + 1, true);
+      outline.material.opacity = opacity;
+      return outline;
+    });
+    this.regions = WITHIN.map((opacity, steps) => {
+      const outline = new Outline(0, 17, steps > 0);
+      outline.material.opacity = opacity;
+      colored(outline.material, 'reach');
+      return outline;
+    });
+    this.trail = growing(TRACE_POINTS);
+    const material = new LineBasicMaterial({depthTest: false, transparent: true, opacity: 0.8});
+    colored(material, 'capture');
+    this.trace = new Line(new BufferGeometry().setAttribute('position', this.trail), material);
+    this.trace.frustumCulled = false;
+    this.trace.renderOrder = 10;
+    this.object = new Group();
+    this.object.add(...this.prints.map((p) => p.object), ...this.labels.map((l) => l.object), ...this.planned.map((p) => p.object),
+      ...this.regions.map((r) => r.object), this.trace);
+    this.flat = [...this.prints.map((p) => p.object), ...this.planned.map((p) => p.object), ...this.regions.map((r) => r.object), this.trace];
+  }
+
+  async load() {
+    await Promise.all([this.footprints.load(),
+      this.samples.load(this.run, {...plannedSignals(), ...vector('capture', 'support_plan_t', 'capture_point')})]);
+  }
+
+  /** What is known at a row, whatever comes after it. */
+  setRow(row) {
+    this.object.visible = this.shown;
+    if (!this.shown) return;
+    const {run, samples} = this;
+    this.footprints.update();
+    const prints = this.footprints.until(run.timeAt(row), SHOWN);
+    this.prints.forEach((view, f) => view.set(prints.filter((print) => print.foot === f)));
+    const dark = isDark();
+    this.labels.forEach((label, i) => label.set(prints[prints.length - 1 - i], dark));
+    const planned = plannedAt(samples, row);
+    this.planned.forEach((outline, i) => {
+      const step = planned[i];
+      const known = step && [...step.position, step.yaw].every(Number.isFinite);
+      outline.set(known ? this.#sole(step) : []);
+      if (known) outline.material.color.set(FOOT_COLORS[step.foot]);
+    });
+    const regions = regionsAt(samples, row);
+    this.regions.forEach((outline, i) => {
+      outline.set(regions[i].flat().every(Number.isFinite) ? regions[i].map(([x, y, z]) => [x, y, z + LIFT]) : []);
+    });
+    this.#setTrace(row);
+  }
+
+  #sole({foot, position, yaw}) {
+    const turn = [Math.cos(yaw / 2), 0, 0, Math.sin(yaw / 2)];
+    return this.run.robot.feet[foot].corners.map(([x, y]) => add(add(position, rotate(turn, [x, y, 0])), [0, 0, LIFT]));
+  }
+
+  #setTrace(row) {
+    const {run, samples} = this;
+    const first = run.rowAt(run.timeAt(row) - TRACE);
+    const stride = Math.max(1, Math.ceil((row - first + 1) / TRACE_POINTS));
+    let count = 0;
+    for (let r = row; r >= first; r -= stride) {
+      const [x, y, z] = samples.vector('capture', r);
+      if (Number.isFinite(x + y + z)) this.trail.setXYZ(count++, x, y, z + LIFT);
+    }
+    this.trail.needsUpdate = true;
+    this.trace.geometry.setDrawRange(0, count);
+    this.trace.visible = count > 1;
+  }
+}
+
+if (PLANNED !== AHEAD.length || REGIONS !== WITHIN.length) throw new Error('a look for each foothold and region');
