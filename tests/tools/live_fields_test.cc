@@ -37,14 +37,14 @@ const FieldDescriptor* FieldAt(const Descriptor* type, const std::string& path) 
   return field;
 }
 
-struct Run {
+struct Prepared {
   std::string name;
   RunSpec spec;
 };
 
 /// A run of each scenario and of each of its variants: what is live follows from the configuration.
-std::vector<Run> Runs() {
-  std::vector<Run> runs;
+std::vector<Prepared> Runs() {
+  std::vector<Prepared> runs;
   for (const std::string& scenario : ListNames("scenarios")) {
     const LoadedScenario plain = LoadScenario(scenario, {});
     std::vector<std::string> variants = {""};
@@ -63,11 +63,11 @@ std::vector<Run> Runs() {
 
 class LiveFieldsTest : public testing::Test {
  protected:
-  static void SetUpTestSuite() { runs_ = new std::vector<Run>(Runs()); }
+  static void SetUpTestSuite() { runs_ = new std::vector<Prepared>(Runs()); }
   static void TearDownTestSuite() { delete runs_; }
-  static std::vector<Run>* runs_;
+  static std::vector<Prepared>* runs_;
 };
-std::vector<Run>* LiveFieldsTest::runs_ = nullptr;
+std::vector<Prepared>* LiveFieldsTest::runs_ = nullptr;
 
 // What a slider or `poise set --list` shows stands in the field's comment and nowhere else.
 TEST_F(LiveFieldsTest, EachIsADocumentedNumberWithUnitAndRange) {
@@ -75,7 +75,7 @@ TEST_F(LiveFieldsTest, EachIsADocumentedNumberWithUnitAndRange) {
                                 std::regex::icase);
   std::set<int> components;
   std::set<std::string> seen;
-  for (const Run& run : *runs_) {
+  for (const Prepared& run : *runs_) {
     for (const LiveField& field : LiveFields(run.spec)) {
       const std::string name = run.name + ": " + field.path;
       const ComponentInstance& instance = run.spec.graph().component(field.component);
@@ -105,7 +105,7 @@ TEST_F(LiveFieldsTest, EachIsADocumentedNumberWithUnitAndRange) {
 // A setting whose value is another field's would turn what it does not name.
 TEST_F(LiveFieldsTest, EachIsTheFieldOfTheConfigurationThatItNames) {
   size_t changed = 0;
-  for (Run& run : *runs_) {
+  for (Prepared& run : *runs_) {
     std::map<std::string, double> wanted;
     for (const LiveField& field : LiveFields(run.spec)) {
       // One of its own each, so that two that are exchanged differ, and close to what it was.
