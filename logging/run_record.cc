@@ -5,9 +5,11 @@
 #include <functional>
 
 #include "components/framework/bus/packet_filter.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "operate/message_traits.hpp"
 #include "poise/message_traits.hpp"
 
 namespace poise::logging {
@@ -106,6 +108,11 @@ std::map<std::string, Add, std::less<>> MakeAdders(const Store& store, RunRecord
   return adders;
 }
 
+bool IsAnswer(std::span<const uint8_t> data, int64_t run_id, operate::answer_t* answer) {
+  return DecodeChecked(data.data(), static_cast<int64_t>(data.size()), answer) &&
+         answer->run_id == run_id && MessageTraits<operate::answer_t>::AllFinite(*answer);
+}
+
 /// Metrics index messages by the robot's joints and feet.
 void CheckRobot(const RunRecord& run, const std::string& path) {
   for (const Channel& channel : run.spec.graph().channel()) {
@@ -139,7 +146,9 @@ RunRecord ReadRun(const std::string& path, uint64_t most_in_memory) {
   auto adders = MakeAdders(store, &run);
   std::vector<Lane> lanes;
   std::map<std::string, size_t, std::less<>> lane_of;
+  std::string_view answers;  // the channel; empty: the graph has none
   for (const Channel& channel : run.spec.graph().channel()) {
+    if (channel.type() == kAnswerType) answers = channel.name();
     if (channel.external() || !IsKept(run.spec, channel.name())) continue;
     auto adder = adders.extract(channel.type());
     lane_of[channel.name()] = lanes.size();
@@ -159,6 +168,9 @@ RunRecord ReadRun(const std::string& path, uint64_t most_in_memory) {
       } else {
         to.ticks.Refuse();
       }
+    } else if (!answers.empty() && event.channel == answers) {
+      operate::answer_t answer;
+      if (IsAnswer(event.data, run.spec.run_id(), &answer)) run.answers.push_back(answer);
     } else if (event.channel.starts_with("HEALTH_")) {
       std::optional<health_t> health = ReadHealth(event, run.spec.run_id());
       if (health) {

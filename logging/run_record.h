@@ -16,6 +16,7 @@
 #include "logging/log_reader.h"
 #include "logging/run_info.h"
 #include "logging/tick_series.h"
+#include "operate/answer_t.hpp"
 #include "poise/balance_torque_t.hpp"
 #include "poise/bridge_status_t.hpp"
 #include "poise/drive_command_t.hpp"
@@ -88,6 +89,8 @@ struct RunRecord {
   Series<external_push_t> push;
   Series<ground_truth_t> truth;
   std::map<std::string, health_t> health;  ///< by component: its last
+  /// To an operator's acts, as they stand in the log: whole, of this run, perhaps said twice.
+  std::vector<operate::answer_t> answers;
 
   std::vector<ChannelCompleteness> channels;  ///< not the external ones
   int64_t damages = 0;                        ///< places where the file held no record

@@ -2,11 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <tuple>
+#include <utility>
 
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
 #include "logging/metrics/analysis.h"
+#include "logging/metrics/bridge_words.h"
 #include "logging/metrics/contact_history.h"
+#include "logging/metrics/operator_words.h"
 #include "logging/metrics/schedule_plan.h"
 
 namespace poise::logging {
@@ -16,6 +23,9 @@ constexpr double kShortestLoss = 0.01;  // s; shorter is the foot's rattle, and 
 
 // A push that comes back sooner is the same push, s.
 constexpr double kPushGap = 0.05;
+
+// An operator's act that is refused sooner than this after one like it is the same attempt, s.
+constexpr double kRefusalGap = 1;
 
 /// Rounded to what one decimal shows, and never "-0.0".
 double Tenths(double value) {
@@ -449,6 +459,44 @@ void AddCrane(const RunRecord& run, EventList* events) {
   }
 }
 
+/// An operator's acts that were refused. A page that is dragged sends many a second: those of one
+/// component with one reason are one event until kRefusalGap has passed without one.
+void AddRefusals(const RunRecord& run, EventList* events) {
+  struct Refusal {
+    int64_t begin, last;  // ticks
+    int count;
+  };
+  std::map<std::tuple<int32_t, int8_t, int8_t>, std::vector<Refusal>> refusals;
+  std::set<std::pair<int32_t, int64_t>> heard;  // an act sent again is answered again
+  for (const operate::answer_t& answer : run.answers) {
+    const bool within = answer.tick >= 0 && answer.tick <= run.num_ticks;
+    if (answer.verdict == operate::answer_t::VERDICT_DONE || !within) continue;
+    if (!heard.emplace(answer.component, answer.id).second) continue;
+    std::vector<Refusal>& same = refusals[{answer.component, answer.kind, answer.verdict}];
+    const bool more =
+        !same.empty() && run.duration(std::abs(answer.tick - same.back().last)) < kRefusalGap;
+    if (more) {
+      same.back().last = answer.tick;
+      ++same.back().count;
+    } else {
+      same.push_back({answer.tick, answer.tick, 1});
+    }
+  }
+  for (const auto& [what, list] : refusals) {
+    const auto& [component, kind, verdict] = what;
+    const Graph& graph = run.spec.graph();
+    const bool known = component >= 0 && component < graph.component_size();
+    for (const Refusal& refusal : list) {
+      events->Add(refusal.begin, "act_refused",
+                  fmt::format("{} by {}: {}{}", ActKindName(kind),
+                              known ? graph.component(component).name()
+                                    : fmt::format("component {}", component),
+                              RefusalReason(verdict),
+                              refusal.count > 1 ? fmt::format("; {} times", refusal.count) : ""));
+    }
+  }
+}
+
 void AddEnd(const RunRecord& run, bool ended, EventList* events) {
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const ground_truth_t* truth = run.truth.at(tick);
@@ -471,100 +519,6 @@ void AddEnd(const RunRecord& run, bool ended, EventList* events) {
 
 }  // namespace
 
-std::string BridgeStateName(int8_t state) {
-  switch (state) {
-    case bridge_status_t::STATE_INIT:
-      return "init";
-    case bridge_status_t::STATE_RUNNING:
-      return "running";
-    case bridge_status_t::STATE_DAMPING:
-      return "damping";
-    case bridge_status_t::STATE_STOPPING:
-      return "stopping";
-    case bridge_status_t::STATE_ENABLING:
-      return "enabling";
-    case bridge_status_t::STATE_HOLDING:
-      return "holding";
-    case bridge_status_t::STATE_STOPPED:
-      return "stopped";
-    case bridge_status_t::STATE_ESTOP:
-      return "emergency stop";
-    default:
-      return fmt::format("state {}", state);
-  }
-}
-
-std::string BridgeReasonName(int8_t reason) {
-  switch (reason) {
-    case bridge_status_t::REASON_NONE:
-      return "";
-    case bridge_status_t::REASON_NO_COMMAND:
-      return "no command";
-    case bridge_status_t::REASON_COMMAND_NOT_FINITE:
-      return "command not finite";
-    case bridge_status_t::REASON_COMMAND_STALE:
-      return "command stale";
-    case bridge_status_t::REASON_COMMAND_SEQUENCE:
-      return "command out of sequence";
-    case bridge_status_t::REASON_COMMAND_SIZE:
-      return "command of wrong size";
-    case bridge_status_t::REASON_COMMAND_RUN:
-      return "command of another run";
-    case bridge_status_t::REASON_OPERATOR:
-      return "operator";
-    case bridge_status_t::REASON_DRIVE_FAULT:
-      return "drive fault";
-    case bridge_status_t::REASON_FEEDBACK_NOT_FINITE:
-      return "feedback not finite";
-    case bridge_status_t::REASON_DRIVE_NOT_ENABLED:
-      return "drive not enabled";
-    case bridge_status_t::REASON_START_POSITION:
-      return "joint out of its range at the start";
-    case bridge_status_t::REASON_START_VELOCITY:
-      return "joint moving at the start";
-    case bridge_status_t::REASON_JOINT_POSITION:
-      return "joint beyond its range";
-    case bridge_status_t::REASON_JOINT_VELOCITY:
-      return "joint too fast";
-    case bridge_status_t::REASON_BODY_TILT:
-      return "body tilted";
-    case bridge_status_t::REASON_BUS_INPUTS:
-      return "inputs of the bus incomplete";
-    case bridge_status_t::REASON_BUS_LINK:
-      return "bus link lost";
-    case bridge_status_t::REASON_CYCLE_OVERRUN:
-      return "cycle overruns";
-    case bridge_status_t::REASON_ENCODER_FROZEN:
-      return "encoder frozen";
-    case bridge_status_t::REASON_ENCODER_JUMP:
-      return "encoder jump";
-    case bridge_status_t::REASON_TORQUE_IMPLAUSIBLE:
-      return "torque implausible";
-    case bridge_status_t::REASON_DRIVE_STO:
-      return "safe torque off";
-    case bridge_status_t::REASON_SIGNAL:
-      return "signal";
-    case bridge_status_t::REASON_SHUTDOWN:
-      return "shutdown";
-    case bridge_status_t::REASON_REMOTE_STOP:
-      return "remote's stop button";
-    case bridge_status_t::REASON_MOTOR_TEMPERATURE:
-      return "motor too hot";
-    case bridge_status_t::REASON_SUPPLY_VOLTAGE:
-      return "supply voltage too low";
-    case bridge_status_t::REASON_ROBOT_MODE:
-      return "robot no longer under low-level commands";
-    default:
-      return fmt::format("reason {}", reason);
-  }
-}
-
-std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names) {
-  const std::string reason = BridgeReasonName(bridge.reason);
-  if (reason.empty() || bridge.reason_joint < 0) return reason;
-  return fmt::format("{} ({})", reason, names.Joint(bridge.reason_joint));
-}
-
 std::vector<Event> Events(const RunRecord& run, bool ended) {
   EventList events(run);
   AddPhases(run, &events);
@@ -580,6 +534,7 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddBridge(run, &events);
   AddPush(run, ended, &events);
   AddCrane(run, &events);
+  AddRefusals(run, &events);
   AddEnd(run, ended, &events);
   std::vector<Event> sorted = std::move(events).Sorted();
   if (run.spec.cut().first_tick() > 0) {

@@ -4,9 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "logging/element_names.h"
 #include "logging/run_record.h"
-#include "poise/bridge_status_t.hpp"
 
 namespace poise::logging {
 
@@ -24,15 +22,8 @@ struct Event {
 /// waiting_ends, searching, touch_down, contact_early, contact_late, no_surface, contact_lost,
 /// contact_regained, balancing_on, balancing_off, eta_infeasible_begins, eta_infeasible_ends,
 /// cop_not_achieved_begins, cop_not_achieved_ends, step_needed, step_needed_ends, step_begins,
-/// step_lands, step_rests, bridge_state, push_begins, push_peak, push_ends, crane_let_go, fall,
-/// run_ended, log_ends.
+/// step_lands, step_rests, bridge_state, push_begins, push_peak, push_ends, crane_let_go,
+/// act_refused (an operator's), fall, run_ended, log_ends.
 std::vector<Event> Events(const RunRecord& run, bool ended = true);
-
-/// The bridge's states and reasons (bridge_status_t) in words: "damping", "no command"; an empty
-/// reason for none.
-std::string BridgeStateName(int8_t state);
-std::string BridgeReasonName(int8_t reason);
-/// With the joint that it is about: "joint too fast (right_knee_pitch)".
-std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& names);
 
 }  // namespace poise::logging

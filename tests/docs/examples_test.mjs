@@ -99,6 +99,24 @@ test('deploy/docs writes every command, field, message and metric', () => {
   }
 });
 
+// Each page runs in a folder of its own here; a reader does them one after another in one checkout.
+test('tutorials write into folders of their own, beside what git knows', () => {
+  const owner = new Map();
+  for (const page of pages) {
+    if (rules.some((rule) => rule.kind === 'page' && rule.begin === page)) continue;
+    for (const {line, text} of commandsOf(page)) {
+      const command = text.split('<<')[0];
+      for (const [, flag, place] of command.matchAll(/(?<=\s)(--out|--to|-o|>)\s+([\w./]+)/g)) {
+        const where = `${page}:${line}: ${flag} ${place}`;
+        assert.match(place, /^(runs|my)\//, `${where}: git would show it`);
+        assert.ok(!owner.has(place), `${where}: ${owner.get(place)} has written it`);
+        owner.set(place, where);
+      }
+    }
+  }
+  assert.ok(owner.size > 10);
+});
+
 test('examples.txt has no rule that no command needs', () => {
   assert.deepEqual(rules.filter((r) => !r.used).map((r) => r.begin), []);
 });

@@ -8,6 +8,8 @@
 
 #include "components/step_planner/step_planner.pb.h"
 #include "google/protobuf/text_format.h"
+#include "logging/metrics/bridge_words.h"
+#include "logging/metrics/operator_words.h"
 #include "tests/logging/record_fixture.h"
 
 namespace poise::logging {
@@ -400,6 +402,63 @@ TEST(BridgeNames, EveryStateAndReasonHasItsOwn) {
        reason <= bridge_status_t::REASON_SHUTDOWN; ++reason) {
     EXPECT_EQ(BridgeReasonName(reason).find("reason "), std::string::npos) << int{reason};
     EXPECT_TRUE(names.insert(BridgeReasonName(reason)).second) << int{reason};
+  }
+}
+
+/// Of the component with this index, in the log of this run.
+operate::answer_t Answered(int64_t id, int64_t tick, int32_t component, int8_t verdict) {
+  operate::answer_t answer{};
+  SetHeader(tick, &answer);
+  answer.id = id;
+  answer.component = component;
+  answer.kind = operate::act_t::KIND_PUSH;
+  answer.verdict = verdict;
+  return answer;
+}
+
+TEST_F(EventsTest, AnOperatorsActThatIsRefusedShows) {
+  using operate::answer_t;
+  answers_ = {Answered(7, 10, 0, answer_t::VERDICT_DONE),
+              Answered(8, 20, 0, answer_t::VERDICT_RANGE),
+              Answered(8, 21, 0, answer_t::VERDICT_RANGE),  // the same act, answered again
+              Answered(9, 40, 99, answer_t::VERDICT_NOT_NOW)};
+  const std::string who = spec_.graph().component(0).name();
+  EXPECT_THAT(Named("act_refused"),
+              ElementsAre(Is(0.04, "act_refused", "push by " + who + ": a number is out of range"),
+                          Is(0.08, "act_refused", "push by component 99: not now")));
+  EXPECT_THAT(Named("act_refused").front().detail, testing::Not(HasSubstr("times")));
+}
+
+TEST_F(EventsTest, ManyRefusalsOfADragAreOneEvent) {
+  using operate::answer_t;
+  for (int64_t i = 0; i < 30; ++i) {
+    answers_.push_back(Answered(i, 10 + i, 0, answer_t::VERDICT_RANGE));
+  }
+  answers_.push_back(Answered(50, 35, 0, answer_t::VERDICT_FULL));  // another reason
+  EXPECT_THAT(Named("act_refused"), ElementsAre(Is(0.02, "act_refused", "out of range; 30 times"),
+                                                Is(0.07, "act_refused", "too many acts wait")));
+}
+
+TEST_F(EventsTest, AnAnswerThatIsNotOfThisRunOrTellsNoTickOfItIsNone) {
+  using operate::answer_t;
+  answer_t other = Answered(1, 10, 0, answer_t::VERDICT_RANGE);
+  other.run_id += 1;
+  answers_ = {other, Answered(2, -5, 0, answer_t::VERDICT_RANGE),
+              Answered(3, int64_t{1} << 60, 0, answer_t::VERDICT_RANGE)};
+  EXPECT_TRUE(Named("act_refused").empty());
+}
+
+TEST_F(EventsTest, EveryKindOfActAndRefusalHasAWord) {
+  using operate::act_t;
+  using operate::answer_t;
+  std::set<std::string> words;
+  for (int8_t kind = act_t::KIND_PUSH; kind <= act_t::KIND_NEXT_PHASE; ++kind) {
+    EXPECT_EQ(ActKindName(kind).find("of kind"), std::string::npos) << int{kind};
+    EXPECT_TRUE(words.insert(ActKindName(kind)).second) << int{kind};
+  }
+  for (int8_t verdict = answer_t::VERDICT_LATE; verdict <= answer_t::VERDICT_NOT_NOW; ++verdict) {
+    EXPECT_EQ(RefusalReason(verdict).find("refused ("), std::string::npos) << int{verdict};
+    EXPECT_TRUE(words.insert(RefusalReason(verdict)).second) << int{verdict};
   }
 }
 

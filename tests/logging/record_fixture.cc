@@ -64,6 +64,7 @@ RunRecord RecordTest::Read() {
     Add("EXTERNAL_PUSH", push_[t], &events);
     Add("GROUND_TRUTH", truth_[t], &events);
   }
+  for (const operate::answer_t& answer : answers_) Add("OPERATOR_ANSWER", answer, &events);
   WriteRawLog(path_, events);
   return ReadRun(path_);
 }

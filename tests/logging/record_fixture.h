@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "logging/run_record.h"
+#include "operate/message_traits.hpp"
 #include "poise/message_traits.hpp"
 #include "tests/logging/log_test_support.h"
 
@@ -44,6 +45,7 @@ class RecordTest : public testing::Test {
   std::vector<bridge_status_t> bridge_;
   std::vector<external_push_t> push_;
   std::vector<ground_truth_t> truth_;
+  std::vector<operate::answer_t> answers_;  // none
 };
 
 }  // namespace poise::logging

@@ -1,6 +1,7 @@
 #include "tools/cli/command_line.h"
 
 #include <algorithm>
+#include <regex>
 #include <vector>
 
 #include "components/framework/configuration/suggest.h"
@@ -64,6 +65,13 @@ std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
   return text;
 }
 
+/// CLI11 names a checked value by its type and its check, "INT:INT in [1 - 9]": the check says
+/// both.
+std::string WithoutDoubledTypes(const std::string& help) {
+  static const std::regex kChecked(R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))");
+  return std::regex_replace(help, kChecked, "$1");
+}
+
 std::string UnknownCommand(const CLI::App& command, const std::string& name) {
   std::vector<std::string> names;
   for (const CLI::App* each : Subcommands(command)) names.push_back(each->get_name());
@@ -75,7 +83,10 @@ std::string UnknownCommand(const CLI::App& command, const std::string& name) {
 std::string HelpText(const CLI::App& app) {
   const int width = ScreenStyle().columns;
   std::string text;
-  const std::string help = Named(app).help();
+  const CLI::App& command = Named(app);
+  const CLI::App* const parent = command.get_parent();
+  const std::string help =
+      WithoutDoubledTypes(command.help(parent == nullptr ? "" : FullName(*parent)));
   for (size_t begin = 0; begin < help.size();) {
     const size_t end = std::min(help.find('\n', begin), help.size());
     const std::string line = help.substr(begin, end - begin);

@@ -30,7 +30,7 @@ bool TakesValue(const CLI::Option& option) { return option.get_items_expected_ma
 
 /// What a value or positional is a name of, "scenarios"; empty: a file, or nothing known.
 std::string KindOf(const CLI::Option& option) {
-  const std::string name = option.get_single_name();
+  const std::string& name = option.get_single_name();
   for (const char* kind : {"scenario", "robot", "sweep", "graph"}) {
     if (name == kind) return std::string(kind) + "s";
   }
@@ -104,7 +104,7 @@ void AppendOptions(const CLI::App& app, std::string* text) {
 }  // namespace
 
 std::string ManPage(const CLI::App& app, const std::string& version) {
-  const std::string name = app.get_name();
+  const std::string& name = app.get_name();
   std::string title = name;
   std::ranges::transform(title, title.begin(),
                          [](char c) { return static_cast<char>(c >= 'a' && c <= 'z' ? c - 32 : c); });

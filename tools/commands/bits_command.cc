@@ -1,5 +1,4 @@
 #include <gnu/libc-version.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -17,6 +16,7 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/signals.h"
+#include "tools/cli/temporary_dir.h"
 #include "tools/commands/commands.h"
 #include "tools/run/scenario_run.h"
 #include "tools/scenario/catalog.h"
@@ -69,28 +69,6 @@ std::string VersionsText(const ordered_json& versions) {
   return text;
 }
 
-/// A folder that goes with the command.
-class TemporaryDir {
- public:
-  TemporaryDir() {
-    std::string name = (fs::temp_directory_path() / "poise-bits-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw std::system_error(errno, std::generic_category(), name);
-    }
-    path_ = name;
-  }
-  ~TemporaryDir() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryDir(const TemporaryDir&) = delete;
-  TemporaryDir& operator=(const TemporaryDir&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 /// Runs what an entry of the record says. Throws when it does not reach its end.
 std::vector<ChannelBits> RunEntry(const ordered_json& entry, const BitsArguments& arguments,
                                   ordered_json* versions) {
@@ -104,7 +82,7 @@ std::vector<ChannelBits> RunEntry(const ordered_json& entry, const BitsArguments
   if (entry.contains("duration")) options.changes.duration = entry["duration"].get<double>();
   options.in_process = !arguments.processes && !arguments.hosted && arguments.drop_rate == 0 &&
                        options.changes.drives.empty();
-  const TemporaryDir dir;
+  const TemporaryDir dir("poise-bits");
   ScenarioRun run(entry.at("scenario").get<std::string>(), options);
   *versions = BuildVersions(run.spec());
   const RunOutcome outcome = run.RunOnly(dir.path() / "run");

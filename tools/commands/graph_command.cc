@@ -2,8 +2,10 @@
 #include <memory>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/graph_files.h"
@@ -38,7 +40,20 @@ void ShowRun(const RunSpec& spec) {
   const auto name_of = [&](const GraphPlan::Endpoint& end) {
     return spec.graph().component(end.component).name();
   };
+  // Whoever takes an operator's acts answers them, beside its ports.
+  std::string answering;
   for (const GraphPlan::ChannelPlan& channel : plan.channels) {
+    if (channel.type != kActType) continue;
+    for (const GraphPlan::Endpoint& reader : channel.readers) {
+      answering += (answering.empty() ? "" : ", ") + name_of(reader);
+    }
+  }
+  for (const GraphPlan::ChannelPlan& channel : plan.channels) {
+    if (channel.type == kAnswerType) {
+      fmt::print("  {:<16} {:<18} {:>5} bytes  {} -> (operator)\n", channel.name, channel.type,
+                 operate::answer_t{}.getEncodedSize(), answering);
+      continue;
+    }
     std::string readers;
     for (const GraphPlan::Endpoint& reader : channel.readers) {
       readers += (readers.empty() ? "" : ", ") + name_of(reader);
@@ -54,13 +69,13 @@ void ShowRun(const RunSpec& spec) {
     for (const int member : members) fmt::print(" {}", spec.graph().component(member).name());
     fmt::print("\n");
   }
-  fmt::print("one tick:");
+  std::string tick = "one tick:";
   for (const GraphPlan::StageRef& ref : plan.order) {
     const ConfiguredComponent& component = bound.component(ref.component);
-    fmt::print(" {}.{}", component.name,
-               component.wiring.stages()[static_cast<size_t>(ref.stage)].name);
+    tick += fmt::format(" {}.{}", component.name,
+                        component.wiring.stages()[static_cast<size_t>(ref.stage)].name);
   }
-  fmt::print("\n");
+  fmt::print("{}\n", Wrapped(tick, ScreenStyle().columns, 2));
 }
 
 int CheckByName(const std::string& name) {

@@ -14,8 +14,9 @@ int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
   const Limit& limit = definition.sweep().limit();
   const auto [first, end] = SelectedRuns(options, definition.points().size());
   SweepSession session(definition, kKindLimit, options);
-  fmt::print("{}: the largest {} of {} to {} at {} points{}, {} runs at a time; {}\n",
+  fmt::print("{}: the largest {} of {} to {} at {} point{}{}, {} runs at a time; {}\n",
              definition.name(), NameOf(limit), limit.min(), limit.max(), end - first,
+             end - first == 1 ? "" : "s",
              session.found() > 0 ? fmt::format(", {} runs done before", session.found()) : "",
              options.jobs, session.folder().string());
   const bool complete = RunLimits(PointRange(first, end), &session);

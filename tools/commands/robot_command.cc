@@ -76,7 +76,9 @@ void AddRobotCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<CheckOptions>();
   CLI::App* check = robot->add_subcommand(
       "check", "what a robot is and can do, and what is wrong with its files; takes seconds");
-  check->add_option("robot", options->robot, "a name (poise robot list) or a .pbtxt file")
+  check
+      ->add_option("robot", options->robot,
+                   "a name (poise robot list), a robot's folder or its .pbtxt file")
       ->required();
   check->add_flag("--json", options->json, "everything in SI units, for programs");
   check->add_option("--page", options->page, "write the robot in 3D to this file")

@@ -6,9 +6,10 @@ namespace poise {
 namespace {
 
 constexpr std::string_view kErrors[] = {"fall", "no_surface", "contact_lost"};
-constexpr std::string_view kWarnings[] = {"bridge_state",          "step_needed",
-                                          "contact_early",         "contact_late",
-                                          "eta_infeasible_begins", "cop_not_achieved_begins"};
+constexpr std::string_view kWarnings[] = {
+    "bridge_state", "step_needed",           "contact_early",
+    "contact_late", "eta_infeasible_begins", "cop_not_achieved_begins",
+    "act_refused"};
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "fmt/format.h"
+#include "tools/run/loopback.h"
 
 namespace poise {
 namespace {
@@ -36,15 +37,6 @@ void AddLittleEndian(Integer value, std::string* bytes) {
   for (size_t i = 0; i < sizeof(Integer); ++i) {
     bytes->push_back(static_cast<char>(static_cast<uint64_t>(value) >> (8 * i)));
   }
-}
-
-/// "127.0.0.1:PORT" or "localhost:PORT": a page of another site that has its name resolve to this
-/// machine sends its own.
-bool NamesThisMachine(std::string_view host, int port) {
-  for (const char* name : {"127.0.0.1", "localhost"}) {
-    if (beast::iequals({host.data(), host.size()}, fmt::format("{}:{}", name, port))) return true;
-  }
-  return false;
 }
 
 /// Whether a list as of Sec-WebSocket-Protocol has `protocol`.
@@ -100,7 +92,7 @@ void FoxgloveClient::Close() {
 void FoxgloveClient::Answer() {
   const auto& request = parser_.get();
   const auto origin = request.find(http::field::origin);
-  if (!NamesThisMachine(View(request[http::field::host]), host_->port())) {
+  if (!IsHere(View(request[http::field::host]), host_->port())) {
     Respond(http::status::forbidden, fmt::format("only as ws://127.0.0.1:{}\n", host_->port()));
   } else if (origin != request.end() && !host_->IsOriginAllowed(View(origin->value()))) {
     Respond(http::status::forbidden,

@@ -11,6 +11,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/foxglove/foxglove_client.h"
+#include "tools/run/loopback.h"
 
 namespace poise {
 namespace {
@@ -69,17 +70,7 @@ class FoxgloveServer::Impl : public FoxgloveHost {
       keeps_.push_back(topic.kept);
       precedes_.push_back(topic.name.starts_with('/'));
     }
-    try {
-      const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), static_cast<uint16_t>(port));
-      acceptor_.open(endpoint.protocol());
-      acceptor_.set_option(tcp::acceptor::reuse_address(true));
-      acceptor_.bind(endpoint);
-      acceptor_.listen();
-      port_ = acceptor_.local_endpoint().port();
-    } catch (const boost::system::system_error& error) {
-      throw ConfigError(fmt::format("--foxglove {}: cannot be had on 127.0.0.1: {}; choose another",
-                                    port, error.code().message()));
-    }
+    port_ = ListenHere(port, "--foxglove", "choose another", &acceptor_);
     Accept();
   }
   ~Impl() override {

@@ -6,7 +6,6 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"
@@ -34,13 +33,7 @@ int OperatorChannel(const Graph& graph, std::string_view type, bool external) {
 }  // namespace
 
 double PagePushLimit(const RunSpec& spec) {
-  std::string robot, urdf;
-  for (const Resource& resource : spec.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  const robot::RobotModel model = robot::LoadRobotTexts(robot, urdf);
-  return std::round(kPushShare * kGravity * model.total_mass());
+  return std::round(kPushShare * kGravity * RobotOf(spec).total_mass());
 }
 
 nlohmann::ordered_json StandingOf(const std::vector<LiveField>& fields,

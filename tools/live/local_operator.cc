@@ -7,13 +7,12 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "logging/metrics/operator_words.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"
 #include "tools/live/bus_operator.h"
-#include "tools/scenario/registry.h"
 
 namespace poise {
 namespace {
@@ -29,28 +28,13 @@ int IndexOf(const std::vector<std::string>& names, const std::string& name, cons
   return static_cast<int>(found - names.begin());
 }
 
-std::string RefusalText(int8_t verdict) {
-  using operate::answer_t;
-  switch (verdict) {
-    case answer_t::VERDICT_RANGE:
-      return "a number is out of range";
-    case answer_t::VERDICT_NOT_ABLE:
-      return "this run's configuration does not allow it";
-    case answer_t::VERDICT_NOT_NOW:
-      return "not now; try again later";
-    case answer_t::VERDICT_FULL:
-      return "too many acts wait already";
-    default:
-      return fmt::format("refused ({})", static_cast<int>(verdict));
-  }
-}
-
 }  // namespace
 
 LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
     : spec_(spec),
       pace_(std::move(pace)),
       fields_(LiveFields(spec)),
+      targets_(FindActTargets(spec)),
       push_limit_(PagePushLimit(spec)) {
   const Graph& graph = spec_.graph();
   for (int i = 0; i < graph.channel_size(); ++i) {
@@ -65,23 +49,6 @@ LocalOperator::LocalOperator(const RunSpec& spec, Pace pace)
                     "acts of an operator",
                     graph.name(), kActType, kAnswerType));
   }
-  for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentType* const type = Components().TypeNamed(TypeOf(graph.component(i)));
-    if (type == nullptr) continue;
-    if (!type->traits.engine.empty()) simulator_ = i;
-    const auto plans = [](const PortType& port) {
-      return !port.input && port.type == "support_plan_t";
-    };
-    if (std::ranges::any_of(type->ports, plans)) planner_ = i;
-  }
-  std::string robot, urdf;
-  for (const Resource& resource : spec_.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  const robot::RobotModel model = robot::LoadRobotTexts(robot, urdf);
-  for (const auto& body : model.bodies()) bodies_.push_back(body.name);
-  for (const auto& foot : model.feet()) feet_.push_back(foot.name);
 }
 
 void LocalOperator::Answered(const OperatorAct& act, int64_t tick, std::string reason) {
@@ -100,12 +67,12 @@ bool LocalOperator::Inject(const std::string& channel, const Message& message) {
 }
 
 void LocalOperator::Fill(const OperatorAct& act, operate::act_t* message) const {
-  message->component = planner_;
+  message->component = targets_.planner;
   switch (act.kind) {
     case OperatorAct::Kind::kPush:
       message->kind = operate::act_t::KIND_PUSH;
-      message->component = simulator_;
-      message->body = act.name.empty() ? 0 : IndexOf(bodies_, act.name, "body");
+      message->component = targets_.simulator;
+      message->body = act.name.empty() ? 0 : IndexOf(targets_.bodies, act.name, "body");
       for (int i = 0; i < 3; ++i) {
         message->force[i] = act.force[i];
         message->point[i] = act.point[i];
@@ -126,7 +93,8 @@ void LocalOperator::Fill(const OperatorAct& act, operate::act_t* message) const 
     }
     case OperatorAct::Kind::kStep:
       message->kind = operate::act_t::KIND_STEP;
-      message->foot = static_cast<int8_t>(act.name.empty() ? -1 : IndexOf(feet_, act.name, "foot"));
+      message->foot =
+          static_cast<int8_t>(act.name.empty() ? -1 : IndexOf(targets_.feet, act.name, "foot"));
       break;
     case OperatorAct::Kind::kWalk:
       message->kind = operate::act_t::KIND_WALK;
@@ -200,7 +168,7 @@ void LocalOperator::Hear(int channel, std::span<const uint8_t> data) {
     push_ = act;
     push_until_ = answer.tick + std::llround(act.duration / spec_.tick_period());
   }
-  Answered(act, answer.tick, done ? "" : RefusalText(answer.verdict));
+  Answered(act, answer.tick, done ? "" : logging::RefusalReason(answer.verdict));
 }
 
 void LocalOperator::HearStatus(std::span<const uint8_t> data) {

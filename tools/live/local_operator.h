@@ -10,6 +10,7 @@
 
 #include "components/framework/runners/inline_runner.h"
 #include "tools/live/operator_sink.h"
+#include "tools/run/act_targets.h"
 #include "tools/run/operator_line.h"
 
 namespace poise {
@@ -57,8 +58,8 @@ class LocalOperator : public OperatorSink {
   RunSpec spec_;
   Pace pace_;
   std::vector<LiveField> fields_;
-  std::vector<std::string> bodies_, feet_;
-  int simulator_ = -1, planner_ = -1, answer_channel_ = -1, status_channel_ = -1;
+  ActTargets targets_;
+  int answer_channel_ = -1, status_channel_ = -1;
   std::string act_channel_, stop_channel_;
   double push_limit_;  // N
   InlineRunner* runner_ = nullptr;

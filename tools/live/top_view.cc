@@ -4,7 +4,7 @@
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "logging/metrics/events.h"
+#include "logging/metrics/bridge_words.h"
 #include "logging/printable.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/report.h"

@@ -3,7 +3,6 @@
 #include <sys/random.h>
 
 #include <array>
-#include <boost/beast/core/string.hpp>
 #include <cerrno>
 #include <charconv>
 #include <system_error>
@@ -11,28 +10,6 @@
 #include "fmt/format.h"
 
 namespace poise {
-namespace {
-
-/// `a` and `b` but for upper and lower case of ASCII.
-bool SameHost(std::string_view a, std::string_view b) {
-  return boost::beast::iequals({a.data(), a.size()}, {b.data(), b.size()});
-}
-
-}  // namespace
-
-bool IsHere(std::string_view host, int port) {
-  for (const char* name : {"127.0.0.1", "localhost"}) {
-    if (SameHost(host, fmt::format("{}:{}", name, port))) return true;
-    if (port == 80 && SameHost(host, name)) return true;
-  }
-  return false;
-}
-
-bool IsOriginHere(std::string_view origin, int port) {
-  constexpr std::string_view kScheme = "http://";
-  return origin.starts_with(kScheme) && IsHere(origin.substr(kScheme.size()), port);
-}
-
 std::optional<ViewTarget> ReadTarget(std::string_view target) {
   ViewTarget read;
   const size_t question = target.find('?');

@@ -8,12 +8,6 @@
 
 namespace poise {
 
-/// "127.0.0.1:PORT" or "localhost:PORT": a page of another site that has its name resolve to this
-/// machine sends its own.
-bool IsHere(std::string_view host, int port);
-/// "http://" before one of these.
-bool IsOriginHere(std::string_view origin, int port);
-
 /// A request's target, "/PATH?KEY=VALUE&...". Other keys are passed over.
 struct ViewTarget {
   std::string_view path;

@@ -13,6 +13,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/live/view_access.h"
+#include "tools/run/loopback.h"
 
 namespace poise {
 namespace {
@@ -292,7 +293,8 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   bool Behind() const {
     const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
     return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
-           sent_acts_ != server_->acts_ || ticks >= (sends_text_ ? 1 : static_cast<int64_t>(BatchTicks()));
+           sent_acts_ != server_->acts_ ||
+           ticks >= (sends_text_ ? 1 : static_cast<int64_t>(BatchTicks()));
   }
   size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
 
@@ -319,18 +321,7 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
 
 ViewServer::Impl::Impl(int port, std::string page, const TickRing* ring, ViewControl control)
     : page_(std::move(page)), ring_(ring), control_(std::move(control)) {
-  try {
-    const tcp::endpoint endpoint(asio::ip::address_v4::loopback(), static_cast<uint16_t>(port));
-    acceptor_.open(endpoint.protocol());
-    acceptor_.set_option(tcp::acceptor::reuse_address(true));
-    acceptor_.bind(endpoint);
-    acceptor_.listen();
-    port_ = acceptor_.local_endpoint().port();
-  } catch (const boost::system::system_error& error) {
-    throw ConfigError(
-        fmt::format("--port {}: cannot be had on 127.0.0.1: {}; choose another, or leave it out",
-                    port, error.code().message()));
-  }
+  port_ = ListenHere(port, "--port", "choose another, or leave it out", &acceptor_);
   Accept();
 }
 

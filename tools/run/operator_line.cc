@@ -15,7 +15,6 @@
 #include "components/framework/graph.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
-#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
@@ -35,16 +34,6 @@ constexpr int kMostTries = 8;                         // each twice as far ahead
 // takes to hand it on. An act that is late all the same goes again, farther ahead.
 constexpr double kAhead = 0.03;
 constexpr int64_t kLeastAhead = 5;
-
-/// The channel at a component's input for acts; empty: it has none.
-std::string ActChannel(const Graph& graph, int component) {
-  for (const Connection& input : graph.component(component).input()) {
-    for (const Channel& channel : graph.channel()) {
-      if (channel.name() == input.channel() && channel.type() == kActType) return channel.name();
-    }
-  }
-  return {};
-}
 
 int ChannelOfType(const Graph& graph, std::string_view type) {
   for (int i = 0; i < graph.channel_size(); ++i) {
@@ -137,23 +126,7 @@ OperatorLine::OperatorLine(RunSpec spec) : spec_(std::move(spec)) {
                     graph.name(), kActType, kAnswerType));
   }
   fields_ = LiveFields(spec_);
-  for (int i = 0; i < graph.component_size(); ++i) {
-    const ComponentType* const type = Components().TypeNamed(TypeOf(graph.component(i)));
-    if (type == nullptr || ActChannel(graph, i).empty()) continue;
-    if (!type->traits.engine.empty()) simulator_ = i;
-    const auto plans = [](const PortType& port) {
-      return !port.input && port.type == "support_plan_t";
-    };
-    if (std::ranges::any_of(type->ports, plans)) planner_ = i;
-  }
-  std::string robot, urdf;
-  for (const Resource& resource : spec_.resource()) {
-    if (resource.name() == "robot") robot = resource.text();
-    if (resource.name() == "urdf") urdf = resource.text();
-  }
-  const robot::RobotModel model = robot::LoadRobotTexts(robot, urdf);
-  for (const auto& body : model.bodies()) bodies_.push_back(body.name);
-  for (const auto& foot : model.feet()) feet_.push_back(foot.name);
+  targets_ = FindActTargets(spec_);
   channel_ = graph.channel(acts).name();
   sender_ = std::make_unique<BusSender>(ChannelUrl(spec_, acts));
   answers_ = std::make_unique<BusReceiver>(ChannelUrl(spec_, answers));
@@ -199,21 +172,22 @@ int64_t OperatorLine::Add(act_t act) {
 
 int64_t OperatorLine::Push(const std::string& body, const Eigen::Vector3d& force,
                            const Eigen::Vector3d& point, double duration) {
-  if (simulator_ < 0) {
+  if (targets_.simulator < 0) {
     throw ConfigError("push: nothing is simulated here that could be pushed");
   }
   if (!force.allFinite() || !point.allFinite() || !std::isfinite(duration)) {
     throw ConfigError("push: force, point and duration must be finite numbers");
   }
-  const auto found = body.empty() ? bodies_.begin() : std::ranges::find(bodies_, body);
-  if (found == bodies_.end()) {
-    throw ConfigError(
-        fmt::format("push: no moving body '{}'; use one of {}", body, fmt::join(bodies_, ", ")));
+  const auto found =
+      body.empty() ? targets_.bodies.begin() : std::ranges::find(targets_.bodies, body);
+  if (found == targets_.bodies.end()) {
+    throw ConfigError(fmt::format("push: no moving body '{}'; use one of {}", body,
+                                  fmt::join(targets_.bodies, ", ")));
   }
   act_t act{};
-  act.component = simulator_;
+  act.component = targets_.simulator;
   act.kind = act_t::KIND_PUSH;
-  act.body = static_cast<int32_t>(found - bodies_.begin());
+  act.body = static_cast<int32_t>(found - targets_.bodies.begin());
   for (int i = 0; i < 3; ++i) {
     act.force[i] = force[i];
     act.point[i] = point[i];
@@ -249,8 +223,9 @@ int64_t OperatorLine::Ask(const std::string& path) {
 }
 
 int64_t OperatorLine::Plan(act_t act) {
-  if (planner_ < 0) throw ConfigError("this graph has no planner that takes an operator's acts");
-  act.component = planner_;
+  if (targets_.planner < 0)
+    throw ConfigError("this graph has no planner that takes an operator's acts");
+  act.component = targets_.planner;
   return Add(act);
 }
 
@@ -259,12 +234,12 @@ int64_t OperatorLine::Step(const std::string& foot) {
   act.kind = act_t::KIND_STEP;
   act.foot = -1;
   if (!foot.empty()) {
-    const auto found = std::ranges::find(feet_, foot);
-    if (found == feet_.end()) {
+    const auto found = std::ranges::find(targets_.feet, foot);
+    if (found == targets_.feet.end()) {
       throw ConfigError(
-          fmt::format("step: no foot '{}'; use one of {}", foot, fmt::join(feet_, ", ")));
+          fmt::format("step: no foot '{}'; use one of {}", foot, fmt::join(targets_.feet, ", ")));
     }
-    act.foot = static_cast<int8_t>(found - feet_.begin());
+    act.foot = static_cast<int8_t>(found - targets_.feet.begin());
   }
   return Plan(act);
 }

@@ -13,6 +13,7 @@
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/graph.pb.h"
 #include "operate/message_traits.hpp"
+#include "tools/run/act_targets.h"
 
 namespace poise {
 
@@ -94,9 +95,8 @@ class OperatorLine {
 
   RunSpec spec_;
   std::vector<LiveField> fields_;
-  std::vector<std::string> bodies_, feet_;
+  ActTargets targets_;
   std::string channel_;
-  int simulator_ = -1, planner_ = -1;
   std::unique_ptr<BusSender> sender_;
   std::unique_ptr<BusReceiver> answers_, ticks_;
   std::string tick_channel_;

@@ -1,14 +1,11 @@
 #include "tools/sweep/sweep_run.h"
 
 #include <google/protobuf/text_format.h>
-#include <stdlib.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/runners/inline_runner.h"
@@ -19,6 +16,7 @@
 #include "logging/recording/inline_record.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/temporary_dir.h"
 #include "tools/report/report.h"
 #include "tools/report/run_story.h"
 #include "tools/run/estimates.h"
@@ -39,28 +37,6 @@ struct Prepared {
   RunSpec spec;
 };
 
-/// A folder that goes with what is done in it.
-class TemporaryDir {
- public:
-  TemporaryDir() {
-    std::string name = (fs::temp_directory_path() / "poise-sweep-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw std::system_error(errno, std::generic_category(), name);
-    }
-    path_ = name;
-  }
-  ~TemporaryDir() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryDir(const TemporaryDir&) = delete;
-  TemporaryDir& operator=(const TemporaryDir&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 /// Whether one process cannot hold the run.
 bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
   if (!changes.drives.empty()) return true;
@@ -73,7 +49,7 @@ bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
 logging::RunRecord RecordOfProcesses(const std::string& scenario, const RunChanges& changes,
                                      const std::string& log_dir, std::string* end_detail) {
   std::optional<TemporaryDir> temporary;
-  if (log_dir.empty()) temporary.emplace();
+  if (log_dir.empty()) temporary.emplace("poise-sweep");
   const fs::path folder = temporary ? temporary->path() / "run" : fs::path(log_dir);
   RunOptions options;
   options.changes = changes;

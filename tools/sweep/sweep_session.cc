@@ -244,8 +244,9 @@ bool RunLimits(const std::vector<int64_t>& points, SweepSession* session) {
           progress.total +=
               is_finished ? point.search.tried() : std::max(per_point, point.search.tried() + 1);
         }
-        progress.text = fmt::format("{} of {} points known, {} runs done", finished,
-                                    searches.size(), static_cast<int64_t>(progress.done));
+        progress.text =
+            fmt::format("{} of {} point{} known, {} runs done", finished, searches.size(),
+                        searches.size() == 1 ? "" : "s", static_cast<int64_t>(progress.done));
         return progress;
       });
 }

@@ -228,7 +228,9 @@ std::vector<FieldEntry> SelectFields(const std::vector<FieldEntry>& fields,
   }
   std::vector<std::string> names;
   for (const FieldEntry& field : fields) {
-    names.push_back(is_path ? field.path : LastName(field.path));
+    std::string name = is_path ? field.path : LastName(field.path);
+    for (size_t at; (at = name.find("[i]")) != name.npos;) name.erase(at, 3);
+    names.push_back(std::move(name));
   }
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());

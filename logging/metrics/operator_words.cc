@@ -1,0 +1,54 @@
+#include "logging/metrics/operator_words.h"
+
+#include "fmt/format.h"
+#include "operate/act_t.hpp"
+#include "operate/answer_t.hpp"
+
+namespace poise::logging {
+
+using operate::act_t;
+using operate::answer_t;
+
+std::string ActKindName(int8_t kind) {
+  switch (kind) {
+    case act_t::KIND_PUSH:
+      return "push";
+    case act_t::KIND_SETTING:
+      return "setting";
+    case act_t::KIND_ASK:
+      return "question for a setting";
+    case act_t::KIND_STEP:
+      return "step";
+    case act_t::KIND_WALK:
+      return "walk";
+    case act_t::KIND_STAND:
+      return "stop walking";
+    case act_t::KIND_NEXT_PHASE:
+      return "next phase";
+    default:
+      return fmt::format("act of kind {}", kind);
+  }
+}
+
+std::string RefusalReason(int8_t verdict) {
+  switch (verdict) {
+    case answer_t::VERDICT_LATE:
+      return "its tick was over";
+    case answer_t::VERDICT_FAR:
+      return "its tick is too far ahead";
+    case answer_t::VERDICT_FULL:
+      return "too many acts wait already";
+    case answer_t::VERDICT_UNKNOWN:
+      return "the component does not know it";
+    case answer_t::VERDICT_RANGE:
+      return "a number is out of range";
+    case answer_t::VERDICT_NOT_ABLE:
+      return "this run's configuration does not allow it";
+    case answer_t::VERDICT_NOT_NOW:
+      return "not now; try again later";
+    default:
+      return fmt::format("refused ({})", verdict);
+  }
+}
+
+}  // namespace poise::logging
