@@ -15,6 +15,8 @@ constexpr double kMaxPeriod = 0.02;  // s, counted at most for a tick after a ga
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
 constexpr double kGently = 0.2;      // s of the load's ramps where no fall is to be caught
+constexpr double kGentleGain = 1;    // as `gain`: the joints' friction leaves less of an error
+constexpr double kStill = 1;         // s that the COM rests beside the middle until that is rest
 constexpr double kTogether = 0.03;   // m from side by side that is side by side
 constexpr double kMostShifts = 2.5;  // times its time after which a shift is given up
 
@@ -274,7 +276,9 @@ Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
   const Vector2d point = state.pendulum.capture_point();
   const Vector2d body = ForBody(input, budget);
   const Vector2d lead = velocity / state.pendulum.frequency;
-  return balance::NearestPoint(support, point - lead + spec_.gain * (point - goal) + body) - body;
+  const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
+  const double gain = gently ? std::max(spec_.gain, kGentleGain) : spec_.gain;
+  return balance::NearestPoint(support, point - lead + gain * (point - goal) + body) - body;
 }
 
 Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
@@ -318,10 +322,11 @@ int Recovery::FootToBring(const StepState& state) const {
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
-  const bool rests = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance &&
-                     input.com_velocity.norm() < spec_.rest_speed;
-  if (!rests) moving_since_ = input.time;
-  return input.time >= moving_since_ + spec_.rest_time - kTimeTolerance;
+  const bool slow = input.com_velocity.norm() < spec_.rest_speed;
+  const bool near = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance;
+  if (!slow || !(near || Beyond(state) < -spec_.rest_distance)) moving_since_ = input.time;
+  // The joints' friction holds the COM some cm beside the middle.
+  return input.time >= moving_since_ + (near ? spec_.rest_time : kStill) - kTimeTolerance;
 }
 
 double Recovery::LowerShare(const StepState& state) const {
