@@ -53,7 +53,7 @@ TEST(Step, CatchesAPushOnOneFoot) {
 
 Eigen::Isometry3d PoseOf(const pose_t& pose) {
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
-  frame.translation() = {pose.position[0], pose.position[1], pose.position[2]};
+  frame.translation() = Eigen::Vector3d(pose.position[0], pose.position[1], pose.position[2]);
   const double* q = pose.orientation;
   frame.linear() = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
   return frame;
