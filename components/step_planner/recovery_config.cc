@@ -18,6 +18,9 @@
 namespace poise {
 namespace {
 
+// Share of the way between the hips that two legs take: beside each other they are clear.
+constexpr double kLegShare = 0.6;
+
 /// m/s² that the hips' joints can give a sole with `share` of their effort: of the leg's joints the
 /// two that swing it furthest, each with the inertia of all that it carries about its own axis.
 double SwingAcceleration(const robot::RobotModel& model, double share) {
@@ -118,6 +121,7 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   positive(config.lower(), "lower");
   not_negative(config.joint_reserve(), "joint_reserve");
   not_negative(config.gap(), "gap");
+  not_negative(config.leg_distance(), "leg_distance");
   positive(config.gain(), "gain");
   not_negative(config.lean_rate(), "lean_rate");
   not_negative(config.swing_budget(), "swing_budget");
@@ -127,6 +131,9 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   positive(config.rest_distance(), "rest_distance");
   positive(config.rest_speed(), "rest_speed");
   positive(config.rest_time(), "rest_time");
+  not_negative(config.together_after(), "together_after");
+  positive(config.together_shift(), "together_shift");
+  positive(config.together_swing(), "together_swing");
 }
 
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
@@ -154,6 +161,10 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   limits.beyond = config.overshoot();
   limits.enough = config.enough();
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+  limits.leg_distance = config.has_leg_distance()
+                            ? config.leg_distance()
+                            : std::max(std::max(model.feet()[0].width, model.feet()[1].width),
+                                       kLegShare * stepping::Legs(model).hip_spacing());
 
   stepping::RecoverySpec spec;
   spec.sure = config.sure();
@@ -177,6 +188,9 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   spec.rest_distance = config.rest_distance();
   spec.rest_speed = config.rest_speed();
   spec.rest_time = config.rest_time();
+  spec.together_after = config.together_after();
+  spec.together_shift = config.together_shift();
+  spec.together_swing = config.together_swing();
   return {stepping::StepChoice(model, reach, limits), spec};
 }
 

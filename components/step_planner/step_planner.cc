@@ -22,46 +22,6 @@ namespace poise {
 std::string_view step_planner_proto_schema();  // generated
 namespace {
 
-int8_t TransitionCode(TransitionKind kind) {
-  switch (kind) {
-    case TransitionKind::kUnloading:
-      return support_plan_t::TRANSITION_UNLOADING;
-    case TransitionKind::kLoading:
-      return support_plan_t::TRANSITION_LOADING;
-    case TransitionKind::kNone:
-      break;
-  }
-  return support_plan_t::TRANSITION_NONE;
-}
-
-int8_t OutcomeCode(Outcome outcome) {
-  switch (outcome) {
-    case DONE:
-      return support_plan_t::OUTCOME_DONE;
-    case NO_SURFACE:
-      return support_plan_t::OUTCOME_NO_SURFACE;
-    case CONTACT_LOST:
-      return support_plan_t::OUTCOME_CONTACT_LOST;
-    case TIMEOUT:
-      return support_plan_t::OUTCOME_TIMEOUT;
-  }
-  return support_plan_t::OUTCOME_NONE;
-}
-
-int8_t FootCode(Landing::State state) {
-  switch (state) {
-    case Landing::State::kSearching:
-      return support_plan_t::FOOT_SEARCHING;
-    case Landing::State::kTouching:
-      return support_plan_t::FOOT_TOUCHING;
-    case Landing::State::kRetracted:
-      return support_plan_t::FOOT_RETRACTED;
-    case Landing::State::kSwing:
-      break;
-  }
-  return support_plan_t::FOOT_SWING;
-}
-
 // The paper's distance of the limits from the edges of its sole, m.
 constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 
@@ -205,7 +165,12 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       std::copy_n(act.velocity, 3, operator_walk_.velocity);
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STAND:
-      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_ && !recovers_) return answer_t::VERDICT_NOT_ABLE;
+      if (recovers_ && !walk_.active()) {
+        const bool stands = in_contact_[0] && in_contact_[1] && last_controlled_;
+        if (!walks_ && (!stands || recovery_.active())) return answer_t::VERDICT_NOT_NOW;
+        if (stands && !recovery_.active()) recovery_.BringTogether();
+      }
       operator_walk_ = {.given = true};
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STEP: {
@@ -505,121 +470,6 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
     over[i] = balance::Contains(stance_sole_[i], at);
   }
   return over;
-}
-
-void StepPlanner::ReportFootsteps(double time) {
-  const FootstepInput input{.time = time,
-                            .com_height = whole_body_->data().com.z(),
-                            .sole = Estimate().sole,
-                            .in_contact = in_contact_};
-  footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,
-                          &*footsteps_);
-}
-
-int8_t StepPlanner::WaitingCode() const {
-  switch (schedule_->state().waiting_for) {
-    case WaitingFor::kCom:
-      return support_plan_t::WAITING_COM;
-    case WaitingFor::kContact:
-      for (size_t i = 0; i < 2; ++i) {
-        if (!in_contact_[i] && landing_[i].state() == Landing::State::kRetracted) {
-          return support_plan_t::WAITING_NO_SURFACE;
-        }
-      }
-      return support_plan_t::WAITING_CONTACT;
-    case WaitingFor::kNothing:
-      break;
-  }
-  return support_plan_t::WAITING_NONE;
-}
-
-void StepPlanner::ReportPhase(double time) {
-  support_plan_t& out = *support_plan_;
-  const ScheduleState& schedule = schedule_->state();
-  out.phase = schedule.phase;
-  out.phase_time = time - schedule.phase_start;
-  out.began_by = schedule.first ? support_plan_t::OUTCOME_NONE : OutcomeCode(schedule.began_by);
-  out.waiting_for = WaitingCode();
-  out.gravity_compensation = schedule_->phase().gravity_compensation() ? 1 : 0;
-  out.transition = TransitionCode(schedule.transition);
-  out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
-  out.transition_progress = schedule.progress;
-  if (!Held()) return;
-  out.waiting_for = support_plan_t::WAITING_NONE;
-  const stepping::StepOutput* steps = Steps();
-  const int kind = steps != nullptr ? steps->transition : 0;
-  out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
-                   : kind > 0 ? support_plan_t::TRANSITION_LOADING
-                              : support_plan_t::TRANSITION_NONE;
-  out.transition_foot = static_cast<int8_t>(kind == 0 ? -1 : steps->foot);
-  out.transition_progress = kind == 0 ? 0 : steps->progress;
-}
-
-void StepPlanner::ReportFeet() {
-  support_plan_t& out = *support_plan_;
-  const int next = schedule_->next();
-  const std::array<bool, 2> then = Steps() != nullptr ? std::array{true, true}
-                                   : next == PhaseGraph::kNone || Held()
-                                       ? in_contact_
-                                       : ContactsOf(schedule_->phase(next).support());
-  for (size_t i = 0; i < 2; ++i) {
-    out.in_contact[i] = in_contact_[i] ? 1 : 0;
-    out.next_in_contact[i] = then[i] ? 1 : 0;
-    out.foot_state[i] = in_contact_[i]       ? support_plan_t::FOOT_SUPPORT
-                        : Steps() != nullptr ? (Steps()->searching ? support_plan_t::FOOT_SEARCHING
-                                                                   : support_plan_t::FOOT_SWING)
-                                             : FootCode(landing_[i].state());
-    SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
-  }
-}
-
-void StepPlanner::ReportReferences() {
-  support_plan_t& out = *support_plan_;
-  const robot::RobotData& data = whole_body_->data();
-  const EstimatedPose estimate = Estimate();
-  const bool controlled = !schedule_->phase().gravity_compensation();
-  SetVector3(data.com, out.com_position);
-  SetVector3(data.com_velocity, out.com_velocity);
-  SetMotion(controlled ? references_.com : PointMotion{.position = data.com}, &out.com_reference);
-  SetMotion(controlled ? references_.body : RotationMotion{.rotation = estimate.body_rotation},
-            &out.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    const bool moves = controlled && !in_contact_[i];
-    const Eigen::Isometry3d& sole = estimate.sole[i];
-    SetMotion(moves ? references_.foot[i] : PointMotion{.position = sole.translation()},
-              &out.foot_reference[i]);
-    SetMotion(moves ? references_.foot_rotation[i] : RotationMotion{.rotation = sole.linear()},
-              &out.foot_rotation_reference[i]);
-  }
-}
-
-void StepPlanner::ReportCapture(double time, const Capture& capture) {
-  if (!capture.known) return;
-  support_plan_t& out = *support_plan_;
-  const robot::RobotData& data = whole_body_->data();
-  const Eigen::Isometry3d& frame_o = capture.frame_o;
-  const balance::ConvexPolygon soles = Soles(frame_o, sole_);
-  if (soles.num_corners == 0) return;
-  balance::CapturePoint counts = capture.pendulum;
-  if (angular_momentum_) {
-    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / whole_body_->data().total_mass;
-    balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
-                                 &counts);
-  }
-  const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
-    return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
-  };
-  SetVector3(world(capture.pendulum.position), out.capture_point);
-  out.capture_margin = balance::SignedDistance(soles, counts.position);
-  out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
-  balance::Step step;
-  if (out.step_needed != 0 && out.capture_margin < 0) {
-    step = balance::LatestStep(soles, counts, step_reach_);
-    SetVector3(world(step.position), out.step_position);
-  } else if (out.step_needed == 0) {
-    SetVector3(Eigen::Vector3d::Zero(), out.step_position);
-  }
-  out.step_time = step.time;
 }
 
 ComponentType StepPlannerType() {

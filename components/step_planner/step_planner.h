@@ -26,8 +26,8 @@
 
 namespace poise {
 
-/// ROBOT_STATE -> SUPPORT_PLAN, and FOOTSTEPS where it makes steps. When a state is invalid the plan of the last good tick is sent
-/// again with the status set.
+/// ROBOT_STATE -> SUPPORT_PLAN, and FOOTSTEPS where it makes steps. When a state is invalid the
+/// plan of the last good tick is sent again with the status set.
 class StepPlanner : public Component, public Operated {
  public:
   void Configure(const ComponentContext& context, Wiring* wiring) override;

@@ -14,6 +14,7 @@ int8_t SteppingCode(stepping::Stage stage) {
       return support_plan_t::STEPPING_SWINGING;
     case stepping::Stage::kLoading:
       return support_plan_t::STEPPING_LOADING;
+    case stepping::Stage::kShifting:
     case stepping::Stage::kCatching:
       return support_plan_t::STEPPING_CATCHING;
     case stepping::Stage::kIdle:

@@ -94,6 +94,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"step"}, "does not walk"},
            {{"walk", "--velocity", "0.1,0"}, "does not walk"},
+           {{"step", "--together"}, "does not step"},
            {{"step", "--next-phase"}, "nothing follows this phase"}}) {
     const ProgramResult refused = Poise(arguments);
     EXPECT_EQ(refused.exit_code, 1) << refused.output;
@@ -188,6 +189,21 @@ TEST_F(OperatorTest, WithMessagesLostOnPurposeAnActIsStillTakenOnceAndRepeated) 
   }
   EXPECT_EQ(pushed, 4 * std::lround(0.02 / log.log.spec().tick_period()));
   const ProgramResult replay = RunPoise({"replay", run_, "--component", "sim"});
+  EXPECT_EQ(replay.exit_code, 0) << replay.output;
+}
+
+// Without walking; the feet are side by side already, so that nothing moves.
+TEST_F(OperatorTest, FeetTogetherIsTakenWhereTheRobotStepsWhenPushed) {
+  Start({"--set", "step_planner.recovery.enabled=true"});
+  const ProgramResult together = Poise({"step", "--together"});
+  EXPECT_EQ(together.exit_code, 0) << together.output;
+  EXPECT_THAT(together.output, HasSubstr("feet together: from tick "));
+  const ProgramResult step = Poise({"step"});
+  EXPECT_EQ(step.exit_code, 1) << step.output;
+  const ProgramResult both = Poise({"step", "--together", "--foot", "left"});
+  EXPECT_EQ(both.exit_code, 2) << both.output;
+  Stop();
+  const ProgramResult replay = RunPoise({"replay", run_});
   EXPECT_EQ(replay.exit_code, 0) << replay.output;
 }
 

@@ -1,6 +1,11 @@
 // A robot that steps stands where no centre of pressure within its feet can stop it.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "logging/run_record.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
@@ -44,6 +49,96 @@ TEST(Step, CatchesAPushOnBothFeet) {
 
 TEST(Step, CatchesAPushOnOneFoot) {
   for (const char* world : {"ode", "mujoco"}) ExpectStands("push_single_support", world);
+}
+
+Eigen::Isometry3d PoseOf(const pose_t& pose) {
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.translation() = Eigen::Vector3d(pose.position[0], pose.position[1], pose.position[2]);
+  const double* q = pose.orientation;
+  frame.linear() = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  return frame;
+}
+
+/// m between the true soles, seen from above; negative: one is above the other.
+double BetweenSoles(const ground_truth_t& truth, double length, double width) {
+  std::array<std::array<Eigen::Vector2d, 4>, 2> corner;
+  std::array<Eigen::Vector2d, 4> axis;
+  for (size_t f = 0; f < 2; ++f) {
+    const Eigen::Isometry3d sole = PoseOf(truth.foot_pose[f]);
+    for (size_t k = 0; k < 4; ++k) {
+      const double x = k % 2 == 0 ? 0.5 * length : -0.5 * length;
+      const double y = k / 2 == 0 ? 0.5 * width : -0.5 * width;
+      corner[f][k] = (sole * Eigen::Vector3d(x, y, 0)).head<2>();
+    }
+    for (size_t k = 0; k < 2; ++k) {
+      axis[2 * f + k] = sole.linear().col(static_cast<int>(k)).head<2>().normalized();
+    }
+  }
+  // Convex figures are apart along one of their sides' normals, or not at all.
+  double apart = -1;
+  for (const Eigen::Vector2d& along : axis) {
+    double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
+    for (size_t f = 0; f < 2; ++f) {
+      for (const Eigen::Vector2d& point : corner[f]) {
+        low[f] = std::min(low[f], along.dot(point));
+        high[f] = std::max(high[f], along.dot(point));
+      }
+    }
+    apart = std::max({apart, low[1] - high[0], low[0] - high[1]});
+  }
+  return apart;
+}
+
+double LeastBetweenSoles(const logging::RunRecord& run) {
+  double least = 1;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    least = std::min(least, BetweenSoles(*run.truth.at(tick), 0.30, 0.15));
+  }
+  return least;
+}
+
+// On the right foot, pushed ahead and behind, half as hard again as the pendulum with its centre of
+// pressure at the toes stands: the left foot goes around the right one and comes down in line.
+TEST(Step, GoesAroundTheStandingLegOnOneFoot) {
+  for (const char* world : {"ode", "mujoco"}) {
+    for (const char* ahead : {"1", "-1"}) {
+      const RunFolder folder;
+      const ProgramResult result = RunPoise(
+          {"run", "push_single_support", "--variant", "step", "--world", world, "--inline",
+           "--no-reference", "--set", std::string("sim.push[0].direction_x=") + ahead, "--set",
+           "sim.push[0].direction_y=0", "--set", "sim.push[0].peak=420", "--out", folder / "run"});
+      EXPECT_EQ(result.exit_code, 0) << world << ' ' << ahead << result.output;
+      const logging::RunRecord run = logging::ReadRun(folder / "run/run.lcm");
+      EXPECT_GT(LeastBetweenSoles(run), 0) << world << ' ' << ahead;
+      const Eigen::Isometry3d right = PoseOf(run.truth.at(run.num_ticks - 1)->foot_pose[0]);
+      const Eigen::Vector3d left =
+          right.inverse() * PoseOf(run.truth.at(run.num_ticks - 1)->foot_pose[1]).translation();
+      EXPECT_GT(std::abs(left.x()), 0.3) << world << ' ' << ahead;
+      EXPECT_LT(std::abs(left.y()), 0.15) << world << ' ' << ahead;
+    }
+  }
+}
+
+// A step ahead, rest, and the feet as they stood before: by themselves after 0.5 s.
+TEST(Step, TheFeetComeSideBySideAfterwards) {
+  for (const char* world : {"ode", "mujoco"}) {
+    const RunFolder folder;
+    const ProgramResult result =
+        RunPoise({"run", "push_double_support", "--variant", "step", "--world", world, "--inline",
+                  "--no-reference", "--duration", "9", "--set",
+                  "step_planner.recovery.together_after=0.5", "--out", folder / "run"});
+    EXPECT_EQ(result.exit_code, 0) << world << result.output;
+    const logging::RunRecord run = logging::ReadRun(folder / "run/run.lcm");
+    const int64_t last = run.num_ticks - 1;
+    EXPECT_EQ(run.plan.at(last)->step_reason, support_plan_t::REASON_TOGETHER) << world;
+    EXPECT_EQ(run.plan.at(last)->stepping, support_plan_t::STEPPING_NONE) << world;
+    const Eigen::Isometry3d right = PoseOf(run.truth.at(last)->foot_pose[0]);
+    const Eigen::Vector3d left =
+        right.inverse() * PoseOf(run.truth.at(last)->foot_pose[1]).translation();
+    EXPECT_NEAR(left.x(), 0, 0.05) << world;
+    EXPECT_NEAR(left.y(), 0.21, 0.03) << world;
+    EXPECT_GT(LeastBetweenSoles(run), 0) << world;
+  }
 }
 
 }  // namespace

@@ -168,14 +168,20 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   auto run = std::make_shared<std::string>();
   auto foot = std::make_shared<std::string>();
   auto next = std::make_shared<bool>(false);
+  auto together = std::make_shared<bool>(false);
   CLI::App* step = app->add_subcommand(
       "step", "a step in place of a run that goes on: each foot once, then side by side");
   step->add_option("--foot", *foot, "the one that steps first, e.g. left; default: right");
-  step->add_flag("--next-phase", *next, "end the scenario's phase, whose moves are over, instead");
+  CLI::Option* both = step->add_flag(
+      "--together", *together, "the feet side by side instead, after steps that caught a push");
+  step->add_flag("--next-phase", *next, "end the scenario's phase, whose moves are over, instead")
+      ->excludes("--together");
   step->add_option("--run", *run, kWhichRun);
-  step->callback([run, foot, next, command] {
-    *command = [run, foot, next] {
+  both->excludes("--foot");
+  step->callback([run, foot, next, together, command] {
+    *command = [run, foot, next, together] {
       OperatorLine line(*run);
+      if (*together) return SayOutcome(line, line.Stand(), "feet together");
       return *next ? SayOutcome(line, line.NextPhase(), "next phase")
                    : SayOutcome(line, line.Step(*foot), "step");
     };

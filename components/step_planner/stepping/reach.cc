@@ -177,6 +177,14 @@ Reach::Reach(const robot::RobotModel& model, double height, double lower, double
     leg[1] = LegPolygon(model, height - lower, foot, joint_reserve);
   }
   least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
+  double front = 0, rear = 0;
+  for (const robot::FootModel& foot : model.feet()) {
+    for (const Vector2d& corner : balance::SolePolygon(foot, 0).corners()) {
+      front = std::max(front, corner.x());
+      rear = std::max(rear, -corner.x());
+    }
+  }
+  least_ahead_ = front + rear + gap;
 }
 
 balance::ConvexPolygon Reach::Leg(int foot, double share) const {
@@ -202,9 +210,11 @@ double Reach::LowerShare(const std::array<Vector2d, 2>& offset) const {
   return share;
 }
 
-balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com) const {
+balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com, Place place) const {
   balance::ConvexPolygon reached = leg_[static_cast<size_t>(foot)][1];
   for (Vector2d& corner : reached.mutable_corners()) corner += com;
+  if (place == Place::kAhead) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
+  if (place == Place::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
   const double side = foot == robot::kLeftFoot ? 1 : -1;
   return balance::Clip(reached, {{0, -side}, -least_spacing_});
 }

@@ -14,6 +14,9 @@ balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,
                               const Eigen::Vector2d& centre, double yaw);
 /// Hull of two polygons; of the corners beyond what a polygon holds the last are left out.
 balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::ConvexPolygon& b);
+/// Where a foothold is, seen from the sole that stands.
+enum class Place { kBeside, kAhead, kBehind };
+
 /// The legs' reach for an upright body with level soles. All in axes of the body's heading, x
 /// ahead, y to the left, m.
 class Reach {
@@ -38,15 +41,18 @@ class Reach {
   /// and by how many m, when even the lowest does not do.
   double LowerShare(const std::array<Eigen::Vector2d, 2>& offset) const;
   /// Sole centre of `foot`, the other's at the origin and the COM at `com`, both lowered all the
-  /// way: the leg's reach, and beside the other sole, so that the legs do not cross.
-  balance::ConvexPolygon Footholds(int foot, const Eigen::Vector2d& com) const;
+  /// way: the leg's reach, and beside the other sole, ahead of it or behind it, `gap` between them.
+  /// Beside, the legs do not cross; of the other two that is not said.
+  balance::ConvexPolygon Footholds(int foot, const Eigen::Vector2d& com,
+                                   Place place = Place::kBeside) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
+  double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
   double lower() const { return lower_; }                  ///< m
 
  private:
   // By foot, by height: standing, lowered.
   std::array<std::array<balance::ConvexPolygon, 2>, 2> leg_;
-  double least_spacing_ = 0, lower_ = 0;
+  double least_spacing_ = 0, least_ahead_ = 0, lower_ = 0;
 };
 
 }  // namespace poise::stepping

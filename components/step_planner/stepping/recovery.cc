@@ -14,6 +14,11 @@ using Eigen::Vector3d;
 constexpr double kMaxPeriod = 0.02;  // s, counted at most for a tick after a gap
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
+constexpr double kGently = 0.2;      // s of the load's ramps where no fall is to be caught
+constexpr double kGentleGain = 1;    // as `gain`: the joints' friction leaves less of an error
+constexpr double kStill = 1;         // s that the COM rests beside the middle until that is rest
+constexpr double kTogether = 0.03;   // m from side by side that is side by side
+constexpr double kMostShifts = 2.5;  // times its time after which a shift is given up
 
 }  // namespace
 
@@ -43,6 +48,19 @@ bool Recovery::Update(const StepInput& input) {
   switch (stage_) {
     case Stage::kIdle: {
       const StepReason need = NeedOfFirstStep(input, state, beyond);
+      if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
+        together_asked_ = false;
+        together_at_ = -1;
+        plan_ = plan;
+        if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
+        height_.Begin(input.com_height);
+        steps_now_ = 0;
+        in_contact_ = input.in_contact;
+        shift_from_ = state.pendulum.capture_point();
+        cop_from_ = output_.cop = shift_from_;
+        since_ = time;
+        stage_ = Stage::kShifting;
+      }
       if (need == StepReason::kNone) break;
       const size_t stance = state.in_contact[0] ? 0 : 1;
       standing_height_ = input.com_height - input.sole[stance].translation().z();
@@ -54,8 +72,11 @@ bool Recovery::Update(const StepInput& input) {
       BeginStep(input, choice_.Choose(state), need);
       break;
     }
+    case Stage::kShifting:
+      Shift(input, state, beyond);
+      break;
     case Stage::kUnloading:
-      if (time >= since_ + choice_.limits().unload - kTimeTolerance) LiftOff(input);
+      if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
       break;
     case Stage::kSwinging:
       if (swing_.Progress(time) < kLeastProgress) {
@@ -65,7 +86,7 @@ bool Recovery::Update(const StepInput& input) {
       }
       break;
     case Stage::kLoading:
-      if (time >= since_ + spec_.load - kTimeTolerance) {
+      if (time >= since_ + LoadTime() - kTimeTolerance) {
         stage_ = Stage::kCatching;
         since_ = moving_since_ = time;
       }
@@ -78,6 +99,8 @@ bool Recovery::Update(const StepInput& input) {
         BeginStep(input, choice_.Plan(state, foot), StepReason::kTogether);
       } else if (AtRest(input, state)) {
         stage_ = Stage::kIdle;
+        const bool caught = reason_ != StepReason::kTogether;
+        if (caught && spec_.together_after > 0) together_at_ = time + spec_.together_after;
       }
       break;
   }
@@ -91,7 +114,7 @@ bool Recovery::Update(const StepInput& input) {
   output_.in_contact = in_contact_;
   output_.foot = plan_.foot;
   output_.transition = stage_ == Stage::kUnloading ? -1 : stage_ == Stage::kLoading ? 1 : 0;
-  const double ramp = stage_ == Stage::kUnloading ? choice_.limits().unload : spec_.load;
+  const double ramp = stage_ == Stage::kUnloading ? UnloadTime() : LoadTime();
   output_.progress = output_.transition == 0 ? 0 : std::clamp((time - since_) / ramp, 0.0, 1.0);
   time_ = time;
   return true;
@@ -108,8 +131,61 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
                                                                            : StepReason::kNone;
 }
 
+double Recovery::UnloadTime() const {
+  return reason_ == StepReason::kTogether ? kGently : choice_.limits().unload;
+}
+
+double Recovery::LoadTime() const {
+  return reason_ == StepReason::kTogether ? kGently : spec_.load;
+}
+
+bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan) {
+  if (!together_asked_ && !(together_at_ >= 0 && input.time >= together_at_)) {
+    moving_since_ = input.time;
+    return false;
+  }
+  if (!input.allowed || !input.in_contact[0] || !input.in_contact[1] || !AtRest(input, state)) {
+    return false;
+  }
+  for (int foot = 0; foot < 2; ++foot) {
+    const StepPlan beside = choice_.Beside(state, foot, kGently + spec_.together_swing);
+    const double way = (beside.foothold - state.sole[static_cast<size_t>(foot)]).norm();
+    if (way < kTogether) {
+      together_asked_ = false;
+      together_at_ = -1;
+      return false;
+    }
+    // Straight rather than around the other leg.
+    if (std::isfinite(beside.margin) && (plan->foot < 0 || !beside.around)) *plan = beside;
+  }
+  return plan->foot >= 0;
+}
+
+void Recovery::Shift(const StepInput& input, const StepState& state, double beyond) {
+  const int stance = 1 - plan_.foot;
+  const auto s = static_cast<size_t>(stance);
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
+  const double over = input.time - since_;
+  if (beyond > 0) {
+    // Pushed meanwhile.
+    stage_ = Stage::kCatching;
+    since_ = moving_since_ = input.time;
+    cop_from_ = output_.cop;
+  } else if (over >= spec_.together_shift - kTimeTolerance &&
+             balance::Contains(sole, state.pendulum.com) &&
+             balance::Contains(sole, state.pendulum.capture_point())) {
+    BeginStep(input, choice_.Beside(state, plan_.foot, kGently + spec_.together_swing),
+              StepReason::kTogether);
+  } else if (over > kMostShifts * spec_.together_shift) {
+    stage_ = Stage::kCatching;
+    since_ = moving_since_ = input.time;
+    cop_from_ = output_.cop;
+  }
+}
+
 void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
-  if (plan.foot < 0) return;
+  if (plan.foot < 0 || !std::isfinite(plan.margin)) return;
   plan_ = plan;
   reason_ = reason;
   ++num_steps_;
@@ -125,6 +201,7 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
                  Eigen::AngleAxisd(plan.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
                  touch_down_, spec_.swing);
     stage_ = Stage::kSwinging;
+    if (plan.around) swing_.GoAround(plan.corner);
     touch_.Reset();
   }
 }
@@ -138,6 +215,7 @@ void Recovery::LiftOff(const StepInput& input) {
                {plan_.foothold.x(), plan_.foothold.y(), ground},
                Eigen::AngleAxisd(plan_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
                touch_down_, spec_.swing);
+  if (plan_.around) swing_.GoAround(plan_.corner);
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -155,8 +233,23 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
   output_.searching = false;
   if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
   const double left = touch_down_ - input.time;
+  // A push takes over a foot that is under way to the other's side.
+  if (reason_ == StepReason::kTogether) {
+    if (!(Beyond(state) > spec_.beyond)) {
+      if (stage_ == Stage::kSwinging) {
+        FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
+      }
+      return;
+    }
+    reason_ = StepReason::kAgain;
+  }
   if (left > spec_.swing.freeze) {
-    plan_ = choice_.At(state, plan_.foot, left);
+    const bool around = stage_ == Stage::kSwinging && swing_.around();
+    const StepPlan next = choice_.At(state, plan_.foot, left, plan_.place);
+    // A foothold that the way under way does not lead to is none.
+    if (std::isfinite(next.margin) && (stage_ == Stage::kUnloading || around || !next.around)) {
+      plan_ = next;
+    }
     if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
   }
   if (stage_ == Stage::kSwinging) {
@@ -177,9 +270,26 @@ Vector2d Recovery::ForBody(const StepInput& input, double budget) const {
   return length > budget ? Vector2d(budget / length * offset) : offset;
 }
 
+Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
+                            const balance::ConvexPolygon& support, const Vector2d& goal,
+                            const Vector2d& velocity, double budget) const {
+  const Vector2d point = state.pendulum.capture_point();
+  const Vector2d body = ForBody(input, budget);
+  const Vector2d lead = velocity / state.pendulum.frequency;
+  const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
+  const double gain = gently ? std::max(spec_.gain, kGentleGain) : spec_.gain;
+  return balance::NearestPoint(support, point - lead + gain * (point - goal) + body) - body;
+}
+
 Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
   const int stance = 1 - plan_.foot;
   const auto s = static_cast<size_t>(stance);
+  if (reason_ == StepReason::kTogether) {
+    return PointFor(
+        input, state,
+        SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]),
+        state.sole[s], Vector2d::Zero(), spec_.swing_budget);
+  }
   const Vector2d body = ForBody(input, spec_.swing_budget);
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
@@ -187,11 +297,15 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
 }
 
 Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
-  const Vector2d point = state.pendulum.capture_point();
-  const Vector2d body = ForBody(input, spec_.catch_budget);
-  return balance::NearestPoint(Soles(state, choice_.limits().edge),
-                               point + spec_.gain * (point - Goal(state)) + body) -
-         body;
+  Vector2d goal = Goal(state), velocity = Vector2d::Zero();
+  if (stage_ == Stage::kShifting) {
+    const Vector2d way = state.sole[static_cast<size_t>(1 - plan_.foot)] - shift_from_;
+    const double s = std::clamp((input.time - since_) / spec_.together_shift, 0.0, 1.0);
+    goal = shift_from_ + balance::SmoothStep(s) * way;
+    velocity = 30 * s * s * (1 - s) * (1 - s) / spec_.together_shift * way;
+  }
+  return PointFor(input, state, Soles(state, choice_.limits().edge), goal, velocity,
+                  spec_.catch_budget);
 }
 
 int Recovery::FootToBring(const StepState& state) const {
@@ -208,10 +322,11 @@ int Recovery::FootToBring(const StepState& state) const {
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
-  const bool rests = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance &&
-                     input.com_velocity.norm() < spec_.rest_speed;
-  if (!rests) moving_since_ = input.time;
-  return input.time >= moving_since_ + spec_.rest_time - kTimeTolerance;
+  const bool slow = input.com_velocity.norm() < spec_.rest_speed;
+  const bool near = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance;
+  if (!slow || !(near || Beyond(state) < -spec_.rest_distance)) moving_since_ = input.time;
+  // The joints' friction holds the COM some cm beside the middle.
+  return input.time >= moving_since_ + (near ? spec_.rest_time : kStill) - kTimeTolerance;
 }
 
 double Recovery::LowerShare(const StepState& state) const {
@@ -230,9 +345,10 @@ double Recovery::LowerShare(const StepState& state) const {
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kMaxPeriod);
   // The height, critically damped.
-  const size_t stance = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging
-                            ? static_cast<size_t>(1 - plan_.foot)
-                            : static_cast<size_t>(plan_.foot);
+  const size_t stance =
+      stage_ == Stage::kShifting || stage_ == Stage::kUnloading || stage_ == Stage::kSwinging
+          ? static_cast<size_t>(1 - plan_.foot)
+          : static_cast<size_t>(plan_.foot);
   const double ground = input.sole[stance].translation().z();
   const double wanted = ground + standing_height_ - LowerShare(state) * choice_.reach().lower();
   height_.Follow(wanted, period);
@@ -243,12 +359,13 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
     case Stage::kUnloading:
     case Stage::kSwinging:
       cop = BrakingPoint(input, state);
-      if (stage_ == Stage::kUnloading) share = (input.time - since_) / choice_.limits().unload;
+      if (stage_ == Stage::kUnloading) share = (input.time - since_) / UnloadTime();
       break;
+    case Stage::kShifting:
     case Stage::kLoading:
     case Stage::kCatching:
       cop = CatchingPoint(input, state);
-      if (stage_ == Stage::kLoading) share = (input.time - since_) / spec_.load;
+      if (stage_ == Stage::kLoading) share = (input.time - since_) / LoadTime();
       break;
     case Stage::kIdle:
       break;
@@ -262,12 +379,12 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
   archive->Show(plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop, plan_.capture_point,
-                plan_.com, plan_.margin);
+                plan_.com, plan_.margin, plan_.place, plan_.around, plan_.corner);
   swing_.Archive(archive);
   touch_.Archive(archive);
   height_.Archive(archive);
   archive->Show(time_, since_, touch_down_, beyond_since_, moving_since_, cop_from_,
-                standing_height_);
+                standing_height_, together_asked_, together_at_, shift_from_);
   output_.Archive(archive);
 }
 

@@ -33,9 +33,12 @@ struct RecoverySpec {
   double far = 1;           ///< share of `lower` from which the feet are too far apart to rest
   double height_rate = 0;   ///< 1/s, with which the COM's height follows what the legs ask for
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+  double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
+  double together_shift = 1;  ///< s in which the COM goes above the foot that stays for it
+  double together_swing = 1;  ///< s of the other in the air
 };
 
-enum class Stage { kIdle, kUnloading, kSwinging, kLoading, kCatching };
+enum class Stage { kIdle, kShifting, kUnloading, kSwinging, kLoading, kCatching };
 /// Why a step was made.
 enum class StepReason {
   kNone,
@@ -59,6 +62,8 @@ class Recovery {
 
   /// Once a tick. False: idle, `output` is not to be used.
   bool Update(const StepInput& input);
+  /// The feet side by side, once the robot rests on both; no effect where they are.
+  void BringTogether() { together_asked_ = true; }
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != Stage::kIdle; }
   Stage stage() const { return stage_; }
@@ -91,6 +96,16 @@ class Recovery {
   /// COM cannot rest there with the feet so far apart; −1: none.
   int FootToBring(const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
+  /// It is time for the feet to be put side by side, and `plan` does it.
+  bool TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan);
+  /// The COM on its way above the foot that stays; then the other one leaves the ground.
+  void Shift(const StepInput& input, const StepState& state, double beyond);
+  /// The centre of pressure on `support` that leads the capture point along `goal`, m, m/s.
+  Eigen::Vector2d PointFor(const StepInput& input, const StepState& state,
+                           const balance::ConvexPolygon& support, const Eigen::Vector2d& goal,
+                           const Eigen::Vector2d& velocity, double budget) const;
+  double UnloadTime() const;
+  double LoadTime() const;
   void LeadCom(const StepInput& input, const StepState& state);
   double LowerShare(const StepState& state) const;
 
@@ -108,8 +123,11 @@ class Recovery {
   double beyond_since_ = -1;                            // s; negative: inside
   double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
-  double standing_height_ = 0;                          // m, above the soles, before the first step
-  HeightLead height_;                                   // m, world, of the COM's reference
+  bool together_asked_ = false;
+  double together_at_ = -1;                               // s; negative: when asked
+  Eigen::Vector2d shift_from_ = Eigen::Vector2d::Zero();  // m, the capture point before it shifts
+  double standing_height_ = 0;  // m, above the soles, before the first step
+  HeightLead height_;           // m, world, of the COM's reference
   StepOutput output_;
 };
 

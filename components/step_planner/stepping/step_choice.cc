@@ -3,6 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
 namespace {
@@ -14,10 +17,28 @@ constexpr double kQuinticAcceleration = 5.7735026918962577;
 // The step's time and the foothold, each of which follows from the other, after so many rounds.
 constexpr int kRounds = 4;
 constexpr double kTimeTolerance = 2e-3;  // s: a tick
+constexpr double kLater = 0.06;          // s, after which a place out of reach is tried again
 // m of margin for which a step may take a second longer.
 constexpr double kMarginOfTime = 0.05;
 // m by which a step that does not catch the capture point must still come nearer than standing.
 constexpr double kLeastGain = 0.02;
+// m by which a way may cut the corner that it keeps off: what standing feet are off by.
+constexpr double kCut = 0.005;
+constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
+
+/// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
+/// the swing leg does not get around it.
+bool IsFree(const Vector2d& from, const Vector2d& to, const Vector2d& half) {
+  // The part of the segment with y < half.y, then where that is in x.
+  double begin = 0, end = 1;
+  const double down = from.y() - to.y(), over = from.y() - half.y();
+  if (from.y() >= half.y() && to.y() >= half.y()) return true;
+  if (from.y() >= half.y()) begin = over / down;
+  if (to.y() >= half.y()) end = over / down;
+  const double one = from.x() + begin * (to.x() - from.x());
+  const double other = from.x() + end * (to.x() - from.x());
+  return std::min(one, other) >= half.x() || std::max(one, other) <= -half.x();
+}
 
 }  // namespace
 
@@ -31,7 +52,53 @@ Vector2d StepChoice::BrakingPoint(const StepState& state, int stance) const {
                                state.pendulum.capture_point());
 }
 
-StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
+double StepChoice::DistanceOfLegs(int foot, const Vector2d& foothold, const Vector2d& com) const {
+  const double height = legs_.height() - reach_.lower();
+  const auto from_com = [&](const Vector2d& sole) -> Eigen::Vector3d {
+    return {sole.x() - com.x(), sole.y() - com.y(), -height};
+  };
+  return LegDistance(legs_.At(foot, from_com(foothold)),
+                     legs_.At(1 - foot, from_com(Vector2d::Zero())));
+}
+
+bool StepChoice::ClearOfLeg(int foot, const Vector2d& com, Vector2d* foothold) const {
+  const auto clear = [&](const Vector2d& at) {
+    return DistanceOfLegs(foot, at, com) >= limits_.leg_distance;
+  };
+  if (clear(*foothold)) return true;
+  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  Vector2d in = {foothold->x(), side * reach_.least_spacing()}, out = *foothold;
+  if (!clear(in)) return false;
+  for (int i = 0; i < kHalvings; ++i) {
+    const Vector2d middle = 0.5 * (in + out);
+    (clear(middle) ? in : out) = middle;
+  }
+  *foothold = in;
+  return true;
+}
+
+bool StepChoice::WayAround(double side, const Vector2d& from, const Vector2d& to,
+                           StepPlan* plan) const {
+  // As if the swing foot were the left one.
+  const Vector2d start(from.x(), side * from.y()), goal(to.x(), side * to.y());
+  const Vector2d corner(reach_.least_ahead(), reach_.least_spacing());
+  Vector2d half = corner - Vector2d::Constant(kCut);
+  // A foot that stands nearer than that goes from where it is.
+  if (std::abs(start.x()) < half.x()) half.y() = std::min(half.y(), start.y());
+  plan->around = false;
+  if (IsFree(start, goal, half)) return true;
+  const double ahead = std::abs(start.x()) > std::abs(goal.x()) ? start.x() : goal.x();
+  for (const double sign : {ahead < 0 ? -1.0 : 1.0, ahead < 0 ? 1.0 : -1.0}) {
+    const Vector2d by(sign * corner.x(), corner.y());
+    if (!IsFree(start, by, half) || !IsFree(by, goal, half)) continue;
+    plan->around = true;
+    plan->corner = {by.x(), side * by.y()};
+    return true;
+  }
+  return false;
+}
+
+StepPlan StepChoice::At(const StepState& state, int foot, double time, Place place) const {
   const int stance = 1 - foot;
   const auto s = static_cast<size_t>(stance);
   const double w = state.pendulum.frequency;
@@ -54,15 +121,34 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
   Vector2d wanted = caught;
   if (distance > 0) wanted += limits_.beyond / distance * away;
   const double side = foot == robot::kLeftFoot ? 1 : -1;
-  // Side by side as when standing, and nearer where the capture point is on the stance foot's side.
-  const double narrow = std::max(side * caught.y() + 0.5 * limits_.spacing, reach_.least_spacing());
-  wanted.y() = side * std::max(side * wanted.y(), std::min(limits_.spacing, narrow));
-  const balance::ConvexPolygon footholds = reach_.Footholds(foot, local(plan.com));
+  plan.place = place;
+  if (place == Place::kBeside) {
+    // Side by side as when standing, and nearer where the capture point is on the stance foot's
+    // side.
+    const double narrow =
+        std::max(side * caught.y() + 0.5 * limits_.spacing, reach_.least_spacing());
+    wanted.y() = side * std::max(side * wanted.y(), std::min(limits_.spacing, narrow));
+  } else {
+    // As far on its own side as holds the capture point well.
+    const double room =
+        std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width - limits_.edge - limits_.enough);
+    wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
+  }
+  const Vector2d com = local(plan.com);
+  const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, place);
   Vector2d foothold = wanted;
+  bool possible = true;
   if (footholds.num_corners > 0) {
     foothold = balance::NearestPoint(footholds, wanted);
   } else {
     foothold = {0, side * limits_.spacing};
+    possible = place == Place::kBeside;
+  }
+  if (place != Place::kBeside) possible = possible && ClearOfLeg(foot, com, &foothold);
+  if (limits_.leg_distance > 0) {
+    possible =
+        WayAround(side, local(state.sole[static_cast<size_t>(foot)]), foothold, &plan) && possible;
+    plan.corner = state.sole[s] + turn * plan.corner;
   }
   plan.foothold = state.sole[s] + turn * foothold;
   const balance::ConvexPolygon soles =
@@ -72,21 +158,45 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time) const {
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   const double follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-local(plan.com)));
   plan.margin = std::min(plan.margin, plan.margin + follows);
+  if (!possible) plan.margin = -std::numeric_limits<double>::infinity();
   return plan;
 }
 
-StepPlan StepChoice::Plan(const StepState& state, int foot) const {
+StepPlan StepChoice::Plan(const StepState& state, int foot, Place place) const {
   const double unload = state.in_contact[static_cast<size_t>(foot)] ? limits_.unload : 0;
   double time = unload + limits_.least_swing;
   StepPlan plan;
   for (int i = 0; i < kRounds; ++i) {
-    plan = At(state, foot, time);
-    const double distance = (plan.foothold - state.sole[static_cast<size_t>(foot)]).norm();
-    const double needed =
-        unload + std::max(limits_.least_swing, SwingTime(distance, limits_.acceleration));
+    plan = At(state, foot, time, place);
+    const Vector2d& from = state.sole[static_cast<size_t>(foot)];
+    const double swing =
+        plan.around
+            ? std::sqrt(CornerAcceleration(from, plan.corner, plan.foothold) / limits_.acceleration)
+            : SwingTime((plan.foothold - from).norm(), limits_.acceleration);
+    double needed = unload + std::max(limits_.least_swing, swing);
+    // Later the COM is nearer to where the foot has to go.
+    if (!std::isfinite(plan.margin)) needed = time + kLater;
     if (needed <= time + kTimeTolerance) break;
     time = needed;
   }
+  return plan;
+}
+
+StepPlan StepChoice::Beside(const StepState& state, int foot, double time) const {
+  const auto s = static_cast<size_t>(1 - foot);
+  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  StepPlan plan;
+  plan.foot = foot;
+  plan.time = time;
+  plan.yaw = state.sole_yaw[s];
+  plan.cop = plan.capture_point = plan.com = state.sole[s];
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(plan.yaw).toRotationMatrix();
+  const Vector2d foothold(0, side * limits_.spacing);
+  plan.foothold = state.sole[s] + turn * foothold;
+  const Vector2d from = turn.transpose() * (state.sole[static_cast<size_t>(foot)] - state.sole[s]);
+  const bool possible = WayAround(side, from, foothold, &plan);
+  plan.corner = state.sole[s] + turn * plan.corner;
+  plan.margin = possible ? limits_.enough : -std::numeric_limits<double>::infinity();
   return plan;
 }
 
@@ -109,13 +219,20 @@ StepPlan StepChoice::Choose(const StepState& state) const {
   for (int foot = 0; foot < 2; ++foot) {
     // The stance foot must be there to stand on.
     if (!state.in_contact[static_cast<size_t>(1 - foot)]) continue;
-    const StepPlan plan = Plan(state, foot);
-    if (!std::isfinite(plan.margin) || !Helps(state, plan)) continue;
-    const double score = std::min(plan.margin, limits_.enough) - kMarginOfTime * plan.time;
-    if (best.foot < 0 || score > best_score) {
+    const auto consider = [&](const StepPlan& plan) {
+      if (!std::isfinite(plan.margin) || !Helps(state, plan)) return;
+      const double score = std::min(plan.margin, limits_.enough) - kMarginOfTime * plan.time;
+      if (best.foot >= 0 && score <= best_score) return;
       best = plan;
       best_score = score;
-    }
+    };
+    const StepPlan beside = Plan(state, foot);
+    consider(beside);
+    if (!(limits_.leg_distance > 0) || beside.margin >= limits_.enough) continue;
+    const Vector2d away =
+        state.pendulum.capture_point() - state.sole[static_cast<size_t>(1 - foot)];
+    const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
+    consider(Plan(state, foot, ahead < 0 ? Place::kBehind : Place::kAhead));
   }
   return best;
 }

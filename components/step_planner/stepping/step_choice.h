@@ -6,6 +6,7 @@
 
 #include "components/balance/convex_polygon.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/legs.h"
 #include "components/step_planner/stepping/pendulum.h"
 #include "components/step_planner/stepping/reach.h"
 
@@ -19,6 +20,9 @@ struct StepLimits {
   double beyond = 0;        ///< m beyond the capture point that a sole's centre comes down
   double enough = 0;        ///< m, of the capture point inside the new support, that is enough
   double spacing = 0;       ///< m, sideways between the soles' centres, when nothing asks for more
+  /// m between the legs' lines at a foothold ahead of the stance sole or behind it; 0: there is
+  /// none
+  double leg_distance = 0;
 };
 
 /// The robot as a step sees it: in any horizontal axes, heading of the body along `yaw`.
@@ -40,8 +44,11 @@ struct StepPlan {
   Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
   Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
   /// m, of the capture point at touch-down inside the soles less `edge`; negative: outside, another
-  /// step must follow.
+  /// step must follow; −∞: no foot can get there.
   double margin = 0;
+  Place place = Place::kBeside;
+  bool around = false;  ///< the way goes around the stance leg, by `corner`, m
+  Eigen::Vector2d corner = Eigen::Vector2d::Zero();
 };
 
 /// Least time of a quintic over `distance`, m, whose acceleration stays below `acceleration`, m/s².
@@ -51,18 +58,25 @@ double SwingTime(double distance, double acceleration);
 class StepChoice {
  public:
   StepChoice() = default;
+  /// With a `leg_distance` a robot that cannot stand throws RobotError.
   StepChoice(const robot::RobotModel& model, const Reach& reach, const StepLimits& limits)
-      : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {}
+      : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {
+    if (limits.leg_distance > 0) legs_ = Legs(model);
+  }
 
   /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
   /// sooner; none when standing still does as well. A foot that is not in contact swings at once,
   /// from where it is.
   StepPlan Choose(const StepState& state) const;
-  /// The step of `foot`, whose least time is iterated from the swing that it takes.
-  StepPlan Plan(const StepState& state, int foot) const;
+  /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
+  /// stance leg where it must.
+  StepPlan Plan(const StepState& state, int foot, Place place = Place::kBeside) const;
   /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
   /// stance sole's point nearest to the capture point.
-  StepPlan At(const StepState& state, int foot, double time) const;
+  StepPlan At(const StepState& state, int foot, double time, Place place = Place::kBeside) const;
+  /// The step of `foot` that puts it beside the other one, as when standing, with the COM above
+  /// that.
+  StepPlan Beside(const StepState& state, int foot, double time) const;
   /// The step catches the capture point, or comes nearer to it than the soles where they are.
   bool Helps(const StepState& state, const StepPlan& plan) const;
   /// The stance sole's point nearest to the capture point, less `edge`.
@@ -72,8 +86,21 @@ class StepChoice {
   const robot::FootModel& foot(int index) const { return feet_[static_cast<size_t>(index)]; }
 
  private:
+  /// m between the legs' lines, `foot` at `foothold`, the other at the origin, the COM at `com`, in
+  /// axes of the heading.
+  double DistanceOfLegs(int foot, const Eigen::Vector2d& foothold,
+                        const Eigen::Vector2d& com) const;
+  /// Draws `foothold` to its own side until the legs' lines are `leg_distance` apart; false: they
+  /// are not there either.
+  bool ClearOfLeg(int foot, const Eigen::Vector2d& com, Eigen::Vector2d* foothold) const;
+  /// By which corner of the stance sole, `gap` off, a foot goes from `from` to the plan's foothold;
+  /// in axes of the heading from the stance sole. False: there is no way.
+  bool WayAround(double side, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                 StepPlan* plan) const;
+
   std::array<robot::FootModel, 2> feet_;
   Reach reach_;
+  Legs legs_;
   StepLimits limits_;
 };
 

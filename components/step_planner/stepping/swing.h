@@ -35,6 +35,17 @@ struct SwingSpec {
   double wait = 0;         ///< share in which it only rises, from rest; below `across`
 };
 
+/// How a way from `from` around a corner to `to` passes it: m, any axes.
+struct Passing {
+  double share = 0.5;                                  ///< of the time, at the corner
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m, there, times the whole time
+};
+Passing PassCorner(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
+                   const Eigen::Vector2d& to);
+/// m: the greatest acceleration of that way, from rest to rest, times the square of its time.
+double CornerAcceleration(const Eigen::Vector2d& from, const Eigen::Vector2d& corner,
+                          const Eigen::Vector2d& to);
+
 /// Sole centre and turn of a foot from lift-off to the ground. The way is continuous in position,
 /// velocity and acceleration whatever the foothold does: each new one begins from the motion so
 /// far. After `end` it goes on downward with touch_speed, for the ground is not where it was
@@ -46,10 +57,13 @@ class Swing {
   void Begin(const PointMotion& from, const Eigen::Matrix3d& rotation,
              const Eigen::Vector3d& foothold, const Eigen::Matrix3d& level, double time, double end,
              const SwingSpec& spec);
+  /// Right after Begin: by way of `corner`, m, world, in x and y, where `across` is 1.
+  void GoAround(const Eigen::Vector2d& corner);
   /// Another foothold, in x and y, and time; no effect within `freeze` of the end.
   void Move(const Eigen::Vector2d& foothold, double time, double end);
   PointMotion At(double time) const;
   RotationMotion RotationAt(double time) const;
+  bool around() const { return around_; }
   double start() const { return start_; }
   double end() const { return end_; }
   /// Share of the time that has passed, 0 to 1.
@@ -59,8 +73,16 @@ class Swing {
   void Archive(StateArchive* archive);
 
  private:
+  void MoveEnd(double time, double end);
+  /// Both pieces, the first from a motion at `time`.
+  void Turn(const Quintic::Point& x, const Quintic::Point& y, double time);
+
   SwingSpec spec_;
   Quintic x_, y_, rise_, fall_;
+  bool around_ = false;
+  Quintic after_x_, after_y_;                                                          // the corner
+  Eigen::Vector2d from_ = Eigen::Vector2d::Zero(), corner_ = Eigen::Vector2d::Zero();  // m
+  double corner_time_ = 0;                                                             // s
   Eigen::Vector3d foothold_ = Eigen::Vector3d::Zero();
   /// s until it is above the foothold.
   double Across(double time) const;

@@ -30,6 +30,7 @@ StepLimits Limits(const robot::RobotModel& model, const Reach& reach) {
   limits.beyond = 0.04;
   limits.enough = 0.04;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+  limits.leg_distance = 0.12;
   return limits;
 }
 
@@ -50,6 +51,9 @@ RecoverySpec Spec() {
   spec.rest_distance = 0.03;
   spec.rest_speed = 0.06;
   spec.rest_time = 0.3;
+  spec.far = 2;  // never while it catches
+  spec.together_shift = 1.5;
+  spec.together_swing = 0.7;
   return spec;
 }
 
@@ -140,6 +144,9 @@ class World {
   }
 
   double Frequency() const { return std::sqrt(robot::kGravity / com_.z()); }
+  const std::array<Eigen::Isometry3d, 2>& soles() const { return sole_; }
+  /// m, least so far while a foot swings, between rectangles of the soles in line with the axes.
+  double nearest() const { return nearest_; }
   double mass() const { return model_.total_mass(); }
   double height() const { return height_; }
   Recovery& recovery() { return recovery_; }
@@ -168,6 +175,9 @@ class World {
     EXPECT_GE(output.progress, 0);
     EXPECT_LE(output.progress, 1);
     if (now == Stage::kSwinging) {
+      const Vector3d apart = (sole_[1].translation() - sole_[0].translation()).cwiseAbs();
+      const robot::FootModel& foot = model_.feet()[0];
+      nearest_ = std::min(nearest_, std::max(apart.x() - foot.length, apart.y() - foot.width));
       // On the stance sole.
       const auto stance = static_cast<size_t>(1 - output.foot);
       EXPECT_TRUE(output.in_contact[stance]);
@@ -196,7 +206,7 @@ class World {
   std::array<Eigen::Isometry3d, 2> sole_;
   std::array<bool, 2> in_contact_{true, true};
   Vector2d last_cop_ = Vector2d::Zero();
-  double largest_jump_ = 0, touched_ = -1, decided_ = -1;
+  double nearest_ = 1, largest_jump_ = 0, touched_ = -1, decided_ = -1;
 };
 
 Vector2d Direction(double degrees) {
@@ -279,6 +289,66 @@ TEST_P(RecoveryCase, TheFootInTheAirStepsAtOnce) {
   EXPECT_GE(world.recovery().num_steps(), 1);
   EXPECT_EQ(world.recovery().output().in_contact, (std::array{true, true}));
   EXPECT_TRUE(world.Rests());
+}
+
+// Ahead and behind: more than standing by a step around the standing leg, no more than the closed
+// form allows, and no sole upon the other.
+TEST_P(RecoveryCase, TheFootInTheAirGoesAroundTheOther) {
+  const World still(GetParam());
+  const double scale = still.mass() * still.Frequency();
+  const robot::FootModel& foot = still.model().feet()[0];
+  struct Way {
+    Vector2d direction;
+    double rest, gain;
+  };
+  for (const Way& way :
+       {Way{{1, 0}, 0.5 * foot.length, 1.4}, Way{{-1, 0}, 0.5 * foot.length, 1.4}}) {
+    double largest = 0, time = 0;
+    for (double impulse = 0.8 * way.rest * scale; impulse < scale; impulse += 0.01 * scale) {
+      World world(GetParam());
+      world.LiftLeft(0.05);
+      world.Push(impulse * way.direction);
+      const bool stands = world.Run(6);
+      EXPECT_GT(world.nearest(), 0.01) << way.direction.transpose() << ' ' << impulse;
+      if (!stands || world.recovery().num_steps() > 1) break;
+      EXPECT_TRUE(world.Rests()) << impulse;
+      if (world.recovery().num_steps() == 1) time = world.touched();
+      largest = impulse;
+    }
+    ASSERT_GT(time, 0) << way.direction.transpose();
+    EXPECT_GT(largest, way.gain * scale * way.rest) << way.direction.transpose();
+    EXPECT_LT(largest,
+              LargestImpulse(still.mass(), still.Frequency(), way.rest, still.height(), time, 1));
+  }
+}
+
+// After a step ahead, and after one in line with the standing foot.
+TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
+  for (const bool one_foot : {false, true}) {
+    World world(GetParam());
+    if (one_foot) world.LiftLeft(0.05);
+    const double rest =
+        one_foot ? 0.5 * world.model().feet()[0].length : EdgeDistance(world, {1, 0}, 0);
+    world.Push({1.1 * world.mass() * world.Frequency() * rest, 0});
+    ASSERT_TRUE(world.Run(5));
+    ASSERT_TRUE(world.Rests());
+    const int steps = world.recovery().num_steps();
+    ASSERT_GE(steps, 1);
+    EXPECT_GT((world.soles()[1].translation() - world.soles()[0].translation()).cwiseAbs().x(),
+              0.05);
+    world.recovery().BringTogether();
+    ASSERT_TRUE(world.Run(8));
+    EXPECT_TRUE(world.Rests());
+    EXPECT_EQ(world.recovery().num_steps(), steps + 1);
+    const Vector3d apart = world.soles()[1].translation() - world.soles()[0].translation();
+    EXPECT_NEAR(apart.x(), 0, 0.005);
+    EXPECT_NEAR(apart.y(), robot::StandingSpacing(world.model()), 0.005);
+    EXPECT_GT(world.nearest(), 0.01);
+    // Where they are, nothing is to be done.
+    world.recovery().BringTogether();
+    world.Run(3);
+    EXPECT_EQ(world.recovery().num_steps(), steps + 1);
+  }
 }
 
 // The ground is 3 cm higher or 4 cm lower than the stance sole: the load says where it is.
