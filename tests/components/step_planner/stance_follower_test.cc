@@ -8,7 +8,7 @@
 namespace poise {
 namespace {
 
-constexpr double kPeriod = 0.002, kDistance = 0.005;
+constexpr double kFollowTick = 0.002, kDistance = 0.005;
 
 class StanceFollowerTest : public testing::Test {
  protected:
@@ -16,11 +16,11 @@ class StanceFollowerTest : public testing::Test {
   Eigen::Vector3d Stand(const Eigen::Vector3d& middle, double seconds, bool carried = true,
                         bool resting = true, bool planned = true) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const double end = time_ + seconds; time_ < end; time_ += kPeriod) {
+    for (const double end = time_ + seconds; time_ < end; time_ += kFollowTick) {
       const bool rests = resting && time_ >= moved_until_;
       const Eigen::Vector3d half(0, 0.1, 0);
-      const Eigen::Vector3d way = follower_.Update(
-          time_, {{middle - half, middle + half}, com_, planned, carried, rests});
+      const Eigen::Vector3d way =
+          follower_.Update(time_, {{middle - half, middle + half}, com_, planned, carried, rests});
       if (!way.isZero(0)) moved_until_ = time_ + 0.5;  // that the reference's move takes
       com_ += way;
       sum += way;
@@ -60,11 +60,11 @@ TEST_F(StanceFollowerTest, OnceItFollowsNextToNothingIsLeft) {
   Eigen::Vector3d sum = Stand({1.2 * kDistance, 0, 0}, 0.2);
   EXPECT_NEAR(sum.x(), 1.2 * kDistance, 1e-15);
   // They slip on; the end is reached to a fifth of the distance.
-  for (int i = 0; i < 100; ++i) sum += Stand({(1.2 + 0.01 * i) * kDistance, 0, 0}, 0.02);
-  sum += Stand({2.19 * kDistance, 0, 0}, 1);
-  EXPECT_NEAR(sum.x(), 2.19 * kDistance, 0.2 * kDistance);
+  for (int i = 0; i < 100; ++i) sum += Stand({(1.2 + 0.03 * i) * kDistance, 0, 0}, 0.02);
+  sum += Stand({4.17 * kDistance, 0, 0}, 1);
+  EXPECT_NEAR(sum.x(), 4.17 * kDistance, 0.2 * kDistance);
   // At rest it waits for the whole distance again.
-  EXPECT_EQ(Stand({2.9 * kDistance, 0, 0}, 1).norm(), 0);
+  EXPECT_EQ(Stand({4.92 * kDistance, 0, 0}, 1).norm(), 0);
 }
 
 TEST_F(StanceFollowerTest, BeginsAnewWhereThePlanPutsTheFeet) {
