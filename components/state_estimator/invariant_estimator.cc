@@ -38,6 +38,9 @@ constexpr double kStartSpeed = 0.01;  // m/s
 constexpr double kRinging = 0.03;
 // A foot that has not come to rest for this long with no other to stand on is the world.
 constexpr double kLongestSlip = 0.5;  // s
+// So are two soles that carry the robot and do not go past each other faster than this: what moves
+// both alike is the base's estimate, as a blow leaves it that the accelerometer has not seen.
+constexpr double kTogether = 0.02;  // m/s
 // Beyond these nothing is known of the base: in flight, or on a hoist, for minutes.
 constexpr double kLostTilt = 0.5, kLostSpeed = 10;  // rad, m/s, standard deviations
 constexpr double kRecoverTilt = 0.1, kRecoverSpeed = 1, kRecoverPosition = 1;
@@ -344,7 +347,16 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
 void InvariantEstimator::LetSlip(size_t foot) {
   feet_[foot].slip_left = config_.rest_time;
   feet_[foot].slip_time = 0;
+  BeginRest(foot);
+}
+
+void InvariantEstimator::BeginRest(size_t foot) {
   feet_[foot].slip_start = filter_.SeenPosition(feet_[foot].reading);
+  feet_[foot].apart_start = Apart(foot);
+}
+
+Eigen::Vector3d InvariantEstimator::Apart(size_t foot) const {
+  return filter_.SeenPosition(feet_[1 - foot].reading) - filter_.SeenPosition(feet_[foot].reading);
 }
 
 void InvariantEstimator::LetTurn(size_t foot) {
@@ -407,12 +419,14 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
       const double way = (filter_.SeenPosition(feet_[f].reading) - foot.slip_start).norm();
       const double speed =
           std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
-      if (!other_stands && foot.slip_time > kLongestSlip) {
+      const bool together = feet_[1 - f].loaded &&
+                            (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time;
+      if (!other_stands && (together || foot.slip_time > kLongestSlip)) {
         // Then it is the world, and the base's velocity is what is wrong.
         filter_.Doubt(0, Square(way / config_.rest_time), 0);
       } else if (way > config_.rest_distance + 3 * speed * config_.rest_time) {
         foot.slip_left = config_.rest_time;
-        foot.slip_start = filter_.SeenPosition(feet_[f].reading);
+        BeginRest(f);
       }
     }
   }
@@ -528,7 +542,7 @@ void InvariantEstimator::Archive(StateArchive* archive) {
                 imu_good_, last_imu_good_, placed_);
   for (Foot& foot : feet_) {
     archive->Show(foot.loaded, foot.excess, foot.slip_left, foot.slip_time, foot.turn_left,
-                  foot.slip_start, foot.turn_start);
+                  foot.slip_start, foot.apart_start, foot.turn_start);
   }
 }
 

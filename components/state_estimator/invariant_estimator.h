@@ -72,7 +72,8 @@ class InvariantEstimator {
     bool loaded = false;
     double slip_left = 0, turn_left = 0;  // s, until it may stand still again; 0: it does
     double slip_time = 0;                 // s, since it began to slip
-    Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();  // where the present rest_time began
+    Eigen::Vector3d slip_start = Eigen::Vector3d::Zero();   // where the present rest_time began
+    Eigen::Vector3d apart_start = Eigen::Vector3d::Zero();  // m, to the other sole then
     Eigen::Matrix3d turn_start = Eigen::Matrix3d::Identity();
     double innovation = 0;
     // Mean of the squared innovation over what is expected: above 1 the readings are worse than
@@ -96,6 +97,9 @@ class InvariantEstimator {
   void LetSlip(size_t foot);
   void LetTurn(size_t foot);
   void ComeToRest(size_t foot, bool other_stands, double dt);
+  void BeginRest(size_t foot);
+  /// From this foot's sole to the other one's, m, world.
+  Eigen::Vector3d Apart(size_t foot) const;
   void Publish();
 
   std::shared_ptr<const robot::RobotModel> model_;

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "components/balance/support_polygon.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/robot/sole.h"
 #include "components/step_planner/hip_strategy.h"
 #include "components/step_planner/phase_graph.h"
 #include "components/step_planner/recovery_config.h"
@@ -226,7 +229,35 @@ void CheckStep(const StepWarning& step) {
   check(step.reach(), "reach");
 }
 
+// The paper's distance of the limits from the edges of its sole, m.
+constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
+
+double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
+  if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
+  if (!(value > 0 && value <= 0.5 * sole)) {
+    throw ConfigError(field, fmt::format("is {}; must be above 0 and at most the sole's {} m",
+                                         value, 0.5 * sole));
+  }
+  return value;
+}
+
 }  // namespace
+
+balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const StepPlannerConfig& config) {
+  const Eigen::Vector2d half(
+      ReadStanceHalf(config.has_stance_half_length(), config.stance_half_length(), foot.length,
+                     kLengthReserve, "stance_half_length"),
+      ReadStanceHalf(config.has_stance_half_width(), config.stance_half_width(), foot.width,
+                     kWidthReserve, "stance_half_width"));
+  if (foot.rectangular()) return balance::Rectangle(half);
+  balance::ConvexPolygon sole =
+      balance::SolePolygon(foot, std::min(kWidthReserve, 0.5 * robot::InnerRadius(foot)));
+  for (const double sign : {1.0, -1.0}) {
+    if (config.has_stance_half_length()) sole = balance::Clip(sole, {{sign, 0}, half.x()});
+    if (config.has_stance_half_width()) sole = balance::Clip(sole, {{0, sign}, half.y()});
+  }
+  return sole;
+}
 
 void CheckStepPlannerConfig(const StepPlannerConfig& config) {
   CheckPositive(config.com_lag(), "com_lag", "m");

@@ -1,6 +1,8 @@
 // What a step planner's configuration must be like.
 #pragma once
 
+#include "components/balance/convex_polygon.h"
+#include "components/robot/robot_model.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
@@ -8,5 +10,9 @@ namespace poise {
 /// Throws ConfigError naming the field ("phase[2].duration", "contact.touch_load") of a plan that
 /// cannot work.
 void CheckStepPlannerConfig(const StepPlannerConfig& config);
+
+/// m, sole frame: where on a foot the robot balances before the other one leaves the ground. Throws
+/// ConfigError: stance_half_length or _width is not of this sole.
+balance::ConvexPolygon StanceSole(const robot::FootModel& foot, const StepPlannerConfig& config);
 
 }  // namespace poise

@@ -114,6 +114,14 @@ class ReferenceGenerator {
   /// under way are dropped. After another planner has led them.
   void Anchor(const EstimatedPose& estimate, const PointMotion& com,
               const Eigen::Vector3d& com_target, double time, double duration);
+  /// The COM's reference goes on from where it rests by `way`, m, world, in `duration` s.
+  void ShiftCom(const Eigen::Vector3d& way, double time, double duration) {
+    com_.Schedule(com_.target() + way, time, duration);
+  }
+  /// m, world: where the COM's last move ends.
+  const Eigen::Vector3d& com_target() const { return com_.target(); }
+  /// Whether the COM's reference has come to rest, and no move of it is to come.
+  bool ComRests(double time) const { return time >= com_.end(); }
   /// The body rests at `rotation` from here on; its turns under way and to come are dropped.
   void HoldBody(const Eigen::Matrix3d& rotation) { body_turn_.Hold(rotation); }
   const ReferencePoint& foot(size_t index) const { return foot_[index]; }

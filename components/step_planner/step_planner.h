@@ -17,6 +17,7 @@
 #include "components/step_planner/landing.h"
 #include "components/step_planner/phase_schedule.h"
 #include "components/step_planner/reference_generator.h"
+#include "components/step_planner/stance_follower.h"
 #include "components/step_planner/step_detector.h"
 #include "components/step_planner/stepping/recovery.h"
 #include "components/step_planner/walk_config.h"
@@ -71,6 +72,8 @@ class StepPlanner : public Component, public Operated {
   /// Contacts, references and landings of a phase's first tick.
   void BeginPhase(double time);
   Capture ComputeCapture() const;
+  /// Moves the COM's reference with soles that have gone elsewhere.
+  void FollowSoles(double time);
   /// The plan's references where the free foot follows them, else its landing's.
   void UpdateReferences(double time, const Capture& capture);
   /// Turns the body's reference by the hip strategy's tilt.
@@ -101,6 +104,7 @@ class StepPlanner : public Component, public Operated {
   std::shared_ptr<balance::WholeBody> whole_body_;
   std::optional<PhaseSchedule> schedule_;
   std::optional<ReferenceGenerator> generator_;
+  StanceFollower stance_follower_{0};
   std::optional<HipStrategy> hip_strategy_;
   double joint_reserve_ = 0, brake_time_ = 0;  // rad, s, of the hip strategy
   std::vector<Landing> landing_;               // by foot

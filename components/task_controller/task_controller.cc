@@ -22,6 +22,12 @@ constexpr double kLeastGain = 0.25, kMostGain = 4;
 // s in which a gain is gone through: a standing error is answered by no more than this slowly.
 constexpr double kGainRamp = 0.5;
 
+// A sole that turns with a joint by more than this share of its speed is what moves: on a sole that
+// stands the body would.
+constexpr double kSoleShare = 0.5;
+// rad/s: slower, it may be the gears that yield.
+constexpr double kSoleRate = 0.3;
+
 /// Joints that are not between the base and a foot.
 int NumOthers(const robot::RobotModel& model) {
   return static_cast<int>(model.num_joints() -
@@ -65,6 +71,12 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   }
   if (config.joint_limits()) {
     limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    leg_[f].assign(static_cast<size_t>(num_joints), 0);
+    for (const int joint : model_->supporting_joints(model_->feet()[f].body)) {
+      leg_[f][static_cast<size_t>(joint)] = 1;
+    }
   }
 
   whole_body_ = context.shared->Get<balance::WholeBody>(
@@ -202,7 +214,7 @@ bool TaskController::FindLimits() {
     const auto end = forced_.begin() + static_cast<std::ptrdiff_t>(num_forced_);
     if (std::any_of(forced_.begin(), end, is_joint)) continue;
     const double position = state_.joint_position[j], velocity = state_.joint_velocity[j];
-    if (!limits_->Near(j, position, velocity)) continue;
+    if (!limits_->Near(j, position, velocity) || SoleTurns(j)) continue;
     if (!have_acceleration) {
       whole_body_->contact().Acceleration(torque_, acceleration_);
       have_acceleration = true;
@@ -217,6 +229,18 @@ bool TaskController::FindLimits() {
     found = true;
   }
   return found;
+}
+
+bool TaskController::SoleTurns(int joint) const {
+  const auto j = static_cast<size_t>(joint);
+  const robot::RobotData& data = whole_body_->data();
+  const double speed = state_.joint_velocity[joint];
+  for (size_t f = 0; f < 2; ++f) {
+    if (!in_contact_[f] || leg_[f][j] == 0) continue;
+    const double turn = data.foot_velocity[f].tail<3>().dot(data.joint_axis[j]);
+    if (std::abs(turn) > kSoleRate && turn * speed > kSoleShare * speed * speed) return true;
+  }
+  return false;
 }
 
 bool TaskController::ComputeTorque(const balance::TaskState& state,

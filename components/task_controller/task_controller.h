@@ -42,6 +42,8 @@ class TaskController : public Component, public Operated {
   /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that
   /// does not; added to `forced_`. False when there is none.
   bool FindLimits();
+  /// Whether what moves the joint is a sole that turns on what it is held to stand on.
+  bool SoleTurns(int joint) const;
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
@@ -62,7 +64,8 @@ class TaskController : public Component, public Operated {
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;
-  Eigen::VectorXd acceleration_;  // n×1
+  std::array<std::vector<char>, 2> leg_;  // by foot: the joint lies between it and the base
+  Eigen::VectorXd acceleration_;          // n×1
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;
 };

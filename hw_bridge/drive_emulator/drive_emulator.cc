@@ -296,6 +296,7 @@ void DriveEmulator::Sense(const Tick& tick) {
   if (drive_feedback_.present()) {
     for (size_t i = 0; i < shafts_.size(); ++i) {
       shafts_[i]->SetCounts(drive_feedback_->position_counts[joint_[i]], period_seconds_);
+      shafts_[i]->SetMeasuredCurrent(drive_feedback_->current[joint_[i]]);
     }
     drive_feedback_t& message = *sensor_feedback_;
     message.position_counts = drive_feedback_->position_counts;

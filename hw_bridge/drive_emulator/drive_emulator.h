@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "components/framework/component.h"
@@ -45,18 +46,24 @@ class DriveEmulator final : public Component, private Device {
         : motor_(motor), sign_(reversed ? -1 : 1), zero_(zero_counts) {}
     /// Counts at the motor shaft, zero at the joint's zero, `seconds` after the last.
     void SetCounts(int64_t counts, double seconds);
+    /// A, as the robot's sensors show it, positive as the joint is.
+    void SetMeasuredCurrent(double current) {
+      measured_ = sign_ * motor_.torque_constant * current;
+    }
     /// A, that gives the drive's torque, positive as the joint is.
     double current() const { return sign_ * torque_ / motor_.torque_constant; }
 
     void SetTorque(double torque) override { torque_ = torque; }
     double position() const override { return position_; }
     double velocity() const override { return velocity_; }
+    double MeasuredTorque(double given) const override { return measured_.value_or(given); }
 
    private:
     robot::MotorModel motor_;
     int sign_;
     int64_t zero_;
     double torque_ = 0, position_ = 0, velocity_ = 0;
+    std::optional<double> measured_;  // N·m; none before the robot is there
     bool known_ = false;
   };
   struct Trouble {

@@ -495,6 +495,32 @@ TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
   EXPECT_LT(worst_after, 1e-3);
 }
 
+// A blow that the accelerometer sees wrongly: neither sole fits, but they do not move against each
+// other. In rest_time it is found that they stand; what was wrong by then is the base's place.
+TEST(InvariantEstimator, SolesThatMoveAlikeStand) {
+  constexpr double kBlow = 50, kSeconds = 2 * kTick;  // m/s² too much, for so long
+  BaseMotion motion(DyrosPath());
+  const InvariantEstimatorConfig config;
+  InvariantEstimator estimator(motion.model(), config, kTick);
+  bool both_slipped = false;
+  for (int i = 0; i < 1000; ++i) {
+    motion.Next();
+    BaseSensors sensors = motion.sensors();
+    if (i >= 500 && i < 502) sensors.acceleration.x() += kBlow;
+    estimator.Update(sensors, kTick);
+    both_slipped = both_slipped || (estimator.contact(0) == FootContact::kSlipping &&
+                                    estimator.contact(1) == FootContact::kSlipping);
+    if (i < 502 + 1.2 * config.rest_time / kTick) continue;
+    EXPECT_EQ(estimator.contact(0), FootContact::kFirm) << i;
+    EXPECT_EQ(estimator.contact(1), FootContact::kFirm) << i;
+    ASSERT_LT(estimator.state().base_linear_velocity.norm(), 0.01) << i;
+  }
+  EXPECT_TRUE(both_slipped);
+  const double way =
+      (estimator.state().base_position - motion.truth().base_position).head<2>().norm();
+  EXPECT_LT(way, kBlow * kSeconds * 1.2 * config.rest_time);
+}
+
 // On a hoist for a minute, then put down: it begins again and finds its velocity.
 TEST(InvariantEstimator, ComesBackAfterAMinuteInTheAir) {
   BaseMotion motion(DyrosPath());

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <limits>
 
 #include "components/messages/conversions.h"
@@ -326,6 +327,44 @@ TEST(TaskController, JointsThatAreNoLegsFollowTheirPosture) {
       }
     }
   }
+}
+
+// A joint that rushes at its limit is stopped where the soles stand, since then the body moves with
+// it; where a sole turns with the joint, stopping it by the body would throw the robot over.
+TEST(TaskController, ASoleThatTurnsIsNotStoppedByTheBody) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const int ankle = model.FindJoint("right_ankle_roll");
+  ASSERT_GE(ankle, 0);
+  const robot::RobotState standing = StandingState(model);
+  const robot::RobotData data = robot::Evaluate(model, standing);
+  const support_plan_t plan = HoldAt(model, data, {true, true});
+  const auto torque = [&](const robot::RobotState& state, const char* limits) {
+    ControlContext context(TestRobot::kDyros);
+    Harness<TaskController> harness(&context, TaskControllerText() + limits);
+    harness.Bind("support_plan", &plan);
+    const robot_state_t message = StateMessage(model, state);
+    harness.Bind("robot_state", &message);
+    harness.Run(TickAt(0));
+    EXPECT_EQ(harness.output<task_torque_t>().status, task_torque_t::STATUS_OK);
+    return ToEigen(harness.output<task_torque_t>().torque);
+  };
+  constexpr double kSpeed = 8;  // rad/s, beyond what can be stopped before the limit
+  robot::RobotState state = standing;
+  state.joint_velocity[ankle] = kSpeed;
+  EXPECT_EQ((torque(state, "") - torque(state, "joint_limits: false")).norm(), 0);
+
+  // The same speed of a motion in which both soles stand still: what is left of the joint alone.
+  const int n = model.num_velocities();
+  Eigen::MatrixXd feet(12, n);
+  feet << data.foot_jacobian[0], data.foot_jacobian[1];
+  const Eigen::MatrixXd fixed = Eigen::MatrixXd::Identity(n, n) -
+                                feet.completeOrthogonalDecomposition().pseudoInverse() * feet;
+  const Eigen::VectorXd motion = fixed.col(6 + ankle) * kSpeed / fixed(6 + ankle, 6 + ankle);
+  ASSERT_LT((feet * motion).norm(), 1e-9);
+  state.base_linear_velocity = motion.head<3>();
+  state.base_angular_velocity = motion.segment<3>(3);
+  state.joint_velocity = motion.tail(n - 6);
+  EXPECT_GT((torque(state, "") - torque(state, "joint_limits: false")).norm(), 1);
 }
 
 // A quaternion off by less than the message's tolerance gives the torque of its direction; one

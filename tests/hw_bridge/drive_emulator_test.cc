@@ -114,6 +114,7 @@ class Pair {
 
   void Tick() {
     feedback.tick = command.tick = tick_;
+    if (follows) feedback.current = drives().current;
     command.utime = 2000 * tick_;
     emulator.Bind("drive_feedback", &feedback);
     {
@@ -139,6 +140,7 @@ class Pair {
   Configured<DriveEmulator> emulator;
   drive_feedback_t feedback;
   joint_command_t command;
+  bool follows = true;  // the motors' currents, the drives of the tick before
 
  private:
   void Serve() {
@@ -198,6 +200,33 @@ TEST(DriveEmulator, GivesInEachTickTheTorqueOfItsFrames) {
   }();
   EXPECT_EQ(problem, "");
   EXPECT_EQ(pair.emulator.component.chain().slave(0).al_state(), ethercat::AlState::kInit);
+}
+
+// A drive shows the current that the robot's sensors show, as late and as small as they do: what a
+// simulation says of delay and lag holds behind the drives as well.
+TEST(DriveEmulator, ShowsTheCurrentThatTheSensorsShow) {
+  std::string wiring;
+  for (size_t j = 0; j < kJoints; ++j) {
+    wiring += fmt::format("wiring {{ joint: \"{}\"{} }} ", Model().joints()[j].name,
+                          j == 4 ? " reversed: true" : "");
+  }
+  Pair pair("enable_at_start: true torque_error: 1000", "", wiring);
+  pair.follows = false;
+  pair.bridge.component.Open();
+  for (int tick = 0; tick < 50; ++tick) {
+    for (size_t j = 0; j < kJoints; ++j) {
+      pair.command.torque[j] = 10 * std::sin(0.3 * tick + static_cast<double>(j));
+      pair.feedback.current[j] = 0.02 * tick - 0.1 * static_cast<double>(j);
+    }
+    pair.Tick();
+    ASSERT_EQ(pair.status().state, bridge_status_t::STATE_RUNNING) << tick;
+    for (size_t j = 0; j < kJoints; ++j) {
+      // 5 N·m/A; rounded to a per mille of 15 A.
+      ASSERT_NEAR(pair.sensors().joint_torque[j], 5 * pair.feedback.current[j], 0.0376) << j;
+    }
+  }
+  pair.emulator.component.Idle();
+  EXPECT_EQ(pair.bridge.component.Close(), "");
 }
 
 struct TroubleCase {

@@ -137,13 +137,22 @@ TEST(PushBound, AMovingRobotHasItsCapturePointInstead) {
   EXPECT_NEAR(moving->lip_impulse, rest->lip_impulse - rest->mass * 0.1, 1e-9);
 }
 
+// Of two pushes alike the one towards the nearer edge counts, and none that the run does not have.
+TEST(PushBound, OfSeveralTheNearestToItsBoundCounts) {
+  const logging::RunRecord run = Standing(0, 0.05);
+  Scenario two = PushScenario("direction_y: -1");
+  const double away = FindPushBound(two, run)->distance;
+  *two.mutable_sim()->add_push() = PushScenario("direction_y: 1").sim().push(0);
+  EXPECT_NEAR(FindPushBound(two, run)->distance, away - 0.1, 1e-9);
+  EXPECT_NEAR(FindPushBound(two, run)->impulse, 100 * kDuration * 2 / pi, 1e-12);
+  two.mutable_sim()->mutable_push(1)->set_start(1);  // the run has 0.012 s
+  EXPECT_NEAR(FindPushBound(two, run)->distance, away, 1e-9);
+}
+
 TEST(PushBound, ThereIsNoneForOtherPushes) {
   const logging::RunRecord run = Standing(0, 0);
   EXPECT_FALSE(FindPushBound(Scenario(), run));
   EXPECT_FALSE(FindPushBound(PushScenario("direction_z: 1"), run));
-  Scenario two = PushScenario("direction_y: 1");
-  *two.mutable_sim()->add_push() = two.sim().push(0);
-  EXPECT_FALSE(FindPushBound(two, run));
   Scenario hand = PushScenario("direction_y: 1");
   hand.mutable_sim()->add_hand();
   EXPECT_FALSE(FindPushBound(hand, run));

@@ -59,16 +59,17 @@ double PendulumShare(Push::Profile profile, double duration, double frequency) {
   return pi * pi * (1 + std::exp(-wt)) / (2 * (wt * wt + pi * pi));
 }
 
-std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run) {
-  const SimConfig& sim = scenario.sim();
-  if (sim.push_size() != 1 || sim.hand_size() > 0) return {};
-  const Push& push = sim.push(0);
+namespace {
+
+std::optional<PushBound> BoundOf(const Push& push, const SimConfig& sim,
+                                 const logging::RunRecord& run) {
   Vector2d along(push.direction_x(), push.direction_y());
   if (!(along.norm() > 1e-12)) return {};
   const double sign = push.has_scaled_impulse() ? push.scaled_impulse() : push.peak();
   along *= (sign < 0 ? -1 : 1) / along.norm();
   const auto tick = static_cast<int64_t>(std::floor(push.start() / run.spec.tick_period())) +
                     run.spec.lead_ticks();
+  if (sim.push_size() > 1 && tick >= run.num_ticks) return {};
   const ground_truth_t* truth = run.truth.at(std::min(tick, run.num_ticks - 1));
   if (truth == nullptr) return {};
   std::vector<Vector2d> corners;
@@ -102,6 +103,21 @@ std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::
   bound.lip_impulse_of_duration =
       bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);
   return bound;
+}
+
+}  // namespace
+
+std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run) {
+  const SimConfig& sim = scenario.sim();
+  if (sim.hand_size() > 0) return {};
+  std::optional<PushBound> nearest;
+  for (const Push& push : sim.push()) {
+    const std::optional<PushBound> bound = BoundOf(push, sim, run);
+    if (!bound) continue;
+    const auto share = [](const PushBound& of) { return of.impulse / of.lip_impulse_of_duration; };
+    if (!nearest || share(*bound) > share(*nearest)) nearest = bound;
+  }
+  return nearest;
 }
 
 }  // namespace poise

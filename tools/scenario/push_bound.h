@@ -24,8 +24,10 @@ struct PushBound {
   double lip_impulse_of_duration = 0;
 };
 
-/// Empty without feet that bear at the push's start, or when the scenario has hands, no push,
-/// several, or a vertical one: then there is no such bound.
+/// Of several pushes the one that is nearest to its bound, or farthest beyond it: each has the
+/// robot as it stands when it begins, those to come after the run's end do not count. Empty without
+/// feet that bear at a push's start, with a capture point beyond them, or when the scenario has
+/// hands, no push or but vertical ones: then there is no such bound.
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run);
 
 /// N·s, horizontal impulse of a push; `impulse_scale`: ImpulseScale (N·s), of which scaled_impulse

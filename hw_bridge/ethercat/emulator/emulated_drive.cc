@@ -11,6 +11,7 @@ namespace poise::ethercat {
 namespace {
 
 constexpr double kNanosecondsPerMs = 1e6;
+constexpr double kMostShown = 32767;  // per mille, of an INTEGER16
 constexpr uint8_t kRw = ObjectDictionary::kWritable;
 constexpr uint8_t kRx = ObjectDictionary::kWritable | ObjectDictionary::kRxMappable;
 constexpr uint8_t kTx = ObjectDictionary::kTxMappable;
@@ -246,7 +247,10 @@ void EmulatedDrive::Report() {
                        static_cast<int8_t>(mode_display_->value) == kModeCyclicTorque;
   if (follows) status |= kStatusFollows;
   statusword_->value = status;
-  torque_object_->value = static_cast<uint16_t>(std::lround(torque_));
+  const double rated = config_.rated_torque() * 1e-6;  // N·m of one per mille
+  const double shown = load_->MeasuredTorque(torque_ * rated) / rated;
+  torque_object_->value = static_cast<uint16_t>(
+      static_cast<int16_t>(std::lround(std::clamp(shown, -kMostShown, kMostShown))));
   if (frozen_) return;
   if (!std::isfinite(load_->position()) || !std::isfinite(load_->velocity())) {
     TriggerFault(kErrorFeedback);

@@ -19,6 +19,8 @@ class MotorLoad {
   virtual void SetTorque(double torque) = 0;
   virtual double position() const = 0;  ///< rad, of the motor shaft
   virtual double velocity() const = 0;  ///< rad/s
+  /// N·m at the motor shaft that the drive's current sensor shows, while it gives `given`.
+  virtual double MeasuredTorque(double given) const { return given; }
 };
 
 /// Error codes of 603F that the emulation gives (CiA 402, annex).

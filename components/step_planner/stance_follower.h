@@ -1,0 +1,48 @@
+// The COM's reference goes along with the soles that the robot stands on.
+//
+// A push that lifts or drags a foot leaves it elsewhere, and while soles slip the estimate of where
+// the world is may slip with them. A reference that stays where it was in the world then holds the
+// COM off the middle of the soles, nearer to an edge than the robot stood before.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "components/framework/state_archive.h"
+
+namespace poise {
+
+class StanceFollower {
+ public:
+  /// `distance`: m, not negative; 0: nothing is followed.
+  explicit StanceFollower(double distance) : distance_(distance) {}
+
+  /// What the robot stands on in a tick.
+  struct Stance {
+    /// m, world, right first.
+    std::array<Eigen::Vector3d, 2> sole = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    Eigen::Vector3d com = Eigen::Vector3d::Zero();  ///< m, world, where its reference rests
+    bool planned = false;  ///< both feet are contacts of the plan, which nothing else leads
+    bool carried = false;  ///< both feet carry the robot
+    bool resting = false;  ///< no move of the COM's reference is under way or to come
+  };
+  /// Once a tick, `time` in s, not decreasing. How far the COM's reference is to be moved from
+  /// where it rests, m, world, horizontally; zero: not at all. It goes with the point of the line
+  /// between the soles beside which it rests: from the middle with both alike, from above one with
+  /// that one. From `distance` on that this point has gone, until next to none of it is left.
+  Eigen::Vector3d Update(double time, const Stance& stance);
+  void Archive(StateArchive* archive) {
+    archive->Show(known_, following_, carried_, since_, sole_[0], sole_[1]);
+  }
+
+ private:
+  double distance_;         // m
+  bool known_ = false;      // sole_ is
+  bool following_ = false;  // the distance has been gone beyond
+  bool carried_ = false;    // in the last tick
+  double since_ = 0;        // s, from when on
+  // m, that the reference belongs to.
+  std::array<Eigen::Vector3d, 2> sole_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+};
+
+}  // namespace poise
