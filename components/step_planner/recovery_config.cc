@@ -137,7 +137,7 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
 }
 
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model) {
+                                const robot::RobotModel& model, double watch) {
   for (const robot::FootModel& foot : model.feet()) {
     if (config.edge() < robot::InnerRadius(foot)) continue;
     throw ConfigError("recovery.edge",
@@ -188,6 +188,7 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   spec.rest_distance = config.rest_distance();
   spec.rest_speed = config.rest_speed();
   spec.rest_time = config.rest_time();
+  spec.watch = watch;
   spec.together_after = config.together_after();
   spec.together_shift = config.together_shift();
   spec.together_swing = config.together_swing();

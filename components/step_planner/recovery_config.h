@@ -10,9 +10,10 @@ namespace poise {
 /// Throws ConfigError "recovery.sure" ...: not finite, or beyond what can work.
 void CheckRecoveryConfig(const RecoveryConfig& config);
 
-/// Reach, limits and thresholds for this robot, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or its soles are smaller than the edge.
+/// `watch`: RecoverySpec::watch. Reach, limits and thresholds for this robot, whose COM stands at
+/// its standing height. Throws ConfigError when its legs reach nothing or its soles are smaller
+/// than the edge.
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model);
+                                const robot::RobotModel& model, double watch);
 
 }  // namespace poise

@@ -53,7 +53,11 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   step_reach_ = step.reach();
   angular_momentum_ = step.angular_momentum();
   recovers_ = config.recovery().enabled();
-  if (recovers_) recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_);
+  if (recovers_) {
+    const HipStrategyConfig& hip = config.hip_strategy();
+    recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_,
+                             hip.enabled() ? hip.start() : -1);
+  }
   walks_ = config.walk().enabled();
   if (walks_) walk_ = MakeWalk(config.walk(), config.contact(), *model_);
   walk_commands_ = WalkCommands(config.walk());
@@ -402,6 +406,8 @@ void StepPlanner::TiltBody(double time, const Capture& capture) {
       input.margin = balance::SignedDistance(region, point);
     }
   }
+  // The turning body takes of the centre of pressure that a step needs.
+  if (recovers_ && recovery_.would_step()) input.excess.setZero();
   // About one axis the rotation vector's derivatives are the angular velocity and acceleration; of
   // a turn that goes over into another, or comes upon the plan's own, only nearly.
   const PointMotion tilt = hip_strategy_->Update(input);

@@ -61,6 +61,8 @@ bool Recovery::Update(const StepInput& input) {
         since_ = time;
         stage_ = Stage::kShifting;
       }
+      step_helps_ = !(spec_.watch >= 0 && stage_ == Stage::kIdle && beyond > -spec_.watch &&
+                      choice_.Choose(state).foot < 0);
       if (need == StepReason::kNone) break;
       const size_t stance = state.in_contact[0] ? 0 : 1;
       standing_height_ = input.com_height - input.sole[stance].translation().z();
@@ -384,7 +386,7 @@ void Recovery::Archive(StateArchive* archive) {
   touch_.Archive(archive);
   height_.Archive(archive);
   archive->Show(time_, since_, touch_down_, beyond_since_, moving_since_, cop_from_,
-                standing_height_, together_asked_, together_at_, shift_from_);
+                standing_height_, together_asked_, together_at_, shift_from_, step_helps_);
   output_.Archive(archive);
 }
 

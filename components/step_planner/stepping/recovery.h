@@ -33,6 +33,7 @@ struct RecoverySpec {
   double far = 1;           ///< share of `lower` from which the feet are too far apart to rest
   double height_rate = 0;   ///< 1/s, with which the COM's height follows what the legs ask for
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+  double watch = -1;  ///< m inside the soles from which is known whether a step helps; < 0: never
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
   double together_shift = 1;  ///< s in which the COM goes above the foot that stays for it
   double together_swing = 1;  ///< s of the other in the air
@@ -66,6 +67,9 @@ class Recovery {
   void BringTogether() { together_asked_ = true; }
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != Stage::kIdle; }
+  /// A step is under way, or one would help: false only within `watch` of the soles' edge, or
+  /// beyond it, where none does and another strategy may have the centre of pressure.
+  bool would_step() const { return active() || step_helps_; }
   Stage stage() const { return stage_; }
   StepReason reason() const { return reason_; }
   int num_steps() const { return num_steps_; }       ///< since the start
@@ -123,6 +127,7 @@ class Recovery {
   double beyond_since_ = -1;                            // s; negative: inside
   double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
+  bool step_helps_ = true;                              // of the last idle tick
   bool together_asked_ = false;
   double together_at_ = -1;                               // s; negative: when asked
   Eigen::Vector2d shift_from_ = Eigen::Vector2d::Zero();  // m, the capture point before it shifts
