@@ -4,7 +4,7 @@ import {deflateSync} from 'node:zlib';
 import {Run} from '../../web/src/data.js';
 import {addDerivedSignals, findPhases, lightLoad, noisyLoad} from '../../web/src/derived.js';
 import {figuresFor, panelOf, pitchJoints} from '../../web/src/figures.js';
-import {addBatch, decodeBatch} from '../../web/src/live.js';
+import {addBatch, decodeBatch} from '../../web/src/live/live.js';
 import {searchSignals} from '../../web/src/search.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';

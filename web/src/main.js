@@ -1,14 +1,14 @@
 // Builds the page from the run that it holds.
 import {KEYS, playerBar} from './bar.js';
-import {Control, Hand} from './control.js';
-import {CONTROL_KEYS, controlPanel} from './control_panel.js';
+import {Control, Hand} from './live/control.js';
+import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
 import {figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
-import {grabbing} from './grab.js';
-import {LiveFeed, firstTicks, followGrowth, showEnd} from './live.js';
+import {grabbing} from './live/grab.js';
+import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';

@@ -1,6 +1,6 @@
 // Checks, assumptions, latencies, channels and the run's information.
 import {element, table} from './dom.js';
-import {latencyFigure, latencyTable} from './latency.js';
+import {latencyFigure, latencyTable} from './live/latency.js';
 import {formatNumber, withUnit} from './units.js';
 
 /** Of a check without a limit none; passed is null until the run has ended. */

@@ -1,5 +1,5 @@
 // When a foot that is to carry counts as lost.
-#include "components/step_planner/contact_loss.h"
+#include "components/step_planner/contact/contact_loss.h"
 
 #include <gtest/gtest.h>
 

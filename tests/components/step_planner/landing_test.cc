@@ -1,6 +1,6 @@
 // The landing of one foot against a mass that follows its reference, and a surface that pushes
 // back.
-#include "components/step_planner/landing.h"
+#include "components/step_planner/contact/landing.h"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,8 @@ TEST(TouchDetector, CountsALoadThatLasts) {
   int tick = 0;
   const auto hold = [&](double load, int ticks) {
     bool touching = false;
-    for (int i = 0; i < ticks; ++i) touching = touch.Update(kTick * tick++, load, LoadLevels(config, 0));
+    for (int i = 0; i < ticks; ++i)
+      touching = touch.Update(kTick * tick++, load, LoadLevels(config, 0));
     return touching;
   };
   // 0.02 s are ten periods: eleven readings.

@@ -1,5 +1,5 @@
 // When a step is said to be needed: neither noise nor the number of ticks decides.
-#include "components/step_planner/step_detector.h"
+#include "components/step_planner/contact/step_detector.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // A run in progress: its ticks from the stream of `poise view`, and the page that grows with them.
-import {element} from './dom.js';
+import {element} from '../dom.js';
 const RETRY = 1000;          // ms
 const SPAN = 10;             // s that the plots show at first
 const GROWTH_PERIOD = 33;    // ms, at least

@@ -1,4 +1,4 @@
-#include "components/step_planner/contact_loss.h"
+#include "components/step_planner/contact/contact_loss.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 // The panel of a page that may act: stop, walk, settings, push, and the pace of an interactive run.
 import {Undo} from './control.js';
-import {element} from './dom.js';
-import {formatNumber, withUnit} from './units.js';
+import {element} from '../dom.js';
+import {formatNumber, withUnit} from '../units.js';
 
 const STEPS = 200;  // of a slider
 const SPEEDS = [0.1, 0.2, 0.5, 1];

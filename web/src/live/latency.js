@@ -1,8 +1,8 @@
 // How long each component took: a histogram on a logarithmic axis, and its counters.
-import {element, saveFile, shape, table} from './dom.js';
-import {quoted} from './export.js';
-import {cssColor} from './palette.js';
-import {formatNumber} from './units.js';
+import {element, saveFile, shape, table} from '../dom.js';
+import {quoted} from '../export.js';
+import {cssColor} from '../palette.js';
+import {formatNumber} from '../units.js';
 
 const WIDTH = 900, NAMES = 200, RIGHT = 20;  // of the picture, in its own units
 const ROW = 46, BARS = 34, AXIS = 34;

@@ -1,4 +1,4 @@
-#include "components/step_planner/landing.h"
+#include "components/step_planner/contact/landing.h"
 
 #include <algorithm>
 

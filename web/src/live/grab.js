@@ -1,11 +1,11 @@
 // Drag on the robot: the point that was grabbed is pulled towards the cursor.
 import {Plane, Raycaster, Vector2, Vector3} from 'three';
 import {springForce} from './control.js';
-import {element} from './dom.js';
-import {Arrow} from './markers.js';
-import {formatForce} from './units.js';
-import {COLORS} from './scene.js';
-import {isDark} from './palette.js';
+import {element} from '../dom.js';
+import {Arrow} from '../markers.js';
+import {formatForce} from '../units.js';
+import {COLORS} from '../scene.js';
+import {isDark} from '../palette.js';
 
 const METRES_PER_NEWTON = 1 / 600;
 

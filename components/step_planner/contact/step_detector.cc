@@ -1,4 +1,4 @@
-#include "components/step_planner/step_detector.h"
+#include "components/step_planner/contact/step_detector.h"
 
 namespace poise {
 namespace {
