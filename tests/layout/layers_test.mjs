@@ -24,6 +24,7 @@ const BELOW = {
   'components/balance/gains': ['components/robot', 'components/balance', 'components/balance/tasks'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/robot_files', 'components/balance'],
   'components': BUS,
+  'components/step_planner/contact': [...BUS, 'components/step_planner'],
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
   'sim_mujoco': [...BUS, 'sim'],
