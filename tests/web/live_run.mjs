@@ -2,11 +2,18 @@
 import assert from 'node:assert/strict';
 import {spawn, spawnSync} from 'node:child_process';
 import {once} from 'node:events';
+import {after} from 'node:test';
 
 const ENDS = 20000;  // ms that a program may take to end
 
+const programs = [];
+
+// A test that fails leaves its programs behind, which would keep node.
+after(() => Promise.all(programs.map((program) => program.stop())));
+
 class Program {
   constructor(poise, parameters) {
+    programs.push(this);
     this.output = '';
     this.child = spawn(poise, parameters, {stdio: ['ignore', 'pipe', 'pipe']});
     this.ended = once(this.child, 'exit').then(([code]) => code);

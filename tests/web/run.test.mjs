@@ -4,7 +4,7 @@ import {deflateSync} from 'node:zlib';
 import {Run} from '../../web/src/data.js';
 import {addDerivedSignals, findPhases, lightLoad, noisyLoad} from '../../web/src/derived.js';
 import {figuresFor, panelOf, pitchJoints} from '../../web/src/figures.js';
-import {addBatch, decodeBatch} from '../../web/src/live/live.js';
+import {addBatch, decodeBatch, LiveFeed} from '../../web/src/live/live.js';
 import {searchSignals} from '../../web/src/search.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
@@ -405,4 +405,25 @@ test('batches of the stream: in order, with a gap, sent twice, damaged', async (
   for (const damaged of [buffer.slice(0, 8), buffer.slice(0, 16), buffer.slice(0, -4), new ArrayBuffer(buffer.byteLength)]) {
     assert.throws(() => decodeBatch(damaged, run));
   }
+});
+
+test('a page says that the run has ended once its last tick has come', (t) => {
+  let socket;
+  t.after(() => { for (const name of ['WebSocket', 'location']) delete globalThis[name]; });
+  globalThis.location = {href: 'http://127.0.0.1:1/'};
+  globalThis.WebSocket = class extends EventTarget { constructor() { super(); socket = this; } };
+  const run = makeRun('', {}, 0, {keep: 100});
+  const feed = new LiveFeed(run);
+  const come = (data) => socket.dispatchEvent(Object.assign(new Event('message'), {data}));
+  const text = (state, end) => come(JSON.stringify({run_id: run.meta.run.run_id, state, lost: 0, end_tick: end}));
+  text('live', 0);
+  come(batchOf(run, 0, 3).buffer);
+  assert.equal(feed.state, 'live');
+  text('ended', 5);  // it overtakes the ticks
+  assert.equal(feed.state, 'live');
+  come(batchOf(run, 3, 2).buffer);
+  assert.equal(feed.state, 'ended');
+  text('live', 5);  // an interactive run went back
+  come(batchOf(run, 5, 2).buffer);
+  assert.equal(feed.state, 'live');
 });

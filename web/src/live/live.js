@@ -74,10 +74,10 @@ export class LiveFeed extends EventTarget {
     socket.binaryType = 'arraybuffer';
     socket.addEventListener('message', ({data}) => {
       if (typeof data === 'string') this.#tell(JSON.parse(data));
-      else addBatch(run, decodeBatch(data, run));
+      else this.#add(decodeBatch(data, run));
     });
     socket.addEventListener('close', () => {
-      if (this.status.ended && run.firstTick + run.numRows >= this.#ticks) return;  // all has come
+      if (this.status.ended && this.#allHasCome()) return;
       this.#setState('waiting');
       setTimeout(() => this.#connect(), RETRY);
     });
@@ -109,8 +109,17 @@ export class LiveFeed extends EventTarget {
       this.dispatchEvent(new Event('restart'));
     }
     this.lost = lost;
-    if (state === 'ended') this.#ticks = ticks;
-    this.#setState(state);
+    this.#ticks = state === 'ended' ? ticks : Infinity;
+    this.#setState(state === 'ended' && !this.#allHasCome() ? 'live' : state);  // the text overtakes the last ticks
+  }
+
+  #add(batch) {
+    addBatch(this.run, batch);
+    if (this.state === 'live' && this.#allHasCome()) this.#setState('ended');
+  }
+
+  #allHasCome() {
+    return this.run.firstTick + this.run.numRows >= this.#ticks;
   }
 
   #setState(state) {
