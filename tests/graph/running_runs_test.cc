@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <set>
 
 #include "logging/run_record.h"
 #include "tests/graph/current_folder.h"
@@ -16,6 +17,7 @@ namespace poise {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -54,6 +56,18 @@ class RunningRunsTest : public ::testing::Test {
     return last != nullptr ? last->state : int8_t{-1};
   }
 
+  /// N, ahead, all that the log's truth has.
+  static std::set<double> Pushes(const std::string& run) {
+    const logging::RunRecord record = logging::ReadRun(run + "/run.lcm");
+    std::set<double> forces;
+    for (int64_t t = 0; t < record.num_ticks; ++t) {
+      if (const ground_truth_t* const truth = record.truth.at(t)) {
+        forces.insert(truth->push_force[0]);
+      }
+    }
+    return forces;
+  }
+
   OwnRegistry registry;
   RunFolder folder;
 };
@@ -68,7 +82,8 @@ TEST_F(RunningRunsTest, TheOnlyOneIsMeantAndADeadOneForgotten) {
   EXPECT_THAT(top.output, HasSubstr(Whole(run)));
   const ProgramResult echo = RunPoise({"echo", "ROBOT_STATE", "tick", "--count", "3"});
   EXPECT_EQ(echo.exit_code, 0) << echo.output;
-  EXPECT_THAT(RunPoise({"list", "runs"}).output, HasSubstr(Whole(run) + "  (stand, for "));
+  EXPECT_THAT(RunPoise({"list", "runs"}).output,
+              HasSubstr(Whole(run) + "  (stand, robot dyros_legs, since "));
   EXPECT_EQ(RunPoise({"list", "runs", "--folders"}).output, Whole(run) + "\n");
 
   kill(program->pid(), SIGKILL);
@@ -102,6 +117,49 @@ TEST_F(RunningRunsTest, AnEmergencyStopWithoutARunStopsEveryOne) {
   second->Wait();
   EXPECT_EQ(LastState(a), bridge_status_t::STATE_ESTOP);
   EXPECT_EQ(LastState(b), bridge_status_t::STATE_ESTOP);
+}
+
+TEST_F(RunningRunsTest, AnActWithoutARunIsForTheOnlyOne) {
+  const std::string a = folder / "a";
+  const std::string b = folder / "b";
+  const std::unique_ptr<PoiseProgram> first = Start(a);
+  {
+    const std::unique_ptr<PoiseProgram> second = Start(b);
+    for (const std::vector<std::string>& command : {std::vector<std::string>{"set", "--list"},
+                                                    {"push", "--force", "-20,0,0"},
+                                                    {"set", "redistributor.eta_min=0.1"},
+                                                    {"step"},
+                                                    {"walk", "--stop"}}) {
+      const ProgramResult result = RunPoise(command);
+      EXPECT_EQ(result.exit_code, 2) << result.output;
+      EXPECT_THAT(result.output, HasSubstr("several runs are going on; name one:"));
+      EXPECT_THAT(result.output, HasSubstr(Whole(a) + "  (stand, robot dyros_legs, since "));
+      EXPECT_THAT(result.output, HasSubstr(Whole(b) + "  (stand, robot dyros_legs, since "));
+      EXPECT_THAT(result.output, ContainsRegex("as in: poise " + command[0] + " --run [ab]"));
+    }
+    const ProgramResult named =
+        RunPoise({"push", "--run", "b", "--force", "-20,0,0", "--duration", "0.02"});
+    EXPECT_EQ(named.exit_code, 0) << named.output;
+    // A name stops one; the other goes on, and is then the only one.
+    const ProgramResult stop = RunPoise({"estop", "b"});
+    EXPECT_EQ(stop.exit_code, 0) << stop.output;
+    EXPECT_THAT(stop.output, HasSubstr(Whole(b) + "): the bridge has stopped the robot"));
+    EXPECT_THAT(stop.output, Not(HasSubstr(Whole(a))));
+    second->Wait();
+  }
+  const ProgramResult push = RunPoise({"push", "--force", "-30,0,0", "--duration", "0.02"});
+  EXPECT_EQ(push.exit_code, 0) << push.output;
+  EXPECT_THAT(push.output,
+              HasSubstr("the run: " + Whole(a) + "  (stand, robot dyros_legs, since "));
+  EXPECT_THAT(push.output, HasSubstr("push of 30 N for 0.02 s: from tick "));
+  const ProgramResult ended = RunPoise({"push", "--run", b, "--force", "-20,0,0"});
+  EXPECT_EQ(ended.exit_code, 1) << ended.output;
+  EXPECT_THAT(ended.output, HasSubstr("this run has ended"));
+  kill(first->pid(), SIGINT);
+  first->Wait();
+  // What was refused or meant for b has not reached a: its truth knows the last push alone.
+  EXPECT_EQ(Pushes(a), (std::set<double>{-30, 0}));
+  EXPECT_EQ(Pushes(b), (std::set<double>{-20, 0}));
 }
 
 TEST_F(RunningRunsTest, ARunInsideOneProcessIsSaidToHaveNoBridge) {

@@ -51,7 +51,7 @@ class LiveRunTest : public ::testing::Test {
   }
   std::string Refusal() {
     try {
-      LiveRun(folder.path(""), "poise log info");
+      LiveRun(folder.path(""), "poise log info", "poise top");
     } catch (const ConfigError& error) {
       return error.what();
     }
@@ -115,13 +115,13 @@ TEST_F(LiveRunTest, SaysWhyThereIsNothingToHear) {
   spec.mutable_graph()->mutable_channel(0)->clear_count();
   WriteSpec();
   EXPECT_THAT(Refusal(), HasSubstr("another version"));
-  EXPECT_THROW(LiveRun(folder.path("nowhere"), "x"), ConfigError);
-  EXPECT_THROW(LiveRun(folder.path("run_spec.pbtxt"), "x"), ConfigError);
+  EXPECT_THROW(LiveRun(folder.path("nowhere"), "x", "x"), ConfigError);
+  EXPECT_THROW(LiveRun(folder.path("run_spec.pbtxt"), "x", "x"), ConfigError);
 }
 
 TEST_F(LiveRunTest, NamesAllChannels) {
   StartOnTheBus();
-  const LiveRun live(folder.path(""), "x");
+  const LiveRun live(folder.path(""), "x", "x");
   EXPECT_THAT(live.ChannelNames(), Contains("ROBOT_STATE"));
   EXPECT_THAT(live.ChannelNames(), Contains("HEALTH_SIM"));
   EXPECT_THAT(live.ChannelNames(), Contains("HEALTH_RECORDER"));
@@ -129,7 +129,7 @@ TEST_F(LiveRunTest, NamesAllChannels) {
 
 TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
   StartOnTheBus();
-  LiveRun live(folder.path(""), "x");
+  LiveRun live(folder.path(""), "x", "x");
   BusSender sender(MirrorUrl(spec));
   health_t health{};
   health.run_id = 42;

@@ -1,6 +1,7 @@
 #include "tools/run/run_registry.h"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -16,6 +17,10 @@ namespace poise {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ContainsRegex;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 
 /// A registry and runs of its own.
 class RunRegistryTest : public ::testing::Test {
@@ -35,6 +40,7 @@ class RunRegistryTest : public ::testing::Test {
     fs::create_directories(dir);
     RunSpec spec = logging::MakeTestSpec();
     spec.set_first_port(port);
+    spec.mutable_resource(0)->set_file("robots/dyros_legs.pbtxt");
     std::string text;
     google::protobuf::TextFormat::PrintToString(spec, &text);
     std::ofstream(dir / "run_spec.pbtxt") << text;
@@ -50,7 +56,7 @@ class RunRegistryTest : public ::testing::Test {
   }
   static std::string ErrorOfOnlyRun() {
     try {
-      OnlyRunningRun("poise log info");
+      OnlyRunningRun("poise log info", "poise push --run");
     } catch (const ConfigError& error) {
       return error.what();
     }
@@ -73,7 +79,7 @@ TEST_F(RunRegistryTest, ARunIsThereForAsLongAsItLives) {
     EXPECT_TRUE(runs[0].own && runs[0].readable && runs[0].networked);
     EXPECT_EQ(runs[0].scenario, "synthetic");
     EXPECT_EQ(runs[0].run_id, 42);
-    EXPECT_EQ(OnlyRunningRun(""), dir);
+    EXPECT_EQ(OnlyRunningRun("", "").dir, dir);
     EXPECT_TRUE(LatestEndedRun().empty());
   }
   EXPECT_TRUE(RunningRuns().empty());
@@ -90,13 +96,43 @@ TEST_F(RunRegistryTest, OfSeveralRunsOneMustBeNamed) {
   const fs::path inside = Run("inside", 0);
   const RunRegistration first(a);
   const RunRegistration in_process(inside);
-  EXPECT_EQ(OnlyRunningRun(""), a);  // the only one that can be heard
+  EXPECT_EQ(OnlyRunningRun("", "").dir, a);  // the only one that can be heard
   const RunRegistration second(b);
   EXPECT_EQ(RunningRuns().size(), 3u);
   const std::string error = ErrorOfOnlyRun();
   EXPECT_TRUE(error.starts_with("several runs are going on; name one:\n")) << error;
-  EXPECT_NE(error.find("  " + a.string() + "  (synthetic, for "), std::string::npos) << error;
-  EXPECT_NE(error.find("  " + b.string() + "  (synthetic, for "), std::string::npos) << error;
+  for (const fs::path& run : {a, b}) {
+    EXPECT_THAT(error, ContainsRegex("  " + run.string() +
+                                     "  \\(synthetic, robot dyros_legs, since "
+                                     "[0-9][0-9]:[0-9][0-9]:[0-9][0-9], for [0-9]+ s\\)\n"));
+  }
+  EXPECT_THAT(error, ContainsRegex("\nas in: poise push --run [ab]$"));
+}
+
+TEST_F(RunRegistryTest, ARunIsNamedByFolderScenarioOrNumber) {
+  const fs::path a = Run("a"), b = Run("b"), other = Run("deeper/a");
+  const RunRegistration first(a), second(b);
+  EXPECT_THAT(RunsNamed("b"), ElementsAre(b));
+  EXPECT_EQ(RunNamed("b", "poise top"), b);
+  EXPECT_THAT(RunsNamed("synthetic"), UnorderedElementsAre(a, b));
+  EXPECT_THAT(RunsNamed("42"), UnorderedElementsAre(a, b));
+  EXPECT_THAT(RunsNamed(other.string()), ElementsAre(other));  // which does not go on
+  EXPECT_THROW(RunsNamed("nothing"), ConfigError);
+  EXPECT_THROW(RunsNamed(folder.path("nothing/a")), ConfigError);  // a path, and no name
+  const auto problem_of = [](const std::string& name) -> std::string {
+    try {
+      RunNamed(name, "poise top");
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(problem_of("nothing"), HasSubstr("no run that goes on is called so"));
+  EXPECT_THAT(problem_of("synthetic"), ContainsRegex("'synthetic'; name one:\n(.*\n){2}as in: "
+                                                     "poise top [ab]$"));
+  // The folder's last part is the same: the whole of it tells them apart.
+  const RunRegistration third(other);
+  EXPECT_THAT(problem_of("a"), ContainsRegex("as in: poise top /.*a$"));
 }
 
 TEST_F(RunRegistryTest, AnEntryOfARunThatWasKilledGoes) {

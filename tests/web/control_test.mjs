@@ -165,3 +165,63 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
   replays(options.poise, path('stand/run.lcm'));
   replays(options.poise, path('stand/branch_1.lcm'));
 });
+
+test('after a fall the page starts the run again, and goes back to its first tick', async () => {
+  const run = await startInteractive(options.poise, path('again'), '--duration', '600');
+  programs.push(run);
+  const {page, problems} = await openPage(browser, run.url);
+  const end = () => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numRows);
+  const height = (at) => page.evaluate((t) => {
+    const {run: r} = window.poise;
+    return r.signals.get('GROUND_TRUTH.base_position[2]').values[t - r.firstTick];
+  }, at);
+  await until(page, () => window.poise.control.standing?.settings.length > 0);
+  await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 250);
+  const stood = await height(200);
+  const {settings: [setting]} = await standing(page);
+  await page.evaluate(([field, value]) => window.poise.control.act('set', {field, value}), [setting.field, 0.9 * setting.value + 0.1 * setting.high]);
+  await until(page, ([field, value]) => window.poise.control.setting(field).value !== value, [setting.field, setting.value]);
+  // Until it falls: half of the weight from the side, for long.
+  await page.evaluate(() => {
+    const {standing: {push_limit: limit, push_longest: longest}} = window.poise.control;
+    window.poise.control.act('push', {body: window.poise.run.robot.bodies[0].name, point: [0, 0, 0], force: [0, limit, 0], duration: longest});
+  });
+  await until(page, () => window.poise.control.standing.run.ended);
+  const {run: {detail}} = await standing(page);
+  assert.match(detail, /fell/);
+  await page.click('#go');
+  await until(page, () => window.poise.control.standing.acts.some((act) => act.do === 'go' && act.state === 'refused'));
+  const fallen = await end();
+  assert.ok(fallen > 500);
+  await picture(page, 'again_fallen');
+
+  await page.click('#restart');
+  await until(page, () => window.poise.control.standing.run.branch === 1);
+  await until(page, () => window.poise.run.numRows > 250 && !window.poise.control.standing.run.paused);
+  const again = await standing(page);
+  assert.equal(again.run.ended, false);
+  assert.equal(again.settings[0].value, setting.value, 'settings are those of the start');
+  assert.equal(await page.evaluate(() => window.poise.run.firstTick < 250), true);
+  assert.equal(await height(200), stood, 'the same bits');
+  await picture(page, 'again_stands');
+
+  // A run that waits starts again as well.
+  await page.click('#go');
+  await until(page, () => window.poise.control.standing.run.paused);
+  await page.click('#restart');
+  await until(page, () => window.poise.control.standing.run.branch === 2 && !window.poise.control.standing.run.paused);
+  await until(page, () => window.poise.run.numRows > 100);
+  assert.equal(await page.evaluate(() => window.poise.run.firstTick), 0);
+  // Back to tick 0 by the cursor: there the run waits, with nothing to show yet, and goes on from there.
+  await page.evaluate(() => window.poise.player.seek(window.poise.run.timeOfTick(0)));
+  await page.click('#back');
+  await until(page, () => window.poise.control.standing.run.branch === 3 && window.poise.control.standing.run.tick === 0);
+  await page.click('#live');
+  await page.click('#go');
+  await until(page, () => window.poise.run.numRows > 250);
+  assert.equal(await height(200), stood);
+  assert.deepEqual(problems, []);
+  await page.context().close();
+  await run.stop();
+  for (const name of ['run.lcm', 'branch_1.lcm']) replays(options.poise, path(`again/${name}`));
+});

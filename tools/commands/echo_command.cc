@@ -155,7 +155,8 @@ void CheckLive(const LiveRun& live, const EchoOptions& options, EchoOutput* outp
 }
 
 int EchoLive(const EchoOptions& options) {
-  LiveRun live(options.run, fmt::format("poise echo {} --log", options.channel));
+  LiveRun live(options.run, fmt::format("poise echo {} --log", options.channel),
+               fmt::format("poise echo {} --run", options.channel));
   EchoOutput output(options, logging::ElementNames::OfSpec(live.spec()));
   CheckLive(live, options, &output);
   CatchStopSignals(/*interrupt=*/true);
@@ -239,8 +240,8 @@ void AddEchoCommand(CLI::App* app, Command* command) {
       "field", options->fields,
       "by path, of JOINT_COMMAND torque[right_knee_pitch] or torque[3], of "
       "ROBOT_SENSORS foot_wrench[left].force; one line a message. Default: the whole message");
-  CLI::Option* run = echo->add_option("--run", options->run,
-                                      "folder of the run; default: the only one that goes on");
+  CLI::Option* run = echo->add_option(
+      "--run", options->run, "folder or name of the run; default: the only one that goes on");
   echo->add_option("--log", options->log, "from a log (any LCM log) or a run's folder instead")
       ->excludes(run);
   echo->add_option("--count", options->count, "end after so many messages")

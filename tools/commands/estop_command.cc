@@ -195,7 +195,7 @@ std::vector<Line> AllLines(int* exit_code) {
   const std::vector<RunningRun> runs = RunningRuns();
   const bool any_own =
       std::any_of(runs.begin(), runs.end(), [](const RunningRun& run) { return run.own; });
-  if (!any_own) OnlyRunningRun("poise log info");  // throws what there is instead
+  if (!any_own) OnlyRunningRun("poise log info", "poise estop");  // throws what there is instead
   std::vector<Line> lines;
   for (const RunningRun& run : runs) {
     if (!run.own) {
@@ -228,7 +228,8 @@ int Estop(const std::string& run, bool reset) {
   if (run.empty()) {
     lines = AllLines(&exit_code);
   } else {
-    lines.emplace_back(run);
+    // Of several that are called so, none is asked for: a stop must not wait for an answer.
+    for (const std::filesystem::path& dir : RunsNamed(run)) lines.emplace_back(dir.string());
   }
   if (lines.empty()) return exit_code;
   const int done = reset ? Reset(lines) : Stop(lines);
@@ -242,7 +243,7 @@ void AddEstopCommand(CLI::App* app, Command* command) {
   auto reset = std::make_shared<bool>(false);
   CLI::App* estop =
       app->add_subcommand("estop", "emergency stop of every run that goes on, or of one (latched)");
-  estop->add_option("run", *run, "folder of the run; default: every run that goes on");
+  estop->add_option("run", *run, "folder or name of the run; default: every run that goes on");
   estop->add_flag("--reset", *reset,
                   "end a stop: only once the motors are at rest and no torque is commanded");
   estop->callback(

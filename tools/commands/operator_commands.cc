@@ -1,4 +1,5 @@
 #include <charconv>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -9,12 +10,15 @@
 #include "tools/cli/terminal.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
+#include "tools/run/live_run.h"
 #include "tools/run/operator_line.h"
+#include "tools/run/run_dir.h"
+#include "tools/run/run_registry.h"
 
 namespace poise {
 namespace {
 
-constexpr char kWhichRun[] = "folder of the run; default: the one that goes on";
+constexpr char kWhichRun[] = "folder or name of the run; default: the only one that goes on";
 
 double NumberOf(std::string_view text, const std::string& flag) {
   double value = 0;
@@ -47,14 +51,36 @@ Eigen::Vector3d VectorOf(const std::string& text, const std::string& flag) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
+/// The run that is acted on.
+struct ActedRun {
+  std::filesystem::path dir;
+  OperatorLine line;
+};
+
+/// `command`: "poise push". Says which run it is where `run` did not, before anything is done to
+/// it.
+ActedRun FindActedRun(const std::string& run, const std::string& command) {
+  const std::string naming = command + " --run";
+  std::filesystem::path dir;
+  if (run.empty()) {
+    const RunningRun only = OnlyRunningRun("poise log info", naming);
+    fmt::print(stderr, "the run: {}\n", FormatRun(only));
+    dir = only.dir;
+  } else {
+    dir = RunNamed(run, naming);
+  }
+  return {dir, OperatorLine(ReadRunSpec(dir.string()))};
+}
+
 /// Says what became of `what`; the exit code.
-int SayOutcome(OperatorLine& line, int64_t id, const std::string& what) {
-  const ActOutcome outcome = line.Wait(id);
+int SayOutcome(ActedRun& run, int64_t id, const std::string& what) {
+  const ActOutcome outcome = run.line.Wait(id);
   if (outcome.done) {
     fmt::print("{}: from tick {} on ({:.3f} s)\n", what, outcome.tick, outcome.time);
     return kExitOk;
   }
-  fmt::print(stderr, "poise: {}: {}\n", what, outcome.text);
+  const bool ended = outcome.verdict == 0 && !RunInProgress(run.dir);
+  fmt::print(stderr, "poise: {}: {}\n", what, ended ? "this run has ended" : outcome.text);
   return kExitFailed;
 }
 
@@ -64,7 +90,8 @@ struct LiveSetOptions {
   bool list = false;
 };
 
-int ListLiveFields(OperatorLine& line) {
+int ListLiveFields(ActedRun& run) {
+  OperatorLine& line = run.line;
   std::vector<TableRow> rows{{"field", "now", "unit", "from", "to", "meaning"}};
   int exit_code = kExitOk;
   for (const LiveField& field : line.fields()) {
@@ -85,8 +112,6 @@ int SetLiveFields(const LiveSetOptions& options) {
   if (options.list == !options.assignments.empty()) {
     throw ConfigError("set: needs FIELD=VALUE, or --list");
   }
-  OperatorLine line(options.run);
-  if (options.list) return ListLiveFields(line);
   std::vector<std::pair<std::string, double>> values;
   for (const std::string& assignment : options.assignments) {
     const size_t equals = assignment.find('=');
@@ -97,12 +122,14 @@ int SetLiveFields(const LiveSetOptions& options) {
         assignment.substr(0, equals),
         NumberOf(std::string_view(assignment).substr(equals + 1), assignment.substr(0, equals)));
   }
+  ActedRun run = FindActedRun(options.run, "poise set");
+  if (options.list) return ListLiveFields(run);
   std::vector<int64_t> ids;
-  for (const auto& [field, value] : values) ids.push_back(line.Set(field, value));
+  for (const auto& [field, value] : values) ids.push_back(run.line.Set(field, value));
   int exit_code = kExitOk;
   for (size_t i = 0; i < ids.size(); ++i) {
     const int code =
-        SayOutcome(line, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
+        SayOutcome(run, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
     if (code != kExitOk) exit_code = code;
   }
   return exit_code;
@@ -116,9 +143,9 @@ struct RobotPushOptions {
 int PushRobot(const RobotPushOptions& options) {
   const Eigen::Vector3d force = VectorOf(options.force, "--force");
   const Eigen::Vector3d point = VectorOf(options.point, "--point");
-  OperatorLine line(options.run);
-  const int64_t id = line.Push(options.body, force, point, options.duration);
-  return SayOutcome(line, id,
+  ActedRun run = FindActedRun(options.run, "poise push");
+  const int64_t id = run.line.Push(options.body, force, point, options.duration);
+  return SayOutcome(run, id,
                     fmt::format("push of {:.4g} N for {:.4g} s", force.norm(), options.duration));
 }
 
@@ -134,9 +161,9 @@ int WalkRobot(const RobotWalkOptions& options, bool turns) {
   }
   std::vector<double> velocity{0, 0};
   if (!options.velocity.empty()) velocity = NumbersOf(options.velocity, 2, "--velocity");
-  OperatorLine line(options.run);
-  if (options.stop) return SayOutcome(line, line.Stand(), "stop walking");
-  return SayOutcome(line, line.Walk(velocity[0], velocity[1], options.turn), "walk");
+  ActedRun run = FindActedRun(options.run, "poise walk");
+  if (options.stop) return SayOutcome(run, run.line.Stand(), "stop walking");
+  return SayOutcome(run, run.line.Walk(velocity[0], velocity[1], options.turn), "walk");
 }
 
 }  // namespace
@@ -180,10 +207,10 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   both->excludes("--foot");
   step->callback([run, foot, next, together, command] {
     *command = [run, foot, next, together] {
-      OperatorLine line(*run);
-      if (*together) return SayOutcome(line, line.Stand(), "feet together");
-      return *next ? SayOutcome(line, line.NextPhase(), "next phase")
-                   : SayOutcome(line, line.Step(*foot), "step");
+      ActedRun acted = FindActedRun(*run, "poise step");
+      if (*together) return SayOutcome(acted, acted.line.Stand(), "feet together");
+      return *next ? SayOutcome(acted, acted.line.NextPhase(), "next phase")
+                   : SayOutcome(acted, acted.line.Step(*foot), "step");
     };
   });
 

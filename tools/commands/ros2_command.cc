@@ -43,7 +43,7 @@ void PublishEvents(RunStatus* status, size_t* told, Ros2Publisher* publisher) {
 int Ros2(const Ros2Options& options) {
   CatchStopSignals();
   StandBack();
-  LiveRun live(options.run, "poise log export --mcap");
+  LiveRun live(options.run, "poise log export --mcap", "poise ros2");
   const logging::RunRecord record = ReadStart(live, kRos2Patience);
   unitree::DdsLink link;
   link.set_domain(static_cast<uint32_t>(options.domain));
@@ -83,7 +83,8 @@ void AddRos2Command(CLI::App* app, Command* command) {
   auto options = std::make_shared<Ros2Options>();
   CLI::App* ros2 = app->add_subcommand(
       "ros2", "a run in progress as ROS 2's standard topics over DDS; it only listens to the run");
-  ros2->add_option("run", options->run, "folder of the run; default: the only one that goes on");
+  ros2->add_option("run", options->run,
+                   "folder or name of the run; default: the only one that goes on");
   ros2->add_option("--domain", options->domain, "DDS domain")
       ->envname("ROS_DOMAIN_ID")
       ->check(CLI::Range(0, kMostDomain))

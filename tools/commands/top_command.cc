@@ -34,7 +34,7 @@ struct TopOptions {
 class Watch {
  public:
   explicit Watch(const std::string& run)
-      : live_(run, "poise log info"),
+      : live_(run, "poise log info", "poise top"),
         control_(live_.spec(), {kRecorderName}),
         names_(logging::ElementNames::OfSpec(live_.spec())),
         statistics_(live_.spec(), NowNanoseconds()),
@@ -141,7 +141,8 @@ void AddTopCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<TopOptions>();
   CLI::App* top = app->add_subcommand(
       "top", "live view of a run in progress: its processes and channels; q or Ctrl-C ends it");
-  top->add_option("run", options->run, "folder of the run; default: the only one that goes on");
+  top->add_option("run", options->run,
+                  "folder or name of the run; default: the only one that goes on");
   top->add_option("--interval", options->interval, "s between views, over which rates are measured")
       ->capture_default_str()
       ->check(Within("in [0.1, 60]", [](double s) { return s >= 0.1 && s <= 60; }));

@@ -159,7 +159,7 @@ class Viewer {
 
 int View(const ViewOptions& options) {
   CatchStopSignals();
-  LiveRun live(options.run, kLogCommand);
+  LiveRun live(options.run, kLogCommand, "poise view");
   const logging::RunRecord record = ReadStart(live, kViewPatience);
   const Scenario scenario = ReadScenario(live, record);
   StandBack();
@@ -172,7 +172,8 @@ void AddViewCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<ViewOptions>();
   CLI::App* view = app->add_subcommand(
       "view", "the page of a run in progress, live in a browser on this machine");
-  view->add_option("run", options->run, "folder of the run; default: the only one that goes on");
+  view->add_option("run", options->run,
+                   "folder or name of the run; default: the only one that goes on");
   view->add_option("--port", options->port, "on 127.0.0.1; default: a free one")
       ->check(CLI::Range(1, 65535));
   view->add_option("--keep", options->keep, "s of the run that the page can look back")

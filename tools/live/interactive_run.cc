@@ -67,7 +67,7 @@ class InteractiveRun {
         ShowPicture();
         next_picture = std::max(next_picture + kPicture, Clock::now());
       }
-      if (back_) GoBack(*std::exchange(back_, std::nullopt));
+      if (back_) GoBack(*std::exchange(back_, std::nullopt), std::exchange(go_on_, false));
       AdvanceUntil(Due());
       const auto wait = std::min(next_picture, paused_ || runner_->ended() ? next_picture : Next());
       server_->RunFor(std::clamp(std::chrono::duration_cast<milliseconds>(wait - Clock::now()),
@@ -121,12 +121,12 @@ class InteractiveRun {
         paused_ = true;
         return {};
       case OperatorAct::Kind::kGo:
-        if (runner_->ended()) return "the run has ended; go back first";
+        if (runner_->ended()) return "the run has ended; go back or start again";
         paused_ = false;
         Anchor();
         return {};
       case OperatorAct::Kind::kTick:
-        if (runner_->ended()) return "the run has ended; go back first";
+        if (runner_->ended()) return "the run has ended; go back or start again";
         paused_ = true;
         single_ += std::min<int64_t>(act.ticks, ring_.capacity());
         return {};
@@ -137,9 +137,14 @@ class InteractiveRun {
         speed_ = act.value;
         Anchor();
         return {};
+      case OperatorAct::Kind::kRestart:
+        back_ = 0;
+        go_on_ = true;
+        return {};
       default:
         if (act.ticks > runner_->ticks_completed()) return "that tick has not been yet";
         back_ = act.ticks;
+        go_on_ = false;
         return {};
     }
   }
@@ -169,8 +174,8 @@ class InteractiveRun {
     if (runner_->ended()) paused_ = true;
   }
 
-  /// `tick` ticks done, as they were; waits there.
-  void GoBack(int64_t tick) {
+  /// `tick` ticks done, as they were; waits there unless it goes on.
+  void GoBack(int64_t tick, bool go_on) {
     recorder_->Close(spec_);
     ++branch_;
     const fs::path folder = fs::path(log_).parent_path();
@@ -194,7 +199,8 @@ class InteractiveRun {
     }
     shown_from_ = 0;
     single_ = 0;
-    paused_ = true;
+    paused_ = !go_on;
+    Anchor();
   }
 
   void ShowPicture() {
@@ -237,6 +243,7 @@ class InteractiveRun {
   double speed_ = 1;
   int64_t single_ = 0;  // ticks to run while it waits
   std::optional<int64_t> back_;
+  bool go_on_ = false;  // once it is back
   int64_t branch_ = 0;
   int64_t shown_from_ = 0;  // tick
   Clock::time_point anchor_time_{};

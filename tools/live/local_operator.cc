@@ -116,11 +116,12 @@ void LocalOperator::Do(const OperatorAct& act) {
     case OperatorAct::Kind::kTick:
     case OperatorAct::Kind::kSpeed:
     case OperatorAct::Kind::kBack:
+    case OperatorAct::Kind::kRestart:
       return Answered(act, -1, pace_(act));
     default:
       break;
   }
-  if (runner_->ended()) return Answered(act, -1, "the run has ended; go back first");
+  if (runner_->ended()) return Answered(act, -1, "the run has ended; go back or start again");
   if (act.kind == OperatorAct::Kind::kStop) {
     emergency_stop_t message{};
     message.run_id = spec_.run_id();
@@ -220,7 +221,7 @@ nlohmann::ordered_json LocalOperator::Standing() const {
   }
   nlohmann::ordered_json json = StandingOf(fields_, in_force, push_limit_);
   json["can"] = {"push",  "set", "step", "walk",  "stop_walking", "stop",
-                 "pause", "go",  "tick", "speed", "back"};
+                 "pause", "go",  "tick", "speed", "back",         "restart"};
   json["stopped"] = stopped_;
   if (runner_->ticks_completed() < push_until_) {
     json["push"] = {{"body", push_.name},

@@ -25,8 +25,8 @@ struct Form {
   std::vector<std::string_view> keys;
 };
 
-const std::array<Form, 12>& Forms() {
-  static const std::array<Form, 12> kForms{{
+const std::array<Form, 13>& Forms() {
+  static const std::array<Form, 13> kForms{{
       {ActKind::kPush, "push", {"body", "force", "point", "duration"}},
       {ActKind::kSet, "set", {"field", "value"}},
       {ActKind::kStep, "step", {"foot"}},
@@ -39,6 +39,7 @@ const std::array<Form, 12>& Forms() {
       {ActKind::kTick, "tick", {"ticks"}},
       {ActKind::kSpeed, "speed", {"value"}},
       {ActKind::kBack, "back", {"ticks"}},
+      {ActKind::kRestart, "restart", {}},
   }};
   return kForms;
 }

@@ -20,9 +20,10 @@ struct OperatorAct {
     kReset,        ///< ends a latched stop
     kPause,        ///< from here on of an interactive run alone
     kGo,
-    kTick,   ///< ticks
-    kSpeed,  ///< factor
-    kBack,   ///< to tick `ticks`
+    kTick,     ///< ticks
+    kSpeed,    ///< factor
+    kBack,     ///< to tick `ticks`
+    kRestart,  ///< to the start, and on from there at once
   };
 
   Kind kind = Kind::kStop;

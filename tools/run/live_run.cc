@@ -24,9 +24,10 @@ constexpr int64_t kMaxTick = int64_t{1} << 52;   // exact as a double, and ever 
 constexpr std::chrono::milliseconds kPause{20};  // while a run writes its first files
 constexpr std::chrono::milliseconds kConnectPatience{5'000};
 
-fs::path FindRunDir(const std::string& run, std::string_view log_command) {
-  if (run.empty()) return OnlyRunningRun(log_command);
-  const fs::path path = run;
+fs::path FindRunDir(const std::string& run, std::string_view log_command,
+                    std::string_view command) {
+  if (run.empty()) return OnlyRunningRun(log_command, command).dir;
+  const fs::path path = RunNamed(run, command);
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
     throw ConfigError(
@@ -74,8 +75,8 @@ bool RunInProgress(const fs::path& dir) {
   return locked;
 }
 
-LiveRun::LiveRun(const std::string& run, std::string_view log_command)
-    : dir_(FindRunDir(run, log_command)), spec_(ReadLiveSpec(dir_, log_command)) {
+LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::string_view command)
+    : dir_(FindRunDir(run, log_command, command)), spec_(ReadLiveSpec(dir_, log_command)) {
   if (spec_.first_port() == 0) {
     throw ConfigError(
         fmt::format("{}: runs inside one process, without the network; after its end: {} {}",

@@ -34,10 +34,11 @@ struct LiveMessage {
 /// every process's health. It sends nothing, and the run does not wait for it. Not thread-safe.
 class LiveRun {
  public:
-  /// `run`: folder of a run, empty: the only one that goes on. Throws ConfigError when no run goes
-  /// on there or it has no network; the message then names `log_command` ("poise log info") for its
-  /// log. BusError.
-  LiveRun(const std::string& run, std::string_view log_command);
+  /// `run`: folder or name (RunNamed) of a run, empty: the only one that goes on. Throws
+  /// ConfigError when no run goes on there or it has no network; the message then names
+  /// `log_command` ("poise log info") for its log; of several, it says how `command` ("poise top")
+  /// names one. BusError.
+  LiveRun(const std::string& run, std::string_view log_command, std::string_view command);
 
   const RunSpec& spec() const { return spec_; }
   const std::filesystem::path& dir() const { return dir_; }

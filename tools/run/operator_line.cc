@@ -16,8 +16,6 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "tools/run/run_dir.h"
-#include "tools/run/run_registry.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -110,15 +108,12 @@ std::vector<LiveField> LiveFields(const RunSpec& spec) {
   return fields;
 }
 
-OperatorLine::OperatorLine(const std::string& run)
-    : OperatorLine(ReadRunSpec(run.empty() ? OnlyRunningRun("poise log info").string() : run)) {}
-
 OperatorLine::OperatorLine(RunSpec spec) : spec_(std::move(spec)) {
   const Graph& graph = spec_.graph();
   if (spec_.first_port() == 0) {
     throw ConfigError(
-        fmt::format("run {}: runs inside one process, which hears nobody; start it "
-                    "without --inline",
+        fmt::format("run {}: runs inside one process, which hears nobody: use its page, if it is "
+                    "interactive, or start it without --inline",
                     spec_.run_id()));
   }
   const int acts = ChannelOfType(graph, kActType), answers = ChannelOfType(graph, kAnswerType);

@@ -45,9 +45,7 @@ struct ActOutcome {
 /// could take (unknown body, field, foot; not finite; a graph without operator's channels).
 class OperatorLine {
  public:
-  /// `run`: folder of a run that goes on as processes; empty: the only one. Throws ConfigError or
-  /// BusError.
-  explicit OperatorLine(const std::string& run);
+  /// To a run that goes on as processes. Throws ConfigError or BusError.
   explicit OperatorLine(RunSpec spec);
 
   /// N, world axes, at `point` (m, body frame) for `duration` s; below 0: until the next push of

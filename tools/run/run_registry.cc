@@ -10,11 +10,13 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <system_error>
 #include <utility>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/graph.pb.h"
+#include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/run/live_run.h"
@@ -30,6 +32,7 @@ constexpr char kRunPrefix[] = "run-";    // then the process's number and a rand
 constexpr char kNewPrefix[] = ".new-";   // until it is locked and whole
 constexpr char kEnded[] = "ended";
 constexpr double kMinute = 60;  // s
+constexpr double kDay = 24 * 60 * kMinute;
 constexpr size_t kLongestPath = 1 << 16;
 
 /// A file that is closed with this.
@@ -88,6 +91,9 @@ void Describe(RunningRun* run) {
     run->scenario = spec.scenario();
     run->run_id = spec.run_id();
     run->networked = spec.first_port() != 0;
+    for (const Resource& resource : spec.resource()) {
+      if (resource.name() == "robot") run->robot = fs::path(resource.file()).stem().string();
+    }
   } catch (const ConfigError&) {
     run->readable = false;
   }
@@ -259,43 +265,99 @@ fs::path LatestEndedRun() {
   return newest;
 }
 
+std::string FormatRun(const RunningRun& run) {
+  std::string what = "its folder cannot be read from here";
+  if (run.readable) {
+    what = run.scenario;
+    if (!run.robot.empty()) what += ", robot " + run.robot;
+    if (!run.networked) what += ", inside one process";
+  }
+  if (run.user != UserName(geteuid())) what += ", of user " + run.user;
+  const double age = std::max(run.age, 0.0);
+  const std::time_t start = std::time(nullptr) - static_cast<std::time_t>(age);
+  const std::string since = age < kDay ? fmt::format("{:%H:%M:%S}", fmt::localtime(start))
+                                       : fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(start));
+  const std::string lasts =
+      age < 10 * kMinute ? fmt::format("{:.0f} s", age) : fmt::format("{:.0f} min", age / kMinute);
+  return fmt::format("{}  ({}, since {}, for {})", logging::ForTerminal(run.dir.string()),
+                     logging::ForTerminal(what), since, lasts);
+}
+
 std::string FormatRuns(const std::vector<RunningRun>& runs) {
   std::string text;
-  for (const RunningRun& run : runs) {
-    std::string what = !run.readable    ? "its folder cannot be read from here"
-                       : !run.networked ? run.scenario + ", inside one process"
-                                        : run.scenario;
-    if (run.user != UserName(geteuid())) what += ", of user " + run.user;
-    text += fmt::format("  {}  ({}, for {:.0f} s)\n", logging::ForTerminal(run.dir.string()),
-                        logging::ForTerminal(what), std::max(run.age, 0.0));
-  }
+  for (const RunningRun& run : runs) text += "  " + FormatRun(run) + "\n";
   return text;
 }
 
-fs::path OnlyRunningRun(std::string_view log_command) {
+namespace {
+
+/// A list of which one has to be named, and how.
+ConfigError NameOne(std::string_view problem, const std::vector<RunningRun>& runs,
+                    std::string_view command) {
+  const fs::path name = runs.front().dir.filename();
+  const auto namesakes = std::ranges::count_if(
+      runs, [&](const RunningRun& run) { return run.dir.filename() == name; });
+  const fs::path& example = namesakes == 1 ? name : runs.front().dir;
+  return ConfigError(fmt::format("{}:\n{}as in: {} {}", problem, FormatRuns(runs), command,
+                                 logging::ForTerminal(example.string())));
+}
+
+bool IsCalled(const RunningRun& run, const std::string& name) {
+  return run.dir.filename() == name || run.scenario == name || std::to_string(run.run_id) == name;
+}
+
+}  // namespace
+
+RunningRun OnlyRunningRun(std::string_view log_command, std::string_view command) {
   const std::vector<RunningRun> runs = RunningRuns();
   std::vector<RunningRun> own;
-  std::copy_if(runs.begin(), runs.end(), std::back_inserter(own),
-               [](const RunningRun& run) { return run.own; });
+  std::ranges::copy_if(runs, std::back_inserter(own), &RunningRun::own);
   std::vector<RunningRun> heard;
-  std::copy_if(own.begin(), own.end(), std::back_inserter(heard),
-               [](const RunningRun& run) { return run.networked; });
-  if (heard.size() == 1) return heard.front().dir;
-  if (heard.empty() && own.size() == 1) return own.front().dir;  // the caller tells what it lacks
+  std::ranges::copy_if(own, std::back_inserter(heard), &RunningRun::networked);
+  if (heard.size() == 1) return heard.front();
+  if (heard.empty() && own.size() == 1) return own.front();  // the caller tells what it lacks
   if (!own.empty()) {
-    std::string list = FormatRuns(heard.empty() ? own : heard);
-    list.pop_back();  // the last line's end
-    throw ConfigError(fmt::format("several runs are going on; name one:\n{}", list));
+    throw NameOne("several runs are going on; name one", heard.empty() ? own : heard, command);
   }
   if (!runs.empty()) {
-    std::string list = FormatRuns(runs);
-    list.pop_back();
-    throw ConfigError(fmt::format("no run of yours is going on; name another user's:\n{}", list));
+    throw NameOne("no run of yours is going on; name another user's", runs, command);
   }
   const fs::path ended = LatestEndedRun();
   throw ConfigError(ended.empty() ? "no run is going on; start one with poise run"
                                   : fmt::format("no run is going on; the latest has ended: {} {}",
                                                 log_command, logging::ForTerminal(ended.string())));
+}
+
+std::vector<fs::path> RunsNamed(const std::string& name) {
+  const fs::path path = name;
+  if (RunInProgress(path)) return {path};
+  std::vector<RunningRun> runs;
+  if (path.filename() == path) runs = RunningRuns();
+  std::vector<fs::path> called;
+  for (const bool own : {true, false}) {
+    for (const RunningRun& run : runs) {
+      if (run.own == own && IsCalled(run, name)) called.push_back(run.dir);
+    }
+    if (!called.empty()) return called;
+  }
+  std::error_code error;
+  if (fs::exists(path, error)) return {path};
+  throw ConfigError(
+      fmt::format("{}: no such run folder, and no run that goes on is called so; "
+                  "poise list runs shows those",
+                  logging::ForTerminal(name)));
+}
+
+fs::path RunNamed(const std::string& name, std::string_view command) {
+  const std::vector<fs::path> dirs = RunsNamed(name);
+  if (dirs.size() == 1) return dirs.front();
+  std::vector<RunningRun> runs = RunningRuns();
+  std::erase_if(
+      runs, [&](const RunningRun& run) { return std::ranges::find(dirs, run.dir) == dirs.end(); });
+  // They may have ended meanwhile.
+  if (runs.empty()) throw ConfigError(fmt::format("{}: this run has ended", dirs.front().string()));
+  throw NameOne(fmt::format("several runs are called '{}'; name one", logging::ForTerminal(name)),
+                runs, command);
 }
 
 }  // namespace poise

@@ -40,6 +40,7 @@ struct RunningRun {
   bool readable = true;    ///< false: run_spec.pbtxt cannot be read from here
   bool networked = false;  ///< heard and stopped from outside; false: inside one process
   std::string scenario;
+  std::string robot;  ///< its file's name, without ending
   int64_t run_id = 0;
   double age = 0;  ///< s since its start
 };
@@ -51,12 +52,22 @@ std::vector<RunningRun> RunningRuns();
 /// Folder of the run of this user that ended last and is still there; empty: none is known.
 std::filesystem::path LatestEndedRun();
 
-/// A line a run: its folder and what is run there.
+/// "FOLDER  (stand, robot dyros_legs, since 11:24:03, for 12 s)"
+std::string FormatRun(const RunningRun& run);
+/// A line a run.
 std::string FormatRuns(const std::vector<RunningRun>& runs);
 
 /// The one run that goes on, for a command that was given none. Throws ConfigError: none (with the
-/// latest that ended, to be looked at with `log_command`), or several, which it lists.
-std::filesystem::path OnlyRunningRun(std::string_view log_command);
+/// latest that ended, to be looked at with `log_command`), or several, which it lists with how to
+/// name one: `command` is what stands before the name, as "poise push --run".
+RunningRun OnlyRunningRun(std::string_view log_command, std::string_view command);
+
+/// Folders that `name` means: the folder itself if a run goes on there; else every run that goes on
+/// whose folder's last part, scenario or number it is, this user's before others'; else the folder
+/// or file, if there is one. Throws ConfigError when there is none.
+std::vector<std::filesystem::path> RunsNamed(const std::string& name);
+/// The same of a command that takes one; throws ConfigError also when `name` means several.
+std::filesystem::path RunNamed(const std::string& name, std::string_view command);
 
 /// $POISE_RUNTIME_DIR alone, or below both $XDG_RUNTIME_DIR, which ends with the user's last login,
 /// and /tmp, which other programs may clean up.

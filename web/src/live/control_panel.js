@@ -104,13 +104,15 @@ function pace(control, player) {
   }}, ...SPEEDS.map((s) => element('option', {value: s}, `${s}×`)));
   const back = button('back to the cursor', 'Back to the tick at the time cursor, and on from there',
     () => control.act('back', {ticks: player.tick}), {id: 'back'});
+  const again = button('start again', 'The run begins anew, with the settings that it began with, and goes on; what was is kept as a branch',
+    () => control.act('restart'), {id: 'restart'});
   const state = element('output', {class: 'soft'});
-  return {element: element('div', {class: 'line'}, go, tick, speed, back, state), update: () => {
+  return {element: element('div', {class: 'line'}, go, tick, speed, back, again, state), update: () => {
     const {run} = control.standing;
     go.textContent = run.paused ? '▶ go' : '⏸ pause';
     go.title = run.paused ? 'The run goes on (p)' : 'The run waits (p)';
     speed.value = run.speed;
-    back.disabled = !run.can_go_back;
+    back.disabled = again.disabled = !run.can_go_back;
     state.textContent = `${run.ended ? `ended: ${run.detail}` : run.paused ? `waits at tick ${run.tick}` : `runs at ${run.speed}×`}${run.branch > 0 ? `, branch ${run.branch}` : ''}`;
   }};
 }
