@@ -234,6 +234,8 @@ bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
   if (!recovers_ && !walks_) return false;
   const stepping::StepInput input = SeeSteps(time, load);
   if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
+    // Where the walk has turned it.
+    if (walk_.active()) generator_->HoldBody(untilted_);
     walk_.Stop();
     return true;
   }
