@@ -2,6 +2,7 @@
 // robot.
 #include "components/step_planner/step_planner.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -346,6 +347,39 @@ class UnconfirmedTouchDown : public TouchDown {
 TEST_F(UnconfirmedTouchDown, FollowsTheScheduleAlone) {
   EXPECT_EQ(Run(0.4, 0).foot_state[1], support_plan_t::FOOT_SWING);
   EXPECT_EQ(Run(0.402, 0).phase, 2);
+}
+
+// Soles slip while the COM's reference moves, which goes after them once it rests. A phase may
+// begin before that, or in its midst: above the soles it is once, and relative to where it was
+// likewise.
+TEST(StepPlanner, APhaseThatBeginsWhereSolesHaveSlippedIsNotBesideThem) {
+  constexpr double kSlip = 0.03;  // m
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  for (const char* target : {"OVER_MIDDLE", "HOLD"}) {
+    for (const char* moves : {"1", "0.8", "0.5"}) {
+      ControlContext context(TestRobot::kDyros);
+      Harness<StepPlanner> harness(
+          &context, fmt::format("com_lag: 1 phase {{ support: DOUBLE duration: 1 "
+                                "com {{ target: SHIFT y: 0.01 duration: {} }} }} "
+                                "phase {{ support: DOUBLE com {{ target: {} duration: 0.5 }} }}",
+                                moves, target));
+      robot_state_t message{};
+      harness.Bind("robot_state", &message);
+      robot::RobotState state = StandingState(model);
+      const Eigen::Vector3d start = robot::Evaluate(model, state).com;
+      for (int64_t tick = 0; tick < 1500; ++tick) {
+        if (tick == 200) state.base_position.x() += kSlip;
+        message = StateMessage(model, state);
+        message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
+        harness.Run(TickAt(tick));
+      }
+      const auto& plan = harness.output<support_plan_t>();
+      ASSERT_EQ(plan.phase, 1);
+      const PointMotion com = GetMotion(plan.com_reference);
+      EXPECT_NEAR(com.position.x() - start.x(), kSlip, 1e-6) << target << ' ' << moves;
+      EXPECT_EQ(com.velocity.norm(), 0) << target << ' ' << moves;
+    }
+  }
 }
 
 // Pushed off the foot that it walks on, the robot makes recovery steps: its body goes on heading
