@@ -121,6 +121,35 @@ TEST(Swing, IsSmoothWhereverTheFootholdGoes) {
   }
 }
 
+TEST(Swing, RisesBeforeItGoesAcrossWhereItIsToldTo) {
+  Swing swing;
+  const SwingSpec spec{
+      .clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1, .across = 0.65, .wait = 0.25};
+  const Vector3d from(0.1, 0.2, 0), to(0.5, 0.22, 0.2);
+  swing.Begin({.position = from}, Eigen::Matrix3d::Identity(), to, Eigen::Matrix3d::Identity(), 2,
+              3, spec);
+  Vector3d last = from;
+  for (int i = 0; i <= 1000; ++i) {
+    const double time = 2 + 1e-3 * i;
+    const PointMotion at = swing.At(time);
+    if (time <= 2.25) {
+      EXPECT_EQ(at.position.x(), from.x());
+      EXPECT_EQ(at.velocity.x(), 0);
+    }
+    // Its velocity is its position's rate.
+    if (i > 0) {
+      EXPECT_NEAR(at.position.x() - last.x(), 1e-3 * at.velocity.x(), 1e-5) << time;
+      EXPECT_NEAR(at.position.z() - last.z(), 1e-3 * at.velocity.z(), 1e-5) << time;
+    }
+    if (time >= 2.65) {
+      EXPECT_NEAR(at.position.x(), to.x(), 1e-12);
+    }
+    last = at.position;
+  }
+  EXPECT_GT(swing.At(2.25).position.z(), 0.1);
+  EXPECT_NEAR(last.z(), to.z(), 1e-9);
+}
+
 TEST(Swing, RisesStraightUpForAsLongAsItWasToWhereverTheFootholdGoes) {
   for (const double across : {0.65, 1.0}) {
     SwingSpec spec{.clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1};
