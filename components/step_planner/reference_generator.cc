@@ -149,7 +149,7 @@ void References::Archive(StateArchive* archive) {
 }
 
 void ReferenceGenerator::Archive(StateArchive* archive) {
-  archive->Show(time_, anchored_, foot_free_);
+  archive->Show(time_, anchored_, shifts_, foot_free_);
   com_.Archive(archive);
   for (ReferencePoint& foot : foot_) foot.Archive(archive);
   body_turn_.Archive(archive);
@@ -185,6 +185,7 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
                                     double time) {
   if (!anchored_) {
     com_.Hold(estimate.com);
+    shifts_ = false;
     body_turn_.Hold(estimate.body_rotation);
     foot_free_ = {false, false};
     anchored_ = true;
@@ -195,8 +196,10 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
   }
   if (phase.has_com()) {
     const ComReference& com = phase.com();
-    com_.Schedule(ComTarget(com, estimate, com_.At(time).position), time + com.delay(),
+    const Eigen::Vector3d standing = com_.At(time).position;
+    com_.Schedule(ComTarget(com, estimate, shifts_ ? com_.target() : standing), time + com.delay(),
                   com.duration());
+    shifts_ = false;
   }
   const auto schedule = [time](const Turn& turn, ReferenceTurn* reference) {
     reference->Schedule({turn.x(), turn.y(), turn.z()}, time + turn.delay(), turn.duration());
@@ -242,6 +245,7 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
 void ReferenceGenerator::Anchor(const EstimatedPose& estimate, const PointMotion& com,
                                 const Eigen::Vector3d& com_target, double time, double duration) {
   com_.Lead(com, com_target, time, duration);
+  shifts_ = false;
   for (size_t i = 0; i < 2; ++i) {
     HoldFoot(i, estimate.sole[i].translation(), estimate.sole[i].linear());
   }

@@ -114,9 +114,11 @@ class ReferenceGenerator {
   /// under way are dropped. After another planner has led them.
   void Anchor(const EstimatedPose& estimate, const PointMotion& com,
               const Eigen::Vector3d& com_target, double time, double duration);
-  /// The COM's reference goes on from where it rests by `way`, m, world, in `duration` s.
+  /// The COM's reference goes on from where it rests by `way`, m, world, in `duration` s. A phase
+  /// that begins meanwhile takes the shift for done.
   void ShiftCom(const Eigen::Vector3d& way, double time, double duration) {
     com_.Schedule(com_.target() + way, time, duration);
+    shifts_ = true;
   }
   /// m, world: where the COM's last move ends.
   const Eigen::Vector3d& com_target() const { return com_.target(); }
@@ -134,6 +136,7 @@ class ReferenceGenerator {
   double com_lag_;
   double time_ = 0;  // s, of the last update
   bool anchored_ = false;
+  bool shifts_ = false;  // the COM's last move is a shift
   std::array<bool, 2> foot_free_{false, false};
   ReferencePoint com_;
   std::array<ReferencePoint, 2> foot_;

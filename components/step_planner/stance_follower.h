@@ -31,6 +31,8 @@ class StanceFollower {
   /// between the soles beside which it rests: from the middle with both alike, from above one with
   /// that one. From `distance` on that this point has gone, until next to none of it is left.
   Eigen::Vector3d Update(double time, const Stance& stance);
+  /// The COM's reference goes to where the soles are now: what they did before counts no more.
+  void Restart() { known_ = following_ = false; }
   void Archive(StateArchive* archive) {
     archive->Show(known_, following_, carried_, since_, sole_[0], sole_[1]);
   }

@@ -234,6 +234,8 @@ bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
   if (!recovers_ && !walks_) return false;
   const stepping::StepInput input = SeeSteps(time, load);
   if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
+    // Where the walk has turned it.
+    if (walk_.active()) generator_->HoldBody(untilted_);
     walk_.Stop();
     return true;
   }
@@ -309,6 +311,10 @@ void StepPlanner::BeginPhase(double time) {
   const Phase& phase = schedule_->phase();
   const EstimatedPose estimate = Estimate();
   const ScheduleState& schedule = schedule_->state();
+  const ComReference::Target com = phase.com().target();
+  const bool above_soles =
+      phase.has_com() && com != ComReference::HOLD && com != ComReference::SHIFT;
+  if (above_soles) stance_follower_.Restart();
   // The first phase begins with the run; its moves wait for the scenario's time 0.
   generator_->BeginPhase(phase, estimate, schedule.first ? std::max(time, 0.0) : time);
   const std::array<bool, 2> last_contact = in_contact_;

@@ -93,3 +93,14 @@ test('regions and planned footholds are what the message says', async () => {
   assert.deepEqual([0, 0.2, 0.5, 0.7].map((x) => stepsThatCatch(regions, [x, 0])), [0, 1, 2, undefined]);
   assert.equal(isInside([], [0, 0]), false);
 });
+
+test('a message with more footholds and corners than it has room for shows those that it has', async () => {
+  const type = 'steps.footsteps_t';
+  const run = makeRun('', {[`${type}.planned`]: 127, [`${type}.stance`]: 1, [`${type}.corners[0]`]: 127, [`${type}.corners[1]`]: -1});
+  const {Samples} = await import('../../web/src/samples.js');
+  const {plannedSignals} = await import('../../web/src/footsteps.js');
+  const samples = new Samples();
+  await samples.load(run, plannedSignals());
+  assert.equal(plannedAt(samples, 0).length, 3);
+  assert.deepEqual(regionsAt(samples, 0).map((region) => region.length), [16, 0, 0]);
+});

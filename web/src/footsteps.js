@@ -103,10 +103,12 @@ export const plannedSignals = () => ({
   ...vector('region_x', FOOTSTEPS, 'region_x', REGIONS * CORNERS), ...vector('region_y', FOOTSTEPS, 'region_y', REGIONS * CORNERS),
 });
 
+/** A count of a message, whatever it holds. */
+const upTo = (most, count) => (count > 0 ? Math.min(most, count) : 0);
+
 /** [{foot, position, yaw, touchDown}], the step under way first. */
 export function plannedAt(samples, row) {
-  const count = samples.at('planned', row);
-  return Array.from({length: count > 0 ? count : 0}, (_, i) => ({
+  return Array.from({length: upTo(PLANNED, samples.at('planned', row))}, (_, i) => ({
     foot: samples.at(`planned_foot[${i}]`, row), yaw: samples.at(`planned_yaw[${i}]`, row),
     position: ['x', 'y', 'z'].map((axis) => samples.at(`planned_${axis}[${i}]`, row)),
     touchDown: samples.at(`planned_touch_down[${i}]`, row),
@@ -118,7 +120,7 @@ export function regionsAt(samples, row) {
   const stands = samples.at('stance', row) >= 0;
   return Array.from({length: REGIONS}, (_, steps) => {
     const count = stands ? samples.at(`region_corners[${steps}]`, row) : 0;
-    return Array.from({length: count > 0 ? count : 0}, (__, i) => [samples.at(`region_x[${steps * CORNERS + i}]`, row),
+    return Array.from({length: upTo(CORNERS, count)}, (__, i) => [samples.at(`region_x[${steps * CORNERS + i}]`, row),
       samples.at(`region_y[${steps * CORNERS + i}]`, row), samples.at('region_height', row)]);
   });
 }

@@ -137,7 +137,7 @@ export class StepsView {
     const planned = plannedAt(samples, row);
     this.planned.forEach((outline, i) => {
       const step = planned[i];
-      const known = step && [...step.position, step.yaw].every(Number.isFinite);
+      const known = step && run.robot.feet[step.foot] && [...step.position, step.yaw].every(Number.isFinite);
       outline.set(known ? this.#sole(step) : []);
       if (known) outline.material.color.set(FOOT_COLORS[step.foot]);
     });

@@ -119,8 +119,10 @@ void Swing::Turn(const Quintic::Point& x, const Quintic::Point& y, double time) 
   const std::array<Quintic::Point, 2> turn{
       Quintic::Point{corner_.x(), passing.velocity.x() / whole},
       Quintic::Point{corner_.y(), passing.velocity.y() / whole}};
-  corner_time_ = std::clamp(start_ + passing.share * whole, time + kLeastTime,
-                            std::max(end_, time + 2 * kLeastTime) - kLeastTime);
+  // The first bound, should rounding leave the second below it.
+  corner_time_ = std::max(
+      time + kLeastTime,
+      std::min(start_ + passing.share * whole, std::max(end_, time + 2 * kLeastTime) - kLeastTime));
   x_.Begin(x, turn[0], time, corner_time_ - time);
   y_.Begin(y, turn[1], time, corner_time_ - time);
   const double left = std::max(end_ - corner_time_, kLeastTime);
@@ -137,10 +139,13 @@ void Swing::Move(const Eigen::Vector2d& foothold, double time, double end) {
   const bool after = around_ && !before;
   const Quintic::Point x = (after ? after_x_ : x_).At(time), y = (after ? after_y_ : y_).At(time);
   foothold_.head<2>() = foothold;
-  const double duration = spec_.across < 1 ? Across(time) : end - time;
+  // It goes on rising straight up for as long as it was to.
+  const double from = std::max(time, start_ + spec_.wait * (end_ - start_));
+  double duration = (spec_.across < 1 ? Across(time) : end - time) - (from - time);
+  if (from > time) duration = std::max(duration, kLeastTime);
   if (!before) {
-    (after ? after_x_ : x_).Begin(x, {foothold.x()}, time, duration);
-    (after ? after_y_ : y_).Begin(y, {foothold.y()}, time, duration);
+    (after ? after_x_ : x_).Begin(x, {foothold.x()}, from, duration);
+    (after ? after_y_ : y_).Begin(y, {foothold.y()}, from, duration);
   }
   MoveEnd(time, end);
   if (before) Turn(x, y, time);

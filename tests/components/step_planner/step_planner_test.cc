@@ -2,6 +2,7 @@
 // robot.
 #include "components/step_planner/step_planner.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -346,6 +347,88 @@ class UnconfirmedTouchDown : public TouchDown {
 TEST_F(UnconfirmedTouchDown, FollowsTheScheduleAlone) {
   EXPECT_EQ(Run(0.4, 0).foot_state[1], support_plan_t::FOOT_SWING);
   EXPECT_EQ(Run(0.402, 0).phase, 2);
+}
+
+// Soles slip while the COM's reference moves, which goes after them once it rests. A phase may
+// begin before that, or in its midst: above the soles it is once, and relative to where it was
+// likewise.
+TEST(StepPlanner, APhaseThatBeginsWhereSolesHaveSlippedIsNotBesideThem) {
+  constexpr double kSlip = 0.03;  // m
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  for (const char* target : {"OVER_MIDDLE", "HOLD"}) {
+    for (const char* moves : {"1", "0.8", "0.5"}) {
+      ControlContext context(TestRobot::kDyros);
+      Harness<StepPlanner> harness(
+          &context, fmt::format("com_lag: 1 phase {{ support: DOUBLE duration: 1 "
+                                "com {{ target: SHIFT y: 0.01 duration: {} }} }} "
+                                "phase {{ support: DOUBLE com {{ target: {} duration: 0.5 }} }}",
+                                moves, target));
+      robot_state_t message{};
+      harness.Bind("robot_state", &message);
+      robot::RobotState state = StandingState(model);
+      const Eigen::Vector3d start = robot::Evaluate(model, state).com;
+      for (int64_t tick = 0; tick < 1500; ++tick) {
+        if (tick == 200) state.base_position.x() += kSlip;
+        message = StateMessage(model, state);
+        message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
+        harness.Run(TickAt(tick));
+      }
+      const auto& plan = harness.output<support_plan_t>();
+      ASSERT_EQ(plan.phase, 1);
+      const PointMotion com = GetMotion(plan.com_reference);
+      EXPECT_NEAR(com.position.x() - start.x(), kSlip, 1e-6) << target << ' ' << moves;
+      EXPECT_EQ(com.velocity.norm(), 0) << target << ' ' << moves;
+    }
+  }
+}
+
+// Pushed off the foot that it walks on, the robot makes recovery steps: its body goes on heading
+// where the walk has turned it, rather than back to where it headed before.
+TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  ControlContext context(TestRobot::kDyros);
+  Harness<StepPlanner> harness(&context,
+                               "phase { support: DOUBLE } recovery { enabled: true } "
+                               "walk { enabled: true rests: true start: 0.5 command { vx: 0 } }");
+  robot_state_t message{};
+  harness.Bind("robot_state", &message);
+  const auto& plan = harness.output<support_plan_t>();
+  const auto reference = [&] { return GetMotion(plan.body_reference).rotation; };
+  // All of it has turned since the walk began, as its steps would have turned it.
+  constexpr double kTurn = 0.3;  // rad
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(kTurn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const robot::RobotState standing = StandingState(model);
+  robot::RobotState turned = standing;
+  turned.base_position = turn * standing.base_position;
+  turned.base_orientation = Eigen::Quaterniond(turn) * standing.base_orientation;
+  const robot::RobotData data = robot::Evaluate(model, turned);
+  const double frequency = std::sqrt(robot::kGravity / data.com.z());
+  int64_t tick = 0, recovering = 0;
+  double largest_turn = 0;
+  for (Eigen::Matrix3d last; recovering < 100 && tick < 2000; last = reference()) {
+    robot::RobotState state = tick < 10 ? standing : turned;
+    // The capture point: above the foot that stays, then 0.25 m ahead of it.
+    Eigen::Vector3d point = data.foot_pose[1].translation();
+    if (plan.in_contact[0] == 0 || recovering > 0) point += turn * Eigen::Vector3d(0.25, 0, 0);
+    if (tick >= 10) {
+      state.base_linear_velocity.head<2>() += frequency * (point - data.com).head<2>();
+    }
+    message = StateMessage(model, state);
+    harness.Run(TickAt(tick));
+    ASSERT_EQ(plan.status, support_plan_t::STATUS_OK);
+    if (tick > 0) {
+      const double step = Eigen::AngleAxisd(reference() * last.transpose()).angle();
+      largest_turn = std::max(largest_turn, step);
+    }
+    const bool steps = plan.stepping != support_plan_t::STEPPING_NONE;
+    if (steps && plan.step_reason != support_plan_t::REASON_WALK) ++recovering;
+    ++tick;
+  }
+  EXPECT_EQ(recovering, 100);
+  // At 5 1/s, critically damped: 0.3 rad turn with at most 5/e of it a second.
+  EXPECT_LT(largest_turn, 1.1 * kTurn * 5 / std::exp(1) * 0.002);
+  EXPECT_LT(Eigen::AngleAxisd(reference() * turn.transpose()).angle(), 0.15);
 }
 
 // What follows when there is no surface, and when a foot that carries does not.

@@ -121,6 +121,55 @@ TEST(Swing, IsSmoothWhereverTheFootholdGoes) {
   }
 }
 
+TEST(Swing, RisesBeforeItGoesAcrossWhereItIsToldTo) {
+  Swing swing;
+  const SwingSpec spec{
+      .clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1, .across = 0.65, .wait = 0.25};
+  const Vector3d from(0.1, 0.2, 0), to(0.5, 0.22, 0.2);
+  swing.Begin({.position = from}, Eigen::Matrix3d::Identity(), to, Eigen::Matrix3d::Identity(), 2,
+              3, spec);
+  Vector3d last = from;
+  for (int i = 0; i <= 1000; ++i) {
+    const double time = 2 + 1e-3 * i;
+    const PointMotion at = swing.At(time);
+    if (time <= 2.25) {
+      EXPECT_EQ(at.position.x(), from.x());
+      EXPECT_EQ(at.velocity.x(), 0);
+    }
+    // Its velocity is its position's rate.
+    if (i > 0) {
+      EXPECT_NEAR(at.position.x() - last.x(), 1e-3 * at.velocity.x(), 1e-5) << time;
+      EXPECT_NEAR(at.position.z() - last.z(), 1e-3 * at.velocity.z(), 1e-5) << time;
+    }
+    if (time >= 2.65) {
+      EXPECT_NEAR(at.position.x(), to.x(), 1e-12);
+    }
+    last = at.position;
+  }
+  EXPECT_GT(swing.At(2.25).position.z(), 0.1);
+  EXPECT_NEAR(last.z(), to.z(), 1e-9);
+}
+
+TEST(Swing, RisesStraightUpForAsLongAsItWasToWhereverTheFootholdGoes) {
+  for (const double across : {0.65, 1.0}) {
+    SwingSpec spec{.clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1};
+    spec.across = across;
+    spec.wait = 0.25;
+    Swing swing;
+    swing.Begin({}, Eigen::Matrix3d::Identity(), {0.2, 0, 0.1}, Eigen::Matrix3d::Identity(), 0, 1,
+                spec);
+    for (int tick = 1; tick < 250; ++tick) {
+      const double time = 0.002 * tick;
+      swing.Move({0.2 + 1e-4 * tick, 0}, time, 1);
+      const PointMotion now = swing.At(time);
+      if (time <= 0.25) {
+        EXPECT_EQ(now.position.head<2>().norm() + now.velocity.head<2>().norm(), 0) << time;
+      }
+    }
+    EXPECT_NEAR(swing.At(across).position.x(), 0.2 + 1e-4 * 249, 1e-9) << across;
+  }
+}
+
 TEST(Swing, TheTurnEndsLevel) {
   const Eigen::Matrix3d tilted =
       Eigen::AngleAxisd(0.3, Vector3d(1, 2, -1).normalized()).toRotationMatrix();

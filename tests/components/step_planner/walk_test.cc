@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <vector>
 
 #include "components/balance/contact_transition.h"
 #include "components/robot/posture.h"
@@ -241,6 +243,9 @@ class World {
     return walk_.Lost(input);
   }
 
+  /// From the next tick on each tick is a fresh object's, which has but the archive of the last
+  /// one.
+  void Hand(const Walk& fresh) { fresh_ = fresh; }
   void Push(const Vector2d& velocity) { velocity_.head<2>() += velocity; }
 
   void Run(double duration, const WalkCommand& command) {
@@ -282,6 +287,7 @@ class World {
 
   void Tick(const WalkCommand& command) {
     const StepInput input = See();
+    if (fresh_) TakeOver();
     const bool was_active = walk_.active();
     if (walk_.Update(input, command)) {
       const StepOutput& output = walk_.output();
@@ -293,6 +299,18 @@ class World {
       Move(output);
     }
     time_ += kPeriod;
+  }
+
+  void TakeOver() {
+    StateArchive measure;
+    walk_.Archive(&measure);
+    std::vector<uint8_t> bytes(measure.size());
+    StateArchive save = StateArchive::Saving(bytes);
+    walk_.Archive(&save);
+    walk_ = *fresh_;
+    StateArchive restore = StateArchive::Restoring(bytes);
+    walk_.Archive(&restore);
+    EXPECT_TRUE(save.ok() && restore.ok());
   }
 
   void Move(const StepOutput& output) {
@@ -322,6 +340,7 @@ class World {
   double rough_;
   std::array<double, 2> hole_{0, 0};
   Walk walk_;
+  std::optional<Walk> fresh_;
   double time_ = 0;
   Vector3d com_, velocity_ = Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole_;
@@ -429,35 +448,6 @@ TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
   EXPECT_FALSE(world.walk().active());
 }
 
-TEST(Swing, RisesBeforeItGoesAcrossWhereItIsToldTo) {
-  Swing swing;
-  const SwingSpec spec{
-      .clearance = 0.05, .touch_speed = 0.1, .freeze = 0.1, .across = 0.65, .wait = 0.25};
-  const Vector3d from(0.1, 0.2, 0), to(0.5, 0.22, 0.2);
-  swing.Begin({.position = from}, Eigen::Matrix3d::Identity(), to, Eigen::Matrix3d::Identity(), 2,
-              3, spec);
-  Vector3d last = from;
-  for (int i = 0; i <= 1000; ++i) {
-    const double time = 2 + 1e-3 * i;
-    const PointMotion at = swing.At(time);
-    if (time <= 2.25) {
-      EXPECT_EQ(at.position.x(), from.x());
-      EXPECT_EQ(at.velocity.x(), 0);
-    }
-    // Its velocity is its position's rate.
-    if (i > 0) {
-      EXPECT_NEAR(at.position.x() - last.x(), 1e-3 * at.velocity.x(), 1e-5) << time;
-      EXPECT_NEAR(at.position.z() - last.z(), 1e-3 * at.velocity.z(), 1e-5) << time;
-    }
-    if (time >= 2.65) {
-      EXPECT_NEAR(at.position.x(), to.x(), 1e-12);
-    }
-    last = at.position;
-  }
-  EXPECT_GT(swing.At(2.25).position.z(), 0.1);
-  EXPECT_NEAR(last.z(), to.z(), 1e-9);
-}
-
 TEST(AnotherPlace, LiesAroundTheFirstOneWhereTheFootReaches) {
   const double yaw = 0.4, shift = 0.15;
   const Footstep stance{{1, 2}, yaw};
@@ -533,6 +523,29 @@ TEST(Walk, AFootThatFindsNoPlaceComesBackToWhereItStood) {
   EXPECT_EQ(world.walk().num_left(), 3);
   ASSERT_EQ(world.walk().num_steps(), 1);
   EXPECT_LT((world.sole()[foot].translation() - home).norm(), 0.005);
+}
+
+TEST(Walk, TheArchiveIsAllOfItsState) {
+  // A turn, holes and a stop; then a push while it does not rest.
+  for (const bool rests : {true, false}) {
+    std::vector<World> worlds(2, World(TestRobot::kDyros, 0, rests ? 0.5 : 0, rests, 4));
+    worlds[1].Hand(worlds[1].walk());
+    for (int tick = 0; tick < 12000; ++tick) {
+      for (World& world : worlds) {
+        if (tick == 0 && rests) world.Dig(0.02, 0.2);
+        if (tick == 2000 && !rests) world.Push({0.1, 0.02});
+        world.Run(kPeriod, tick < 8000 ? WalkCommand{{0.05, 0}, 0.05, true} : kStand);
+      }
+      for (size_t foot = 0; foot < 2; ++foot) {
+        ASSERT_EQ(worlds[0].sole()[foot].matrix(), worlds[1].sole()[foot].matrix()) << tick;
+      }
+      ASSERT_EQ(worlds[0].com(), worlds[1].com()) << tick;
+      ASSERT_EQ(worlds[0].walk().output().cop, worlds[1].walk().output().cop) << tick;
+      ASSERT_EQ(worlds[0].walk().num_left(), worlds[1].walk().num_left()) << tick;
+    }
+    EXPECT_EQ(worlds[0].walk().num_left() > 0, rests);
+    EXPECT_GE(worlds[0].walk().num_steps(), 4);
+  }
 }
 
 TEST(Walk, WithoutOtherPlacesAFootWaitsWhereItIs) {

@@ -7,7 +7,7 @@ const FULL_REACH = 0.4;   // m from the grabbed point to the cursor at which a d
 export class Control extends EventTarget {
   /** As the server told it last; undefined: this page only looks. */
   standing;
-  /** The last act, if there was no connection to send it by. A stop is sent once there is one again. */
+  /** The last act, if there was no connection to send it by. A stop stays until there is one again, and is sent then. */
   unsent;
   #client = crypto.getRandomValues(new Uint32Array(1))[0];
   #next = 1;
@@ -19,7 +19,8 @@ export class Control extends EventTarget {
     feed.addEventListener('control', () => this.#tell(feed.control));
     // A stop that nobody has answered when the connection is lost may be lost with it.
     feed.addEventListener('state', () => {
-      if (feed.state === 'waiting') this.unsent ??= this.waiting.find((act) => act.do === 'stop');
+      const stop = this.waiting.find((act) => act.do === 'stop');
+      if (feed.state === 'waiting' && stop) this.unsent = stop;
     });
   }
 
@@ -35,7 +36,7 @@ export class Control extends EventTarget {
   act(what, more = {}) {
     const act = {client: this.#client, id: this.#next++, do: what, ...more};
     const sent = this.feed.send(JSON.stringify(act));
-    this.unsent = sent ? undefined : act;
+    if (what === 'stop' || this.unsent?.do !== 'stop') this.unsent = sent ? undefined : act;
     if (!sent) {
       this.dispatchEvent(new Event('change'));
       return 0;
