@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/optional_ports.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
@@ -513,6 +514,16 @@ void HwBridge::Actuate(const Tick& tick) {
 }
 
 ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
+  // AddPorts says why.
+  AddOptionalPort({.component = "hw_bridge",
+                   .port = "drive_feedback",
+                   .type = MessageTraits<drive_feedback_t>::kName,
+                   .unless = {"hw_bridge.unitree.follow_robot"},
+                   .input = true});
+  AddOptionalPort({.component = "hw_bridge",
+                   .port = "bus_status",
+                   .type = MessageTraits<bus_status_t>::kName,
+                   .when = {"hw_bridge.ethercat", "hw_bridge.unitree"}});
   return {"hw_bridge",
           "drives and sensors: units, limits, safety states, e-stop",
           [stop_signal] { return std::make_unique<HwBridge>(stop_signal); },
@@ -529,8 +540,10 @@ ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
                            {.group = "hw_bridge.unitree",
                             .simulated_time = "hw_bridge.unitree.simulated_time",
                             .tag = "hw_bridge.unitree.link.tag"}}},
-          // With EtherCAT there is one more, bus_status: known once it is configured.
-          {},
+          {Reads<joint_command_t>("joint_command"),
+           Reads<emergency_stop_t>("emergency_stop", InputKind::kLatest),
+           Writes<robot_sensors_t>("robot_sensors"), Writes<drive_command_t>("drive_command"),
+           Writes<bridge_status_t>("bridge_status")},
           HwBridgeConfig::descriptor(),
           hw_bridge_proto_schema};
 }

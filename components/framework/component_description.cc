@@ -3,7 +3,7 @@
 #include <google/protobuf/descriptor.h>
 
 #include "components/framework/configuration/field_reference.h"
-#include "components/framework/optional_outputs.h"
+#include "components/framework/optional_ports.h"
 
 namespace poise {
 namespace {
@@ -42,9 +42,12 @@ Json DescriptionOf(const ComponentType& type) {
     if (port.input) entry["kind"] = KindName(port.kind);
     description[port.input ? "inputs" : "outputs"].push_back(entry);
   }
-  for (const OptionalOutput& output : OptionalOutputsOf(type.name)) {
-    description["outputs"].push_back(
-        {{"name", output.port}, {"type", output.type}, {"when", output.when}});
+  for (const OptionalPort& port : OptionalPortsOf(type.name)) {
+    Json entry = {{"name", port.port}, {"type", port.type}};
+    if (port.input) entry["kind"] = KindName(port.kind);
+    if (!port.when.empty()) entry["when"] = port.when;
+    if (!port.unless.empty()) entry["unless"] = port.unless;
+    description[port.input ? "inputs" : "outputs"].push_back(entry);
   }
   if (type.config != nullptr) description["configuration"] = type.config->full_name();
   description["settings"] = Json::array();

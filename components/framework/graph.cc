@@ -9,7 +9,7 @@
 #include "components/framework/graph_order.h"
 #include "components/framework/modules.h"
 #include "components/framework/operator_acts.h"
-#include "components/framework/optional_outputs.h"
+#include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 
@@ -217,6 +217,10 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
                                                 "on timing",
                                                 channel.name()))});
     }
+    for (const OptionalPort& port : OptionalPortsOf(TypeOf(instance))) {
+      const bool named = std::find(names.begin(), names.end(), port.port) != names.end();
+      if (port.input == is_input && !named) names.push_back(port.port);
+    }
     for (int k = 0; k < connections.size(); ++k) {
       if (std::find(names.begin(), names.end(), connections[k].port()) != names.end()) continue;
       // An operator's acts reach who takes them: in such a place another type may stand.
@@ -230,14 +234,16 @@ void CheckPorts(const Graph& graph, int component, const std::vector<PortType>& 
   }
 }
 
-/// The declared ports, with those outputs that not every run has where `has` says so of their name.
+/// The declared ports, with those that not every run has where `has` says so.
 template <class Has>
 std::vector<PortType> WithOptional(const std::string& component, std::vector<PortType> declared,
                                    const Has& has) {
-  for (const OptionalOutput& output : OptionalOutputsOf(component)) {
-    const bool declares = std::ranges::any_of(
-        declared, [&](const PortType& port) { return !port.input && port.name == output.port; });
-    if (!declares && has(output.port)) declared.push_back({output.port, output.type, false});
+  for (const OptionalPort& optional : OptionalPortsOf(component)) {
+    const bool declares = std::ranges::any_of(declared, [&](const PortType& port) {
+      return port.input == optional.input && port.name == optional.port;
+    });
+    if (declares || !has(optional)) continue;
+    declared.push_back({optional.port, optional.type, optional.input, optional.kind});
   }
   return declared;
 }
@@ -258,13 +264,15 @@ void CheckDeclared(const Graph& graph, int component, const std::vector<PortType
     std::sort(lines.begin(), lines.end());
     return fmt::format("{}", fmt::join(lines, ", "));
   };
-  const auto writes = [&](const std::string& port) {
-    return std::ranges::any_of(wiring.outputs(),
-                               [&](const OutputPort* output) { return output->name() == port; });
+  const std::vector<PortType> ports = PortsOf(wiring);
+  const auto has = [&](const OptionalPort& optional) {
+    return std::ranges::any_of(ports, [&](const PortType& port) {
+      return port.input == optional.input && port.name == optional.port;
+    });
   };
   const std::string says =
-      describe(WithOptional(TypeOf(graph.component(component)), declared, writes));
-  const std::string is = describe(PortsOf(wiring));
+      describe(WithOptional(TypeOf(graph.component(component)), declared, has));
+  const std::string is = describe(ports);
   if (says == is) return;
   problems->push_back(
       {fmt::format("component[{}]", component),
@@ -435,8 +443,9 @@ void CheckGraph(const Graph& graph, const ComponentRegistry& registry) {
   for (int i = 0; i < graph.component_size(); ++i) {
     const ComponentType* const type = registry.TypeNamed(TypeOf(graph.component(i)));
     if (type == nullptr || type->ports.empty()) continue;
-    const auto connected = [&](const std::string& port) {
-      return FindConnection(graph.component(i).output(), port) >= 0;
+    const auto connected = [&](const OptionalPort& port) {
+      const ComponentInstance& instance = graph.component(i);
+      return FindConnection(port.input ? instance.input() : instance.output(), port.port) >= 0;
     };
     CheckPorts(graph, i, WithOptional(type->name, type->ports, connected), &problems);
   }

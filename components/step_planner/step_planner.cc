@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "components/balance/support_polygon.h"
-#include "components/framework/optional_outputs.h"
+#include "components/framework/optional_ports.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
@@ -475,10 +475,11 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
 }
 
 ComponentType StepPlannerType() {
-  AddOptionalOutput({"step_planner",
-                     "footsteps",
-                     MessageTraits<::steps::footsteps_t>::kName,
-                     {"step_planner.recovery.enabled", "step_planner.walk.enabled"}});
+  AddOptionalPort({.component = "step_planner",
+                   .port = "footsteps",
+                   .type = MessageTraits<::steps::footsteps_t>::kName,
+                   .when = {"step_planner.recovery.enabled", "step_planner.walk.enabled"},
+                   .brings_channel = true});
   return {
       "step_planner",
       "which feet carry, and where COM, body and feet go: phases, capture point",

@@ -92,8 +92,14 @@ void SetRotation(const RotationMotion& motion, balance::TaskTarget* target) {
 
 balance::TaskGains ReadGains(const Gains& gains, const std::string& field, bool has_position) {
   const auto check = [&](bool has, double value, const char* name) {
-    if (!has || !(value > 0) || !std::isfinite(value)) {
-      throw ConfigError(fmt::format("{}.{}", field, name), "must be a positive number");
+    const std::string path = fmt::format("{}.{}", field, name);
+    if (!has) {
+      throw ConfigError(path, fmt::format("is not set, but {0} is: set all of its gains, or none, "
+                                          "which then follow from the robot",
+                                          field));
+    }
+    if (!(value > 0) || !std::isfinite(value)) {
+      throw ConfigError(path, "must be a positive number");
     }
   };
   if (has_position) {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "components/framework/optional_outputs.h"
+#include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
 #include "tests/framework/toy_components.h"
 
@@ -384,17 +384,29 @@ TEST_F(DeclaredPortsTest, AreWhatTheComponentIs) {
 }
 
 // Another type's: a graph may have it or not, but the component must be as the graph says.
-TEST_F(DeclaredPortsTest, AnOutputThatNotEveryRunHasMayBeThere) {
+TEST_F(DeclaredPortsTest, APortThatNotEveryRunHasMayBeThere) {
   std::vector<PortType> ports = Right();
   const PortType output = ports.back();
   ASSERT_FALSE(output.input);
   ports.pop_back();
   EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("does not exist; it has"));
-  AddOptionalOutput({"toy_filter", output.name, output.type, {"toy.enabled"}});
+  AddOptionalPort({"toy_filter", output.name, output.type, {"toy.enabled"}});
   EXPECT_EQ(ProblemsWith(ports, false), "");
   EXPECT_EQ(ProblemsWith(ports, true), "");
-  AddOptionalOutput({"toy_filter", "more", output.type, {"toy.enabled"}});
+  AddOptionalPort({"toy_filter", "more", output.type, {"toy.enabled"}});
   EXPECT_EQ(ProblemsWith(ports, true), "");
+  ports = Right();
+  const PortType input = ports.front();
+  ASSERT_TRUE(input.input);
+  ports.erase(ports.begin());
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("does not exist; it has"));
+  AddOptionalPort({"toy_filter", input.name, "health_t", {}, {"toy.follows"}, true, input.kind});
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("carries health_t, but channel"));
+  EXPECT_THAT(ProblemsWith(ports, true), HasSubstr("carries health_t, but channel"));
+  // Whoever mistypes the name is told of it, though this graph does not connect it.
+  graph_.mutable_component(1)->mutable_output(0)->set_port("mroe");
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("'mroe' does not exist; it has: "));
+  EXPECT_THAT(ProblemsWith(ports, false), HasSubstr("more"));
 }
 
 }  // namespace

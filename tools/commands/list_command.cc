@@ -5,6 +5,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/optional_ports.h"
 #include "components/robot_files/robot.pb.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
@@ -156,12 +157,22 @@ int ListComponent(const std::string& name) {
         fmt::format("there is no component '{}'; {}", name, Suggest(name, std::move(names))));
   }
   fmt::print("{}: {}\n", type->name, type->summary);
-  for (const PortType& port : type->ports) {
-    const char* const kind = port.kind == InputKind::kPreviousTick ? ", of the tick before"
-                             : port.kind == InputKind::kLatest     ? ", the latest"
-                                                                   : "";
-    fmt::print("  {:<7} {:<18} {}{}\n", port.input ? "input" : "output", port.name, port.type,
-               kind);
+  const auto print = [](bool input, const std::string& port, const std::string& carried,
+                        InputKind kind, const std::string& where) {
+    const char* const when = kind == InputKind::kPreviousTick ? ", of the tick before"
+                             : kind == InputKind::kLatest     ? ", the latest"
+                                                              : "";
+    fmt::print("{}\n", Wrapped(fmt::format("  {:<7} {:<18} {}{}{}{}", input ? "input" : "output",
+                                           port, carried, when, where.empty() ? "" : ", ", where),
+                               ScreenStyle().columns, 29));
+  };
+  for (const bool input : {true, false}) {
+    for (const PortType& port : type->ports) {
+      if (port.input == input) print(input, port.name, port.type, port.kind, "");
+    }
+    for (const OptionalPort& port : OptionalPortsOf(type->name)) {
+      if (port.input == input) print(input, port.port, port.type, port.kind, WhereText(port));
+    }
   }
   if (type->config == nullptr || type->schema == nullptr) return kExitOk;
   AddSchema(type->schema());
@@ -216,11 +227,10 @@ int List(const ListRequest& request) {
     });
   }
   if (wanted("robots")) {
-    ListFiles("robots",
-              [](const std::string& file) {
-                const Robot robot = ReadMessage<Robot>(file);
-                return robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf();
-              });
+    ListFiles("robots", [](const std::string& file) {
+      const Robot robot = ReadMessage<Robot>(file);
+      return robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf();
+    });
   }
   if (wanted("graphs")) {
     ListFiles("graphs", [](const std::string& file) {
@@ -232,10 +242,11 @@ int List(const ListRequest& request) {
   if (wanted("components")) {
     for (const auto& [type, entry] : Components().entries()) {
       const std::vector<std::string>& sections = entry.traits.sections;
-      fmt::print("  {:<24}{}{}\n", type, entry.summary,
-                 sections.empty()
-                     ? ""
-                     : fmt::format(" (the scenario's fields {})", fmt::join(sections, " and ")));
+      const std::string fields =
+          sections.empty() ? ""
+                           : fmt::format(" (the scenario's fields {})", fmt::join(sections, " and "));
+      fmt::print("{}\n", Wrapped(fmt::format("  {:<24}{}{}", type, entry.summary, fields),
+                                 ScreenStyle().columns, 26));
     }
   }
   if (wanted("runs")) ListRuns();

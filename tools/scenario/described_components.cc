@@ -33,6 +33,15 @@ ComponentType ReadDescription(const fs::path& file) {
   try {
     const Json json = Json::parse(ReadFile(file.string()));
     std::vector<PortType> ports;
+    for (const char* const side : {"inputs", "outputs"}) {
+      for (const Json& port : json.value(side, Json::array())) {
+        if (!port.contains("when") && !port.contains("unless")) continue;
+        throw ConfigError(fmt::format(
+            "its port {} is not in every run, which a component of a program of one's own cannot "
+            "have; leave \"when\" and \"unless\" out",
+            port.value("name", "")));
+      }
+    }
     for (const Json& port : json.value("inputs", Json::array())) {
       ports.push_back({port.at("name"), port.at("type"), true, KindOf(port.at("kind"))});
     }

@@ -15,7 +15,7 @@
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
-#include "components/framework/optional_outputs.h"
+#include "components/framework/optional_ports.h"
 #include "components/framework/run.h"
 #include "components/robot_files/robot.pb.h"
 #include "components/robot_files/robot_files.h"
@@ -99,16 +99,21 @@ std::string ScenarioPath(const std::string& type, const std::string& field) {
   return field.empty() ? sections[0] : sections[0] + "." + field;
 }
 
-/// Whether a setting, "step_planner.walk.enabled", is there and true.
+/// Whether a setting, "step_planner.walk.enabled", is true, or a group is set.
 bool IsTrue(const google::protobuf::Message& message, const std::string& path) {
   const size_t dot = path.find('.');
   const FieldDescriptor* field = FindField(*message.GetDescriptor(), path.substr(0, dot));
   if (field == nullptr || field->is_repeated()) return false;
   const google::protobuf::Reflection& reflection = *message.GetReflection();
   if (dot == std::string::npos) {
-    return field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL && reflection.GetBool(message, field);
+    return field->cpp_type() == FieldDescriptor::CPPTYPE_BOOL ? reflection.GetBool(message, field)
+           : field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE
+               ? reflection.HasField(message, field)
+               : false;
   }
+  // A group that is not set has no settings, whatever their defaults are.
   return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE &&
+         reflection.HasField(message, field) &&
          IsTrue(reflection.GetMessage(message, field), path.substr(dot + 1));
 }
 
@@ -119,9 +124,9 @@ std::string InCapitals(std::string name) {
 
 /// Gives the outputs that not every run has a channel, or takes it away.
 void ConnectWhere(const Scenario& scenario, ComponentInstance* instance, Graph* graph) {
-  for (const OptionalOutput& optional : OptionalOutputsOf(TypeOf(*instance))) {
-    const bool wanted = std::ranges::any_of(
-        optional.when, [&](const std::string& path) { return IsTrue(scenario, path); });
+  for (const OptionalPort& optional : OptionalPortsOf(TypeOf(*instance))) {
+    if (!optional.brings_channel) continue;
+    const bool wanted = IsThere(optional, scenario);
     const auto& outputs = instance->output();
     const auto& channels = graph->channel();
     const auto channel_named = [&](const std::string& name) {
@@ -274,6 +279,12 @@ bool PortsFree(int first, int count) {
 }
 
 }  // namespace
+
+bool IsThere(const OptionalPort& port, const Scenario& scenario) {
+  const auto is_true = [&](const std::string& path) { return IsTrue(scenario, path); };
+  return (port.when.empty() || std::ranges::any_of(port.when, is_true)) &&
+         std::ranges::none_of(port.unless, is_true);
+}
 
 std::string EngineOfField(const std::string& field) {
   const std::string section = field.substr(0, field.find_first_of(".[="));

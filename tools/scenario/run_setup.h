@@ -6,6 +6,7 @@
 
 #include "components/framework/graph.h"
 #include "components/framework/graph.pb.h"
+#include "components/framework/optional_ports.h"
 #include "tools/scenario/scenario_loading.h"
 
 namespace poise {
@@ -27,12 +28,15 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec);
 /// The lines that CheckRun would throw for a graph on its own, without a scenario.
 void CheckGraphFile(const std::string& path);
 
+/// Whether a run of the scenario has the port.
+bool IsThere(const OptionalPort& port, const Scenario& scenario);
+
 /// Changes one field of the components' configurations in a run, "task_controller.com.kp=200".
 /// Throws ConfigError.
 void ChangeConfiguration(const std::string& change, RunSpec* spec);
 
-/// Whether a component is at one of the ends of what passes between a bridge and drives, which no log
-/// holds.
+/// Whether a component is at one of the ends of what passes between a bridge and drives, which no
+/// log holds.
 bool SpeaksToDrives(const RunSpec& spec, int component);
 
 /// A block of free UDP ports for the run's channels. Throws ConfigError when none is found.
