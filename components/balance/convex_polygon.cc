@@ -1,5 +1,6 @@
 #include "components/balance/convex_polygon.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
