@@ -1,5 +1,6 @@
 #include "components/balance/convex_polygon.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -166,7 +167,8 @@ ConvexPolygon Clip(const ConvexPolygon& polygon, const HalfPlane& plane) {
 ConvexPolygon Inset(const ConvexPolygon& polygon, double margin) {
   ConvexPolygon rest = polygon.num_corners < 3 ? ConvexPolygon() : polygon;
   if (margin == 0) return rest;
-  for (HalfPlane plane : EdgesOf(polygon).planes()) {
+  const HalfPlanes edges = EdgesOf(polygon);
+  for (HalfPlane plane : edges.planes()) {
     plane.offset -= margin;
     rest = Clip(rest, plane);
   }

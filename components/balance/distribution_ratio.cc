@@ -297,7 +297,8 @@ void MoveIntoSoles(const std::array<Eigen::Isometry3d, 2>& foot,
   const Eigen::Matrix2d follows =
       wrench[light](2) / wrench[heavy](2) * turn * to_heavy.topLeftCorner<2, 2>() * turn;
   ConvexPolygon both = sole[light];  // where the lighter's may be so that the heavier's is inside
-  for (const HalfPlane& edge : EdgesOf(sole[heavy]).planes()) {
+  const HalfPlanes edges = EdgesOf(sole[heavy]);
+  for (const HalfPlane& edge : edges.planes()) {
     const Eigen::Vector2d normal = follows.transpose() * edge.normal;
     const double norm = normal.norm();
     if (!(norm > 0)) continue;

@@ -107,8 +107,8 @@ ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotMo
   const robot::FootModel &right = model.feet()[0], &left = model.feet()[1];
   if (!right.rectangular() || !left.rectangular()) {
     balance::ConvexPolygon common = balance::SolePolygon(right, margin);
-    for (const balance::HalfPlane& edge :
-         balance::EdgesOf(balance::SolePolygon(left, margin)).planes()) {
+    const balance::HalfPlanes edges = balance::EdgesOf(balance::SolePolygon(left, margin));
+    for (const balance::HalfPlane& edge : edges.planes()) {
       common = balance::Clip(common, edge);
     }
     const Eigen::Vector2d half = balance::LargestRectangle(

@@ -149,7 +149,8 @@ TEST_F(OutputPlaceTest, FieldsAreNamedByWhatTheyLimit) {
   ExpectUsageError({"run", StandScenario(), "--set", "sim.push.peak=100"},
                    {"write sim.push[0].peak"});
   EXPECT_EQ(RunPoise(Run({"--inline", "--set", check + ".at_most=7"})).exit_code, 0);
-  for (const nlohmann::json& row : ReadSummary(run_)["checks"]) {
+  const nlohmann::json checks = ReadSummary(run_)["checks"];
+  for (const nlohmann::json& row : checks) {
     if (row["name"] != "violated_ticks") continue;
     EXPECT_EQ(row["at_most"], 7);
   }

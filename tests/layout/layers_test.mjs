@@ -118,3 +118,15 @@ test('no folder holds more than some thirty files', () => {
   assert.ok(counts.size > 40, `${counts.size} folders found`);
   assert.deepEqual([...counts].filter(([, count]) => count > 32), []);
 });
+
+// C++20 destroys what f() returned before the loop's first turn when a view of it is gone through: for (x : f().corners()).
+const DANGLING = /\bfor \([^;()]*:\s*[\w:]+\([^;]*?\)\.(?:mutable_)?(?:corners|planes)\(\)\)/g;
+
+test('no loop goes through a view of what is gone', () => {
+  const all = repositoryFiles().filter((f) => /\.(h|cc)$/.test(f));
+  assert.ok(all.length > 500, `${all.length} files found`);
+  const found = all.flatMap((f) => [...readFileSync(join(root, f), 'utf8').matchAll(DANGLING)].map(([loop]) => `${f}: ${loop}`));
+  assert.deepEqual(found, []);
+  assert.match('for (HalfPlane plane : EdgesOf(sole[1]).planes()) {', DANGLING);
+  assert.doesNotMatch('for (HalfPlane plane : edges.planes()) {', new RegExp(DANGLING.source));
+});

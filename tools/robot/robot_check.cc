@@ -140,7 +140,8 @@ void FindSoles(RobotCheck* check) {
 double DistanceToEdge(const balance::ConvexPolygon& polygon, const Vector2d& point,
                       const Vector2d& along) {
   double least = HUGE_VAL;
-  for (const balance::HalfPlane& edge : balance::EdgesOf(polygon).planes()) {
+  const balance::HalfPlanes edges = balance::EdgesOf(polygon);
+  for (const balance::HalfPlane& edge : edges.planes()) {
     const double rate = edge.normal.dot(along);
     if (rate > 0) least = std::min(least, (edge.offset - edge.normal.dot(point)) / rate);
   }

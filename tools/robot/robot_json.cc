@@ -56,7 +56,8 @@ Json RobotJson(const robot::RobotModel& model, const RobotDrawing& drawing) {
   json["feet"] = Json::array();
   for (const robot::FootModel& foot : model.feet()) {
     Json corners = Json::array();
-    for (const Eigen::Vector2d& corner : balance::SolePolygon(foot, 0).corners()) {
+    const balance::ConvexPolygon sole = balance::SolePolygon(foot, 0);
+    for (const Eigen::Vector2d& corner : sole.corners()) {
       corners.push_back({corner.x(), corner.y()});
     }
     json["feet"].push_back({{"name", foot.name},

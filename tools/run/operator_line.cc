@@ -16,6 +16,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "logging/metrics/operator_words.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -44,16 +45,9 @@ std::string Why(const answer_t& answer, const LiveField* field) {
   switch (answer.verdict) {
     case answer_t::VERDICT_LATE:
       return "the run goes so fast that each try came too late; try again, or run with --realtime";
-    case answer_t::VERDICT_FAR:
-      return "its tick is too far ahead";
-    case answer_t::VERDICT_FULL:
-      return "too many acts wait already";
-    case answer_t::VERDICT_UNKNOWN:
-      return "the component does not know it";
     case answer_t::VERDICT_RANGE:
-      return field == nullptr ? "a number is out of range"
-                              : fmt::format("is outside {:.6g} to {:.6g} {}", field->least,
-                                            field->most, field->unit);
+      if (field == nullptr) break;
+      return fmt::format("is outside {:.6g} to {:.6g} {}", field->least, field->most, field->unit);
     case answer_t::VERDICT_NOT_ABLE:
       return answer.kind == act_t::KIND_STAND
                  ? "this run's step_planner does not step; its scenario needs "
@@ -65,8 +59,9 @@ std::string Why(const answer_t& answer, const LiveField* field) {
                  ? "the robot does not stand still on both feet; try again when it does"
                  : "nothing follows this phase, or its moves are not over; try again later";
     default:
-      return fmt::format("refused ({})", static_cast<int>(answer.verdict));
+      break;
   }
+  return logging::RefusalReason(answer.verdict);
 }
 
 }  // namespace

@@ -179,7 +179,8 @@ Reach::Reach(const robot::RobotModel& model, double height, double lower, double
   least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
   double front = 0, rear = 0;
   for (const robot::FootModel& foot : model.feet()) {
-    for (const Vector2d& corner : balance::SolePolygon(foot, 0).corners()) {
+    const balance::ConvexPolygon sole = balance::SolePolygon(foot, 0);
+    for (const Vector2d& corner : sole.corners()) {
       front = std::max(front, corner.x());
       rear = std::max(rear, -corner.x());
     }

@@ -98,7 +98,8 @@ bool Recovery::Update(const StepInput& input) {
           steps_now_ < spec_.max_steps) {
         BeginStep(input, choice_.Choose(state), StepReason::kAgain);
       } else if (const int foot = FootToBring(state); foot >= 0 && steps_now_ < spec_.max_steps) {
-        BeginStep(input, choice_.Plan(state, foot), StepReason::kTogether);
+        BeginStep(input, choice_.Beside(state, foot, kGently + spec_.together_swing),
+                  StepReason::kTogether);
       } else if (AtRest(input, state)) {
         stage_ = Stage::kIdle;
         const bool caught = reason_ != StepReason::kTogether;

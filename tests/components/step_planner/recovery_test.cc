@@ -34,7 +34,7 @@ StepLimits Limits(const robot::RobotModel& model, const Reach& reach) {
   return limits;
 }
 
-RecoverySpec Spec() {
+RecoverySpec Spec(double far) {
   RecoverySpec spec;
   spec.sure = 0.03;
   spec.reserve = 0.03;
@@ -51,7 +51,7 @@ RecoverySpec Spec() {
   spec.rest_distance = 0.03;
   spec.rest_speed = 0.06;
   spec.rest_time = 0.3;
-  spec.far = 2;  // never while it catches
+  spec.far = far;
   spec.together_shift = 1.5;
   spec.together_swing = 0.7;
   return spec;
@@ -59,14 +59,15 @@ RecoverySpec Spec() {
 
 class World {
  public:
-  World(TestRobot robot, double ground_there = 0)
+  /// `far`: 2: feet far apart are left where they are.
+  World(TestRobot robot, double ground_there = 0, double far = 2)
       : model_(robot::LoadTestRobot(robot)),
         height_(robot::StandingHeight(model_)),
         spacing_(robot::StandingSpacing(model_)),
         reach_(model_, height_, 0.08 * height_, 0.1, 0.02),
         ground_there_(ground_there) {
     StepChoice choice(model_, reach_, Limits(model_, reach_));
-    recovery_ = Recovery(choice, Spec());
+    recovery_ = Recovery(choice, Spec(far));
     com_ = {0, 0, height_};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing_ : 0.5 * spacing_, 0) *
@@ -349,6 +350,29 @@ TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
     world.Run(3);
     EXPECT_EQ(world.recovery().num_steps(), steps + 1);
   }
+}
+
+// The feet are too far apart to rest: the one behind comes beside the other one, no faster than the
+// hips can swing it.
+TEST_P(RecoveryCase, AFootFarBehindIsBroughtAsFastAsTheHipsCan) {
+  World world(GetParam(), 0, 0.5);
+  world.Push({1.25 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
+  double largest = 0;
+  int swings = 0;
+  for (int tick = 0; tick < 4000; ++tick) {
+    world.Tick();
+    const Recovery& recovery = world.recovery();
+    if (recovery.stage() != Stage::kSwinging || recovery.reason() != StepReason::kTogether)
+      continue;
+    ++swings;
+    largest = std::max(largest, recovery.output().swing.acceleration.head<2>().norm());
+  }
+  EXPECT_GT(swings, 0);
+  EXPECT_LT(largest, 1.05 * world.recovery().choice().limits().acceleration);
+  EXPECT_TRUE(world.Rests());
+  const Vector3d apart = world.soles()[1].translation() - world.soles()[0].translation();
+  EXPECT_NEAR(apart.x(), 0, 0.03);
+  EXPECT_GT(world.nearest(), 0.01);
 }
 
 // The ground is 3 cm higher or 4 cm lower than the stance sole: the load says where it is.
