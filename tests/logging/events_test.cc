@@ -444,7 +444,7 @@ TEST_F(EventsTest, AnAnswerThatIsNotOfThisRunOrTellsNoTickOfItIsNone) {
   answer_t other = Answered(1, 10, 0, answer_t::VERDICT_RANGE);
   other.run_id += 1;
   answers_ = {other, Answered(2, -5, 0, answer_t::VERDICT_RANGE),
-              Answered(3, int64_t{1} << 60, 0, answer_t::VERDICT_RANGE)};
+              Answered(3, int64_t{1} << 50, 0, answer_t::VERDICT_RANGE)};
   EXPECT_TRUE(Named("act_refused").empty());
 }
 
