@@ -32,6 +32,9 @@ constexpr double kAcrossShare = 0.65;
 constexpr double kWaitShare = 0.15;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
+/// Of the smaller sole's inner radius, that unloading puts the soles' own centres of pressure off
+/// their middles: on soft ground a sole rolls by as much. Chosen.
+constexpr double kLeadShare = 0.13;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
 
 double LeastInnerRadius(const robot::RobotModel& model) {
@@ -183,6 +186,7 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
   spec.place_shift = config.place_shift();
   spec.patience = config.patience();
   spec.roll_damping = config.roll_damping() / (robot::kGravity * model.total_mass());
+  spec.lead = kLeadShare * LeastInnerRadius(model);
   spec.give_up = config.give_up();
   spec.most_tilt = config.most_tilt();
   for (const KnownGroundConfig& edge : config.ground()) {

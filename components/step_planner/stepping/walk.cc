@@ -24,6 +24,7 @@ constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge
 constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
 constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
+constexpr double kSlowest = 0.1;        // of the unloading's rate, however far the centre of pressure is
 constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
@@ -42,6 +43,7 @@ Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
       touch_(spec.touch_load, spec.touch_duration),
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
+      pressed_(spec.height_rate),
       ramp_start_(RampStart(spec.press_share)) {}
 
 double RampStart(double share) {
@@ -54,6 +56,7 @@ double RampStart(double share) {
 }
 
 void Walk::Enter(WalkStage stage, double time) {
+  if (stage == WalkStage::kUnloading) unloaded_ = 0;
   stage_ = stage;
   since_ = time;
 }
@@ -75,6 +78,7 @@ Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
 
 bool Walk::LiftsOff(const StepState& state, double time) const {
   if (time < since_ + spec_.unload - kTimeTolerance) return false;
+  if (spec_.rests && unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
   return !spec_.rests || off.norm() < spec_.off_center;
 }
@@ -109,6 +113,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
       break;
     case WalkStage::kUnloading:
+      Unload(state, std::clamp(time - time_, 0.0, kLongestTick));
       if (LiftsOff(state, time)) BeginSwing(input);
       break;
     case WalkStage::kSwinging:
@@ -185,6 +190,7 @@ void Walk::BeginSwing(const StepInput& input) {
   in_contact_[foot] = false;
   starting_ = false;
   touch_down_ = input.time + spec_.swing;
+  pressed_.Begin(0);
   attempt_ = 0;
   first_ = foothold_;
   home_ = {input.sole[foot].translation().head<2>(), Yaw(input.sole[foot])};
@@ -408,9 +414,21 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
 
 double Walk::Progress(double time) const {
   const double past = time - since_;
-  if (stage_ == WalkStage::kUnloading) return std::clamp(past / spec_.unload, 0.0, 1.0);
+  if (stage_ == WalkStage::kUnloading) {
+    return spec_.rests ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
+  }
   // From what the press carries.
   return std::clamp(ramp_start_ + (1 - ramp_start_) * past / spec_.load, 0.0, 1.0);
+}
+
+void Walk::Unload(const StepState& state, double period) {
+  const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
+  const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
+  // Of the way, how far the centre of pressure still is from the sole that shall carry.
+  const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
+  const double share = spec_.lead < left * way.norm() ? spec_.lead / (left * way.norm()) : 1;
+  const double step = period / spec_.unload, most = share < 1 ? RampStart(share) : 1;
+  unloaded_ = std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowest * step, step));
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
@@ -440,15 +458,22 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
 
 CapturePlan::Point Walk::Resting(const StepState& state, double time) const {
   const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
-  if (OnOneFoot()) return {stance, stance};
   const Vector2d& other = state.sole[static_cast<size_t>(1 - stance_)];
+  const double w = state.pendulum.frequency;
+  const double pressed = pressed_.point().position, pressing = pressed_.point().velocity;
+  if (OnOneFoot()) {
+    const Vector2d point = stance + pressed * (other - stance);
+    return {point, point - pressing / w * (other - stance)};
+  }
   const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
   // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, beyond the next middle at last.
   const double s = std::clamp((time - double_since_) / Transfer(), 0.0, 1.0);
-  const double share = s * s * s * (10 + s * (-15 + 6 * s));
-  const double rate = 30 * s * s * (1 - s) * (1 - s) / Transfer();
+  const double gone = s * s * s * (10 + s * (-15 + 6 * s));
+  const double going = 30 * s * s * (1 - s) * (1 - s) / Transfer();
+  const double share = pressed + (1 - pressed) * gone;
+  const double rate = pressing * (1 - gone) + (1 - pressed) * going;
   const Vector2d point = other + share * way;
-  return {point, point - rate / state.pendulum.frequency * way};
+  return {point, point - rate / w * way};
 }
 
 Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
@@ -531,6 +556,10 @@ Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double
 
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
+  const bool presses = stage_ == WalkStage::kTouching;
+  const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
+  pressed_.Follow(share * spec_.press_share, period);
   const auto s = static_cast<size_t>(stance_);
   // Above the lower foot: a straight leg reaches no farther down.
   double ground = input.sole[s].translation().z();
@@ -567,9 +596,10 @@ void Walk::Archive(StateArchive* archive) {
   touch_.Archive(archive);
   height_.Archive(archive);
   body_yaw_.Archive(archive);
+  pressed_.Archive(archive);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
-  archive->Show(lowered_, attempt_, num_left_, first_.position, first_.yaw, home_.position,
+  archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw, home_.position,
                 home_.yaw);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);

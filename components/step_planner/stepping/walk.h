@@ -46,6 +46,9 @@ struct WalkSpec {
   KnownGround ground;
   /// m of the centre of pressure for each rad/s with which the sole that carries turns.
   double roll_damping = 0;
+  /// m by which the load of a foot that rests may leave it sooner than the centre of pressure does:
+  /// what each sole's own is off its middle then.
+  double lead = 0;
   double give_up = 0;  ///< m beyond the sole that carries, from which another planner may step
 
   /// s from touch-down to touch-down.
@@ -138,6 +141,8 @@ class Walk {
   double GroundAt(const StepInput& input, const Footstep& foothold) const;
   /// Of the ramp that is under way, 0 to 1.
   double Progress(double time) const;
+  /// The unloading ramp, in a walk that rests, no sooner than the centre of pressure goes over.
+  void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
     return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
@@ -177,9 +182,11 @@ class Walk {
   Swing swing_;
   TouchTimer touch_;
   HeightLead height_, body_yaw_;
+  HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
   double settled_since_ = 0;                        // s: pressed down
+  double unloaded_ = 0;                              // of the unloading ramp, where it rests
   double ramp_start_ = 0;                           // of the loading ramp: what the press carries
   double standing_height_ = 0;                      // m
   bool lowered_ = false;            // stopped while it walked: it has not stood up since
