@@ -24,8 +24,10 @@ constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge
 constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
 constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
-constexpr double kSlowest = 0.1;        // of the unloading's rate, however far the centre of pressure is
-constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
+// Of the unloading's rate: however far the centre of pressure is, and to come up with it. Chosen: a
+// foot that carries nothing and is a contact of the model still was dragged off its place.
+constexpr double kSlowest = 0.1, kFastest = 3;
+constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
@@ -44,6 +46,7 @@ Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
       pressed_(spec.height_rate),
+      sole_{PressedSole(choice.foot(0)), PressedSole(choice.foot(1))},
       ramp_start_(RampStart(spec.press_share)) {}
 
 double RampStart(double share) {
@@ -77,7 +80,7 @@ Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
 }
 
 bool Walk::LiftsOff(const StepState& state, double time) const {
-  if (time < since_ + spec_.unload - kTimeTolerance) return false;
+  if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
   if (spec_.rests && unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
   return !spec_.rests || off.norm() < spec_.off_center;
@@ -121,6 +124,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
         touch_.Reset();
       } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
         settled_since_ = time;
+        sole_[static_cast<size_t>(1 - stance_)].Touch(input.sole[static_cast<size_t>(1 - stance_)]);
         Enter(WalkStage::kTouching, time);
       } else if (Leaves(input, false)) {
         Retreat(input, state);
@@ -134,7 +138,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       }
       break;
     case WalkStage::kLoading:
-      if (time < since_ + spec_.load - kTimeTolerance) break;
+      if (time < since_ + slower_ * spec_.load - kTimeTolerance) break;
       moving_since_ = time;
       Enter(final_ ? WalkStage::kStopping : WalkStage::kUnloading, time);
       break;
@@ -161,6 +165,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
   stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
   in_contact_ = {true, true};
+  sinks_ = {0, 0};
+  slower_ = 1;
   if (!lowered_) standing_height_ = input.com_height - input.sole[0].translation().z();
   lowered_ = false;
   height_.Begin(input.com_height);
@@ -296,6 +302,12 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   ++num_steps_;
   in_contact_ = {true, true};
   from_cop_ = wanted_.cop;
+  const auto foot = static_cast<size_t>(1 - stance_);
+  sinks_[foot] =
+      std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
+               spec_.most_sinking);
+  const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
+  slower_ = spec_.rests && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
   way_ = Next(way_, 1 - stance_);
   stance_ = 1 - stance_;
   double_since_ = input.time;
@@ -418,7 +430,7 @@ double Walk::Progress(double time) const {
     return spec_.rests ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
   }
   // From what the press carries.
-  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / spec_.load, 0.0, 1.0);
+  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
 }
 
 void Walk::Unload(const StepState& state, double period) {
@@ -427,8 +439,9 @@ void Walk::Unload(const StepState& state, double period) {
   // Of the way, how far the centre of pressure still is from the sole that shall carry.
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
   const double share = spec_.lead < left * way.norm() ? spec_.lead / (left * way.norm()) : 1;
-  const double step = period / spec_.unload, most = share < 1 ? RampStart(share) : 1;
-  unloaded_ = std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowest * step, step));
+  const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
+  unloaded_ =
+      std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowest * step, kFastest * step));
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
@@ -563,6 +576,8 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   const auto s = static_cast<size_t>(stance_);
   // Above the lower foot: a straight leg reaches no farther down.
   double ground = input.sole[s].translation().z();
+  // Before it sinks: the leg behind would be stretched.
+  if (spec_.rests) ground -= sinks_[s] * std::clamp(1 - input.load[s] / spec_.weight, 0.0, 1.0);
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
@@ -597,10 +612,12 @@ void Walk::Archive(StateArchive* archive) {
   height_.Archive(archive);
   body_yaw_.Archive(archive);
   pressed_.Archive(archive);
+  for (PressedSole& sole : sole_) sole.Archive(archive);
+  archive->Show(sinks_, slower_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
-  archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw, home_.position,
-                home_.yaw);
+  archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw,
+                home_.position, home_.yaw);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);

@@ -9,6 +9,7 @@
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
+#include "components/step_planner/stepping/pressed_sole.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
 
@@ -49,7 +50,10 @@ struct WalkSpec {
   /// m by which the load of a foot that rests may leave it sooner than the centre of pressure does:
   /// what each sole's own is off its middle then.
   double lead = 0;
-  double give_up = 0;  ///< m beyond the sole that carries, from which another planner may step
+  double weight = 1;        ///< N, of the robot
+  double most_sinking = 0;  ///< m, that a sole where it rests is expected to sink at most
+  double sink_speed = 1;    ///< m/s of its sinking, on average over the ramps: above 0
+  double give_up = 0;       ///< m beyond the sole that carries, from which another planner may step
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -156,7 +160,7 @@ class Walk {
   CapturePlan::Point Resting(const StepState& state, double time) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
-  double Transfer() const { return spec_.load + spec_.unload; }  ///< s
+  double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
   /// Of the plan, from the first piece that is not over; `stance`: the sole that carries.
   void PlanFrom(const StepState& state);
   /// The swing's foothold, moved by what the centre of pressure cannot correct.
@@ -186,12 +190,15 @@ class Walk {
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
   double settled_since_ = 0;                        // s: pressed down
-  double unloaded_ = 0;                              // of the unloading ramp, where it rests
-  double ramp_start_ = 0;                           // of the loading ramp: what the press carries
-  double standing_height_ = 0;                      // m
-  bool lowered_ = false;            // stopped while it walked: it has not stood up since
-  double start_yaw_ = 0;            // rad
-  bool starting_ = false;           // no foot has left the ground yet
+  std::array<PressedSole, 2> sole_;
+  std::array<double, 2> sinks_{0, 0};  // m, expected of each sole under the weight
+  double slower_ = 1;                  // ratio: the ramps, where the sole sinks
+  double unloaded_ = 0;                // of the unloading ramp, where it rests
+  double ramp_start_ = 0;              // of the loading ramp: what the press carries
+  double standing_height_ = 0;         // m
+  bool lowered_ = false;               // stopped while it walked: it has not stood up since
+  double start_yaw_ = 0;               // rad
+  bool starting_ = false;              // no foot has left the ground yet
   bool closing_ = false;            // the step under way comes beside the other foot, the last one
   bool final_ = false;              // it has
   int attempt_ = 0, num_left_ = 0;  // places left: of this step, of all
