@@ -567,6 +567,18 @@ Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double
   return asked;
 }
 
+double Walk::StillSinks(const StepInput& input) {
+  const auto s = static_cast<size_t>(stance_);
+  // A sole that stands on one corner sinks farther than one that lies, under the same load: each
+  // tick's is an upper bound.
+  const double sunk = sole_[s].Sunk(input.sole[s]), load = input.load[s];
+  if (load > spec_.press_load) {
+    sinks_[s] = std::min(sinks_[s], std::max(sunk, ExpectedSinking(sunk, load, spec_.weight)));
+  }
+  const double left = sinks_[s] * std::clamp(1 - load / spec_.weight, 0.0, 1.0);
+  return std::min(left, spec_.most_ahead);
+}
+
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
@@ -577,7 +589,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   // Above the lower foot: a straight leg reaches no farther down.
   double ground = input.sole[s].translation().z();
   // Before it sinks: the leg behind would be stretched.
-  if (spec_.rests) ground -= sinks_[s] * std::clamp(1 - input.load[s] / spec_.weight, 0.0, 1.0);
+  if (spec_.rests) ground -= StillSinks(input);
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;

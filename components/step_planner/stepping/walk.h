@@ -52,6 +52,7 @@ struct WalkSpec {
   double lead = 0;
   double weight = 1;        ///< N, of the robot
   double most_sinking = 0;  ///< m, that a sole where it rests is expected to sink at most
+  double most_ahead = 0;    ///< m, by which the COM goes down at most before its sole does
   double sink_speed = 1;    ///< m/s of its sinking, on average over the ramps: above 0
   double give_up = 0;       ///< m beyond the sole that carries, from which another planner may step
 
@@ -171,6 +172,8 @@ class Walk {
   /// What brakes the sole that carries, m: on soft ground it rolls on a spring, with the ankle's
   /// rotor as its mass, and gravity makes that spring softer yet.
   Eigen::Vector2d AgainstRolling(const StepInput& input) const;
+  /// m, that the stance sole goes down yet under the whole weight, as its load so far lets expect.
+  double StillSinks(const StepInput& input);
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
