@@ -466,7 +466,12 @@ void Simulation::DetectFall() {
   if (fallen_) return;
   const double upright = world_->rotation(model_.body_task_body())(2, 2);
   const double tilt = std::acos(std::clamp(upright, -1.0, 1.0));
-  const double share = truth_.com.z() / start_com_height_;
+  // On blocks, above the lower sole: they lie deeper than the ground, and give way.
+  double ground = 0;
+  if (terrain_.has_field()) {
+    ground = std::min(truth_.foot_pose[0].translation().z(), truth_.foot_pose[1].translation().z());
+  }
+  const double share = (truth_.com.z() - ground) / start_com_height_;
   constexpr size_t kRoom = sizeof end_reason_ - 1;
   if (tilt > fall_tilt_) {
     fallen_ = true;

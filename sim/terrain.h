@@ -33,6 +33,8 @@ class Terrain {
   ContactMaterial material(bool block, size_t corners) const;
   ContactMaterial material(const Surface& surface, size_t corners) const;
 
+  bool has_field() const { return !field_.empty(); }
+
  private:
   void ReadField(const BlockField& field, uint64_t seed);
   /// Of the field's blocks the one at (x, y); −1: none.

@@ -1,6 +1,7 @@
 // Falls, breakdowns, hostile commands, determinism, allocation.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -52,6 +53,22 @@ TEST(Fall, ALimpRobotFalls) {
   for (int i = 0; i < 1000; ++i) simulation.Advance();
   EXPECT_TRUE(Finite(simulation.truth()));
   EXPECT_EQ(simulation.end_reason(), reason);
+}
+
+TEST(Fall, GroundThatGivesWayIsNoFall) {
+  // Blocks of 1 kN/m under each sole: the robot goes down with them by more than 0.3 of its height.
+  SimConfig config = StandingConfig(
+      "block_field { start: -2 rows: 10 height: 0 tilt: 0 stagger: 0 least_stiffness: 1000 "
+      "most_stiffness: 1000 }");
+  EngineSimulation simulation(RigidRobot(), config, kTick, 1);
+  const double height = simulation.truth().com.z();
+  double lowest = height;
+  for (int i = 0; i < 300 && !simulation.fallen(); ++i) {
+    simulation.Advance();
+    lowest = std::min(lowest, simulation.truth().com.z());
+  }
+  EXPECT_FALSE(simulation.fallen()) << simulation.end_reason();
+  EXPECT_LT(lowest, 0.65 * height);
 }
 
 TEST(Fall, TiltIsNamed) {

@@ -14,8 +14,6 @@ using Eigen::Vector3d;
 constexpr double kLongestTick = 0.02;  // s, counted at most for a tick after a gap
 constexpr double kRiseOver = 0.5;      // share of a swing before which no load is a landing
 constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
-// Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
-constexpr int kAhead = Walk::kPlannedSteps;
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
 constexpr int kHalvings = 40;           // of [0, 1]
@@ -24,7 +22,10 @@ constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge
 constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
 constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
-constexpr double kWait = 0.1;           // s in which a capture point that must wait is stopped
+// Of the unloading's rate: however far the centre of pressure is, and to come up with it. Chosen: a
+// foot that carries nothing and is a contact of the model still was dragged off its place.
+constexpr double kSlowest = 0.1, kFastest = 3;
+constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
@@ -42,6 +43,8 @@ Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
       touch_(spec.touch_load, spec.touch_duration),
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
+      pressed_(spec.height_rate),
+      sole_{PressedSole(choice.foot(0)), PressedSole(choice.foot(1))},
       ramp_start_(RampStart(spec.press_share)) {}
 
 double RampStart(double share) {
@@ -54,6 +57,7 @@ double RampStart(double share) {
 }
 
 void Walk::Enter(WalkStage stage, double time) {
+  if (stage == WalkStage::kUnloading) unloaded_ = 0;
   stage_ = stage;
   since_ = time;
 }
@@ -74,7 +78,8 @@ Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
 }
 
 bool Walk::LiftsOff(const StepState& state, double time) const {
-  if (time < since_ + spec_.unload - kTimeTolerance) return false;
+  if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
+  if (spec_.rests && unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
   return !spec_.rests || off.norm() < spec_.off_center;
 }
@@ -109,6 +114,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
       break;
     case WalkStage::kUnloading:
+      Unload(state, std::clamp(time - time_, 0.0, kLongestTick));
       if (LiftsOff(state, time)) BeginSwing(input);
       break;
     case WalkStage::kSwinging:
@@ -116,6 +122,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
         touch_.Reset();
       } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
         settled_since_ = time;
+        sole_[static_cast<size_t>(1 - stance_)].Touch(input.sole[static_cast<size_t>(1 - stance_)]);
         Enter(WalkStage::kTouching, time);
       } else if (Leaves(input, false)) {
         Retreat(input, state);
@@ -129,7 +136,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       }
       break;
     case WalkStage::kLoading:
-      if (time < since_ + spec_.load - kTimeTolerance) break;
+      if (time < since_ + slower_ * spec_.load - kTimeTolerance) break;
       moving_since_ = time;
       Enter(final_ ? WalkStage::kStopping : WalkStage::kUnloading, time);
       break;
@@ -156,6 +163,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
   stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
   in_contact_ = {true, true};
+  sinks_ = {0, 0};
+  slower_ = 1;
   if (!lowered_) standing_height_ = input.com_height - input.sole[0].translation().z();
   lowered_ = false;
   height_.Begin(input.com_height);
@@ -185,6 +194,7 @@ void Walk::BeginSwing(const StepInput& input) {
   in_contact_[foot] = false;
   starting_ = false;
   touch_down_ = input.time + spec_.swing;
+  pressed_.Begin(0);
   attempt_ = 0;
   first_ = foothold_;
   home_ = {input.sole[foot].translation().head<2>(), Yaw(input.sole[foot])};
@@ -290,6 +300,12 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   ++num_steps_;
   in_contact_ = {true, true};
   from_cop_ = wanted_.cop;
+  const auto foot = static_cast<size_t>(1 - stance_);
+  sinks_[foot] =
+      std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
+               spec_.most_sinking);
+  const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
+  slower_ = spec_.rests && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
   way_ = Next(way_, 1 - stance_);
   stance_ = 1 - stance_;
   double_since_ = input.time;
@@ -301,116 +317,24 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
 }
 
-int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
-  if (!active() || final_) return 0;
-  double due = touch_down_;  // of a foot that swings
-  switch (stage_) {
-    case WalkStage::kStarting:
-      due = since_ + spec_.start + spec_.unload + spec_.swing;
-      break;
-    case WalkStage::kUnloading:
-      due = since_ + spec_.unload + spec_.swing;
-      break;
-    case WalkStage::kLoading:
-      due = since_ + spec_.load + spec_.unload + spec_.swing;
-      break;
-    default:
-      break;
-  }
-  Footstep next = foothold_;
-  int foot = stepping_foot(), count = 0;
-  for (PlannedStep& step : *steps) {
-    step = {next, foot, due + count * spec_.period()};
-    ++count;
-    if (closing_) break;
-    foot = 1 - foot;
-    next = Next(next, foot);
-  }
-  return count;
-}
-
-void Walk::PlanFrom(const StepState& state) {
-  const double between = spec_.load + spec_.unload, w = state.pendulum.frequency;
-  Footstep stance = Standing(state, stance_);
-  const bool both = !starting_ && !OnOneFoot();
-  plan_.Clear();
-  if (final_) {
-    const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
-    plan_.Append(from_cop_, middle, between);
-    plan_.Finish(w, middle);
-    return;
-  }
-  if (both) plan_.Append(from_cop_, stance.position, between);
-  plan_.Append(stance.position, stance.position, spec_.single());
-  Footstep next = foothold_;
-  if (closing_) {
-    const Vector2d middle = 0.5 * (stance.position + next.position);
-    plan_.Append(stance.position, middle, between);
-    plan_.Finish(w, middle);
-    return;
-  }
-  int foot = stance_;
-  for (int i = 0; i < kAhead; ++i) {
-    plan_.Append(stance.position, next.position, between);
-    plan_.Append(next.position, next.position, spec_.single());
-    stance = next;
-    next = Next(stance, foot);
-    foot = 1 - foot;
-  }
-  plan_.Finish(w, stance.position);
-}
-
-void Walk::Adjust(const StepInput& input, const StepState& state) {
-  // Until the foot carries.
-  const double left = touch_down_ + spec_.settle - input.time;
-  if (swing_.frozen(input.time)) return;
-  const auto s = static_cast<size_t>(stance_);
-  const double w = state.pendulum.frequency;
-  const Vector2d& stance = state.sole[s];
-  // The plan for the foothold that the command asks for.
-  const Vector2d moved = foothold_.position;
-  foothold_.position = NextOnWay(Standing(state, stance_), 1 - stance_).position;
-  PlanFrom(state);
-  const Vector2d planned = plan_.At(spec_.single()).capture_point;
-  const Vector2d now = state.pendulum.capture_point();
-  const Vector2d error = now - plan_.At(spec_.single() - left).capture_point;
-  const double size = error.norm();
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance_), choice_.limits().edge, stance, state.sole_yaw[s]);
-  // What the centre of pressure at the sole's edge leaves of the error at touch-down.
-  const Vector2d cop = balance::NearestPoint(sole, stance + (1 + spec_.gain) * error);
-  const Vector2d caught = CapturePointAfter(now, cop, w, left);
-  double beyond = 0;
-  if (size > 0) beyond = (caught - planned).dot(error) / size - spec_.adjust_from;
-  if (!(beyond > 0)) {
-    // Back to what is commanded, once the error is small enough.
-    if (!moved.isApprox(foothold_.position, 1e-12)) {
-      swing_.Move(foothold_.position, input.time, touch_down_);
-    }
-    return;
-  }
-  // A foothold farther by d takes the plan's capture point at touch-down d (1 − e^{−ωB})/(ωB)
-  // farther, for the centre of pressure needs B to get there.
-  const double between = w * (spec_.load + spec_.unload);
-  beyond *= between / (1 - std::exp(-between));
-  Vector2d foothold = foothold_.position + beyond / size * error;
-  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
-  const Vector2d com = After(state.pendulum, cop, left).com;
-  const balance::ConvexPolygon footholds =
-      choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
-  if (footholds.num_corners == 0) return;
-  const Vector2d offset = turn.transpose() * (foothold - stance);
-  foothold = stance + turn * balance::NearestPoint(footholds, offset);
-  foothold_.position = foothold;
-  PlanFrom(state);
-  swing_.Move(foothold, input.time, touch_down_);
-}
-
 double Walk::Progress(double time) const {
   const double past = time - since_;
-  if (stage_ == WalkStage::kUnloading) return std::clamp(past / spec_.unload, 0.0, 1.0);
+  if (stage_ == WalkStage::kUnloading) {
+    return spec_.rests ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
+  }
   // From what the press carries.
-  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / spec_.load, 0.0, 1.0);
+  return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
+}
+
+void Walk::Unload(const StepState& state, double period) {
+  const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
+  const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
+  // Of the way, how far the centre of pressure still is from the sole that shall carry.
+  const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
+  const double share = spec_.lead < left * way.norm() ? spec_.lead / (left * way.norm()) : 1;
+  const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
+  unloaded_ =
+      std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowest * step, kFastest * step));
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
@@ -440,15 +364,22 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
 
 CapturePlan::Point Walk::Resting(const StepState& state, double time) const {
   const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
-  if (OnOneFoot()) return {stance, stance};
   const Vector2d& other = state.sole[static_cast<size_t>(1 - stance_)];
+  const double w = state.pendulum.frequency;
+  const double pressed = pressed_.point().position, pressing = pressed_.point().velocity;
+  if (OnOneFoot()) {
+    const Vector2d point = stance + pressed * (other - stance);
+    return {point, point - pressing / w * (other - stance)};
+  }
   const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
   // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, beyond the next middle at last.
   const double s = std::clamp((time - double_since_) / Transfer(), 0.0, 1.0);
-  const double share = s * s * s * (10 + s * (-15 + 6 * s));
-  const double rate = 30 * s * s * (1 - s) * (1 - s) / Transfer();
+  const double gone = s * s * s * (10 + s * (-15 + 6 * s));
+  const double going = 30 * s * s * (1 - s) * (1 - s) / Transfer();
+  const double share = pressed + (1 - pressed) * gone;
+  const double rate = pressing * (1 - gone) + (1 - pressed) * going;
   const Vector2d point = other + share * way;
-  return {point, point - rate / state.pendulum.frequency * way};
+  return {point, point - rate / w * way};
 }
 
 Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
@@ -529,11 +460,29 @@ Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double
   return asked;
 }
 
+double Walk::StillSinks(const StepInput& input) {
+  const auto s = static_cast<size_t>(stance_);
+  // A sole that stands on one corner sinks farther than one that lies, under the same load: each
+  // tick's is an upper bound.
+  const double sunk = sole_[s].Sunk(input.sole[s]), load = input.load[s];
+  if (load > spec_.press_load) {
+    sinks_[s] = std::min(sinks_[s], std::max(sunk, ExpectedSinking(sunk, load, spec_.weight)));
+  }
+  const double left = sinks_[s] * std::clamp(1 - load / spec_.weight, 0.0, 1.0);
+  return std::min(left, spec_.most_ahead);
+}
+
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
+  const bool presses = stage_ == WalkStage::kTouching;
+  const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
+  pressed_.Follow(share * spec_.press_share, period);
   const auto s = static_cast<size_t>(stance_);
   // Above the lower foot: a straight leg reaches no farther down.
   double ground = input.sole[s].translation().z();
+  // Before it sinks: the leg behind would be stretched.
+  if (spec_.rests) ground -= StillSinks(input);
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
@@ -567,10 +516,13 @@ void Walk::Archive(StateArchive* archive) {
   touch_.Archive(archive);
   height_.Archive(archive);
   body_yaw_.Archive(archive);
+  pressed_.Archive(archive);
+  for (PressedSole& sole : sole_) sole.Archive(archive);
+  archive->Show(sinks_, slower_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
-  archive->Show(lowered_, attempt_, num_left_, first_.position, first_.yaw, home_.position,
-                home_.yaw);
+  archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw,
+                home_.position, home_.yaw);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);

@@ -9,6 +9,7 @@
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
+#include "components/step_planner/stepping/pressed_sole.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
 
@@ -46,7 +47,14 @@ struct WalkSpec {
   KnownGround ground;
   /// m of the centre of pressure for each rad/s with which the sole that carries turns.
   double roll_damping = 0;
-  double give_up = 0;  ///< m beyond the sole that carries, from which another planner may step
+  /// m by which the load of a foot that rests may leave it sooner than the centre of pressure does:
+  /// what each sole's own is off its middle then.
+  double lead = 0;
+  double weight = 1;        ///< N, of the robot
+  double most_sinking = 0;  ///< m, that a sole where it rests is expected to sink at most
+  double most_ahead = 0;    ///< m, by which the COM goes down at most before its sole does
+  double sink_speed = 1;    ///< m/s of its sinking, on average over the ramps: above 0
+  double give_up = 0;       ///< m beyond the sole that carries, from which another planner may step
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -138,6 +146,8 @@ class Walk {
   double GroundAt(const StepInput& input, const Footstep& foothold) const;
   /// Of the ramp that is under way, 0 to 1.
   double Progress(double time) const;
+  /// The unloading ramp, in a walk that rests, no sooner than the centre of pressure goes over.
+  void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
     return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
@@ -151,7 +161,7 @@ class Walk {
   CapturePlan::Point Resting(const StepState& state, double time) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
-  double Transfer() const { return spec_.load + spec_.unload; }  ///< s
+  double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
   /// Of the plan, from the first piece that is not over; `stance`: the sole that carries.
   void PlanFrom(const StepState& state);
   /// The swing's foothold, moved by what the centre of pressure cannot correct.
@@ -162,6 +172,8 @@ class Walk {
   /// What brakes the sole that carries, m: on soft ground it rolls on a spring, with the ankle's
   /// rotor as its mass, and gravity makes that spring softer yet.
   Eigen::Vector2d AgainstRolling(const StepInput& input) const;
+  /// m, that the stance sole goes down yet under the whole weight, as its load so far lets expect.
+  double StillSinks(const StepInput& input);
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
@@ -177,14 +189,19 @@ class Walk {
   Swing swing_;
   TouchTimer touch_;
   HeightLead height_, body_yaw_;
+  HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
   double settled_since_ = 0;                        // s: pressed down
-  double ramp_start_ = 0;                           // of the loading ramp: what the press carries
-  double standing_height_ = 0;                      // m
-  bool lowered_ = false;            // stopped while it walked: it has not stood up since
-  double start_yaw_ = 0;            // rad
-  bool starting_ = false;           // no foot has left the ground yet
+  std::array<PressedSole, 2> sole_;
+  std::array<double, 2> sinks_{0, 0};  // m, expected of each sole under the weight
+  double slower_ = 1;                  // ratio: the ramps, where the sole sinks
+  double unloaded_ = 0;                // of the unloading ramp, where it rests
+  double ramp_start_ = 0;              // of the loading ramp: what the press carries
+  double standing_height_ = 0;         // m
+  bool lowered_ = false;               // stopped while it walked: it has not stood up since
+  double start_yaw_ = 0;               // rad
+  bool starting_ = false;              // no foot has left the ground yet
   bool closing_ = false;            // the step under way comes beside the other foot, the last one
   bool final_ = false;              // it has
   int attempt_ = 0, num_left_ = 0;  // places left: of this step, of all

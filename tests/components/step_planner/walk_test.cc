@@ -14,6 +14,7 @@
 #include "components/robot/posture.h"
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
+#include "components/step_planner/stepping/pressed_sole.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::stepping {
@@ -193,6 +194,10 @@ WalkSpec Spec(const Reach& reach, double spacing) {
 
 constexpr double kEdge = 0.02;          // m
 constexpr double kRollDamping = 0.007;  // m/(rad/s)
+constexpr double kLead = 0.01;          // m
+constexpr double kWeight = 500;         // N
+constexpr double kDownLoad = 200;       // N of a foot that is down
+constexpr double kSinkSpeed = 0.02;     // m/s
 
 class World {
  public:
@@ -219,6 +224,13 @@ class World {
     spec.patience = 1;
     spec.most_tilt = 0.4;
     spec.roll_damping = kRollDamping;
+    spec.lead = kLead;
+    spec.press_share = rests ? 0.1 : 0;
+    spec.press_load = rests ? kDownLoad : 0;
+    spec.weight = kWeight;
+    spec.most_sinking = 0.2;
+    spec.most_ahead = 0.05;
+    spec.sink_speed = kSinkSpeed;
     walk_ = Walk(StepChoice(model_, reach, limits), spec);
     com_ = {0, 0, height};
     for (size_t i = 0; i < 2; ++i) {
@@ -227,6 +239,8 @@ class World {
     }
   }
 
+  /// Ground that gives way by so much, m, under a foot that is down.
+  void Soften(double depth) { soft_ = depth; }
   /// No ground under a sole whose centre is from `from` to `to`, m, along x.
   void Dig(double from, double to) { hole_ = {from, to}; }
   /// The centre of pressure asked for in the next tick if the soles turned like this.
@@ -252,11 +266,19 @@ class World {
     for (const double end = time_ + duration; time_ < end - 0.5 * kPeriod;) Tick(command);
   }
 
+  /// False: it has not come to `stage` within 10 s.
+  bool RunTo(WalkStage stage, const WalkCommand& command) {
+    const double end = time_ + 10;
+    while (walk_.stage() != stage && time_ < end) Tick(command);
+    return walk_.stage() == stage;
+  }
+
   Walk& walk() { return walk_; }
   const std::array<Eigen::Isometry3d, 2>& sole() const { return sole_; }
   Vector2d middle() const {
     return 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
   }
+  double time() const { return time_; }
   double yaw() const { return 0.5 * (Yaw(sole_[0]) + Yaw(sole_[1])); }
   const Vector3d& com() const { return com_; }
   Vector2d capture_point() const {
@@ -280,7 +302,7 @@ class World {
     input.com_height = com_.z();
     for (size_t i = 0; i < 2; ++i) {
       const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground(sole_[i]);
-      input.load[i] = down ? 200 : 0;
+      input.load[i] = down ? kDownLoad : 0;
     }
     return input;
   }
@@ -324,7 +346,10 @@ class World {
       sole_[i].translation() = output.swing.position;
       sole_[i].linear() = output.swing_rotation.rotation;
       double& z = sole_[i].translation().z();
-      if (output.swing.velocity.z() < 0) z = std::max(z, Ground(sole_[i]));
+      const bool pressed = walk_.stage() == WalkStage::kTouching;
+      const double ground = Ground(sole_[i]) - (pressed ? soft_ : 0);
+      if (pressed || output.swing.velocity.z() < 0) z = std::max(z, ground);
+      if (pressed && soft_ > 0) z = ground;
     }
     EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
     const Vector3d& acceleration = output.com.acceleration;
@@ -337,7 +362,7 @@ class World {
   }
 
   robot::RobotModel model_;
-  double rough_;
+  double rough_, soft_ = 0;
   std::array<double, 2> hole_{0, 0};
   Walk walk_;
   std::optional<Walk> fresh_;
@@ -446,6 +471,98 @@ TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
   EXPECT_GE(world.walk().num_steps(), 12);
   world.Run(15, kStand);
   EXPECT_FALSE(world.walk().active());
+}
+
+TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const robot::FootModel& foot = model.feet()[0];
+  // Ground tilted by 8 degrees about both axes; each corner stands on a quarter of its stiffness.
+  const double tilt = 8 * std::numbers::pi / 180, load = 52, weight = 520;
+  const Eigen::Matrix3d lies =
+      (Eigen::AngleAxisd(tilt, Vector3d::UnitX()) * Eigen::AngleAxisd(tilt, Vector3d::UnitY()))
+          .toRotationMatrix();
+  for (const double stiffness : {2e3, 2e4, 1e9}) {
+    // Level, it touches with the corner that is the highest once it lies.
+    double highest = 0;
+    for (const double x : {-0.5, 0.5}) {
+      for (const double y : {-0.5, 0.5}) {
+        const Vector3d corner = lies * Vector3d(x * foot.length, y * foot.width, 0);
+        highest = std::max(highest, corner.z());
+      }
+    }
+    Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();
+    sole.translation().z() = 0.03 + highest;
+    PressedSole pressed(foot);
+    pressed.Touch(sole);
+    EXPECT_EQ(pressed.Sunk(sole), 0);
+    sole.linear() = lies;
+    sole.translation().z() = 0.03 - load / stiffness;
+    const double sunk = pressed.Sunk(sole);
+    EXPECT_NEAR(sunk, load / stiffness, 1e-9) << stiffness;
+    EXPECT_NEAR(ExpectedSinking(sunk, load, weight), weight / stiffness, 1e-8);
+    sole.translation().z() = 0.2;  // up again
+    EXPECT_EQ(pressed.Sunk(sole), 0);
+  }
+  EXPECT_EQ(ExpectedSinking(0.01, 0, weight), 0);
+}
+
+TEST(Walk, LoadLeavesAFootNoSoonerThanTheCentreOfPressure) {
+  World world(TestRobot::kDyros, 0, 0.5, true);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  double most = 0;
+  int seen = 0;
+  for (int i = 0; i < 10000; ++i) {
+    world.Run(kPeriod, command);
+    const Walk& walk = world.walk();
+    if (walk.stage() != WalkStage::kUnloading || walk.num_steps() == 0) continue;
+    const auto leaves = static_cast<size_t>(walk.stepping_foot());
+    const Vector2d other = world.sole()[1 - leaves].translation().head<2>();
+    const Vector2d way = world.sole()[leaves].translation().head<2>() - other;
+    // As much as lies below the centre of pressure, were each sole's own in its middle.
+    const double natural = (walk.output().cop - other).dot(way) / way.squaredNorm();
+    const double left = std::max(natural, 0.0);
+    const double carries = left * (1 - balance::SmoothStep(walk.output().progress));
+    most = std::max(most, (left - carries) * way.norm());
+    ++seen;
+  }
+  EXPECT_GT(seen, 1000);
+  EXPECT_GT(most, 0.5 * kLead);  // the ramp runs at all
+  EXPECT_LT(most, 1.3 * kLead);  // a tick late, and the slowest rate
+}
+
+TEST(Walk, StandsInTheMiddlesOfBothSolesWhilePressing) {
+  World world(TestRobot::kDyros, 0, 0.5, true);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  ASSERT_TRUE(world.RunTo(WalkStage::kTouching, command));
+  // The stance keeps nine tenths of the weight, the other sole takes one.
+  ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+  world.Run(0.1, command);
+  const auto landed = static_cast<size_t>(1 - world.walk().stepping_foot());
+  const Vector2d stance = world.sole()[1 - landed].translation().head<2>();
+  const Vector2d way = world.sole()[landed].translation().head<2>() - stance;
+  const double share = (world.walk().wanted().capture_point - stance).dot(way) / way.squaredNorm();
+  EXPECT_GT(share, 0.02);
+  EXPECT_LT(share, 0.1);
+}
+
+TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
+  for (const double depth : {0.0, 0.04}) {
+    World world(TestRobot::kDyros, 0, 0.5, true);
+    const WalkCommand command{{0, 0}, 0, true};
+    world.Soften(depth);
+    ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+    world.Soften(0);
+    const double start = world.time(), height = world.com().z();
+    ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
+    // A spring that 200 of 500 N press by `depth` goes down by 2.5 times that under all of them.
+    const double whole = depth * kWeight / kDownLoad;
+    EXPECT_GE(world.time() - start, std::max(whole / kSinkSpeed, 1.4) - 0.01) << depth;
+    EXPECT_LT(world.time() - start, std::max(whole / kSinkSpeed, 1.4) + 1.0) << depth;
+    // The foot stands `depth` lower; three fifths of the load are still to come, of which
+    // most_ahead counts.
+    const double ahead = std::min(0.6 * whole, 0.05);
+    EXPECT_NEAR(height - world.com().z(), depth + ahead, 0.2 * whole + 0.005) << depth;
+  }
 }
 
 TEST(AnotherPlace, LiesAroundTheFirstOneWhereTheFootReaches) {

@@ -1,0 +1,121 @@
+// The part of Walk that looks ahead: the steps that it counts with, and where they come down.
+#include <cmath>
+
+#include "components/step_planner/stepping/walk.h"
+
+namespace poise::stepping {
+namespace {
+
+using Eigen::Vector2d;
+
+// Footsteps that the plan looks ahead: what comes later counts by e^{−3 ω T} at most.
+constexpr int kAhead = Walk::kPlannedSteps;
+
+}  // namespace
+
+int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
+  if (!active() || final_) return 0;
+  double due = touch_down_;  // of a foot that swings
+  switch (stage_) {
+    case WalkStage::kStarting:
+      due = since_ + spec_.start + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kUnloading:
+      due = since_ + spec_.unload + spec_.swing;
+      break;
+    case WalkStage::kLoading:
+      due = since_ + spec_.load + spec_.unload + spec_.swing;
+      break;
+    default:
+      break;
+  }
+  Footstep next = foothold_;
+  int foot = stepping_foot(), count = 0;
+  for (PlannedStep& step : *steps) {
+    step = {next, foot, due + count * spec_.period()};
+    ++count;
+    if (closing_) break;
+    foot = 1 - foot;
+    next = Next(next, foot);
+  }
+  return count;
+}
+
+void Walk::PlanFrom(const StepState& state) {
+  const double between = spec_.load + spec_.unload, w = state.pendulum.frequency;
+  Footstep stance = Standing(state, stance_);
+  const bool both = !starting_ && !OnOneFoot();
+  plan_.Clear();
+  if (final_) {
+    const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
+    plan_.Append(from_cop_, middle, between);
+    plan_.Finish(w, middle);
+    return;
+  }
+  if (both) plan_.Append(from_cop_, stance.position, between);
+  plan_.Append(stance.position, stance.position, spec_.single());
+  Footstep next = foothold_;
+  if (closing_) {
+    const Vector2d middle = 0.5 * (stance.position + next.position);
+    plan_.Append(stance.position, middle, between);
+    plan_.Finish(w, middle);
+    return;
+  }
+  int foot = stance_;
+  for (int i = 0; i < kAhead; ++i) {
+    plan_.Append(stance.position, next.position, between);
+    plan_.Append(next.position, next.position, spec_.single());
+    stance = next;
+    next = Next(stance, foot);
+    foot = 1 - foot;
+  }
+  plan_.Finish(w, stance.position);
+}
+
+void Walk::Adjust(const StepInput& input, const StepState& state) {
+  // Until the foot carries.
+  const double left = touch_down_ + spec_.settle - input.time;
+  if (swing_.frozen(input.time)) return;
+  const auto s = static_cast<size_t>(stance_);
+  const double w = state.pendulum.frequency;
+  const Vector2d& stance = state.sole[s];
+  // The plan for the foothold that the command asks for.
+  const Vector2d moved = foothold_.position;
+  foothold_.position = NextOnWay(Standing(state, stance_), 1 - stance_).position;
+  PlanFrom(state);
+  const Vector2d planned = plan_.At(spec_.single()).capture_point;
+  const Vector2d now = state.pendulum.capture_point();
+  const Vector2d error = now - plan_.At(spec_.single() - left).capture_point;
+  const double size = error.norm();
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(stance_), choice_.limits().edge, stance, state.sole_yaw[s]);
+  // What the centre of pressure at the sole's edge leaves of the error at touch-down.
+  const Vector2d cop = balance::NearestPoint(sole, stance + (1 + spec_.gain) * error);
+  const Vector2d caught = CapturePointAfter(now, cop, w, left);
+  double beyond = 0;
+  if (size > 0) beyond = (caught - planned).dot(error) / size - spec_.adjust_from;
+  if (!(beyond > 0)) {
+    // Back to what is commanded, once the error is small enough.
+    if (!moved.isApprox(foothold_.position, 1e-12)) {
+      swing_.Move(foothold_.position, input.time, touch_down_);
+    }
+    return;
+  }
+  // A foothold farther by d takes the plan's capture point at touch-down d (1 − e^{−ωB})/(ωB)
+  // farther, for the centre of pressure needs B to get there.
+  const double between = w * (spec_.load + spec_.unload);
+  beyond *= between / (1 - std::exp(-between));
+  Vector2d foothold = foothold_.position + beyond / size * error;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
+  const Vector2d com = After(state.pendulum, cop, left).com;
+  const balance::ConvexPolygon footholds =
+      choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
+  if (footholds.num_corners == 0) return;
+  const Vector2d offset = turn.transpose() * (foothold - stance);
+  foothold = stance + turn * balance::NearestPoint(footholds, offset);
+  foothold_.position = foothold;
+  PlanFrom(state);
+  swing_.Move(foothold, input.time, touch_down_);
+}
+
+}  // namespace poise::stepping
