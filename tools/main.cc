@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "
-      "wrong usage or configuration.");
+      "wrong usage or configuration, 3 in real time, the machine was too late.");
   poise::Command command;
   poise::AddRunCommand(&app, &command);
   poise::AddMatrixCommand(&app, &command);

@@ -1,14 +1,19 @@
 // Bad input gets one line that names the place, and exit code 2.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
+#include <sstream>
 
 #include "components/framework/configuration/configuration.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
 namespace {
+
+using ::testing::HasSubstr;
 
 class BadInputTest : public testing::Test {
  protected:
@@ -177,6 +182,46 @@ TEST_F(BadInputTest, PageReplacesNoLogAndIsThereWholeOrNotAtAll) {
   EXPECT_EQ(RunPoise({"report", run, "--html", folder_ / "other.lcm"}).exit_code, 2);
   EXPECT_EQ(ReadFile(folder_ / "other.lcm"), bytes);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "other.lcm.part"));
+}
+
+TEST_F(BadInputTest, ANumberThatIsNoneIsNamedWithItsFlag) {
+  for (const char* const seed : {"99999999999999999999", "-1", "1.5", "abc"}) {
+    ExpectUsageError({"run", StandScenario(), "--inline", "--seed", seed}, {"--seed", seed});
+    ExpectUsageError({"run", StandScenario(), "--realtime", "--kill", "1", "--kill-seed", seed},
+                     {"--kill-seed", seed});
+    ExpectUsageError({"sweep", StandScenario(), "--vary", "seed=1:2:2", "--seed", seed},
+                     {"--seed", seed});
+  }
+  ExpectUsageError({"sweep", StandScenario(), "--vary", "seed=1:2:2", "--world", "abc"},
+                   {"--world: there is no engine 'abc'", "mujoco"});
+  ExpectUsageError({"worlds", StandScenario(), "--range", "0:1"}, {"--range: is of a sweep"});
+  // Not a number passes every comparison of a range the wrong way round.
+  ExpectUsageError({"estimators", "--from", "nan"}, {"--from", "nan"});
+  for (const char* const flag : {"--inertia", "--damping", "--duration"}) {
+    ExpectUsageError({"drives", "emulate", flag, "1e999"}, {flag, "1e999"});
+  }
+  ExpectUsageError({"drives", "emulate", "--profile", "abc"}, {"'abc'", "elmo_gold"});
+  ExpectUsageError({"run", "push", "--inline", "--set", "task_controller.com.kp=200"},
+                   {"com.kd", "is not set, but com is"});
+}
+
+TEST_F(BadInputTest, ListsKeepToTheColumns) {
+  setenv("COLUMNS", "60", 1);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"list", "components"}, {"list", "components", "hw_bridge"}}) {
+    const ProgramResult result = RunPoise(command);
+    EXPECT_EQ(result.exit_code, 0);
+    std::stringstream lines(result.output);
+    // Up to the settings, each of which begins with a line of its own, to be searched for.
+    for (std::string line; std::getline(lines, line) && !line.empty();) {
+      if (!line.starts_with("  ")) continue;  // a summary
+      EXPECT_LE(line.size(), 60u) << line;
+    }
+  }
+  const std::string bridge = RunPoise({"list", "components", "hw_bridge"}).output;
+  EXPECT_THAT(bridge, HasSubstr("drive_feedback_t, unless"));
+  EXPECT_THAT(bridge, HasSubstr("bus_status_t, where"));
+  unsetenv("COLUMNS");
 }
 
 TEST_F(BadInputTest, HelpIsThereForEveryCommand) {

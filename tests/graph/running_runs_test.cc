@@ -93,6 +93,8 @@ TEST_F(RunningRunsTest, TheOnlyOneIsMeantAndADeadOneForgotten) {
                    {"no run is going on; the latest has ended: poise log info " + Whole(run)});
   ExpectUsageError({"view"}, {"no run is going on; the latest has ended: poise report"});
   ExpectUsageError({"estop", "--reset"}, {"no run is going on"});
+  // Of an ended run nothing can be pushed.
+  ExpectUsageError({"push", "--force", "1,0,0"}, {"no run is going on; start one with poise run"});
 }
 
 TEST_F(RunningRunsTest, AnEmergencyStopWithoutARunStopsEveryOne) {

@@ -19,6 +19,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
+#include "tools/cli/output_style.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/library_versions.h"
@@ -169,8 +170,9 @@ int Doctor() {
     const char* const mark = finding.level == Level::kGood   ? "ok  "
                              : finding.level == Level::kNote ? "note"
                                                              : "BAD ";
-    fmt::print("{}  {:<15} {}{}{}\n", mark, finding.what, finding.found,
-               finding.advice.empty() ? "" : "; ", finding.advice);
+    const std::string line = fmt::format("{}  {:<15} {}{}{}", mark, finding.what, finding.found,
+                                         finding.advice.empty() ? "" : "; ", finding.advice);
+    fmt::print("{}\n", Wrapped(line, ScreenStyle().columns, 22));
     bad = bad || finding.level == Level::kBad;
   }
   return bad ? kExitFailed : kExitOk;

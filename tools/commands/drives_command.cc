@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <memory>
 
 #include "components/framework/configuration/configuration.h"
@@ -65,7 +66,8 @@ std::unique_ptr<ethercat::SocketLink> OpenSlaves(const ethercat::LinkConfig& con
 
 ethercat::EmulatedChainConfig ChainOf(const DrivesOptions& options) {
   ethercat::DriveProfile profile;
-  ReadTextProto((DeployDir() / "drives" / (options.profile + ".pbtxt")).string(), &profile);
+  ReadTextProto(FindFile("drives", options.profile, std::filesystem::current_path()).string(),
+                &profile);
   ethercat::EmulatedChainConfig chain;
   for (int i = 0; i < options.count; ++i) {
     ethercat::EmulatedDriveConfig& drive = *chain.add_drive();
@@ -160,12 +162,13 @@ void AddDrivesCommand(CLI::App* app, Command* command) {
       ->capture_default_str();
   emulate->add_option("--inertia", options->inertia, "kg·m², of each rotor")
       ->capture_default_str()
-      ->check(Within("above 0", [](double value) { return value > 0; }));
+      ->check(Within("in (0, 1000]", [](double value) { return value > 0 && value <= 1000; }));
   emulate->add_option("--damping", options->damping, "N·m·s/rad, of each rotor")
       ->capture_default_str()
-      ->check(Within("above 0", [](double value) { return value > 0; }));
+      ->check(Within("in (0, 1000000]", [](double value) { return value > 0 && value <= 1e6; }));
   emulate->add_option("--duration", options->duration, "s until they end; 0: until Ctrl-C")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(Within("in [0, 1000000]", [](double s) { return s >= 0 && s <= 1e6; }));
   emulate->callback([options, command] { *command = [options] { return Emulate(*options); }; });
 
   CLI::App* scan = drives->add_subcommand(

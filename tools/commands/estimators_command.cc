@@ -6,6 +6,7 @@
 #include "fmt/format.h"
 #include "logging/log_reader.h"
 #include "logging/metrics/metrics.h"
+#include "tools/cli/cli_checks.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/run/estimates.h"
@@ -109,7 +110,7 @@ void AddEstimatorsCommand(CLI::App* app, Command* command) {
       ->allow_extra_args(false)
       ->take_all();
   estimators->add_option("--from", options->from, "s: errors from here on")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(Within("in [0, 1000000]", [](double s) { return s >= 0 && s <= 1e6; }))
       ->capture_default_str();
   estimators->callback(
       [options, command] { *command = [options] { return CompareEstimators(*options); }; });

@@ -242,9 +242,9 @@ int List(const ListRequest& request) {
   if (wanted("components")) {
     for (const auto& [type, entry] : Components().entries()) {
       const std::vector<std::string>& sections = entry.traits.sections;
-      const std::string fields =
-          sections.empty() ? ""
-                           : fmt::format(" (the scenario's fields {})", fmt::join(sections, " and "));
+      const std::string fields = sections.empty() ? ""
+                                                  : fmt::format(" (the scenario's fields {})",
+                                                                fmt::join(sections, " and "));
       fmt::print("{}\n", Wrapped(fmt::format("  {:<24}{}{}", type, entry.summary, fields),
                                  ScreenStyle().columns, 26));
     }

@@ -11,6 +11,7 @@
 #include "logging/run_info.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/foxglove/mcap_scene.h"
@@ -47,9 +48,12 @@ void PrintRun(const logging::LogSurvey& survey) {
   for (const std::string& version : spec.library_version()) versions += ", " + version;
   if (!spec.instruction_set().empty()) versions += "; built for " + spec.instruction_set();
   const int64_t ticks = survey.end_tick - survey.first_tick;
-  fmt::print("scenario  {}\nrun       {}\nseed      {}\nstarted   {}\nversions  {}\n",
+  const auto wrapped = [](const std::string& line) {
+    return Wrapped(line, ScreenStyle().columns, 10);
+  };
+  fmt::print("scenario  {}\nrun       {}\nseed      {}\nstarted   {}\n{}\n",
              ForTerminal(spec.scenario()), spec.run_id(), spec.seed(),
-             ForTerminal(survey.info.started_at), ForTerminal(versions));
+             ForTerminal(survey.info.started_at), wrapped("versions  " + ForTerminal(versions)));
   fmt::print("duration  {:.3f} s in the log, {} ticks of {:g} s from tick {}; {} planned\n",
              static_cast<double>(ticks) * spec.tick_period(), ticks, spec.tick_period(),
              survey.first_tick, spec.num_ticks());

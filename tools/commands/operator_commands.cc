@@ -63,7 +63,7 @@ ActedRun FindActedRun(const std::string& run, const std::string& command) {
   const std::string naming = command + " --run";
   std::filesystem::path dir;
   if (run.empty()) {
-    const RunningRun only = OnlyRunningRun("poise log info", naming);
+    const RunningRun only = OnlyRunningRun("", naming);
     fmt::print(stderr, "the run: {}\n", FormatRun(only));
     dir = only.dir;
   } else {

@@ -108,6 +108,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
       ->needs(realtime);
   KillOptions* const kills = &options->launch.kills;
   run->add_option("--kill-seed", kills->seed, "of the moments and processes of --kill")
+      ->check(Whole())
       ->capture_default_str();
   run->add_option("--kill-from", kills->from,
                   "first time of a fault, s of the scenario; negative: while the robot starts")
@@ -160,11 +161,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
   run->add_option("--duration", options->changes.duration, "simulated time, s")
       ->check(Within("a number of seconds in (0, 36000]",
                      [](double s) { return s > 0 && s <= 36000; }));
-  run->add_option("--seed", options->changes.seed, "of all noise")
-      ->check([](const std::string& text) -> std::string {
-        const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
-        return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
-      });
+  run->add_option("--seed", options->changes.seed, "of all noise")->check(Whole());
   run->add_option("--drop", options->changes.drop_rate,
                   "share of the messages that each process drops, to test the recovery")
       ->check(Within("in [0, 0.9]", [](double share) { return share >= 0 && share <= 0.9; }))

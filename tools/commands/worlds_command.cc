@@ -253,6 +253,9 @@ int Worlds(WorldsArguments arguments) {
     }
   }
   CheckSpace(arguments.out.empty() ? RunsDir() : fs::path(arguments.out), sizes, options.force);
+  if (sweeps.empty() && !arguments.session.range.empty()) {
+    throw ConfigError("--range: is of a sweep, and none is named");
+  }
   const RunDir folder = MakeRunDir(arguments.out, "worlds", options.force);
   CatchStopSignals();
   bool passed = true;

@@ -1,6 +1,7 @@
 #include "tools/run/kill_schedule.h"
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 
 #include "components/framework/clock.h"
@@ -51,10 +52,11 @@ void KillSchedule::Check(const RunSpec& spec, const KillOptions& options) {
   const Window window = WindowOf(spec, options);
   const double length = window.until - window.from;
   if (length / options.count < kShortestSlot) {
-    throw ConfigError(
-        fmt::format("--kill {}: {:.1f} s are too short for so many; 0.5 s each at least, or a "
-                    "longer --duration",
-                    options.count, std::max(0.0, length)));
+    throw ConfigError(fmt::format(
+        "--kill {}: {:.1f} s are too short for so many; at most {:.0f}, one in {} s, or "
+        "a longer --duration",
+        options.count, std::max(0.0, length), std::floor(std::max(0.0, length) / kShortestSlot),
+        kShortestSlot));
   }
 }
 

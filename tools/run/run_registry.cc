@@ -322,7 +322,7 @@ RunningRun OnlyRunningRun(std::string_view log_command, std::string_view command
   if (!runs.empty()) {
     throw NameOne("no run of yours is going on; name another user's", runs, command);
   }
-  const fs::path ended = LatestEndedRun();
+  const fs::path ended = log_command.empty() ? fs::path() : LatestEndedRun();
   throw ConfigError(ended.empty() ? "no run is going on; start one with poise run"
                                   : fmt::format("no run is going on; the latest has ended: {} {}",
                                                 log_command, logging::ForTerminal(ended.string())));

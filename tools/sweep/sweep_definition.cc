@@ -18,6 +18,7 @@
 #include "tools/cli/text_table.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/library_versions.h"
+#include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
@@ -28,6 +29,17 @@ namespace fs = std::filesystem;
 constexpr char kAllMetrics[] = "all";
 // Tells of how a run went on this machine, not of what it did.
 constexpr char kMachineMetric[] = "real_time_factor";
+
+/// Throws ConfigError for what is no engine: a run would blame a change that nobody made.
+void CheckEngine(const std::string& engine) {
+  std::vector<std::string> engines;
+  for (const auto& [type, entry] : Components().entries()) {
+    if (!entry.traits.engine.empty()) engines.push_back(entry.traits.engine);
+  }
+  if (std::ranges::find(engines, engine) != engines.end()) return;
+  throw ConfigError(
+      fmt::format("--world: there is no engine '{}'; {}", engine, Suggest(engine, engines)));
+}
 
 std::string Digest(const std::string& text) {
   const boost::uuids::name_generator_sha1 generator(boost::uuids::ns::oid());
@@ -209,7 +221,10 @@ SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(st
   if (!changes.variant.empty()) sweep.set_variant(changes.variant);
   for (const std::string& part : changes.without) sweep.add_without(part);
   if (changes.ideal) sweep.set_ideal(true);
-  if (!changes.world.empty()) sweep.add_set("engine=" + changes.world);
+  if (!changes.world.empty()) {
+    CheckEngine(changes.world);
+    sweep.add_set("engine=" + changes.world);
+  }
   for (const std::string& set : changes.set) sweep.add_set(set);
   if (changes.duration) sweep.add_set(fmt::format("duration={}", *changes.duration));
   if (arguments.limit) sweep.mutable_limit()->MergeFrom(*arguments.limit);

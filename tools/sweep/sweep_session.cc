@@ -95,7 +95,7 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
   app->add_option("--random", arguments->random,
                   "this many runs with every variable drawn at random, in place of the grid")
       ->check(CLI::Range(int64_t{1}, kMaxSweepRuns));
-  app->add_option("--seed", arguments->seed, "of what is drawn at random");
+  app->add_option("--seed", arguments->seed, "of what is drawn at random")->check(Whole());
   list("--column", &arguments->column,
        "metric of the table (poise list metrics), repeatable, or all; default: those of the "
        "scenario's checks",
