@@ -46,6 +46,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   generator_.emplace(config.com_lag());
   stance_follower_ = StanceFollower(kFollowFrom);
   ConfigureLimits(config);
+  contact_ = config.contact();
   landing_.assign(2, Landing(config.contact()));
   contact_loss_.assign(2, ContactLoss(config.contact()));
   const StepWarning& step = config.step();
@@ -218,8 +219,7 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
   ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
   const int ramped = schedule_->state().transition_foot;
   for (size_t i = 0; i < 2; ++i) {
-    const bool observed = robot_state_->foot_wrench_source[i] == robot_state_t::SOURCE_OBSERVER;
-    const double deviation = observed ? robot_state_->foot_wrench_deviation[i].force[2] : 0;
+    const double deviation = LoadDeviation(i);
     landing_[i].Measure(time, load[i], deviation);
     contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i),
                             deviation);
@@ -228,6 +228,12 @@ ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& loa
     input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
   }
   return input;
+}
+
+double StepPlanner::LoadDeviation(size_t foot) const {
+  return robot_state_->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER
+             ? robot_state_->foot_wrench_deviation[foot].force[2]
+             : 0;
 }
 
 bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
@@ -256,6 +262,10 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 
   input.sole = {data.foot_pose[0], data.foot_pose[1]};
   for (size_t i = 0; i < 2; ++i) input.sole_turning[i] = data.foot_velocity[i].tail<3>();
   input.load = load;
+  for (size_t i = 0; i < 2; ++i) {
+    const double deviation = LoadDeviation(i);
+    if (deviation > 0) input.least_load[i] = LoadLevels(contact_, deviation).touch;
+  }
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();
   input.step_needed = support_plan_->step_needed != 0;

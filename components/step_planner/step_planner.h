@@ -53,6 +53,8 @@ class StepPlanner : public Component, public Operated {
   int8_t Plan(double time);
   /// What the robot says to the schedule.
   ScheduleInput Observe(double time, const std::array<double, 2>& load);
+  /// N, standard deviation of an observed load; 0 of a measured one.
+  double LoadDeviation(size_t foot) const;
   /// The tick of what leads in place of the schedule; false: the schedule goes on.
   bool Step(double time, const std::array<double, 2>& load);
   stepping::StepInput SeeSteps(double time, const std::array<double, 2>& load);
@@ -107,8 +109,9 @@ class StepPlanner : public Component, public Operated {
   StanceFollower stance_follower_{0};
   std::optional<HipStrategy> hip_strategy_;
   double joint_reserve_ = 0, brake_time_ = 0;  // rad, s, of the hip strategy
-  std::vector<Landing> landing_;               // by foot
-  std::vector<ContactLoss> contact_loss_;      // by foot
+  ContactConfirmation contact_;
+  std::vector<Landing> landing_;           // by foot
+  std::vector<ContactLoss> contact_loss_;  // by foot
   StepDetector step_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;

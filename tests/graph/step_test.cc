@@ -51,6 +51,26 @@ TEST(Step, CatchesAPushOnOneFoot) {
   for (const char* world : {"ode", "mujoco"}) ExpectStands("push_single_support", world);
 }
 
+// A robot that nothing was fitted to, without foot sensors, gains by rule: ahead and behind it
+// stands by a step what fells it without one.
+TEST(Step, CatchesAPushOnAnotherRobotWithoutFootSensors) {
+  for (const char* world : {"ode", "mujoco"}) {
+    for (const char* ahead : {"1", "-1"}) {
+      for (const char* enabled : {"true", "false"}) {
+        const RunFolder folder;
+        const ProgramResult result = RunPoise(
+            {"run", "push", "--variant", "step", "--robot", "heron/heron", "--world", world,
+             "--inline", "--no-reference", "--set", std::string("sim.push[0].direction_x=") + ahead,
+             "--set", std::string("step_planner.recovery.enabled=") + enabled, "--out",
+             folder / "run"});
+        const bool steps = std::string(enabled) == "true";
+        EXPECT_EQ(result.exit_code, steps ? 0 : 1) << world << ' ' << ahead << result.output;
+        if (steps) EXPECT_GE(Measured(ReadSummary(folder / "run"), "steps"), 1) << world << ahead;
+      }
+    }
+  }
+}
+
 Eigen::Isometry3d PoseOf(const pose_t& pose) {
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
   frame.translation() = Eigen::Vector3d(pose.position[0], pose.position[1], pose.position[2]);

@@ -65,13 +65,30 @@ PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, doub
   return com;
 }
 
-bool TouchTimer::Update(double time, double load) {
-  if (!(load > load_)) {
+bool TouchTimer::Update(double time, double load, double least) {
+  if (!(load > std::max(load_, least))) {
     since_ = -1;
     return false;
   }
   if (since_ < 0) since_ = time;
   return time >= since_ + duration_ - kTimeTolerance;
+}
+
+void LetGo(const Eigen::Isometry3d& sole, double share, double pulled, double down, double lowest,
+           StepOutput* output) {
+  PointMotion& swing = output->swing;
+  swing.position +=
+      share * Eigen::Vector3d(1, 1, pulled).cwiseProduct(sole.translation() - swing.position);
+  double& z = swing.position.z();
+  z = std::max(z - down, std::min(z, lowest));
+  swing.velocity -= share * swing.velocity;
+  swing.acceleration.setZero();
+  RotationMotion& turn = output->swing_rotation;
+  turn.rotation = Eigen::Quaterniond(turn.rotation)
+                      .slerp(share, Eigen::Quaterniond(sole.linear()))
+                      .toRotationMatrix();
+  turn.angular_velocity -= share * turn.angular_velocity;
+  turn.angular_acceleration.setZero();
 }
 
 void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,

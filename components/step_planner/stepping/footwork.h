@@ -28,7 +28,9 @@ struct StepInput {
                                         Eigen::Isometry3d::Identity()};
   /// rad/s, of the soles, world.
   std::array<Eigen::Vector3d, 2> sole_turning{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  std::array<double, 2> load{0, 0};            ///< N
+  std::array<double, 2> load{0, 0};  ///< N
+  /// N that a load must be above to be one: of what is observed only; 0 of a measured one.
+  std::array<double, 2> least_load{0, 0};
   std::array<bool, 2> in_contact{true, true};  ///< of the plan; while no step is under way
   PointMotion free_foot;                       ///< reference of a foot in the air; likewise
   Eigen::Matrix3d free_rotation = Eigen::Matrix3d::Identity();
@@ -87,13 +89,20 @@ class TouchTimer {
  public:
   explicit TouchTimer(double load = 0, double duration = 0) : load_(load), duration_(duration) {}
   void Reset() { since_ = -1; }
-  bool Update(double time, double load);
+  /// `least`: N, in place of the load that is one, where that is less.
+  bool Update(double time, double load, double least = 0);
   void Archive(StateArchive* archive) { archive->Show(since_); }
 
  private:
   double load_, duration_;  // N, s
   double since_ = -1;       // s; negative: no load
 };
+
+/// A foot that has touched is let go: its reference comes by `share` to where the sole stands, in
+/// height by `pulled` of that, and goes `down`, m, on towards `lowest`, m, where it carries too
+/// little. So its task asks for nothing when it becomes a contact of the model.
+void LetGo(const Eigen::Isometry3d& sole, double share, double pulled, double down, double lowest,
+           StepOutput* output);
 
 /// The swing's motion into `output`; below the foothold it ends `depth`, m, deeper.
 void FollowSwing(const Swing& swing, const SwingSpec& spec, double depth, double time,

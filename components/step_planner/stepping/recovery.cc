@@ -14,10 +14,12 @@ using Eigen::Vector3d;
 constexpr double kMaxPeriod = 0.02;  // s, counted at most for a tick after a gap
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
-constexpr double kGently = 0.2;      // s of the load's ramps where no fall is to be caught
-constexpr double kGentleGain = 1;    // as `gain`: the joints' friction leaves less of an error
-constexpr double kStill = 1;         // s that the COM rests beside the middle until that is rest
-constexpr double kTogether = 0.03;   // m from side by side that is side by side
+constexpr double kGently = 0.2;     // s of the load's ramps where no fall is to be caught
+constexpr double kGentleGain = 1;   // as `gain`: the joints' friction leaves less of an error
+constexpr double kStill = 1;        // s that the COM rests beside the middle until that is rest
+constexpr double kTogether = 0.03;  // m from side by side that is side by side
+// Time constant, as a share of the settling, with which a foot that touches is let go.
+constexpr double kLetGo = 0.25;
 constexpr double kMostShifts = 2.5;  // times its time after which a shift is given up
 
 }  // namespace
@@ -81,11 +83,7 @@ bool Recovery::Update(const StepInput& input) {
       if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
       break;
     case Stage::kSwinging:
-      if (swing_.Progress(time) < kLeastProgress) {
-        touch_.Reset();
-      } else if (touch_.Update(time, input.load[static_cast<size_t>(plan_.foot)])) {
-        Land(input);
-      }
+      if (Touches(input)) Land(input);
       break;
     case Stage::kLoading:
       if (time >= since_ + LoadTime() - kTimeTolerance) {
@@ -223,6 +221,34 @@ void Recovery::LiftOff(const StepInput& input) {
   since_ = input.time;
   cop_from_ = output_.cop;
   touch_.Reset();
+  touched_since_ = -1;
+}
+
+double Recovery::TouchLoad(const StepInput& input) const {
+  const double least = input.least_load[static_cast<size_t>(plan_.foot)];
+  return std::max(spec_.touch_load, least > 0 ? std::max(least, spec_.observed_load) : 0);
+}
+
+bool Recovery::Touches(const StepInput& input) {
+  if (swing_.Progress(input.time) < kLeastProgress) {
+    touch_.Reset();
+    return false;
+  }
+  if (touched_since_ < 0) {
+    const double load = input.load[static_cast<size_t>(plan_.foot)];
+    if (!touch_.Update(input.time, load, TouchLoad(input))) return false;
+    touched_since_ = input.time;
+  }
+  return input.time >= touched_since_ + spec_.settle - kTimeTolerance;
+}
+
+void Recovery::Settle(const StepInput& input) {
+  const auto foot = static_cast<size_t>(plan_.foot);
+  const double period = std::clamp(input.time - time_, 0.0, kMaxPeriod);
+  const double share = period / (kLetGo * spec_.settle + period);
+  const double loaded = std::clamp(input.load[foot] / TouchLoad(input), 0.0, 1.0);
+  LetGo(input.sole[foot], share, loaded, period * (1 - loaded) * spec_.swing.touch_speed,
+        swing_.foothold().z() - spec_.search_depth, &output_);
 }
 
 void Recovery::Land(const StepInput& input) {
@@ -235,6 +261,10 @@ void Recovery::Land(const StepInput& input) {
 void Recovery::Swings(const StepInput& input, const StepState& state) {
   output_.searching = false;
   if (stage_ != Stage::kUnloading && stage_ != Stage::kSwinging) return;
+  if (stage_ == Stage::kSwinging && touched_since_ >= 0) {
+    Settle(input);
+    return;
+  }
   const double left = touch_down_ - input.time;
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
@@ -386,7 +416,7 @@ void Recovery::Archive(StateArchive* archive) {
   swing_.Archive(archive);
   touch_.Archive(archive);
   height_.Archive(archive);
-  archive->Show(time_, since_, touch_down_, beyond_since_, moving_since_, cop_from_,
+  archive->Show(time_, since_, touched_since_, touch_down_, beyond_since_, moving_since_, cop_from_,
                 standing_height_, together_asked_, together_at_, shift_from_, step_helps_);
   output_.Archive(archive);
 }

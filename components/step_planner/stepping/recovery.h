@@ -23,8 +23,10 @@ struct RecoverySpec {
   double load = 0;      ///< s of the ramp that loads a landed foot
   SwingSpec swing;
   double touch_load = 0, touch_duration = 0;  ///< N, s
-  double search_depth = 0;                    ///< m below the foothold
-  double gain = 0;  ///< of the capture point's error in the centre of pressure, > 0
+  double observed_load = 0;  ///< N, in place of `touch_load` where loads are observed
+  double settle = 0;         ///< s from a touch until the foot is a contact of the model
+  double search_depth = 0;   ///< m below the foothold
+  double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
   /// m·s²: the inertia with which the body turns, soles and COM at rest, over the robot's weight.
   double turn_share = 0;
   double lean_rate = 0;     ///< 1/s, critically damped, of the body's return to upright
@@ -89,6 +91,12 @@ class Recovery {
   void LiftOff(const StepInput& input);
   /// The foothold where the capture point now says, and the foot on its way there.
   void Swings(const StepInput& input, const StepState& state);
+  /// The foot that swings has met the ground.
+  bool Touches(const StepInput& input);
+  /// N on it that are a touch.
+  double TouchLoad(const StepInput& input) const;
+  /// It stands on the ground, and is not a contact of the model yet.
+  void Settle(const StepInput& input);
   void Land(const StepInput& input);
   bool AtRest(const StepInput& input, const StepState& state);
   /// What the body's return to upright takes of the centre of pressure, m, at most `budget`.
@@ -124,6 +132,7 @@ class Recovery {
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double touch_down_ = 0;        // s
   TouchTimer touch_;
+  double touched_since_ = -1;                           // s; negative: not yet, in this swing
   double beyond_since_ = -1;                            // s; negative: inside
   double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began

@@ -280,20 +280,9 @@ void Walk::LetGo(const StepInput& input) {
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
   const double loaded = Loaded(input);
   const double pulled = spec_.press_share > 0 ? 0 : loaded;
-  output_.swing.position +=
-      share * Vector3d(1, 1, pulled).cwiseProduct(sole.translation() - output_.swing.position);
-  double& z = output_.swing.position.z();
-  const double lowest = std::min(z, swing_.foothold().z() - spec_.search_depth);
   const double missing = spec_.press_share > 0 ? Missing(input) : 1 - loaded;
-  z = std::max(z - period * missing * spec_.foot.touch_speed, lowest);
-  output_.swing.velocity -= share * output_.swing.velocity;
-  output_.swing.acceleration.setZero();
-  RotationMotion& turn = output_.swing_rotation;
-  turn.rotation = Eigen::Quaterniond(turn.rotation)
-                      .slerp(share, Eigen::Quaterniond(sole.linear()))
-                      .toRotationMatrix();
-  turn.angular_velocity -= share * turn.angular_velocity;
-  turn.angular_acceleration.setZero();
+  stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
+                  swing_.foothold().z() - spec_.search_depth, &output_);
 }
 
 void Walk::Land(const StepInput& input, const StepState& state, const WalkCommand& command) {
