@@ -51,8 +51,8 @@ TEST(Step, CatchesAPushOnOneFoot) {
   for (const char* world : {"ode", "mujoco"}) ExpectStands("push_single_support", world);
 }
 
-// A robot that nothing was fitted to, without foot sensors, gains by rule: ahead and behind it
-// stands by a step what fells it without one.
+// A robot without foot sensors, gains by rule: ahead and behind it stands by a step what fells it
+// without one. The variant's margin and filters were chosen on it.
 TEST(Step, CatchesAPushOnAnotherRobotWithoutFootSensors) {
   for (const char* world : {"ode", "mujoco"}) {
     for (const char* ahead : {"1", "-1"}) {
