@@ -65,7 +65,9 @@ TEST(Step, CatchesAPushOnAnotherRobotWithoutFootSensors) {
              folder / "run"});
         const bool steps = std::string(enabled) == "true";
         EXPECT_EQ(result.exit_code, steps ? 0 : 1) << world << ' ' << ahead << result.output;
-        if (steps) EXPECT_GE(Measured(ReadSummary(folder / "run"), "steps"), 1) << world << ahead;
+        if (steps) {
+          EXPECT_GE(Measured(ReadSummary(folder / "run"), "steps"), 1) << world << ahead;
+        }
       }
     }
   }
