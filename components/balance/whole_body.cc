@@ -120,8 +120,7 @@ void WholeBody::ContactJacobian(const std::array<bool, 2>& in_contact,
                                 Eigen::MatrixXd* jacobian) const {
   const Eigen::Index n = model_->num_velocities();
   const Eigen::Index rows = 6 * (in_contact[0] + in_contact[1]);
-  // Columns of joints that are no leg's stay zero.
-  if (jacobian->rows() != rows || jacobian->cols() != n) jacobian->setZero(rows, n);
+  jacobian->setZero(rows, n);  // columns of joints that are no leg's
   Eigen::Index row = 0;
   for (int i = 0; i < 2; ++i) {
     if (!in_contact[i]) continue;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/balance/balance_test_support.h"
 
 namespace poise::balance {
@@ -48,7 +50,9 @@ TEST(WholeBody, ContactJacobianMapsVelocityToTheSoles) {
   Eigen::VectorXd velocity(model->num_velocities());
   velocity << state.base_linear_velocity, state.base_angular_velocity, state.joint_velocity;
   for (const auto& in_contact : {kDouble, kRight, kLeft}) {
-    Eigen::MatrixXd jacobian;
+    // Of the right size, whatever it holds: joints that are no leg's have columns, too.
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Constant(6 * (in_contact[0] + in_contact[1]),
+                                                         model->num_velocities(), std::nan(""));
     body.ContactJacobian(in_contact, &jacobian);
     ASSERT_EQ(jacobian.rows(), 6 * (in_contact[0] + in_contact[1]));
     int row = 0;

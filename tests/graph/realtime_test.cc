@@ -85,7 +85,7 @@ TEST(Realtime, RefusesWhatOnlyRealTimeHas) {
   RunFolder folder;
   ExpectUsageError({"run", StandScenario(), "--realtime", "--kill", "100", "--duration", "1",
                     "--out", folder / "run"},
-                   {"--kill 100", "0.5 s each"});
+                   {"--kill 100", "one in 0.5 s"});
 }
 
 TEST(Hosting, RefusesGroupsThatCannotLiveTogether) {

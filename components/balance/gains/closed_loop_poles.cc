@@ -160,7 +160,7 @@ Plant MakePlant(const std::shared_ptr<const robot::RobotModel>& model,
 
   // The stiffness of gravity and of the contacts' forces on it.
   MatrixXd force(n, n - m);
-  MatrixXd moved(m, n);
+  MatrixXd moved;
   for (Index i = 0; i < n - m; ++i) {
     VectorXd side[2];
     for (const int s : {0, 1}) {
