@@ -58,8 +58,11 @@ export async function startView(poise, run, folder, ...more) {
 }
 
 /** `poise run stand --interactive`; has `port` and `url`. */
-export async function startInteractive(poise, folder, ...more) {
-  const run = new Program(poise, ['run', 'stand', '--interactive', '--out', folder, ...more]);
+export const startInteractive = (poise, folder, ...more) => interactive(poise, 'stand', folder, ...more);
+
+/** The same of any scenario. Its page gets every tick; a page beside a run on the bus lacks what a busy machine loses. */
+export async function interactive(poise, scenario, folder, ...more) {
+  const run = new Program(poise, ['run', scenario, '--interactive', '--out', folder, ...more]);
   const [, url, port] = await run.prints(/(http:\/\/127\.0\.0\.1:(\d+)\/\S*)/);
   return Object.assign(run, {url, port: Number(port)});
 }

@@ -8,7 +8,7 @@ import {join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {startRun, startView} from './live_run.mjs';
+import {interactive} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-steps-'));
@@ -155,10 +155,9 @@ test('the footprints of a step that catches a push are where its soles were, and
 });
 
 test('a page that follows a run draws the same', async () => {
-  const run = startRun(options.poise, path('live'), '--variant', 'step', '--duration', '2');
-  const view = await startView(options.poise, run, path('live'));
-  const {page, problems} = await openPage(browser, view.url);
-  await page.waitForFunction(() => window.poise?.feed?.state === 'ended', undefined, {timeout: PATIENCE});
+  const run = await interactive(options.poise, 'push_double_support', path('live'), '--variant', 'step', '--duration', '2');
+  const {page, problems} = await openPage(browser, run.url);
+  await page.waitForFunction(() => window.poise?.run?.firstTick === 0 && window.poise.run.numRows === 1000, undefined, {timeout: PATIENCE});
   const seen = await shown(page);
   compare(seen, 0.03);
   assert.ok(seen.steps >= 1);
@@ -170,6 +169,5 @@ test('a page that follows a run draws the same', async () => {
   assert.ok(regions.every((corners) => corners >= 4), `regions with ${regions} corners`);
   assert.deepEqual(problems, []);
   await page.context().close();
-  await view.stop();
   await run.stop();
 });
