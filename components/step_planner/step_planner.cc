@@ -119,7 +119,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
   for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
   step_.Archive(archive);
   references_.Archive(archive);
-  archive->Show(in_contact_, last_controlled_, stands_otherwise_, untilted_);
+  archive->Show(in_contact_, last_controlled_, stands_otherwise_, untilted_, was_free_);
   recovery_.Archive(archive);
   walk_.Archive(archive);
   footstep_report_.Archive(archive);
@@ -332,6 +332,7 @@ void StepPlanner::BeginPhase(double time) {
   for (size_t i = 0; i < 2; ++i) {
     contact_loss_[i].Reset();
     if (in_contact_[i]) continue;
+    was_free_ = true;
     if (last_contact[i] || !last_controlled_) {
       references_.foot[i].position = estimate.sole[i].translation();
       references_.foot_rotation[i].rotation = estimate.sole[i].linear();
@@ -365,7 +366,7 @@ void StepPlanner::FollowSoles(double time) {
   const StanceFollower::Stance stance{
       .sole = {estimate.sole[0].translation(), estimate.sole[1].translation()},
       .com = generator_->com_target(),
-      .planned = in_contact_[0] && in_contact_[1] && last_controlled_ && !Held(),
+      .planned = in_contact_[0] && in_contact_[1] && last_controlled_ && !Held() && !was_free_,
       .carried = robot_state_->foot_load_share[0] > 0 && robot_state_->foot_load_share[1] > 0,
       .resting = generator_->ComRests(time)};
   const Eigen::Vector3d way = stance_follower_.Update(time, stance);

@@ -127,6 +127,8 @@ class StepPlanner : public Component, public Operated {
     double velocity[3] = {0, 0, 0};  // m/s ahead, m/s to the left, rad/s
   } operator_walk_;
   bool stands_otherwise_ = false;  // on both feet after steps, where the phase is on one
+  // A foot that a phase put down may stand on ground that gives way: its sole is not followed.
+  bool was_free_ = false;
   double step_reach_ = 0;          // m
   bool angular_momentum_ = false;  // counts in the capture point that asks for a step
   References references_;
