@@ -382,6 +382,34 @@ TEST(StepPlanner, APhaseThatBeginsWhereSolesHaveSlippedIsNotBesideThem) {
   }
 }
 
+// The ground below a foot that a phase put down may give way: its sole sinks and rolls, and a COM
+// that went after it would load it the more.
+TEST(StepPlanner, ASoleThatAPhasePutDownIsNotFollowed) {
+  constexpr double kSlip = 0.03;  // m
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  for (const bool lifted : {false, true}) {
+    ControlContext context(TestRobot::kDyros);
+    Harness<StepPlanner> harness(
+        &context, fmt::format("com_lag: 1 contact {{ required: false }} "
+                              "phase {{ support: {} duration: 0.5 }} phase {{ support: DOUBLE }}",
+                              lifted ? "RIGHT" : "DOUBLE"));
+    robot_state_t message{};
+    harness.Bind("robot_state", &message);
+    robot::RobotState state = StandingState(model);
+    const Eigen::Vector3d start = robot::Evaluate(model, state).com;
+    for (int64_t tick = 0; tick < 1500; ++tick) {
+      if (tick == 500) state.base_position.x() += kSlip;
+      message = StateMessage(model, state);
+      message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
+      harness.Run(TickAt(tick));
+    }
+    const auto& plan = harness.output<support_plan_t>();
+    ASSERT_EQ(plan.phase, 1);
+    const PointMotion com = GetMotion(plan.com_reference);
+    EXPECT_NEAR(com.position.x() - start.x(), lifted ? 0 : kSlip, 1e-6) << lifted;
+  }
+}
+
 // Pushed off the foot that it walks on, the robot makes recovery steps: its body goes on heading
 // where the walk has turned it, rather than back to where it headed before.
 TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
