@@ -140,8 +140,7 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   positive(config.together_swing(), "together_swing");
 }
 
-stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model, double watch) {
+stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model) {
   for (const robot::FootModel& foot : model.feet()) {
     if (config.edge() < robot::InnerRadius(foot)) continue;
     throw ConfigError("recovery.edge",
@@ -169,7 +168,11 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
                             ? config.leg_distance()
                             : std::max(std::max(model.feet()[0].width, model.feet()[1].width),
                                        kLegShare * stepping::Legs(model).hip_spacing());
+  return {model, reach, limits};
+}
 
+stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
+                                const robot::RobotModel& model, double watch) {
   stepping::RecoverySpec spec;
   spec.sure = config.sure();
   spec.reserve = config.reserve();
@@ -198,7 +201,7 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   spec.together_after = config.together_after();
   spec.together_shift = config.together_shift();
   spec.together_swing = config.together_swing();
-  return {stepping::StepChoice(model, reach, limits), spec};
+  return {MakeStepChoice(config, model), spec};
 }
 
 }  // namespace poise

@@ -10,9 +10,11 @@ namespace poise {
 /// Throws ConfigError "recovery.sure" ...: not finite, or beyond what can work.
 void CheckRecoveryConfig(const RecoveryConfig& config);
 
-/// `watch`: RecoverySpec::watch. Reach, limits and thresholds for this robot, whose COM stands at
-/// its standing height. Throws ConfigError when its legs reach nothing or its soles are smaller
-/// than the edge.
+/// Reach and limits of this robot's steps, whose COM stands at its standing height. Throws
+/// ConfigError when its legs reach nothing or its soles are smaller than the edge.
+stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model);
+
+/// `watch`: RecoverySpec::watch. Thresholds for this robot besides. Throws as MakeStepChoice.
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
                                 const robot::RobotModel& model, double watch);
 

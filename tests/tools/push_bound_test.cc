@@ -149,6 +149,35 @@ TEST(PushBound, OfSeveralTheNearestToItsBoundCounts) {
   EXPECT_NEAR(FindPushBound(two, run)->distance, away, 1e-9);
 }
 
+// The push begins at tick 1, the foot leaves at 2 and is down at 5.
+TEST(PushBound, AStepCatchesWhatComesDuringItAtItsReach) {
+  logging::RunRecord run = Standing(0, 0);
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    external_push_t push{};
+    push.force[0] = tick == 1 ? 100 : 0;
+    run.push.Set(tick, push);
+    support_plan_t plan{};
+    plan.stepping = tick == 2   ? support_plan_t::STEPPING_UNLOADING
+                    : tick == 3 ? support_plan_t::STEPPING_SWINGING
+                                : support_plan_t::STEPPING_NONE;
+    if (tick == 4) plan.stepping = support_plan_t::STEPPING_SWINGING;
+    run.plan.Set(tick, plan);
+  }
+  Scenario scenario = PushScenario("direction_x: 1");
+  EXPECT_EQ(FindPushBound(scenario, run)->step_time, 0) << "no recovery, no step";
+  scenario.mutable_step_planner()->mutable_recovery()->set_enabled(true);
+  const auto bound = FindPushBound(scenario, run);
+  ASSERT_TRUE(bound);
+  EXPECT_NEAR(bound->step_time, 4 * 0.002, 1e-12);
+  // A sole in front of the other has its toe at least a sole's length farther.
+  EXPECT_GT(bound->reach, run.robot.feet()[0].length);
+  const double frequency = std::sqrt(robot::kGravity / 0.75);
+  EXPECT_NEAR(
+      bound->step_impulse,
+      bound->lip_impulse + bound->mass * frequency * bound->reach * std::exp(-frequency * 0.008),
+      1e-9);
+}
+
 TEST(PushBound, ThereIsNoneForOtherPushes) {
   const logging::RunRecord run = Standing(0, 0);
   EXPECT_FALSE(FindPushBound(Scenario(), run));

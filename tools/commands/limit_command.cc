@@ -75,6 +75,12 @@ void AddLimitCommand(CLI::App* app, Command* command) {
       "f(t) e^(-wt) dt <= m w d; of a half\n"
       "                           sine F T 2/pi with F = m w d (w^2 + (pi/T)^2) T / (pi (1 + "
       "e^(-wT)))\n"
+      "  reach, step_time         of the run at the limit, where a recovery step was made: m from "
+      "that edge to the farthest one\n"
+      "                           that the legs can make by a step, along the push; s from the "
+      "push's begin to touch-down\n"
+      "  step_impulse             m w (d + reach e^(-w step_time)): what one step catches of an "
+      "instantaneous push\n"
       "  share_of_...             impulse over each\n"
       "poise sweep merge joins the folders of --range or --part. Exit code: as poise sweep.");
   limit->callback([arguments, session, given, command] {

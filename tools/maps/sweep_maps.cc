@@ -298,7 +298,12 @@ std::vector<std::string> Maps::OfLimits() const {
       {"share of the pendulum's impulse m w d",
        [](const LimitPoint& p) { return share(p, &PushBound::lip_impulse); }},
       {"share of the pendulum's impulse for the push's duration",
-       [](const LimitPoint& p) { return share(p, &PushBound::lip_impulse_of_duration); }}};
+       [](const LimitPoint& p) { return share(p, &PushBound::lip_impulse_of_duration); }},
+      {"share of what one step catches", [](const LimitPoint& p) -> std::optional<double> {
+         if (p.at_limit == nullptr || !p.at_limit->push) return {};
+         if (!(p.at_limit->push->step_time > 0)) return {};
+         return share(p, &PushBound::step_impulse);
+       }}};
   const std::vector<LimitPoint> points = LimitPoints(header_, rows_);
   std::vector<std::string> charts;
   for (const auto& [label, get] : values) {

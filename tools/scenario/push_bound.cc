@@ -8,39 +8,18 @@
 
 #include "components/messages/conversions.h"
 #include "components/robot/sole.h"
+#include "components/step_planner/recovery_config.h"
+#include "components/step_planner/stepping/pendulum.h"
+#include "logging/metrics/metrics.h"
 #include "sim/push.h"
 #include "sim/simulated_robot.h"
 #include "sim/start_posture.h"
+#include "tools/scenario/step_reach.h"
 
 namespace poise {
-namespace {
 
 using Eigen::Vector2d;
 using std::numbers::pi;
-
-double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
-
-/// How far `from` is inside the convex hull of `points` along the unit vector `along`; empty when
-/// the ray misses it. The hull's edges are among the segments between points, and no segment
-/// reaches beyond it.
-std::optional<double> DistanceToEdge(const std::vector<Vector2d>& points, const Vector2d& from,
-                                     const Vector2d& along) {
-  std::optional<double> furthest;
-  for (const Vector2d& a : points) {
-    for (const Vector2d& b : points) {
-      const Vector2d segment = b - a;
-      const double sine = Cross(along, segment);
-      if (std::abs(sine) < 1e-12) continue;
-      const double distance = Cross(a - from, segment) / sine;
-      const double share = Cross(a - from, along) / sine;
-      if (share < 0 || share > 1) continue;
-      furthest = std::max(furthest.value_or(distance), distance);
-    }
-  }
-  return furthest;
-}
-
-}  // namespace
 
 double HorizontalImpulse(const Push& push, double impulse_scale) {
   const double horizontal = std::hypot(push.direction_x(), push.direction_y());
@@ -61,8 +40,16 @@ double PendulumShare(Push::Profile profile, double duration, double frequency) {
 
 namespace {
 
-std::optional<PushBound> BoundOf(const Push& push, const SimConfig& sim,
+/// s from the push's begin to the first step's touch-down; empty: there was none.
+std::optional<double> StepTime(const Scenario& scenario, const logging::RunRecord& run) {
+  if (!scenario.step_planner().recovery().enabled()) return {};
+  return logging::FindMetric("step_touch_down")->compute(run);
+}
+
+std::optional<PushBound> BoundOf(const Push& push, const Scenario& scenario,
+                                 const std::optional<double>& step_time,
                                  const logging::RunRecord& run) {
+  const SimConfig& sim = scenario.sim();
   Vector2d along(push.direction_x(), push.direction_y());
   if (!(along.norm() > 1e-12)) return {};
   const double sign = push.has_scaled_impulse() ? push.scaled_impulse() : push.peak();
@@ -102,6 +89,22 @@ std::optional<PushBound> BoundOf(const Push& push, const SimConfig& sim,
   bound.lip_impulse = bound.mass * frequency * bound.distance;
   bound.lip_impulse_of_duration =
       bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);
+  if (step_time) {
+    const stepping::StepChoice choice =
+        MakeStepChoice(scenario.step_planner().recovery(), run.robot);
+    for (int foot = 0; foot < 2; ++foot) {
+      if (truth->foot_contact_points[static_cast<size_t>(foot)] == 0) continue;
+      const Eigen::Isometry3d sole = GetPose(truth->foot_pose[static_cast<size_t>(foot)]);
+      const Eigen::Vector3d ahead = sole.linear().col(0);
+      const std::optional<double> farthest =
+          FarthestSupport(choice, foot, sole.translation().head<2>(),
+                          std::atan2(ahead.y(), ahead.x()), capture_point, along);
+      if (farthest) bound.reach = std::max(bound.reach, *farthest - bound.distance);
+    }
+    bound.step_time = *step_time;
+    bound.step_impulse = stepping::LargestImpulse(bound.mass, frequency, bound.distance,
+                                                  bound.reach, bound.step_time, 1);
+  }
   return bound;
 }
 
@@ -110,9 +113,10 @@ std::optional<PushBound> BoundOf(const Push& push, const SimConfig& sim,
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run) {
   const SimConfig& sim = scenario.sim();
   if (sim.hand_size() > 0) return {};
+  const std::optional<double> step_time = StepTime(scenario, run);
   std::optional<PushBound> nearest;
   for (const Push& push : sim.push()) {
-    const std::optional<PushBound> bound = BoundOf(push, sim, run);
+    const std::optional<PushBound> bound = BoundOf(push, scenario, step_time, run);
     if (!bound) continue;
     const auto share = [](const PushBound& of) { return of.impulse / of.lip_impulse_of_duration; };
     if (!nearest || share(*bound) > share(*nearest)) nearest = bound;

@@ -22,6 +22,10 @@ struct PushBound {
   /// N·s, the bound of a push of this shape and duration T, whose force f(t) must satisfy
   /// integral of f e^(-wt) dt <= m w d.
   double lip_impulse_of_duration = 0;
+  /// Of a run with a recovery step, else 0: m from that edge to the farthest one that a step can
+  /// make (FarthestSupport), s from the push's begin to the first touch-down, and
+  /// N·s, m w (d + reach e^(-w time)): what one step catches of a push at once.
+  double reach = 0, step_time = 0, step_impulse = 0;
 };
 
 /// Of several pushes the one that is nearest to its bound, or farthest beyond it: each has the

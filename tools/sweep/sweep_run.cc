@@ -171,6 +171,11 @@ std::string SweepRow::RowText(const SweepRow& row) {
                     {"distance", row.push->distance},
                     {"lip_impulse", row.push->lip_impulse},
                     {"lip_impulse_of_duration", row.push->lip_impulse_of_duration}};
+    if (row.push->step_time > 0) {
+      json["push"]["reach"] = row.push->reach;
+      json["push"]["step_time"] = row.push->step_time;
+      json["push"]["step_impulse"] = row.push->step_impulse;
+    }
   }
   // A scenario's words may be any bytes.
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
@@ -190,10 +195,15 @@ SweepRow SweepRow::Parse(const std::string& text) {
   row.metrics = json.at("metrics").get<std::map<std::string, double>>();
   if (json.contains("push")) {
     const nlohmann::json& push = json["push"];
-    row.push = PushBound{
-        push.at("impulse").get<double>(),     push.at("mass").get<double>(),
-        push.at("height").get<double>(),      push.at("distance").get<double>(),
-        push.at("lip_impulse").get<double>(), push.at("lip_impulse_of_duration").get<double>()};
+    row.push = PushBound{push.at("impulse").get<double>(),
+                         push.at("mass").get<double>(),
+                         push.at("height").get<double>(),
+                         push.at("distance").get<double>(),
+                         push.at("lip_impulse").get<double>(),
+                         push.at("lip_impulse_of_duration").get<double>(),
+                         push.value("reach", 0.0),
+                         push.value("step_time", 0.0),
+                         push.value("step_impulse", 0.0)};
   }
   return row;
 }

@@ -91,10 +91,26 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
   const SweepPoints points(header.sweep);
   std::vector<std::string> names = PlaceNames(header.sweep);
   names.push_back(NameOf(header.sweep.limit()));
-  for (const char* name :
-       {"fails_at", "largest_survived", "monotone", "runs", "impulse", "largest_survived_impulse",
-        "mass", "com_height", "distance_to_edge", "lip_impulse", "share_of_lip",
-        "lip_impulse_of_duration", "share_of_lip_of_duration", "phase", "trouble", "reason"}) {
+  for (const char* name : {"fails_at",
+                           "largest_survived",
+                           "monotone",
+                           "runs",
+                           "impulse",
+                           "largest_survived_impulse",
+                           "mass",
+                           "com_height",
+                           "distance_to_edge",
+                           "lip_impulse",
+                           "share_of_lip",
+                           "lip_impulse_of_duration",
+                           "share_of_lip_of_duration",
+                           "reach",
+                           "step_time",
+                           "step_impulse",
+                           "share_of_step",
+                           "phase",
+                           "trouble",
+                           "reason"}) {
     names.emplace_back(name);
   }
   std::string csv = Line(names);
@@ -123,6 +139,15 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
     of_bound(&PushBound::distance);
     share(&PushBound::lip_impulse);
     share(&PushBound::lip_impulse_of_duration);
+    // Of the run at the limit: each has its own time.
+    const std::optional<PushBound> stepped =
+        point.at_limit != nullptr && point.at_limit->push && point.at_limit->push->step_time > 0
+            ? point.at_limit->push
+            : std::nullopt;
+    for (const auto field : {&PushBound::reach, &PushBound::step_time, &PushBound::step_impulse}) {
+      cells.push_back(stepped ? fmt::format("{}", (*stepped).*field) : "");
+    }
+    cells.push_back(stepped ? Share(stepped->impulse, stepped->step_impulse) : "");
     const SweepRow* const fall = point.at_fall;
     for (const auto field : {&SweepRow::phase, &SweepRow::trouble, &SweepRow::reason}) {
       cells.push_back(fall != nullptr ? fall->*field : "");
@@ -205,6 +230,10 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
   const bool push = std::any_of(found.begin(), found.end(),
                                 [](const LimitPoint& p) { return p.any->push.has_value(); });
   if (push) heading.insert(heading.end(), {"N·s", "of pendulum", "for the duration"});
+  const bool step = std::any_of(found.begin(), found.end(), [](const LimitPoint& p) {
+    return p.at_limit != nullptr && p.at_limit->push && p.at_limit->push->step_time > 0;
+  });
+  if (step) heading.emplace_back("of one step's");
   std::vector<TableRow> table = {TableRow(heading.begin(), heading.end())};
   for (const LimitPoint& point : found) {
     std::vector<std::string> cells = Place(points, point.run);
@@ -225,6 +254,7 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
       cells.push_back(known ? FormatNumber(bound.impulse) : "");
       cells.push_back(percent(bound.lip_impulse));
       cells.push_back(percent(bound.lip_impulse_of_duration));
+      if (step) cells.push_back(bound.step_time > 0 ? percent(bound.step_impulse) : "no step");
     }
     table.emplace_back(cells.begin(), cells.end());
   }
