@@ -71,6 +71,11 @@ void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recover
 
 }  // namespace
 
+FootstepReport::FootstepReport(const stepping::Recovery* recovery, const Walk* walk) {
+  if (recovery != nullptr) recovery_regions_ = stepping::RegionFinder(recovery->choice());
+  if (walk != nullptr) walk_regions_ = stepping::RegionFinder(walk->choice());
+}
+
 void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery* recovery,
                             const Walk* walk, Report* out) {
   ReportPlanned(input, recovery, walk, out);
@@ -87,7 +92,6 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
   const bool walks = walk != nullptr && (walk->active() || recovery == nullptr);
   const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(stance)];
   const double height = std::max(input.com_height - sole.translation().z(), kLeastHeight);
-  const stepping::StepChoice& choice = walks ? walk->choice() : recovery->choice();
   stepping::RegionInput seen{.stance = stance,
                              .sole = sole.translation().head<2>(),
                              .yaw = stepping::Yaw(sole),
@@ -99,11 +103,11 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
     seen.left = out->touch_down[0];
     // A walk is counted on where it is planned.
     if (!walks && recovery->stage() == Stage::kSwinging) {
-      const double metre = stepping::SwingTime(1, choice.limits().acceleration);
+      const double metre = stepping::SwingTime(1, recovery->choice().limits().acceleration);
       seen.movable = seen.left * seen.left / (metre * metre);
     }
   }
-  const stepping::CaptureRegions regions = stepping::RegionsAbout(choice, seen);
+  const stepping::CaptureRegions regions = (walks ? walk_regions_ : recovery_regions_).About(seen);
   out->frequency = seen.frequency;
   out->step_time[0] = regions.first;
   out->step_time[1] = regions.longest;

@@ -24,7 +24,10 @@ struct FootstepInput {
 /// Regions are made anew when the foot that carries changes, and every 20 ms. Never allocates.
 class FootstepReport {
  public:
-  /// `recovery`, `walk`: null where they are not enabled.
+  FootstepReport() = default;
+  /// `recovery`, `walk`: null where they are not enabled, as below.
+  FootstepReport(const stepping::Recovery* recovery, const stepping::Walk* walk);
+
   void Update(const FootstepInput& input, const stepping::Recovery* recovery,
               const stepping::Walk* walk, ::steps::footsteps_t* out);
   void Archive(StateArchive* archive) { archive->Show(since_, stance_); }
@@ -32,6 +35,7 @@ class FootstepReport {
  private:
   double since_ = -1e9;  // s, last time that regions were made
   int stance_ = -1;
+  stepping::RegionFinder recovery_regions_, walk_regions_;
 };
 
 }  // namespace poise

@@ -61,6 +61,7 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   }
   walks_ = config.walk().enabled();
   if (walks_) walk_ = MakeWalk(config.walk(), config.contact(), *model_);
+  footstep_report_ = FootstepReport(recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
   state_ = robot::RobotState(model_->num_joints());
   in_contact_ = ContactsOf(config.phase(0).support());

@@ -25,68 +25,85 @@ Vector2d Farthest(const balance::ConvexPolygon& polygon, const Vector2d& directi
   return farthest;
 }
 
+/// Unit vector of one of the directions.
+Vector2d Direction(size_t k) {
+  const double angle = 2 * std::numbers::pi * static_cast<double>(k) / kRegionDirections;
+  return {std::cos(angle), std::sin(angle)};
+}
+
 }  // namespace
 
-CaptureRegions RegionsAbout(const StepChoice& choice, const RegionInput& input) {
+RegionFinder::RegionFinder(const StepChoice& choice) {
   const StepLimits& limits = choice.limits();
-  std::array<balance::ConvexPolygon, 2> sole, footholds;
+  std::array<balance::ConvexPolygon, 2> sole;
   for (int foot = 0; foot < 2; ++foot) {
     const auto i = static_cast<size_t>(foot);
     sole[i] = balance::SolePolygon(choice.foot(foot), limits.edge);
-    // Of this foot, the other one at the origin.
-    footholds[i] = choice.reach().Footholds(foot, Vector2d::Zero());
+    footholds_[i] = choice.reach().Footholds(foot, Vector2d::Zero());
   }
+  stands_ = sole[0].num_corners > 0 && sole[1].num_corners > 0;
+  reaches_ = footholds_[0].num_corners > 0 && footholds_[1].num_corners > 0;
+  for (size_t i = 0; i < 2; ++i) {
+    const double side = i == robot::kLeftFoot ? 1 : -1;
+    for (size_t k = 0; k < kRegionDirections; ++k) {
+      edge_[i][k] = Farthest(sole[i], Direction(k));
+      foothold_[i][k] = Farthest(footholds_[i], Direction(k));
+      const double way = (foothold_[i][k] - Vector2d(0, side * limits.spacing)).norm();
+      time_[i][k] =
+          limits.unload + std::max(limits.least_swing, SwingTime(way, limits.acceleration));
+    }
+  }
+}
+
+CaptureRegions RegionFinder::About(const RegionInput& input) const {
   CaptureRegions result;
-  if (sole[0].num_corners == 0 || sole[1].num_corners == 0) return result;
-  const bool reaches = footholds[0].num_corners > 0 && footholds[1].num_corners > 0;
+  if (!stands_) return result;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(input.yaw).toRotationMatrix();
   const auto own = static_cast<size_t>(input.stance);
   const Vector2d planned = turn.transpose() * (input.foothold - input.sole);
-  balance::ConvexPolygon around = footholds[1 - own];  // and where the step under way goes
+  balance::ConvexPolygon around = footholds_[1 - own];  // and where the step under way goes
   if (input.under_way) {
     around = HullOf(around, balance::ConvexHull({&planned, 1}));
     result.first = result.longest = input.left;
   }
-  std::array<std::array<Vector2d, kRegionDirections>, kMostRegionSteps + 1> corner;
-  for (int k = 0; k < kRegionDirections; ++k) {
-    const double angle = 2 * std::numbers::pi * k / kRegionDirections;
-    const Vector2d direction(std::cos(angle), std::sin(angle));
+  std::array<Points, kMostRegionSteps + 1> corner;
+  for (size_t k = 0; k < kRegionDirections; ++k) {
+    const Vector2d direction = Direction(k);
     const auto farther = [&](const Vector2d& a, const Vector2d& b) {
       return a.dot(direction) > b.dot(direction) ? a : b;
     };
-    const std::array<Vector2d, 2> edge{Farthest(sole[0], direction), Farthest(sole[1], direction)};
+    const std::array<Vector2d, 2> edge{edge_[0][k], edge_[1][k]};
+    std::array<double, 2> decay{};  // by the foot that stands
+    for (size_t s = 0; s < 2 && reaches_; ++s) {
+      const double time = input.step_time > 0 ? input.step_time : time_[1 - s][k];
+      result.longest = std::max(result.longest, time);
+      if (!input.under_way) result.first = std::max(result.first, s == own ? time : 0.0);
+      decay[s] = std::exp(-input.frequency * time);
+    }
     std::array<Vector2d, 2> before = edge;  // about each foot, of the number of steps before
     Vector2d region = edge[own];
-    corner[0][static_cast<size_t>(k)] = region;
+    corner[0][k] = region;
     for (size_t n = 1; n < corner.size(); ++n) {
       std::array<Vector2d, 2> now = before;
-      for (size_t s = 0; s < 2 && reaches; ++s) {
-        const double side = s == robot::kRightFoot ? 1 : -1;
-        const Vector2d foothold = Farthest(footholds[1 - s], direction);
-        double time = input.step_time;
-        if (time <= 0) {
-          const double way = (foothold - Vector2d(0, side * limits.spacing)).norm();
-          time = limits.unload + std::max(limits.least_swing, SwingTime(way, limits.acceleration));
-        }
-        result.longest = std::max(result.longest, time);
-        if (!input.under_way) result.first = std::max(result.first, s == own ? time : 0.0);
-        const double decay = std::exp(-input.frequency * time);
-        now[s] = farther((1 - decay) * edge[s] + decay * (foothold + before[1 - s]), before[s]);
+      for (size_t s = 0; s < 2 && reaches_; ++s) {
+        const Vector2d& foothold = foothold_[1 - s][k];
+        now[s] =
+            farther((1 - decay[s]) * edge[s] + decay[s] * (foothold + before[1 - s]), before[s]);
       }
       if (input.under_way) {
         const Vector2d foothold =
             balance::NearestPoint(around, planned + input.movable * direction);
-        const double decay = std::exp(-input.frequency * input.left);
-        region = farther((1 - decay) * edge[own] + decay * (foothold + before[1 - own]), region);
+        const double left = std::exp(-input.frequency * input.left);
+        region = farther((1 - left) * edge[own] + left * (foothold + before[1 - own]), region);
       } else {
         region = now[own];
       }
-      corner[n][static_cast<size_t>(k)] = region;
+      corner[n][k] = region;
       before = now;
     }
   }
-  for (auto& corners : corner) {
-    for (Vector2d& point : corners) point = input.sole + turn * point;
+  for (Points& points : corner) {
+    for (Vector2d& point : points) point = input.sole + turn * point;
   }
   for (size_t n = 0; n < corner.size(); ++n) result.region[n] = balance::ConvexHull(corner[n]);
   return result;

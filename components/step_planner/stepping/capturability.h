@@ -41,7 +41,26 @@ struct CaptureRegions {
 /// and d_{N−1} about this foot where that is farther. Each point so found can be brought to rest by
 /// that foothold; between the directions a region is their hull. Approximated: the pendulum's
 /// height stays, feet come down parallel, the COM is above the stance sole when a foot comes down,
-/// and a swing begins beside it and takes its least time. Pure, never allocates.
-CaptureRegions RegionsAbout(const StepChoice& choice, const RegionInput& input);
+/// and a swing begins beside it and takes its least time.
+class RegionFinder {
+ public:
+  /// Finds nothing.
+  RegionFinder() = default;
+  /// Keeps s, f and swings' times, which a robot does not change.
+  explicit RegionFinder(const StepChoice& choice);
+
+  /// Pure, never allocates.
+  CaptureRegions About(const RegionInput& input) const;
+
+ private:
+  using Points = std::array<Eigen::Vector2d, kRegionDirections>;
+
+  bool stands_ = false, reaches_ = false;
+  // By foot, in axes of the heading: its sole's from its centre; its footholds' with the other
+  // sole's centre at the origin, and the s that its swing there takes.
+  std::array<Points, 2> edge_, foothold_;
+  std::array<std::array<double, kRegionDirections>, 2> time_{};
+  std::array<balance::ConvexPolygon, 2> footholds_;
+};
 
 }  // namespace poise::stepping

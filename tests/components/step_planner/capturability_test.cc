@@ -48,7 +48,7 @@ TEST(CaptureRegions, AreTheClosedFormAheadAndBack) {
   const double yaw = 0.4, frequency = 3.5, time = 0.4;
   const Vector2d sole(0.3, -0.2);
   for (int stance = 0; stance < 2; ++stance) {
-    const CaptureRegions regions = RegionsAbout(choice, {stance, sole, yaw, frequency, time});
+    const CaptureRegions regions = RegionFinder(choice).About({stance, sole, yaw, frequency, time});
     EXPECT_EQ(regions.first, time);
     EXPECT_EQ(regions.longest, time);
     for (const double sign : {1.0, -1.0}) {
@@ -76,8 +76,8 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
   for (int trial = 0; trial < 20; ++trial) {
     const double frequency = 2.5 + 2 * any(random), time = 0.25 + 0.4 * any(random);
     const int stance = trial % 2, other = 1 - stance;
-    const CaptureRegions about = RegionsAbout(choice, {stance, {0, 0}, 0, frequency, time});
-    const CaptureRegions next = RegionsAbout(choice, {other, {0, 0}, 0, frequency, time});
+    const CaptureRegions about = RegionFinder(choice).About({stance, {0, 0}, 0, frequency, time});
+    const CaptureRegions next = RegionFinder(choice).About({other, {0, 0}, 0, frequency, time});
     const ConvexPolygon sole = about.region[0];
     const ConvexPolygon footholds = choice.reach().Footholds(other, {0, 0});
     for (size_t steps = 1; steps < about.region.size(); ++steps) {
@@ -116,7 +116,7 @@ TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
   input.under_way = true;
   input.foothold = foothold;
   input.left = left;
-  const CaptureRegions regions = RegionsAbout(choice, input);
+  const CaptureRegions regions = RegionFinder(choice).About(input);
   EXPECT_EQ(regions.first, left);
   const double half = 0.5 * choice.foot(robot::kLeftFoot).length - kEdge;
   const Vector2d ahead = Eigen::Rotation2Dd(yaw) * Vector2d(1, 0);
@@ -126,18 +126,18 @@ TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
   EXPECT_NEAR((end - foothold).dot(ahead), half, 1e-6);
   // What can be moved in time catches more.
   input.movable = 0.1;
-  const double more = Farthest(RegionsAbout(choice, input).region[1], ahead);
+  const double more = Farthest(RegionFinder(choice).About(input).region[1], ahead);
   EXPECT_GT(more, edge + 1e-3);
   EXPECT_LE(more, edge + 0.1 * std::exp(-frequency * left) + 1e-9);
 }
 
 TEST(CaptureRegions, GrowWithTheStepsAndStepsTakeWhatTheSwingTakes) {
   const StepChoice choice = Choice();
-  const CaptureRegions regions = RegionsAbout(choice, {robot::kLeftFoot, {0, 0}, 0, 3.6, 0});
+  const CaptureRegions regions = RegionFinder(choice).About({robot::kLeftFoot, {0, 0}, 0, 3.6, 0});
   EXPECT_GE(regions.first, choice.limits().unload + choice.limits().least_swing - 1e-12);
   EXPECT_GE(regions.longest, regions.first);
   // Quicker steps catch more.
-  const CaptureRegions slow = RegionsAbout(choice, {robot::kLeftFoot, {0, 0}, 0, 3.6, 0.8});
+  const CaptureRegions slow = RegionFinder(choice).About({robot::kLeftFoot, {0, 0}, 0, 3.6, 0.8});
   EXPECT_GT(slow.first, regions.longest);
   for (int k = 0; k < kRegionDirections; ++k) {
     const double angle = 2 * std::numbers::pi * k / kRegionDirections;
