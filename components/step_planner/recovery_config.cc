@@ -138,6 +138,8 @@ void CheckRecoveryConfig(const RecoveryConfig& config) {
   not_negative(config.together_after(), "together_after");
   positive(config.together_shift(), "together_shift");
   positive(config.together_swing(), "together_swing");
+  not_negative(config.lingering(), "lingering");
+  not_negative(config.lingering_time(), "lingering_time");
 }
 
 stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model) {
@@ -178,6 +180,8 @@ stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfi
   spec.reserve = config.reserve();
   spec.beyond = config.beyond();
   spec.again_after = config.again_after();
+  spec.lingering = config.lingering();
+  spec.lingering_time = config.lingering_time();
   spec.max_steps = config.max_steps();
   spec.momentum = config.momentum();
   spec.load = config.load();

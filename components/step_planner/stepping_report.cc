@@ -31,6 +31,8 @@ int8_t ReasonCode(stepping::StepReason reason) {
       return support_plan_t::REASON_SURE;
     case stepping::StepReason::kDeadline:
       return support_plan_t::REASON_DEADLINE;
+    case stepping::StepReason::kLingering:
+      return support_plan_t::REASON_LINGERING;
     case stepping::StepReason::kAgain:
       return support_plan_t::REASON_AGAIN;
     case stepping::StepReason::kWalk:

@@ -336,6 +336,8 @@ const char* StepReason(int8_t reason) {
       return "the capture point is farther beyond the soles than balancing brings back";
     case support_plan_t::REASON_DEADLINE:
       return "later the foothold would be out of reach";
+    case support_plan_t::REASON_LINGERING:
+      return "the capture point lingers at the soles' edge and comes out";
     case support_plan_t::REASON_AGAIN:
       return "the step before did not catch the capture point";
     case support_plan_t::REASON_WALK:

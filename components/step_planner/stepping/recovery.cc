@@ -47,6 +47,12 @@ bool Recovery::Update(const StepInput& input) {
   } else if (beyond_since_ < 0) {
     beyond_since_ = time;
   }
+  if (active() || !(beyond > -spec_.lingering)) {
+    lingers_since_ = -1;
+  } else if (lingers_since_ < 0) {
+    lingers_since_ = time;
+    lingered_from_ = beyond;
+  }
   switch (stage_) {
     case Stage::kIdle: {
       const StepReason need = NeedOfFirstStep(input, state, beyond);
@@ -123,7 +129,13 @@ bool Recovery::Update(const StepInput& input) {
 
 StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& state,
                                      double beyond) {
-  if (!input.allowed || !(beyond > 0) || spec_.max_steps < 1) return StepReason::kNone;
+  if (!input.allowed || spec_.max_steps < 1) return StepReason::kNone;
+  if (spec_.lingering > 0 && lingers_since_ >= 0 && beyond > lingered_from_ &&
+      input.time >= lingers_since_ + spec_.lingering_time - kTimeTolerance) {
+    const StepPlan plan = choice_.Choose(state);
+    if (plan.foot >= 0 && plan.margin >= 0) return StepReason::kLingering;
+  }
+  if (!(beyond > 0)) return StepReason::kNone;
   if (input.step_needed) return StepReason::kPersistent;
   if (beyond > spec_.sure) return StepReason::kSure;
   if (beyond < spec_.beyond) return StepReason::kNone;
@@ -416,8 +428,9 @@ void Recovery::Archive(StateArchive* archive) {
   swing_.Archive(archive);
   touch_.Archive(archive);
   height_.Archive(archive);
-  archive->Show(time_, since_, touched_since_, touch_down_, beyond_since_, moving_since_, cop_from_,
-                standing_height_, together_asked_, together_at_, shift_from_, step_helps_);
+  archive->Show(time_, since_, touched_since_, touch_down_, beyond_since_, lingers_since_,
+                lingered_from_, moving_since_, cop_from_, standing_height_, together_asked_,
+                together_at_, shift_from_, step_helps_);
   output_.Archive(archive);
 }
 

@@ -35,6 +35,7 @@ struct RecoverySpec {
   double far = 1;           ///< share of `lower` from which the feet are too far apart to rest
   double height_rate = 0;   ///< 1/s, with which the COM's height follows what the legs ask for
   double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
+  double lingering = 0, lingering_time = 0;                 ///< m inside the soles, 0: none; s
   double watch = -1;  ///< m inside the soles from which is known whether a step helps; < 0: never
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
   double together_shift = 1;  ///< s in which the COM goes above the foot that stays for it
@@ -48,6 +49,7 @@ enum class StepReason {
   kPersistent,  ///< the capture point stayed beyond the soles
   kSure,        ///< so far beyond that nothing else can bring it back
   kDeadline,    ///< waiting longer would leave the reach
+  kLingering,   ///< at the edge for long, and coming out
   kAgain,       ///< the step before did not catch it
   kWalk,        ///< the robot walks
   kTogether,    ///< the feet are put side by side
@@ -132,7 +134,9 @@ class Recovery {
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double touch_down_ = 0;        // s
   TouchTimer touch_;
-  double touched_since_ = -1;                           // s; negative: not yet, in this swing
+  double touched_since_ = -1;  // s; negative: not yet, in this swing
+  // s and m beyond, when it came near the edge; negative s: it is not.
+  double lingers_since_ = -1, lingered_from_ = 0;
   double beyond_since_ = -1;                            // s; negative: inside
   double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began

@@ -57,17 +57,22 @@ RecoverySpec Spec(double far) {
   return spec;
 }
 
+constexpr double kLingers = 0.1;  // s
+
 class World {
  public:
   /// `far`: 2: feet far apart are left where they are.
-  World(TestRobot robot, double ground_there = 0, double far = 2)
+  World(TestRobot robot, double ground_there = 0, double far = 2, double lingering = 0)
       : model_(robot::LoadTestRobot(robot)),
         height_(robot::StandingHeight(model_)),
         spacing_(robot::StandingSpacing(model_)),
         reach_(model_, height_, 0.08 * height_, 0.1, 0.02),
         ground_there_(ground_there) {
     StepChoice choice(model_, reach_, Limits(model_, reach_));
-    recovery_ = Recovery(choice, Spec(far));
+    RecoverySpec spec = Spec(far);
+    spec.lingering = lingering;
+    spec.lingering_time = kLingers;
+    recovery_ = Recovery(choice, spec);
     com_ = {0, 0, height_};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing_ : 0.5 * spacing_, 0) *
@@ -144,6 +149,7 @@ class World {
            velocity_.norm() < 0.1;
   }
 
+  Vector2d CapturePoint() const { return com_.head<2>() + velocity_.head<2>() / Frequency(); }
   double Frequency() const { return std::sqrt(robot::kGravity / com_.z()); }
   const std::array<Eigen::Isometry3d, 2>& soles() const { return sole_; }
   /// m, least so far while a foot swings, between rectangles of the soles in line with the axes.
@@ -230,9 +236,34 @@ double EdgeDistance(const World& world, const Vector2d& direction, double edge) 
 
 class RecoveryCase : public testing::TestWithParam<TestRobot> {};
 
+// Somewhat beyond what the centre of pressure reaches, 10 mm inside the edge, it goes out.
+TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
+  constexpr double kNear = 0.006;
+  for (const double degrees : {0.0, 180.0}) {
+    const Vector2d direction = Direction(degrees);
+    std::array<double, 2> decided{};
+    for (const bool lingers : {false, true}) {
+      World world(GetParam(), 0, 2, lingers ? kNear : 0);
+      const double edge = EdgeDistance(world, direction, 0);
+      world.Push(world.mass() * world.Frequency() *
+                 (EdgeDistance(world, direction, 0.01) + 0.0005) * direction);
+      while (world.CapturePoint().dot(direction) < edge - kNear) world.Tick();
+      const double near = world.time();
+      EXPECT_TRUE(world.Run(4)) << degrees;
+      EXPECT_TRUE(world.Rests()) << degrees;
+      EXPECT_EQ(world.recovery().num_steps(), 1) << degrees;
+      decided[lingers ? 1 : 0] = world.decided();
+      if (!lingers) continue;
+      EXPECT_EQ(world.recovery().reason(), StepReason::kLingering) << degrees;
+      EXPECT_NEAR(world.decided(), near + kLingers, 1.5 * kPeriod) << degrees;
+    }
+    EXPECT_LT(decided[1], decided[0]) << degrees;
+  }
+}
+
 TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
   for (double degrees = 0; degrees < 360; degrees += 30) {
-    World world(GetParam());
+    World world(GetParam(), 0, 2, degrees < 180 ? 0 : 0.006);
     const Vector2d direction = Direction(degrees);
     world.Push(0.97 * world.mass() * world.Frequency() * EdgeDistance(world, direction, 0.01) *
                direction);
