@@ -178,10 +178,15 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
     wrench[i] = GetWrench(balance_torque_->foot_wrench[i]);
   }
   const bool own_soles = sole_[0].num_corners > 0 && sole_[1].num_corners > 0;
-  const balance::RatioInterval interval = KeepLanded(
-      own_soles
-          ? balance::FreeRatio(resultant, sole_in_o, double_support_, sole_, eta_min_, eta_max_)
-          : balance::FeasibleRatio(resultant, sole_in_o, double_support_, eta_min_, eta_max_));
+  const auto allowed = [&](double least, double most) {
+    return own_soles ? balance::FreeRatio(resultant, sole_in_o, double_support_, sole_, least, most)
+                     : balance::FeasibleRatio(resultant, sole_in_o, double_support_, least, most);
+  };
+  balance::RatioInterval interval = allowed(eta_min_, eta_max_);
+  // The least share holds outside a ramp: on one a foot may carry nothing.
+  const bool ramped = transition_ && support_plan_->transition != support_plan_t::TRANSITION_NONE;
+  if (!interval.feasible && ramped) interval = allowed(0, 1);
+  interval = KeepLanded(interval);
   const bool pressed = resultant[2] < 0;
   out.eta_feasible = interval.feasible && pressed ? 1 : 0;
   out.eta_min = interval.feasible ? interval.min : 0.0;

@@ -1,6 +1,8 @@
 #include "components/step_planner/walk_config.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 
 #include <algorithm>
 #include <array>
@@ -48,6 +50,67 @@ constexpr double kMostPress = 0.4;  // of the weight: more would lift the other 
 
 double LeastInnerRadius(const robot::RobotModel& model) {
   return std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
+}
+
+/// Of the robot whose walk the defaults are: the paper's. Another's is the same in units of g and
+/// of its COM's height, so that as much of the capture point's error grows in a step.
+constexpr double kDefaultHeight = 0.75;  // m
+
+enum class Unit { kTime, kLength, kSpeed, kRate, kTurnAcceleration };
+struct ScaledField {
+  const char* name;
+  Unit unit;
+};
+// Accelerations in m/s² are of g. Left as they are: `gap` and `touch_duration`, which are what a
+// foot is off by and how long a hard sole bounces, and angles.
+constexpr auto kScaledFields = std::to_array<ScaledField>({
+    {"start", Unit::kTime},
+    {"unload", Unit::kTime},
+    {"swing", Unit::kTime},
+    {"load", Unit::kTime},
+    {"settle", Unit::kTime},
+    {"freeze", Unit::kTime},
+    {"rest_time", Unit::kTime},
+    {"longest", Unit::kLength},
+    {"widest", Unit::kLength},
+    {"clearance", Unit::kLength},
+    {"adjust_from", Unit::kLength},
+    {"line", Unit::kLength},
+    {"lower", Unit::kLength},
+    {"reach_lower", Unit::kLength},
+    {"rest_distance", Unit::kLength},
+    {"touch_speed", Unit::kSpeed},
+    {"rest_speed", Unit::kSpeed},
+    {"offset_rate", Unit::kRate},
+    {"height_rate", Unit::kRate},
+    {"yaw_rate", Unit::kRate},
+    {"turn_acceleration", Unit::kTurnAcceleration},
+});
+
+/// `height`: m, of the standing COM. A field that is given stays.
+WalkConfig WithRobotDefaults(WalkConfig config, double height) {
+  const double length = height / kDefaultHeight, time = std::sqrt(length);
+  const auto factor = [&](Unit unit) {
+    switch (unit) {
+      case Unit::kTime:
+      case Unit::kSpeed:
+        return time;
+      case Unit::kLength:
+        return length;
+      case Unit::kRate:
+        return 1 / time;
+      case Unit::kTurnAcceleration:
+        break;
+    }
+    return 1 / length;
+  };
+  const google::protobuf::Reflection& values = *config.GetReflection();
+  for (const ScaledField& scaled : kScaledFields) {
+    const auto* field = WalkConfig::descriptor()->FindFieldByName(scaled.name);
+    if (values.HasField(config, field)) continue;
+    values.SetDouble(&config, field, factor(scaled.unit) * values.GetDouble(config, field));
+  }
+  return config;
 }
 
 void CheckWalk(bool holds, const char* name, const char* must) {
@@ -130,8 +193,10 @@ void CheckWalkConfig(const WalkConfig& config) {
   }
 }
 
-stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
+stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& contact,
                         const robot::RobotModel& model) {
+  const double height = robot::StandingHeight(model);
+  const WalkConfig config = WithRobotDefaults(given, height);
   double edge = config.edge();
   if (!config.has_edge()) {
     edge = kEdgeShare * LeastInnerRadius(model);
@@ -142,7 +207,6 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                       fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                   edge, foot.name, foot.length, foot.width));
   }
-  const double height = robot::StandingHeight(model);
   const stepping::Reach reach(model, height, config.reach_lower(), config.joint_reserve(),
                               config.gap());
   if (reach.empty()) {
@@ -173,6 +237,7 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
                config.rests() ? kAcrossShare : 1,
                config.rests() ? kWaitShare : 0};
   spec.touch_load = contact.touch_load();
+  spec.release_load = contact.release_load();
   spec.touch_duration = config.touch_duration();
   spec.search_depth = contact.search_depth();
   spec.gain = config.gain();

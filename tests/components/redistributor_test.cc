@@ -391,6 +391,37 @@ TEST(Redistributor, ALandedFootKeepsItsShareUntilItLeavesTheGround) {
   EXPECT_NEAR(ratio_with_cop_at(left), 0.1, 1e-9);
 }
 
+// The centre of pressure 49 mm beside the right sole's middle, which bears 50: with 2 % of the load
+// on the other foot the right one's own would lie 2 % of the soles' distance farther out.
+TEST(Redistributor, OnARampAFootMayCarryNothing) {
+  Chain chain(TestRobot::kDyros, "phase { }", MonitorConfig(false), RedistributorText());
+  chain.Run(StandingState(chain.model()), 0);
+  support_plan_t plan = chain.plan();
+  balance_torque_t balance = chain.balance();
+  ControlContext context(TestRobot::kDyros);
+  Harness<Redistributor> alone(&context, RedistributorText());
+  alone.Bind("robot_state", &chain.state());
+  alone.Bind("support_plan", &plan);
+  alone.Bind("balance_torque", &balance);
+  const double right =
+      (GetPose(balance.frame_o).inverse() * GetPose(plan.foot_pose[0])).translation().y();
+  const auto with_cop_at = [&](double y) -> const joint_command_t& {
+    balance.resultant.moment[0] = balance.resultant.force[2] * y;
+    alone.Run(TickAt(0));
+    return alone.output<joint_command_t>();
+  };
+  EXPECT_EQ(with_cop_at(right - 0.049).status, joint_command_t::STATUS_INFEASIBLE);
+  plan.transition = support_plan_t::TRANSITION_LOADING;
+  plan.transition_foot = 1;
+  plan.transition_progress = 0;
+  const joint_command_t& out = with_cop_at(right - 0.049);
+  EXPECT_EQ(out.status, joint_command_t::STATUS_OK);
+  EXPECT_EQ(out.eta_feasible, 1);
+  EXPECT_EQ(out.conditions_met[0] + out.conditions_met[1], 2);
+  EXPECT_NEAR(out.eta, 1, 1e-9);
+  EXPECT_EQ(with_cop_at(right - 0.051).status, joint_command_t::STATUS_INFEASIBLE);
+}
+
 TEST(Redistributor, RefusesRatiosThatCannotBe) {
   EXPECT_EQ(RefusedField("landed_share: -0.1"), "landed_share");
   EXPECT_EQ(RefusedField("landed_share: 0.5"), "landed_share");

@@ -1,6 +1,9 @@
 // A walk from start to stop in both engines, and its replay.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+
 #include "tests/graph/poise_program.h"
 
 namespace poise {
@@ -39,6 +42,58 @@ TEST(WalkRun, TenStepsAndAStopInEachEngine) {
     const ProgramResult replay = RunPoise({"replay", folder / "run"});
     EXPECT_EQ(replay.exit_code, 0) << replay.output;
   }
+}
+
+/// What a walk of ten steps is judged by in any robot.
+void ExpectWalks(const std::string& robot, const std::string& engine) {
+  const RunFolder folder;
+  std::vector<std::string> arguments = {"run",     "walk", "--inline", "--robot",     robot,
+                                        "--world", engine, "--out",    folder / "run"};
+  arguments.insert(arguments.end(), kTenSteps.begin(), kTenSteps.end());
+  const ProgramResult result = RunPoise(arguments);
+  EXPECT_EQ(result.exit_code, 0) << robot << ", " << engine << result.output;
+  const nlohmann::json summary = ReadSummary(folder / "run");
+  for (const char* none : {"fallen", "violated_ticks", "eta_infeasible_ticks"}) {
+    EXPECT_EQ(Measured(summary, none), 0) << robot << ", " << engine << ": " << none;
+  }
+  EXPECT_GE(Measured(summary, "steps"), 9) << robot << ", " << engine;
+  EXPECT_GT(Measured(summary, "walk_way"), 0.6) << robot << ", " << engine;
+}
+
+// No sensors in its feet, soft gears, arms.
+TEST(WalkRun, HeronWalksInEachEngine) {
+  for (const char* engine : {"mujoco", "ode"}) ExpectWalks("heron/heron", engine);
+}
+
+/// A folder with a public robot's text and its maker's file; empty: that file is not there.
+std::string PublicRobot(const std::string& name, const std::string& urdf, const RunFolder& folder) {
+  const char* const given = std::getenv("POISE_ROBOTS");
+  const std::filesystem::path robots =
+      given != nullptr ? given : POISE_SOURCE_DIR "/../shared/robots";
+  if (!std::filesystem::exists(robots / urdf)) return {};
+  const std::filesystem::path place = folder / name;
+  std::filesystem::create_directories(place);
+  std::filesystem::copy_file(robots / urdf, place / urdf);
+  const std::string text = name + ".pbtxt";
+  std::filesystem::copy_file(POISE_SOURCE_DIR "/deploy/robots/" + name + "/" + text, place / text);
+  return place / text;
+}
+
+// A COM at 0.46 m, and legs whose force at the ground, let go, came to rest below what a contact
+// asked for: it fell in its fourth step.
+TEST(WalkRun, ASmallRobotWalks) {
+  const RunFolder folder;
+  const std::string robot = PublicRobot("icub", "icub_reduced.urdf", folder);
+  if (robot.empty()) GTEST_SKIP() << "icub_reduced.urdf is not there: it is not part of Poise";
+  ExpectWalks(robot, "mujoco");
+}
+
+// Soles 50 to 60 mm wide without sensors: it stood on a sole's edge while that was loaded.
+TEST(WalkRun, ARobotWithNarrowSolesWalks) {
+  const RunFolder folder;
+  const std::string robot = PublicRobot("g1", "g1_29dof_rev_1_0.urdf", folder);
+  if (robot.empty()) GTEST_SKIP() << "g1_29dof_rev_1_0.urdf is not there: it is not part of Poise";
+  ExpectWalks(robot, "mujoco");
 }
 
 // What a scenario leaves open is filled for walking: with the rule's values for standing this

@@ -270,7 +270,8 @@ bool Walk::Settled(const StepInput& input) {
   }
   // Not before the capture point is where both feet are to take it over.
   const double since = std::max(since_, touch_down_);
-  return input.time >= since + spec_.settle - kTimeTolerance && Loaded(input) >= 1;
+  return input.time >= since + spec_.settle - kTimeTolerance &&
+         input.load[static_cast<size_t>(1 - stance_)] >= spec_.release_load;
 }
 
 void Walk::LetGo(const StepInput& input) {
@@ -278,9 +279,14 @@ void Walk::LetGo(const StepInput& input) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
   const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
-  const double loaded = Loaded(input);
-  const double pulled = spec_.press_share > 0 ? 0 : loaded;
-  const double missing = spec_.press_share > 0 ? Missing(input) : 1 - loaded;
+  double pulled = 0, missing = Missing(input);
+  if (!(spec_.press_share > 0)) {
+    // Comes to rest between the two loads, on a leg of any mass: there it counts as a contact.
+    const double load = input.load[static_cast<size_t>(1 - stance_)];
+    pulled =
+        std::clamp((load - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0, 1.0);
+    missing = 1 - pulled;
+  }
   stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
                   swing_.foothold().z() - spec_.search_depth, &output_);
 }

@@ -26,6 +26,7 @@ struct WalkSpec {
   double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is commanded
   SwingSpec foot;
   double touch_load = 0, touch_duration = 0;  ///< N, s
+  double release_load = 0;                    ///< N, below touch_load: a foot let go carries more
   double search_depth = 0;                    ///< m below the foothold
   double gain = 0;                            ///< of the capture point's error, > 0
   double offset_rate = 0;                     ///< 1/s, of the pendulum's observed offset; 0: none

@@ -1,0 +1,133 @@
+// Walking's defaults on robots of other sizes, and a foot that is let go on legs of any mass.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/robot/posture.h"
+#include "components/step_planner/walk_config.h"
+#include "tests/robot/robot_test_support.h"
+
+namespace poise {
+namespace {
+
+using robot::TestRobot;
+using stepping::StepInput;
+using stepping::Walk;
+using stepping::WalkStage;
+
+constexpr double kPeriod = 0.002;  // s
+
+/// A robot that stands still whatever is asked for, but for the foot that swings.
+class StillWorld {
+ public:
+  /// `stiffness`: N/m with which the foot presses where its reference is below the ground.
+  StillWorld(const robot::RobotModel& model, const WalkConfig& config, double stiffness)
+      : walk_(MakeWalk(config, ContactConfirmation(), model)), stiffness_(stiffness) {
+    const double spacing = walk_.choice().limits().spacing;
+    for (size_t i = 0; i < 2; ++i) {
+      input_.sole[i] = Eigen::Translation3d(0, (i == 0 ? -0.5 : 0.5) * spacing, 0) *
+                       Eigen::Isometry3d::Identity();
+    }
+    input_.com = {0, 0, robot::StandingHeight(model)};
+    input_.com_height = input_.com.z();
+    input_.allowed = true;
+  }
+
+  void Tick(const stepping::WalkCommand& command) {
+    if (walk_.Update(input_, command)) {
+      input_.in_contact = walk_.output().in_contact;
+      for (size_t i = 0; i < 2; ++i) {
+        input_.load[i] = 200;
+        if (input_.in_contact[i]) continue;
+        Eigen::Vector3d foot = walk_.output().swing.position;
+        input_.load[i] = stiffness_ * std::max(-foot.z(), 0.0);
+        foot.z() = std::max(foot.z(), 0.0);
+        input_.sole[i].translation() = foot;
+      }
+    }
+    input_.time += kPeriod;
+  }
+
+  /// s until `stage`; 10 when it does not come.
+  double Until(WalkStage stage, const stepping::WalkCommand& command) {
+    const double start = input_.time;
+    while (walk_.stage() != stage && input_.time < start + 10) Tick(command);
+    return input_.time - start;
+  }
+  const Walk& walk() const { return walk_; }
+
+ private:
+  Walk walk_;
+  double stiffness_;
+  StepInput input_;
+};
+
+const stepping::WalkCommand kAhead{{1, 0}, 0, true};  // m/s: approached, not reached
+
+/// The paper's robot with its COM at four fifths of its height.
+robot::RobotModel Crouched() {
+  std::string text = robot::ReadWhole(robot::RobotPath(TestRobot::kDyros));
+  const std::string height = "com_height: 0.75";
+  text.replace(text.find(height), height.size(), "com_height: 0.6");
+  return robot::LoadRobotTexts(text, robot::ReadWhole(robot::UrdfPath(TestRobot::kDyros)));
+}
+
+WalkConfig Enabled() {
+  WalkConfig config;
+  config.set_enabled(true);
+  return config;
+}
+
+TEST(WalkDefaults, AreThePapersRobots) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const WalkConfig defaults;
+  const Walk walk = MakeWalk(Enabled(), ContactConfirmation(), model);
+  // To the bit.
+  EXPECT_EQ(walk.period(),
+            defaults.unload() + defaults.swing() + defaults.settle() + defaults.load());
+}
+
+// Dynamic similarity: lengths go with the height h, times with √(h/g).
+TEST(WalkDefaults, AreOneWalkInUnitsOfGravityAndHeight) {
+  const robot::RobotModel papers = robot::LoadTestRobot(TestRobot::kDyros);
+  const robot::RobotModel other = Crouched();
+  const double height = robot::StandingHeight(papers),
+               ratio = robot::StandingHeight(other) / height;
+  ASSERT_NEAR(ratio, 0.8, 1e-12);
+  StillWorld first(papers, Enabled(), 1e5), second(other, Enabled(), 1e5);
+  EXPECT_NEAR(second.walk().period(), std::sqrt(ratio) * first.walk().period(), 1e-12);
+  // From a stand to the first lift-off, and the first step's length: accelerations are of g.
+  EXPECT_NEAR(second.Until(WalkStage::kSwinging, kAhead),
+              std::sqrt(ratio) * first.Until(WalkStage::kSwinging, kAhead), 2 * kPeriod);
+  EXPECT_NEAR(second.walk().command().velocity.x(),
+              std::sqrt(ratio) * first.walk().command().velocity.x(), 1e-12);
+
+  WalkConfig given = Enabled();
+  given.set_swing(0.5);
+  const Walk walk = MakeWalk(given, ContactConfirmation(), other);
+  EXPECT_NEAR(walk.period() - 0.5,
+              std::sqrt(ratio) * (first.walk().period() - WalkConfig().swing()), 1e-12);
+}
+
+// A leg presses with its mass at the foot times k_p of the foot's task: 6 kg and 625 1/s^2 of a
+// small robot, 45 kg of a large one. Let go, the foot's reference comes back to the sole and goes
+// down by turns; a light leg's load came to rest below `touch_load`, and the foot was never a
+// contact.
+TEST(WalkLanding, AFootThatIsLetGoCarriesUntilItCountsOnALegOfAnyMass) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const ContactConfirmation contact;
+  for (const double stiffness : {600.0, 3750.0, 30e3}) {
+    StillWorld world(model, Enabled(), stiffness);
+    ASSERT_LT(world.Until(WalkStage::kTouching, kAhead), 3) << stiffness;
+    const int foot = world.walk().stepping_foot();
+    EXPECT_LT(world.Until(WalkStage::kLoading, kAhead), 0.5) << stiffness;
+    EXPECT_EQ(world.walk().num_steps(), 1) << stiffness;
+    EXPECT_EQ(world.walk().stepping_foot(), 1 - foot) << stiffness;
+  }
+}
+
+}  // namespace
+}  // namespace poise
