@@ -56,8 +56,8 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
     if (!Plausible(feedback.current[j])) return {unusable.reason, static_cast<int>(j)};
   }
   // A foot's sensor may fail: the robot stands without it (HwBridge::Sense).
-  const bool rest = AllPlausible(feedback.imu_angular_velocity) &&
-                    AllPlausible(feedback.imu_acceleration);
+  const bool rest =
+      AllPlausible(feedback.imu_angular_velocity) && AllPlausible(feedback.imu_acceleration);
   return rest ? Problem{} : unusable;
 }
 
@@ -89,10 +89,9 @@ FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feed
         greatest_torque_[j] - least_torque_[j] > config_.frozen_torque) {
       return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
     }
-    const bool differs =
-        motors_[j].current_sensor && enabled_[j] != 0 &&
-        std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
-                                config_.torque_error;
+    const bool differs = motors_[j].current_sensor && enabled_[j] != 0 &&
+                         std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
+                             config_.torque_error;
     error_cycles_[j] = differs ? std::min(error_cycles_[j] + 1, config_.torque_error_cycles) : 0;
     if (differs && error_cycles_[j] >= config_.torque_error_cycles) {
       return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};

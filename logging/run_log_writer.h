@@ -26,8 +26,8 @@ class RunLogWriter {
   RunLogWriter(const std::string& path, const RunSpec& spec, const run_info_t& info);
 
   /// The encoded message of `tick` on channel `channel` of the graph. Every channel's ticks must
-  /// come in order and without a gap but for skipped ones (std::logic_error otherwise); channels may
-  /// run ahead of each other. External channels: any tick. Throws LogError.
+  /// come in order and without a gap but for skipped ones (std::logic_error otherwise); channels
+  /// may run ahead of each other. External channels: any tick. Throws LogError.
   void AddMessage(int channel, int64_t tick, std::span<const uint8_t> data);
   /// Real time: of this channel no message before `tick` will come any more. Throws LogError.
   void Skip(int channel, int64_t tick);

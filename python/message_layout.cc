@@ -11,7 +11,7 @@ namespace {
 
 const std::map<std::string_view, Number>& Numbers() {
   static const std::map<std::string_view, Number> numbers = {
-      {"int8_t", Number::kInt8},   {"byte", Number::kUint8},   {"boolean", Number::kInt8},
+      {"int8_t", Number::kInt8},   {"byte", Number::kUint8},    {"boolean", Number::kInt8},
       {"int16_t", Number::kInt16}, {"int32_t", Number::kInt32}, {"int64_t", Number::kInt64},
       {"float", Number::kFloat},   {"double", Number::kDouble}};
   return numbers;

@@ -1,4 +1,5 @@
-// Where the fields of an encoded message stand: arrays are made of the bytes, without a message between.
+// Where the fields of an encoded message stand: arrays are made of the bytes, without a message
+// between.
 #pragma once
 
 #include <cstddef>

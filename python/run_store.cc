@@ -124,8 +124,8 @@ void RunStore::Index() {
     const auto offset = static_cast<uint64_t>(event.data.data() - reader.bytes());
     if (offset + lane.channel->layout.size() > size_) continue;
     lane.channel->ticks.push_back(
-        lane.external ? static_cast<int64_t>(
-                            std::llround(static_cast<double>(event.utime) * 1e-6 / spec_.tick_period()))
+        lane.external ? static_cast<int64_t>(std::llround(static_cast<double>(event.utime) * 1e-6 /
+                                                          spec_.tick_period()))
                       : lane.filter->tick(event.data.data()));
     lane.channel->offsets.push_back(offset);
   }
@@ -184,8 +184,7 @@ void RunStore::CheckUnchanged() const {
       ModifiedAt(info) == modified_) {
     return;
   }
-  throw LogError(
-      fmt::format("{}: has changed since it was opened; open the run again", log_));
+  throw LogError(fmt::format("{}: has changed since it was opened; open the run again", log_));
 }
 
 logging::RunRecord& RunStore::record() const {

@@ -68,8 +68,8 @@ class Session {
   /// Ends the run and gives its messages, of what was kept. A second call gives the same.
   std::shared_ptr<const RunStore> Finish();
 
-  int64_t tick();         ///< ticks done
-  double time();          ///< s, of the scenario, of the last tick
+  int64_t tick();  ///< ticks done
+  double time();   ///< s, of the scenario, of the last tick
   bool ended();
   bool failed();
   std::string detail();
@@ -96,7 +96,7 @@ class Session {
   std::vector<std::unique_ptr<MessageLayout>> layouts_;  // by channel; nullptr: none
   int sim_index_ = -1;                                   // in the graph
   int64_t next_act_ = 1;
-  std::vector<double> override_;                         // by joint; NaN: none
+  std::vector<double> override_;  // by joint; NaN: none
   bool overrides_ = false;
   int command_channel_ = -1;
 

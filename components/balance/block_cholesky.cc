@@ -39,8 +39,7 @@ bool FactorDiagonal(double* lower, Index stride, double* inverse) {
 
 }  // namespace
 
-void AddColumnsOfBlocks(double sign, const BlockMatrix& a, Index cols, const double* x,
-                        double* y) {
+void AddColumnsOfBlocks(double sign, const BlockMatrix& a, Index cols, const double* x, double* y) {
   for (Index i = 0; i < a.rows; i += kBlock) {
     Block sum = Load(y + i);
     for (Index j = 0; j < cols; ++j) sum += Load(a.col(j) + i) * (sign * x[j]);

@@ -62,9 +62,10 @@ void ForeignComponent::Configure(const ComponentContext& context, Wiring* wiring
   for (const PortType& port : declared_) {
     std::unique_ptr<Carrier> carrier = MakeCarrier(port.type);
     if (!carrier) {
-      throw ConfigError(fmt::format("port {}: {} is no message that such a component can carry; "
-                                    "poise list messages shows them",
-                                    port.name, port.type));
+      throw ConfigError(
+          fmt::format("port {}: {} is no message that such a component can carry; "
+                      "poise list messages shows them",
+                      port.name, port.type));
     }
     MessageCounts counts;
     for (const std::string_view name : carrier->count_names()) {
@@ -73,8 +74,8 @@ void ForeignComponent::Configure(const ComponentContext& context, Wiring* wiring
       } else if (name == "num_feet") {
         counts.push_back(static_cast<int32_t>(robot->feet().size()));
       } else {
-        throw ConfigError(fmt::format("port {}: the robot does not tell {} of {}", port.name, name,
-                                      port.type));
+        throw ConfigError(
+            fmt::format("port {}: the robot does not tell {} of {}", port.name, name, port.type));
       }
     }
     if (port.input) {
@@ -109,8 +110,8 @@ void ForeignComponent::Step(const Tick& tick) {
     functions_->Step(tick, ports_);
     for (size_t i = 0; i < ports_.size(); ++i) {
       if (ports_[i].port.input || carriers_[i]->DecodeOutput(ports_[i].bytes)) continue;
-      throw ConfigError(fmt::format("output {}: its bytes are no {}", ports_[i].port.name,
-                                    ports_[i].port.type));
+      throw ConfigError(
+          fmt::format("output {}: its bytes are no {}", ports_[i].port.name, ports_[i].port.type));
     }
   } catch (const std::exception& error) {
     error_ = std::current_exception();

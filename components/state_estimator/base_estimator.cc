@@ -100,8 +100,8 @@ void BaseEstimator::Archive(StateArchive* archive) {
                 orientation_, gyro_bias_, imu_orientation_, gyro_, imu_rotation_, angular_velocity_,
                 imu_velocity_, imu_acceleration_);
   for (Foot& foot : feet_) archive->Show(foot.last_offset, foot.anchor);
-  archive->Show(accelerometer_bias_, averaged_, foot_weight_, rest_position_, rest_load_, rest_gyro_, rest_samples_, rest_left_,
-                placed_);
+  archive->Show(accelerometer_bias_, averaged_, foot_weight_, rest_position_, rest_load_,
+                rest_gyro_, rest_samples_, rest_left_, placed_);
 }
 
 void BaseEstimator::UpdateJoints(const BaseSensors& sensors, double dt) {

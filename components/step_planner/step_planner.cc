@@ -243,7 +243,7 @@ bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
   if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
     // Where the walk has turned it.
     if (walk_.active()) generator_->HoldBody(untilted_);
-    walk_.Stop();
+    walk_.Stop(time);
     return true;
   }
   return (walks_ && WalkOn(input)) || stands_otherwise_;

@@ -17,9 +17,8 @@ void FootLoad::Configure(const poise::ComponentContext& context, poise::Wiring* 
   if (!(config.time_constant() >= 0)) {
     throw poise::ConfigError("time_constant", "must be a time in s, 0 or more");
   }
-  gain_ = config.time_constant() > 0
-              ? 1 - std::exp(-context.tick_period / config.time_constant())
-              : 1;
+  gain_ =
+      config.time_constant() > 0 ? 1 - std::exp(-context.tick_period / config.time_constant()) : 1;
   const auto model = poise::LoadRobot(context);
   wiring->AddInput(&robot_state_, "robot_state", poise::JointAndFootCounts(*model));
   wiring->AddOutput(&foot_load_, "foot_load", poise::FootCounts(*model));
@@ -52,14 +51,14 @@ bool FootLoad::Archive(poise::StateArchive* archive) {
 }
 
 poise::ComponentType FootLoadType() {
-  return {"foot_load",
-          "load of the feet, filtered",
-          [] { return std::make_unique<FootLoad>(); },
-          {},
-          {poise::Reads<poise::robot_state_t>("robot_state"),
-           poise::Writes<foot_load_t>("foot_load")},
-          FootLoadConfig::descriptor(),
-          poise::gait_lab_schema};
+  return {
+      "foot_load",
+      "load of the feet, filtered",
+      [] { return std::make_unique<FootLoad>(); },
+      {},
+      {poise::Reads<poise::robot_state_t>("robot_state"), poise::Writes<foot_load_t>("foot_load")},
+      FootLoadConfig::descriptor(),
+      poise::gait_lab_schema};
 }
 
 }  // namespace gait_lab

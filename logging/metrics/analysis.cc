@@ -106,8 +106,8 @@ std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
   for (int foot = 0; foot < plan->num_feet; ++foot) {
     if (!InContact(*plan, foot)) continue;
     const auto f = static_cast<size_t>(foot);
-    resultant += balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) *
-                 *KnownWrench(run, f, tick);
+    resultant +=
+        balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) * *KnownWrench(run, f, tick);
   }
   if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
   return balance::CenterOfPressure(resultant);

@@ -119,11 +119,11 @@ void AddMotion(MetricList* list) {
          return kMilli *
                 (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
        }});
-  list->push_back(
-      {"com_error_end_model", "mm",
-       "the same of the COM that the controller's model has in the true posture: without the model's "
-       "own error",
-       ModelComErrorAtEnd});
+  list->push_back({"com_error_end_model", "mm",
+                   "the same of the COM that the controller's model has in the true posture: "
+                   "without the model's "
+                   "own error",
+                   ModelComErrorAtEnd});
   list->push_back({"orientation_error_max", "mrad", "largest error of the body's orientation",
                    [](const RunRecord& run) {
                      return Scaled(Maximum(run,

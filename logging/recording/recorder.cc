@@ -18,8 +18,8 @@
 namespace poise::logging {
 namespace {
 
-constexpr int64_t kFlushInterval = 50'000'000;    // ns
-constexpr int kSpin = 50;                         // ms
+constexpr int64_t kFlushInterval = 50'000'000;   // ns
+constexpr int kSpin = 50;                        // ms
 constexpr int64_t kListenInterval = 20'000'000;  // ns, between two looks for a listener
 constexpr timespec kNap{0, 1'000'000};
 constexpr int kLastSpins = 20;  // each takes a batch of every channel

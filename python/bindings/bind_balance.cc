@@ -237,8 +237,8 @@ py::array_t<double> Nearest(const Array& corners, const Array& points) {
   for (py::ssize_t i = 0; i < count; ++i) {
     const Eigen::Vector2d point(from[2 * i], from[2 * i + 1]);
     const bool good = point.allFinite();
-    const Eigen::Vector2d nearest = good ? balance::NearestPoint(polygon, point)
-                                         : Eigen::Vector2d::Constant(kNan).eval();
+    const Eigen::Vector2d nearest =
+        good ? balance::NearestPoint(polygon, point) : Eigen::Vector2d::Constant(kNan).eval();
     to[3 * i] = nearest.x();
     to[3 * i + 1] = nearest.y();
     to[3 * i + 2] = good ? balance::SignedDistance(polygon, point) : kNan;
@@ -334,11 +334,11 @@ py::tuple Balance(const RobotHandle& robot, const StateArrays& states, const Fee
       if (good) {
         row = body.data().com_jacobian.bottomRows(1);
         bias[0] = body.data().com_bias_acceleration.z();
-        good = height.Compute(body.contact(), row, bias) &&
-               control.Compute(body.contact(), height, body.geometry(), polygon, true, now,
-                               &balanced,
-                               legs_only ? balance::Movers::kLegs : balance::Movers::kAllJoints) ==
-                   balance::BalanceStatus::kOk;
+        good =
+            height.Compute(body.contact(), row, bias) &&
+            control.Compute(body.contact(), height, body.geometry(), polygon, true, now, &balanced,
+                            legs_only ? balance::Movers::kLegs : balance::Movers::kAllJoints) ==
+                balance::BalanceStatus::kOk;
       }
       if (!good) {
         now.setConstant(kNan);

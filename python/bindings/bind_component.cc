@@ -44,8 +44,9 @@ class PythonFunctions : public ForeignFunctions {
       auto out = std::make_unique<Outgoing>(Outgoing{*layouts_.back(), {}});
       py::dict fields;
       for (const Leaf& leaf : out->layout.leaves()) {
-        const bool header = leaf.path == "run_id" || leaf.path == "tick" || leaf.path == "utime" ||
-                            std::ranges::find(type.count_names, leaf.path) != type.count_names.end();
+        const bool header =
+            leaf.path == "run_id" || leaf.path == "tick" || leaf.path == "utime" ||
+            std::ranges::find(type.count_names, leaf.path) != type.count_names.end();
         if (header) continue;
         py::array array = NewArray(leaf, -1);
         std::memset(array.mutable_data(), 0, static_cast<size_t>(array.nbytes()));
@@ -96,13 +97,14 @@ using Ports = std::vector<std::tuple<std::string, std::string, std::string>>;
 std::vector<PortType> PortsOf(const Ports& inputs, const Ports& outputs) {
   std::vector<PortType> ports;
   for (const auto& [name, type, kind] : inputs) {
-    const InputKind of = kind == "same tick"     ? InputKind::kSameTick
-                         : kind == "tick before" ? InputKind::kPreviousTick
-                         : kind == "latest"      ? InputKind::kLatest
-                                                 : throw ConfigError(fmt::format(
-                                                  "input {}: kind '{}' is none of: same tick, "
-                                                  "tick before, latest",
-                                                  name, kind));
+    const InputKind of =
+        kind == "same tick"     ? InputKind::kSameTick
+        : kind == "tick before" ? InputKind::kPreviousTick
+        : kind == "latest"
+            ? InputKind::kLatest
+            : throw ConfigError(fmt::format("input {}: kind '{}' is none of: same tick, "
+                                            "tick before, latest",
+                                            name, kind));
     ports.push_back({name, type, true, of});
   }
   for (const auto& [name, type, kind] : outputs) {
@@ -137,12 +139,12 @@ std::shared_ptr<ForeignFunctions> FunctionsOf(py::object component) {
 
 void BindComponent(py::module_* module) {
   py::class_<Message>(*module, "Message")
-      .def("get", [](const Message& message,
-                     const std::string& path) { return message.Get(path); })
+      .def("get", [](const Message& message, const std::string& path) { return message.Get(path); })
       .def_property_readonly("type", [](const Message& message) { return message.type; })
       .def("fields", [](const Message& message) {
         std::vector<std::pair<std::string, std::vector<int64_t>>> fields;
-        for (const Leaf& leaf : message.layout->leaves()) fields.emplace_back(leaf.path, leaf.shape);
+        for (const Leaf& leaf : message.layout->leaves())
+          fields.emplace_back(leaf.path, leaf.shape);
         return fields;
       });
   module->def("component_main", &Main);

@@ -80,8 +80,7 @@ py::dict Columns(const RunStore& run, const std::string& name) {
 
 py::array_t<int64_t> Ticks(const RunStore& run, const std::string& name) {
   const StoredChannel& channel = ChannelOf(run, name);
-  return py::array_t<int64_t>(static_cast<py::ssize_t>(channel.ticks.size()),
-                              channel.ticks.data());
+  return py::array_t<int64_t>(static_cast<py::ssize_t>(channel.ticks.size()), channel.ticks.data());
 }
 
 std::vector<std::string> ElementNamesOf(const RunStore& run, const std::string& name,

@@ -105,7 +105,7 @@ void BindSession(py::module_* module) {
               const std::array<double, 3>& point, int64_t ticks) {
              Unlocked([&] {
                session.Push(body, {force[0], force[1], force[2]}, {point[0], point[1], point[2]},
-                             ticks);
+                            ticks);
                return 0;
              });
            })
@@ -141,26 +141,23 @@ void BindSession(py::module_* module) {
            [](const Session& session, const std::string& channel, const std::string& path) {
              return session.names().Of(session.Type(channel).name, path.substr(0, path.find('.')));
            })
-      .def("unit", [](const Session& session, const std::string& channel,
-                      const std::string& path) {
-        return UnitOfLeaf(session.Type(channel).name, path);
-      })
+      .def("unit",
+           [](const Session& session, const std::string& channel, const std::string& path) {
+             return UnitOfLeaf(session.Type(channel).name, path);
+           })
       .def("finish",
            [](Session& session) {
              return std::const_pointer_cast<RunStore>(Unlocked([&] { return session.Finish(); }));
            })
-      .def_property_readonly("tick",
-                             [](Session& s) { return Unlocked([&] { return s.tick(); }); })
-      .def_property_readonly("time",
-                             [](Session& s) { return Unlocked([&] { return s.time(); }); })
+      .def_property_readonly("tick", [](Session& s) { return Unlocked([&] { return s.tick(); }); })
+      .def_property_readonly("time", [](Session& s) { return Unlocked([&] { return s.time(); }); })
       .def_property_readonly("ended",
                              [](Session& s) { return Unlocked([&] { return s.ended(); }); })
       .def_property_readonly("failed",
                              [](Session& s) { return Unlocked([&] { return s.failed(); }); })
       .def_property_readonly("detail",
                              [](Session& s) { return Unlocked([&] { return s.detail(); }); })
-      .def_property_readonly("tick_period",
-                             [](const Session& s) { return s.spec().tick_period(); })
+      .def_property_readonly("tick_period", [](const Session& s) { return s.spec().tick_period(); })
       .def_property_readonly("num_ticks", [](const Session& s) { return s.spec().num_ticks(); })
       .def_property_readonly("scenario", [](const Session& s) { return s.spec().scenario(); })
       .def_property_readonly("warnings", [](const Session& s) { return s.warnings(); })

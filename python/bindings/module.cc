@@ -14,7 +14,8 @@ namespace poise::python {
 
 void CheckShape(const Array& array, const char* name, py::ssize_t count,
                 std::initializer_list<py::ssize_t> shape) {
-  bool right = array.ndim() == 1 + static_cast<py::ssize_t>(shape.size()) && array.shape(0) == count;
+  bool right =
+      array.ndim() == 1 + static_cast<py::ssize_t>(shape.size()) && array.shape(0) == count;
   std::string wanted = fmt::format("{}", count);
   py::ssize_t i = 1;
   for (const py::ssize_t size : shape) {
@@ -26,8 +27,8 @@ void CheckShape(const Array& array, const char* name, py::ssize_t count,
   for (py::ssize_t d = 0; d < array.ndim(); ++d) {
     is += fmt::format("{}{}", d == 0 ? "" : " × ", array.shape(d));
   }
-  throw py::value_error(fmt::format("{}: is {}, must be {}", name, is.empty() ? "a number" : is,
-                                    wanted));
+  throw py::value_error(
+      fmt::format("{}: is {}, must be {}", name, is.empty() ? "a number" : is, wanted));
 }
 
 py::array NewArray(const Leaf& leaf, py::ssize_t rows) {

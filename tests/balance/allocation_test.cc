@@ -110,8 +110,8 @@ TEST(Allocation, TasksAndTheirHierarchyAllocateNothing) {
     const long before = allocations;
     int row = 0;
     for (const auto& task : tasks) {
-      TaskRows view{jacobian.middleRows(row, task->num_rows()),
-                    bias.segment(row, task->num_rows()), wanted.segment(row, task->num_rows())};
+      TaskRows view{jacobian.middleRows(row, task->num_rows()), bias.segment(row, task->num_rows()),
+                    wanted.segment(row, task->num_rows())};
       task->Hold(at, &target);
       task->Write(at, target, &view);
       row += task->num_rows();

@@ -61,8 +61,9 @@ void Run(benchmark::State& state, std::shared_ptr<const robot::RobotModel> model
   std::vector<Work> works;
   works.reserve(kStates);
   for (const Tick& tick : ticks) {
-    Work& w = works.emplace_back(MakeContactDynamics(*model), TaskDynamics(k, t), TaskDynamics(k, 1),
-                                 Eigen::VectorXd(k), Eigen::VectorXd(m), BalanceResult{});
+    Work& w =
+        works.emplace_back(MakeContactDynamics(*model), TaskDynamics(k, t), TaskDynamics(k, 1),
+                           Eigen::VectorXd(k), Eigen::VectorXd(m), BalanceResult{});
     w.contact.Compute(tick.data.mass_matrix, tick.data.bias, tick.data.gravity,
                       tick.contact_jacobian, tick.contact_bias);
     w.task.Compute(w.contact, tick.task.jacobian, tick.task.bias_acceleration);

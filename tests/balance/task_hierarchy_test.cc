@@ -68,8 +68,8 @@ void Minimise(const MatrixL& rows, const VectorL& error, Accelerations* left) {
   Eigen::Index rank = 0;
   while (rank < svd.singularValues().size() && svd.singularValues()(rank) > 1e-9L) ++rank;
   const VectorL right = svd.matrixU().leftCols(rank).transpose() * (error - rows * left->x);
-  const VectorL z = svd.matrixV().leftCols(rank) *
-                    VectorL(right.cwiseQuotient(svd.singularValues().head(rank)));
+  const VectorL z =
+      svd.matrixV().leftCols(rank) * VectorL(right.cwiseQuotient(svd.singularValues().head(rank)));
   left->x += left->basis * z;
   left->basis = (left->basis * svd.matrixV().rightCols(e.cols() - rank)).eval();
 }
@@ -107,8 +107,8 @@ VectorL LeastTorque(const PaperContact& paper, const VectorL& acceleration) {
   if (paper.m > 6) {
     const Eigen::FullPivLU<MatrixL> lu(base);
     const MatrixL internal = joints * lu.kernel();
-    torque -= internal *
-              Eigen::CompleteOrthogonalDecomposition<MatrixL>(internal).solve(torque).eval();
+    torque -=
+        internal * Eigen::CompleteOrthogonalDecomposition<MatrixL>(internal).solve(torque).eval();
   }
   return torque;
 }
@@ -215,10 +215,10 @@ void CheckRobot(const char* name, const std::shared_ptr<const robot::RobotModel>
       worst.Add("Γ against the least torque of the programs' q̈",
                 MaxResidual(hierarchy.torque().cast<Real>(), LeastTorque(paper, exact.x)));
     }
-    worst.PrintAndCheck(fmt::format("{}, {} support: worst of {} states; levels in conflict in {}, "
-                                    "compared with the programs {}",
-                                    name, in_contact == kDouble ? "double" : "single", kStates,
-                                    in_conflict, compared));
+    worst.PrintAndCheck(fmt::format(
+        "{}, {} support: worst of {} states; levels in conflict in {}, "
+        "compared with the programs {}",
+        name, in_contact == kDouble ? "double" : "single", kStates, in_conflict, compared));
     EXPECT_GT(compared, kStates / 2);
     EXPECT_GT(in_conflict, kStates / 2);
   }
@@ -243,8 +243,8 @@ TEST(TaskHierarchy, OneLevelIsTheTaskTorque) {
     task.TaskTorque(wanted, torque);
     TaskHierarchy hierarchy(model->num_joints(), 6, 1);
     const std::array<int, 1> rows{6};
-    ASSERT_TRUE(hierarchy.Compute(body.contact(), paper.jacobian, paper.bias_acceleration, wanted,
-                                  rows));
+    ASSERT_TRUE(
+        hierarchy.Compute(body.contact(), paper.jacobian, paper.bias_acceleration, wanted, rows));
     EXPECT_EQ(hierarchy.torque(), torque);  // the same bits
     EXPECT_EQ(hierarchy.num_free(), body.contact().reduced().rank() - 6);
   }

@@ -55,9 +55,9 @@ TEST(FootWrenchesAndCalibrator, AllocateNothingPerTick) {
   for (int i = 0; i < 30; ++i) {
     motion.Next();
     const BaseSensors read = motion.sensors();
-    const BaseSensors sensors = {read.joint_position, read.angular_velocity, read.acceleration,
-                                 {},                  {},
-                                 {torque.data(), torque.size()}};
+    const BaseSensors sensors = {
+        read.joint_position,           read.angular_velocity, read.acceleration, {}, {},
+        {torque.data(), torque.size()}};
     const long before = allocations;
     wrenches.Update(i, BaseMotion::kPeriod, sensors, {}, {});
     calibrator.Track({wrenches.wrench(0), wrenches.wrench(1)}, BaseMotion::kPeriod);

@@ -9,9 +9,8 @@ namespace {
 /// A push that no standing robot of this size survives: m sqrt(g/h) times the reach of the foot
 /// bounds the impulse (linear inverted pendulum) at about 54.63 kg * 3.6 1/s * 0.18 m = 36 N s;
 /// this one has 127 N s.
-const std::vector<std::string> kHardPush = {"--set",      "sim.push[0].peak=1000",
-                                            "--set",      "sim.push[0].duration=0.2",
-                                            "--duration", "4"};
+const std::vector<std::string> kHardPush = {
+    "--set", "sim.push[0].peak=1000", "--set", "sim.push[0].duration=0.2", "--duration", "4"};
 
 void ExpectFall(std::vector<std::string> flags) {
   const RunFolder folder;

@@ -25,13 +25,12 @@ class SweepTest : public testing::Test {
                      "check { metric: \"com_error_max_x\" }\n"
                      "check { metric: \"push_peak\" }\n");
     fs::create_directories(deploy_ / "deploy/sweeps");
-    Sweep(
-        "tiny",
-        "scenario: \"pushed\"\n"
-        "vary { name: \"direction\" from: 0 to: 360 steps: 4 angle: true }\n"
-        "vary { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n"
-        "assign { field: \"sim.push[0].direction_x\" value: \"cos(direction*deg)\" }\n"
-        "assign { field: \"sim.push[0].direction_y\" value: \"sin(direction*deg)\" }\n");
+    Sweep("tiny",
+          "scenario: \"pushed\"\n"
+          "vary { name: \"direction\" from: 0 to: 360 steps: 4 angle: true }\n"
+          "vary { name: \"force\" field: \"sim.push[0].peak\" unit: \"N\" value: 20 value: 60 }\n"
+          "assign { field: \"sim.push[0].direction_x\" value: \"cos(direction*deg)\" }\n"
+          "assign { field: \"sim.push[0].direction_y\" value: \"sin(direction*deg)\" }\n");
   }
   std::string Sweep(const std::string& name, const std::string& text) const {
     const std::string file = deploy_ / ("deploy/sweeps/" + name + ".pbtxt");
@@ -248,8 +247,8 @@ TEST_F(SweepTest, AreListedWithWhatTheySay) {
 }
 
 TEST_F(SweepTest, RunsThatCannotBeMadeAreNamedAndTheOthersGoOn) {
-  const ProgramResult result = RunPoise(
-      {"sweep", "pushed", "--vary", "sim.ground.friction=0.9,-1", "--out", Out("sweep")});
+  const ProgramResult result =
+      RunPoise({"sweep", "pushed", "--vary", "sim.ground.friction=0.9,-1", "--out", Out("sweep")});
   EXPECT_EQ(result.exit_code, 1) << result.output;
   EXPECT_NE(result.output.find("run 1: invalid: "), std::string::npos) << result.output;
   const std::vector<CsvRow> rows = ReadCsv(Out("sweep") + "/table.csv");

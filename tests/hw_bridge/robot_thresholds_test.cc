@@ -20,8 +20,7 @@ RobotThresholds Of(const std::function<void(Robot*)>& edit) {
   Robot description;
   ReadTextProto(folder + "dyros_legs.pbtxt", &description);
   edit(&description);
-  return DeriveThresholds(
-      robot::MakeRobot(description, ReadFile(folder + "dyros_legs.urdf")));
+  return DeriveThresholds(robot::MakeRobot(description, ReadFile(folder + "dyros_legs.urdf")));
 }
 
 // docs/reference/robots.md has the same figures; recorded runs hold their bits.

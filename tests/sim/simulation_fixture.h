@@ -8,8 +8,8 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
-#include "components/robot_files/robot_files.h"
 #include "components/robot/robot_model.h"
+#include "components/robot_files/robot_files.h"
 #include "sim/simulation.h"
 #include "sim/start_posture.h"
 

@@ -27,8 +27,8 @@ class StatusLine {
   double next_;  // wall time from which to show again
 };
 
-/// What a long piece of work is at, and for how long: said by a thread of its own from the first second
-/// of a stage on. Whoever prints ends the stage first.
+/// What a long piece of work is at, and for how long: said by a thread of its own from the first
+/// second of a stage on. Whoever prints ends the stage first.
 class StageLine {
  public:
   explicit StageLine(bool quiet);

@@ -106,8 +106,9 @@ void AppendOptions(const CLI::App& app, std::string* text) {
 std::string ManPage(const CLI::App& app, const std::string& version) {
   const std::string& name = app.get_name();
   std::string title = name;
-  std::ranges::transform(title, title.begin(),
-                         [](char c) { return static_cast<char>(c >= 'a' && c <= 'z' ? c - 32 : c); });
+  std::ranges::transform(title, title.begin(), [](char c) {
+    return static_cast<char>(c >= 'a' && c <= 'z' ? c - 32 : c);
+  });
   std::string text = fmt::format(
       ".TH {} 1 \"\" \"{}\" \"User Commands\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n"
       "\\fICOMMAND\\fR [\\fIOPTIONS\\fR]\n.SH OPTIONS\n",
@@ -115,21 +116,22 @@ std::string ManPage(const CLI::App& app, const std::string& version) {
   AppendOptions(app, &text);
   text += ".SH COMMANDS\n";
   for (const CLI::App* command : CommandsOf(app)) {
-    ForEachCommand(*command, command->get_name(),
-                   [&](const std::string& path, const CLI::App& each) {
-                     text += fmt::format(".SS {} {}\n{}\n", name, Roff(path),
-                                         Roff(each.get_description()));
-                     AppendOptions(each, &text);
-                     if (!each.get_footer().empty()) {
-                       text += fmt::format(".PP\n{}\n", Roff(each.get_footer()));
-                     }
-                   });
+    ForEachCommand(
+        *command, command->get_name(), [&](const std::string& path, const CLI::App& each) {
+          text += fmt::format(".SS {} {}\n{}\n", name, Roff(path), Roff(each.get_description()));
+          AppendOptions(each, &text);
+          if (!each.get_footer().empty()) {
+            text += fmt::format(".PP\n{}\n", Roff(each.get_footer()));
+          }
+        });
   }
   text +=
-      ".SH EXIT STATUS\n0: good. 1: a check or the run failed. 2: wrong usage or configuration. 3, in "
+      ".SH EXIT STATUS\n0: good. 1: a check or the run failed. 2: wrong usage or configuration. 3, "
+      "in "
       "real time: nothing failed but what the machine was too late for.\n"
       ".SH ENVIRONMENT\n"
-      ".TP\n.B POISE_PATH\nFolders with modules, programs, scenarios and robots of one's own, parted "
+      ".TP\n.B POISE_PATH\nFolders with modules, programs, scenarios and robots of one's own, "
+      "parted "
       "by colons.\n"
       ".TP\n.B POISE_RUNS_DIR\nWhere runs without \\-\\-out go. Without it: runs/ in the current "
       "folder, or where that cannot be written, poise/runs in XDG_STATE_HOME (~/.local/state).\n"
@@ -190,8 +192,8 @@ std::string ZshCompletion(const CLI::App& app) {
   ForEachCommand(app, "", [&](const std::string& path, const CLI::App& each) {
     std::string commands, flags, names;
     for (const CLI::App* command : CommandsOf(each)) {
-      commands += fmt::format(" {}", Quoted(command->get_name() + ":" +
-                                            Short(command->get_description())));
+      commands +=
+          fmt::format(" {}", Quoted(command->get_name() + ":" + Short(command->get_description())));
     }
     for (const CLI::Option* option : OptionsOf(each)) {
       for (const std::string& flag : FlagsOf(*option)) {
@@ -200,8 +202,8 @@ std::string ZshCompletion(const CLI::App& app) {
       const std::string kind = KindOf(*option);
       if (!kind.empty()) names += " " + kind;
     }
-    cases += fmt::format("    '{}') commands=({}) flags=({}) kinds=({}) ;;\n", path, commands, flags,
-                         names);
+    cases += fmt::format("    '{}') commands=({}) flags=({}) kinds=({}) ;;\n", path, commands,
+                         flags, names);
   });
   return fmt::format(R"sh(#compdef poise
 # zsh completion of poise, written by `poise shell zsh`.

@@ -23,9 +23,8 @@ void AddShellCommand(CLI::App* app, Command* command) {
       };
     });
   };
-  add("man", "the manual page: poise shell man | man -l -", [](const CLI::App& root) {
-    return ManPage(root, fmt::format("poise {}", PoiseVersion()));
-  });
+  add("man", "the manual page: poise shell man | man -l -",
+      [](const CLI::App& root) { return ManPage(root, fmt::format("poise {}", PoiseVersion())); });
   add("bash", "completion: source <(poise shell bash)", BashCompletion);
   add("zsh", "completion: poise shell zsh > _poise, in a folder of $fpath", ZshCompletion);
   add("fish", "completion: poise shell fish | source", FishCompletion);

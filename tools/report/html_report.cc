@@ -350,8 +350,8 @@ void WriteRobotPage(const fs::path& file, const RobotCheck& check, const RobotDr
   json["robot"] = RobotJson(check.model, drawing);
   json["stance"]["base"] = {{"position", {at.x(), at.y(), at.z()}},
                             {"orientation", {turn.w(), turn.x(), turn.y(), turn.z()}}};
-  json["stance"]["joints"] = std::vector<double>(stance.joint_position.begin(),
-                                                 stance.joint_position.end());
+  json["stance"]["joints"] =
+      std::vector<double>(stance.joint_position.begin(), stance.joint_position.end());
   json["check"] = RobotCheckJson(check);
   json["drawn_instead"] = WhatIsDrawnInstead(drawing);
   json["triangles"] = {drawing.triangles, drawing.file_triangles};

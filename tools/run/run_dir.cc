@@ -48,8 +48,8 @@ fs::path FindRun(const std::string& run) {
 
 namespace {
 
-/// For who stands where nothing can be written: $XDG_STATE_HOME/poise/runs, or below ~/.local/state;
-/// empty without a home.
+/// For who stands where nothing can be written: $XDG_STATE_HOME/poise/runs, or below
+/// ~/.local/state; empty without a home.
 fs::path StateRuns() {
   const char* const state = std::getenv("XDG_STATE_HOME");
   if (state != nullptr && *state == '/') return fs::path(state) / "poise" / "runs";

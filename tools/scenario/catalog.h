@@ -23,8 +23,8 @@ enum class BaseFiles { kRefused, kTaken };
 /// The file of a `kind` ("scenarios", "robots", ...) that `name` means, by the one rule for all of
 /// them: NAME or NAME.pbtxt beside the file that names it, in `beside` (for a name of the command
 /// line: the current folder), then in `kind` of each of DataFolders. A name that ends in .pbtxt
-/// means no other ending; an absolute one is looked for only there. A robot's name may be that of its
-/// folder, which holds the text.
+/// means no other ending; an absolute one is looked for only there. A robot's name may be that of
+/// its folder, which holds the text.
 std::optional<std::filesystem::path> LookForFile(const std::string& kind, const std::string& name,
                                                  const std::filesystem::path& beside,
                                                  BaseFiles bases = BaseFiles::kRefused);

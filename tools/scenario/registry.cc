@@ -20,8 +20,8 @@ const ComponentRegistry& Components() {
   static const ComponentRegistry registry = [] {
     ComponentRegistry r;
     for (const ComponentType& type :
-         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), UnitreeEmulatorType(), StateEstimatorType(),
-          StepPlannerType(), TaskControllerType(), ContactWrenchMonitorType(),
+         {SimOdeType(), SimMujocoType(), HwBridgeType(), DriveEmulatorType(), UnitreeEmulatorType(),
+          StateEstimatorType(), StepPlannerType(), TaskControllerType(), ContactWrenchMonitorType(),
           RedistributorType()}) {
       r.Add(type);
     }

@@ -9,8 +9,8 @@ namespace poise::balance {
 
 /// Of a frame's origin, world axes, linear over angular.
 struct FrameMotion {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< in the world
-  robot::Vector6d velocity = robot::Vector6d::Zero();      ///< m/s, rad/s
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();       ///< in the world
+  robot::Vector6d velocity = robot::Vector6d::Zero();           ///< m/s, rad/s
   robot::Vector6d bias_acceleration = robot::Vector6d::Zero();  ///< J̇ v: m/s², rad/s²
 };
 

@@ -206,6 +206,7 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
   since_ = input.time;
   touch_down_ = input.time + plan.time;
   cop_from_ = output_.cop;
+  ramp_from_ = 0;
   stage_ = Stage::kUnloading;
   if (!in_contact_[static_cast<size_t>(plan.foot)]) {
     const Vector2d sole = plan.foothold;
@@ -277,7 +278,6 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
     Settle(input);
     return;
   }
-  const double left = touch_down_ - input.time;
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
     if (!(Beyond(state) > spec_.beyond)) {
@@ -286,8 +286,9 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
       }
       return;
     }
-    reason_ = StepReason::kAgain;
+    Hurry(state, input.time);
   }
+  const double left = touch_down_ - input.time;
   if (left > spec_.swing.freeze) {
     const bool around = stage_ == Stage::kSwinging && swing_.around();
     const StepPlan next = choice_.At(state, plan_.foot, left, plan_.place);
@@ -300,6 +301,17 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
   if (stage_ == Stage::kSwinging) {
     FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
   }
+}
+
+void Recovery::Hurry(const StepState& state, double time) {
+  const double share = std::clamp((time - since_) / UnloadTime(), 0.0, 1.0);
+  reason_ = StepReason::kAgain;
+  if (stage_ != Stage::kUnloading) return;
+  since_ = time - share * UnloadTime();
+  ramp_from_ = share;
+  cop_from_ = output_.cop;
+  const StepPlan next = choice_.Plan(state, plan_.foot, plan_.place);
+  touch_down_ = std::min(touch_down_, time + next.time - share * UnloadTime());
 }
 
 Vector2d Recovery::Goal(const StepState& state) const {
@@ -404,7 +416,9 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
     case Stage::kUnloading:
     case Stage::kSwinging:
       cop = BrakingPoint(input, state);
-      if (stage_ == Stage::kUnloading) share = (input.time - since_) / UnloadTime();
+      if (stage_ == Stage::kUnloading) {
+        share = ((input.time - since_) / UnloadTime() - ramp_from_) / (1 - ramp_from_);
+      }
       break;
     case Stage::kShifting:
     case Stage::kLoading:
@@ -428,9 +442,9 @@ void Recovery::Archive(StateArchive* archive) {
   swing_.Archive(archive);
   touch_.Archive(archive);
   height_.Archive(archive);
-  archive->Show(time_, since_, touched_since_, touch_down_, beyond_since_, lingers_since_,
-                lingered_from_, moving_since_, cop_from_, standing_height_, together_asked_,
-                together_at_, shift_from_, step_helps_);
+  archive->Show(time_, since_, ramp_from_, touched_since_, touch_down_, beyond_since_,
+                lingers_since_, lingered_from_, moving_since_, cop_from_, standing_height_,
+                together_asked_, together_at_, shift_from_, step_helps_);
   output_.Archive(archive);
 }
 

@@ -120,6 +120,9 @@ class Recovery {
                            const Eigen::Vector2d& velocity, double budget) const;
   double UnloadTime() const;
   double LoadTime() const;
+  /// A push while the feet are put side by side: the step catches it from now on. A foot that is
+  /// being unloaded goes on from the load that it has, faster, and comes down as soon as it can.
+  void Hurry(const StepState& state, double time);
   void LeadCom(const StepInput& input, const StepState& state);
   double LowerShare(const StepState& state) const;
 
@@ -132,6 +135,7 @@ class Recovery {
   StepPlan plan_;
   Swing swing_;
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
+  double ramp_from_ = 0;         // share of the unloading ramp where `cop_from_` was asked for
   double touch_down_ = 0;        // s
   TouchTimer touch_;
   double touched_since_ = -1;  // s; negative: not yet, in this swing

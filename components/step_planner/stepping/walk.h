@@ -101,8 +101,9 @@ class Walk {
   /// On one foot that rests, the capture point is so far beyond its sole that the walk does not
   /// bring it back.
   bool Lost(const StepInput& input) const;
-  /// Another planner has moved the feet.
-  void Stop() {
+  /// Another planner moves the feet in this tick.
+  void Stop(double time) {
+    time_ = time;
     num_steps_ = num_begun();
     lowered_ = lowered_ || active();
     stage_ = WalkStage::kStanding;

@@ -159,6 +159,8 @@ class World {
   Recovery& recovery() { return recovery_; }
   const robot::RobotModel& model() const { return model_; }
   double largest_jump() const { return largest_jump_; }
+  /// Of the load's ramps, in a tick.
+  double fastest_ramp() const { return fastest_ramp_; }
   double touched() const { return touched_; }
   double decided() const { return decided_; }
   double time() const { return time_; }
@@ -201,6 +203,11 @@ class World {
     }
     if (before == Stage::kSwinging && now == Stage::kLoading && touched_ < 0) touched_ = time_;
     last_cop_ = output.cop;
+    if (output.transition != 0 && output.transition == last_transition_) {
+      fastest_ramp_ = std::max(fastest_ramp_, output.progress - last_progress_);
+    }
+    last_transition_ = output.transition;
+    last_progress_ = output.progress;
   }
 
   robot::RobotModel model_;
@@ -214,6 +221,8 @@ class World {
   std::array<bool, 2> in_contact_{true, true};
   Vector2d last_cop_ = Vector2d::Zero();
   double nearest_ = 1, largest_jump_ = 0, touched_ = -1, decided_ = -1;
+  int last_transition_ = 0;
+  double last_progress_ = 0, fastest_ramp_ = 0;
 };
 
 Vector2d Direction(double degrees) {
@@ -381,6 +390,41 @@ TEST_P(RecoveryCase, TheFeetComeSideBySideWhenAsked) {
     world.Run(3);
     EXPECT_EQ(world.recovery().num_steps(), steps + 1);
   }
+}
+
+// Pushed while a foot is unloaded so that it comes beside the other one: its load goes on from
+// where it is, no faster than before a step that catches a push, and the foot comes down as soon as
+// such a one.
+TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
+  int hurried = 0, stood = 0;
+  for (const double unloaded : {0.1, 0.5, 0.9}) {
+    for (double degrees = 0; degrees < 360; degrees += 15) {
+      World world(GetParam());
+      const double rest = EdgeDistance(world, {1, 0}, 0);
+      const double impulse = world.mass() * world.Frequency() * rest;
+      world.Push({1.1 * impulse, 0});
+      ASSERT_TRUE(world.Run(5) && world.Rests());
+      world.recovery().BringTogether();
+      const auto unloads = [&] { return world.recovery().stage() == Stage::kUnloading; };
+      const auto progress = [&] { return world.recovery().output().progress; };
+      for (int i = 0; i < 5000 && !(unloads() && progress() >= unloaded); ++i) world.Tick();
+      ASSERT_TRUE(unloads());
+      ASSERT_EQ(world.recovery().reason(), StepReason::kTogether);
+      const double pushed = world.time();
+      world.Push(1.5 * impulse * Direction(degrees));
+      world.Tick();
+      if (!unloads() || world.recovery().reason() == StepReason::kTogether) continue;
+      ++hurried;
+      for (int i = 0; i < 2000 && world.recovery().stage() != Stage::kLoading; ++i) world.Tick();
+      // Unloaded within 0.04 s, then 0.2 s in the air, or as long as the way takes.
+      EXPECT_LT(world.time() - pushed, 0.6) << unloaded << ' ' << degrees;
+      const double fastest = kPeriod / world.recovery().choice().limits().unload;
+      EXPECT_LT(world.fastest_ramp(), 1.001 * fastest) << unloaded << ' ' << degrees;
+      stood += world.Run(6) && world.Rests() ? 1 : 0;
+    }
+  }
+  EXPECT_GE(hurried, 40);
+  EXPECT_GE(stood, 10);  // none, with a foot that took its time
 }
 
 // The feet are too far apart to rest: the one behind comes beside the other one, no faster than the

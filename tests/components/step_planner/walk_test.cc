@@ -266,6 +266,13 @@ class World {
     for (const double end = time_ + duration; time_ < end - 0.5 * kPeriod;) Tick(command);
   }
 
+  /// Another planner has the feet.
+  void Recover(double duration) {
+    for (const double end = time_ + duration; time_ < end - 0.5 * kPeriod; time_ += kPeriod) {
+      walk_.Stop(time_);
+    }
+  }
+
   /// False: it has not come to `stage` within 10 s.
   bool RunTo(WalkStage stage, const WalkCommand& command) {
     const double end = time_ + 10;
@@ -395,6 +402,20 @@ TEST(Walk, TenStepsAheadAndAStopSideBySide) {
   EXPECT_GT(world.middle().x(), 0.8);
   // No jump of the centre of pressure beyond what a tick of the fastest ramp moves it.
   EXPECT_LT(world.largest_jump(), 0.012);
+}
+
+// The COM's height begins to move by the time of one tick, however long another planner had the
+// feet.
+TEST(Walk, BeginsAfterARecoveryAsAfterATick) {
+  World world(TestRobot::kDyros);
+  const WalkCommand command{{0.1, 0}, 0, true};
+  world.Run(kPeriod, kStand);
+  world.Recover(1);
+  world.Run(kPeriod, command);
+  ASSERT_EQ(world.walk().stage(), WalkStage::kStarting);
+  const PointMotion& com = world.walk().output().com;
+  EXPECT_LT(com.acceleration.z(), -0.1);
+  EXPECT_NEAR(com.velocity.z(), kPeriod * com.acceleration.z(), 1e-9);
 }
 
 TEST(Walk, KeepsToTheCommandedVelocity) {

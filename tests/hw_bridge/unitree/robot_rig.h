@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,6 +18,12 @@ namespace poise {
 
 inline constexpr int kMotors = 12;
 
+/// POISE_FUZZ_SAMPLES, or enough to look at every kind of mutation.
+inline int FuzzSamples() {
+  const char* const wanted = std::getenv("POISE_FUZZ_SAMPLES");
+  return wanted != nullptr ? std::atoi(wanted) : 5000;
+}
+
 /// A robot that says what the test puts in `state`, once a cycle, and keeps what it is told.
 struct RobotInMemory {
   unitree::LowState state{};
@@ -24,8 +31,9 @@ struct RobotInMemory {
   int commands = 0;
   bool torque_seen = false;  // in any of them
   bool silent = false;
-  bool own_crc = false;  // the test has set crc
-  std::string mode;      // of the maker's controller
+  bool own_crc = false;                         // the test has set crc
+  const unitree::LowState* verbatim = nullptr;  // said in place of `state`, as it is
+  std::string mode;                             // of the maker's controller
   bool answers = true, releases = true;
   int releases_asked = 0;
   bool fresh = false;
@@ -47,6 +55,10 @@ class MemoryRobotLink final : public unitree::RobotLink {
     if (robot_->silent || !std::exchange(robot_->fresh, false)) {
       now_ = std::max(now_, deadline);
       return false;
+    }
+    if (robot_->verbatim != nullptr) {
+      *state = *robot_->verbatim;
+      return true;
     }
     if (!robot_->own_crc) robot_->state.crc = unitree::CrcOf(robot_->state);
     *state = robot_->state;
@@ -138,6 +150,26 @@ class RobotRig : public BridgeBench {
       if (motor.tau != 0 || motor.kp != 0 || motor.dq != 0) return false;
     }
     return true;
+  }
+  /// What of the last command is outside limits, in words; empty: nothing. Holds whatever the robot
+  /// has said.
+  std::string Broken() const {
+    for (size_t j = 0; j < kMotors; ++j) {
+      const unitree::MotorCmd& motor = told(j);
+      const robot::MotorModel& known = model->motors()[j];
+      const double peak = known.torque_per_ampere() * known.peak_current;
+      if (!(std::abs(motor.tau) <= 2 * peak * 1.0001)) return "torque of " + std::to_string(j);
+      if (!std::isfinite(motor.q) || !std::isfinite(motor.dq))
+        return "goal of " + std::to_string(j);
+      if (!(motor.kp >= 0 && motor.kp <= 1e5 && motor.kd >= 0 && motor.kd <= 1e4)) {
+        return "impedance of " + std::to_string(j);
+      }
+      // At the last state that was whole the motor stays within its peak.
+      if (!(std::abs(status().applied_torque[j]) <= peak * 1.0001)) {
+        return "torque in all of " + std::to_string(j);
+      }
+    }
+    return robot.command.crc == unitree::CrcOf(robot.command) ? "" : "check sum";
   }
   RobotInMemory robot;
   std::shared_ptr<const robot::RobotModel> model;
