@@ -219,7 +219,9 @@ bool TaskController::FindLimits() {
       whole_body_->contact().Acceleration(torque_, acceleration_);
       have_acceleration = true;
     }
-    const balance::AccelerationRange range = limits_->Accelerations(j, position, velocity);
+    const balance::AccelerationRange range = Stands(j)
+                                                 ? limits_->Stopping(j, position, velocity)
+                                                 : limits_->Accelerations(j, position, velocity);
     const double most = limits_->range(j).acceleration, a = acceleration_[6 + j];
     // Of a range that a limit narrows this side alone.
     const bool above = range.upper < most && a > range.upper;
@@ -229,6 +231,11 @@ bool TaskController::FindLimits() {
     found = true;
   }
   return found;
+}
+
+bool TaskController::Stands(int joint) const {
+  const auto j = static_cast<size_t>(joint);
+  return (in_contact_[0] && leg_[0][j] != 0) || (in_contact_[1] && leg_[1][j] != 0);
 }
 
 bool TaskController::SoleTurns(int joint) const {

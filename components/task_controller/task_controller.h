@@ -42,6 +42,8 @@ class TaskController : public Component, public Operated {
   /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that
   /// does not; added to `forced_`. False when there is none.
   bool FindLimits();
+  /// Whether the joint is of a leg whose foot is a contact.
+  bool Stands(int joint) const;
   /// Whether what moves the joint is a sole that turns on what it is held to stand on.
   bool SoleTurns(int joint) const;
 
