@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "components/robot/robot_model.h"
@@ -41,6 +42,12 @@ class JointLimits {
   double horizon() const { return horizon_; }
   AccelerationRange Accelerations(int joint, double position, double velocity) const {
     return ViableAccelerations(range(joint), position, velocity, horizon_);
+  }
+  /// The same of a joint of a leg that stands: beyond its range it is stopped, and not brought
+  /// back. Between contacts that takes the whole body, as hard as the joint alone could turn.
+  AccelerationRange Stopping(int joint, double position, double velocity) const {
+    const JointRange& own = range(joint);
+    return Accelerations(joint, std::clamp(position, own.lower, own.upper), velocity);
   }
   /// Whether a limit is so near that the range is narrower than ±acceleration.
   bool Near(int joint, double position, double velocity) const {

@@ -62,6 +62,8 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   const int num_joints = model_->num_joints();
   gains_ = ReadStandingGains(config, balance::GainsByRule(*model_, context.tick_period));
   tasks_.emplace(config, model_, gains_);
+  com_gains_ = gains_.com;
+  if (!config.has_com()) soft_ground_.emplace(*model_, context.tick_period);
   base_share_ = balance::BaseVelocityShare(gains_.base_velocity_cutoff, context.tick_period);
   AddSettings(context.tick_period);
   const int others = config.task_size() == 0 ? NumOthers(*model_) : 0;
@@ -114,13 +116,34 @@ void TaskController::AddSettings(double tick_period) {
 
 void TaskController::TakeActs(const Tick& tick) {
   while (operator_.Next(tick) != nullptr) operator_.Answer(operate::answer_t::VERDICT_UNKNOWN);
-  if (operator_.settings().Advance(tick.index)) tasks_->SetGains(gains_);
+  if (operator_.settings().Advance(tick.index)) SetGains();
+}
+
+void TaskController::SetGains() {
+  balance::StandingGains gains = gains_;
+  if (soft_ground_) gains.com = soft_ground_->Limited(gains.com);
+  com_gains_ = gains.com;
+  tasks_->SetGains(gains);
+}
+
+void TaskController::FollowGround() {
+  if (!soft_ground_) return;
+  const support_plan_t& plan = *support_plan_;
+  std::array<SoftGround::Foot, 2> feet;
+  for (size_t i = 0; i < 2; ++i) {
+    feet[i].put_down = in_contact_[i] && plan.stepping == support_plan_t::STEPPING_NONE;
+    feet[i].height = whole_body_->data().foot_pose[i].translation().z();
+    feet[i].load = -robot_state_->foot_wrench[i].force[2];
+  }
+  soft_ground_->Update(feet);
+  if (soft_ground_->Limited(gains_.com).kp != com_gains_.kp) SetGains();
 }
 
 bool TaskController::Archive(StateArchive* archive) {
   archive->Show(in_contact_, started_, posture_reference_, base_velocity_);
   operator_.Archive(archive);
-  if (archive->restoring()) tasks_->SetGains(gains_);
+  if (soft_ground_) soft_ground_->Archive(archive);
+  if (archive->restoring()) SetGains();
   tasks_->Archive(archive);
   ArchiveMessage(&*task_torque_, archive);
   return true;
@@ -153,6 +176,7 @@ int8_t TaskController::Control() {
   } else {
     tasks_->Follow(plan);
     SmoothBase();
+    FollowGround();
     if (!ComputeTorque(state, in_contact)) return task_torque_t::STATUS_SINGULAR;
     const auto body = static_cast<size_t>(model_->body_task_body());
     orientation_error = balance::OrientationError(GetMotion(plan.body_reference).rotation,
@@ -219,7 +243,9 @@ bool TaskController::FindLimits() {
       whole_body_->contact().Acceleration(torque_, acceleration_);
       have_acceleration = true;
     }
-    const balance::AccelerationRange range = limits_->Accelerations(j, position, velocity);
+    const balance::AccelerationRange range = Stands(j)
+                                                 ? limits_->Stopping(j, position, velocity)
+                                                 : limits_->Accelerations(j, position, velocity);
     const double most = limits_->range(j).acceleration, a = acceleration_[6 + j];
     // Of a range that a limit narrows this side alone.
     const bool above = range.upper < most && a > range.upper;
@@ -229,6 +255,11 @@ bool TaskController::FindLimits() {
     found = true;
   }
   return found;
+}
+
+bool TaskController::Stands(int joint) const {
+  const auto j = static_cast<size_t>(joint);
+  return (in_contact_[0] && leg_[0][j] != 0) || (in_contact_[1] && leg_[1][j] != 0);
 }
 
 bool TaskController::SoleTurns(int joint) const {

@@ -10,6 +10,7 @@
 #include "components/framework/component.h"
 #include "components/framework/operator_acts.h"
 #include "components/robot/robot_model.h"
+#include "components/task_controller/soft_ground.h"
 #include "components/task_controller/task_list.h"
 #include "poise/robot_state_t.hpp"
 #include "poise/support_plan_t.hpp"
@@ -29,9 +30,13 @@ class TaskController : public Component, public Operated {
  private:
   void AddSettings(double tick_period);
   void TakeActs(const Tick& tick);
+  /// Of the tasks, with what the ground takes off the COM's.
+  void SetGains();
   void Prepare();
   /// Fills the torque; STATUS_* of the message.
   int8_t Control();
+  /// Lowers the COM's gains where a foot stands on something soft.
+  void FollowGround();
   bool ComputeTorque(const balance::TaskState& state, const FeetInContact& in_contact);
   /// Filters the base's velocity for the tasks.
   void SmoothBase();
@@ -42,6 +47,8 @@ class TaskController : public Component, public Operated {
   /// Joints of the legs that the last torque would drive beyond a limit, with the acceleration that
   /// does not; added to `forced_`. False when there is none.
   bool FindLimits();
+  /// Whether the joint is of a leg whose foot is a contact.
+  bool Stands(int joint) const;
   /// Whether what moves the joint is a sole that turns on what it is held to stand on.
   bool SoleTurns(int joint) const;
 
@@ -60,7 +67,9 @@ class TaskController : public Component, public Operated {
   FeetInContact in_contact_{true, true};  // of the last tick
   bool started_ = false;
   bool others_held_ = false;  // the joints that are no leg's have their posture alone
-  balance::StandingGains gains_;
+  balance::StandingGains gains_;  // before what the ground takes off them
+  std::optional<SoftGround> soft_ground_;  // none: the COM's gains are given
+  balance::TaskGains com_gains_;           // as the tasks have them
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;

@@ -85,5 +85,28 @@ TEST(JointLimits, KeepAReserveOfWhatTheUrdfGives) {
   }
 }
 
+// Of a leg that stands: a joint at rest beyond its range may stay there, may come back, and goes no
+// further.
+TEST(JointLimits, AStandingLegsJointIsStoppedAndNotBroughtBack) {
+  const auto model = Humanoid();
+  const JointLimits limits(*model, 0.04);
+  for (int j = 0; j < model->num_joints(); ++j) {
+    const JointRange& range = limits.range(j);
+    if (!std::isfinite(range.upper - range.lower)) continue;
+    for (const double side : {1.0, -1.0}) {
+      const double limit = side > 0 ? range.upper : range.lower, beyond = limit + 0.02 * side;
+      const auto outward = [&](const AccelerationRange& a) { return side > 0 ? a.upper : -a.lower; };
+      EXPECT_LT(outward(limits.Accelerations(j, beyond, 0)), -1);
+      EXPECT_NEAR(outward(limits.Stopping(j, beyond, 0)), 0, 1e-12);
+      // What moves outward is stopped as at the limit itself.
+      EXPECT_EQ(outward(limits.Stopping(j, beyond, 0.3 * side)),
+                outward(limits.Accelerations(j, limit, 0.3 * side)));
+      EXPECT_LT(outward(limits.Stopping(j, beyond, 0.3 * side)), -1);
+    }
+    const double middle = 0.5 * (range.lower + range.upper);
+    EXPECT_EQ(limits.Stopping(j, middle, 0.1).upper, limits.Accelerations(j, middle, 0.1).upper);
+  }
+}
+
 }  // namespace
 }  // namespace poise::balance

@@ -3,11 +3,13 @@
 import assert from 'node:assert/strict';
 import {spawn, spawnSync} from 'node:child_process';
 import {createHash} from 'node:crypto';
-import {existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
+import {existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {test} from 'node:test';
+import {fileURLToPath} from 'node:url';
 
+const deploy = (...path) => readFileSync(new URL(`../../deploy/${path.join('/')}`, import.meta.url), 'utf8');
 // Of this build's bits, as deploy/bits/record.json is: recorded anew where a change moves those, and then the commit says why.
 const record = JSON.parse(readFileSync(new URL('benchmark_record.json', import.meta.url), 'utf8'));
 
@@ -31,7 +33,8 @@ test('a quick subset gives the recorded table', () => {
   const about = JSON.parse(read('quick', 'benchmark.json'));
   assert.equal(sha1(read('quick', 'benchmark.csv')), about.table_sha1);
   assert.match(printed, new RegExp(about.table_sha1));
-  assert.equal(about.benchmark.sha1, record.set_sha1, 'balance_1 is fixed: a change makes another set');
+  assert.equal(about.benchmark.name, 'balance_2');
+  assert.equal(about.benchmark.sha1, record.set_sha1, 'balance_2 is fixed: a change makes another set');
   const build = {instruction_set: about.poise.instruction_set, libraries: about.libraries, glibc: about.glibc};
   if (JSON.stringify(build) !== JSON.stringify(record.build)) {
     console.log(`not compared: the record is of ${JSON.stringify(record.build)}, this build of ${JSON.stringify(build)}`);
@@ -66,6 +69,58 @@ test('impulses and shares are the pendulum\'s', () => {
   }
   const mean = rows('quick').find((row) => row.part === 'push_double' && row.point === 'mean');
   assert.ok(Math.abs(mean.impulse - pushes.reduce((sum, row) => sum + row.impulse / 4, 0)) < 1e-9);
+});
+
+test('each set is fixed: a change makes another one', () => {
+  const {sets} = record;
+  assert.deepEqual(Object.keys(sets), ['balance_1', 'balance_2']);
+  for (const [name, hash] of Object.entries(sets)) assert.equal(sha1(deploy('benchmarks', `${name}.pbtxt`)), hash, name);
+});
+
+/** The part `blocks` of a set, its first run alone. */
+function firstBlock(set, robot, out) {
+  writeFileSync(join(folder, `${set}_first.pbtxt`), deploy('benchmarks', `${set}.pbtxt`).replace(/quick: 12/, 'quick: 1'));
+  poise(['benchmark', `${set}_first.pbtxt`, '--quick', '--part', 'blocks', '--robot', robot, '--world', 'mujoco', '--out', out]);
+  return JSON.parse(read(out, 'parts/blocks/results.jsonl').trim().split('\n')[1]);
+}
+
+// balance_1's block reaches 16 mm under the other sole of a heron whose feet stand 3 cm apart.
+test('no block rises under the sole that carries', () => {
+  mkdirSync(join(folder, 'narrow'));
+  writeFileSync(join(folder, 'narrow/heron.urdf'), deploy('robots/heron/heron.urdf'));
+  writeFileSync(join(folder, 'narrow/narrow.pbtxt'), deploy('robots/heron/heron.pbtxt').replace('\nstance {', '\nstance {\n  foot_spacing: 0.122'));
+  const before = firstBlock('balance_1', 'narrow', 'narrow_1');
+  assert.equal(before.outcome, 'fell');
+  assert.match(before.phase, /lift|lower/);
+  const now = firstBlock('balance_2', 'narrow', 'narrow_2');
+  assert.equal(now.outcome, 'stands', now.reason);
+  assert.equal(now.phase, 'load');
+});
+
+// The makers' robots with the narrowest stances that are known.
+const makers = process.env.POISE_ROBOTS ?? fileURLToPath(new URL('../../../shared/robots', import.meta.url));
+for (const [robot, file] of [['talos', 'talos_reduced_box.urdf'], ['tocabi', 'dyros_tocabi.urdf']]) {
+  const skip = existsSync(join(makers, file)) ? false : `${file} is not in $POISE_ROBOTS`;
+  test(`${robot} lifts its foot and lands`, {skip}, () => {
+    poise(['robot', 'import', join(makers, file), '--name', robot, '--to', robot]);
+    const row = firstBlock('balance_2', robot, `${robot}_block`);
+    assert.equal(row.outcome, 'stands', row.reason);
+    assert.equal(row.metrics.violated_ticks, 0);
+  });
+}
+
+// A block on which half of heron sinks by 7 cm. With the gains of hard ground the load swings to and fro until the sole tips.
+test('on soft ground the COM is controlled slower', () => {
+  const block = {stiffness: 3279, damping: 152, height: 0.088, length: 0.32, width: 0.192, tilt_roll: 0.122, tilt_pitch: 0.076};
+  const run = (out, ...set) => {
+    const changes = [...Object.entries(block).map(([field, value]) => `sim.block.${field}=${value}`), 'sim.block.x=0', 'sim.block.y=0.1',
+      'step_planner.phase[1].foot.height_above_support=0.117', 'step_planner.phase[2].foot.height_above_support=0.083',
+      'step_planner.contact.search_depth=0.068', 'seed=417108', ...set];
+    return poise(['run', 'narrow_2/set/blocks_scenario.pbtxt', '--robot', 'heron/heron', '--world', 'mujoco', '--inline', '--out', out,
+      ...changes.flatMap((change) => ['--set', change])], set.length > 0 ? 1 : 0);
+  };
+  run('soft');
+  assert.match(run('soft_as_hard', 'task_controller.com.kp=101', 'task_controller.com.kd=14.1', 'task_controller.base_velocity_cutoff=12.9'), /fell/);
 });
 
 test('an interrupted benchmark goes on and comes to the same', async () => {

@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct BenchmarkArguments {
-  std::string set = "balance_1";
+  std::string set = "balance_2";
   BenchmarkSubject subject;
   std::vector<std::string> parts;  // empty: all
   SessionOptions session;
