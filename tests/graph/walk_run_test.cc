@@ -96,6 +96,29 @@ TEST(WalkRun, ARobotWithNarrowSolesWalks) {
   ExpectWalks(robot, "mujoco");
 }
 
+// Seven steps on stairs and a stand with a foot on each of two treads, of which one lies across the
+// other's edge. The stretched leg fell off the stairs down at 13 s, the stand on two treads up.
+TEST(WalkRun, UpAndDownStairsToAStandOnThem) {
+  for (const std::string engine : {"mujoco", "ode"}) {
+    for (const std::string way : {"up", "down"}) {
+      const RunFolder folder;
+      std::vector<std::string> arguments = {
+          "run",        "walk_stairs", "--inline",
+          "--world",    engine,        "--out",
+          folder / way, "--set",       "step_planner.walk.command[1].time=20",
+          "--duration", "30"};
+      if (way == "down") arguments.insert(arguments.end(), {"--variant", "down"});
+      RunPoise(arguments);  // its exit code: the scenario asks for 20 steps
+      const nlohmann::json summary = ReadSummary(folder / way);
+      EXPECT_EQ(Measured(summary, "fallen"), 0) << engine << way;
+      EXPECT_EQ(Measured(summary, "violated_ticks"), 0) << engine << way;
+      EXPECT_EQ(Measured(summary, "duration_reached"), 30) << engine << way;
+      EXPECT_GE(Measured(summary, "steps"), 6) << engine << way;
+      EXPECT_LE(Measured(summary, "steps"), 9) << engine << way;
+    }
+  }
+}
+
 // What a scenario leaves open is filled for walking: with the rule's values for standing this
 // falls.
 TEST(WalkRun, AScenarioThatStandsWalksOnceItIsToldTo) {

@@ -32,4 +32,10 @@ double KnownGround::At(int foot, double x) const {
   return height;
 }
 
+bool KnownGround::EdgeWithin(int foot, double rear, double front) const {
+  return std::any_of(edge_.begin(), edge_.end(), [&](const Edge& edge) {
+    return edge.foot == foot && edge.from > rear && edge.from < front;
+  });
+}
+
 }  // namespace poise::stepping

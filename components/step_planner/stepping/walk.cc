@@ -165,7 +165,9 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   in_contact_ = {true, true};
   sinks_ = {0, 0};
   slower_ = 1;
-  if (!lowered_) standing_height_ = input.com_height - input.sole[0].translation().z();
+  double ground = input.sole[0].translation().z();
+  if (!spec_.ground.empty()) ground = std::min(ground, input.sole[1].translation().z());
+  if (!lowered_) standing_height_ = input.com_height - ground;
   lowered_ = false;
   height_.Begin(input.com_height);
   start_yaw_ = state.yaw;
@@ -310,6 +312,8 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
                       spec_.turn_acceleration * spec_.period());
   closing_ = !command_.stepping;
   foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
+  // The feet come to stand as they are, one on a tread, one on the next.
+  if (closing_ && AcrossEdge(foothold_)) final_ = true;
 }
 
 double Walk::Progress(double time) const {
@@ -481,7 +485,9 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
-  height_.Follow(ground + standing_height_ - lower, period);
+  double height = ground + standing_height_ - lower;
+  if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));
+  height_.Follow(height, period);
   // The body heads between the feet: where they stand, and where the one in the air will.
   const bool swings = OnOneFoot();
   const double other = swings ? foothold_.yaw : state.sole_yaw[1 - s];

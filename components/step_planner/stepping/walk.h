@@ -146,6 +146,8 @@ class Walk {
   void Retreat(const StepInput& input, const StepState& state);
   /// m, world: what is told of the ground, from where the other sole stands.
   double GroundAt(const StepInput& input, const Footstep& foothold) const;
+  /// m, world: the highest COM from which the foot reaches down to the foothold that it is told of.
+  double HighestForStep(const StepInput& input, const StepState& state) const;
   /// Of the ramp that is under way, 0 to 1.
   double Progress(double time) const;
   /// The unloading ramp, in a walk that rests, no sooner than the centre of pressure goes over.
@@ -180,6 +182,8 @@ class Walk {
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
   bool FeetTogether(const StepState& state) const;
+  /// Side by side the foot that steps would stand across an edge that it is told of.
+  bool AcrossEdge(const Footstep& foothold) const;
   void Lead(const StepInput& input, const StepState& state);
 
   StepChoice choice_;

@@ -1,5 +1,7 @@
 // The part of Walk that looks ahead: the steps that it counts with, and where they come down.
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "components/step_planner/stepping/walk.h"
 
@@ -39,6 +41,29 @@ int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
     next = Next(next, foot);
   }
   return count;
+}
+
+double Walk::HighestForStep(const StepInput& input, const StepState& state) const {
+  const bool steps = stage_ == WalkStage::kUnloading || OnOneFoot();
+  if (!steps) return std::numeric_limits<double>::infinity();
+  const auto s = static_cast<size_t>(stance_);
+  std::array<Vector2d, 2> offset{Vector2d::Zero(), Vector2d::Zero()};
+  offset[1 - s] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
+  const double share = std::min(choice_.reach().LowerShare(offset), 1.0);
+  return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lower();
+}
+
+bool Walk::AcrossEdge(const Footstep& foothold) const {
+  if (spec_.ground.empty()) return false;
+  const int foot = 1 - stance_;
+  const balance::ConvexPolygon sole =
+      SoleAt(choice_.foot(foot), 0, foothold.position, foothold.yaw);
+  double rear = foothold.position.x(), front = rear;
+  for (const Vector2d& corner : sole.corners()) {
+    rear = std::min(rear, corner.x());
+    front = std::max(front, corner.x());
+  }
+  return spec_.ground.EdgeWithin(foot, rear, front);
 }
 
 void Walk::PlanFrom(const StepState& state) {

@@ -619,6 +619,9 @@ TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
   EXPECT_EQ(ground.At(robot::kRightFoot, 0.7), 0);
   EXPECT_EQ(ground.At(robot::kRightFoot, 5), 0.2);
   EXPECT_EQ(ground.At(robot::kLeftFoot, 1.2), 0.3);
+  EXPECT_TRUE(ground.EdgeWithin(robot::kLeftFoot, 0.5, 0.7));
+  EXPECT_FALSE(ground.EdgeWithin(robot::kRightFoot, 0.5, 0.7));
+  EXPECT_FALSE(ground.EdgeWithin(robot::kLeftFoot, 0.6, 1.0));
 }
 
 /// Until the second foot has come down, the capture point above the sole that carries meanwhile.
