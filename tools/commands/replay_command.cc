@@ -92,7 +92,7 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
 int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogReplay replay(log);
   RunSpec spec = replay.spec();
-  for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
+  ChangeConfigurations(options.set, &spec);
   const logging::LogMessages messages(log);
   bool equal = true;
   for (const int index : Wanted(spec, options.components)) {
