@@ -70,6 +70,11 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
         component.unplaced_messages, component.external_messages);
   }
   for (const logging::ReplayedChannel& output : component.outputs) {
+    if (output.ticks == 0) {
+      fmt::print("  {}: nothing to compare with: this run had no such channel\n",
+                 ForTerminal(output.channel));
+      continue;
+    }
     if (output.differing == 0) {
       fmt::print("  {}: {} messages, the same bits\n", ForTerminal(output.channel), output.ticks);
       continue;
