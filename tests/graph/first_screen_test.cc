@@ -232,6 +232,7 @@ TEST(CommandLine, SaysWhatWasMeant) {
                    {"--durration", "did you mean --duration", "poise run --help"});
   ExpectUsageError({"report", "--seed", "5"}, {"--seed", "poise run"});
   ExpectUsageError({"compare", "a", "b", "c"}, {"'c'", "poise compare --help"});
+  ExpectUsageError({"view", "--run", "a"}, {"--run", "without a flag: poise view run"});
   ExpectUsageError({"run", "--out"}, {"--out needs a value"});
   ExpectUsageError({"run", "--duration", "long"}, {"--duration", "poise run --help"});
 }
