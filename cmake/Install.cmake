@@ -43,9 +43,7 @@ install(FILES ${PROJECT_BINARY_DIR}/poise_commit.h DESTINATION ${_headers} COMPO
 foreach(folder scenarios graphs robots sweeps drives bits benchmarks layouts)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/deploy/${folder} DESTINATION share/poise)
 endforeach()
-install(FILES ${POISE_LCM_FILES} DESTINATION share/poise/lcmtypes)
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/lcmtypes/operate ${PROJECT_SOURCE_DIR}/lcmtypes/steps
-        DESTINATION share/poise/lcmtypes)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/lcmtypes DESTINATION share/poise FILES_MATCHING PATTERN "*.lcm")
 # The manual page and completion, of the program's own option tables.
 set(_shell ${PROJECT_BINARY_DIR}/shell)
 add_custom_command(

@@ -250,4 +250,14 @@ double StandingSpacing(const RobotModel& model) {
                   data.foot_pose[kRightFoot].translation().y());
 }
 
+PostureGoal StandingGoal(const RobotModel& model) {
+  PostureGoal goal;
+  const double side = 0.5 * StandingSpacing(model);
+  goal.foot[kRightFoot] = Eigen::Isometry3d(Eigen::Translation3d(0, -side, 0));
+  goal.foot[kLeftFoot] = Eigen::Isometry3d(Eigen::Translation3d(0, side, 0));
+  goal.com_height = StandingHeight(model);
+  goal.nominal = model.stance().joint_position;
+  return goal;
+}
+
 }  // namespace poise::robot

@@ -27,5 +27,7 @@ RobotState SolvePosture(const RobotModel& model, const PostureGoal& goal);
 double StandingHeight(const RobotModel& model);
 /// m between the soles' centres in that stance.
 double StandingSpacing(const RobotModel& model);
+/// That stance on level ground: soles at ± half the spacing beside the origin, the COM above it.
+PostureGoal StandingGoal(const RobotModel& model);
 
 }  // namespace poise::robot

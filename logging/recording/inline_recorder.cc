@@ -42,9 +42,10 @@ health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int compon
   return health;
 }
 
-void InlineRecorder::Close(const RunSpec& spec) {
+void InlineRecorder::Close(const RunSpec& spec, const std::string& detail) {
   for (int i = 0; i < spec.graph().component_size(); ++i) {
-    const health_t health = FinalHealth(spec, *runner_, i);
+    health_t health = FinalHealth(spec, *runner_, i);
+    if (health.detail.empty()) health.detail = detail;
     std::vector<uint8_t> bytes(static_cast<size_t>(health.getEncodedSize()));
     health.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     writer_.AddHealth(HealthChannel(health.component), bytes);

@@ -13,6 +13,9 @@
 
 namespace poise::logging {
 
+/// Each component's detail where a person has ended a run that only ends so.
+inline constexpr char kEndedByHand[] = "ended by hand";
+
 /// The health of a component (an index in the graph) as it stands.
 health_t FinalHealth(const RunSpec& spec, const InlineRunner& runner, int component);
 
@@ -33,8 +36,9 @@ class InlineRecorder {
     writer_.AddMessage(channel, -1, data);
   }
 
-  /// Writes the components' health as it stands, and closes. Throws LogError.
-  void Close(const RunSpec& spec);
+  /// Writes the components' health as it stands, and closes. `detail`: of those that tell of no end
+  /// themselves. Throws LogError.
+  void Close(const RunSpec& spec, const std::string& detail = "");
   const RunLogWriter& writer() const { return writer_; }
   void Flush() { writer_.Flush(); }
 

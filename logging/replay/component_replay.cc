@@ -114,7 +114,8 @@ class ReplayedStages {
     result.ticks = end_;
     for (const BoundStage& stage : stages_) {
       for (const Output& output : stage.outputs) {
-        result.outputs.emplace_back().channel = spec_.graph().channel(output.channel).name();
+        result.outputs.emplace_back().channel =
+            ChannelName(instance_.output(), output.port->name());
       }
     }
     result.external_messages = acts_;
@@ -147,7 +148,7 @@ class ReplayedStages {
   };
   struct Output {
     OutputPort* port;
-    int channel;
+    int channel;  // of the log's graph; -1: it has none of that name
   };
   struct BoundStage {
     const Stage* stage;
@@ -161,17 +162,33 @@ class ReplayedStages {
         fmt::format("{}: {} cannot be replayed: {}", log_.path_, instance_.name(), problem));
   }
 
-  /// Index of the channel at the component's port; CheckWiring has found it.
-  int ChannelOf(const google::protobuf::RepeatedPtrField<Connection>& connections,
-                const std::string& port) const {
-    const auto& channels = spec_.graph().channel();
-    for (const Connection& connection : connections) {
-      if (connection.port() != port) continue;
-      for (int i = 0; i < channels.size(); ++i) {
-        if (channels[i].name() == connection.channel()) return i;
-      }
+  using Connections = google::protobuf::RepeatedPtrField<Connection>;
+
+  /// Of the channel at the component's port; CheckWiring has found it.
+  static std::string ChannelName(const Connections& connections, const std::string& port) {
+    const auto found = std::ranges::find_if(
+        connections, [&](const Connection& connection) { return connection.port() == port; });
+    return found == connections.end() ? "" : found->channel();
+  }
+
+  /// Its index in the log's graph, of which another configuration may have channels more or less;
+  /// -1: it is not there.
+  int ChannelOf(const Connections& connections, const std::string& port) const {
+    const std::string name = ChannelName(connections, port);
+    const auto& channels = log_.spec().graph().channel();
+    for (int i = 0; i < channels.size(); ++i) {
+      if (channels[i].name() == name) return i;
     }
-    Fail(fmt::format("port {} has no channel in the log's graph", port));
+    return -1;
+  }
+
+  int InputChannel(const std::string& port) const {
+    const int channel = ChannelOf(instance_.input(), port);
+    if (channel < 0) {
+      Fail(fmt::format("the log's graph has no channel {}, which it reads",
+                       ChannelName(instance_.input(), port)));
+    }
+    return channel;
   }
 
   void Bind(const Stage& stage) {
@@ -181,14 +198,15 @@ class ReplayedStages {
         PlaceActs(acts);
         continue;
       }
-      const int channel = ChannelOf(instance_.input(), port->name());
+      const int channel = InputChannel(port->name());
       CheckSize(channel, port->encoded_size());
       bound.inputs.push_back({port, channel, OwnedMessage(port), External(port, channel)});
     }
     for (OutputPort* port : stage.outputs) {
       const int channel = ChannelOf(instance_.output(), port->name());
-      CheckSize(channel, port->encoded_size());
       bound.outputs.push_back({port, channel});
+      if (channel < 0) continue;
+      CheckSize(channel, port->encoded_size());
       end_ = std::max(end_, lane(channel).ticks.newest() + 1);
     }
     stages_.push_back(std::move(bound));
@@ -215,7 +233,7 @@ class ReplayedStages {
     std::set<int64_t> placed;
     for (const Connection& connection : instance_.input()) {
       if (connection.port() != acts->name()) continue;
-      const int channel = ChannelOf(instance_.input(), acts->name());
+      const int channel = InputChannel(acts->name());
       for (const ExternalMessage& message : log_.external_[static_cast<size_t>(channel)]) {
         operate::act_t act;
         if (static_cast<int>(message.data.size()) != acts->encoded_size() ||
@@ -247,7 +265,7 @@ class ReplayedStages {
     if (lane(channel).type != FindMessageType("emergency_stop_t")) return messages;
     for (const OutputPort* output : component_.wiring.outputs()) {
       const int status = ChannelOf(instance_.output(), output->name());
-      if (lane(status).type == FindMessageType("bridge_status_t")) {
+      if (status >= 0 && lane(status).type == FindMessageType("bridge_status_t")) {
         PlaceEmergencyStops(lane(status).by_tick, &messages);
       }
     }
@@ -255,7 +273,7 @@ class ReplayedStages {
   }
 
   void CheckSize(int channel, int size) const {
-    const Channel& c = spec_.graph().channel(channel);
+    const Channel& c = log_.spec().graph().channel(channel);
     const std::vector<int32_t> counts(c.count().begin(), c.count().end());
     if (lane(channel).type->encoded_size(counts) != size) {
       Fail(fmt::format("{}: its messages do not have the counts of the log's robot", c.name()));
@@ -271,14 +289,16 @@ class ReplayedStages {
       // The recording may have ended inside the last tick.
       const auto has_last = [&](int channel) { return lane(channel).ticks.newest() >= end_ - 1; };
       bool last = true;
-      for (const Output& output : stage.outputs) last = last && has_last(output.channel);
+      for (const Output& output : stage.outputs) {
+        last = last && (output.channel < 0 || has_last(output.channel));
+      }
       for (const Input& input : stage.inputs) {
         const bool same_tick = input.port->kind() == InputKind::kSameTick;
         if (stage.outputs.empty() && same_tick) last = last && has_last(input.channel);
       }
       stage.end = last ? end_ : end_ - 1;
       for (const Output& output : stage.outputs) {
-        if (named.insert(output.channel).second) {
+        if (output.channel >= 0 && named.insert(output.channel).second) {
           AddMissing(output.channel, stage.end, "to compare with", &lacking);
         }
       }
@@ -303,7 +323,7 @@ class ReplayedStages {
     if (missing.empty()) return;
     const int64_t refused = lane(channel).ticks.refused();
     lacking->push_back(fmt::format(
-        "the log lacks {} of tick {} to {}{}, {}{}", spec_.graph().channel(channel).name(),
+        "the log lacks {} of tick {} to {}{}, {}{}", log_.spec().graph().channel(channel).name(),
         missing.front().first, missing.front().last,
         missing.size() > 1 ? fmt::format(" and {} more ranges", missing.size() - 1) : "", purpose,
         refused > 0 ? fmt::format(" ({} messages of it are refused: poise log check)", refused)
@@ -326,7 +346,7 @@ class ReplayedStages {
       input->present = wanted >= 0;
       if (input->present && !Decode(input, Logged(input->channel, wanted))) {
         Fail(fmt::format("{} of tick {} is not finite",
-                         spec_.graph().channel(input->channel).name(), wanted));
+                         log_.spec().graph().channel(input->channel).name(), wanted));
       }
     }
     input->port->Bind(input->present ? input->message.get() : nullptr);
@@ -347,6 +367,7 @@ class ReplayedStages {
     for (const Input& input : stage->inputs) input.port->Bind(nullptr);
     for (size_t i = 0; i < stage->outputs.size(); ++i) {
       const Output& output = stage->outputs[i];
+      if (output.channel < 0) continue;
       const auto size = static_cast<size_t>(output.port->encoded_size());
       buffer_.resize(size);
       output.port->Encode(buffer_.data(), static_cast<int>(size));

@@ -30,7 +30,7 @@ struct FieldDifference {
 
 struct ReplayedChannel {
   std::string channel;
-  int64_t ticks = 0;      ///< compared
+  int64_t ticks = 0;      ///< compared; 0: the log has no such channel
   int64_t differing = 0;  ///< ticks
   int64_t first_differing_tick = -1;
   std::string first_field;              ///< that differs there, "torque[3]"

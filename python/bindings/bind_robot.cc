@@ -322,14 +322,7 @@ py::array_t<double> InverseDynamicsOf(const RobotHandle& robot, const StateArray
 /// The robot standing on level ground in its stance, soles about the world's origin.
 py::dict Stance(const RobotHandle& robot) {
   const RobotModel& model = robot.model();
-  robot::PostureGoal goal;
-  const double half = robot::StandingSpacing(model) / 2;
-  goal.foot = {Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};
-  goal.foot[robot::kRightFoot].translation() = Eigen::Vector3d(0, -half, 0);
-  goal.foot[robot::kLeftFoot].translation() = Eigen::Vector3d(0, half, 0);
-  goal.com_height = robot::StandingHeight(model);
-  goal.nominal = model.stance().joint_position;
-  const robot::RobotState state = robot::SolvePosture(model, goal);
+  const robot::RobotState state = robot::SolvePosture(model, robot::StandingGoal(model));
   py::dict result;
   const Eigen::Quaterniond& q = state.base_orientation;
   const std::array<double, 4> orientation = {q.w(), q.x(), q.y(), q.z()};

@@ -1,24 +1,13 @@
 // The tick path must not touch the heap: malloc itself is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstddef>
-
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/redistribution.h"
 #include "components/balance/task_hierarchy.h"
 #include "components/balance/tasks/task.h"
+#include "tests/allocation_counter.h"
 #include "tests/balance/balance_test_support.h"
-
-extern "C" void* __libc_malloc(size_t size);
-namespace {
-std::atomic<long> allocations{0};
-}
-extern "C" void* malloc(size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
 
 namespace poise::balance {
 namespace {

@@ -1,24 +1,14 @@
 // A control tick must not touch the heap: malloc itself is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
 
+#include "tests/allocation_counter.h"
 #include "tests/components/control_tick.h"
 #include "tests/test_seed.h"
-
-extern "C" void* __libc_malloc(size_t size);
-namespace {
-std::atomic<long> allocations{0};
-}
-extern "C" void* malloc(size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
 
 namespace poise {
 namespace {

@@ -7,13 +7,31 @@
 #include <regex>
 #include <stdexcept>
 
+#include "components/messages/motion.h"
 #include "components/robot/posture.h"
+#include "poise/message_traits.hpp"
 
 namespace poise {
 
 Tick TickAt(int64_t index) {
   const int64_t utime = index * kTickMicroseconds;
   return {.index = index, .utime = utime, .time = static_cast<double>(utime) * 1e-6};
+}
+
+support_plan_t HoldAt(const robot::RobotModel& model, const robot::RobotData& data,
+                      const Contacts& in_contact) {
+  support_plan_t plan{};
+  MessageTraits<support_plan_t>::Resize(plan, std::array{2});
+  SetMotion(PointMotion{.position = data.com}, &plan.com_reference);
+  const auto body = static_cast<size_t>(model.body_task_body());
+  SetMotion(RotationMotion{.rotation = data.body_rotation[body]}, &plan.body_reference);
+  for (size_t i = 0; i < 2; ++i) {
+    plan.in_contact[i] = in_contact[i] ? 1 : 0;
+    SetMotion(PointMotion{.position = data.foot_pose[i].translation()}, &plan.foot_reference[i]);
+    SetMotion(RotationMotion{.rotation = data.foot_pose[i].linear()},
+              &plan.foot_rotation_reference[i]);
+  }
+  return plan;
 }
 
 ControlContext::ControlContext(const std::string& robot_path)

@@ -21,6 +21,7 @@
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_model.h"
 #include "poise/robot_state_t.hpp"
+#include "poise/support_plan_t.hpp"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise {
@@ -29,6 +30,10 @@ using Contacts = std::array<bool, 2>;
 
 inline constexpr int64_t kTickMicroseconds = 2000;
 Tick TickAt(int64_t index);
+
+/// A plan that holds the robot where it is at `data`.
+support_plan_t HoldAt(const robot::RobotModel& model, const robot::RobotData& data,
+                      const Contacts& in_contact);
 
 /// What a run gives to its components.
 class ControlContext {

@@ -1,23 +1,13 @@
 // The estimator's tick must not touch the heap: malloc itself is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstddef>
 #include <vector>
 
 #include "components/state_estimator/calibrator.h"
 #include "components/state_estimator/foot_wrenches.h"
 #include "components/state_estimator/invariant_estimator.h"
+#include "tests/allocation_counter.h"
 #include "tests/components/base_motion.h"
-
-extern "C" void* __libc_malloc(size_t size);
-namespace {
-std::atomic<long> allocations{0};
-}
-extern "C" void* malloc(size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
 
 namespace poise {
 namespace {

@@ -17,23 +17,6 @@ namespace {
 
 using robot::TestRobot;
 
-// A plan that holds the robot where it is at `data`.
-support_plan_t HoldAt(const robot::RobotModel& model, const robot::RobotData& data,
-                      const Contacts& in_contact) {
-  support_plan_t plan{};
-  MessageTraits<support_plan_t>::Resize(plan, std::array{2});
-  SetMotion(PointMotion{.position = data.com}, &plan.com_reference);
-  const auto body = static_cast<size_t>(model.body_task_body());
-  SetMotion(RotationMotion{.rotation = data.body_rotation[body]}, &plan.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    plan.in_contact[i] = in_contact[i] ? 1 : 0;
-    SetMotion(PointMotion{.position = data.foot_pose[i].translation()}, &plan.foot_reference[i]);
-    SetMotion(RotationMotion{.rotation = data.foot_pose[i].linear()},
-              &plan.foot_rotation_reference[i]);
-  }
-  return plan;
-}
-
 struct Case {
   TestRobot robot;
   const char* support;

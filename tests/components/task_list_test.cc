@@ -22,23 +22,6 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using robot::TestRobot;
 
-// A plan that holds the robot where it is at `data`.
-support_plan_t PlanAt(const robot::RobotModel& model, const robot::RobotData& data,
-                      const Contacts& in_contact) {
-  support_plan_t plan{};
-  MessageTraits<support_plan_t>::Resize(plan, std::array{2});
-  SetMotion(PointMotion{.position = data.com}, &plan.com_reference);
-  const auto body = static_cast<size_t>(model.body_task_body());
-  SetMotion(RotationMotion{.rotation = data.body_rotation[body]}, &plan.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    plan.in_contact[i] = in_contact[i] ? 1 : 0;
-    SetMotion(PointMotion{.position = data.foot_pose[i].translation()}, &plan.foot_reference[i]);
-    SetMotion(RotationMotion{.rotation = data.foot_pose[i].linear()},
-              &plan.foot_rotation_reference[i]);
-  }
-  return plan;
-}
-
 /// Angular momentum about the COM, summed over the bodies.
 Vector3d SummedMomentum(const robot::RobotModel& model, const robot::RobotData& data) {
   Vector3d sum = Vector3d::Zero();
@@ -147,7 +130,7 @@ TEST_P(TaskListCase, ThreeLevelsOfARobotWithoutArms) {
   std::mt19937 random{TestSeed(31)};
   const auto body = static_cast<size_t>(model.body_task_body());
   const robot::RobotData goal = robot::Evaluate(model, standing);
-  const support_plan_t plan = PlanAt(model, goal, GetParam());
+  const support_plan_t plan = HoldAt(model, goal, GetParam());
   harness.Bind("support_plan", &plan);
   Vector3d held;
   double worst = 0, slope = 0, least_conflict = 1e9;
@@ -224,7 +207,7 @@ TEST_P(TaskListCase, ThreeLevelsOfARobotWithAHand) {
   const robot::RobotState standing = StandingState(model);
   std::mt19937 random{TestSeed(32)};
   const robot::RobotData goal = robot::Evaluate(model, standing);
-  const support_plan_t plan = PlanAt(model, goal, GetParam());
+  const support_plan_t plan = HoldAt(model, goal, GetParam());
   harness.Bind("support_plan", &plan);
   Vector3d held;
   VectorXd posture;
@@ -295,7 +278,7 @@ std::vector<std::vector<double>> Torques(TestRobot robot, const std::string& con
   ControlContext context(robot);
   Harness<TaskController> harness(&context, config);
   const robot::RobotState standing = StandingState(model);
-  support_plan_t plan = PlanAt(model, robot::Evaluate(model, standing), in_contact);
+  support_plan_t plan = HoldAt(model, robot::Evaluate(model, standing), in_contact);
   plan.com_reference.position[0] += com_ahead;
   harness.Bind("support_plan", &plan);
   std::mt19937 random{7};
@@ -339,7 +322,7 @@ TEST(TaskList, TheStartIsHeld) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kMantis);
   ControlContext context(TestRobot::kMantis);
   const robot::RobotState standing = StandingState(model);
-  const support_plan_t message = PlanAt(model, robot::Evaluate(model, standing), both);
+  const support_plan_t message = HoldAt(model, robot::Evaluate(model, standing), both);
   std::mt19937 random{TestSeed(33)};
   std::array<robot_state_t, 2> states;
   for (robot_state_t& state : states) {

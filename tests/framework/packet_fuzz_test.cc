@@ -12,21 +12,11 @@
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/component.h"
 #include "components/framework/run.h"
-#include "operate/message_traits.hpp"
-#include "steps/message_traits.hpp"
+#include "tests/every_message.h"
 #include "tests/test_seed.h"
 
 namespace poise {
 namespace {
-
-/// Of the packages poise, operate and steps.
-template <class F>
-void ForEveryType(F&& f) {
-  ForEachMessageType(f);
-  f.template operator()<operate::act_t>();
-  f.template operator()<operate::answer_t>();
-  f.template operator()<steps::footsteps_t>();
-}
 
 constexpr int64_t kRun = 0x1234;
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -207,6 +208,23 @@ TEST_F(FirstScreenTest, IsColouredOnATerminalAloneAndFitsIt) {
   ExpectFits(narrow, 50);
 }
 
+// Its person ends an interactive run: that it did not last as long as it might have is no failure,
+// neither then nor when it is read again.
+TEST(FirstScreen, AnInteractiveRunEndsByCtrlC) {
+  RunFolder folder;
+  PoiseProgram run({"run", "stand", "--interactive", "--duration", "600", "--out", folder / "run"});
+  ASSERT_TRUE(WaitForLog(folder / "run", kUnderWay * 20));
+  kill(run.pid(), SIGINT);
+  const ProgramResult ended = run.Wait();
+  EXPECT_EQ(ended.exit_code, 0) << ended.output;
+  EXPECT_THAT(ended.output, HasSubstr("of 600 s: ended by hand"));
+  EXPECT_THAT(ended.output, HasSubstr("passed: "));
+  EXPECT_EQ(ReadSummary(folder / "run")["passed"], true);
+  const ProgramResult report = RunPoise({"report", folder / "run", "--no-html"});
+  EXPECT_EQ(report.exit_code, 0) << report.output;
+  EXPECT_THAT(report.output, HasSubstr("of 600 s: ended by hand"));
+}
+
 TEST(CommandLine, SaysWhatWasMeant) {
   ExpectUsageError({"rnu"}, {"poise has no command 'rnu'", "did you mean run", "poise --help"});
   ExpectUsageError({"log", "inof"}, {"poise log has no command 'inof'", "info"});
@@ -214,6 +232,7 @@ TEST(CommandLine, SaysWhatWasMeant) {
                    {"--durration", "did you mean --duration", "poise run --help"});
   ExpectUsageError({"report", "--seed", "5"}, {"--seed", "poise run"});
   ExpectUsageError({"compare", "a", "b", "c"}, {"'c'", "poise compare --help"});
+  ExpectUsageError({"view", "--run", "a"}, {"--run", "without a flag: poise view run"});
   ExpectUsageError({"run", "--out"}, {"--out needs a value"});
   ExpectUsageError({"run", "--duration", "long"}, {"--duration", "poise run --help"});
 }

@@ -79,6 +79,22 @@ TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
   EXPECT_HAS(result, "first torque[");
 }
 
+// Of FOOTSTEPS, which only a planner that steps writes.
+TEST_F(ReplayTest, ASettingMayBringOrTakeAChannel) {
+  const std::string steps = folder_ / "steps", setting = "step_planner.walk.enabled=";
+  Run({"--inline"});
+  RunPoise({"run", StandScenario(), "--inline", "--set", setting + "true", "--out", steps});
+  const ProgramResult more = Replay({"--component", "step_planner", "--set", setting + "true"});
+  EXPECT_NE(more.exit_code, -1) << more.output;
+  EXPECT_HAS(more, "step_planner: 200 ticks");
+  EXPECT_HAS(more, "FOOTSTEPS: nothing to compare with");
+  const ProgramResult less =
+      Replay({"--component", "step_planner", "--set", setting + "false"}, steps);
+  EXPECT_NE(less.exit_code, -1) << less.output;
+  EXPECT_HAS(less, "step_planner: 200 ticks");
+  EXPECT_EQ(less.output.find("FOOTSTEPS"), std::string::npos) << less.output;
+}
+
 TEST_F(ReplayTest, OneChangedBitShowsWithItsFieldAndTick) {
   Run({"--inline"});
   double change = 0;

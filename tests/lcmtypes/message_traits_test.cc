@@ -12,21 +12,11 @@
 #include <string>
 #include <vector>
 
-#include "operate/message_traits.hpp"
-#include "steps/message_traits.hpp"
+#include "tests/every_message.h"
 #include "tests/test_seed.h"
 
 namespace poise {
 namespace {
-
-/// Of the packages poise, operate and steps.
-template <class F>
-void ForEveryType(F&& f) {
-  ForEachMessageType(f);
-  f.template operator()<operate::act_t>();
-  f.template operator()<operate::answer_t>();
-  f.template operator()<steps::footsteps_t>();
-}
 
 using ::testing::ElementsAre;
 

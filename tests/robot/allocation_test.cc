@@ -1,20 +1,9 @@
 // The tick path's functions must not touch the heap: malloc itself is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstddef>
-
+#include "tests/allocation_counter.h"
 #include "tests/robot/robot_test_support.h"
 #include "tests/test_seed.h"
-
-extern "C" void* __libc_malloc(size_t size);
-namespace {
-std::atomic<long> allocations{0};
-}
-extern "C" void* malloc(size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
 
 namespace poise::robot {
 namespace {

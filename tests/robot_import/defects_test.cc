@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fstream>
 #include <random>
+#include <regex>
 
 #include "components/robot/posture.h"
 #include "components/robot_files/robot_files.h"
@@ -264,6 +265,19 @@ TEST(Defects, ABaseThatFacesElsewhereIsTheSameRobot) {
     for (size_t f = 0; f < 2; ++f) {
       EXPECT_TRUE(a.foot_pose[f].isApprox(b.foot_pose[f], 1e-8)) << rpy;
     }
+  }
+}
+
+TEST(Defects, AFileWithoutMassesIsRefused) {
+  const std::string maker =
+      std::regex_replace(SimpleBiped(), std::regex("<inertial>[^]*?</inertial>"), "");
+  ASSERT_EQ(maker.find("mass"), std::string::npos);
+  try {
+    ImportText("massless", maker);
+    FAIL() << "imported";
+  } catch (const robot::RobotError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no link has a mass"));
+    EXPECT_THAT(error.what(), HasSubstr("<inertial>"));
   }
 }
 

@@ -116,9 +116,11 @@ TEST_F(LiveFieldsTest, EachIsTheFieldOfTheConfigurationThatItNames) {
       wanted[field.path] = value;
     }
     RunSpec spec = run.spec;
+    std::vector<std::string> changes;
     for (const auto& [path, value] : wanted) {
-      ChangeConfiguration(fmt::format("{}={:.17g}", path, value), &spec);
+      changes.push_back(fmt::format("{}={:.17g}", path, value));
     }
+    ChangeConfigurations(changes, &spec);
     const std::vector<LiveField> fields = LiveFields(spec);
     ASSERT_EQ(fields.size(), wanted.size()) << run.name;
     for (const LiveField& field : fields) {

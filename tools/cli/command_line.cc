@@ -50,6 +50,13 @@ void FindFlag(const CLI::App& app, const std::string& flag, std::vector<std::str
   }
 }
 
+/// Whether `app` takes what is called so without a flag.
+bool TakesBare(const CLI::App& app, const std::string& name) {
+  return std::ranges::any_of(app.get_options(), [&](const CLI::Option* option) {
+    return option->get_positional() && option->get_name() == name;
+  });
+}
+
 std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
                         const std::string& argument) {
   const std::string flag = argument.substr(0, argument.find('='));
@@ -57,7 +64,9 @@ std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
   const std::vector<std::string> near = Nearest(flag, Flags(command));
   std::vector<std::string> others;
   FindFlag(root, flag, &others);
-  if (!near.empty()) {
+  if (flag.starts_with("--") && TakesBare(command, flag.substr(2))) {
+    text += fmt::format("; it takes that without a flag: {} {}", FullName(command), flag.substr(2));
+  } else if (!near.empty()) {
     text += fmt::format("; did you mean {}?", Joined(near, " or "));
   } else if (!others.empty()) {
     text += fmt::format("; it is one of {}", Joined(others, ", "));

@@ -69,7 +69,7 @@ int CompareEstimators(const EstimatorsOptions& options) {
       throw logging::LogError(fmt::format("{}: holds no ROBOT_SENSORS to estimate from", log));
     }
     RunSpec spec = run.spec;
-    for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
+    ChangeConfigurations(options.set, &spec);
     // Both methods again, also the one that ran: the configuration may be another.
     run.estimator = {};
     for (const auto& [method, name_of_method, prefix] : kMethods) {

@@ -70,6 +70,11 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
         component.unplaced_messages, component.external_messages);
   }
   for (const logging::ReplayedChannel& output : component.outputs) {
+    if (output.ticks == 0) {
+      fmt::print("  {}: nothing to compare with: this run had no such channel\n",
+                 ForTerminal(output.channel));
+      continue;
+    }
     if (output.differing == 0) {
       fmt::print("  {}: {} messages, the same bits\n", ForTerminal(output.channel), output.ticks);
       continue;
@@ -92,7 +97,7 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
 int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogReplay replay(log);
   RunSpec spec = replay.spec();
-  for (const std::string& change : options.set) ChangeConfiguration(change, &spec);
+  ChangeConfigurations(options.set, &spec);
   const logging::LogMessages messages(log);
   bool equal = true;
   for (const int index : Wanted(spec, options.components)) {

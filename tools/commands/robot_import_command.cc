@@ -74,7 +74,9 @@ int ImportIt(ImportArguments arguments) {
   }
   fmt::print("{}", FormatColumns(std::move(rows)));
   if (!imported.defects.empty()) {
-    rows = {{fmt::format("{} defects of the file", imported.defects.size()), "what was done"}};
+    rows = {{fmt::format("{} defect{} of the file", imported.defects.size(),
+                         imported.defects.size() == 1 ? "" : "s"),
+             "what was done"}};
     for (const Defect& d : imported.defects) rows.push_back({d.what, d.done});
     fmt::print("\n{}", FormatColumns(std::move(rows)));
   }

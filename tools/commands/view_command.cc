@@ -8,6 +8,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
+#include "tools/cli/output_style.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/foxglove/live_foxglove.h"
@@ -64,10 +65,11 @@ class Viewer {
   }
 
   int Run() {
-    fmt::print(
-        "{}: {}  (the last {} s, {:.0f} MB; Ctrl-C ends)\n", live_->dir().string(), server_.url(),
-        keep_,
-        1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity()));
+    const double size =
+        1e-6 * static_cast<double>(ring_.tick_size()) * static_cast<double>(ring_.capacity());
+    fmt::print("{}\n", server_.url());
+    Say(fmt::format("the page of {}, its last {} s ({:.0f} MB); Ctrl-C ends", live_->dir().string(),
+                    keep_, size));
     if (foxglove_) fmt::print("Foxglove: ws://127.0.0.1:{}\n", foxglove_->port());
     if (desk_) fmt::print("whoever has this address can push, change and stop the robot\n");
     std::fflush(stdout);
@@ -93,6 +95,10 @@ class Viewer {
   }
 
  private:
+  static void Say(const std::string& text) {
+    fmt::print("{}\n", Wrapped(text, ScreenStyle().columns, 2));
+  }
+
   void Listen(Clock::time_point now) {
     const int64_t lost = ring_.lost();
     live_->Spin(0, [&](const LiveMessage& message) {
@@ -108,8 +114,8 @@ class Viewer {
         ring_.Finish();
         status_.Finish();
         if (foxglove_) foxglove_->Finish();
-        fmt::print("the run has ended; its page stays until Ctrl-C; {} {} checks it\n", kLogCommand,
-                   live_->dir().string());
+        Say(fmt::format("the run has ended; its page stays until Ctrl-C; {} {} checks it",
+                        kLogCommand, live_->dir().string()));
         std::fflush(stdout);
         live_ = nullptr;
       }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -73,11 +74,18 @@ class InteractiveRun {
       server_->RunFor(std::clamp(std::chrono::duration_cast<milliseconds>(wait - Clock::now()),
                                  milliseconds(0), kPicture));
     }
-    recorder_->Close(spec_);
+    const bool early = !runner_->ended();
+    recorder_->Close(spec_, early ? logging::kEndedByHand : "");
     RunOutcome outcome;
     outcome.wall_time = std::chrono::duration<double>(Clock::now() - start).count();
     outcome.completed = !runner_->failed();
     outcome.message = runner_->end_detail();
+    // Before the scenario has begun there is nothing to judge.
+    if (early && runner_->ticks_completed() <= spec_.lead_ticks()) {
+      outcome.completed = false;
+      outcome.interrupted = true;
+      outcome.message = fmt::format("interrupted ({})", sigdescr_np(StopSignal()));
+    }
     return outcome;
   }
 

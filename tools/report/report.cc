@@ -7,6 +7,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
+#include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/realtime_verdict.h"
 #include "tools/scenario/scenario_loading.h"
@@ -148,11 +149,14 @@ const logging::Metric* MetricOfCheck(const Scenario& scenario, int index) {
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run) {
   std::vector<CheckResult> results;
   const bool part = run.spec.has_cut();  // what the scenario limits is of the whole run
+  // An interactive run lasts as long as its person wants.
+  const bool by_hand = std::ranges::any_of(
+      run.health, [](const auto& each) { return each.second.detail == logging::kEndedByHand; });
   const auto reaches_end = [&](const char* metric, const RunSpec& spec) {
     CheckResult duration;
     if (part) {
       duration.label = "simulated time at which this part of the run ends";
-    } else if (spec.num_ticks() > 0) {
+    } else if (spec.num_ticks() > 0 && !by_hand) {
       duration.at_least =
           static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period();
     }

@@ -7,6 +7,7 @@
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metrics.h"
+#include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {
@@ -225,7 +226,9 @@ std::string EndReason(const RunRecord& run) {
   for (const auto& [component, health] : run.health) {
     if (health.detail.empty() || health.state < health_t::STATE_FINISHED) continue;
     if (reason.empty() || health.state == health_t::STATE_FAILED) {
-      reason = fmt::format("{}: {}", component, health.detail);
+      reason = health.detail == logging::kEndedByHand
+                   ? health.detail
+                   : fmt::format("{}: {}", component, health.detail);
     }
   }
   return reason;

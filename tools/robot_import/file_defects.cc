@@ -104,9 +104,17 @@ class Repairer {
     }
   }
 
+  /// A file for pictures alone is refused: with brackets for links a robot of 0.3 kg comes of it.
+  void Masses() const {
+    if (Mass() > 0) return;
+    throw robot::RobotError(fmt::format(
+        "{}: no link has a mass: what balances is forces on masses; import the maker's file for "
+        "dynamics, whose links have an <inertial>",
+        source_.format));
+  }
+
   void Limits() {
-    double mass = 0;
-    for (const SourceLink& link : source_.links) mass += std::max(0.0, link.mass.mass);
+    const double mass = Mass();
     std::map<std::pair<double, double>, JointLimit*> same;
     int no_effort = 0, no_velocity = 0, no_range = 0;
     for (SourceJoint& joint : source_.joints) {
@@ -154,6 +162,13 @@ class Repairer {
   }
 
  private:
+  /// kg, of all links.
+  double Mass() const {
+    double mass = 0;
+    for (const SourceLink& link : source_.links) mass += std::max(0.0, link.mass.mass);
+    return mass;
+  }
+
   void Tell(std::string what, std::string done) {
     result_.defects.push_back({std::move(what), std::move(done)});
   }
@@ -400,6 +415,7 @@ class Repairer {
 void RepairDefects(const std::vector<std::string>& lock, MakerFile* maker, RobotImport* result,
                    std::map<std::string, double>* rotor) {
   Repairer repairer(maker, result, rotor);
+  repairer.Masses();
   repairer.Names();
   repairer.Locks(lock);
   repairer.Limits();

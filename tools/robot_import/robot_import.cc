@@ -451,7 +451,9 @@ class Import {
       }
     }
     AddDriveTrain(torque, &robot());
-    Say("motors", fmt::format("{} joints, {} kinds", tree.joints.size(), robot().motor_size()),
+    Say("motors",
+        fmt::format("{} joints, {} kind{}", tree.joints.size(), robot().motor_size(),
+                    robot().motor_size() == 1 ? "" : "s"),
         "torques and velocities of the file; gears, currents and encoders by class",
         Sureness::kGuess);
     Say("rotor inertia",

@@ -33,7 +33,8 @@ std::optional<int> EstimatorOf(const RunSpec& spec) {
 Reestimated Reestimate(RunSpec spec, int method, const logging::RunRecord& run) {
   const int index = EstimatorOf(spec).value();
   const std::string& type = TypeOf(spec.graph().component(index));
-  ChangeConfiguration(Components().TraitsOf(type).methods.at(static_cast<size_t>(method)), &spec);
+  ChangeConfigurations({Components().TraitsOf(type).methods.at(static_cast<size_t>(method))},
+                       &spec);
   SharedObjects shared;
   const ConfiguredComponent estimator =
       ConfigureComponent(spec, index, *Components().Find(type), &shared);

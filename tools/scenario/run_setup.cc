@@ -298,9 +298,8 @@ namespace {
 
 /// Walking needs other values than standing where the scenario leaves them open (docs/walking.md):
 /// with those of the rule for standing the paper's robot falls after some 15 s.
-Scenario FilledForWalking(Scenario scenario) {
-  if (!scenario.step_planner().walk().enabled()) return scenario;
-  TaskControllerConfig& tasks = *scenario.mutable_task_controller();
+void FillForWalking(Scenario* scenario) {
+  TaskControllerConfig& tasks = *scenario->mutable_task_controller();
   // The COM's reference has its velocity from the same tick.
   if (!tasks.has_base_velocity_cutoff()) tasks.set_base_velocity_cutoff(0);
   if (!tasks.has_foot()) {
@@ -308,19 +307,21 @@ Scenario FilledForWalking(Scenario scenario) {
     tasks.mutable_foot()->set_kp(625);
     tasks.mutable_foot()->set_kd(50);
   }
-  StateEstimatorConfig& estimator = *scenario.mutable_state_estimator();
+  StateEstimatorConfig& estimator = *scenario->mutable_state_estimator();
   // Hz; heron falls with the 12.9 Hz that its gears ask for.
   if (!estimator.has_joint_velocity_cutoff()) estimator.set_joint_velocity_cutoff(20);
-  ContactWrenchMonitorConfig& monitor = *scenario.mutable_contact_wrench_monitor();
+  ContactWrenchMonitorConfig& monitor = *scenario->mutable_contact_wrench_monitor();
   if (!monitor.has_region()) monitor.set_region(ContactWrenchMonitorConfig::POLYGON);
-  return scenario;
 }
+
+bool Walks(const Scenario& scenario) { return scenario.step_planner().walk().enabled(); }
 
 }  // namespace
 
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings) {
-  const Scenario scenario = FilledForWalking(loaded.scenario);
+  Scenario scenario = loaded.scenario;
+  if (Walks(scenario)) FillForWalking(&scenario);
   RunSpec spec;
   std::random_device random;
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
@@ -390,6 +391,8 @@ void CheckGraphFile(const std::string& path) {
   }
 }
 
+namespace {
+
 void ChangeConfiguration(const std::string& change, RunSpec* spec) {
   const std::string section = change.substr(0, change.find_first_of(".[="));
   std::vector<std::string> names;
@@ -422,6 +425,29 @@ void ChangeConfiguration(const std::string& change, RunSpec* spec) {
   if (!changed) {
     throw ConfigError(fmt::format("--set {}: no component of the run has a configuration '{}'; {}",
                                   change, section, Suggest(section, names)));
+  }
+}
+
+}  // namespace
+
+void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec) {
+  for (const std::string& change : changes) ChangeConfiguration(change, spec);
+  bool walks = false;
+  for (const ComponentInstance& instance : spec->graph().component()) {
+    const std::string& type = TypeOf(instance);
+    const int config = ConfigIndex(*spec, instance);
+    const std::vector<std::string> sections = SectionsOf(type);
+    if (config < 0 || std::ranges::find(sections, "step_planner") == sections.end()) continue;
+    walks = walks || Walks(ParseConfig(spec->config(config), type));
+  }
+  if (!walks) return;
+  for (const ComponentInstance& instance : spec->graph().component()) {
+    const std::string& type = TypeOf(instance);
+    const int config = ConfigIndex(*spec, instance);
+    if (config < 0 || ConfigField(SectionsOf(type)[0]) == nullptr) continue;
+    Scenario own = ParseConfig(spec->config(config), type);
+    FillForWalking(&own);
+    spec->mutable_config(config)->set_text(ConfigText(own, type));
   }
 }
 

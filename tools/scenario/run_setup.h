@@ -31,9 +31,10 @@ void CheckGraphFile(const std::string& path);
 /// Whether a run of the scenario has the port.
 bool IsThere(const OptionalPort& port, const Scenario& scenario);
 
-/// Changes one field of the components' configurations in a run, "task_controller.com.kp=200".
-/// Throws ConfigError.
-void ChangeConfiguration(const std::string& change, RunSpec* spec);
+/// Changes fields of the components' configurations in a run, "task_controller.com.kp=200", in
+/// order, then fills in what MakeRunSpec does for such a configuration. What it once filled in for
+/// another one stays. Throws ConfigError.
+void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec);
 
 /// Whether a component is at one of the ends of what passes between a bridge and drives, which no
 /// log holds.

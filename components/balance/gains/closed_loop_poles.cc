@@ -375,16 +375,12 @@ class Loop {
 
 robot::RobotState StandingState(const robot::RobotModel& model,
                                 const std::array<bool, 2>& in_contact, double lift) {
-  robot::PostureGoal goal;
-  const double side = 0.5 * robot::StandingSpacing(model);
+  robot::PostureGoal goal = robot::StandingGoal(model);
   const bool both = in_contact[0] && in_contact[1];
   for (const size_t foot : {0, 1}) {
-    const double y = foot == 0 ? -side : side;
-    goal.foot[foot] = Eigen::Isometry3d(Eigen::Translation3d(0, y, in_contact[foot] ? 0 : lift));
-    if (!both && in_contact[foot]) goal.com_xy = {0, y};
+    if (!in_contact[foot]) goal.foot[foot].translation().z() = lift;
+    if (!both && in_contact[foot]) goal.com_xy = goal.foot[foot].translation().head<2>();
   }
-  goal.com_height = robot::StandingHeight(model);
-  goal.nominal = model.stance().joint_position;
   return robot::SolvePosture(model, goal);
 }
 

@@ -16,14 +16,7 @@ constexpr double kPoint = 1e-12;  // m²: a segment so short is a point
 }  // namespace
 
 Legs::Legs(const robot::RobotModel& model) : height_(robot::StandingHeight(model)) {
-  const double spacing = robot::StandingSpacing(model);
-  robot::PostureGoal goal;
-  for (size_t i = 0; i < 2; ++i) {
-    goal.foot[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing : 0.5 * spacing, 0) *
-                   Eigen::Isometry3d::Identity();
-  }
-  goal.com_height = height_;
-  goal.nominal = model.stance().joint_position;
+  const robot::PostureGoal goal = robot::StandingGoal(model);
   robot::RobotData data(model);
   robot::ComputeKinematics(model, robot::SolvePosture(model, goal), &data);
   const Vector3d com = Vector3d(0, 0, height_) - data.base_position;

@@ -111,14 +111,8 @@ class Leg {
 /// Of `foot` from the COM, from the stance outwards; empty when the stance cannot be held.
 balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, int foot,
                                   double reserve) {
-  const double spacing = robot::StandingSpacing(model);
-  robot::PostureGoal goal;
-  for (size_t i = 0; i < 2; ++i) {
-    goal.foot[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing : 0.5 * spacing, 0) *
-                   Eigen::Isometry3d::Identity();
-  }
+  robot::PostureGoal goal = robot::StandingGoal(model);
   goal.com_height = height;
-  goal.nominal = model.stance().joint_position;
   robot::RobotState standing;
   try {
     standing = robot::SolvePosture(model, goal);

@@ -180,20 +180,17 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double beyo
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
   const double over = input.time - since_;
-  if (beyond > 0) {
-    // Pushed meanwhile.
+  const bool above = over >= spec_.together_shift - kTimeTolerance &&
+                     balance::Contains(sole, state.pendulum.com) &&
+                     balance::Contains(sole, state.pendulum.capture_point());
+  if (beyond > 0 || (!above && over > kMostShifts * spec_.together_shift)) {
+    // Pushed meanwhile, or it does not get there.
     stage_ = Stage::kCatching;
     since_ = moving_since_ = input.time;
     cop_from_ = output_.cop;
-  } else if (over >= spec_.together_shift - kTimeTolerance &&
-             balance::Contains(sole, state.pendulum.com) &&
-             balance::Contains(sole, state.pendulum.capture_point())) {
+  } else if (above) {
     BeginStep(input, choice_.Beside(state, plan_.foot, kGently + spec_.together_swing),
               StepReason::kTogether);
-  } else if (over > kMostShifts * spec_.together_shift) {
-    stage_ = Stage::kCatching;
-    since_ = moving_since_ = input.time;
-    cop_from_ = output_.cop;
   }
 }
 

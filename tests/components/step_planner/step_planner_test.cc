@@ -349,34 +349,44 @@ TEST_F(UnconfirmedTouchDown, FollowsTheScheduleAlone) {
   EXPECT_EQ(Run(0.402, 0).phase, 2);
 }
 
+constexpr double kSlip = 0.03;  // m
+
+// The COM's reference after 1500 ticks, when the robot has slipped ahead by kSlip in tick `slip`;
+// m, from where the COM was at the start.
+PointMotion ComAfterSlip(const std::string& config, int64_t slip) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  ControlContext context(TestRobot::kDyros);
+  Harness<StepPlanner> harness(&context, config);
+  robot_state_t message{};
+  harness.Bind("robot_state", &message);
+  robot::RobotState state = StandingState(model);
+  const Eigen::Vector3d start = robot::Evaluate(model, state).com;
+  for (int64_t tick = 0; tick < 1500; ++tick) {
+    if (tick == slip) state.base_position.x() += kSlip;
+    message = StateMessage(model, state);
+    message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
+    harness.Run(TickAt(tick));
+  }
+  const auto& plan = harness.output<support_plan_t>();
+  EXPECT_EQ(plan.phase, 1);
+  PointMotion com = GetMotion(plan.com_reference);
+  com.position -= start;
+  return com;
+}
+
 // Soles slip while the COM's reference moves, which goes after them once it rests. A phase may
 // begin before that, or in its midst: above the soles it is once, and relative to where it was
 // likewise.
 TEST(StepPlanner, APhaseThatBeginsWhereSolesHaveSlippedIsNotBesideThem) {
-  constexpr double kSlip = 0.03;  // m
-  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   for (const char* target : {"OVER_MIDDLE", "HOLD"}) {
     for (const char* moves : {"1", "0.8", "0.5"}) {
-      ControlContext context(TestRobot::kDyros);
-      Harness<StepPlanner> harness(
-          &context, fmt::format("com_lag: 1 phase {{ support: DOUBLE duration: 1 "
-                                "com {{ target: SHIFT y: 0.01 duration: {} }} }} "
-                                "phase {{ support: DOUBLE com {{ target: {} duration: 0.5 }} }}",
-                                moves, target));
-      robot_state_t message{};
-      harness.Bind("robot_state", &message);
-      robot::RobotState state = StandingState(model);
-      const Eigen::Vector3d start = robot::Evaluate(model, state).com;
-      for (int64_t tick = 0; tick < 1500; ++tick) {
-        if (tick == 200) state.base_position.x() += kSlip;
-        message = StateMessage(model, state);
-        message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
-        harness.Run(TickAt(tick));
-      }
-      const auto& plan = harness.output<support_plan_t>();
-      ASSERT_EQ(plan.phase, 1);
-      const PointMotion com = GetMotion(plan.com_reference);
-      EXPECT_NEAR(com.position.x() - start.x(), kSlip, 1e-6) << target << ' ' << moves;
+      const PointMotion com =
+          ComAfterSlip(fmt::format("com_lag: 1 phase {{ support: DOUBLE duration: 1 "
+                                   "com {{ target: SHIFT y: 0.01 duration: {} }} }} "
+                                   "phase {{ support: DOUBLE com {{ target: {} duration: 0.5 }} }}",
+                                   moves, target),
+                       200);
+      EXPECT_NEAR(com.position.x(), kSlip, 1e-6) << target << ' ' << moves;
       EXPECT_EQ(com.velocity.norm(), 0) << target << ' ' << moves;
     }
   }
@@ -385,28 +395,13 @@ TEST(StepPlanner, APhaseThatBeginsWhereSolesHaveSlippedIsNotBesideThem) {
 // The ground below a foot that a phase put down may give way: its sole sinks and rolls, and a COM
 // that went after it would load it the more.
 TEST(StepPlanner, ASoleThatAPhasePutDownIsNotFollowed) {
-  constexpr double kSlip = 0.03;  // m
-  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   for (const bool lifted : {false, true}) {
-    ControlContext context(TestRobot::kDyros);
-    Harness<StepPlanner> harness(
-        &context, fmt::format("com_lag: 1 contact {{ required: false }} "
-                              "phase {{ support: {} duration: 0.5 }} phase {{ support: DOUBLE }}",
-                              lifted ? "RIGHT" : "DOUBLE"));
-    robot_state_t message{};
-    harness.Bind("robot_state", &message);
-    robot::RobotState state = StandingState(model);
-    const Eigen::Vector3d start = robot::Evaluate(model, state).com;
-    for (int64_t tick = 0; tick < 1500; ++tick) {
-      if (tick == 500) state.base_position.x() += kSlip;
-      message = StateMessage(model, state);
-      message.foot_load_share[0] = message.foot_load_share[1] = 0.5;
-      harness.Run(TickAt(tick));
-    }
-    const auto& plan = harness.output<support_plan_t>();
-    ASSERT_EQ(plan.phase, 1);
-    const PointMotion com = GetMotion(plan.com_reference);
-    EXPECT_NEAR(com.position.x() - start.x(), lifted ? 0 : kSlip, 1e-6) << lifted;
+    const PointMotion com = ComAfterSlip(
+        fmt::format("com_lag: 1 contact {{ required: false }} "
+                    "phase {{ support: {} duration: 0.5 }} phase {{ support: DOUBLE }}",
+                    lifted ? "RIGHT" : "DOUBLE"),
+        500);
+    EXPECT_NEAR(com.position.x(), lifted ? 0 : kSlip, 1e-6) << lifted;
   }
 }
 

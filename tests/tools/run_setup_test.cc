@@ -1,0 +1,53 @@
+// What a replay's --set makes of a run's configuration, beside a run that began with it.
+#include "tools/scenario/run_setup.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tools/scenario/scenario_loading.h"
+
+namespace poise {
+namespace {
+
+RunSpec SpecOf(const std::string& scenario, const std::vector<std::string>& set) {
+  RunChanges changes;
+  changes.set = set;
+  std::vector<std::string> warnings;
+  return MakeRunSpec(LoadScenario(scenario, changes), changes, &warnings);
+}
+
+struct Change {
+  const char* scenario;
+  std::vector<std::string> set;
+};
+
+// Walking fills in what the scenario leaves open, of other components too, and has a channel more.
+TEST(ChangeConfigurations, GiveWhatARunWithTheSameSettingsHas) {
+  const std::vector<Change> all{
+      {"stand", {"task_controller.com.kp=150"}},
+      {"stand", {"step_planner.walk.enabled=true"}},
+      {"stand", {"step_planner.walk.enabled=true", "state_estimator.joint_velocity_cutoff=35"}},
+      {"stand",
+       {"step_planner.walk.enabled=true", "task_controller.foot.kp=700",
+        "task_controller.foot.kd=60"}},
+      {"stand", {"step_planner.recovery.enabled=true"}},
+      {"walk", {"step_planner.walk.command[0].vx=0.05"}},
+  };
+  for (const Change& change : all) {
+    const RunSpec wanted = SpecOf(change.scenario, change.set);
+    RunSpec changed = SpecOf(change.scenario, {});
+    ChangeConfigurations(change.set, &changed);
+    const std::string name = change.scenario + (" " + change.set.back());
+    ASSERT_EQ(changed.config_size(), wanted.config_size()) << name;
+    for (int i = 0; i < wanted.config_size(); ++i) {
+      EXPECT_EQ(changed.config(i).component(), wanted.config(i).component()) << name;
+      EXPECT_EQ(changed.config(i).text(), wanted.config(i).text()) << name;
+    }
+    EXPECT_EQ(changed.graph().ShortDebugString(), wanted.graph().ShortDebugString()) << name;
+  }
+}
+
+}  // namespace
+}  // namespace poise
