@@ -364,8 +364,8 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     if (!on_block || p.z() > kContactMargin) continue;
     ++count;
     if (add) {
-      world_->AddContact({body, p, Vector3d::UnitZ(), -p.z(), 0,
-                          terrain_.material(false, corners_[foot].size())});
+      world_->AddContact(
+          {body, p, Vector3d::UnitZ(), -p.z(), 0, terrain_.material(false, corners_[foot].size())});
     }
   }
   return count;
