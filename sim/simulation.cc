@@ -115,7 +115,8 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       fall_height_(config.fall_height()),
       fall_tilt_(config.fall_tilt()),
       terrain_(config, seed),
-      world_(worlds(model_, NumCorners(model_), step_)),
+      // In a block pressed down to the ground a corner meets both.
+      world_(worlds(model_, (config.has_block() ? 2 : 1) * NumCorners(model_), step_)),
       drive_train_(SimulatedDriveTrain(model_, config)),
       drivetrain_options_(DrivetrainOptions(model_, motors_, drive_train_, config)),
       current_loop_(drive_train_, step_),
@@ -358,6 +359,13 @@ int Simulation::CollectContacts(size_t foot, bool add) {
     if (add) {
       world_->AddContact({body, p, surface.normal, depth, surface.velocity * surface.normal.z(),
                           terrain_.material(surface, corners_[foot].size())});
+    }
+    const bool on_block = surface.block && surface.field < 0;
+    if (!on_block || p.z() > kContactMargin) continue;
+    ++count;
+    if (add) {
+      world_->AddContact(
+          {body, p, Vector3d::UnitZ(), -p.z(), 0, terrain_.material(false, corners_[foot].size())});
     }
   }
   return count;

@@ -37,8 +37,8 @@ class SoftGround {
 
  private:
   struct Trace {
-    bool known = false;  // of a foot that became a contact within the run
-    bool stands = true;  // in the last tick
+    bool known = false;           // of a foot that became a contact within the run
+    bool stands = true;           // in the last tick
     double height = 0, load = 0;  // m, N, when it became one
     double compliance = 0;        // m/N, filtered
   };

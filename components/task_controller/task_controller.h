@@ -66,8 +66,8 @@ class TaskController : public Component, public Operated {
   bool state_valid_ = false;
   FeetInContact in_contact_{true, true};  // of the last tick
   bool started_ = false;
-  bool others_held_ = false;  // the joints that are no leg's have their posture alone
-  balance::StandingGains gains_;  // before what the ground takes off them
+  bool others_held_ = false;               // the joints that are no leg's have their posture alone
+  balance::StandingGains gains_;           // before what the ground takes off them
   std::optional<SoftGround> soft_ground_;  // none: the COM's gains are given
   balance::TaskGains com_gains_;           // as the tasks have them
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control

@@ -95,7 +95,9 @@ TEST(JointLimits, AStandingLegsJointIsStoppedAndNotBroughtBack) {
     if (!std::isfinite(range.upper - range.lower)) continue;
     for (const double side : {1.0, -1.0}) {
       const double limit = side > 0 ? range.upper : range.lower, beyond = limit + 0.02 * side;
-      const auto outward = [&](const AccelerationRange& a) { return side > 0 ? a.upper : -a.lower; };
+      const auto outward = [&](const AccelerationRange& a) {
+        return side > 0 ? a.upper : -a.lower;
+      };
       EXPECT_LT(outward(limits.Accelerations(j, beyond, 0)), -1);
       EXPECT_NEAR(outward(limits.Stopping(j, beyond, 0)), 0, 1e-12);
       // What moves outward is stopped as at the limit itself.

@@ -163,6 +163,30 @@ TEST(Block, SinksAsTheSpringsItIsMadeOf) {
   }
 }
 
+// What is too soft for the robot is pressed down to the ground, which carries what the springs do
+// not.
+TEST(Block, LiesOnTheGround) {
+  SimConfig config = StandingConfig();
+  SoftBlock* block = config.mutable_block();
+  block->set_length(1);
+  block->set_width(1);
+  block->set_height(0.03);
+  block->set_stiffness(2000);
+  block->set_damping(200);
+  block->set_start(1e-6);
+  EngineSimulation simulation(RigidRobot(), config, kTick, 1);
+  robot::RobotState state = simulation.truth().state;
+  state.base_position.z() += 0.03;
+  simulation.SetState(state);
+  ASSERT_GT(Weight(simulation) / (2 * 2000), 0.06);  // m, that the springs alone would sink
+  for (int i = 0; i < 3000; ++i) simulation.Advance();
+  EXPECT_NEAR(simulation.truth().foot_pose[0].translation().z(), 0, 1e-4);
+  EXPECT_NEAR(simulation.truth().foot_wrench[0][2] + simulation.truth().foot_wrench[1][2],
+              Weight(simulation), 0.01);
+  // Four corners in the block and on the ground.
+  EXPECT_EQ(simulation.truth().contact_points[0], 8);
+}
+
 // Dropped onto the block it swings at sqrt(k / m) and the logarithmic decrement of its damper.
 TEST(Block, SwingsAsSpringAndDamper) {
   SimConfig config = StandingConfig();
@@ -196,10 +220,14 @@ TEST(Block, TheHigherSurfaceWins) {
   block->set_height(0.004);  // under the left foot only
   block->set_stiffness(40000);
   EngineSimulation simulation(RigidRobot(), config, kTick, 1);
+  robot::RobotState state = simulation.truth().state;
+  state.base_position.z() += 0.001;
+  simulation.SetState(state);
   simulation.Step();
-  // Every corner of the left foot is 4 mm deep in the block; the right one is on the ground.
-  EXPECT_NEAR(simulation.truth().foot_wrench[1][2], 0.004 * 40000, 0.5 * 0.004 * 40000);
+  // Every corner of the left foot is 3 mm deep in the block and off the ground, as the right ones.
+  EXPECT_NEAR(simulation.truth().foot_wrench[1][2], 0.003 * 40000, 0.5 * 0.003 * 40000);
   EXPECT_EQ(simulation.truth().contact_points[1], 4);
+  EXPECT_EQ(simulation.truth().contact_points[0], 0);
 }
 
 // A lift: at its greatest speed it accelerates nothing, so its spring carries the weight alone. A
