@@ -418,6 +418,21 @@ TEST(Walk, BeginsAfterARecoveryAsAfterATick) {
   EXPECT_NEAR(com.velocity.z(), kPeriod * com.acceleration.z(), 1e-9);
 }
 
+// Another planner takes over in mid-walk, while the COM is lower than when standing.
+TEST(Walk, GoesAsHighAfterARecoveryAsBefore) {
+  World world(TestRobot::kDyros);
+  const WalkCommand command{{0.1, 0}, 0, true};
+  const double standing = world.com().z();
+  world.Run(6, command);
+  ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+  const double before = world.com().z();
+  EXPECT_NEAR(standing - before, 0.02, 0.002);  // WalkSpec::lower
+  world.Recover(0.5);
+  world.Run(6, command);
+  ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+  EXPECT_NEAR(world.com().z(), before, 0.002);
+}
+
 TEST(Walk, KeepsToTheCommandedVelocity) {
   World world(TestRobot::kDyros);
   const WalkCommand command{{0.15, 0}, 0, true};
