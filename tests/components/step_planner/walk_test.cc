@@ -700,8 +700,8 @@ TEST(Walk, BrakesASoleThatTurns) {
   }
 }
 
-// Soles that sink by 2.5 and 4.5 times what counts as soft: the swing takes the root of it longer, at
-// most twice, and the turning of the sole is braked by the root of the ground's stiffness.
+// Soles that sink by 2.5 and 4.5 times what counts as soft: the swing takes the root of it longer,
+// at most twice, and the turning of the sole is braked by the root of the ground's stiffness.
 TEST(Walk, SwingsSlowlyAboveASoleThatHasSunkAndBrakesItsTurning) {
   const WalkCommand command{{0, 0}, 0, true};
   for (const double sinks : {0.0, 2.5 * kSoft, 4.5 * kSoft}) {
