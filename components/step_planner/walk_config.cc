@@ -46,6 +46,9 @@ constexpr double kMostAhead = 0.08;
 /// m/s, that a sole sinks on average while it is loaded. At 10 kN/m the paper's robot loads as fast
 /// as on hard ground. Chosen.
 constexpr double kSinkSpeed = 0.04;
+/// Of the smaller sole's inner radius, that a sole sinks under the weight on ground which counts as
+/// soft: a stiffness of 18 kN/m under the paper's robot, which walks on 20 as on hard ground.
+constexpr double kSoftShare = 0.4;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
 
 double LeastInnerRadius(const robot::RobotModel& model) {
@@ -113,6 +116,21 @@ WalkConfig WithRobotDefaults(WalkConfig config, double height) {
   return config;
 }
 
+/// Of WalkSpec: `ratio` of the damping that is critical for an ankle's rotor on the spring that a
+/// sole of half sizes a and b has in the ground, weight a²/sinking and weight b²/sinking.
+Eigen::Vector2d SoftDamping(const robot::RobotModel& model, double ratio) {
+  const double weight = robot::kGravity * model.total_mass();
+  Eigen::Vector2d least = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  for (const robot::FootModel& foot : model.feet()) {
+    const auto leg = model.supporting_joints(foot.body);
+    const double rotor =
+        leg.empty() ? 0 : model.motors()[static_cast<size_t>(leg.back())].reflected_inertia;
+    const Eigen::Vector2d half(0.5 * foot.width, 0.5 * foot.length);
+    least = least.cwiseMin(2 * ratio * std::sqrt(rotor / weight) * half);
+  }
+  return least;
+}
+
 void CheckWalk(bool holds, const char* name, const char* must) {
   if (!holds) throw ConfigError(std::string("walk.") + name, must);
 }
@@ -174,6 +192,9 @@ void CheckWalkConfig(const WalkConfig& config) {
   positive(config.patience(), "patience");
   not_negative(config.roll_damping(), "roll_damping");
   not_negative(config.give_up(), "give_up");
+  not_negative(config.soft_damping(), "soft_damping");
+  CheckWalk(config.slowest_swing() >= 1 && std::isfinite(config.slowest_swing()), "slowest_swing",
+            "must be a number, 1 or more");
   CheckWalk(config.most_tilt() > 0 && config.most_tilt() < 0.5 * M_PI, "most_tilt",
             "must be above 0 and below pi/2 rad");
   std::array<double, 2> from{-std::numeric_limits<double>::infinity(),
@@ -266,6 +287,9 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
   spec.most_ahead = kMostAhead * height;
   spec.sink_speed = kSinkSpeed;
   spec.give_up = config.give_up();
+  spec.soft = kSoftShare * LeastInnerRadius(model);
+  spec.slowest_swing = config.slowest_swing();
+  spec.soft_damping = SoftDamping(model, config.soft_damping());
   spec.most_tilt = config.most_tilt();
   for (const KnownGroundConfig& edge : config.ground()) {
     spec.ground.Add(edge.foot(), edge.from(), edge.height());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "components/balance/contact_conditions.h"
+#include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
 #include "tests/components/control_fixture.h"
 #include "tests/test_seed.h"

@@ -25,7 +25,9 @@ constexpr double kPressed = 0.8;        // share of the press' load that counts 
 // Of the unloading's rate: however far the centre of pressure is, and to come up with it. Chosen: a
 // foot that carries nothing and is a contact of the model still was dragged off its place.
 constexpr double kSlowest = 0.1, kFastest = 3;
-constexpr double kWait = 0.1;   // s in which a capture point that must wait is stopped
+constexpr double kWait = 0.1;  // s in which a capture point that must wait is stopped
+// Of the load: a sole that bears less has not shown yet how far it sinks.
+constexpr double kBears = 0.5, kBearsAll = 0.7;
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
@@ -195,7 +197,7 @@ void Walk::BeginSwing(const StepInput& input) {
   const auto foot = static_cast<size_t>(1 - stance_);
   in_contact_[foot] = false;
   starting_ = false;
-  touch_down_ = input.time + spec_.swing;
+  touch_down_ = input.time + SwingTime();
   pressed_.Begin(0);
   attempt_ = 0;
   first_ = foothold_;
@@ -432,9 +434,25 @@ Vector2d Walk::AgainstRolling(const StepInput& input) const {
     if (!in_contact_[i] || !(all > spec_.touch_load)) continue;
     const double share = std::clamp(input.load[i] / all, 0.0, 1.0);
     const Vector3d& turning = input.sole_turning[i];
-    cop += share * spec_.roll_damping * Vector2d(-turning.y(), turning.x());
+    cop += share * spec_.roll_damping * Vector2d(-turning.y(), turning.x()) +
+           AgainstSoftRolling(input, i, share);
   }
   return cop;
+}
+
+Vector2d Walk::AgainstSoftRolling(const StepInput& input, size_t foot, double share) const {
+  if (!spec_.rests || !(sinks_[foot] > spec_.soft) || !(share > kBears)) return Vector2d::Zero();
+  const double bears = balance::SmoothStep((share - kBears) / (kBearsAll - kBears));
+  const Eigen::Rotation2Dd turn(Yaw(input.sole[foot]));
+  const Vector2d turning = turn.inverse() * Vector2d(input.sole_turning[foot].head<2>());
+  const Vector2d damping = spec_.soft_damping / std::sqrt(sinks_[foot]);
+  return bears * share * (turn * Vector2d(-damping.y() * turning.y(), damping.x() * turning.x()));
+}
+
+double Walk::SwingTime() const {
+  const double sinks = sinks_[static_cast<size_t>(stance_)];
+  if (!spec_.rests || !(sinks > spec_.soft)) return spec_.swing;
+  return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), spec_.slowest_swing);
 }
 
 bool Walk::Lost(const StepInput& input) const {

@@ -54,8 +54,13 @@ struct WalkSpec {
   double weight = 1;        ///< N, of the robot
   double most_sinking = 0;  ///< m, that a sole where it rests is expected to sink at most
   double most_ahead = 0;    ///< m, by which the COM goes down at most before its sole does
-  double sink_speed = 1;    ///< m/s of its sinking, on average over the ramps: above 0
-  double give_up = 0;       ///< m beyond the sole that carries, from which another planner may step
+  double soft = 0;  ///< m of sinking under the weight, above which a sole stands on soft ground
+  double slowest_swing = 1;  ///< ratio: a swing above soft ground to one above firm ground, at most
+  /// m s/rad: of the centre of pressure for each rad/s of a soft sole's turning about its length
+  /// and its width, at a sinking of 1 m; it goes with the root of the stiffness.
+  Eigen::Vector2d soft_damping = Eigen::Vector2d::Zero();
+  double sink_speed = 1;  ///< m/s of its sinking, on average over the ramps: above 0
+  double give_up = 0;     ///< m beyond the sole that carries, from which another planner may step
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -176,6 +181,11 @@ class Walk {
   /// What brakes the sole that carries, m: on soft ground it rolls on a spring, with the ankle's
   /// rotor as its mass, and gravity makes that spring softer yet.
   Eigen::Vector2d AgainstRolling(const StepInput& input) const;
+  /// The same of one that has sunk into soft ground and bears more than half of the load.
+  Eigen::Vector2d AgainstSoftRolling(const StepInput& input, size_t foot, double share) const;
+  /// s: slower where the sole that stands has sunk, as the root of it. The leg's reaction then goes
+  /// down as the centre of pressure does that the sole takes without rolling to the ankle's limit.
+  double SwingTime() const;
   /// m, that the stance sole goes down yet under the whole weight, as its load so far lets expect.
   double StillSinks(const StepInput& input);
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.

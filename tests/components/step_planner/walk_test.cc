@@ -194,6 +194,8 @@ WalkSpec Spec(const Reach& reach, double spacing) {
 
 constexpr double kEdge = 0.02;          // m
 constexpr double kRollDamping = 0.007;  // m/(rad/s)
+constexpr double kSoft = 0.02;          // m
+constexpr double kSoftDamping = 0.001;  // m^1.5/(rad/s)
 constexpr double kLead = 0.01;          // m
 constexpr double kWeight = 500;         // N
 constexpr double kDownLoad = 200;       // N of a foot that is down
@@ -205,8 +207,9 @@ class World {
   /// `patient`: s more for each ramp of the load.
   /// `rests`: the capture point, above the sole that carries.
   /// `places`: of WalkSpec.
+  /// `slowest_swing`: of WalkSpec, with soft_damping; 1: neither.
   explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false,
-                 int places = 0)
+                 int places = 0, double slowest_swing = 1)
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
     const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
@@ -231,6 +234,9 @@ class World {
     spec.most_sinking = 0.2;
     spec.most_ahead = 0.05;
     spec.sink_speed = kSinkSpeed;
+    spec.soft = kSoft;
+    spec.slowest_swing = slowest_swing;
+    if (slowest_swing > 1) spec.soft_damping = {kSoftDamping, 2 * kSoftDamping};
     walk_ = Walk(StepChoice(model_, reach, limits), spec);
     com_ = {0, 0, height};
     for (size_t i = 0; i < 2; ++i) {
@@ -727,6 +733,31 @@ TEST(Walk, BrakesASoleThatTurns) {
     const Vector3d about = Vector3d(turning.x(), turning.y(), 0);
     EXPECT_LT((-ground + kRollDamping * about).norm(), 1e-9) << turning.transpose();
     EXPECT_LT(-ground.dot(turning), 0);
+  }
+}
+
+// Soles that sink by 2.5 and 4.5 times what counts as soft: the swing takes the root of it longer,
+// at most twice, and the turning of the sole is braked by the root of the ground's stiffness.
+TEST(Walk, SwingsSlowlyAboveASoleThatHasSunkAndBrakesItsTurning) {
+  const WalkCommand command{{0, 0}, 0, true};
+  for (const double sinks : {0.0, 2.5 * kSoft, 4.5 * kSoft}) {
+    World world(TestRobot::kDyros, 0, 0.5, true, 0, 2);
+    ASSERT_TRUE(world.RunTo(WalkStage::kTouching, command));
+    world.Soften(sinks * kDownLoad / kWeight);
+    ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+    world.Soften(0);
+    ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
+    const double due = world.walk().touch_down() - world.time();
+    EXPECT_NEAR(due / 0.55, std::clamp(std::sqrt(sinks / kSoft), 1.0, 2.0), 0.02) << sinks;
+    world.Run(0.2, command);
+    const Vector2d still = world.AskedFor(Vector3d::Zero(), command);
+    const double soft = sinks > 0 ? 1 / std::sqrt(sinks) : 0;
+    for (const Vector3d& turning : {Vector3d(0.1, 0, 0), Vector3d(0, -0.1, 0)}) {
+      const Vector2d moved = world.AskedFor(turning, command) - still;
+      const Vector2d expected(-(kRollDamping + 2 * kSoftDamping * soft) * turning.y(),
+                              (kRollDamping + kSoftDamping * soft) * turning.x());
+      EXPECT_LT((moved - expected).norm(), 1e-9) << sinks;
+    }
   }
 }
 
