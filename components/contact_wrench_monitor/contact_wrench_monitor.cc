@@ -76,11 +76,8 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   single_support_ = ReadLimits(WithinSoles(single_support, *model_, margin), "single_support");
   // One foot needs no reserve for what the other one carries.
   const bool given = config.has_sole_margin();
-  CutSoles("sole_margin", given ? config.sole_margin() : SoleMargin(*model_), &sole_);
-  CutSoles("sole_margin", given ? config.sole_margin() : margin, &shared_sole_);
-  if (config.has_step_margin()) {
-    CutSoles("step_margin", config.step_margin(), &step_sole_.emplace());
-  }
+  CutSoles(given ? config.sole_margin() : SoleMargin(*model_), &sole_);
+  CutSoles(given ? config.sole_margin() : margin, &shared_sole_);
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -208,7 +205,7 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
   }
   const balance::ContactLimits limits = Limits(in_contact);
   balance::ConvexPolygon region =
-      polygon_ ? Support(frame_o) : balance::Rectangle({limits.half_length, limits.half_width});
+      polygon_ ? Soles(frame_o) : balance::Rectangle({limits.half_length, limits.half_width});
   if (cop_feedback_ > 0) {
     UpdateCopError(frame_o, in_contact, tick);
     for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
@@ -394,28 +391,25 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
-void ContactWrenchMonitor::CutSoles(const char* name, double margin, Soles* soles) const {
-  ReadNotNegative(margin, name, "must be m, 0 or more");
+void ContactWrenchMonitor::CutSoles(double margin,
+                                    std::array<balance::ConvexPolygon, 2>* soles) const {
+  ReadNotNegative(margin, "sole_margin", "must be m, 0 or more");
   for (size_t f = 0; f < 2; ++f) {
     const robot::FootModel& foot = model_->feet()[f];
     if (margin >= robot::InnerRadius(foot)) {
-      throw ConfigError(name, fmt::format("is {} m and leaves nothing of the {} foot's "
-                                          "sole, {} x {} m",
-                                          margin, foot.name, foot.length, foot.width));
+      throw ConfigError("sole_margin", fmt::format("is {} m and leaves nothing of the {} foot's "
+                                                   "sole, {} x {} m",
+                                                   margin, foot.name, foot.length, foot.width));
     }
     (*soles)[f] = balance::SolePolygon(foot, margin);
   }
 }
 
-balance::ConvexPolygon ContactWrenchMonitor::Support(const Eigen::Isometry3d& frame_o) const {
+balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
   const balance::ContactGeometry& geometry = whole_body_->geometry();
   const bool both = geometry.in_contact[0] && geometry.in_contact[1];
-  const bool steps = step_sole_ && support_plan_->stepping != support_plan_t::STEPPING_NONE;
-  return balance::WithFewerCorners(balance::SupportPolygon(frame_o, geometry,
-                                                           steps  ? *step_sole_
-                                                           : both ? shared_sole_
-                                                                  : sole_),
-                                   kMostCorners);
+  return balance::WithFewerCorners(
+      balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
 }
 
 balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {

@@ -32,8 +32,6 @@ class ContactWrenchMonitor : public Component, public Operated {
   const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
-  using Soles = std::array<balance::ConvexPolygon, 2>;
-
   void AddSettings(double tick_period);
   void TakeActs(const Tick& tick);
   void Prepare();
@@ -66,9 +64,9 @@ class ContactWrenchMonitor : public Component, public Operated {
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
   /// Both soles less `margin` (m) on every side. ConfigError: nothing is left.
-  void CutSoles(const char* name, double margin, Soles* soles) const;
+  void CutSoles(double margin, std::array<balance::ConvexPolygon, 2>* soles) const;
   /// The hull of the soles in contact, less the margin.
-  balance::ConvexPolygon Support(const Eigen::Isometry3d& frame_o) const;
+  balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
   /// says of the tick before.
   void UpdateCopError(const Eigen::Isometry3d& frame_o, const std::array<bool, 2>& in_contact,
@@ -103,8 +101,7 @@ class ContactWrenchMonitor : public Component, public Operated {
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull
   // Less the margin, m, sole frames: alone on the ground, and with the other foot.
-  Soles sole_, shared_sole_;
-  std::optional<Soles> step_sole_;                   // while the planner makes steps
+  std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "components/balance/contact_conditions.h"
-#include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
 #include "tests/components/control_fixture.h"
 #include "tests/test_seed.h"
@@ -215,39 +214,6 @@ TEST_P(MonitorCase, InAStepBodyOrComGiveWayAndNothingElse) {
       EXPECT_NEAR(balance::SignedDistance(region, cop), 0, 1e-8);
     }
     EXPECT_GT(active, GetParam().robot == TestRobot::kDyros ? 10 : -1);
-  }
-}
-
-/// Whether each corner of the region is off the nearest edge of a sole in contact by `margin`.
-double MarginOf(const balance_torque_t& out, const robot::RobotModel& model,
-                const Dynamics& dynamics, const std::array<bool, 2>& in_contact) {
-  double least = 1;
-  for (size_t f = 0; f < 2; ++f) {
-    if (!in_contact[f]) continue;
-    const Eigen::Isometry3d to_sole = dynamics.data.foot_pose[f].inverse() * GetPose(out.frame_o);
-    for (int i = 0; i < out.num_corners; ++i) {
-      const Eigen::Vector3d corner = to_sole * Eigen::Vector3d(out.corner_x[i], out.corner_y[i], 0);
-      const balance::ConvexPolygon sole = balance::SolePolygon(model.feet()[f], 0);
-      const double inside = balance::SignedDistance(sole, corner.head<2>());
-      if (inside > -1e-9) least = std::min(least, inside);
-    }
-  }
-  return least;
-}
-
-TEST_P(MonitorCase, KeepsAnotherMarginWhileThePlannerMakesSteps) {
-  if (plan_.in_contact[0] && plan_.in_contact[1]) GTEST_SKIP() << "a sole's corners inside a hull";
-  for (const bool steps : {false, true}) {
-    plan_.stepping = steps ? support_plan_t::STEPPING_SWINGING : support_plan_t::STEPPING_NONE;
-    Harness<ContactWrenchMonitor> harness(&context_,
-                                          "region: POLYGON sole_margin: 0.003 step_margin: 0.012");
-    Draw(3);
-    Run(&harness);
-    const auto& out = harness.output<balance_torque_t>();
-    ASSERT_GE(out.num_corners, 3);
-    const Dynamics dynamics(model_, now_, GetParam().in_contact);
-    EXPECT_NEAR(MarginOf(out, model_, dynamics, GetParam().in_contact), steps ? 0.012 : 0.003,
-                1e-9);
   }
 }
 
@@ -461,7 +427,6 @@ TEST(ContactWrenchMonitor, RefusesLimitsThatCannotBe) {
   EXPECT_EQ(field_of("region: POLYGON"), "accepted");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: 0.075"), "sole_margin");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: -0.01"), "sole_margin");
-  EXPECT_EQ(field_of("region: POLYGON step_margin: 0.075"), "step_margin");
   EXPECT_EQ(field_of("region: POLYGON half_width_beyond_soles: 0.02"), "half_width_beyond_soles");
   EXPECT_EQ(field_of("region: POLYGON double_support { friction: -1 }"), "double_support.friction");
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "accepted");
