@@ -34,7 +34,8 @@ StepLimits Limits(const robot::RobotModel& model, const Reach& reach) {
   return limits;
 }
 
-RecoverySpec Spec(double far) {
+/// `far`: 2: feet far apart are left where they are.
+RecoverySpec Spec(double far = 2) {
   RecoverySpec spec;
   spec.sure = 0.03;
   spec.reserve = 0.03;
@@ -59,19 +60,22 @@ RecoverySpec Spec(double far) {
 
 constexpr double kLingers = 0.1;  // s
 
+RecoverySpec Lingering(double inside) {
+  RecoverySpec spec = Spec();
+  spec.lingering = inside;
+  spec.lingering_time = kLingers;
+  return spec;
+}
+
 class World {
  public:
-  /// `far`: 2: feet far apart are left where they are.
-  World(TestRobot robot, double ground_there = 0, double far = 2, double lingering = 0)
+  explicit World(TestRobot robot, double ground_there = 0, const RecoverySpec& spec = Spec())
       : model_(robot::LoadTestRobot(robot)),
         height_(robot::StandingHeight(model_)),
         spacing_(robot::StandingSpacing(model_)),
         reach_(model_, height_, 0.08 * height_, 0.1, 0.02),
         ground_there_(ground_there) {
     StepChoice choice(model_, reach_, Limits(model_, reach_));
-    RecoverySpec spec = Spec(far);
-    spec.lingering = lingering;
-    spec.lingering_time = kLingers;
     recovery_ = Recovery(choice, spec);
     com_ = {0, 0, height_};
     for (size_t i = 0; i < 2; ++i) {
@@ -252,7 +256,7 @@ TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
     const Vector2d direction = Direction(degrees);
     std::array<double, 2> decided{};
     for (const bool lingers : {false, true}) {
-      World world(GetParam(), 0, 2, lingers ? kNear : 0);
+      World world(GetParam(), 0, lingers ? Lingering(kNear) : Spec());
       const double edge = EdgeDistance(world, direction, 0);
       world.Push(world.mass() * world.Frequency() *
                  (EdgeDistance(world, direction, 0.01) + 0.0005) * direction);
@@ -270,9 +274,42 @@ TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
   }
 }
 
+// On the right foot, the capture point 4 mm inside its edge: the free foot can catch it on its own
+// side; on the other one it would have to cross.
+TEST_P(RecoveryCase, WhereNoStepHelpsAnotherStrategyHasTheCentreOfPressure) {
+  for (const double watch : {-1.0, 0.01}) {
+    for (const double side : {1.0, -1.0}) {
+      RecoverySpec spec = Spec();
+      spec.watch = watch;
+      World world(GetParam(), 0, spec);
+      world.LiftLeft(0.05);
+      const double out = 0.5 * world.model().feet()[0].width - 0.004;
+      world.Push({0, side * world.mass() * world.Frequency() * out});
+      world.Tick();
+      EXPECT_FALSE(world.recovery().active());
+      EXPECT_EQ(world.recovery().would_step(), watch < 0 || side > 0) << watch << ' ' << side;
+    }
+  }
+}
+
+// A foot that is let go is a contact so much later, and nothing else changes until then.
+TEST_P(RecoveryCase, AFootThatSettlesIsAContactLater) {
+  std::array<double, 2> landed{};
+  for (size_t i = 0; i < 2; ++i) {
+    RecoverySpec spec = Spec();
+    spec.settle = i == 0 ? 0 : 0.04;
+    World world(GetParam(), 0, spec);
+    world.Push({1.1 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
+    EXPECT_TRUE(world.Run(4));
+    landed[i] = world.touched();
+  }
+  EXPECT_GT(landed[0], 0);
+  EXPECT_NEAR(landed[1] - landed[0], 0.04, 1.5 * kPeriod);
+}
+
 TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
   for (double degrees = 0; degrees < 360; degrees += 30) {
-    World world(GetParam(), 0, 2, degrees < 180 ? 0 : 0.006);
+    World world(GetParam(), 0, degrees < 180 ? Spec() : Lingering(0.006));
     const Vector2d direction = Direction(degrees);
     world.Push(0.97 * world.mass() * world.Frequency() * EdgeDistance(world, direction, 0.01) *
                direction);
@@ -430,7 +467,7 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
 // The feet are too far apart to rest: the one behind comes beside the other one, no faster than the
 // hips can swing it.
 TEST_P(RecoveryCase, AFootFarBehindIsBroughtAsFastAsTheHipsCan) {
-  World world(GetParam(), 0, 0.5);
+  World world(GetParam(), 0, Spec(0.5));
   world.Push({1.25 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
   double largest = 0;
   int swings = 0;
