@@ -1,20 +1,16 @@
-// Footsteps and the capture point between them, and walking in a world of its own: a point mass
-// that obeys the pendulum's equations, on feet that go where the swing says.
+// Walking in a world of its own: a point mass that obeys the pendulum's equations, on feet that go
+// where the swing says.
 #include "components/step_planner/stepping/walk.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <vector>
 
 #include "components/balance/contact_transition.h"
 #include "components/robot/posture.h"
-#include "components/step_planner/stepping/capture_plan.h"
-#include "components/step_planner/stepping/footsteps.h"
-#include "components/step_planner/stepping/pressed_sole.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::stepping {
@@ -25,148 +21,6 @@ using Eigen::Vector3d;
 using robot::TestRobot;
 
 constexpr double kPeriod = 0.002;  // s
-
-CapturePlan ThreePieces(double w) {
-  CapturePlan plan;
-  plan.Append({0, 0.1}, {0.02, -0.1}, 0.4);
-  plan.Append({0.02, -0.1}, {0.02, -0.1}, 0.6);
-  plan.Append({0.02, -0.1}, {0.15, 0.1}, 0.5);
-  plan.Finish(w, {0.2, 0.08});
-  return plan;
-}
-
-TEST(CapturePlan, ObeysItsDifferentialEquation) {
-  const double w = 3.5, h = 1e-4;
-  const CapturePlan plan = ThreePieces(w);
-  // Forward by Runge and Kutta from where the plan begins: it ends where it was told to.
-  Vector2d point = plan.At(0).capture_point;
-  const auto rate = [&](double t, const Vector2d& x) -> Vector2d {
-    return w * (x - plan.At(t).cop);
-  };
-  for (int i = 0; i < 15000; ++i) {
-    const double t = i * h;
-    EXPECT_NEAR((point - plan.At(t).capture_point).norm(), 0, 1e-6) << t;
-    const Vector2d k1 = rate(t, point), k2 = rate(t + 0.5 * h, point + 0.5 * h * k1);
-    const Vector2d k3 = rate(t + 0.5 * h, point + 0.5 * h * k2), k4 = rate(t + h, point + h * k3);
-    point += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-  }
-  EXPECT_NEAR((point - Vector2d(0.2, 0.08)).norm(), 0, 1e-6);
-}
-
-TEST(CapturePlan, IsClosedFormOnOneFootAndHeldAtItsEnds) {
-  const double w = 3.5;
-  CapturePlan plan;
-  const Vector2d foot(0.1, -0.1), end(0.15, -0.02);
-  plan.Append(foot, foot, 0.6);
-  plan.Finish(w, end);
-  EXPECT_LT((plan.At(0).capture_point - (foot + std::exp(-w * 0.6) * (end - foot))).norm(), 1e-12);
-  EXPECT_LT((plan.At(9).capture_point - end).norm(), 1e-12);
-  EXPECT_LT((plan.At(-1).capture_point - plan.At(0).capture_point).norm(), 1e-12);
-}
-
-FootstepLimits Limits() { return {0.21, 0.17, 0.3, 0.15, 0.4}; }
-
-TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
-  // 16 pairs of steps, each a sixteenth of a turn.
-  const double turn = 2 * std::numbers::pi / 16;
-  for (const double sign : {1.0, -1.0}) {
-    WalkCommand command{{0, 0}, sign * 0.5 * turn, true};
-    Footstep stance{{0, -0.105}, 0};  // the right foot
-    const Footstep first = stance;
-    for (int i = 0; i < 32; ++i) {
-      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot, command, 1,
-                            Limits());
-    }
-    EXPECT_NEAR(stance.yaw - first.yaw, sign * 2 * std::numbers::pi, 1e-9);
-    EXPECT_LT((stance.position - first.position).norm(), 1e-9);
-  }
-}
-
-TEST(Footsteps, GoesAsFastAsCommanded) {
-  for (const Vector2d& velocity :
-       {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05), Vector2d(0.1, -0.05)}) {
-    Footstep stance{{0, -0.105}, 0};
-    for (int i = 0; i < 20; ++i) {
-      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot,
-                            {velocity, 0, true}, 0.8, Limits());
-    }
-    EXPECT_LT((stance.position - Vector2d(0, -0.105) - 16 * velocity).norm(), 1e-9)
-        << velocity.transpose();
-  }
-}
-
-TEST(Footsteps, FeetNeverCrossOrTurnTowardsEachOther) {
-  for (const double vx : {-1.0, 0.0, 1.0}) {
-    for (const double vy : {-1.0, 0.0, 1.0}) {
-      for (const double wz : {-1.0, 0.0, 1.0}) {
-        Footstep stance{{0, 0.105}, 0.3};  // the left foot
-        for (int i = 0; i < 12; ++i) {
-          const int foot = i % 2 == 0 ? robot::kRightFoot : robot::kLeftFoot;
-          const double side = foot == robot::kLeftFoot ? 1 : -1;
-          const Footstep next = NextFootstep(stance, foot, {{vx, vy}, wz, true}, 1, Limits());
-          const Vector2d apart =
-              Eigen::Rotation2Dd(-stance.yaw) * (next.position - stance.position);
-          EXPECT_GE(side * apart.y(), Limits().least_spacing - 1e-12);
-          EXPECT_GE(side * (next.yaw - stance.yaw), -1e-12);
-          EXPECT_LE(std::abs(next.yaw - stance.yaw), Limits().most_turn + 1e-12);
-          stance = next;
-        }
-      }
-    }
-  }
-}
-
-TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
-  // Every landing is 10 mm beside its foothold and 5 mrad turned: the way is left by one landing's
-  // error, not by the sum of 40.
-  const WalkCommand command{{0.2, 0}, 0, true};
-  const Vector2d error(0.004, 0.01);
-  Footstep way{{0, -0.105}, 0}, stance = way, adrift = way;
-  for (int i = 0; i < 40; ++i) {
-    const int foot = i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot;
-    const auto next = [&](const Footstep& from) {
-      return NextFootstep(from, foot, command, 1, Limits());
-    };
-    stance = Towards(next(stance), next(way), 0.03, stance, foot, Limits());
-    adrift = Towards(next(adrift), next(way), 0, adrift, foot, Limits());
-    way = next(way);
-    for (Footstep* step : {&stance, &adrift}) {
-      step->position += error;
-      step->yaw += 0.005;
-    }
-    EXPECT_NEAR((stance.position - way.position).norm(), error.norm(), 1e-12) << i;
-    EXPECT_NEAR(stance.yaw - way.yaw, 0.005, 1e-12) << i;
-  }
-  EXPECT_GT((adrift.position - way.position).norm(), 0.4);
-}
-
-TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
-  const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
-  const Footstep moved = Towards(step, far, 0.03, stance, robot::kRightFoot, Limits());
-  EXPECT_NEAR(moved.position.y(), 0.105 - Limits().least_spacing, 1e-12);
-  EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
-}
-
-TEST(Walk, TheRampBeginsWhereItCarriesWhatThePressDoes) {
-  for (const double share : {0.0, 0.1, 0.4}) {
-    EXPECT_NEAR(balance::SmoothStep(RampStart(share)), share, 1e-9);
-  }
-}
-
-TEST(Footsteps, ACommandIsApproachedWithoutHaste) {
-  WalkCommand now;
-  const WalkCommand wanted{{0.3, -0.4}, 0.5, true};
-  now = Approach(now, wanted, 0.1, 0.2);
-  EXPECT_NEAR(now.velocity.norm(), 0.1, 1e-12);
-  EXPECT_NEAR(now.turn_rate, 0.2, 1e-12);
-  for (int i = 0; i < 4; ++i) now = Approach(now, wanted, 0.1, 0.2);
-  EXPECT_LT((now.velocity - wanted.velocity).norm(), 1e-12);
-  // To a stand it slows down first.
-  now = Approach(now, {}, 0.1, 1);
-  EXPECT_TRUE(now.stepping);
-  for (int i = 0; i < 4; ++i) now = Approach(now, {}, 0.1, 1);
-  EXPECT_FALSE(now.stepping);
-}
 
 WalkSpec Spec(const Reach& reach, double spacing) {
   WalkSpec spec;
@@ -515,39 +369,6 @@ TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
   EXPECT_FALSE(world.walk().active());
 }
 
-TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
-  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
-  const robot::FootModel& foot = model.feet()[0];
-  // Ground tilted by 8 degrees about both axes; each corner stands on a quarter of its stiffness.
-  const double tilt = 8 * std::numbers::pi / 180, load = 52, weight = 520;
-  const Eigen::Matrix3d lies =
-      (Eigen::AngleAxisd(tilt, Vector3d::UnitX()) * Eigen::AngleAxisd(tilt, Vector3d::UnitY()))
-          .toRotationMatrix();
-  for (const double stiffness : {2e3, 2e4, 1e9}) {
-    // Level, it touches with the corner that is the highest once it lies.
-    double highest = 0;
-    for (const double x : {-0.5, 0.5}) {
-      for (const double y : {-0.5, 0.5}) {
-        const Vector3d corner = lies * Vector3d(x * foot.length, y * foot.width, 0);
-        highest = std::max(highest, corner.z());
-      }
-    }
-    Eigen::Isometry3d sole = Eigen::Isometry3d::Identity();
-    sole.translation().z() = 0.03 + highest;
-    PressedSole pressed(foot);
-    pressed.Touch(sole);
-    EXPECT_EQ(pressed.Sunk(sole), 0);
-    sole.linear() = lies;
-    sole.translation().z() = 0.03 - load / stiffness;
-    const double sunk = pressed.Sunk(sole);
-    EXPECT_NEAR(sunk, load / stiffness, 1e-9) << stiffness;
-    EXPECT_NEAR(ExpectedSinking(sunk, load, weight), weight / stiffness, 1e-8);
-    sole.translation().z() = 0.2;  // up again
-    EXPECT_EQ(pressed.Sunk(sole), 0);
-  }
-  EXPECT_EQ(ExpectedSinking(0.01, 0, weight), 0);
-}
-
 TEST(Walk, LoadLeavesAFootNoSoonerThanTheCentreOfPressure) {
   World world(TestRobot::kDyros, 0, 0.5, true);
   const WalkCommand command{{0.05, 0}, 0, true};
@@ -605,44 +426,6 @@ TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
     const double ahead = std::min(0.6 * whole, 0.05);
     EXPECT_NEAR(height - world.com().z(), depth + ahead, 0.2 * whole + 0.005) << depth;
   }
-}
-
-TEST(AnotherPlace, LiesAroundTheFirstOneWhereTheFootReaches) {
-  const double yaw = 0.4, shift = 0.15;
-  const Footstep stance{{1, 2}, yaw};
-  const Eigen::Rotation2Dd turn(yaw);
-  const Footstep first{stance.position + turn * Vector2d(0.1, 0.2), yaw + 0.1};
-  const std::array<Vector2d, 4> expected{Vector2d(0.25, 0.2), Vector2d(-0.05, 0.2),
-                                         Vector2d(0.1, 0.35), Vector2d(0.1, 0.05)};
-  for (int i = 1; i <= kMostPlaces; ++i) {
-    const Footstep place = AnotherPlace(first, i, shift, stance, robot::kLeftFoot, {});
-    const Vector2d seen = turn.inverse() * (place.position - stance.position);
-    EXPECT_LT((seen - expected[static_cast<size_t>(i - 1)]).norm(), 1e-12) << i;
-    EXPECT_EQ(place.yaw, first.yaw);
-  }
-  // A reach of 0.15 m ahead and 0.1 to 0.3 m aside.
-  const std::array<Vector2d, 4> corners{Vector2d(-0.2, 0.1), Vector2d(0.15, 0.1),
-                                        Vector2d(0.15, 0.3), Vector2d(-0.2, 0.3)};
-  const balance::ConvexPolygon reach = balance::ConvexHull(corners);
-  const Footstep near = AnotherPlace(first, 1, shift, stance, robot::kLeftFoot, reach);
-  EXPECT_LT((turn.inverse() * (near.position - stance.position) - Vector2d(0.15, 0.2)).norm(),
-            1e-12);
-}
-
-TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
-  KnownGround ground;
-  EXPECT_TRUE(ground.empty());
-  ground.Add(robot::kLeftFoot, 0.6, 0.1);
-  ground.Add(robot::kRightFoot, 0.8, 0.2);
-  ground.Add(robot::kLeftFoot, 1.0, 0.3);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.5), 0);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.6), 0.1);
-  EXPECT_EQ(ground.At(robot::kRightFoot, 0.7), 0);
-  EXPECT_EQ(ground.At(robot::kRightFoot, 5), 0.2);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 1.2), 0.3);
-  EXPECT_TRUE(ground.EdgeWithin(robot::kLeftFoot, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(robot::kRightFoot, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(robot::kLeftFoot, 0.6, 1.0));
 }
 
 /// Until the second foot has come down, the capture point above the sole that carries meanwhile.
