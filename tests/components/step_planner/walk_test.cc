@@ -53,6 +53,9 @@ constexpr double kSoftDamping = 0.001;  // m^1.5/(rad/s)
 constexpr double kLead = 0.01;          // m
 constexpr double kWeight = 500;         // N
 constexpr double kDownLoad = 200;       // N of a foot that is down
+constexpr double kTouchLoad = 20;       // N of one that touches what does not carry
+constexpr double kMostTilt = 0.4;       // rad
+constexpr double kPatience = 1;         // s
 constexpr double kSinkSpeed = 0.02;     // m/s
 
 class World {
@@ -78,8 +81,8 @@ class World {
     spec.line = 0.03;
     spec.places = places;
     spec.place_shift = 0.15;
-    spec.patience = 1;
-    spec.most_tilt = 0.4;
+    spec.patience = kPatience;
+    spec.most_tilt = kMostTilt;
     spec.roll_damping = kRollDamping;
     spec.lead = kLead;
     spec.press_share = rests ? 0.1 : 0;
@@ -103,6 +106,13 @@ class World {
   void Soften(double depth) { soft_ = depth; }
   /// No ground under a sole whose centre is from `from` to `to`, m, along x.
   void Dig(double from, double to) { hole_ = {from, to}; }
+  /// Ground on which a pressed sole there lies tilted by so much, rad.
+  void Slant(double from, double to, double tilt) {
+    slanted_ = {from, to};
+    tilt_ = tilt;
+  }
+  /// Ground that a sole there touches, and that does not take the press.
+  void Weaken(double from, double to) { weak_ = {from, to}; }
   /// The centre of pressure asked for in the next tick if the soles turned like this.
   Vector2d AskedFor(const Vector3d& turning, const WalkCommand& command) const {
     StepInput input = See();
@@ -154,9 +164,11 @@ class World {
   double largest_jump() const { return largest_jump_; }
 
  private:
+  static bool IsAt(const std::array<double, 2>& range, const Eigen::Isometry3d& sole) {
+    return sole.translation().x() > range[0] && sole.translation().x() < range[1];
+  }
   double Ground(const Eigen::Isometry3d& sole) const {
-    const double x = sole.translation().x();
-    if (x > hole_[0] && x < hole_[1]) return -1;
+    if (IsAt(hole_, sole)) return -1;
     return walk_.num_steps() % 3 == 1 ? -rough_ : 0;
   }
 
@@ -169,7 +181,7 @@ class World {
     input.com_height = com_.z();
     for (size_t i = 0; i < 2; ++i) {
       const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground(sole_[i]);
-      input.load[i] = down ? kDownLoad : 0;
+      input.load[i] = !down ? 0 : IsAt(weak_, sole_[i]) && !in_contact_[i] ? kTouchLoad : kDownLoad;
     }
     return input;
   }
@@ -217,6 +229,9 @@ class World {
       const double ground = Ground(sole_[i]) - (pressed ? soft_ : 0);
       if (pressed || output.swing.velocity.z() < 0) z = std::max(z, ground);
       if (pressed && soft_ > 0) z = ground;
+      if (pressed && IsAt(slanted_, sole_[i])) {
+        sole_[i].linear() = Eigen::AngleAxisd(tilt_, Vector3d::UnitX()).toRotationMatrix();
+      }
     }
     EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
     const Vector3d& acceleration = output.com.acceleration;
@@ -230,7 +245,8 @@ class World {
 
   robot::RobotModel model_;
   double rough_, soft_ = 0;
-  std::array<double, 2> hole_{0, 0};
+  std::array<double, 2> hole_{0, 0}, slanted_{0, 0}, weak_{0, 0};
+  double tilt_ = 0;
   Walk walk_;
   std::optional<Walk> fresh_;
   double time_ = 0;
@@ -452,6 +468,26 @@ TEST(Walk, LeavesAPlaceWithoutGroundForAnother) {
     EXPECT_TRUE(x <= 0.02 || x >= 0.3) << x;
     EXPECT_NEAR(sole.translation().z(), 0, 0.002);
   }
+}
+
+TEST(Walk, LeavesAPlaceWhereItsSoleLiesTooTilted) {
+  for (const double tilt : {0.9 * kMostTilt, -0.9 * kMostTilt, 1.1 * kMostTilt, -1.1 * kMostTilt}) {
+    World world(TestRobot::kDyros, 0, 0.5, true, 4);
+    world.Slant(0.02, 0.3, tilt);
+    WalkOverAHole(&world, {{0.05, 0}, 0, true});
+    ASSERT_EQ(world.walk().num_steps(), 2) << tilt;
+    EXPECT_EQ(world.walk().num_left() > 0, std::abs(tilt) > kMostTilt) << tilt;
+  }
+}
+
+TEST(Walk, LeavesAPlaceThatDoesNotTakeThePressForLong) {
+  World world(TestRobot::kDyros, 0, 0.5, true, 4);
+  world.Weaken(0.02, 0.3);
+  const WalkCommand command{{0.05, 0}, 0, true};
+  ASSERT_TRUE(world.RunTo(WalkStage::kTouching, command));
+  const double touched = world.time();
+  while (world.walk().num_left() == 0 && world.time() < touched + 5) world.Run(kPeriod, command);
+  EXPECT_NEAR(world.time() - touched, kPatience, 0.05);
 }
 
 TEST(Walk, AFootThatFindsNoPlaceComesBackToWhereItStood) {
