@@ -162,6 +162,8 @@ test('pages of other sites, other names and other protocols are refused', async 
   assert.match(await firstLine(upgrade('', undefined, '')), /400/);
   assert.match(await firstLine(upgrade('', undefined, 'Sec-WebSocket-Protocol: other\r\n')), /400/);
   assert.match(await firstLine(get('')), /426/);
+  // As fast as they come: who has been refused takes nobody's place.
+  for (let i = 0; i < 200; ++i) assert.match(await firstLine(get('')), /426/, `${i}`);
 });
 
 /** A masked frame, as clients send them. */

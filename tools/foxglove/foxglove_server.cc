@@ -94,10 +94,7 @@ class FoxgloveServer::Impl : public FoxgloveHost {
     io_.restart();
     io_.poll();
     for (const auto& client : clients_) client->Check();
-    std::erase_if(clients_, [this](const std::shared_ptr<FoxgloveClient>& client) {
-      if (client->closed()) dropped_ += client->dropped();
-      return client->closed();
-    });
+    ForgetClosed();
   }
   bool Wants(size_t topic) const {
     return keeps_[topic] ||
@@ -120,6 +117,12 @@ class FoxgloveServer::Impl : public FoxgloveHost {
   size_t clients() const { return clients_.size(); }
 
  private:
+  void ForgetClosed() {
+    std::erase_if(clients_, [this](const std::shared_ptr<FoxgloveClient>& client) {
+      if (client->closed()) dropped_ += client->dropped();
+      return client->closed();
+    });
+  }
   void Accept() {
     acceptor_.async_accept([this](ErrorCode error, tcp::socket socket) {
       if (error) {
@@ -127,6 +130,7 @@ class FoxgloveServer::Impl : public FoxgloveHost {
         accept_timer_.async_wait([this](ErrorCode) { Accept(); });
         return;
       }
+      ForgetClosed();  // of this poll: they leave room
       if (clients_.size() < kMaxConnections) {  // else the socket closes
         clients_.push_back(std::make_shared<FoxgloveClient>(std::move(socket), this));
         clients_.back()->Start();
