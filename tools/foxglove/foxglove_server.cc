@@ -130,7 +130,7 @@ class FoxgloveServer::Impl : public FoxgloveHost {
         accept_timer_.async_wait([this](ErrorCode) { Accept(); });
         return;
       }
-      ForgetClosed();  // of this poll: they leave room
+      ForgetClosed();                           // of this poll: they leave room
       if (clients_.size() < kMaxConnections) {  // else the socket closes
         clients_.push_back(std::make_shared<FoxgloveClient>(std::move(socket), this));
         clients_.back()->Start();
