@@ -71,6 +71,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   }
 
   impedance_ = PlannedImpedance(config.impedance(), *model_, context.tick_period);
+  swing_friction_ = SwingFriction(config.friction_compensation(), *model_, context.tick_period);
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   state_ = robot::RobotState(model_->num_joints());
@@ -110,6 +111,7 @@ void Redistributor::TakeActs(const Tick& tick) {
 bool Redistributor::Archive(StateArchive* archive) {
   operator_.Archive(archive);
   feedback_.Archive(archive);
+  swing_friction_.Archive(archive);
   archive->Show(last_index_, last_time_, last_eta_, learn_from_, landed_foot_);
   ArchiveMessage(&*joint_command_, archive);
   return true;
@@ -142,16 +144,21 @@ void Redistributor::Redistribute(const Tick& tick) {
     return;
   }
   out.status = in_contact[0] && in_contact[1] ? ComputeDouble(tick) : ComputeSingle(in_contact);
-  if (impedance_.enabled()) PlanImpedance(in_contact);
+  swing_friction_.Ramp(in_contact, out.eta);
+  if (impedance_.enabled() || swing_friction_.acts()) FollowMotion(in_contact);
 }
 
-void Redistributor::PlanImpedance(const std::array<bool, 2>& in_contact) {
+void Redistributor::FollowMotion(const std::array<bool, 2>& in_contact) {
   joint_command_t& out = *joint_command_;
   if (!whole_body_->Update(state_, in_contact)) return ClearImpedance(&out);
-  torque_ = Eigen::Map<const Eigen::VectorXd>(out.torque.data(), model_->num_joints());
+  const int num_joints = model_->num_joints();
+  torque_ = Eigen::Map<const Eigen::VectorXd>(out.torque.data(), num_joints);
   whole_body_->contact().Acceleration(torque_, acceleration_);
   if (!acceleration_.allFinite()) return ClearImpedance(&out);
-  impedance_.Plan(state_, acceleration_.tail(model_->num_joints()), &out);
+  const auto joint_acceleration = acceleration_.tail(num_joints);
+  if (impedance_.enabled()) impedance_.Plan(state_, joint_acceleration, &out);
+  // Last: the model's joints have no friction, so that this torque causes none of the motion.
+  swing_friction_.Add(state_.joint_velocity, joint_acceleration, out.torque);
 }
 
 int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {

@@ -15,6 +15,7 @@
 #include "components/redistributor/internal_feedback.h"
 #include "components/redistributor/ratio_moves.h"
 #include "components/redistributor/shared_impedance.h"
+#include "components/redistributor/swing_friction.h"
 #include "components/robot/robot_model.h"
 #include "poise/balance_torque_t.hpp"
 #include "poise/joint_command_t.hpp"
@@ -57,8 +58,8 @@ class Redistributor : public Component, public Operated {
   /// Share of the feedback that acts at this ratio and in a transition: none without load, so that
   /// a change of support makes no step.
   double FeedbackShare(double eta) const;
-  /// Adds the motion that the command's torque is computed to cause, for the drives to hold.
-  void PlanImpedance(const std::array<bool, 2>& in_contact);
+  /// Adds to the command what follows from the motion that its torque is computed to cause.
+  void FollowMotion(const std::array<bool, 2>& in_contact);
   void ForgetDistribution();
   void PassTorqueThrough();
   void Report(const Wrenches& wrench, const balance::SoleLimits& limits,
@@ -79,6 +80,7 @@ class Redistributor : public Component, public Operated {
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
   PlannedImpedance impedance_;
+  SwingFriction swing_friction_;
   double feedback_pause_ = 0;  // s
   double feedback_edge_ = 0;   // m
   // Of the last distribution, which a reading answers to; index −1: none.

@@ -107,14 +107,14 @@ std::vector<robot_sensors_t> SwayingSensors(const robot::RobotModel& model,
 }
 
 ControlTick::ControlTick(const std::string& robot_path, const Contacts& in_contact,
-                         const std::string& estimator)
+                         const std::string& estimator, const std::string& redistributor)
     : context_(robot_path),
       estimator_(&context_, estimator),
       planner_(&context_, std::string("phase { support: ") +
                               (in_contact[0] && in_contact[1] ? "DOUBLE" : "RIGHT") + " }"),
       task_(&context_, TaskControllerText()),
       monitor_(&context_, MonitorConfig(true)),
-      redistributor_(&context_, RedistributorText()),
+      redistributor_(&context_, RedistributorText(redistributor)),
       whole_body_(context_.shared()->Get<balance::WholeBody>(
           "estimated", [] { return std::shared_ptr<balance::WholeBody>(); })) {
   planner_.Bind("robot_state", &state());

@@ -29,9 +29,9 @@ class ControlTick {
   /// `estimator`: StateEstimatorConfig.
   ControlTick(robot::TestRobot robot, const Contacts& in_contact, const std::string& estimator = "")
       : ControlTick(robot::RobotPath(robot), in_contact, estimator) {}
-  /// `robot_path`: a Robot file.
+  /// `robot_path`: a Robot file. `redistributor`: RedistributorConfig beyond the paper's limits.
   ControlTick(const std::string& robot_path, const Contacts& in_contact,
-              const std::string& estimator = "");
+              const std::string& estimator = "", const std::string& redistributor = "");
 
   void Estimate(const robot_sensors_t& sensors, const Tick& tick);
   void Plan(const Tick& tick) { planner_.Run(tick); }

@@ -62,7 +62,8 @@ class Chain {
         task_(&context_, TaskControllerText()),
         monitor_(&context_, MonitorConfig(true, 0.05, 0.05) + " cop_feedback { share: 0.5 }"),
         redistributor_(&context_,
-                       RedistributorText("feedback { enabled: true integral: 200 pause: 0.002 }")) {
+                       RedistributorText("feedback { enabled: true integral: 200 pause: 0.002 } "
+                                         "friction_compensation { share: 0.8 }")) {
     task_.Bind("support_plan", &plan());
     monitor_.Bind("support_plan", &plan());
     monitor_.Bind("task_torque", &task());

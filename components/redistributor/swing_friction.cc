@@ -1,0 +1,75 @@
+#include "components/redistributor/swing_friction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "components/balance/contact_transition.h"
+#include "components/framework/configuration/configuration.h"
+
+namespace poise {
+namespace {
+
+double Positive(double value, const char* field, const char* unit) {
+  if (value > 0 && std::isfinite(value)) return value;
+  throw ConfigError(field, std::string("must be a finite number of ") + unit + " above 0");
+}
+
+}  // namespace
+
+double FrictionTorque(const robot::MotorModel& motor, double velocity, double smoothing) {
+  return motor.coulomb_friction * std::tanh(velocity / smoothing) +
+         motor.viscous_friction * velocity;
+}
+
+SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::RobotModel& model,
+                             double period)
+    : share_(config.share()),
+      lead_(config.lead()),
+      smoothing_(Positive(config.smoothing_velocity(), "friction_compensation.smoothing_velocity",
+                          "rad/s")),
+      rate_(period / Positive(config.ramp(), "friction_compensation.ramp", "s")),
+      fade_load_(config.fade_load()) {
+  if (!(share_ >= 0 && share_ <= 1)) {
+    throw ConfigError("friction_compensation.share", "must lie between 0 and 1");
+  }
+  if (!(lead_ >= 0) || !std::isfinite(lead_)) {
+    throw ConfigError("friction_compensation.lead", "must be a time in s, 0 or more");
+  }
+  if (!(fade_load_ >= 0 && fade_load_ <= 1)) {
+    throw ConfigError("friction_compensation.fade_load", "must lie between 0 and 1");
+  }
+  if (share_ == 0) return;
+  for (int j = 0; j < model.num_joints(); ++j) {
+    Joint joint{.index = j, .motor = model.motors()[static_cast<size_t>(j)]};
+    for (size_t f = 0; f < 2; ++f) {
+      const std::span<const int> leg = model.supporting_joints(model.feet()[f].body);
+      joint.carries[f] = std::ranges::find(leg, j) != leg.end();
+    }
+    if (joint.carries[0] || joint.carries[1]) joints_.push_back(joint);
+  }
+}
+
+void SwingFriction::Ramp(const std::array<bool, 2>& in_contact, double eta) {
+  if (joints_.empty()) return;
+  const std::array<double, 2> load{eta, 1 - eta};
+  for (size_t f = 0; f < 2; ++f) {
+    double open = 1;
+    if (in_contact[f]) open = load[f] < fade_load_ ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
+    swing_[f] = std::clamp(open, swing_[f] - rate_, swing_[f] + rate_);
+  }
+}
+
+void SwingFriction::Add(const Eigen::Ref<const Eigen::VectorXd>& velocity,
+                        const Eigen::Ref<const Eigen::VectorXd>& acceleration,
+                        std::span<double> torque) const {
+  for (const Joint& joint : joints_) {
+    const double swing =
+        std::min(joint.carries[0] ? swing_[0] : 1.0, joint.carries[1] ? swing_[1] : 1.0);
+    if (swing == 0) continue;
+    const double asked = velocity[joint.index] + lead_ * acceleration[joint.index];
+    torque[static_cast<size_t>(joint.index)] +=
+        share_ * balance::SmoothStep(swing) * FrictionTorque(joint.motor, asked, smoothing_);
+  }
+}
+
+}  // namespace poise
