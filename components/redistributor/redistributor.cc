@@ -329,7 +329,9 @@ ComponentType RedistributorType() {
           "ratio eta, contact transitions and the joint torque (53)",
           [] { return std::make_unique<Redistributor>(); },
           {.parts = {{"redistribution", "redistributor.redistribution"},
-                     {"transition", "redistributor.transition"}}},
+                     {"transition", "redistributor.transition"}},
+           // The ideal robot's joints have no friction.
+           .ideal = {"redistributor.friction_compensation.share=0"}},
           {Reads<robot_state_t>("robot_state"), Reads<support_plan_t>("support_plan"),
            Reads<balance_torque_t>("balance_torque"),
            Reads<operate::act_t>("operator", InputKind::kLatest),
