@@ -63,6 +63,13 @@ LegLine Legs::At(int foot, const Vector3d& sole) const {
   return line;
 }
 
+double Legs::Highest(int foot, const Eigen::Vector2d& sole, double stretch) const {
+  const Leg& leg = leg_[static_cast<size_t>(foot)];
+  const double length = stretch * (leg.thigh + leg.shank);
+  const double away = (sole + leg.ankle.head<2>() - leg.hip.head<2>()).norm();
+  return leg.ankle.z() - leg.hip.z() + std::sqrt(std::max(0.0, length * length - away * away));
+}
+
 double SegmentDistance(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   // Both parameters where the lines are nearest, the second clamped, then the first for it, and
   // again: for two segments that is exact (Ericson 2005, 5.1.9).

@@ -26,6 +26,9 @@ class Legs {
 
   /// `sole`: its centre from the COM.
   LegLine At(int foot, const Eigen::Vector3d& sole) const;
+  /// m of the COM above a level sole, its centre at `sole` from the COM, where the leg is `stretch`
+  /// of a straight one; as if below the hip where it reaches no farther.
+  double Highest(int foot, const Eigen::Vector2d& sole, double stretch) const;
   /// m from COM to soles in the stance.
   double height() const { return height_; }
   /// m sideways between the hips.

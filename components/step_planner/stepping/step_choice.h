@@ -58,10 +58,10 @@ double SwingTime(double distance, double acceleration);
 class StepChoice {
  public:
   StepChoice() = default;
-  /// With a `leg_distance` a robot that cannot stand throws RobotError.
+  /// A robot that cannot stand throws RobotError, but where it has no reach and no `leg_distance`.
   StepChoice(const robot::RobotModel& model, const Reach& reach, const StepLimits& limits)
       : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {
-    if (limits.leg_distance > 0) legs_ = Legs(model);
+    if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
   }
 
   /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
@@ -83,6 +83,7 @@ class StepChoice {
   Eigen::Vector2d BrakingPoint(const StepState& state, int stance) const;
   const StepLimits& limits() const { return limits_; }
   const Reach& reach() const { return reach_; }
+  const Legs& legs() const { return legs_; }  ///< of a robot that has a reach
   const robot::FootModel& foot(int index) const { return feet_[static_cast<size_t>(index)]; }
 
  private:

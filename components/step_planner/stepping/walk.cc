@@ -28,6 +28,7 @@ constexpr double kSlowest = 0.1, kFastest = 3;
 constexpr double kWait = 0.1;  // s in which a capture point that must wait is stopped
 // Of the load: a sole that bears less has not shown yet how far it sinks.
 constexpr double kBears = 0.5, kBearsAll = 0.7;
+constexpr double kStretched = 0.97;  // of a straight leg: how far it is stretched at most
 constexpr double kBlend = 0.1;  // s in which the centre of pressure goes over to another stage's
 
 double Difference(double yaw, double from) { return std::remainder(yaw - from, 2 * M_PI); }
@@ -166,6 +167,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
   in_contact_ = {true, true};
   sinks_ = {0, 0};
+  for (size_t i = 0; i < 2; ++i) sole_[i].Touch(input.sole[i]);
   slower_ = 1;
   double ground = input.sole[0].translation().z();
   if (!spec_.ground.empty()) ground = std::min(ground, input.sole[1].translation().z());
@@ -198,6 +200,7 @@ void Walk::BeginSwing(const StepInput& input) {
   in_contact_[foot] = false;
   starting_ = false;
   touch_down_ = input.time + SwingTime();
+  search_depth_ = spec_.search_depth + Sunk(input);
   pressed_.Begin(0);
   attempt_ = 0;
   first_ = foothold_;
@@ -216,9 +219,14 @@ void Walk::BeginSwing(const StepInput& input) {
   Enter(WalkStage::kSwinging, input.time);
 }
 
+double Walk::Sunk(const StepInput& input) const {
+  const auto s = static_cast<size_t>(stance_);
+  return spec_.rests && spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
+}
+
 double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
   const Vector3d stance = input.sole[static_cast<size_t>(stance_)].translation();
-  if (spec_.ground.empty()) return stance.z();
+  if (spec_.ground.empty()) return stance.z() + Sunk(input);
   // From sole to sole: what the estimator's height drifts by does not count.
   return stance.z() + spec_.ground.At(1 - stance_, foothold.position.x()) -
          spec_.ground.At(stance_, stance.x());
@@ -229,7 +237,7 @@ bool Walk::Leaves(const StepInput& input, bool settled) const {
   // carried before.
   if (!spec_.rests || attempt_ > spec_.places || spec_.places == 0) return false;
   if (stage_ == WalkStage::kSwinging) {
-    const double end = swing_.end() + spec_.search_depth / spec_.foot.touch_speed;
+    const double end = swing_.end() + search_depth_ / spec_.foot.touch_speed;
     return input.time >= end + kNothing - kTimeTolerance;
   }
   if (!settled) return input.time >= since_ + spec_.patience - kTimeTolerance;
@@ -292,7 +300,7 @@ void Walk::LetGo(const StepInput& input) {
     missing = 1 - pulled;
   }
   stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
-                  swing_.foothold().z() - spec_.search_depth, &output_);
+                  swing_.foothold().z() - search_depth_, &output_);
 }
 
 void Walk::Land(const StepInput& input, const StepState& state, const WalkCommand& command) {
@@ -489,6 +497,28 @@ double Walk::StillSinks(const StepInput& input) {
   return std::min(left, spec_.most_ahead);
 }
 
+double Walk::Height(const StepInput& input, const StepState& state) {
+  const auto s = static_cast<size_t>(stance_), o = 1 - s;
+  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
+  const double stance = input.sole[s].translation().z(), other = input.sole[o].translation().z();
+  // Before it sinks: its leg would be stretched.
+  const double low = spec_.rests ? stance - StillSinks(input) : stance;
+  const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
+  // Above the lower foot: a straight leg reaches no farther down.
+  const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
+  const bool shifts = stage_ == WalkStage::kLoading || stage_ == WalkStage::kUnloading;
+  if (!spec_.rests || !shifts) return height;
+  // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
+  // leg that is bent above its sole comes to its limit first.
+  double highest = std::max(stance, other) + standing_height_ - lower;
+  for (size_t i = 0; i < 2; ++i) {
+    const Vector2d offset = Eigen::Rotation2Dd(-state.yaw) * (state.sole[i] - input.com.head<2>());
+    const double leg = choice_.legs().Highest(static_cast<int>(i), offset, kStretched);
+    highest = std::min(highest, (i == s ? low : other) + std::min(leg, standing_height_));
+  }
+  return std::max(height, highest);
+}
+
 void Walk::Lead(const StepInput& input, const StepState& state) {
   const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
@@ -496,14 +526,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
   pressed_.Follow(share * spec_.press_share, period);
   const auto s = static_cast<size_t>(stance_);
-  // Above the lower foot: a straight leg reaches no farther down.
-  double ground = input.sole[s].translation().z();
-  // Before it sinks: the leg behind would be stretched.
-  if (spec_.rests) ground -= StillSinks(input);
-  const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
-  if (feels) ground = std::min(ground, input.sole[1 - s].translation().z());
-  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
-  double height = ground + standing_height_ - lower;
+  double height = Height(input, state);
   if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));
   height_.Follow(height, period);
   // The body heads between the feet: where they stand, and where the one in the air will.
@@ -519,7 +542,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   output_.in_contact = in_contact_;
   output_.searching = false;
   if (stage_ == WalkStage::kSwinging) {
-    FollowSwing(swing_, spec_.foot, spec_.search_depth, input.time, &output_);
+    FollowSwing(swing_, spec_.foot, search_depth_, input.time, &output_);
   } else if (stage_ == WalkStage::kTouching) {
     LetGo(input);
   }
@@ -537,7 +560,7 @@ void Walk::Archive(StateArchive* archive) {
   body_yaw_.Archive(archive);
   pressed_.Archive(archive);
   for (PressedSole& sole : sole_) sole.Archive(archive);
-  archive->Show(sinks_, slower_);
+  archive->Show(sinks_, slower_, search_depth_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
                 start_yaw_, starting_, closing_, final_, settled_since_, way_.position, way_.yaw);
   archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw,

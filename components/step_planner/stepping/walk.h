@@ -149,7 +149,10 @@ class Walk {
   bool Leaves(const StepInput& input, bool settled) const;
   /// Up from there, to another place; the last one is where the foot stood before the step.
   void Retreat(const StepInput& input, const StepState& state);
-  /// m, world: what is told of the ground, from where the other sole stands.
+  /// m, by which the stance sole has sunk into ground that it did not know, in a walk that rests.
+  double Sunk(const StepInput& input) const;
+  /// m, world: what is told of the ground, or where the stance sole met it, from where the other
+  /// sole stands.
   double GroundAt(const StepInput& input, const Footstep& foothold) const;
   /// m, world: the highest COM from which the foot reaches down to the foothold that it is told of.
   double HighestForStep(const StepInput& input, const StepState& state) const;
@@ -186,6 +189,8 @@ class Walk {
   /// s: slower where the sole that stands has sunk, as the root of it. The leg's reaction then goes
   /// down as the centre of pressure does that the sole takes without rolling to the ankle's limit.
   double SwingTime() const;
+  /// m, world: where the COM would stand above the soles that carry.
+  double Height(const StepInput& input, const StepState& state);
   /// m, that the stance sole goes down yet under the whole weight, as its load so far lets expect.
   double StillSinks(const StepInput& input);
   /// Where the soles can have their common centre of pressure at the load that the ramp gives them.
@@ -211,6 +216,7 @@ class Walk {
   double settled_since_ = 0;                        // s: pressed down
   std::array<PressedSole, 2> sole_;
   std::array<double, 2> sinks_{0, 0};  // m, expected of each sole under the weight
+  double search_depth_ = 0;            // m, below the foothold: as deep as the stance sole's ground
   double slower_ = 1;                  // ratio: the ramps, where the sole sinks
   double unloaded_ = 0;                // of the unloading ramp, where it rests
   double ramp_start_ = 0;              // of the loading ramp: what the press carries
