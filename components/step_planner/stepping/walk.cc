@@ -507,7 +507,7 @@ double Walk::Height(const StepInput& input, const StepState& state) {
   // Above the lower foot: a straight leg reaches no farther down.
   const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
   const bool shifts = stage_ == WalkStage::kLoading || stage_ == WalkStage::kUnloading;
-  if (!spec_.rests || !shifts) return height;
+  if (!spec_.rests || !shifts || !(sinks_[s] > spec_.soft)) return height;
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
   double highest = std::max(stance, other) + standing_height_ - lower;
