@@ -14,6 +14,7 @@
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
+#include "components/step_planner/leg_limits.h"
 
 namespace poise {
 namespace {
@@ -158,6 +159,8 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
                                   config.lower(), model.name(), config.lower(),
                                   robot::StandingHeight(model), config.joint_reserve()));
   }
+  if (config.has_gap()) CheckGap("recovery", config.gap(), model, reach);
+  if (config.has_clearance()) CheckClearance("recovery", config.clearance(), model);
   stepping::StepLimits limits;
   limits.edge = config.edge();
   limits.acceleration = SwingAcceleration(model, config.swing_effort());

@@ -11,7 +11,8 @@ namespace poise {
 void CheckRecoveryConfig(const RecoveryConfig& config);
 
 /// Reach and limits of this robot's steps, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or its soles are smaller than the edge.
+/// ConfigError when its legs reach nothing or not what is configured, or its soles are smaller than
+/// the edge.
 stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model);
 
 /// `watch`: RecoverySpec::watch. Thresholds for this robot besides. Throws as MakeStepChoice.

@@ -9,10 +9,12 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
+#include "components/step_planner/leg_limits.h"
 
 namespace poise {
 namespace {
@@ -49,6 +51,7 @@ constexpr double kSinkSpeed = 0.04;
 /// Of the smaller sole's inner radius, that a sole sinks under the weight on ground which counts as
 /// soft: a stiffness of 18 kN/m under the paper's robot, which walks on 20 as on hard ground.
 constexpr double kSoftShare = 0.4;
+constexpr double kRounding = 1e-6;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
 
 double LeastInnerRadius(const robot::RobotModel& model) {
@@ -129,6 +132,40 @@ Eigen::Vector2d SoftDamping(const robot::RobotModel& model, double ratio) {
     least = least.cwiseMin(2 * ratio * std::sqrt(rotor / weight) * half);
   }
   return least;
+}
+
+/// Throws ConfigError on what is `given` and this robot's legs cannot do. `config`: with the
+/// robot's defaults, which are no one's mistake.
+void CheckLegs(const WalkConfig& given, const WalkConfig& config, const robot::RobotModel& model,
+               const stepping::Reach& reach, double spacing) {
+  const double height = robot::StandingHeight(model);
+  if (given.has_lower() && config.lower() > config.reach_lower() &&
+      (config.lower() >= height ||
+       stepping::Reach(model, height, config.lower(), config.joint_reserve(), config.gap())
+           .empty())) {
+    throw ConfigError("walk.lower",
+                      fmt::format("is {} m; robot '{}', whose COM stands {:.3f} m high, cannot "
+                                  "stand so much lower with joint_reserve {} rad: give less; it "
+                                  "can {:.3f} m (reach_lower)",
+                                  config.lower(), model.name(), height, config.joint_reserve(),
+                                  config.reach_lower()));
+  }
+  if (given.has_gap()) CheckGap("walk", config.gap(), model, reach);
+  if (given.has_clearance()) CheckClearance("walk", config.clearance(), model);
+  const double longest = LongestStride(reach, spacing);
+  if (given.has_longest() && config.longest() > longest) {
+    throw ConfigError("walk.longest",
+                      fmt::format("is {} m; the legs of robot '{}' span {:.3f} m ahead with the "
+                                  "COM reach_lower {} m below standing: give 0 to that",
+                                  config.longest(), model.name(), longest, config.reach_lower()));
+  }
+  const double widest = WidestStance(reach) - spacing;
+  if (given.has_widest() && config.widest() > widest) {
+    throw ConfigError("walk.widest",
+                      fmt::format("is {} m; the legs of robot '{}' span {:.3f} m to the side "
+                                  "beyond the soles side by side: give 0 to that",
+                                  config.widest(), model.name(), std::max(0.0, widest)));
+  }
 }
 
 void CheckWalk(bool holds, const char* name, const char* must) {
@@ -240,6 +277,7 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
   stepping::StepLimits limits;
   limits.edge = edge;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
+  CheckLegs(given, config, model, reach, limits.spacing);
 
   stepping::WalkSpec spec;
   spec.start = config.start();
@@ -295,6 +333,31 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
     spec.ground.Add(edge.foot(), edge.from(), edge.height());
   }
   return {stepping::StepChoice(model, reach, limits), spec};
+}
+
+std::vector<std::string> WalkWarnings(const WalkConfig& given, const robot::RobotModel& model) {
+  std::vector<std::string> warnings;
+  const WalkConfig config = WithRobotDefaults(given, robot::StandingHeight(model));
+  const double period = config.unload() + config.swing() + config.settle() + config.load();
+  const double fastest = config.longest() / period;
+  for (int i = 0; i < config.command_size(); ++i) {
+    const double vx = config.command(i).vx();
+    if (config.command(i).stop() || !(std::abs(vx) > fastest * (1 + kRounding))) continue;
+    warnings.push_back(
+        fmt::format("walk.command[{}].vx={} is walked at {:.3g} m/s: `longest` "
+                    "allows {:.3g} m in a step, which takes {:.3g} s",
+                    i, vx, std::copysign(fastest, vx), config.longest(), period));
+  }
+  if (config.rests()) return warnings;
+  const auto idle = [&](bool given_one, const char* name) {
+    if (!given_one) return;
+    warnings.push_back(fmt::format("walk.{} has no effect without walk.rests=true", name));
+  };
+  idle(config.places() > 0, "places");
+  idle(config.give_up() > 0, "give_up");
+  idle(config.soft_damping() > 0, "soft_damping");
+  idle(config.slowest_swing() > 1, "slowest_swing");
+  return warnings;
 }
 
 WalkCommands::WalkCommands(const WalkConfig& config) {

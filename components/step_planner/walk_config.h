@@ -1,6 +1,7 @@
 // Walking's configuration, and what the robot makes of it.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "components/robot/robot_model.h"
@@ -13,9 +14,13 @@ namespace poise {
 void CheckWalkConfig(const WalkConfig& config);
 
 /// Reach, spacing and thresholds for this robot, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or its soles are smaller than the edge.
+/// ConfigError when its legs reach nothing or not what is configured, or its soles are smaller than
+/// the edge.
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
                         const robot::RobotModel& model);
+
+/// What this robot will not walk as it is configured, and settings without effect: a sentence each.
+std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model);
 
 /// What is commanded at a time of the run.
 class WalkCommands {

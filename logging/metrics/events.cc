@@ -1,13 +1,17 @@
 #include "logging/metrics/events.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <map>
 #include <set>
 #include <tuple>
 #include <utility>
 
+#include "components/balance/convex_polygon.h"
+#include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
 #include "logging/metrics/analysis.h"
@@ -26,6 +30,9 @@ constexpr double kPushGap = 0.05;
 
 // An operator's act that is refused sooner than this after one like it is the same attempt, s.
 constexpr double kRefusalGap = 1;
+
+// m of the capture point beyond what a walk's step covers: that the planner calls beyond the soles.
+constexpr double kStrays = 0.01;
 
 /// Rounded to what one decimal shows, and never "-0.0".
 double Tenths(double value) {
@@ -269,6 +276,28 @@ void AddCalibration(const RunRecord& run, EventList* events) {
           kMilli * last->imu_tilt[0], kMilli * last->imu_tilt[1]));
 }
 
+/// Why the centre of pressure is not within its limits.
+std::string NotAchievedText(const balance_torque_t& balance) {
+  // Of a wrench that does not press on the ground there is none, and the message has zeros.
+  const double pulls = balance.resultant_task.force[2];
+  if (!(pulls < 0)) {
+    return fmt::format("no CoP: the task torque would pull at the ground with {:.0f} N", pulls);
+  }
+  const Eigen::Vector2d cop(balance.cop[0], balance.cop[1]);
+  const std::string at =
+      fmt::format("CoP ({:.1f}, {:.1f}) mm", Tenths(kMilli * cop.x()), Tenths(kMilli * cop.y()));
+  const auto corners = std::clamp<size_t>(balance.num_corners, 0, std::size(balance.corner_x));
+  if (balance.region != balance_torque_t::REGION_POLYGON || corners < 3) {
+    return fmt::format("{}, limits ({:.1f}, {:.1f}) mm", at, kMilli * balance.cop_limit[0],
+                       kMilli * balance.cop_limit[1]);
+  }
+  std::array<Eigen::Vector2d, std::size(balance_torque_t{}.corner_x)> corner;
+  for (size_t i = 0; i < corners; ++i) corner[i] = {balance.corner_x[i], balance.corner_y[i]};
+  const double inside = balance::SignedDistance(balance::ConvexHull({corner.data(), corners}), cop);
+  return inside < 0 ? fmt::format("{}, {:.1f} mm outside the soles' region", at, -kMilli * inside)
+                    : fmt::format("{}, at the edge of the soles' region", at);
+}
+
 void AddBalancing(const RunRecord& run, EventList* events) {
   for (const auto& [axis, name] : {std::pair{0, "x"}, std::pair{1, "y"}}) {
     const auto on = [&, a = axis](int64_t tick) -> std::optional<bool> {
@@ -291,13 +320,8 @@ void AddBalancing(const RunRecord& run, EventList* events) {
     return balance->status == balance_torque_t::STATUS_NOT_ACHIEVED;
   };
   events->AddIntervals(Intervals(run, not_achieved), "cop_not_achieved_begins",
-                       "cop_not_achieved_ends", [&](int64_t tick) {
-                         const balance_torque_t& balance = *run.balance.at(tick);
-                         return fmt::format(
-                             "CoP ({:.1f}, {:.1f}) mm, limits ({:.1f}, {:.1f}) mm",
-                             Tenths(kMilli * balance.cop[0]), Tenths(kMilli * balance.cop[1]),
-                             kMilli * balance.cop_limit[0], kMilli * balance.cop_limit[1]);
-                       });
+                       "cop_not_achieved_ends",
+                       [&](int64_t tick) { return NotAchievedText(*run.balance.at(tick)); });
   const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
     const joint_command_t* command = run.command.at(tick);
     if (command == nullptr) return {};
@@ -310,11 +334,36 @@ void AddBalancing(const RunRecord& run, EventList* events) {
                        });
 }
 
+/// The robot walks, and the capture point is within the sole that carries, the planned foothold and
+/// what lies between: the step that is needed is the one under way.
+bool WalksThere(const RunRecord& run, const support_plan_t& plan) {
+  if (plan.stepping == support_plan_t::STEPPING_NONE || plan.step_foot < 0 || plan.step_foot > 1 ||
+      plan.step_reason != support_plan_t::REASON_WALK) {
+    return false;
+  }
+  const auto foot = static_cast<size_t>(plan.step_foot);
+  const Eigen::Isometry3d stance = GetPose(plan.foot_pose[1 - foot]);
+  // The foothold's heading is not told: it is nearly the stance foot's.
+  Eigen::Isometry3d foothold = stance;
+  foothold.translation() = GetVector3(plan.foothold);
+  std::array<Eigen::Vector2d, balance::ConvexPolygon::kMaxCorners> points;
+  size_t count = 0;
+  for (const auto& [pose, sole] : {std::pair{stance, 1 - foot}, std::pair{foothold, foot}}) {
+    const balance::ConvexPolygon polygon = balance::SolePolygon(run.robot.feet()[sole], 0);
+    for (const Eigen::Vector2d& corner : polygon.corners()) {
+      if (count == points.size()) break;
+      points[count++] = (pose * Eigen::Vector3d(corner.x(), corner.y(), 0)).head<2>();
+    }
+  }
+  const Eigen::Vector2d point(plan.capture_point[0], plan.capture_point[1]);
+  return balance::SignedDistance(balance::ConvexHull({points.data(), count}), point) > -kStrays;
+}
+
 void AddCapturePoint(const RunRecord& run, EventList* events) {
   const auto needed = [&](int64_t tick) -> std::optional<bool> {
     const support_plan_t* plan = run.plan.at(tick);
     if (plan == nullptr) return {};
-    return plan->step_needed != 0;
+    return plan->step_needed != 0 && !WalksThere(run, *plan);
   };
   const std::vector<Interval> intervals = Intervals(run, needed);
   for (const Interval& interval : intervals) {
@@ -493,7 +542,7 @@ void AddRefusals(const RunRecord& run, EventList* events) {
                   fmt::format("{} by {}: {}{}", ActKindName(kind),
                               known ? graph.component(component).name()
                                     : fmt::format("component {}", component),
-                              RefusalReason(verdict),
+                              RefusalReason(kind, verdict),
                               refusal.count > 1 ? fmt::format("; {} times", refusal.count) : ""));
     }
   }

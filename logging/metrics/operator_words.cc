@@ -22,7 +22,7 @@ std::string ActKindName(int8_t kind) {
     case act_t::KIND_WALK:
       return "walk";
     case act_t::KIND_STAND:
-      return "stop walking";
+      return "feet side by side";
     case act_t::KIND_NEXT_PHASE:
       return "next phase";
     default:
@@ -30,7 +30,8 @@ std::string ActKindName(int8_t kind) {
   }
 }
 
-std::string RefusalReason(int8_t verdict) {
+std::string RefusalReason(int8_t kind, int8_t verdict) {
+  const bool stand = kind == act_t::KIND_STAND;
   switch (verdict) {
     case answer_t::VERDICT_LATE:
       return "its tick was over";
@@ -43,8 +44,22 @@ std::string RefusalReason(int8_t verdict) {
     case answer_t::VERDICT_RANGE:
       return "a number is out of range";
     case answer_t::VERDICT_NOT_ABLE:
+      if (stand) {
+        return "this run's step_planner does not step; its scenario needs "
+               "step_planner.walk.enabled=true or step_planner.recovery.enabled=true";
+      }
+      if (kind == act_t::KIND_WALK || kind == act_t::KIND_STEP) {
+        return "this run's step_planner does not walk; its scenario needs "
+               "step_planner.walk.enabled=true";
+      }
       return "this run's configuration does not allow it";
     case answer_t::VERDICT_NOT_NOW:
+      if (stand || kind == act_t::KIND_STEP) {
+        return "not now: the robot does not stand still on both feet; try again when it does";
+      }
+      if (kind == act_t::KIND_NEXT_PHASE) {
+        return "not now: nothing follows this phase, or its moves are not over; try again later";
+      }
       return "not now; try again later";
     default:
       return fmt::format("refused ({})", verdict);

@@ -288,7 +288,10 @@ TEST_F(EventsTest, BalancingOfEachAxis) {
     balance_[t].cop_task[1] = -0.085;
   }
   balance_[99].active_x = 1;
-  for (size_t t = 25; t < 28; ++t) balance_[t].status = balance_torque_t::STATUS_NOT_ACHIEVED;
+  for (size_t t = 25; t < 28; ++t) {
+    balance_[t].status = balance_torque_t::STATUS_NOT_ACHIEVED;
+    balance_[t].resultant_task.force[2] = -400;
+  }
   command_[26].eta_feasible = 0;
   EXPECT_THAT(Events(Read()),
               ElementsAre(Is(0, "phase_began"),
@@ -298,6 +301,44 @@ TEST_F(EventsTest, BalancingOfEachAxis) {
                           Is(0.056, "cop_not_achieved_ends", "after 0.006 s"),
                           Is(0.06, "balancing_off", "y, after 0.020 s"),
                           Is(0.198, "balancing_on", "x"), Is(0.2, "run_ended")));
+}
+
+TEST_F(EventsTest, ACentreOfPressureThatIsNotKeptIsNeverCalledWithinItsLimits) {
+  for (size_t t = 25; t < 28; ++t) {
+    balance_[t].status = balance_torque_t::STATUS_NOT_ACHIEVED;
+    balance_[t].resultant_task.force[2] = 120;
+  }
+  for (size_t t = 40; t < 42; ++t) {
+    balance_[t].status = balance_torque_t::STATUS_NOT_ACHIEVED;
+    balance_[t].resultant_task.force[2] = -400;
+    balance_[t].region = balance_torque_t::REGION_POLYGON;
+    balance_[t].num_corners = 3;
+    balance_[t].corner_x[1] = balance_[t].corner_y[2] = 0.3;
+    balance_[t].cop[0] = balance_[t].cop[1] = 0.2;  // within the corners' extent
+  }
+  EXPECT_THAT(Named("cop_not_achieved_begins"),
+              ElementsAre(Is(0.05, "cop_not_achieved_begins", "no CoP: the task torque would pull"),
+                          Is(0.08, "cop_not_achieved_begins",
+                             "CoP (200.0, 200.0) mm, 70.7 mm outside the soles' region")));
+}
+
+TEST_F(EventsTest, AStepThatAWalkMakesAnywayIsNotCalledFor) {
+  for (size_t t = 30; t < 80; ++t) {
+    support_plan_t& plan = plan_[t];
+    plan.step_needed = 1;
+    plan.capture_margin = -0.05;
+    plan.stepping = support_plan_t::STEPPING_SWINGING;
+    plan.step_reason = support_plan_t::REASON_WALK;
+    plan.step_foot = 1;
+    plan.foot_pose[0].position[1] = -0.1;
+    plan.foothold[0] = 0.3;
+    plan.foothold[1] = 0.1;
+    plan.capture_point[0] = 0.15;
+    plan.capture_point[1] = t < 60 ? 0 : -0.5;  // pushed aside
+  }
+  EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.12, "step_needed", "a foot at")));
+  for (size_t t = 30; t < 80; ++t) plan_[t].step_reason = support_plan_t::REASON_SURE;
+  EXPECT_THAT(Named("step_needed"), ElementsAre(Is(0.06, "step_needed", "a foot at")));
 }
 
 TEST_F(EventsTest, AStepThatIsNeededSaysWhereAndByWhen) {
@@ -439,6 +480,16 @@ TEST_F(EventsTest, ManyRefusalsOfADragAreOneEvent) {
                                                 Is(0.07, "act_refused", "too many acts wait")));
 }
 
+TEST_F(EventsTest, ARefusedActSaysWhichAndWhy) {
+  using operate::answer_t;
+  answer_t together = Answered(3, 30, 0, answer_t::VERDICT_NOT_NOW);
+  together.kind = operate::act_t::KIND_STAND;
+  answers_ = {together};
+  EXPECT_THAT(Named("act_refused"),
+              ElementsAre(Is(0.06, "act_refused", "does not stand still on both feet")));
+  EXPECT_THAT(Named("act_refused").front().detail, HasSubstr("feet side by side by "));
+}
+
 TEST_F(EventsTest, AnAnswerThatIsNotOfThisRunOrTellsNoTickOfItIsNone) {
   using operate::answer_t;
   answer_t other = Answered(1, 10, 0, answer_t::VERDICT_RANGE);
@@ -457,8 +508,9 @@ TEST_F(EventsTest, EveryKindOfActAndRefusalHasAWord) {
     EXPECT_TRUE(words.insert(ActKindName(kind)).second) << int{kind};
   }
   for (int8_t verdict = answer_t::VERDICT_LATE; verdict <= answer_t::VERDICT_NOT_NOW; ++verdict) {
-    EXPECT_EQ(RefusalReason(verdict).find("refused ("), std::string::npos) << int{verdict};
-    EXPECT_TRUE(words.insert(RefusalReason(verdict)).second) << int{verdict};
+    const std::string reason = RefusalReason(act_t::KIND_PUSH, verdict);
+    EXPECT_EQ(reason.find("refused ("), std::string::npos) << int{verdict};
+    EXPECT_TRUE(words.insert(reason).second) << int{verdict};
   }
 }
 

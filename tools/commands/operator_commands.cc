@@ -208,7 +208,12 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   step->callback([run, foot, next, together, command] {
     *command = [run, foot, next, together] {
       ActedRun acted = FindActedRun(*run, "poise step");
-      if (*together) return SayOutcome(acted, acted.line.Stand(), "feet together");
+      if (*together) {
+        const int code = SayOutcome(acted, acted.line.Stand(), "feet together");
+        // The planner's answer does not tell whether there is anything to do.
+        if (code == kExitOk) fmt::print("feet that stand side by side already stay\n");
+        return code;
+      }
       return *next ? SayOutcome(acted, acted.line.NextPhase(), "next phase")
                    : SayOutcome(acted, acted.line.Step(*foot), "step");
     };

@@ -169,7 +169,7 @@ void LocalOperator::Hear(int channel, std::span<const uint8_t> data) {
     push_ = act;
     push_until_ = answer.tick + std::llround(act.duration / spec_.tick_period());
   }
-  Answered(act, answer.tick, done ? "" : logging::RefusalReason(answer.verdict));
+  Answered(act, answer.tick, done ? "" : logging::RefusalReason(answer.kind, answer.verdict));
 }
 
 void LocalOperator::HearStatus(std::span<const uint8_t> data) {

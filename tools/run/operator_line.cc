@@ -48,20 +48,10 @@ std::string Why(const answer_t& answer, const LiveField* field) {
     case answer_t::VERDICT_RANGE:
       if (field == nullptr) break;
       return fmt::format("is outside {:.6g} to {:.6g} {}", field->least, field->most, field->unit);
-    case answer_t::VERDICT_NOT_ABLE:
-      return answer.kind == act_t::KIND_STAND
-                 ? "this run's step_planner does not step; its scenario needs "
-                   "step_planner.walk.enabled=true or step_planner.recovery.enabled=true"
-                 : "this run's step_planner does not walk; its scenario needs "
-                   "step_planner.walk.enabled=true";
-    case answer_t::VERDICT_NOT_NOW:
-      return answer.kind == act_t::KIND_STEP || answer.kind == act_t::KIND_STAND
-                 ? "the robot does not stand still on both feet; try again when it does"
-                 : "nothing follows this phase, or its moves are not over; try again later";
     default:
       break;
   }
-  return logging::RefusalReason(answer.verdict);
+  return logging::RefusalReason(answer.kind, answer.verdict);
 }
 
 }  // namespace

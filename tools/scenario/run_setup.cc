@@ -19,6 +19,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot.pb.h"
 #include "components/robot_files/robot_files.h"
+#include "components/step_planner/walk_config.h"
 #include "fmt/format.h"
 #include "tools/scenario/graph_files.h"
 #include "tools/scenario/library_versions.h"
@@ -345,7 +346,12 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   }
   Robot robot;
   ReadTextProto(loaded.robot_file, &robot);
-  robot::LoadRobotFiles(loaded.robot_file, warnings);
+  const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file, warnings);
+  if (warnings != nullptr && Walks(scenario)) {
+    for (const std::string& text : WalkWarnings(scenario.step_planner().walk(), model)) {
+      warnings->push_back("step_planner." + text);
+    }
+  }
   AddResource(&spec, "robot", loaded.robot_file);
   AddResource(&spec, "urdf", robot::MakerFile(robot, loaded.robot_file));
   spec.set_realtime(changes.realtime);

@@ -13,7 +13,8 @@ namespace poise {
 
 /// Builds the run: a random 63-bit run_id, configurations by component, robot and URDF, versions.
 /// No ports yet. Throws ConfigError, also for a change of another engine's field, or RobotError
-/// when the robot's files cannot work; what is odd about them goes to `warnings`.
+/// when the robot's files cannot work; what is odd about them, and what of a walk's
+/// settings the robot will not do, goes to `warnings`.
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings);
 

@@ -173,6 +173,7 @@ Reach::Reach(const robot::RobotModel& model, double height, double lower, double
   least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
   double front = 0, rear = 0;
   for (const robot::FootModel& foot : model.feet()) {
+    roll_ = std::max(roll_, foot.length);
     const balance::ConvexPolygon sole = balance::SolePolygon(foot, 0);
     for (const Vector2d& corner : sole.corners()) {
       front = std::max(front, corner.x());
@@ -205,9 +206,18 @@ double Reach::LowerShare(const std::array<Vector2d, 2>& offset) const {
   return share;
 }
 
+Vector2d Reach::ComAbove(int stance, const Vector2d& com) const {
+  const balance::ConvexPolygon& leg = leg_[static_cast<size_t>(stance)][1];
+  if (leg.num_corners == 0) return com;
+  const Vector2d nearest = -balance::NearestPoint(leg, -com);
+  const double beyond = (com - nearest).norm();
+  return beyond > roll_ ? Vector2d(nearest + roll_ / beyond * (com - nearest)) : com;
+}
+
 balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com, Place place) const {
+  const Vector2d above = ComAbove(1 - foot, com);
   balance::ConvexPolygon reached = leg_[static_cast<size_t>(foot)][1];
-  for (Vector2d& corner : reached.mutable_corners()) corner += com;
+  for (Vector2d& corner : reached.mutable_corners()) corner += above;
   if (place == Place::kAhead) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
   if (place == Place::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
   const double side = foot == robot::kLeftFoot ? 1 : -1;

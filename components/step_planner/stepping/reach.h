@@ -40,19 +40,26 @@ class Reach {
   /// Least share of `lower` with which the soles stand at `offset` from the COM by foot; above 1,
   /// and by how many m, when even the lowest does not do.
   double LowerShare(const std::array<Eigen::Vector2d, 2>& offset) const;
-  /// Sole centre of `foot`, the other's at the origin and the COM at `com`, both lowered all the
-  /// way: the leg's reach, and beside the other sole, ahead of it or behind it, `gap` between them.
-  /// Beside, the legs do not cross; of the other two that is not said.
+  /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
+  /// all the way, in that leg's reach or `roll` beyond it.
+  Eigen::Vector2d ComAbove(int stance, const Eigen::Vector2d& com) const;
+  /// Sole centre of `foot`, the other's at the origin and the COM above `ComAbove` of `com`,
+  /// lowered all the way: the leg's reach, and beside the other sole, ahead of it or behind it,
+  /// `gap` between them. So the legs span what is between the soles, wherever `com` is. Beside, the
+  /// legs do not cross; of the other two that is not said.
   balance::ConvexPolygon Footholds(int foot, const Eigen::Vector2d& com,
                                    Place place = Place::kBeside) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
   double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
   double lower() const { return lower_; }                  ///< m
+  /// m, of the longer sole: a stance foot that rolls over its edge lets the COM go no farther than
+  /// that beyond its leg's reach.
+  double roll() const { return roll_; }
 
  private:
   // By foot, by height: standing, lowered.
   std::array<std::array<balance::ConvexPolygon, 2>, 2> leg_;
-  double least_spacing_ = 0, least_ahead_ = 0, lower_ = 0;
+  double least_spacing_ = 0, least_ahead_ = 0, lower_ = 0, roll_ = 0;
 };
 
 }  // namespace poise::stepping

@@ -24,6 +24,9 @@ constexpr double kMarginOfTime = 0.05;
 constexpr double kLeastGain = 0.02;
 // m by which a way may cut the corner that it keeps off: what standing feet are off by.
 constexpr double kCut = 0.005;
+constexpr double kOffReach = 1e-9;  // m off a polygon that is rounding
+// ωT of a step at most: what the capture point is off by has grown 55 times then, beyond any reach.
+constexpr double kLongest = 4;
 constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
 
 /// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
@@ -135,16 +138,15 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
   const Vector2d com = local(plan.com);
+  plan.follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
   const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, place);
-  Vector2d foothold = wanted;
-  bool possible = true;
-  if (footholds.num_corners > 0) {
-    foothold = balance::NearestPoint(footholds, wanted);
-  } else {
-    foothold = {0, side * limits_.spacing};
-    possible = place == Place::kBeside;
+  Vector2d foothold(0, side * limits_.spacing);
+  bool possible = footholds.num_corners > 0;
+  if (possible) foothold = balance::NearestPoint(footholds, wanted);
+  if (place != Place::kBeside && possible) {
+    possible = ClearOfLeg(foot, reach_.ComAbove(stance, com), &foothold) &&
+               balance::SignedDistance(footholds, foothold) >= -kOffReach;
   }
-  if (place != Place::kBeside) possible = possible && ClearOfLeg(foot, com, &foothold);
   if (limits_.leg_distance > 0) {
     possible =
         WayAround(side, local(state.sole[static_cast<size_t>(foot)]), foothold, &plan) && possible;
@@ -156,8 +158,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
              SoleAt(feet_[static_cast<size_t>(foot)], limits_.edge, plan.foothold, plan.yaw));
   plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
-  const double follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-local(plan.com)));
-  plan.margin = std::min(plan.margin, plan.margin + follows);
+  plan.margin = std::min(plan.margin, plan.margin + plan.follows);
   if (!possible) plan.margin = -std::numeric_limits<double>::infinity();
   return plan;
 }
@@ -178,6 +179,10 @@ StepPlan StepChoice::Plan(const StepState& state, int foot, Place place) const {
     if (!std::isfinite(plan.margin)) needed = time + kLater;
     if (needed <= time + kTimeTolerance) break;
     time = needed;
+    if (state.pendulum.frequency * time > kLongest) {
+      plan.margin = -std::numeric_limits<double>::infinity();
+      break;
+    }
   }
   return plan;
 }
@@ -202,6 +207,8 @@ StepPlan StepChoice::Beside(const StepState& state, int foot, double time) const
 
 bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   if (plan.margin >= 0) return true;
+  // The stance sole would leave the ground before the foot comes down.
+  if (plan.follows < 0) return false;
   balance::ConvexPolygon soles;
   for (size_t i = 0; i < 2; ++i) {
     if (!state.in_contact[i]) continue;

@@ -46,6 +46,8 @@ struct StepPlan {
   /// m, of the capture point at touch-down inside the soles less `edge`; negative: outside, another
   /// step must follow; −∞: no foot can get there.
   double margin = 0;
+  /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
+  double follows = 0;
   Place place = Place::kBeside;
   bool around = false;  ///< the way goes around the stance leg, by `corner`, m
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();
@@ -69,15 +71,17 @@ class StepChoice {
   /// from where it is.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
-  /// stance leg where it must.
+  /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
   StepPlan Plan(const StepState& state, int foot, Place place = Place::kBeside) const;
   /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
-  /// stance sole's point nearest to the capture point.
+  /// stance sole's point nearest to the capture point. Within what both legs span, also
+  /// where the COM has left it.
   StepPlan At(const StepState& state, int foot, double time, Place place = Place::kBeside) const;
   /// The step of `foot` that puts it beside the other one, as when standing, with the COM above
   /// that.
   StepPlan Beside(const StepState& state, int foot, double time) const;
-  /// The step catches the capture point, or comes nearer to it than the soles where they are.
+  /// The step catches the capture point, or comes nearer to it than the soles where they are while
+  /// the stance leg follows the COM.
   bool Helps(const StepState& state, const StepPlan& plan) const;
   /// The stance sole's point nearest to the capture point, less `edge`.
   Eigen::Vector2d BrakingPoint(const StepState& state, int stance) const;

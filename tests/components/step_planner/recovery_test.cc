@@ -292,6 +292,33 @@ TEST_P(RecoveryCase, WhereNoStepHelpsAnotherStrategyHasTheCentreOfPressure) {
   }
 }
 
+// A push far beyond what steps catch: no foot is sent where no leg reaches, and none for long.
+TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
+  int steps = 0;
+  for (int i = 0; i < 16; ++i) {
+    for (const double share : {1.05, 1.2, 1.5, 2.5}) {
+      World world(GetParam());
+      const double size = EdgeDistance(world, Direction(22.5 * i), 0.01);
+      world.Push(share * world.mass() * world.Frequency() * size * Direction(22.5 * i));
+      // Two legs, and the sole that rolls over its edge.
+      const double farthest = 2 * world.height() + world.model().feet()[0].length;
+      for (int tick = 0; tick < 1000; ++tick) {
+        world.Tick();
+        const Recovery& recovery = world.recovery();
+        if (recovery.stage() != Stage::kUnloading && recovery.stage() != Stage::kSwinging) continue;
+        const StepPlan& plan = recovery.plan();
+        const Vector2d stance =
+            world.soles()[static_cast<size_t>(1 - plan.foot)].translation().head<2>();
+        ASSERT_TRUE(plan.foothold.allFinite()) << i << ' ' << share;
+        ASSERT_LT((plan.foothold - stance).norm(), farthest) << i << ' ' << share;
+        ASSERT_LT(recovery.touch_down() - world.time(), 4 / world.Frequency()) << i << ' ' << share;
+      }
+      steps += world.recovery().num_steps();
+    }
+  }
+  EXPECT_GT(steps, 10);
+}
+
 // A foot that is let go is a contact so much later, and nothing else changes until then.
 TEST_P(RecoveryCase, AFootThatSettlesIsAContactLater) {
   std::array<double, 2> landed{};

@@ -431,9 +431,9 @@ TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
   double largest_turn = 0;
   for (Eigen::Matrix3d last; recovering < 100 && tick < 2000; last = reference()) {
     robot::RobotState state = tick < 10 ? standing : turned;
-    // The capture point: above the foot that stays, then 0.25 m ahead of it.
+    // The capture point: above the foot that stays, then 0.17 m ahead of it.
     Eigen::Vector3d point = data.foot_pose[1].translation();
-    if (plan.in_contact[0] == 0 || recovering > 0) point += turn * Eigen::Vector3d(0.25, 0, 0);
+    if (plan.in_contact[0] == 0 || recovering > 0) point += turn * Eigen::Vector3d(0.17, 0, 0);
     if (tick >= 10) {
       state.base_linear_velocity.head<2>() += frequency * (point - data.com).head<2>();
     }

@@ -291,6 +291,81 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
   EXPECT_GT(possible, 20);
 }
 
+double Support(const balance::ConvexPolygon& polygon, const Vector2d& direction) {
+  double most = -1e9;
+  for (const Vector2d& corner : polygon.corners()) most = std::max(most, corner.dot(direction));
+  return most;
+}
+
+// m that `foothold`, from the stance sole, is beyond what both legs span, wherever the COM is:
+// outside some half-plane of the sum of one leg's polygon and the other's turned round.
+double BeyondSpan(const Reach& reach, int foot, const Vector2d& foothold) {
+  double beyond = -1e9;
+  for (int i = 0; i < 360; ++i) {
+    const Vector2d direction(std::cos(i * M_PI / 180), std::sin(i * M_PI / 180));
+    beyond = std::max(beyond, foothold.dot(direction) - Support(reach.Leg(foot, 1), direction) -
+                                  Support(reach.Leg(1 - foot, 1), -direction));
+  }
+  return beyond;
+}
+
+// However fast the robot falls: the prediction runs away as e^ωT, the foothold does not.
+TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
+  const Reach reach(model_, height_, lower_, 0.1, 0.02);
+  const StepLimits limits{.edge = 0.01,
+                          .acceleration = 25,
+                          .least_swing = 0.2,
+                          .unload = 0.04,
+                          .beyond = 0.04,
+                          .enough = 0.03,
+                          .spacing = robot::StandingSpacing(model_),
+                          .leg_distance = 0.12};
+  const StepChoice choice(model_, reach, limits);
+  const double frequency = std::sqrt(kGravity / height_), far = model_.feet()[0].length + 1e-6;
+  std::mt19937 random{TestSeed(165)};
+  std::uniform_real_distribution<double> any(-1, 1);
+  int chosen = 0, none = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    StepState state;
+    state.pendulum.frequency = frequency;
+    state.yaw = 3 * any(random);
+    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
+    const double fastest = trial % 3 == 0 ? 0.4 : trial % 3 == 1 ? 1.5 : 8;
+    state.pendulum.com = 0.3 * Vector2d(any(random), any(random));
+    state.pendulum.velocity = fastest * Vector2d(any(random), any(random));
+    const Vector2d apart =
+        turn * Vector2d(0.3 * any(random), limits.spacing * (1.2 + 0.3 * any(random)));
+    state.sole = {Vector2d(-0.5 * apart), Vector2d(0.5 * apart)};
+    state.sole_yaw = {state.yaw, state.yaw + 0.2 * any(random)};
+    if (trial % 4 > 1) state.in_contact[static_cast<size_t>(trial % 2)] = false;
+    const auto from_stance = [&](const StepPlan& plan) -> Vector2d {
+      return turn.transpose() * (plan.foothold - state.sole[static_cast<size_t>(1 - plan.foot)]);
+    };
+    for (const int foot : {0, 1}) {
+      for (const Place place : {Place::kBeside, Place::kAhead, Place::kBehind}) {
+        const StepPlan plan = choice.At(state, foot, 1 + any(random), place);
+        ASSERT_TRUE(plan.foothold.allFinite());
+        if (!std::isfinite(plan.margin)) continue;
+        ASSERT_LT(BeyondSpan(reach, foot, from_stance(plan)), far) << trial;
+      }
+    }
+    const StepPlan plan = choice.Choose(state);
+    (plan.foot < 0 ? none : chosen)++;
+    if (plan.foot < 0) continue;
+    ASSERT_TRUE(std::isfinite(plan.margin) && plan.foothold.allFinite());
+    ASSERT_LT(BeyondSpan(reach, plan.foot, from_stance(plan)), far) << trial;
+    ASSERT_LE(plan.time, 4 / frequency) << trial;
+    // Both legs reach what does not catch the capture point, with level soles.
+    if (plan.margin >= 0) continue;
+    const Vector2d com =
+        turn.transpose() * (plan.com - state.sole[static_cast<size_t>(1 - plan.foot)]);
+    ASSERT_GE(balance::SignedDistance(reach.Leg(1 - plan.foot, 1), -com), 0) << trial;
+    ASSERT_GE(balance::SignedDistance(reach.Leg(plan.foot, 1), from_stance(plan) - com), -1e-6);
+  }
+  EXPECT_GT(chosen, 100);
+  EXPECT_GT(none, 100);
+}
+
 INSTANTIATE_TEST_SUITE_P(Robots, ReachCase, testing::Values(TestRobot::kDyros, TestRobot::kMantis));
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
+#include "components/step_planner/recovery_config.h"
 #include "components/step_planner/walk_config.h"
 #include "tests/robot/robot_test_support.h"
 
@@ -127,6 +128,59 @@ TEST(WalkLanding, AFootThatIsLetGoCarriesUntilItCountsOnALegOfAnyMass) {
     EXPECT_EQ(world.walk().num_steps(), 1) << stiffness;
     EXPECT_EQ(world.walk().stepping_foot(), 1 - foot) << stiffness;
   }
+}
+
+void Set(const char* field, double value, WalkConfig* config) {
+  config->GetReflection()->SetDouble(config, WalkConfig::descriptor()->FindFieldByName(field),
+                                     value);
+}
+
+std::string RefusedField(const WalkConfig& config, const robot::RobotModel& model) {
+  try {
+    MakeWalk(config, ContactConfirmation(), model);
+  } catch (const ConfigError& error) {
+    return error.field();
+  }
+  return "accepted";
+}
+
+TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  struct Case {
+    const char* field;
+    double possible, impossible;
+  };
+  for (const Case& c : {Case{"lower", 0.08, 0.8}, Case{"gap", 0.1, 0.5}, Case{"clearance", 0.14, 3},
+                        Case{"longest", 0.3, 9}, Case{"widest", 0.2, 4}}) {
+    WalkConfig config = Enabled();
+    Set(c.field, c.possible, &config);
+    EXPECT_EQ(RefusedField(config, model), "accepted") << c.field;
+    Set(c.field, c.impossible, &config);
+    EXPECT_EQ(RefusedField(config, model), std::string("walk.") + c.field);
+  }
+  RecoveryConfig recovery;
+  recovery.set_clearance(3);
+  EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
+  recovery.set_clearance(0.05);
+  EXPECT_NO_THROW(MakeStepChoice(recovery, model));
+  recovery.set_gap(0.5);
+  EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
+}
+
+TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  WalkConfig config = Enabled();
+  config.add_command()->set_vx(0.24);
+  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  config.mutable_command(0)->set_vx(-0.5);
+  ASSERT_EQ(WalkWarnings(config, model).size(), 1);
+  EXPECT_NE(WalkWarnings(config, model)[0].find("walked at -0.248 m/s"), std::string::npos);
+  config.mutable_command(0)->set_vx(0.1);
+  config.set_places(2);
+  config.set_slowest_swing(2);
+  EXPECT_EQ(WalkWarnings(config, model).size(), 2);
+  config.set_rests(true);
+  EXPECT_TRUE(WalkWarnings(config, model).empty());
 }
 
 }  // namespace
