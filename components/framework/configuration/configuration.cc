@@ -10,8 +10,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <regex>
+#include <string>
+#include <vector>
 
 #include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {
