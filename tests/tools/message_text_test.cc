@@ -9,7 +9,7 @@
 #include <random>
 
 #include "tests/test_seed.h"
-#include "tools/live/value_names.h"
+#include "tools/reference/value_names.h"
 
 namespace poise {
 namespace {

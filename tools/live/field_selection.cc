@@ -6,7 +6,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
-#include "tools/live/value_names.h"
+#include "tools/reference/value_names.h"
 
 namespace poise {
 namespace {

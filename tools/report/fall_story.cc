@@ -14,7 +14,7 @@ namespace {
 using logging::Event;
 using logging::EventSpan;
 
-constexpr double kSameTrouble = 0.3;  // s; what sets in again sooner had not ended
+constexpr double kSameTrouble = 0.5;  // s; what sets in again sooner had not ended
 constexpr double kLastSeconds =
     3;                        // s before the fall; of what ended, what began earlier is not told
 constexpr double kLedTo = 1;  // s before the first that did not end

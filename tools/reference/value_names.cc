@@ -1,4 +1,4 @@
-#include "tools/live/value_names.h"
+#include "tools/reference/value_names.h"
 
 #include <cstdlib>
 #include <map>
