@@ -21,7 +21,7 @@ function poise(...parameters) {
 }
 
 before(async () => {
-  poise('run', 'walk_stairs', '--variant', 'down', '--inline', '--duration', '14', '--out', path('stairs'));
+  poise('run', 'walk_stairs', '--variant', 'down', '--inline', '--duration', '24', '--out', path('stairs'));
   poise('run', 'push_double_support', '--without', 'balancing', '--inline', '--out', path('fall'));
   browser = await launchBrowser(options.web);
 });
