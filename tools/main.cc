@@ -29,9 +29,7 @@ namespace {
 
 void Fail(std::string_view problem) {
   std::fflush(stdout);
-  // A problem of the command line names the command itself.
-  poise::SayError(fmt::format("{}{}", problem.starts_with("poise ") ? "" : "poise: ",
-                              poise::logging::LinesForTerminal(problem)));
+  poise::SayError(fmt::format("poise: {}", poise::logging::LinesForTerminal(problem)));
 }
 
 /// `code`, or failure where what was printed has not come out: a full disk behind a redirection.

@@ -128,7 +128,11 @@ std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
       what = fmt::format("{} {}", what.substr(0, colon),
                          again ? "may be given once" : "needs a value");
     }
-    return fmt::format("{}: {}; {}", name, what, see);
+    // Who says it stands in front already: "poise: run: ...".
+    const size_t space = name.find(' ');
+    const std::string command_alone =
+        space == std::string::npos ? "" : name.substr(space + 1) + ": ";
+    return fmt::format("{}{}; {}", command_alone, what, see);
   }
   std::string problem;
   if (extra.front().starts_with("-") && extra.front().size() > 1) {
