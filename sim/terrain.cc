@@ -114,6 +114,18 @@ void Terrain::ReadField(const BlockField& field, uint64_t seed) {
   }
 }
 
+std::vector<Terrain::FieldTop> Terrain::FieldTops() const {
+  std::vector<FieldTop> tops;
+  const size_t rows = field_.size() / 2;
+  for (size_t i = 0; i < field_.size(); ++i) {
+    const bool left = i >= rows;
+    const double from = field_start_ + (left ? field_stagger_ : 0) +
+                        static_cast<double>(left ? i - rows : i) * field_length_;
+    tops.push_back({from, from + field_length_, left, field_[i].material.stiffness});
+  }
+  return tops;
+}
+
 int Terrain::FieldBlock(double x, double y) const {
   const auto rows = static_cast<int>(field_.size() / 2);
   const bool left = y > 0;

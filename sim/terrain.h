@@ -35,6 +35,15 @@ class Terrain {
 
   bool has_field() const { return !field_.empty(); }
 
+  /// A block of the field as long as nothing stands on it.
+  struct FieldTop {
+    double from, to;   ///< m, along x
+    bool left;         ///< y > 0; else the other lane. A lane has no outer edge.
+    double stiffness;  ///< N/m, under a whole sole
+  };
+  /// As many as the field has; its height At() any place of it tells.
+  std::vector<FieldTop> FieldTops() const;
+
  private:
   void ReadField(const BlockField& field, uint64_t seed);
   /// Of the field's blocks the one at (x, y); −1: none.

@@ -188,7 +188,10 @@ void CheckWalkConfig(const WalkConfig& config) {
     for (const double value : {command.time(), command.vx(), command.vy(), command.wz()}) {
       if (!std::isfinite(value)) throw ConfigError(field, "must be of numbers");
     }
-    if (!(command.time() > last)) throw ConfigError(field + ".time", "must come after the last's");
+    if (!(command.time() > last)) {
+      throw ConfigError(field + ".time",
+                        fmt::format("must come after command[{}].time = {}", i - 1, last));
+    }
     last = command.time();
   }
   positive(config.start(), "start");

@@ -18,6 +18,7 @@
 #include "logging/metrics/bridge_words.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/operator_words.h"
+#include "logging/metrics/planner_steps.h"
 #include "logging/metrics/schedule_plan.h"
 
 namespace poise::logging {
@@ -377,54 +378,44 @@ void AddCapturePoint(const RunRecord& run, EventList* events) {
   }
 }
 
-const char* StepReason(int8_t reason) {
-  switch (reason) {
-    case support_plan_t::REASON_PERSISTENT:
-      return "the capture point stays beyond the soles";
-    case support_plan_t::REASON_SURE:
-      return "the capture point is farther beyond the soles than balancing brings back";
-    case support_plan_t::REASON_DEADLINE:
-      return "later the foothold would be out of reach";
-    case support_plan_t::REASON_LINGERING:
-      return "the capture point lingers at the soles' edge and comes out";
-    case support_plan_t::REASON_AGAIN:
-      return "the step before did not catch the capture point";
-    case support_plan_t::REASON_WALK:
-      return "the robot walks";
-    case support_plan_t::REASON_TOGETHER:
-      return "the feet are put side by side";
-    default:
-      return "no reason";
-  }
+/// "107.8 mm inside the soles".
+std::string Inside(double margin) {
+  const double tenths = Tenths(kMilli * margin);
+  return fmt::format("{:.1f} mm {} the soles", std::abs(tenths), tenths < 0 ? "outside" : "inside");
 }
 
 void AddSteps(const RunRecord& run, EventList* events) {
-  const support_plan_t* before = nullptr;
+  for (const PlannerStep& step : PlannerSteps(run)) {
+    const std::string foot = FootName(run, step.foot);
+    // A walk's foot is unloaded before its touch-down is timed.
+    const std::string in_time =
+        step.planned_time > 0 ? fmt::format(" in {:.2f} s", step.planned_time) : std::string();
+    events->Add(step.begin, "step_begins",
+                fmt::format("{} to ({:.2f}, {:.2f}) m{}: {}", foot, step.planned.x(),
+                            step.planned.y(), in_time, StepReason(step.reason)));
+    if (!step.landing) continue;
+    // A walk plans no capture point.
+    const bool catches = step.reason != support_plan_t::REASON_WALK &&
+                         step.reason != support_plan_t::REASON_TOGETHER;
+    events->Add(
+        *step.landing, "step_lands",
+        fmt::format("{} at ({:.2f}, {:.2f}) m, {:.0f} mm from its last foothold, {:.0f} mm "
+                    "from where it stood (planned at first {:.0f} mm); capture point {}{}",
+                    foot, step.landed.x(), step.landed.y(),
+                    kMilli * (step.landed - step.foothold).norm(),
+                    kMilli * (step.landed - step.from).norm(),
+                    kMilli * (step.planned - step.from).norm(), Inside(step.margin),
+                    catches ? fmt::format(" (planned {})", Inside(step.planned_margin)) : ""));
+  }
+  int8_t before = support_plan_t::STEPPING_NONE;
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
     const support_plan_t* plan = run.plan.at(tick);
     if (plan == nullptr) continue;
-    if (before != nullptr && plan->num_steps > before->num_steps && plan->step_foot >= 0) {
-      // A walk's foot is unloaded before its touch-down is timed.
-      const std::string in_time = plan->touch_down_time > 0
-                                      ? fmt::format(" in {:.2f} s", plan->touch_down_time)
-                                      : std::string();
-      events->Add(
-          tick, "step_begins",
-          fmt::format("{} to ({:.2f}, {:.2f}) m{}: {}",
-                      FootName(run, static_cast<size_t>(plan->step_foot)), plan->foothold[0],
-                      plan->foothold[1], in_time, StepReason(plan->step_reason)));
+    if (before != support_plan_t::STEPPING_NONE &&
+        plan->stepping == support_plan_t::STEPPING_NONE) {
+      events->Add(tick, "step_rests", "the COM is at rest between the feet");
     }
-    if (before != nullptr && plan->stepping != before->stepping) {
-      if (plan->stepping == support_plan_t::STEPPING_LOADING) {
-        events->Add(tick, "step_lands",
-                    fmt::format("{}; capture point {:.1f} mm inside the soles",
-                                FootName(run, static_cast<size_t>(plan->step_foot)),
-                                kMilli * plan->capture_margin));
-      } else if (plan->stepping == support_plan_t::STEPPING_NONE) {
-        events->Add(tick, "step_rests", "the COM is at rest between the feet");
-      }
-    }
-    before = plan;
+    before = plan->stepping;
   }
 }
 

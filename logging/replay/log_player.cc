@@ -18,7 +18,7 @@ namespace {
 
 constexpr int64_t kLongestSleep = 50'000'000;  // ns, so that a stop is soon seen
 
-struct Event {
+struct PlayedEvent {
   int64_t tick;
   std::string channel;
   std::span<const uint8_t> data;
@@ -47,7 +47,7 @@ PlayResult PlayLog(const std::string& path, const std::string& url, double speed
       own_ticks.emplace(channel.name(), ChannelTicks(spec, channel, messages.reader().file_size()));
     }
   }
-  std::vector<Event> events;
+  std::vector<PlayedEvent> events;
   LogEvent event;
   int64_t newest = spec.cut().first_tick();
   while (messages.reader().Next(&event)) {
@@ -62,14 +62,14 @@ PlayResult PlayLog(const std::string& path, const std::string& url, double speed
     events.push_back({*tick, std::string(event.channel), event.data});
   }
   std::stable_sort(events.begin(), events.end(),
-                   [](const Event& a, const Event& b) { return a.tick < b.tick; });
+                   [](const PlayedEvent& a, const PlayedEvent& b) { return a.tick < b.tick; });
 
   BusSender bus(url);
   PlayResult result;
   if (events.empty()) return result;
   const double first = MakeTick(events.front().tick, spec.tick_period()).time;
   const int64_t start = NowNanoseconds();
-  for (const Event& e : events) {
+  for (const PlayedEvent& e : events) {
     const double time = MakeTick(e.tick, spec.tick_period()).time - first;
     if (!WaitUntil(start + static_cast<int64_t>(time / speed * 1e9), stop)) break;
     const bool sent = bus.Send(e.channel.c_str(), e.data.data(), e.data.size());

@@ -39,6 +39,12 @@ TEST(WalkRun, TenStepsAndAStopInEachEngine) {
     EXPECT_EQ(Measured(summary, "violated_ticks"), 0) << engine;
     EXPECT_GE(Measured(summary, "steps"), 9) << engine;
     EXPECT_LE(Measured(summary, "steps"), 12) << engine;
+    const std::string told =
+        "It walked " + std::to_string(std::lround(Measured(summary, "steps"))) + " steps";
+    std::string words = result.output;
+    std::replace(words.begin(), words.end(), '\n', ' ');
+    EXPECT_NE(words.find(told), std::string::npos) << result.output;
+    EXPECT_EQ(words.find("strayed"), std::string::npos) << result.output;
     // Eight of the strides' steps at least, 0.1 m each.
     EXPECT_GT(Measured(summary, "walk_way"), 0.6) << engine;
     if (engine == "ode") continue;

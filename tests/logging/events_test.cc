@@ -356,6 +356,51 @@ TEST_F(EventsTest, AStepThatIsNeededSaysWhereAndByWhen) {
               ElementsAre(Is(0.12, "step_needed_ends", "after 0.060 s")));
 }
 
+/// The left foot steps from (0, 0.1) to be planned at (0.3, 0.1), then (0.32, 0.1); lands at
+/// tick 60.
+class StepEventsTest : public EventsTest {
+ protected:
+  StepEventsTest() {
+    for (size_t t = 0; t < kTicks; ++t) {
+      support_plan_t& plan = plan_[t];
+      plan.step_foot = t < 30 ? -1 : 1;
+      plan.num_steps = t < 30 ? 0 : 1;
+      plan.step_reason = support_plan_t::REASON_SURE;
+      plan.stepping = t < 30   ? support_plan_t::STEPPING_NONE
+                      : t < 60 ? support_plan_t::STEPPING_SWINGING
+                      : t < 80 ? support_plan_t::STEPPING_LOADING
+                               : support_plan_t::STEPPING_NONE;
+      plan.foothold[0] = t < 40 ? 0.3 : 0.32;
+      plan.foothold[1] = 0.1;
+      plan.foot_pose[1].position[0] = t < 60 ? 0 : 0.31;
+      plan.foot_pose[1].position[1] = 0.1;
+      plan.capture_margin = -0.0125;
+      plan.foothold_margin = 0.04;
+    }
+  }
+};
+
+TEST_F(StepEventsTest, AStepThatLandsSaysWhereBesideThePlan) {
+  EXPECT_THAT(Named("step_begins"),
+              ElementsAre(Is(0.06, "step_begins", "left foot to (0.30, 0.10) m")));
+  EXPECT_THAT(
+      Named("step_lands"),
+      ElementsAre(Is(0.12, "step_lands",
+                     "left foot at (0.31, 0.10) m, 10 mm from its last foothold, 310 mm from "
+                     "where it stood (planned at first 300 mm); capture point 12.5 mm outside the "
+                     "soles (planned 40.0 mm inside the soles)")));
+  EXPECT_EQ(Named("step_rests").size(), 1u);
+}
+
+TEST_F(StepEventsTest, AStepOfAWalkPlansNoCapturePoint) {
+  for (support_plan_t& plan : plan_) {
+    plan.step_reason = support_plan_t::REASON_WALK;
+    plan.capture_margin = 0.07;
+  }
+  EXPECT_THAT(Named("step_lands"),
+              ElementsAre(Field(&Event::detail, testing::EndsWith("70.0 mm inside the soles"))));
+}
+
 TEST_F(EventsTest, BridgeStatesCarryTheirReason) {
   for (size_t t = 0; t < kTicks; ++t) {
     bridge_[t].state = t < 2    ? bridge_status_t::STATE_INIT

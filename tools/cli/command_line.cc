@@ -78,7 +78,9 @@ std::string UnknownFlag(const CLI::App& root, const CLI::App& command,
 /// both.
 std::string WithoutDoubledTypes(const std::string& help) {
   static const std::regex kChecked(R"(\b(?:INT|FLOAT|TEXT|PART):((?:INT in|FLOAT in|DIR\b|\{)))");
-  return std::regex_replace(help, kChecked, "$1");
+  // A flag that switches off is written there with what it sets.
+  static const std::regex kOff(R"((--[\w-]+)\{false\})");
+  return std::regex_replace(std::regex_replace(help, kChecked, "$1"), kOff, "$1");
 }
 
 std::string UnknownCommand(const CLI::App& command, const std::string& name) {
@@ -122,9 +124,15 @@ std::string UsageProblem(const CLI::App& app, const CLI::ParseError& error) {
     const size_t colon = what.find(':');
     // CLI11 says "--out: 1 required TEXT missing".
     if (colon != std::string::npos && dynamic_cast<const CLI::ArgumentMismatch*>(&error)) {
-      what = fmt::format("{} needs a value", what.substr(0, colon));
+      const bool again = what.find("At Most") != std::string::npos;
+      what = fmt::format("{} {}", what.substr(0, colon),
+                         again ? "may be given once" : "needs a value");
     }
-    return fmt::format("{}: {}; {}", name, what, see);
+    // Who says it stands in front already: "poise: run: ...".
+    const size_t space = name.find(' ');
+    const std::string command_alone =
+        space == std::string::npos ? "" : name.substr(space + 1) + ": ";
+    return fmt::format("{}{}; {}", command_alone, what, see);
   }
   std::string problem;
   if (extra.front().starts_with("-") && extra.front().size() > 1) {

@@ -93,19 +93,27 @@ int CheckByName(const std::string& name) {
   RunSpec spec = MakeRunSpec(loaded, {}, nullptr);
   CheckRun(loaded, &spec);
   std::string variants;
+  std::string problems;
   for (const Variant& variant : loaded.scenario.variant()) {
     RunChanges changes;
     changes.variant = variant.name();
-    const LoadedScenario changed = LoadScenario(file, changes);
-    RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
-    CheckRun(changed, &changed_spec);
-    variants += ", " + variant.name();
+    try {
+      const LoadedScenario changed = LoadScenario(file, changes);
+      RunSpec changed_spec = MakeRunSpec(changed, changes, nullptr);
+      CheckRun(changed, &changed_spec);
+      variants += ", " + variant.name();
+    } catch (const ConfigError& error) {
+      // One of a base may not fit what is run: the others are told of all the same.
+      problems += fmt::format("variant {}: {}\n", variant.name(), error.what());
+    }
   }
   fmt::print("{} with {}: {} components, {} channels, all good{}\n", loaded.files.file(),
              loaded.graph_file, spec.graph().component_size(), spec.graph().channel_size(),
              variants.empty() ? "" : "; variants too: " + variants.substr(2));
   ShowRun(spec);
-  return kExitOk;
+  if (problems.empty()) return kExitOk;
+  fmt::print(stderr, "poise: {}", problems);
+  return kExitUsage;
 }
 
 }  // namespace

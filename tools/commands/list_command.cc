@@ -212,9 +212,21 @@ int List(const ListRequest& request) {
       std::string text =
           fmt::format("{} ({} s{})", s.description(), s.duration(),
                       s.has_paper_section() ? ", paper section " + s.paper_section() : "");
+      // What a variant of the base says of itself need not be true here.
+      const auto own = ReadMessage<Scenario>(file);
+      std::string inherited;
       for (const Variant& variant : s.variant()) {
+        const bool here = std::ranges::any_of(
+            own.variant(), [&](const Variant& other) { return other.name() == variant.name(); });
+        if (!here) {
+          inherited += (inherited.empty() ? "" : ", ") + variant.name();
+          continue;
+        }
         text += fmt::format("\n      --variant {}: {}{}", variant.name(), variant.description(),
                             variant.name() == s.reference() ? " (the reference)" : "");
+      }
+      if (!inherited.empty()) {
+        text += fmt::format("\n      of its base {}, described there: {}", own.base(), inherited);
       }
       return text;
     });

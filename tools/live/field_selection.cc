@@ -6,6 +6,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
+#include "tools/reference/value_names.h"
 
 namespace poise {
 namespace {
@@ -13,13 +14,13 @@ namespace {
 class Collect final : public ScalarVisitor {
  public:
   void Integer(std::string_view path, int64_t value) override {
-    scalars.push_back({std::string(path), value});
+    scalars.push_back({std::string(path), value, {}});
   }
   void Real(std::string_view path, double value) override {
-    scalars.push_back({std::string(path), value});
+    scalars.push_back({std::string(path), value, {}});
   }
   void Text(std::string_view path, std::string_view value) override {
-    scalars.push_back({std::string(path), std::string(value)});
+    scalars.push_back({std::string(path), std::string(value), {}});
   }
   std::vector<Scalar> scalars;
 };
@@ -101,7 +102,12 @@ std::optional<std::vector<Scalar>> ReadScalars(const MessageType& type,
                                                const logging::ElementNames& names) {
   Collect collect;
   if (!type.visit(data.data(), static_cast<int64_t>(data.size()), &collect)) return std::nullopt;
-  for (Scalar& scalar : collect.scalars) scalar.path = names.Label(type.name, scalar.path);
+  for (Scalar& scalar : collect.scalars) {
+    if (const int64_t* const value = std::get_if<int64_t>(&scalar.value)) {
+      scalar.name = ValueName(type.name, scalar.path, *value);
+    }
+    scalar.path = names.Label(type.name, scalar.path);
+  }
   return std::move(collect.scalars);
 }
 

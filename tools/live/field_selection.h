@@ -18,6 +18,7 @@ namespace poise {
 struct Scalar {
   std::string path;  ///< "foot_wrench[1].force[2]", or with names "foot_wrench[left].force[2]"
   std::variant<int64_t, double, std::string> value;
+  std::string name = {};  ///< of an enumeration's value, "LOADING"; empty: it has none
 };
 
 /// All scalars of an encoded message, in order of declaration, elements called by `names`; none

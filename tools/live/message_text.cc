@@ -23,7 +23,8 @@ std::string ShortValue(const Scalar& scalar) {
       return '"' + logging::Printable(value) + '"';
     }
   };
-  return std::visit(Format{}, scalar.value);
+  const std::string value = std::visit(Format{}, scalar.value);
+  return scalar.name.empty() ? value : fmt::format("{}({})", value, scalar.name);
 }
 
 std::string CsvValue(const Scalar& scalar) {

@@ -188,7 +188,8 @@ std::vector<std::string> Sentences::OfSweep() const {
   }
   std::string where;
   for (size_t i = 0; i < count(); ++i) {
-    const std::string text = IsNumber(i) ? Failures(i) : "";
+    // Seeds have no order: a range of them says nothing.
+    const std::string text = IsNumber(i) && !IsSeed(variable(i)) ? Failures(i) : "";
     if (!text.empty()) where += (where.empty() ? "" : "; ") + text;
   }
   if (!where.empty()) sentences.push_back("Those that do not have " + where + ".");
@@ -218,14 +219,18 @@ std::vector<std::string> Sentences::OfLimits() const {
     return place.empty() ? "" : fmt::format(" ({})", place);
   };
   std::vector<std::string> sentences;
+  // What lies between two values that were tried is not known.
+  const std::string every =
+      fmt::format(" (tried: {} values from {} to {}, then finer about where survival ends)",
+                  limit.samples(), Quantity(limit.min(), unit), Quantity(limit.max(), unit));
   if (least && least->first == most->first) {
-    sentences.push_back(fmt::format("The largest {} survived is {}{}.", name,
+    sentences.push_back(fmt::format("Nothing fell up to a {} of {}{}{}.", name,
                                     Quantity(least->first, unit),
-                                    found.size() == 1 ? at(least->second) : ""));
+                                    found.size() == 1 ? at(least->second) : "", every));
   } else if (least) {
-    sentences.push_back(fmt::format("The largest {} survived is between {}{} and {}{}.", name,
+    sentences.push_back(fmt::format("Nothing fell up to a {} between {}{} and {}{}{}.", name,
                                     Quantity(least->first, unit), at(least->second),
-                                    Quantity(most->first, unit), at(most->second)));
+                                    Quantity(most->first, unit), at(most->second), every));
   }
   const auto add = [&](size_t number, const std::string& what) {
     if (number > 0) {
@@ -234,7 +239,10 @@ std::vector<std::string> Sentences::OfLimits() const {
   };
   add(none, fmt::format("not even {} is survived", Quantity(limit.min(), unit)));
   add(open, fmt::format("{} is survived, the most that was tried", Quantity(limit.max(), unit)));
-  add(broken, "something beyond the limit is survived again");
+  add(broken, broken == 1 && found.size() == 1
+                  ? fmt::format("{} is survived again, beyond one that was not",
+                                Quantity(*found.front().search.largest_survived(), unit))
+                  : "something beyond one that was not is survived again");
   return sentences;
 }
 

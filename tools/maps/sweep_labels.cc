@@ -47,6 +47,8 @@ std::string PlainNameOf(const Quantity& quantity) {
 std::string PlainName(const Variable& variable) { return PlainNameOf(variable); }
 std::string PlainName(const Limit& limit) { return PlainNameOf(limit); }
 
+bool IsSeed(const Variable& variable) { return variable.field() == "seed"; }
+
 std::string UnitOf(const Variable& variable) {
   if (variable.has_unit()) return variable.unit();
   return variable.angle() ? "°" : UnitOfField(variable.field());

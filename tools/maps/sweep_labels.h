@@ -11,6 +11,9 @@ namespace poise {
 std::string PlainName(const Variable& variable);
 std::string PlainName(const Limit& limit);
 
+/// The variable is the run's seed, which has no order.
+bool IsSeed(const Variable& variable);
+
 /// Of the variable itself, else of the scenario's field that it sets; "°" of an angle; may be
 /// empty.
 std::string UnitOf(const Variable& variable);

@@ -252,7 +252,9 @@ SweepMaps Maps::OfSweep() const {
   }
   if (sweep_.map_size() > 0) return maps;
   if (count() == 1) {
-    maps.survival.push_back(Curve(0, kStandsValue));
+    // Over seeds, which have no order, a point at 0 or 1 for each tells less than the table.
+    const bool seed = IsSeed(variable(0));
+    if (!seed) maps.survival.push_back(Curve(0, kStandsValue));
     for (const std::string& column : header_.columns) {
       std::string constant = ConstantSentence(column);
       if (constant.empty()) {
@@ -263,7 +265,11 @@ SweepMaps Maps::OfSweep() const {
     }
   }
   for (size_t y = 0; y < count(); ++y) {
-    for (size_t x = 0; x < y; ++x) maps.survival.push_back(Pair(x, y, kStandsValue));
+    if (IsSeed(variable(y))) continue;
+    for (size_t x = 0; x < y; ++x) {
+      if (IsSeed(variable(x))) continue;
+      maps.survival.push_back(Pair(x, y, kStandsValue));
+    }
   }
   return maps;
 }

@@ -74,7 +74,8 @@ class MapFiles {
     }
     drawing_.clear();
     if (charts_ > 0) {
-      fmt::print("{}: {} maps, {} as .png\n", (folder_ / "map_1.svg").string(), charts_, drawn_);
+      fmt::print("{}: {} map{}, {} as .png\n", (folder_ / "map_1.svg").string(), charts_,
+                 charts_ == 1 ? "" : "s", drawn_);
     }
     if (!problem_.empty()) {
       fmt::print(stderr, "poise: the maps are not all there as PNG: {}\n", problem_);

@@ -22,6 +22,8 @@
 #include "logging/export/signal_table.h"
 #include "logging/metrics/events.h"
 #include "logging/partial_file.h"
+#include "tools/report/ground_json.h"
+#include "tools/report/run_story.h"
 #include "tools/robot/robot_json.h"
 
 namespace poise {
@@ -251,6 +253,8 @@ Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
   json["scenario"] = ScenarioJson(scenario);
   json["scenario_text"] = record.info.scenario;
   json["robot"] = RobotJson(record);
+  json["ground"] = GroundJson(scenario.sim(), record.spec.seed());
+  json["story"] = "";
   json["events"] = Json::array();
   json["messages"] = Json::array();  // the page has Poise's own
   for (const std::string_view file : MessageDefinitions()) {
@@ -269,6 +273,7 @@ void WriteRun(const ReportedRun& run, size_t index, double megabytes, std::ostre
   json["run"]["log"] = LogName(run.log);
   const std::vector<logging::Event> events = logging::Events(run.record);
   json["events"] = EventsJson(events);
+  json["story"] = TellRun(run.record, run.checks, events, "");
   BlobWriter blobs(out, index);
   const logging::PageRows rows = RowsOf(run.record, events, megabytes);
   if (rows.every_tick()) {

@@ -273,28 +273,6 @@ std::string FormatProcesses(const RunOutcome& outcome) {
   return fmt::format("\n{}", FormatColumns(rows));
 }
 
-std::string FormatEvents(const std::vector<logging::Event>& events) {
-  constexpr size_t kFirst = 30;
-  constexpr size_t kLast = 10;
-  std::string text = events.empty() ? "" : "Events:\n";
-  size_t width = 0;
-  for (const logging::Event& event : events) width = std::max(width, event.name.size());
-  for (size_t i = 0; i < events.size(); ++i) {
-    if (events.size() > kFirst + kLast + 1 && i == kFirst) {
-      const size_t hidden = events.size() - kFirst - kLast;
-      text += fmt::format("  ... {} more, all of them in summary.json ...\n", hidden);
-      i += hidden;
-    }
-    std::string name = events[i].name;
-    std::replace(name.begin(), name.end(), '_', ' ');
-    text += Wrapped(fmt::format("  {:7.3f} s  {:<{}}  {}", events[i].time, name, width,
-                                events[i].detail),
-                    ScreenStyle().columns, static_cast<int>(width) + 15) +
-            "\n";
-  }
-  return text;
-}
-
 std::string FormatAssumptions(const Scenario& scenario) {
   if (scenario.assumption_size() == 0) return "";
   std::string text = "Not given by the paper:\n";

@@ -56,8 +56,6 @@ TableCell VerdictCell(const CheckResult& check);
 std::string FormatFaults(const RunOutcome& outcome);
 /// The processes of a run in real time: latencies, deadlines, what the system granted, memory.
 std::string FormatProcesses(const RunOutcome& outcome);
-/// A line each; of a long list the first and the last ones.
-std::string FormatEvents(const std::vector<logging::Event>& events);
 /// The scenario's assumptions with the values they have.
 std::string FormatAssumptions(const Scenario& scenario);
 

@@ -12,6 +12,7 @@
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/text_table.h"
+#include "tools/report/event_list.h"
 #include "tools/report/run_story.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/registry.h"

@@ -9,6 +9,8 @@
 #include "logging/metrics/metrics.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
+#include "tools/report/fall_story.h"
+#include "tools/report/step_story.h"
 
 namespace poise {
 namespace {
@@ -16,25 +18,13 @@ namespace {
 using logging::Event;
 using logging::RunRecord;
 
-constexpr size_t kFigures = 3;   // in the second sentence
-constexpr size_t kTroubles = 4;  // likewise
-constexpr size_t kSupports = 5;  // named one by one
+constexpr size_t kFigures = 3;            // in the second sentence
+constexpr size_t kSupports = 5;           // named one by one
+constexpr double kReferenceMoved = 5e-3;  // m, of a reference that is none to stand at
 
 struct Words {
   std::string_view name;
   std::string_view words;  // {} stands for the figure, or for the event's detail
-};
-
-constexpr Words kTrouble[] = {
-    {"contact_early", "contact came early ({})"},
-    {"contact_late", "contact came late ({})"},
-    {"searching", "a foot searched for the ground ({})"},
-    {"no_surface", "a foot found no ground ({})"},
-    {"contact_lost", "contact was lost ({})"},
-    {"eta_infeasible_begins", "no distribution between the feet met all conditions"},
-    {"cop_not_achieved_begins", "the centre of pressure could not be kept in its limits"},
-    {"step_needed", "the capture point left the soles, which only a step can answer"},
-    {"bridge_state", "the bridge went from {}"},
 };
 
 constexpr Words kFigure[] = {
@@ -160,29 +150,30 @@ std::string Fill(std::string_view words, const std::string& text) {
   return filled;
 }
 
-/// The first of each kind of trouble before the fall; empty when there was none.
-std::string TroubleBefore(double fall, const std::vector<Event>& events) {
-  std::vector<std::string_view> seen;
-  std::vector<std::string> parts;
-  for (const Event& event : events) {
-    if (event.time > fall || parts.size() == kTroubles) break;
-    const Words* const words = Find(kTrouble, event.name);
-    if (words == nullptr || std::find(seen.begin(), seen.end(), event.name) != seen.end()) continue;
-    // At its start the bridge comes to follow: no trouble.
-    if (event.name == "bridge_state" && !event.detail.starts_with("running")) continue;
-    seen.emplace_back(words->name);
-    parts.push_back(fmt::format("at {} {}", Seconds(event.time), Fill(words->words, event.detail)));
+/// The COM was to go somewhere: what its error is of is then said.
+bool ComWasMoved(const RunRecord& run) {
+  std::array<double, 2> least{}, most{};
+  bool known = false;
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const support_plan_t* const plan = run.plan.at(tick);
+    if (plan == nullptr) continue;
+    for (size_t i = 0; i < 2; ++i) {
+      const double x = plan->com_reference.position[i];
+      least[i] = known ? std::min(least[i], x) : x;
+      most[i] = known ? std::max(most[i], x) : x;
+    }
+    known = true;
   }
-  if (parts.empty()) return "Nothing else went wrong before it fell.";
-  return fmt::format("Before it fell: {}.", Joined(parts, "; "));
+  return most[0] - least[0] > kReferenceMoved || most[1] - least[1] > kReferenceMoved;
 }
 
-std::string Figure(const CheckResult& check) {
+std::string Figure(const CheckResult& check, bool moved) {
   const Words* const words = Find(kFigure, check.name);
   const std::string measured = FormatMeasured(check);
   const std::string paper = check.paper.empty() ? "" : fmt::format("paper: {}", check.paper);
   std::string text = words != nullptr ? Fill(words->words, measured)
                                       : fmt::format("{}: {}", check.label, measured);
+  if (moved && check.name.starts_with("com_error_")) text += " of its reference";
   return paper.empty() ? text : fmt::format("{} ({})", text, paper);
 }
 
@@ -198,28 +189,35 @@ std::string BridgeTrouble(const std::vector<Event>& events) {
 /// Figures beside the paper's; those of any run where the scenario has none.
 std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks) {
   std::vector<std::string> parts;
+  const bool stepped = MadeSteps(run), moved = ComWasMoved(run);
+  const auto tells = [&](std::string_view name) {
+    // While it steps the COM leads its reference: the error is not how far it went.
+    return !stepped || !name.starts_with("com_error_");
+  };
   for (const CheckResult& check : checks) {
     const bool beside = !check.paper.empty() && check.measured && !check.unit.empty();
     // What was done to the robot is in the first sentence.
-    if (!beside || check.name.starts_with("push_") || parts.size() == kFigures) continue;
-    parts.push_back(Figure(check));
+    if (!beside || check.name.starts_with("push_") || parts.size() == kFigures ||
+        !tells(check.name)) {
+      continue;
+    }
+    parts.push_back(Figure(check, moved));
   }
   if (!parts.empty()) return Capital(Joined(parts, "; ")) + ".";
   for (const char* name :
        {"com_error_max_x", "com_error_max_y", "balancing_active", "joint_torque_share"}) {
+    if (!tells(name)) continue;
     const logging::Metric* const metric = logging::FindMetric(name);
     CheckResult figure;
     figure.name = name;
     figure.unit = metric->unit;
     figure.measured = metric->compute(run);
-    if (figure.measured && parts.size() < kFigures) parts.push_back(Figure(figure));
+    if (figure.measured && parts.size() < kFigures) parts.push_back(Figure(figure, moved));
   }
   return parts.empty() ? "" : Capital(Joined(parts, "; ")) + ".";
 }
 
 }  // namespace
-
-bool IsTrouble(std::string_view event) { return Find(kTrouble, event) != nullptr; }
 
 std::string EndReason(const RunRecord& run) {
   std::string reason;
@@ -256,7 +254,9 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
   if (fall != events.end()) {
     first += fmt::format("{} fell at {} of {}{}", and_, Seconds(fall->time),
                          FormatNumber(planned, "s"), HowItFell(run));
-    return fmt::format("{}. {}", Capital(first), TroubleBefore(fall->time, events));
+    const std::string steps = TellSteps(run);
+    return fmt::format("{}. {}{}{}", Capital(first), steps, steps.empty() ? "" : " ",
+                       TellFall(run, fall->time, events));
   }
   const std::string reason = end.empty() ? EndReason(run) : end;
   const std::string on =
@@ -270,7 +270,11 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
   }
   first += BridgeTrouble(events);
   const std::string figures = Figures(run, checks);
-  return fmt::format("{}.{}{}", Capital(first), figures.empty() ? "" : " ", figures);
+  std::string text = Capital(first) + ".";
+  for (const std::string& more : {TellSteps(run), figures}) {
+    if (!more.empty()) text += " " + more;
+  }
+  return text;
 }
 
 }  // namespace poise

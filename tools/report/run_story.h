@@ -12,13 +12,10 @@
 
 namespace poise {
 
-/// True for an event (logging::Events) that tells of something wrong before a run's end.
-bool IsTrouble(std::string_view event);
-
 /// Where the run's end was not the planned one: why, as its components say; empty when none does.
 std::string EndReason(const logging::RunRecord& run);
 
-/// What happened to the robot; then what went wrong first, where it fell, or else its figures,
+/// What happened to the robot, and by which steps; then what led to its fall, or else its figures,
 /// beside the paper's where the scenario gives them. Everything comes from the run itself. `end`:
 /// why the run ended, where its starter knows more than the log; empty otherwise.
 std::string TellRun(const logging::RunRecord& run, const std::vector<CheckResult>& checks,

@@ -121,15 +121,20 @@ RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_p
 void ScenarioRun::PrintHeading() const {
   const Scenario& scenario = main_.loaded.scenario;
   const RunSpec& spec = main_.spec;
-  std::string text = fmt::format("{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong),
-                                 scenario.has_paper_section()
-                                     ? fmt::format(" (the paper's {})", scenario.paper_section())
-                                     : "",
-                                 scenario.description());
-  if (main_.loaded.variant && main_.loaded.variant->has_description()) {
-    text += fmt::format("variant {}: {}\n", main_.loaded.variant->name(),
-                        main_.loaded.variant->description());
-  }
+  const bool varied = main_.loaded.variant.has_value();
+  const std::string variant =
+      varied ? fmt::format(", variant {}", main_.loaded.variant->name()) : "";
+  const std::string paper =
+      scenario.has_paper_section()
+          ? fmt::format(" ({}the paper's {})", ChangedByHand(scenario) ? "changed from " : "",
+                        scenario.paper_section())
+          : "";
+  std::string text =
+      fmt::format("{}{}{}: {}\n", Toned(spec.scenario(), Tone::kStrong), variant, paper,
+                  varied && main_.loaded.variant->has_description()
+                      ? fmt::format("{} (a variant of: {})", main_.loaded.variant->description(),
+                                    scenario.description())
+                      : scenario.description());
   text += FormatChanges(scenario);
   if (reference_) {
     text += fmt::format("compared with variant {}, which runs first, in one process\n",

@@ -114,11 +114,24 @@ std::string KindNames(const std::vector<std::string>& kinds) {
   return Joined(names, " or ");
 }
 
+/// Names of `kinds` that `name` may have meant by their last part: "heron/heron" of "hero".
+std::vector<std::string> NearestLast(const std::string& name, const std::set<std::string>& names) {
+  std::vector<std::string> last, found;
+  for (const std::string& each : names) last.push_back(fs::path(each).filename().string());
+  for (const std::string& near : Nearest(fs::path(name).filename().string(), last)) {
+    for (const std::string& each : names) {
+      const bool meant = fs::path(each).filename() == near;
+      if (meant && std::ranges::find(found, each) == found.end()) found.push_back(each);
+    }
+  }
+  return found;
+}
+
 [[noreturn]] void FailToFind(const std::vector<std::string>& kinds, const std::string& name,
                              const fs::path& beside, BaseFiles bases) {
   if (name.empty()) throw ConfigError(fmt::format("no {} is named", KindNames(kinds)));
   std::vector<std::string> searched;
-  std::set<std::string> names;
+  std::set<std::string> names, listed;
   for (const std::string& kind : kinds) {
     const std::vector<fs::path> candidates = Candidates(kind, name, beside);
     for (const fs::path& file : candidates) {
@@ -126,12 +139,23 @@ std::string KindNames(const std::vector<std::string>& kinds) {
         searched.push_back(file.string());
       }
     }
+    // A file beside may be of any kind: it is named where its name is near alone.
     names.merge(NamesThere(candidates, name));
     if (name.ends_with(kEnding)) continue;
-    for (const std::string& listed : ListNames(kind)) names.insert(listed);
+    for (const std::string& each : ListNames(kind)) listed.insert(each);
   }
-  if (bases == BaseFiles::kRefused) std::erase_if(names, IsBase);
-  const std::string near = names.empty() ? "" : Suggest(name, {names.begin(), names.end()}) + "; ";
+  std::set<std::string> all = names;
+  all.insert(listed.begin(), listed.end());
+  if (bases == BaseFiles::kRefused) {
+    std::erase_if(all, IsBase);
+    std::erase_if(listed, IsBase);
+  }
+  std::vector<std::string> meant = Nearest(name, {all.begin(), all.end()});
+  if (meant.empty()) meant = NearestLast(name, all);
+  const std::set<std::string>& has = name.ends_with(kEnding) ? all : listed;
+  const std::string near = !meant.empty() ? fmt::format("did you mean {}?; ", Joined(meant, " or "))
+                           : has.empty()  ? ""
+                                          : Suggest(name, {has.begin(), has.end()}) + "; ";
   throw ConfigError(fmt::format("no {} named '{}'; {}searched: {}", KindNames(kinds), name, near,
                                 Joined(searched, ", ")));
 }

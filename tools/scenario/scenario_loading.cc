@@ -382,6 +382,18 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
 
 }  // namespace
 
+/// What the variant sets in the group of fields at `parent`.
+std::string SetsBeside(const LoadedScenario& loaded, std::string_view parent) {
+  std::string sets;
+  for (const FieldChange& change : loaded.changes) {
+    const std::string path = PathOf(loaded, change);
+    if (change.by != VariantLabel(*loaded.variant)) continue;
+    if (std::string_view(path).substr(0, path.rfind('.')) != parent) continue;
+    sets += (sets.empty() ? "" : ", ") + change.set;
+  }
+  return sets;
+}
+
 void FailField(const LoadedScenario& loaded, std::string_view field, std::string_view problem) {
   const auto concerns = [&](const std::string& path) {
     return field == path || field.starts_with(path + ".") || field.starts_with(path + "[") ||
@@ -397,6 +409,14 @@ void FailField(const LoadedScenario& loaded, std::string_view field, std::string
     written = fmt::format("variant[{}].{}", loaded.variant_index, field);
   }
   const FieldPlace place = loaded.files.Locate(written);
+  // A variant may contradict what its scenario's file says beside what it sets.
+  const auto parent = [](std::string_view path) { return path.substr(0, path.rfind('.')); };
+  for (const FieldChange& change : loaded.changes) {
+    if (!loaded.variant || change.by != VariantLabel(*loaded.variant)) continue;
+    if (parent(PathOf(loaded, change)) != parent(field) || place.line == 0) continue;
+    throw ConfigError(fmt::format("{}:{}: {}: {}; {} sets {}", place.file, place.line, place.field,
+                                  problem, change.by, SetsBeside(loaded, parent(field))));
+  }
   if (place.line == 0) throw ConfigError(fmt::format("{}: {}: {}", place.file, field, problem));
   throw ConfigError(fmt::format("{}:{}: {}: {}", place.file, place.line, place.field, problem));
 }
@@ -480,6 +500,14 @@ std::string FormatChanges(const Scenario& scenario) {
     text += fmt::format("\n--ideal: {}", scenario.ideal().reason());
   }
   return text.empty() ? "" : text + "\n";
+}
+
+bool ChangedByHand(const Scenario& scenario) {
+  const Applied& applied = scenario.applied();
+  return applied.has_variant() || applied.ablation_size() > 0 ||
+         std::ranges::any_of(applied.change(), [](const Applied::Change& change) {
+           return change.by() == kSetFlag || change.by() == kRobotFlag;
+         });
 }
 
 std::string ScenarioText(const Scenario& scenario) { return TextOf(scenario); }

@@ -67,6 +67,8 @@ RunChanges ReferenceChanges(const LoadedScenario& loaded, const RunChanges& chan
 
 /// A line for each flag and the variant: what they changed.
 std::string FormatChanges(const Scenario& scenario);
+/// A variant, --without, --ideal, --set or --robot made another experiment of it.
+bool ChangedByHand(const Scenario& scenario);
 
 /// Throws the ConfigError of a value of the scenario: with file and line of `field`, a path in the
 /// merged scenario, or with the flag that changed it.

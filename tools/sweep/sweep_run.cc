@@ -17,8 +17,9 @@
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/temporary_dir.h"
+#include "tools/cli/text_table.h"
+#include "tools/report/fall_story.h"
 #include "tools/report/report.h"
-#include "tools/report/run_story.h"
 #include "tools/run/estimates.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
@@ -99,18 +100,21 @@ std::string PhaseAtEnd(const logging::RunRecord& run) {
 }
 
 void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
+  const std::vector<logging::Event> events = logging::Events(run);
+  const auto fall = std::ranges::find(events, std::string("fall"), &logging::Event::name);
   std::vector<std::string> troubles;
-  for (const logging::Event& event : logging::Events(run)) {
-    if (event.name == "fall") {
-      row->fell_at = event.time;
-      break;
-    }
-    if (IsTrouble(event.name) &&
-        std::find(troubles.begin(), troubles.end(), event.name) == troubles.end()) {
-      troubles.push_back(event.name);
+  const auto add = [&](const std::string& name) {
+    if (std::ranges::find(troubles, name) == troubles.end()) troubles.push_back(name);
+  };
+  if (fall != events.end()) {
+    row->fell_at = fall->time;
+    for (const Trouble& trouble : TroublesBefore(fall->time, events)) add(trouble.name);
+  } else {
+    for (const logging::Event& event : events) {
+      if (IsTrouble(event.name)) add(event.name);
     }
   }
-  for (const std::string& name : troubles) row->trouble += (row->trouble.empty() ? "" : "+") + name;
+  row->trouble = Joined(troubles, "+");
 }
 
 }  // namespace

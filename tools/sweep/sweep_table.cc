@@ -188,6 +188,19 @@ std::string FormatWarnings(const SweepRows& rows) {
   return text;
 }
 
+/// "step needed, bridge state" of "step_needed+bridge_state": words, between which a cell breaks.
+std::string Words(const std::string& trouble) {
+  std::string words;
+  for (const char c : trouble) {
+    if (c == '+') {
+      words += ", ";
+    } else {
+      words += c == '_' ? ' ' : c;
+    }
+  }
+  return words.empty() ? "-" : words;
+}
+
 }  // namespace
 
 std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
@@ -214,7 +227,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
                    [](const auto& a, const auto& b) { return a.second > b.second; });
   std::vector<TableRow> table = {{"fell", "in phase", "after"}};
   for (const auto& [way, count] : sorted) {
-    table.push_back({fmt::format("{}", count), way.first, way.second.empty() ? "-" : way.second});
+    table.push_back({fmt::format("{}", count), way.first, Words(way.second)});
   }
   return text + "\n" + FormatColumns(table);
 }
@@ -225,8 +238,10 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
   std::vector<std::string> heading = PlaceNames(header.sweep);
   const std::string unit = limit.has_unit() ? fmt::format(" [{}]", limit.unit()) : "";
   heading.push_back(NameOf(limit) + unit);
-  heading.insert(heading.end(), {"largest survived", ""});
   const std::vector<LimitPoint> found = LimitPoints(header, rows);
+  const bool again =
+      std::ranges::any_of(found, [](const LimitPoint& point) { return !point.search.monotone(); });
+  if (again) heading.emplace_back("survived again");
   const bool push = std::any_of(found.begin(), found.end(),
                                 [](const LimitPoint& p) { return p.any->push.has_value(); });
   if (push) heading.insert(heading.end(), {"N·s", "of pendulum", "for the duration"});
@@ -243,8 +258,7 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
     };
     cells.push_back(
         fmt::format("{}{}", search.fails_at() ? "" : "at least ", number(search.limit())));
-    cells.push_back(search.monotone() ? "" : number(search.largest_survived()));
-    cells.emplace_back(search.monotone() ? "" : "not monotone");
+    if (again) cells.push_back(search.monotone() ? "" : number(search.largest_survived()));
     if (push) {
       const bool known = point.at_limit != nullptr && point.at_limit->push;
       const PushBound bound = known ? *point.at_limit->push : PushBound();

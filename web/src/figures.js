@@ -89,6 +89,13 @@ function jointTorque(figure, run, joint) {
 const bodyRoll = (figure, note) => ({figure, title: 'Orientation error of the body about x', unit: 'rad', note,
   series: [series('desired less actual', 'computed', 'task_torque_t', 'body_orientation_error[0]')]});
 
+/** "variant step", "without balancing", "2 settings changed": what the run has besides its scenario. */
+export function changesOf({variant, ablations = [], changes = []}) {
+  const sets = changes.filter((change) => ['--set', '--robot'].includes(change.by)).length;
+  return [variant ? `variant ${variant}` : '', ...ablations.map((flag) => flag.replace(/^--/, '')),
+    sets ? `${sets} setting${sets === 1 ? '' : 's'} changed` : ''].filter(Boolean);
+}
+
 /** The paper's figures by section. */
 const SECTIONS = {
   '7.1': (run) => [...footWrenches(run, '6'),
@@ -156,7 +163,9 @@ function common(run, covered) {
 export function figuresFor(run) {
   const section = /7\.[1-5]/.exec(run.scenario.paper_section ?? '')?.[0];
   const wanted = [...(SECTIONS[section] ?? defaults)(run), ...common(run, section)];
-  return wanted.map((panel) => ({...panel, series: panel.series
+  const changed = changesOf(run.meta.run).length > 0;
+  const noteOf = ({note}) => (changed ? note?.replace(/The paper's largest( error)?:/, "The paper's largest$1, of its own experiment:") : note);
+  return wanted.map((panel) => ({...panel, note: noteOf(panel), series: panel.series
     .map((s) => ({...s, signal: findSignal(run, s)})).filter((s) => s.signal)}))
     .filter((panel) => panel.series.some((s) => s.role !== 'limit'));
 }

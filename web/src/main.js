@@ -5,7 +5,7 @@ import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
-import {figuresFor} from './figures.js';
+import {changesOf, figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
@@ -33,16 +33,21 @@ function buildOf({versions, poise_commit: commit, instruction_set: instructions}
 
 function header(run, overlay, feed) {
   const {run: r} = run.meta;
+  const changes = changesOf(r);
+  const variant = (run.scenario.variant ?? []).find((v) => v.name === r.variant);
   const state = element('span', {class: 'badges'});
   const update = () => state.replaceChildren(...stateBadges(run, feed));
   for (const event of feed ? ['state', 'status'] : []) feed.addEventListener(event, update);
-  document.title = `${r.scenario} – Poise`;
+  document.title = `${[r.scenario, ...changes].join(', ')} – Poise`;
   document.getElementById('header').append(
-    element('h1', {}, r.scenario), element('p', {}, run.scenario.description ?? ''),
-    r.paper_section ? element('span', {class: 'badge'}, `paper, section ${r.paper_section}`) : '',
+    element('h1', {}, r.scenario), ...changes.map((change) => element('span', {class: 'badge change'}, change)),
+    element('p', {}, variant?.description ? `${variant.description} (a variant of: ${run.scenario.description ?? ''})`
+      : run.scenario.description ?? ''),
+    r.paper_section ? element('span', {class: 'badge'}, changes.length ? `changed from the paper's section ${r.paper_section}`
+      : `paper, section ${r.paper_section}`) : '',
     state, element('span', {class: 'soft'}, `${r.started_at}, ${buildOf(r)}`),
     overlay ? element('span', {class: 'badge second'}, `over it, dashed: ${overlay.meta.run.scenario}, ${overlay.meta.run.started_at}`)
-      : '');
+      : '', run.meta.story ? element('p', {class: 'story'}, run.meta.story) : '');
   update();
 }
 
@@ -75,6 +80,8 @@ function sceneKey(run, overlay) {
     entry('support', '▰', 'footprints and when the foot came down: right blue, left orange; ╌ planned'),
     run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'from inside, 0, ╌ 1, 2 steps bring it to rest (approximate)') : '',
     entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
+    run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'),
+      'blocks as nothing stands on them (a lane has no outer edge): light soft, dark stiff') : '',
     run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
     overlay ? entry('desired', '▒', 'second run') : '');
 }

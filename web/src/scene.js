@@ -8,6 +8,7 @@ import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {CraneView} from './crane.js';
 import {lightLoad} from './derived.js';
 import {element} from './dom.js';
+import {GroundBlocks} from './ground.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
 import {place, RobotView} from './robot_view.js';
 import {isDark} from './palette.js';
@@ -155,6 +156,10 @@ export class SceneView {
       this.block = new Block(block);
       scene.add(this.block.object);
     }
+    if (this.run.meta.ground?.length) {
+      this.blocks = new GroundBlocks(this.run.meta.ground);
+      scene.add(this.blocks.object);
+    }
     this.colored = [];  // [material, name of COLORS]
     const colored = (material, name) => { this.colored.push([material, name]); };
     const flat = (kind, name, size) => {
@@ -272,12 +277,13 @@ export class SceneView {
 
   /** The view, the ground and its grid go with a robot that walks away. */
   #follow() {
-    const {x, y} = this.robotView.object.position;
+    const {x, y, z} = this.robotView.object.position;
     const {target} = this.controls;
     const away = Math.hypot(x - target.x, y - target.y);
-    if (away > FOLLOW) {
-      const share = 1 - FOLLOW / away;
-      const move = new Vector3((x - target.x) * share, (y - target.y) * share, 0);
+    const up = z - target.z;  // on stairs
+    if (away > FOLLOW || Math.abs(up) > FOLLOW) {
+      const share = Math.max(0, 1 - FOLLOW / away), rise = Math.max(0, 1 - FOLLOW / Math.abs(up));
+      const move = new Vector3((x - target.x) * share, (y - target.y) * share, up * rise);
       target.add(move);
       this.camera.position.add(move);
       this.controls.update();

@@ -10,8 +10,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <regex>
+#include <string>
+#include <vector>
 
 #include "components/framework/configuration/added_fields.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
 namespace poise {
@@ -34,11 +38,28 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
     for (char& c : text) {
       if (c == '\n') c = ' ';
     }
+    text += Meant(text);
     if (line_ < 0) return fmt::format("{}: {}", source, text);
     return fmt::format("{}:{}:{}: {}", source, line_ + 1, column_ + 1, text);
   }
 
  private:
+  /// What the parser does not say of a field that there is not: which one is near.
+  static std::string Meant(const std::string& problem) {
+    static const std::regex kNoField(R"re("([\w.]+)" has no field named "(\w+)")re");
+    std::smatch parts;
+    if (!std::regex_search(problem, parts, kNoField)) return "";
+    const auto* const type =
+        google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(parts[1]);
+    if (type == nullptr) return "";
+    std::vector<std::string> names;
+    for (int i = 0; i < type->field_count(); ++i) names.push_back(type->field(i)->name());
+    const std::vector<std::string> near = Nearest(parts[2].str(), names);
+    std::string text;
+    for (const std::string& name : near) text += (text.empty() ? "" : " or ") + name;
+    return text.empty() ? "" : fmt::format(" Did you mean {}?", text);
+  }
+
   bool any_ = false;
   int line_ = -1;
   int column_ = 0;
