@@ -46,6 +46,20 @@ TEST(Legs, SegmentsAreAsFarApartAsTheirNearestPoints) {
   }
 }
 
+TEST(Legs, AtTheHighestALegIsStretchedAsAsked) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const Legs legs(model);
+  for (const double x : {-0.2, 0.0, 0.3}) {
+    for (int foot = 0; foot < 2; ++foot) {
+      const Eigen::Vector2d sole(x, foot == 0 ? -0.1 : 0.1);
+      const LegLine line =
+          legs.At(foot, Vector3d(sole.x(), sole.y(), -legs.Highest(foot, sole, 0.9)));
+      const double straight = (line.knee - line.hip).norm() + (line.ankle - line.knee).norm();
+      EXPECT_NEAR((line.ankle - line.hip).norm(), 0.9 * straight, 1e-9) << x;
+    }
+  }
+}
+
 // Hip, knee and ankle where the robot's own joints are, its feet level and straight ahead.
 TEST(Legs, KneesAreWhereTheRobotHasThem) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);

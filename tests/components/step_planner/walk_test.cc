@@ -20,7 +20,9 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using robot::TestRobot;
 
-constexpr double kPeriod = 0.002;  // s
+constexpr double kPeriod = 0.002;       // s
+constexpr double kSearchDepth = 0.06;  // m
+constexpr double kLower = 0.02;         // m
 
 WalkSpec Spec(const Reach& reach, double spacing) {
   WalkSpec spec;
@@ -34,10 +36,10 @@ WalkSpec Spec(const Reach& reach, double spacing) {
   spec.foot = {0.04, 0.1, 0.1};
   spec.touch_load = 10;
   spec.touch_duration = 0.006;
-  spec.search_depth = 0.06;
+  spec.search_depth = kSearchDepth;
   spec.gain = 1;
   spec.adjust_from = 0.01;
-  spec.lower = 0.02;
+  spec.lower = kLower;
   spec.height_rate = 6;
   spec.yaw_rate = 5;
   spec.rest_distance = 0.02;
@@ -438,9 +440,32 @@ TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
     EXPECT_GE(world.time() - start, std::max(whole / kSinkSpeed, 1.4) - 0.01) << depth;
     EXPECT_LT(world.time() - start, std::max(whole / kSinkSpeed, 1.4) + 1.0) << depth;
     // The foot stands `depth` lower; three fifths of the load are still to come, of which
-    // most_ahead counts.
-    const double ahead = std::min(0.6 * whole, 0.05);
-    EXPECT_NEAR(height - world.com().z(), depth + ahead, 0.2 * whole + 0.005) << depth;
+    // most_ahead counts. Above a sole that sinks the COM comes up by `lower`, as its leg reaches.
+    const double ahead = std::min(0.6 * whole, 0.05), up = whole > kSoft ? kLower : 0;
+    EXPECT_NEAR(height - world.com().z(), depth + ahead - up, 0.005) << depth;
+  }
+}
+
+// Where a sole has sunk the other foot looks for the ground where that sole met it, and as deep
+// below where it stands as else.
+TEST(Walk, LooksForTheGroundWhereTheSunkSoleMetIt) {
+  const WalkCommand command{{0.05, 0}, 0, true};
+  constexpr double kSunk = 0.05;
+  for (const bool hole : {false, true}) {
+    World world(TestRobot::kDyros, 0, 0.5, true);
+    world.Soften(kSunk);
+    ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
+    world.Soften(0);
+    ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
+    const double due = world.walk().touch_down();
+    if (hole) world.Dig(-1, 1);
+    if (!hole) {
+      ASSERT_TRUE(world.RunTo(WalkStage::kTouching, command));
+      EXPECT_NEAR(world.time(), due, 0.02);
+    } else {
+      world.Run(3, command);
+      EXPECT_NEAR(world.walk().output().swing.position.z(), -kSunk - kSearchDepth, 1e-3);
+    }
   }
 }
 
