@@ -20,9 +20,9 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using robot::TestRobot;
 
-constexpr double kPeriod = 0.002;       // s
+constexpr double kPeriod = 0.002;      // s
 constexpr double kSearchDepth = 0.06;  // m
-constexpr double kLower = 0.02;         // m
+constexpr double kLower = 0.02;        // m
 
 WalkSpec Spec(const Reach& reach, double spacing) {
   WalkSpec spec;
