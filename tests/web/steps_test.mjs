@@ -1,7 +1,6 @@
 // Footprints, planned footholds and regions of a walk and of a recovery step, in a browser: drawn where the log's soles were.
 // Usage: node steps_test.mjs --poise PROGRAM --web DIR, where DIR is build/web
 import assert from 'node:assert/strict';
-import {spawnSync} from 'node:child_process';
 import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
@@ -9,17 +8,13 @@ import {after, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
 import {interactive} from './live_run.mjs';
+import {poiseCaller} from './program.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-steps-'));
 const path = (name) => join(folder, name);
+const poise = poiseCaller(options.poise);
 let browser;
-
-function poise(...parameters) {
-  const {status, stdout, stderr} = spawnSync(options.poise, parameters, {encoding: 'utf8'});
-  assert.ok(status === 0 || status === 1, stdout + stderr);  // a check of a shorter run may fail
-  return stdout;
-}
 
 before(async () => {
   poise('run', 'walk', '--inline', '--duration', '7', '--out', path('walk'));

@@ -380,8 +380,6 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   }
 }
 
-}  // namespace
-
 /// What the variant sets in the group of fields at `parent`.
 std::string SetsBeside(const LoadedScenario& loaded, std::string_view parent) {
   std::string sets;
@@ -393,6 +391,8 @@ std::string SetsBeside(const LoadedScenario& loaded, std::string_view parent) {
   }
   return sets;
 }
+
+}  // namespace
 
 void FailField(const LoadedScenario& loaded, std::string_view field, std::string_view problem) {
   const auto concerns = [&](const std::string& path) {

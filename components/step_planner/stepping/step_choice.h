@@ -60,7 +60,7 @@ double SwingTime(double distance, double acceleration);
 class StepChoice {
  public:
   StepChoice() = default;
-  /// A robot that cannot stand throws RobotError, but where it has no reach and no `leg_distance`.
+  /// Throws RobotError where the robot cannot stand and has a reach or a `leg_distance`.
   StepChoice(const robot::RobotModel& model, const Reach& reach, const StepLimits& limits)
       : feet_{model.feet()[0], model.feet()[1]}, reach_(reach), limits_(limits) {
     if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
