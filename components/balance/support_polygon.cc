@@ -11,6 +11,19 @@ ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin) {
   return Inset(ConvexHull(foot.vertices), margin);
 }
 
+ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin, double side_margin) {
+  if (foot.rectangular()) {
+    return Rectangle({0.5 * foot.length - margin, 0.5 * foot.width - side_margin});
+  }
+  ConvexPolygon rest = SolePolygon(foot, 0);
+  const HalfPlanes edges = EdgesOf(rest);
+  for (HalfPlane plane : edges.planes()) {
+    plane.offset -= plane.normal.cwiseProduct(Eigen::Vector2d(margin, side_margin)).norm();
+    rest = Clip(rest, plane);
+  }
+  return rest;
+}
+
 ConvexPolygon SupportPolygon(const Eigen::Isometry3d& frame_o, const ContactGeometry& geometry,
                              const std::array<ConvexPolygon, 2>& sole) {
   std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners> corner;

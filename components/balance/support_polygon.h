@@ -14,6 +14,9 @@ namespace poise::balance {
 /// The sole in its own frame, less `margin` (m) on every side; empty, for a polygon, when that has
 /// no area.
 ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin);
+/// The points of the sole about which an ellipse of half axes `margin` along x and `side_margin`
+/// along y (m) lies in it: the same of two that are equal.
+ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin, double side_margin);
 
 /// Hull of the soles in contact, each a polygon of at most robot::kMaxSoleVertices corners in its
 /// own frame (m, right foot first), seen along the normal of `frame_o` on its plane.

@@ -76,8 +76,10 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   single_support_ = ReadLimits(WithinSoles(single_support, *model_, margin), "single_support");
   // One foot needs no reserve for what the other one carries.
   const bool given = config.has_sole_margin();
-  CutSoles(given ? config.sole_margin() : SoleMargin(*model_), &sole_);
-  CutSoles(given ? config.sole_margin() : margin, &shared_sole_);
+  const double alone = given ? config.sole_margin() : SoleMargin(*model_);
+  const double side = config.has_side_margin() ? config.side_margin() : alone;
+  CutSoles({alone, side}, &sole_);
+  CutSoles(Eigen::Vector2d::Constant(given ? config.sole_margin() : margin), &shared_sole_);
   const char* const must = "must be a number, 0 or more";
   cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
   cop_feedback_time_ =
@@ -391,17 +393,21 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
   cop_error_ += period / (cop_feedback_time_ + period) * (error - cop_error_);
 }
 
-void ContactWrenchMonitor::CutSoles(double margin,
+void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,
                                     std::array<balance::ConvexPolygon, 2>* soles) const {
-  ReadNotNegative(margin, "sole_margin", "must be m, 0 or more");
-  for (size_t f = 0; f < 2; ++f) {
-    const robot::FootModel& foot = model_->feet()[f];
-    if (margin >= robot::InnerRadius(foot)) {
-      throw ConfigError("sole_margin", fmt::format("is {} m and leaves nothing of the {} foot's "
-                                                   "sole, {} x {} m",
-                                                   margin, foot.name, foot.length, foot.width));
+  constexpr std::array<const char*, 2> kField = {"sole_margin", "side_margin"};
+  for (int axis = 0; axis < 2; ++axis) {
+    ReadNotNegative(margin[axis], kField[axis], "must be m, 0 or more");
+    for (const robot::FootModel& foot : model_->feet()) {
+      if (margin[axis] < robot::InnerRadius(foot)) continue;
+      throw ConfigError(kField[axis],
+                        fmt::format("is {} m and leaves nothing of the {} foot's "
+                                    "sole, {} x {} m",
+                                    margin[axis], foot.name, foot.length, foot.width));
     }
-    (*soles)[f] = balance::SolePolygon(foot, margin);
+  }
+  for (size_t f = 0; f < 2; ++f) {
+    (*soles)[f] = balance::SolePolygon(model_->feet()[f], margin.x(), margin.y());
   }
 }
 

@@ -64,7 +64,7 @@ class ContactWrenchMonitor : public Component, public Operated {
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
   /// Both soles less `margin` (m) on every side. ConfigError: nothing is left.
-  void CutSoles(double margin, std::array<balance::ConvexPolygon, 2>* soles) const;
+  void CutSoles(const Eigen::Vector2d& margin, std::array<balance::ConvexPolygon, 2>* soles) const;
   /// The hull of the soles in contact, less the margin.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick

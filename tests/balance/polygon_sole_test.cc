@@ -94,6 +94,37 @@ TEST(PolygonSole, MarginCutsShortEdgesAway) {
   EXPECT_NEAR(SignedDistance(rest, {0.08, 0.08}), 0, 1e-12);
 }
 
+TEST(PolygonSole, UnequalMarginsLeaveWhatAnEllipseFitsAbout) {
+  std::mt19937 random(TestSeed(27));
+  std::uniform_real_distribution<double> x(-0.15, 0.15), y(-0.08, 0.08);
+  const Vector2d margin(0.012, 0.004);
+  int inside = 0, outside = 0;
+  for (int n = 0; n < 40; ++n) {
+    const robot::FootModel foot = Foot(RandomSole(7, &random));
+    const ConvexPolygon sole = SolePolygon(foot, 0);
+    const ConvexPolygon rest = SolePolygon(foot, margin.x(), margin.y());
+    for (int i = 0; i < 50; ++i) {
+      const Vector2d at(x(random), y(random));
+      double least = 1;
+      for (int k = 0; k < 720; ++k) {
+        const double angle = pi * k / 360;
+        const Vector2d by(margin.x() * std::cos(angle), margin.y() * std::sin(angle));
+        least = std::min(least, SignedDistance(sole, at + by));
+      }
+      if (std::abs(least) < 1e-6) continue;  // on the edge, as far as 720 points tell
+      EXPECT_EQ(rest.num_corners > 0 && SignedDistance(rest, at) > 0, least > 0);
+      ++(least > 0 ? inside : outside);
+    }
+  }
+  EXPECT_GT(inside, 200);
+  EXPECT_GT(outside, 200);
+  robot::FootModel rectangle;
+  rectangle.length = 0.3;
+  rectangle.width = 0.15;
+  EXPECT_NEAR(SignedDistance(SolePolygon(rectangle, 0.01, 0.005), {0.14, 0}), 0, 1e-15);
+  EXPECT_NEAR(SignedDistance(SolePolygon(rectangle, 0.01, 0.005), {0, -0.07}), 0, 1e-15);
+}
+
 TEST(PolygonSole, LargestRectangleOfDiamondAndHexagon) {
   const auto largest = [](const std::vector<Vector2d>& corners, const Vector2d& given) {
     return LargestRectangle(EdgesOf(ConvexHull(corners)), given);

@@ -220,7 +220,10 @@ TEST_P(MonitorCase, InAStepBodyOrComGiveWayAndNothingElse) {
 // The same for the hull of the soles, whatever the feet's heights and angles.
 TEST_P(MonitorCase, PutsTheCentreOfPressureOnTheNearestPointOfTheSolesHull) {
   constexpr double kMargin = 0.045;
-  Harness<ContactWrenchMonitor> harness(&context_, "region: POLYGON sole_margin: 0.045");
+  // Of a sole that carries alone.
+  const double side = GetParam().in_contact[0] && GetParam().in_contact[1] ? kMargin : 0.03;
+  Harness<ContactWrenchMonitor> harness(&context_,
+                                        "region: POLYGON sole_margin: 0.045 side_margin: 0.03");
   int active = 0;
   double worst_cop = 0, worst_corner = 0, worst_height = 0;
   for (int trial = 0; trial < 200; ++trial) {
@@ -255,7 +258,7 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnTheNearestPointOfTheSolesHull) {
       const robot::FootModel& foot = model_.feet()[i];
       for (const int corner : {0, 1, 2, 3}) {
         const Eigen::Vector3d at((corner % 2 == 0 ? -1 : 1) * (0.5 * foot.length - kMargin),
-                                 (corner < 2 ? -1 : 1) * (0.5 * foot.width - kMargin), 0);
+                                 (corner < 2 ? -1 : 1) * (0.5 * foot.width - side), 0);
         const Eigen::Vector3d in_o =
             frame.linear().transpose() * (dynamics.data.foot_pose[i] * at - frame.translation());
         soles.push_back(in_o.head<2>());
@@ -427,6 +430,8 @@ TEST(ContactWrenchMonitor, RefusesLimitsThatCannotBe) {
   EXPECT_EQ(field_of("region: POLYGON"), "accepted");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: 0.075"), "sole_margin");
   EXPECT_EQ(field_of("region: POLYGON sole_margin: -0.01"), "sole_margin");
+  EXPECT_EQ(field_of("region: POLYGON side_margin: 0.075"), "side_margin");
+  EXPECT_EQ(field_of("region: POLYGON side_margin: nan"), "side_margin");
   EXPECT_EQ(field_of("region: POLYGON half_width_beyond_soles: 0.02"), "half_width_beyond_soles");
   EXPECT_EQ(field_of("region: POLYGON double_support { friction: -1 }"), "double_support.friction");
   EXPECT_EQ(field_of(single + "double_support { half_length: 0.1 }"), "accepted");
