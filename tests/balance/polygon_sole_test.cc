@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -43,6 +44,26 @@ std::vector<Vector2d> RandomSole(int n, std::mt19937* random) {
     const std::vector<Vector2d> corners(hull.corners().begin(), hull.corners().end());
     if (robot::SoleProblem(corners).empty()) return corners;
   }
+}
+
+/// m that `at` is inside the hull of any number of points: least distance from an edge's line, of
+/// the edges that Jarvis' march finds.
+double Inside(const std::vector<Vector2d>& points, const Vector2d& at) {
+  const auto left_most = [](const Vector2d& a, const Vector2d& b) { return a.x() < b.x(); };
+  const Vector2d start = *std::min_element(points.begin(), points.end(), left_most);
+  double least = HUGE_VAL;
+  Vector2d corner = start;
+  do {
+    Vector2d next = corner == points[0] ? points[1] : points[0];
+    for (const Vector2d& point : points) {
+      const Vector2d way = next - corner, other = point - corner;
+      if (way.x() * other.y() - way.y() * other.x() < 0) next = point;
+    }
+    const Vector2d way = (next - corner).normalized(), to = at - corner;
+    least = std::min(least, way.x() * to.y() - way.y() * to.x());
+    corner = next;
+  } while (corner != start);
+  return least;
 }
 
 ContactLimits Limits(const robot::FootModel& foot, double margin = 0) {
@@ -324,18 +345,8 @@ TEST(PolygonSole, SharesAreMovedIntoSolesWhereTheSumOfSolesHasThem) {
     for (const Vector2d& a : sole[0].corners()) {
       for (const Vector2d& b : sole[1].corners()) sums.push_back(eta * a + (1 - eta) * b);
     }
-    const auto can = [&](const Vector2d& cop) {  // inside every line along two of the sums' points
-      double least = HUGE_VAL;
-      for (int k = 0; k < 720; ++k) {
-        const Vector2d n(std::cos(pi * k / 360), std::sin(pi * k / 360));
-        double furthest = -HUGE_VAL;
-        for (const Vector2d& sum : sums) furthest = std::max(furthest, n.dot(sum));
-        least = std::min(least, furthest - n.dot(cop));
-      }
-      return least;
-    };
     const Vector2d cop(x(random), y(random));
-    const double room = can(cop);
+    const double room = Inside(sums, cop);
     std::array<Eigen::Isometry3d, 2> foot{Eigen::Isometry3d::Identity(),
                                           Eigen::Isometry3d::Identity()};
     foot[0].translation() << 0.03, -0.1, 0;
