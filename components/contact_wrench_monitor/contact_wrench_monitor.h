@@ -63,7 +63,7 @@ class ContactWrenchMonitor : public Component, public Operated {
   bool MoveForStep(const balance::ContactGeometry& geometry, const Bounds& bounds,
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
-  /// Both soles less `margin` (m) on every side. ConfigError: nothing is left.
+  /// Both soles less `margin`, m: x at toe and heel, y at the sides. ConfigError: nothing is left.
   void CutSoles(const Eigen::Vector2d& margin, std::array<balance::ConvexPolygon, 2>* soles) const;
   /// The hull of the soles in contact, less the margin.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
