@@ -175,7 +175,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 }
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
-  if (!operator_walk_.given) return walk_commands_.At(time);
+  if (!operator_walk_.given) return walk_commands_.At(time, walk_.num_begun());
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
   if (operator_walk_.one_step && walk_.num_steps() == operator_walk_.steps_before) {

@@ -182,17 +182,25 @@ void CheckWalkConfig(const WalkConfig& config) {
     CheckWalk(value > 0 && std::isfinite(value), name, "must be a number above 0");
   };
   double last = -std::numeric_limits<double>::infinity();
+  int last_steps = 0;
   for (int i = 0; i < config.command_size(); ++i) {
     const WalkCommandConfig& command = config.command(i);
     const std::string field = fmt::format("walk.command[{}]", i);
     for (const double value : {command.time(), command.vx(), command.vy(), command.wz()}) {
       if (!std::isfinite(value)) throw ConfigError(field, "must be of numbers");
     }
-    if (!(command.time() > last)) {
+    if (command.after_steps() < last_steps) {
+      throw ConfigError(field + ".after_steps",
+                        fmt::format("must be {} or more, {}", last_steps,
+                                    i > 0 ? "as the command before" : "a number of steps"));
+    }
+    const bool by_steps = command.after_steps() > last_steps && !command.has_time();
+    last_steps = command.after_steps();
+    if (!by_steps && !(command.time() > last)) {
       throw ConfigError(field + ".time",
                         fmt::format("must come after command[{}].time = {}", i - 1, last));
     }
-    last = command.time();
+    last = std::max(last, command.time());
   }
   positive(config.start(), "start");
   positive(config.unload(), "unload");
@@ -367,14 +375,14 @@ WalkCommands::WalkCommands(const WalkConfig& config) {
   for (const WalkCommandConfig& command : config.command()) {
     stepping::WalkCommand walk;
     if (!command.stop()) walk = {{command.vx(), command.vy()}, command.wz(), true};
-    entry_.push_back({command.time(), walk});
+    entry_.push_back({command.time(), command.after_steps(), walk});
   }
 }
 
-stepping::WalkCommand WalkCommands::At(double time) const {
+stepping::WalkCommand WalkCommands::At(double time, int num_steps) const {
   stepping::WalkCommand command;
   for (const Entry& entry : entry_) {
-    if (entry.time > time) break;
+    if (entry.time > time || entry.after_steps > num_steps) break;
     command = entry.command;
   }
   return command;

@@ -22,17 +22,18 @@ stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& con
 /// What this robot will not walk as it is configured, and settings without effect: a sentence each.
 std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::RobotModel& model);
 
-/// What is commanded at a time of the run.
+/// What is commanded at a time of the run, after a number of steps.
 class WalkCommands {
  public:
   WalkCommands() = default;
   explicit WalkCommands(const WalkConfig& config);
-  /// `time`: s, in any order. Standing before the first.
-  stepping::WalkCommand At(double time) const;
+  /// `time`: s, in any order; `num_steps`: begun since the run's start. Standing before the first.
+  stepping::WalkCommand At(double time, int num_steps) const;
 
  private:
   struct Entry {
-    double time;  // s
+    double time;      // s
+    int after_steps;  // begun before
     stepping::WalkCommand command;
   };
   std::vector<Entry> entry_;

@@ -226,6 +226,7 @@ class Walk {
   bool starting_ = false;              // no foot has left the ground yet
   bool closing_ = false;            // the step under way comes beside the other foot, the last one
   bool final_ = false;              // it has
+  int closings_ = 0;                // last ones so far: on soft ground soles turn as they land
   int attempt_ = 0, num_left_ = 0;  // places left: of this step, of all
   Footstep foothold_;
   Footstep first_, home_;  // foothold of the step's first attempt; where the foot stood before

@@ -85,8 +85,16 @@ TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
     EXPECT_GE(world.time() - start, std::max(whole / kSinkSpeed, 1.4) - 0.01) << depth;
     EXPECT_LT(world.time() - start, std::max(whole / kSinkSpeed, 1.4) + 1.0) << depth;
     // The foot stands `depth` lower; three fifths of the load are still to come, of which
-    // most_ahead counts. Above a sole that sinks the COM comes up by `lower`, as its leg reaches.
-    const double ahead = std::min(0.6 * whole, 0.05), up = whole > kSoft ? kLower : 0;
+    // most_ahead counts. Above a sole that sinks the COM comes up as its leg reaches, 0.92 of a
+    // straight one, as high as it stands at most.
+    const Walk& walk = world.walk();
+    const int foot = 1 - walk.stepping_foot();
+    const double stands = walk.choice().legs().height();
+    const Vector2d sole =
+        world.sole()[static_cast<size_t>(foot)].translation().head<2>() - world.com().head<2>();
+    const double leg = walk.choice().legs().Highest(foot, sole, 0.92);
+    const double ahead = std::min(0.6 * whole, 0.05);
+    const double up = whole > kSoft ? std::max(std::min(leg, stands) - stands + kLower, 0.0) : 0;
     EXPECT_NEAR(height - world.com().z(), depth + ahead - up, 0.005) << depth;
   }
 }

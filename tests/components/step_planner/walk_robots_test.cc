@@ -137,6 +137,7 @@ void Set(const char* field, double value, WalkConfig* config) {
 
 std::string RefusedField(const WalkConfig& config, const robot::RobotModel& model) {
   try {
+    CheckWalkConfig(config);
     MakeWalk(config, ContactConfirmation(), model);
   } catch (const ConfigError& error) {
     return error.field();
@@ -165,6 +166,39 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
   EXPECT_NO_THROW(MakeStepChoice(recovery, model));
   recovery.set_gap(0.5);
   EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
+}
+
+TEST(WalkCommands, HoldFromATimeAndANumberOfStepsOn) {
+  WalkConfig config = Enabled();
+  config.add_command()->set_time(1);
+  config.mutable_command(0)->set_vx(0.1);
+  config.add_command()->set_after_steps(20);
+  config.mutable_command(1)->set_stop(true);
+  EXPECT_EQ(RefusedField(config, robot::LoadTestRobot(TestRobot::kDyros)), "accepted");
+  const WalkCommands commands(config);
+  EXPECT_FALSE(commands.At(0.5, 0).stepping);
+  EXPECT_TRUE(commands.At(1, 0).stepping);
+  EXPECT_TRUE(commands.At(1000, 19).stepping);
+  EXPECT_FALSE(commands.At(30, 20).stepping);
+  // Both, where both are given.
+  config.mutable_command(1)->set_time(60);
+  EXPECT_TRUE(WalkCommands(config).At(59, 21).stepping);
+  EXPECT_FALSE(WalkCommands(config).At(60, 21).stepping);
+}
+
+TEST(WalkCommands, OutOfOrderAreRefused) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  WalkConfig config = Enabled();
+  config.add_command()->set_after_steps(-1);
+  EXPECT_EQ(RefusedField(config, model), "walk.command[0].after_steps");
+  config.mutable_command(0)->set_after_steps(5);
+  config.add_command()->set_after_steps(4);
+  EXPECT_EQ(RefusedField(config, model), "walk.command[1].after_steps");
+  // As many steps, and no later: neither holds after the other.
+  config.mutable_command(1)->set_after_steps(5);
+  EXPECT_EQ(RefusedField(config, model), "walk.command[1].time");
+  config.mutable_command(1)->set_time(2);
+  EXPECT_EQ(RefusedField(config, model), "accepted");
 }
 
 TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {

@@ -87,6 +87,18 @@ TEST(Walk, TurnsAndStepsAside) {
   EXPECT_LT(aside.middle().y(), -0.25);
 }
 
+TEST(Walk, StandsWhereTheFeetDoNotComeSideBySide) {
+  // No last step is the last one where the ground turns each foot as it lands.
+  World world(TestRobot::kDyros);
+  world.Twist(0.1);
+  world.Run(6, {{0, 0}, 0, true});
+  const int steps = world.walk().num_steps();
+  world.Run(10, kStand);
+  EXPECT_GT(std::abs(Yaw(world.sole()[1]) - Yaw(world.sole()[0])), 0.15);
+  EXPECT_FALSE(world.walk().active());
+  EXPECT_LE(world.walk().num_steps() - steps, 4);
+}
+
 TEST(Walk, APushIsCaughtByTheNextFoothold) {
   // More than the centre of pressure within the sole brings back, on the side of the foot in the
   // air.

@@ -112,6 +112,8 @@ class World {
     slanted_ = {from, to};
     tilt_ = tilt;
   }
+  /// Ground that turns each foot outwards by so much, rad, as it comes down.
+  void Twist(double yaw) { twist_ = yaw; }
   /// Ground that a sole there touches, and that does not take the press.
   void Weaken(double from, double to) { weak_ = {from, to}; }
   /// The centre of pressure asked for in the next tick if the soles turned like this.
@@ -233,6 +235,10 @@ class World {
       if (pressed && IsAt(slanted_, sole_[i])) {
         sole_[i].linear() = Eigen::AngleAxisd(tilt_, Vector3d::UnitX()).toRotationMatrix();
       }
+      if (pressed && twist_ != 0) {
+        sole_[i].linear() =
+            Eigen::AngleAxisd(i == 0 ? -twist_ : twist_, Vector3d::UnitZ()).toRotationMatrix();
+      }
     }
     EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
     const Vector3d& acceleration = output.com.acceleration;
@@ -247,7 +253,7 @@ class World {
   robot::RobotModel model_;
   double rough_, soft_ = 0;
   std::array<double, 2> hole_{0, 0}, slanted_{0, 0}, weak_{0, 0};
-  double tilt_ = 0;
+  double tilt_ = 0, twist_ = 0;
   Walk walk_;
   std::optional<Walk> fresh_;
   double time_ = 0;
