@@ -8,7 +8,10 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
+#include <fstream>
+#include <string>
 #include <thread>
 
 #include "hw_bridge/ethercat/links/socket_link.h"
@@ -163,6 +166,7 @@ class VethPair {
     b_ = "ecs" + id;
     created_ = Ip("link add " + a_ + " type veth peer name " + b_) &&
                Ip("link set " + a_ + " up") && Ip("link set " + b_ + " up");
+    EXPECT_TRUE(!created_ || (Carries(a_) && Carries(b_))) << "no carrier after 10 s";
   }
   ~VethPair() {
     if (created_) Ip("link del " + a_);
@@ -174,6 +178,17 @@ class VethPair {
  private:
   static bool Ip(const std::string& arguments) {
     return std::system(("ip " + arguments + " >/dev/null 2>&1").c_str()) == 0;
+  }
+  // The kernel finds the carrier after `up` has returned, and drops what is sent before. It does so
+  // under the lock that the second `up` takes.
+  static bool Carries(const std::string& name) {
+    using namespace std::chrono_literals;
+    const auto end = std::chrono::steady_clock::now() + 10s;
+    for (std::string state; state != "up"; std::this_thread::sleep_for(2ms)) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::ifstream("/sys/class/net/" + name + "/operstate") >> state;
+    }
+    return Ip("link set " + name + " up");
   }
   std::string a_, b_;
   bool created_ = false;
