@@ -6,8 +6,8 @@
 namespace poise::logging {
 
 /// A file under way: written as part(), which becomes the file at Keep and is removed otherwise, by
-/// SIGINT, SIGTERM and SIGHUP too where they would end the process. What is no file (a device, a
-/// pipe) is written itself.
+/// SIGINT, SIGTERM, SIGHUP and SIGPIPE too where they would end the process. What is no file (a
+/// device, a pipe) is written itself.
 class PartialFile {
  public:
   /// Throws LogError: `path` is an event log, which nothing replaces; the part cannot be made or

@@ -83,7 +83,7 @@ TEST_F(PartialFileTest, DeviceIsWrittenItself) {
 }
 
 TEST_F(PartialFileTest, SignalsRemoveEveryPart) {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) {
     const pid_t child = fork();
     if (child == 0) {
       PartialFile first(path_);
