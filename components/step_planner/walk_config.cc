@@ -36,6 +36,8 @@ constexpr double kAcrossShare = 0.65;
 constexpr double kWaitShare = 0.15;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
+/// rad in a step. Beyond it a foot points back.
+constexpr double kMostTurn = 0.5 * M_PI;
 /// Of the smaller sole's inner radius, that unloading puts the soles' own centres of pressure off
 /// their middles: on soft ground a sole rolls by as much. Chosen.
 constexpr double kLeadShare = 0.13;
@@ -186,8 +188,18 @@ void CheckWalkConfig(const WalkConfig& config) {
   for (int i = 0; i < config.command_size(); ++i) {
     const WalkCommandConfig& command = config.command(i);
     const std::string field = fmt::format("walk.command[{}]", i);
-    for (const double value : {command.time(), command.vx(), command.vy(), command.wz()}) {
-      if (!std::isfinite(value)) throw ConfigError(field, "must be of numbers");
+    const auto finite = [&](double value, const char* name, const char* what) {
+      if (std::isfinite(value)) return;
+      throw ConfigError(fmt::format("{}.{}", field, name),
+                        fmt::format("is {}; must be a finite {}", value, what));
+    };
+    finite(command.time(), "time", "time in s");
+    finite(command.vx(), "vx", "speed in m/s");
+    finite(command.vy(), "vy", "speed in m/s");
+    finite(command.wz(), "wz", "rate in rad/s");
+    if (command.time() < 0) {
+      throw ConfigError(field + ".time",
+                        fmt::format("is {} s; must be 0 s or more, of the run", command.time()));
     }
     if (command.after_steps() < last_steps) {
       throw ConfigError(field + ".after_steps",
@@ -209,7 +221,8 @@ void CheckWalkConfig(const WalkConfig& config) {
   positive(config.settle(), "settle");
   not_negative(config.longest(), "longest");
   not_negative(config.widest(), "widest");
-  not_negative(config.most_turn(), "most_turn");
+  CheckWalk(config.most_turn() >= 0 && config.most_turn() <= kMostTurn, "most_turn",
+            "must be 0 to pi/2 rad");
   positive(config.acceleration(), "acceleration");
   positive(config.turn_acceleration(), "turn_acceleration");
   positive(config.clearance(), "clearance");
@@ -348,16 +361,40 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
 
 std::vector<std::string> WalkWarnings(const WalkConfig& given, const robot::RobotModel& model) {
   std::vector<std::string> warnings;
+  if (!given.enabled()) {
+    if (given.command_size() > 0) {
+      warnings.emplace_back("walk.command has no effect without walk.enabled=true");
+    }
+    return warnings;
+  }
   const WalkConfig config = WithRobotDefaults(given, robot::StandingHeight(model));
   const double period = config.unload() + config.swing() + config.settle() + config.load();
   const double fastest = config.longest() / period;
   for (int i = 0; i < config.command_size(); ++i) {
-    const double vx = config.command(i).vx();
-    if (config.command(i).stop() || !(std::abs(vx) > fastest * (1 + kRounding))) continue;
-    warnings.push_back(
-        fmt::format("walk.command[{}].vx={} is walked at {:.3g} m/s: `longest` "
-                    "allows {:.3g} m in a step, which takes {:.3g} s",
-                    i, vx, std::copysign(fastest, vx), config.longest(), period));
+    const WalkCommandConfig& command = config.command(i);
+    if (command.stop()) continue;
+    // Aside and in a turn only every second step goes out (stepping::NextFootstep).
+    const struct {
+      const char* name;
+      double value, most;  // m/s or rad/s
+      const char* unit;
+      const char* limit;
+      double in_a_step;  // m or rad
+      const char* steps;
+      double time;  // s
+    } parts[] = {{"vx", command.vx(), fastest, "m", "longest", config.longest(), "a step", period},
+                 {"vy", command.vy(), config.widest() / (2 * period), "m", "widest",
+                  config.widest(), "two steps", 2 * period},
+                 {"wz", command.wz(), config.most_turn() / (2 * period), "rad", "most_turn",
+                  config.most_turn(), "two steps", 2 * period}};
+    for (const auto& part : parts) {
+      if (!(std::abs(part.value) > part.most * (1 + kRounding))) continue;
+      warnings.push_back(fmt::format(
+          "walk.command[{}].{}={} is walked at {:.3g} {}/s: `{}` "
+          "allows {:.3g} {} in {}, which {} {:.3g} s",
+          i, part.name, part.value, std::copysign(part.most, part.value), part.unit, part.limit,
+          part.in_a_step, part.unit, part.steps, &part == &parts[0] ? "takes" : "take", part.time));
+    }
   }
   if (config.rests()) return warnings;
   const auto idle = [&](bool given_one, const char* name) {

@@ -10,7 +10,8 @@
 
 namespace poise {
 
-/// Throws ConfigError "walk.unload" ...: not finite, beyond what can work, commands out of order.
+/// Throws ConfigError "walk.unload" ...: not finite, beyond what can work, commands out of
+/// order or before the run.
 void CheckWalkConfig(const WalkConfig& config);
 
 /// Reach, spacing and thresholds for this robot, whose COM stands at its standing height. Throws

@@ -55,6 +55,15 @@ TEST(FallStory, WhatWasOverLongBeforeIsNotTold) {
   EXPECT_THAT(TroublesBefore(44, events), ElementsAre(Named("searching", 9.838)));
 }
 
+TEST(FallStory, WhatBeganLongBeforeAndEndedInTheLastStretchIsTold) {
+  const std::vector<Event> events = {{38, "searching", "right foot without contact"},
+                                     {43.5, "step_lands", "right foot at (0.60, -0.15) m"},
+                                     {43.9, "bridge_state", "running to stopping"},
+                                     {44, "fall", ""}};
+  EXPECT_THAT(TroublesBefore(44, events),
+              ElementsAre(Named("searching", 38), Named("bridge_state", 43.9)));
+}
+
 TEST(FallStory, ATroubleThatFlickersToTheEndDidNotEnd) {
   std::vector<Event> events;
   for (double time = 20; time < 24; time += 0.125) {

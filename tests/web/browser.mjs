@@ -11,11 +11,11 @@ const QUIET = ['--no-first-run', '--disable-background-networking', '--disable-c
 /** ms: a busy machine without a graphics card draws slowly, which is no failure. */
 export const PATIENCE = 240000;
 
-/** `web`: build/web, where deploy/setup installs playwright-core. */
-export async function launchBrowser(web) {
+/** `web`: build/web, where deploy/setup installs playwright-core; `more`: of Chromium's switches. */
+export async function launchBrowser(web, more = []) {
   if (!existsSync(CHROMIUM)) throw new Error(`${CHROMIUM} is missing: run deploy/setup, which installs it`);
   const {chromium} = createRequire(resolve(web, 'package.json'))('playwright-core');
-  return chromium.launch({executablePath: CHROMIUM, args: QUIET});
+  return chromium.launch({executablePath: CHROMIUM, args: [...QUIET, ...more]});
 }
 
 /** Opens a file from disk or an http address; `problems` gathers errors of its console and every request beyond the page itself. */

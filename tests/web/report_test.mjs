@@ -365,6 +365,22 @@ test('a page that nobody has scrolled prints with all its plots, light', async (
   await page.context().close();
 });
 
+test('a browser without 3D has the rest of the page', async () => {
+  // What Chromium does without a graphics card and without its software renderer.
+  const bare = await launchBrowser(options.web, ['--disable-gpu', '--disable-3d-apis']);
+  const {page} = await openPage(bare, path('a/report.html'));  // Chromium's own complaint may be in the console
+  assert.equal(await page.locator('[role=alert]').count(), 0);
+  assert.match(await page.locator('#scene').innerText(), /No picture of the robot: this browser has no WebGL/);
+  await page.waitForFunction(() => 'drawn' in document.documentElement.dataset);
+  assert.ok(await page.evaluate(() => window.poise.grid.panels.length > 15 && window.poise.grid.panels.every((p) => p.plot)));
+  assert.ok(await page.locator('.events').innerText() !== '');
+  const before = await page.evaluate(() => window.poise.player.time);
+  await page.keyboard.press('ArrowRight');
+  assert.ok(await page.evaluate(() => window.poise.player.time) > before);
+  await page.pdf({format: 'A4'});
+  await bare.close();
+});
+
 test('a page too small for every tick shows rows, shaded between their least and largest values', async () => {
   poise('report', path('a'));
   poise('report', path('a'), '--html', path('rows.html'), '--page-size', '0.3');

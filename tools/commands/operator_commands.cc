@@ -221,8 +221,10 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
 
   auto walk_options = std::make_shared<RobotWalkOptions>();
   CLI::App* walk = app->add_subcommand("walk", "walk, in a run that goes on, or stop walking");
-  walk->add_option("--velocity", walk_options->velocity, "m/s ahead and to the left: x,y");
-  CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left");
+  walk->add_option(
+      "--velocity", walk_options->velocity,
+      "m/s ahead and to the left, x,y, each within 1; steps and settings of the run allow less");
+  CLI::Option* turn = walk->add_option("--turn", walk_options->turn, "rad/s to the left, within 1");
   walk->add_flag("--stop", walk_options->stop, "stand, with the feet side by side");
   walk->add_option("--run", walk_options->run, kWhichRun);
   walk->callback([walk_options, turn, command] {

@@ -14,10 +14,9 @@ namespace {
 using logging::Event;
 using logging::EventSpan;
 
-constexpr double kSameTrouble = 0.5;  // s; what sets in again sooner had not ended
-constexpr double kLastSeconds =
-    3;                        // s before the fall; of what ended, what began earlier is not told
-constexpr double kLedTo = 1;  // s before the first that did not end
+constexpr double kSameTrouble = 0.5;    // s; what sets in again sooner had not ended
+constexpr double kLastSeconds = 3;      // s before the fall; what ended earlier is not told
+constexpr double kLedTo = 1;            // s before the first that did not end
 constexpr size_t kMostTroubles = 5;     // told at most
 constexpr double kBalanced = 0.2;       // s, of balancing that is worth telling
 constexpr double kBalancingGap = 0.02;  // s, of an interruption of it
@@ -36,7 +35,8 @@ constexpr TroubleWords kTrouble[] = {
     {"foot_sensor_fault", "a foot's sensor was not believed ({})"},
     {"eta_infeasible_begins", "no distribution between the feet met all conditions"},
     {"cop_not_achieved_begins", "the centre of pressure could not be kept in its limits"},
-    {"step_needed", "the capture point left the soles, which only a step can answer"},
+    {"step_needed",
+     "the capture point was outside the soles, which only another step could answer"},
     {"bridge_state", "the bridge went from {}"},
 };
 
@@ -132,7 +132,7 @@ std::vector<Trouble> TroublesBefore(double fall, const std::vector<Event>& event
   for (const bool lasting : {true, false}) {
     for (const Trouble& trouble : all) {
       if (open(trouble) != lasting || told.size() == kMostTroubles) continue;
-      if (!lasting && trouble.begin < since) continue;
+      if (!lasting && *trouble.end < since) continue;
       const bool same = std::ranges::any_of(
           told, [&](const Trouble& other) { return other.name == trouble.name; });
       if (!same || (lasting && trouble.name == "contact_lost")) told.push_back(trouble);

@@ -233,7 +233,9 @@ int64_t OperatorLine::Walk(double ahead, double left, double turn) {
   const double velocity[3] = {ahead, left, turn};
   for (int i = 0; i < 3; ++i) {
     if (!(std::abs(velocity[i]) <= 1)) {
-      throw ConfigError("walk: velocity and turn must lie between -1 and 1 m/s or rad/s");
+      constexpr const char* kWhat[3] = {"velocity ahead", "velocity to the left", "turn"};
+      throw ConfigError(fmt::format("walk: {} is {}; must lie between -1 and 1 {}", kWhat[i],
+                                    velocity[i], i < 2 ? "m/s" : "rad/s"));
     }
     act.velocity[i] = velocity[i];
   }

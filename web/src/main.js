@@ -9,6 +9,7 @@ import {changesOf, figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
+import {NoPicture, has3D} from './no_picture.js';
 import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
@@ -133,9 +134,9 @@ async function start() {
   const events = run.meta.events ?? [];
   const player = new Player(run);
   const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
-  const scene = new SceneView(document.getElementById('scene'), run, overlay);
-  scene.host.append(sceneToolbar(scene), sceneKey(run, overlay),
-    element('span', {class: 'inset'}, 'soles from above, forward is up'));
+  const drawn = has3D(), host = document.getElementById('scene');
+  const scene = drawn ? new SceneView(host, run, overlay) : new NoPicture(host);
+  if (drawn) host.append(sceneToolbar(scene), sceneKey(run, overlay), element('span', {class: 'inset'}, 'soles from above, forward is up'));
   const [phases] = await Promise.all([phasesFound, scene.load()]);
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
 
@@ -149,8 +150,10 @@ async function start() {
   const control = feed && new Control(feed);
   if (control) {
     document.getElementById('side').append(controlPanel(control, shared));
-    const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
-    player.addEventListener('time', pull);
+    if (drawn) {
+      const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
+      player.addEventListener('time', pull);
+    }
     control.catchUp();
   }
   const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
@@ -163,7 +166,7 @@ async function start() {
     element('li', {}, element('span', {class: 'area missing'}), 'no message tells'),
     element('li', {}, element('span', {class: 'area event'}), 'event'),
     element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')), rowsNote(run),
-  dockedScene(scene), printer.button);
+  drawn ? dockedScene(scene) : '', printer.button);
   for (const definition of figuresFor(run)) grid.add(definition);
   const live = feed && liveTables(run, feed);
   document.getElementById('tables').append(...(live ? live.elements : tables(run, overlay)));

@@ -49,8 +49,11 @@ export class Printer {
   #toPaper() {
     setPaper(true);
     this.scene.setTheme();
-    this.#picture.src = this.scene.imageUrl();
-    document.getElementById('scene-place').prepend(this.#picture);
+    const url = this.scene.imageUrl();
+    if (url) {
+      this.#picture.src = url;
+      document.getElementById('scene-place').prepend(this.#picture);
+    }
     for (const panel of this.grid.panels) panel.resize(PLOT_WIDTH);
     this.grid.restyle();
   }

@@ -6,6 +6,7 @@ import {
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {element, table} from './dom.js';
 import {Arrow} from './markers.js';
+import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';
 import {RobotView} from './robot_view.js';
 import {formatNumber} from './units.js';
@@ -148,10 +149,11 @@ export function robotPage(data) {
   const good = check.defects.length === 0;
   document.getElementById('header').append(element('h1', {}, check.name), element('p', {}, 'A robot, from its files alone'),
     element('span', {class: `badge ${good ? 'ok' : 'failed'}`}, good ? 'no defect was found' : `${check.defects.length} defects`));
-  const still = new StillView(document.getElementById('scene'), data);
+  const drawn3d = has3D(), host = document.getElementById('scene');
+  const still = drawn3d ? new StillView(host, data) : new NoPicture(host);
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: true,
     change: (e) => still.show(name, e.target.checked)}), label);
-  still.host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
+  if (drawn3d) host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
     element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes')));
   const [drawn, inFiles] = data.triangles;
   const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);

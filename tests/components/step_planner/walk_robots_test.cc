@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
@@ -130,8 +133,8 @@ TEST(WalkLanding, AFootThatIsLetGoCarriesUntilItCountsOnALegOfAnyMass) {
   }
 }
 
-void Set(const char* field, double value, WalkConfig* config) {
-  config->GetReflection()->SetDouble(config, WalkConfig::descriptor()->FindFieldByName(field),
+void Set(const char* field, double value, google::protobuf::Message* config) {
+  config->GetReflection()->SetDouble(config, config->GetDescriptor()->FindFieldByName(field),
                                      value);
 }
 
@@ -201,6 +204,20 @@ TEST(WalkCommands, OutOfOrderAreRefused) {
   EXPECT_EQ(RefusedField(config, model), "accepted");
 }
 
+TEST(WalkCommands, WhatNoOneCanWalkIsRefused) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [field, value] :
+       {std::pair{"vx", nan}, {"vy", nan}, {"wz", nan}, {"time", nan}, {"time", -1.0}}) {
+    WalkConfig config = Enabled();
+    Set(field, value, config.add_command());
+    EXPECT_EQ(RefusedField(config, model), std::string("walk.command[0].") + field);
+  }
+  WalkConfig config = Enabled();
+  Set("most_turn", 1.6, &config);  // a foot that points back
+  EXPECT_EQ(RefusedField(config, model), "walk.most_turn");
+}
+
 TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   WalkConfig config = Enabled();
@@ -215,6 +232,37 @@ TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
   EXPECT_EQ(WalkWarnings(config, model).size(), 2);
   config.set_rests(true);
   EXPECT_TRUE(WalkWarnings(config, model).empty());
+}
+
+TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  WalkConfig config = Enabled();
+  config.set_unload(0.2);
+  config.set_swing(0.5);
+  config.set_settle(0.1);
+  config.set_load(0.2);  // 1 s a step
+  config.set_widest(0.2);
+  config.set_most_turn(0.3);
+  WalkCommandConfig* command = config.add_command();
+  command->set_vy(0.1);
+  command->set_wz(-0.15);
+  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  command->set_vy(0.11);
+  command->set_wz(-0.16);
+  const std::vector<std::string> warnings = WalkWarnings(config, model);
+  ASSERT_EQ(warnings.size(), 2);
+  EXPECT_NE(warnings[0].find("vy=0.11 is walked at 0.1 m/s"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[1].find("wz=-0.16 is walked at -0.15 rad/s"), std::string::npos)
+      << warnings[1];
+}
+
+TEST(WalkLimits, CommandsOfAWalkThatIsOffAreTold) {
+  const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
+  WalkConfig config;
+  EXPECT_TRUE(WalkWarnings(config, model).empty());
+  config.add_command()->set_vx(0.1);
+  ASSERT_EQ(WalkWarnings(config, model).size(), 1);
+  EXPECT_NE(WalkWarnings(config, model)[0].find("walk.enabled=true"), std::string::npos);
 }
 
 }  // namespace
