@@ -340,6 +340,7 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
   spec.off_center = 0.5 * (LeastInnerRadius(model) - edge);
   spec.line = config.line();
   spec.places = config.places();
+  spec.stand_apart = config.stand_apart();
   spec.place_shift = config.place_shift();
   spec.patience = config.patience();
   spec.roll_damping = config.roll_damping() / (robot::kGravity * model.total_mass());

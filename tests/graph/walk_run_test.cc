@@ -169,6 +169,23 @@ TEST(WalkRun, UpAndDownStairsToAStandOnThem) {
   }
 }
 
+// Of which nothing is told. With its feet side by side, one across an edge, it fell in 12 of 12.
+TEST(WalkRun, UpAndDownStairsItIsNotToldOfToAStandOnThem) {
+  for (const std::string engine : {"mujoco", "ode"}) {
+    for (const std::string variant : {"stairs", "stairs_down"}) {
+      const RunFolder folder;
+      RunPoise({"run", "walk_blocks", "--variant", variant, "--inline", "--world", engine, "--out",
+                folder / "run", "--set", "step_planner.walk.command[1].after_steps=7", "--duration",
+                "40"});  // its exit code: the scenario asks for 20 steps
+      const nlohmann::json summary = ReadSummary(folder / "run");
+      EXPECT_EQ(Measured(summary, "fallen"), 0) << engine << variant;
+      EXPECT_EQ(Measured(summary, "violated_ticks"), 0) << engine << variant;
+      EXPECT_EQ(Measured(summary, "duration_reached"), 40) << engine << variant;
+      EXPECT_GE(Measured(summary, "steps"), 7) << engine << variant;
+    }
+  }
+}
+
 // What a scenario leaves open is filled for walking: with the rule's values for standing this
 // falls.
 TEST(WalkRun, AScenarioThatStandsWalksOnceItIsToldTo) {

@@ -329,7 +329,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   closing_ = !command_.stepping;
   foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
   // The feet come to stand as they are, one on a tread, one on the next.
-  if (closing_ && AcrossEdge(foothold_)) final_ = true;
+  if (closing_ && (spec_.stand_apart || AcrossEdge(foothold_))) final_ = true;
 }
 
 double Walk::Progress(double time) const {

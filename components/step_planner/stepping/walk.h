@@ -41,10 +41,11 @@ struct WalkSpec {
   double press_share = 0;  ///< of the weight that this is; 0: it only has to touch
   double off_center = 0;   ///< m of the capture point beside the sole's middle at lift-off, at most
   double line = 0;         ///< m, rad by which a foothold comes back to the commanded way
-  int places = 0;          ///< others that are tried for a step; 0: a foot waits where it is
-  double place_shift = 0;  ///< m between them
-  double patience = 0;     ///< s of a press until a place is left that does not take it
-  double most_tilt = 0;    ///< rad of a sole that is stood on
+  bool stand_apart = false;  ///< at a stop; else the feet come side by side
+  int places = 0;            ///< others that are tried for a step; 0: a foot waits where it is
+  double place_shift = 0;    ///< m between them
+  double patience = 0;       ///< s of a press until a place is left that does not take it
+  double most_tilt = 0;      ///< rad of a sole that is stood on
   KnownGround ground;
   /// m of the centre of pressure for each rad/s with which the sole that carries turns.
   double roll_damping = 0;

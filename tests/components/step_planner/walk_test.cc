@@ -62,6 +62,23 @@ TEST(Walk, GoesAsHighAfterARecoveryAsBefore) {
   EXPECT_NEAR(world.com().z(), before, 0.002);
 }
 
+TEST(Walk, StandsApartWhereItIsToldTo) {
+  World world(TestRobot::kDyros, 0, 0, false, 0, 1, true);
+  const WalkCommand command{{0.1, 0}, 0, true};
+  world.Run(8, command);
+  ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
+  const int steps = world.walk().num_steps();
+  world.Run(6, kStand);
+  EXPECT_FALSE(world.walk().active());
+  EXPECT_EQ(world.walk().num_steps(), steps + 1);  // the one that was under way
+  const Vector3d apart = world.sole()[1].translation() - world.sole()[0].translation();
+  EXPECT_NEAR(std::abs(apart.x()), 0.1, 0.01);
+  EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02);
+  // And walks on from there.
+  world.Run(6, command);
+  EXPECT_GT(world.walk().num_steps(), steps + 4);
+}
+
 TEST(Walk, KeepsToTheCommandedVelocity) {
   World world(TestRobot::kDyros);
   const WalkCommand command{{0.15, 0}, 0, true};

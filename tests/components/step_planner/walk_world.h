@@ -66,8 +66,9 @@ class World {
   /// `rests`: the capture point, above the sole that carries.
   /// `places`: of WalkSpec.
   /// `slowest_swing`: of WalkSpec, with soft_damping; 1: neither.
+  /// `stand_apart`: of WalkSpec.
   explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false,
-                 int places = 0, double slowest_swing = 1)
+                 int places = 0, double slowest_swing = 1, bool stand_apart = false)
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
     const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
@@ -80,6 +81,7 @@ class World {
     spec.rests = rests;
     spec.off_center = 0.02;
     spec.line = 0.03;
+    spec.stand_apart = stand_apart;
     spec.places = places;
     spec.place_shift = 0.15;
     spec.patience = kPatience;
