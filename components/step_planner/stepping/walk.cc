@@ -98,6 +98,10 @@ bool Walk::FeetTogether(const StepState& state) const {
          std::abs(Difference(state.sole_yaw[1], state.sole_yaw[0])) < kTogether;
 }
 
+bool Walk::OnSoftGround() const {
+  return spec_.rests && std::max(sinks_[0], sinks_[1]) > spec_.soft;
+}
+
 bool Walk::AtRest(const StepInput& input, const StepState& state) {
   const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
   const bool rests = (state.pendulum.capture_point() - middle).norm() < spec_.rest_distance &&
@@ -148,7 +152,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       Enter(final_ ? WalkStage::kStopping : WalkStage::kUnloading, time);
       break;
     case WalkStage::kStopping:
-      if (!AtRest(input, state)) break;
+      if (!AtRest(input, state) || (OnSoftGround() && !command.stepping)) break;
       Enter(WalkStage::kStanding, time);
       time_ = time;
       return false;

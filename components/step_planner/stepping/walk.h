@@ -198,6 +198,9 @@ class Walk {
   balance::ConvexPolygon Carrying(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d DesiredCop(const StepInput& input, const StepState& state);
   bool FeetTogether(const StepState& state) const;
+  /// A sole has sunk. The control of a phase that stands would stir it: the walk goes on without
+  /// steps.
+  bool OnSoftGround() const;
   /// Side by side the foot that steps would stand across an edge that it is told of.
   bool AcrossEdge(const Footstep& foothold) const;
   void Lead(const StepInput& input, const StepState& state);

@@ -122,6 +122,25 @@ TEST(Walk, LooksForTheGroundWhereTheSunkSoleMetIt) {
   }
 }
 
+// A phase's control of the COM stirred soles on soft ground: the robot fell within a second.
+TEST(Walk, KeepsARobotThatStopsOnSoftGround) {
+  const WalkCommand command{{0, 0}, 0, true};
+  for (const double depth : {0.0, 0.04}) {
+    World world(TestRobot::kDyros, 0, 0.5, true);
+    world.Soften(depth);
+    world.Run(12, command);
+    ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
+    world.Run(20, kStand);
+    EXPECT_EQ(world.walk().active(), depth > 0);
+    EXPECT_NEAR((world.com().head<2>() - world.middle()).norm(), 0, 0.02) << depth;
+    const int steps = world.walk().num_steps();
+    world.Run(5, kStand);
+    EXPECT_EQ(world.walk().num_steps(), steps) << depth;
+    world.Run(12, command);
+    EXPECT_GT(world.walk().num_steps(), steps) << depth;
+  }
+}
+
 /// Until the second foot has come down, the capture point above the sole that carries meanwhile.
 void WalkOverAHole(World* world, const WalkCommand& command) {
   for (int i = 0; i < 15000 && world->walk().num_steps() < 2; ++i) {
