@@ -122,7 +122,7 @@ TEST(Walk, LooksForTheGroundWhereTheSunkSoleMetIt) {
   }
 }
 
-// A phase's control of the COM stirred soles on soft ground: the robot fell within a second.
+// A phase's control of the COM stirred soles on soft ground: the robot fell as it stopped.
 TEST(Walk, KeepsARobotThatStopsOnSoftGround) {
   const WalkCommand command{{0, 0}, 0, true};
   for (const double depth : {0.0, 0.04}) {
