@@ -1,5 +1,7 @@
 # The instruction set that all code is compiled for. It decides the last bits of every result, so it is a named choice
 # and not this machine's own: x86-64-v3 (AVX2, FMA; processors since about 2013) gives the recorded bits everywhere.
+# Of that set only the vector instructions touch a floating-point number. The integer ones (lzcnt, bmi, movbe) are left
+# out: virtual machines hide one or the other, and no bit of a result depends on them.
 # Sets POISE_MARCH (flag, may be empty) and POISE_BITS (what bits a build gives, for `poise --version` and logs).
 set(POISE_INSTRUCTION_SET "" CACHE STRING
     "x86-64-v3 (default where the processor has it), x86-64 (any such processor), or native (bits of its own)")
@@ -9,13 +11,13 @@ if(DEFINED POISE_NATIVE)
   message(FATAL_ERROR "POISE_NATIVE is gone: -DPOISE_INSTRUCTION_SET=native (bits of its own) takes its place")
 endif()
 
-# What the processor lacks of x86-64-v3, by the name that /proc/cpuinfo gives it.
+# What the processor lacks of x86-64-v3's vector instructions, by the name that /proc/cpuinfo gives it.
 function(poise_missing_of_v3 result)
   file(STRINGS /proc/cpuinfo flags REGEX "^flags" LIMIT_COUNT 1)
   string(REGEX REPLACE "^flags[ \t]*:[ ]*" "" flags "${flags}")
   string(REPLACE " " ";" flags "${flags}")
   set(missing)
-  foreach(flag avx avx2 bmi1 bmi2 f16c fma abm movbe xsave)
+  foreach(flag avx avx2 fma)
     if(NOT flag IN_LIST flags)
       list(APPEND missing ${flag})
     endif()
@@ -49,6 +51,8 @@ endif()
 if(POISE_BITS STREQUAL "native")
   message(NOTICE "Building for this machine's processor (-march=native): its bits are its own, not the recorded ones")
   set(POISE_MARCH -march=native)
-elseif(POISE_BITS MATCHES "^x86-64")
-  set(POISE_MARCH -march=${POISE_BITS})
+elseif(POISE_BITS STREQUAL "x86-64-v3")
+  set(POISE_MARCH -march=x86-64 -mavx2 -mfma)
+elseif(POISE_BITS STREQUAL "x86-64")
+  set(POISE_MARCH -march=x86-64)
 endif()

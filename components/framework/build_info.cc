@@ -16,13 +16,10 @@ namespace {
 [[gnu::constructor(101)]] void CheckProcessor() {
   if (std::strcmp(POISE_BITS, "x86-64-v3") != 0) return;
   __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("bmi2")) {
-    return;
-  }
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return;
   static constexpr char kText[] =
-      "poise: this program was built for x86-64-v3 (AVX2, FMA, BMI2), which this processor lacks; "
-      "build it here (deploy/setup), or with -DPOISE_INSTRUCTION_SET=x86-64\n";
+      "poise: this program was built for x86-64-v3 (AVX2, FMA), which this processor lacks; build "
+      "it here (deploy/setup), or with -DPOISE_INSTRUCTION_SET=x86-64\n";
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kText, sizeof(kText) - 1);
   _exit(2);
 }
