@@ -4,7 +4,7 @@ set(POISE_CMAKE_DIR ${CMAKE_CURRENT_LIST_DIR})
 set(POISE_COMPILER "${CMAKE_CXX_COMPILER_ID} ${CMAKE_CXX_COMPILER_VERSION}")
 option(POISE_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 option(POISE_BUILD_TESTS "Build tests and benchmarks" ON)
-option(POISE_WERROR "Treat warnings as errors" ON)
+option(POISE_WERROR "Treat warnings as errors: where Poise is developed and in its CI, never for a user" OFF)
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)

@@ -2,7 +2,7 @@
 
 #include <console_bridge/console.h>
 #include <fmt/format.h>
-#include <tinyxml.h>
+#include <tinyxml2.h>
 #include <urdf_model/model.h>
 #include <urdf_parser/urdf_parser.h>
 
@@ -18,33 +18,34 @@ namespace {
 
 constexpr int kMaxLinks = 1000;  // urdfdom recurses over chains of links
 
-std::string RequiredAttribute(const TiXmlElement& element, const char* name,
+std::string RequiredAttribute(const tinyxml2::XMLElement& element, const char* name,
                               const std::string& what) {
   const std::string value = Attribute(element, name);
   if (value.empty()) {
-    throw RobotError(
-        fmt::format("URDF line {}: {} has no {}: add {}=\"...\"", element.Row(), what, name, name));
+    throw RobotError(fmt::format("URDF line {}: {} has no {}: add {}=\"...\"", element.GetLineNum(),
+                                 what, name, name));
   }
   if (value != element.Attribute(name)) {
     throw RobotError(
         fmt::format("URDF line {}: {} '{}' of {} is too long or has control characters: rename it",
-                    element.Row(), name, value, what));
+                    element.GetLineNum(), name, value, what));
   }
   return value;
 }
 
-void RemoveChildren(TiXmlElement* element, const char* name) {
-  while (TiXmlElement* child = element->FirstChildElement(name)) element->RemoveChild(child);
+void RemoveChildren(tinyxml2::XMLElement* element, const char* name) {
+  while (tinyxml2::XMLElement* child = element->FirstChildElement(name))
+    element->DeleteChild(child);
 }
 
-void CheckLinks(TiXmlElement* robot, std::map<std::string, int>* link_line) {
-  for (TiXmlElement* link = robot->FirstChildElement("link"); link;
+void CheckLinks(tinyxml2::XMLElement* robot, std::map<std::string, int>* link_line) {
+  for (tinyxml2::XMLElement* link = robot->FirstChildElement("link"); link;
        link = link->NextSiblingElement("link")) {
     const std::string name = RequiredAttribute(*link, "name", "a link");
-    if (!link_line->emplace(name, link->Row()).second) {
+    if (!link_line->emplace(name, link->GetLineNum()).second) {
       throw RobotError(
           fmt::format("URDF line {}: link '{}' stands already at line {}: rename or remove one",
-                      link->Row(), name, link_line->at(name)));
+                      link->GetLineNum(), name, link_line->at(name)));
     }
     RemoveChildren(link, "visual");
     RemoveChildren(link, "collision");
@@ -56,42 +57,43 @@ void CheckLinks(TiXmlElement* robot, std::map<std::string, int>* link_line) {
   }
 }
 
-double Number(const TiXmlElement& element, const char* name, double missing) {
+double Number(const tinyxml2::XMLElement& element, const char* name, double missing) {
   const char* const text = element.Attribute(name);
   if (text == nullptr) return missing;
   double value = 0;
-  if (element.QueryDoubleAttribute(name, &value) != TIXML_SUCCESS || !std::isfinite(value)) {
+  if (element.QueryDoubleAttribute(name, &value) != tinyxml2::XML_SUCCESS ||
+      !std::isfinite(value)) {
     throw RobotError(fmt::format("URDF line {}: {} '{}' is no finite number: correct it",
-                                 element.Row(), name, OneLine(text)));
+                                 element.GetLineNum(), name, OneLine(text)));
   }
   return value;
 }
 
-Mimic ReadMimic(const TiXmlElement& mimic, const std::string& joint) {
+Mimic ReadMimic(const tinyxml2::XMLElement& mimic, const std::string& joint) {
   return {RequiredAttribute(mimic, "joint", fmt::format("<mimic> of joint '{}'", joint)),
           Number(mimic, "multiplier", 1), Number(mimic, "offset", 0)};
 }
 
-std::vector<std::string> CheckJoints(TiXmlElement* robot,
+std::vector<std::string> CheckJoints(tinyxml2::XMLElement* robot,
                                      const std::map<std::string, int>& link_line,
                                      std::map<std::string, int>* joint_lines,
                                      std::map<std::string, Mimic>* mimics) {
   std::vector<std::string> order;
   std::map<std::string, int>& joint_line = *joint_lines;
   std::map<std::string, std::string> parent_joint;
-  for (TiXmlElement* joint = robot->FirstChildElement("joint"); joint;
+  for (tinyxml2::XMLElement* joint = robot->FirstChildElement("joint"); joint;
        joint = joint->NextSiblingElement("joint")) {
     const std::string name = RequiredAttribute(*joint, "name", "a joint");
-    if (!joint_line.emplace(name, joint->Row()).second) {
+    if (!joint_line.emplace(name, joint->GetLineNum()).second) {
       throw RobotError(
           fmt::format("URDF line {}: joint '{}' stands already at line {}: rename or remove one",
-                      joint->Row(), name, joint_line.at(name)));
+                      joint->GetLineNum(), name, joint_line.at(name)));
     }
     for (const char* end : {"parent", "child"}) {
-      const TiXmlElement* element = joint->FirstChildElement(end);
+      const tinyxml2::XMLElement* element = joint->FirstChildElement(end);
       if (!element) {
         throw RobotError(fmt::format("URDF line {}: joint '{}' has no {}: add <{} link=\"...\"/>",
-                                     joint->Row(), name, end, end));
+                                     joint->GetLineNum(), name, end, end));
       }
       const std::string link =
           RequiredAttribute(*element, "link", fmt::format("{} of joint '{}'", end, name));
@@ -99,16 +101,16 @@ std::vector<std::string> CheckJoints(TiXmlElement* robot,
         throw RobotError(
             fmt::format("URDF line {}: joint '{}' names {} link '{}', which does not exist: "
                         "correct the name or add the link",
-                        element->Row(), name, end, link));
+                        element->GetLineNum(), name, end, link));
       }
       if (std::string_view(end) == "child" && !parent_joint.emplace(link, name).second) {
         throw RobotError(fmt::format(
             "URDF line {}: link '{}' has two parents, through joints '{}' and '{}': closed loops "
             "are not supported, remove one joint",
-            joint->Row(), link, parent_joint.at(link), name));
+            joint->GetLineNum(), link, parent_joint.at(link), name));
       }
     }
-    if (const TiXmlElement* mimic = joint->FirstChildElement("mimic")) {
+    if (const tinyxml2::XMLElement* mimic = joint->FirstChildElement("mimic")) {
       (*mimics)[name] = ReadMimic(*mimic, name);
       RemoveChildren(joint, "mimic");
     }
@@ -120,9 +122,9 @@ std::vector<std::string> CheckJoints(TiXmlElement* robot,
   return order;
 }
 
-void CheckConnected(const std::map<std::string, int>& link_line, TiXmlElement* robot) {
+void CheckConnected(const std::map<std::string, int>& link_line, tinyxml2::XMLElement* robot) {
   std::map<std::string, std::string> parent;
-  for (TiXmlElement* joint = robot->FirstChildElement("joint"); joint;
+  for (tinyxml2::XMLElement* joint = robot->FirstChildElement("joint"); joint;
        joint = joint->NextSiblingElement("joint")) {
     parent[Attribute(*joint->FirstChildElement("child"), "link")] =
         Attribute(*joint->FirstChildElement("parent"), "link");
@@ -151,29 +153,30 @@ void CheckConnected(const std::map<std::string, int>& link_line, TiXmlElement* r
 
 // Leaves elements and attributes only. urdfdom hands texts to printf as its format: no % may reach
 // it.
-void Strip(TiXmlElement* element) {
-  for (const TiXmlAttribute* a = element->FirstAttribute(); a; a = a->Next()) {
-    if (a->ValueStr().find('%') != std::string::npos) {
-      throw RobotError(fmt::format("URDF line {}: {} '{}' has a '%': remove it", element->Row(),
-                                   a->Name(), OneLine(a->Value())));
+void Strip(tinyxml2::XMLElement* element) {
+  for (const tinyxml2::XMLAttribute* a = element->FirstAttribute(); a; a = a->Next()) {
+    if (std::string_view(a->Value()).find('%') != std::string::npos) {
+      throw RobotError(fmt::format("URDF line {}: {} '{}' has a '%': remove it",
+                                   element->GetLineNum(), a->Name(), OneLine(a->Value())));
     }
   }
-  for (TiXmlNode* node = element->FirstChild(); node;) {
-    TiXmlNode* next = node->NextSibling();
-    if (TiXmlElement* child = node->ToElement()) {
+  for (tinyxml2::XMLNode* node = element->FirstChild(); node;) {
+    tinyxml2::XMLNode* next = node->NextSibling();
+    if (tinyxml2::XMLElement* child = node->ToElement()) {
       Strip(child);
     } else {
-      element->RemoveChild(node);
+      element->DeleteChild(node);
     }
     node = next;
   }
 }
 
 // What describes no link or joint: materials, simulators' and controllers' extensions.
-void RemoveForeign(TiXmlElement* robot) {
-  for (TiXmlElement* child = robot->FirstChildElement(); child;) {
-    TiXmlElement* next = child->NextSiblingElement();
-    if (child->ValueStr() != "link" && child->ValueStr() != "joint") robot->RemoveChild(child);
+void RemoveForeign(tinyxml2::XMLElement* robot) {
+  for (tinyxml2::XMLElement* child = robot->FirstChildElement(); child;) {
+    tinyxml2::XMLElement* next = child->NextSiblingElement();
+    const std::string_view kind = child->Value();
+    if (kind != "link" && kind != "joint") robot->DeleteChild(child);
     child = next;
   }
 }
@@ -252,9 +255,9 @@ urdf::ModelInterfaceSharedPtr ParseWithUrdfdom(const std::string& xml,
 }  // namespace
 
 UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings) {
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   ParseXml(xml, "URDF", &document);
-  TiXmlElement* robot = document.FirstChildElement("robot");
+  tinyxml2::XMLElement* robot = document.FirstChildElement("robot");
   if (!robot) throw RobotError("URDF has no <robot> element: is it a URDF (xacro expanded)?");
 
   UrdfDocument result;
@@ -265,7 +268,7 @@ UrdfDocument ParseUrdf(std::string_view xml, std::vector<std::string>* warnings)
   RemoveForeign(robot);
   Strip(robot);
 
-  TiXmlPrinter printer;
+  tinyxml2::XMLPrinter printer;
   robot->Accept(&printer);
   result.model = ParseWithUrdfdom(printer.CStr(), link_line, joint_line, warnings);
   return result;

@@ -1,7 +1,7 @@
 #include "components/robot/xml_text.h"
 
 #include <fmt/format.h>
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <cctype>
@@ -48,12 +48,12 @@ std::string OneLine(std::string text) {
   return text;
 }
 
-std::string Attribute(const TiXmlElement& element, const char* name) {
+std::string Attribute(const tinyxml2::XMLElement& element, const char* name) {
   const char* value = element.Attribute(name);
   return value ? OneLine(value) : std::string();
 }
 
-void ParseXml(std::string_view xml, const char* format, TiXmlDocument* document) {
+void ParseXml(std::string_view xml, const char* format, tinyxml2::XMLDocument* document) {
   if (xml.size() > kMaxBytes) {
     throw RobotError(fmt::format("{0} has {1} bytes, more than {2}: is it a {0}?", format,
                                  xml.size(), kMaxBytes));
@@ -67,10 +67,10 @@ void ParseXml(std::string_view xml, const char* format, TiXmlDocument* document)
         fmt::format("{} line {} nests elements more than {} deep: is an element not closed?",
                     format, LineAt(xml, at), kMaxNesting));
   }
-  document->Parse(std::string(xml).c_str(), nullptr, TIXML_ENCODING_UTF8);
+  document->Parse(xml.data(), xml.size());
   if (document->Error()) {
     throw RobotError(fmt::format("{} line {}: not XML ({}): correct the text there", format,
-                                 document->ErrorRow(), OneLine(document->ErrorDesc())));
+                                 document->ErrorLineNum(), OneLine(document->ErrorStr())));
   }
 }
 

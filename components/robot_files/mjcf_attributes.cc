@@ -1,6 +1,6 @@
 #include "components/robot_files/mjcf_attributes.h"
 
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <cctype>
@@ -54,17 +54,17 @@ bool Has(const Names& names, std::string_view name) {
 
 }  // namespace
 
-void FailMjcfAt(const TiXmlElement& at, const std::string& text) {
-  throw RobotError(fmt::format("MJCF line {}: {}", at.Row(), text));
+void FailMjcfAt(const tinyxml2::XMLElement& at, const std::string& text) {
+  throw RobotError(fmt::format("MJCF line {}: {}", at.GetLineNum(), text));
 }
 
-void FailMjcfLength(const TiXmlElement& at, const char* name, size_t has, size_t needs) {
+void FailMjcfLength(const tinyxml2::XMLElement& at, const char* name, size_t has, size_t needs) {
   FailMjcf(at, "{} of <{}> has {} numbers, it needs {}", name, Shown(at), has, needs);
 }
 
-std::string Shown(const TiXmlElement& element) { return OneLine(element.ValueStr()); }
+std::string Shown(const tinyxml2::XMLElement& element) { return OneLine(element.Value()); }
 
-std::vector<double> MjcfNumbers(const TiXmlElement& element, std::string_view name) {
+std::vector<double> MjcfNumbers(const tinyxml2::XMLElement& element, std::string_view name) {
   std::vector<double> numbers;
   const char* text = element.Attribute(std::string(name).c_str());
   while (text != nullptr) {
@@ -83,7 +83,7 @@ std::vector<double> MjcfNumbers(const TiXmlElement& element, std::string_view na
   return numbers;
 }
 
-std::string KeptAttributes(const TiXmlElement& element, std::string_view kind) {
+std::string KeptAttributes(const tinyxml2::XMLElement& element, std::string_view kind) {
   std::string text;
   const auto keep = [&](std::string_view name) {
     const std::vector<double> numbers = MjcfNumbers(element, name);

@@ -12,32 +12,34 @@
 
 #include "components/robot/robot_model.h"
 
-class TiXmlElement;
+namespace tinyxml2 {
+class XMLElement;
+}
 
 namespace poise::robot {
 
-[[noreturn]] void FailMjcfAt(const TiXmlElement& at, const std::string& text);
+[[noreturn]] void FailMjcfAt(const tinyxml2::XMLElement& at, const std::string& text);
 
 /// Throws RobotError: "MJCF line 12: ...".
 template <typename... Args>
-[[noreturn]] void FailMjcf(const TiXmlElement& at, fmt::format_string<Args...> text,
+[[noreturn]] void FailMjcf(const tinyxml2::XMLElement& at, fmt::format_string<Args...> text,
                            Args&&... args) {
   FailMjcfAt(at, fmt::format(text, std::forward<Args>(args)...));
 }
 
 /// The element's name, one line.
-std::string Shown(const TiXmlElement& element);
+std::string Shown(const tinyxml2::XMLElement& element);
 
 /// The numbers of an attribute, all finite and of at most 1e6; none where it is missing. Throws
 /// RobotError.
-std::vector<double> MjcfNumbers(const TiXmlElement& element, std::string_view name);
+std::vector<double> MjcfNumbers(const tinyxml2::XMLElement& element, std::string_view name);
 
-[[noreturn]] void FailMjcfLength(const TiXmlElement& at, const char* name, size_t has,
+[[noreturn]] void FailMjcfLength(const tinyxml2::XMLElement& at, const char* name, size_t has,
                                  size_t needs);
 
 /// Exactly `n` of them. Throws RobotError.
 template <size_t n>
-std::array<double, n> MjcfNumbers(const TiXmlElement& element, const char* name) {
+std::array<double, n> MjcfNumbers(const tinyxml2::XMLElement& element, const char* name) {
   const std::vector<double> numbers = MjcfNumbers(element, name);
   if (numbers.size() != n) FailMjcfLength(element, name, numbers.size(), n);
   std::array<double, n> result;
@@ -47,7 +49,7 @@ std::array<double, n> MjcfNumbers(const TiXmlElement& element, const char* name)
 
 /// What MuJoCo is to see of an element of this kind ("joint", "geom", "site", "body", "inertial",
 /// "actuator", "compiler"), as text. Throws RobotError: numbers that are none, unknown words.
-std::string KeptAttributes(const TiXmlElement& element, std::string_view kind);
+std::string KeptAttributes(const tinyxml2::XMLElement& element, std::string_view kind);
 
 /// Attributes that turn a frame.
 inline constexpr std::array<std::string_view, 5> kOrientations = {"quat", "axisangle", "xyaxes",

@@ -1,7 +1,7 @@
 #include "components/robot_files/mjcf_cleaning.h"
 
 #include <fmt/format.h>
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -27,33 +27,33 @@ class Cleaner {
   Cleaner(std::vector<std::string>* warnings, CleanMjcf* result)
       : warnings_(warnings), result_(*result) {}
 
-  void Clean(const TiXmlElement& root) {
-    if (root.ValueStr() != "mujoco") {
+  void Clean(const tinyxml2::XMLElement& root) {
+    if (std::string_view(root.Value()) != "mujoco") {
       FailMjcf(root, "<{}> is no MJCF: its outermost element must be <mujoco>", Shown(root));
     }
-    if (const TiXmlElement* const e = root.FirstChildElement("include")) {
+    if (const tinyxml2::XMLElement* const e = root.FirstChildElement("include")) {
       FailMjcf(*e, "<include file='{}'> is not followed: import that file, if it has the robot",
                Attribute(*e, "file"));
     }
     result_.model = Attribute(root, "model");
-    Sections(root, "compiler", [&](const TiXmlElement& e) { Compiler(e); });
+    Sections(root, "compiler", [&](const tinyxml2::XMLElement& e) { Compiler(e); });
     std::string xml = "<mujoco><compiler autolimits='true'" + compiler_ +
                       " balanceinertia='true' boundmass='1e-9' boundinertia='1e-12'/>"
                       "<size njmax='1' nconmax='1'/>";
-    Sections(root, "default", [&](const TiXmlElement& e) { Defaults(e, "", &xml); });
-    Sections(root, "asset", [&](const TiXmlElement& e) { Assets(e); });
-    const TiXmlElement& robot = RobotBody(root);
+    Sections(root, "default", [&](const tinyxml2::XMLElement& e) { Defaults(e, "", &xml); });
+    Sections(root, "asset", [&](const tinyxml2::XMLElement& e) { Assets(e); });
+    const tinyxml2::XMLElement& robot = RobotBody(root);
     xml += "<worldbody>";
     Body(robot, -1, "", &xml);
     xml += "</worldbody><actuator>";
-    Sections(root, "actuator", [&](const TiXmlElement& e) { Actuators(e, &xml); });
+    Sections(root, "actuator", [&](const tinyxml2::XMLElement& e) { Actuators(e, &xml); });
     xml += "</actuator></mujoco>";
     result_.xml = std::move(xml);
-    Sections(root, "equality", [&](const TiXmlElement& e) { Equalities(e); });
-    Sections(root, "sensor", [&](const TiXmlElement& e) { Sensors(e); });
-    Sections(root, "keyframe", [&](const TiXmlElement& e) { Keys(e); });
-    for (const TiXmlElement* e = root.FirstChildElement(); e; e = e->NextSiblingElement()) {
-      const std::string& name = e->ValueStr();
+    Sections(root, "equality", [&](const tinyxml2::XMLElement& e) { Equalities(e); });
+    Sections(root, "sensor", [&](const tinyxml2::XMLElement& e) { Sensors(e); });
+    Sections(root, "keyframe", [&](const tinyxml2::XMLElement& e) { Keys(e); });
+    for (const tinyxml2::XMLElement* e = root.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string name = e->Value();
       if (name == "tendon" || name == "extension" || name == "deformable") {
         Note(*e, "<{}> is left out", name);
       }
@@ -62,20 +62,21 @@ class Cleaner {
 
  private:
   template <typename... Args>
-  void Note(const TiXmlElement& at, fmt::format_string<Args...> text, Args&&... args) {
+  void Note(const tinyxml2::XMLElement& at, fmt::format_string<Args...> text, Args&&... args) {
     if (warnings_ == nullptr) return;
-    warnings_->push_back(
-        fmt::format("MJCF line {}: {}", at.Row(), fmt::format(text, std::forward<Args>(args)...)));
+    warnings_->push_back(fmt::format("MJCF line {}: {}", at.GetLineNum(),
+                                     fmt::format(text, std::forward<Args>(args)...)));
   }
 
-  static void Sections(const TiXmlElement& root, const char* name,
-                       const std::function<void(const TiXmlElement&)>& read) {
-    for (const TiXmlElement* e = root.FirstChildElement(name); e; e = e->NextSiblingElement(name)) {
+  static void Sections(const tinyxml2::XMLElement& root, const char* name,
+                       const std::function<void(const tinyxml2::XMLElement&)>& read) {
+    for (const tinyxml2::XMLElement* e = root.FirstChildElement(name); e;
+         e = e->NextSiblingElement(name)) {
       read(*e);
     }
   }
 
-  std::string ClassAttribute(const TiXmlElement& element, const char* name) const {
+  std::string ClassAttribute(const tinyxml2::XMLElement& element, const char* name) const {
     const std::string value = Attribute(element, name);
     if (value.empty()) return "";
     const auto known = class_index_.find(value);
@@ -102,7 +103,7 @@ class Cleaner {
     compiler_.erase(at, compiler_.find('\'', at + beginning.size()) + 1 - at);
   }
 
-  void Compiler(const TiXmlElement& element) {
+  void Compiler(const tinyxml2::XMLElement& element) {
     Merge(KeptAttributes(element, "compiler"));
     Forget(" autolimits='");  // ours is set
     if (Attribute(element, "coordinate") == "global") {
@@ -125,8 +126,8 @@ class Cleaner {
     }
   }
 
-  void Assets(const TiXmlElement& section) {
-    Sections(section, "mesh", [&](const TiXmlElement& mesh) {
+  void Assets(const tinyxml2::XMLElement& section) {
+    Sections(section, "mesh", [&](const tinyxml2::XMLElement& mesh) {
       const std::string file = Attribute(mesh, "file");
       std::string name = Attribute(mesh, "name");
       if (name.empty()) {  // the file's, without folder and ending
@@ -143,7 +144,7 @@ class Cleaner {
     });
   }
 
-  void Defaults(const TiXmlElement& element, const std::string& parent, std::string* xml) {
+  void Defaults(const tinyxml2::XMLElement& element, const std::string& parent, std::string* xml) {
     std::string name = Attribute(element, "class");
     const bool is_main = parent.empty();
     if (name.empty() && is_main) name = "main";
@@ -158,13 +159,14 @@ class Cleaner {
     // The outermost class is MuJoCo's "main".
     *xml += is_main ? std::string("<default>")
                     : fmt::format("<default class='c{}'>", class_index_[name]);
-    for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
-      const std::string& kind = e->ValueStr();
+    for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
+      const std::string kind = e->Value();
       if (kind == "default") {
         Defaults(*e, name, xml);
       } else if (kind == "joint" || kind == "geom") {
         auto& known = kind == "joint" ? own.joint : own.geom;
-        for (const TiXmlAttribute* a = e->FirstAttribute(); a; a = a->Next()) {
+        for (const tinyxml2::XMLAttribute* a = e->FirstAttribute(); a; a = a->Next()) {
           known[a->Name()] = OneLine(a->Value());
         }
         if (e->Attribute("actuatorfrcrange"))
@@ -181,7 +183,7 @@ class Cleaner {
   }
 
   // The class whose defaults an element takes.
-  std::string ClassOf(const TiXmlElement& element, const std::string& child_class) const {
+  std::string ClassOf(const tinyxml2::XMLElement& element, const std::string& child_class) const {
     const std::string own = Attribute(element, "class");
     if (!own.empty()) return own;
     return child_class.empty() ? main_ : child_class;
@@ -196,7 +198,7 @@ class Cleaner {
     return nullptr;
   }
 
-  std::string Resolved(const TiXmlElement& element, const char* name,
+  std::string Resolved(const tinyxml2::XMLElement& element, const char* name,
                        const std::string& child_class,
                        std::map<std::string, std::string> DefaultClass::*kind) const {
     if (element.Attribute(name)) return Attribute(element, name);
@@ -208,32 +210,33 @@ class Cleaner {
     return "";
   }
 
-  bool IsFree(const TiXmlElement& joint) const {
+  bool IsFree(const tinyxml2::XMLElement& joint) const {
     return Resolved(joint, "type", "", &DefaultClass::joint) == "free";
   }
 
-  bool HasFreeJoint(const TiXmlElement& body) const {
+  bool HasFreeJoint(const tinyxml2::XMLElement& body) const {
     if (body.FirstChildElement("freejoint")) return true;
-    const TiXmlElement* joint = body.FirstChildElement("joint");
+    const tinyxml2::XMLElement* joint = body.FirstChildElement("joint");
     return joint != nullptr && IsFree(*joint);
   }
 
-  static bool HasJoints(const TiXmlElement& body) {
+  static bool HasJoints(const tinyxml2::XMLElement& body) {
     if (body.FirstChildElement("joint")) return true;
-    for (const TiXmlElement* b = body.FirstChildElement("body"); b;
+    for (const tinyxml2::XMLElement* b = body.FirstChildElement("body"); b;
          b = b->NextSiblingElement("body")) {
       if (HasJoints(*b)) return true;
     }
     return false;
   }
 
-  const TiXmlElement& RobotBody(const TiXmlElement& root) {
-    const TiXmlElement* robot = nullptr;
-    const TiXmlElement* first = nullptr;
-    Sections(root, "worldbody", [&](const TiXmlElement& world) {
-      for (const TiXmlElement* e = world.FirstChildElement(); e; e = e->NextSiblingElement()) {
+  const tinyxml2::XMLElement& RobotBody(const tinyxml2::XMLElement& root) {
+    const tinyxml2::XMLElement* robot = nullptr;
+    const tinyxml2::XMLElement* first = nullptr;
+    Sections(root, "worldbody", [&](const tinyxml2::XMLElement& world) {
+      for (const tinyxml2::XMLElement* e = world.FirstChildElement(); e;
+           e = e->NextSiblingElement()) {
         CheckStructure(*e);
-        if (e->ValueStr() != "body") continue;
+        if (std::string_view(e->Value()) != "body") continue;
         if (HasFreeJoint(*e)) {
           if (robot != nullptr) {
             FailMjcf(*e, "body '{}' floats, and so does '{}': leave one in the file",
@@ -252,16 +255,16 @@ class Cleaner {
   }
 
   // Elements that would put bodies where the reader sees none.
-  void CheckStructure(const TiXmlElement& element) const {
+  void CheckStructure(const tinyxml2::XMLElement& element) const {
     static const std::set<std::string> kUnknown = {"frame",     "replicate", "attach",
                                                    "composite", "flexcomp",  "include"};
-    if (kUnknown.contains(element.ValueStr())) {
+    if (kUnknown.contains(element.Value())) {
       FailMjcf(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
                Shown(element));
     }
   }
 
-  std::string UniqueName(const TiXmlElement& element, const char* kind, size_t index,
+  std::string UniqueName(const tinyxml2::XMLElement& element, const char* kind, size_t index,
                          std::set<std::string>* taken) {
     std::string name = Attribute(element, "name");
     if (name.empty()) name = fmt::format("{}_{}", kind, index);
@@ -271,12 +274,13 @@ class Cleaner {
     return name;
   }
 
-  void Count(const TiXmlElement& element) {
+  void Count(const tinyxml2::XMLElement& element) {
     if (++elements_ > kMaxElements)
       FailMjcf(element, "more than {} elements: simplify it", kMaxElements);
   }
 
-  void Body(const TiXmlElement& element, int parent, std::string child_class, std::string* xml) {
+  void Body(const tinyxml2::XMLElement& element, int parent, std::string child_class,
+            std::string* xml) {
     Count(element);
     const int index = static_cast<int>(result_.bodies.size());
     CleanBody& body = result_.bodies.emplace_back();
@@ -289,8 +293,9 @@ class Cleaner {
     *xml += fmt::format("<body name='b{}'{}{}>", index, ClassAttribute(element, "childclass"),
                         KeptAttributes(element, "body"));
     bool has_inertial = false;
-    for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
-      const std::string& kind = e->ValueStr();
+    for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
+      const std::string kind = e->Value();
       CheckStructure(*e);
       if (kind == "body") continue;
       if (kind == "inertial") {
@@ -308,14 +313,14 @@ class Cleaner {
         Site(*e, index, xml);
       }
     }
-    for (const TiXmlElement* e = element.FirstChildElement("body"); e;
+    for (const tinyxml2::XMLElement* e = element.FirstChildElement("body"); e;
          e = e->NextSiblingElement("body")) {
       Body(*e, index, child_class, xml);
     }
     *xml += "</body>";
   }
 
-  void Inertial(const TiXmlElement& element, CleanBody* body, std::string* xml) {
+  void Inertial(const tinyxml2::XMLElement& element, CleanBody* body, std::string* xml) {
     body->has_inertial = true;
     body->mass = MjcfNumbers<1>(element, "mass")[0];
     std::string place = KeptAttributes(element, "inertial");
@@ -333,7 +338,7 @@ class Cleaner {
             (element.Attribute("pos") ? place : " pos='0 0 0'" + place) + "/>";
   }
 
-  void Joint(const TiXmlElement& element, int body, const std::string& child_class,
+  void Joint(const tinyxml2::XMLElement& element, int body, const std::string& child_class,
              std::string* xml) {
     Count(element);
     CleanBody& owner = result_.bodies[static_cast<size_t>(body)];
@@ -366,7 +371,7 @@ class Cleaner {
                         KeptAttributes(element, "joint"));
   }
 
-  void Geom(const TiXmlElement& element, int body, const std::string& child_class,
+  void Geom(const tinyxml2::XMLElement& element, int body, const std::string& child_class,
             std::string* xml) {
     Count(element);
     const std::string type = Resolved(element, "type", child_class, &DefaultClass::geom);
@@ -399,7 +404,7 @@ class Cleaner {
     result_.geoms.push_back(geom);
   }
 
-  void Site(const TiXmlElement& element, int body, std::string* xml) {
+  void Site(const tinyxml2::XMLElement& element, int body, std::string* xml) {
     Count(element);
     if (Attribute(element, "name").empty()) return;
     const size_t index = result_.sites.size();
@@ -426,10 +431,11 @@ class Cleaner {
     return -1;
   }
 
-  void Actuators(const TiXmlElement& section, std::string* xml) {
-    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
+  void Actuators(const tinyxml2::XMLElement& section, std::string* xml) {
+    for (const tinyxml2::XMLElement* e = section.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
       Count(*e);
-      const std::string& kind = e->ValueStr();
+      const std::string kind = e->Value();
       const int joint = JointIndex(Attribute(*e, "joint"));
       if (!IsActuator(kind) || joint < 0) {
         Note(*e, "<{}> '{}' moves no joint of the robot directly: it is left out", Shown(*e),
@@ -443,9 +449,10 @@ class Cleaner {
     }
   }
 
-  void Equalities(const TiXmlElement& section) {
-    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
-      if (e->ValueStr() != "joint") {
+  void Equalities(const tinyxml2::XMLElement& section) {
+    for (const tinyxml2::XMLElement* e = section.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
+      if (std::string_view(e->Value()) != "joint") {
         Note(*e, "equality <{}> '{}' closes a loop: it is left out", Shown(*e),
              Attribute(*e, "name"));
         continue;
@@ -465,8 +472,9 @@ class Cleaner {
     }
   }
 
-  void Sensors(const TiXmlElement& section) {
-    for (const TiXmlElement* e = section.FirstChildElement(); e; e = e->NextSiblingElement()) {
+  void Sensors(const tinyxml2::XMLElement& section) {
+    for (const tinyxml2::XMLElement* e = section.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
       const std::string site = Attribute(*e, "site");
       if (site.empty()) continue;
       const std::vector<double> noise = MjcfNumbers(*e, "noise");
@@ -474,8 +482,8 @@ class Cleaner {
     }
   }
 
-  void Keys(const TiXmlElement& section) {
-    Sections(section, "key", [&](const TiXmlElement& element) {
+  void Keys(const tinyxml2::XMLElement& section) {
+    Sections(section, "key", [&](const tinyxml2::XMLElement& element) {
       const std::vector<double> position = MjcfNumbers(element, "qpos");
       const std::string name = Attribute(element, "name");
       const size_t joints = result_.joints.size();
@@ -510,9 +518,9 @@ class Cleaner {
 }  // namespace
 
 CleanMjcf CleanedMjcf(std::string_view xml, std::vector<std::string>* warnings) {
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   ParseXml(xml, "MJCF", &document);
-  const TiXmlElement* const root = document.RootElement();
+  const tinyxml2::XMLElement* const root = document.RootElement();
   if (root == nullptr) throw RobotError("MJCF has no element: is it an MJCF file?");
   CleanMjcf result;
   Cleaner(warnings, &result).Clean(*root);

@@ -3,7 +3,7 @@
 // sanitize, the same files must not leak or read what is not theirs.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <array>
@@ -120,8 +120,8 @@ size_t ImportAndEvaluate(const ImportOptions& options, std::mt19937* random) {
 
 void ImportDamaged(const fs::path& whole, int files, unsigned seed) {
   const std::string text = robot::ReadWhole(whole);
-  TiXmlDocument document;
-  document.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
+  tinyxml2::XMLDocument document;
+  document.Parse(text.data(), text.size());
   ASSERT_FALSE(document.Error());
   ImportOptions options;
   options.file = WriteMaker("damaged_" + whole.stem().string(), text);
@@ -156,7 +156,7 @@ TEST(DamagedFiles, Srdf) {
   ImportOptions options;
   options.file = WriteMaker("srdf_damaged", SimpleBiped());
   options.srdf = options.file.parent_path() / "states.srdf";
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   document.Parse(
       "<robot name='biped'><group name='all'/><group_state name='half_sitting' group='all'>"
       "<joint name='left_hip_pitch_joint' value='-0.5'/><joint name='left_knee_joint' value='1'/>"

@@ -1,6 +1,6 @@
 #include "tests/robot_import/file_damage.h"
 
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <array>
@@ -84,9 +84,10 @@ constexpr std::array kForeign = {
     "0'/><geometry><sphere/></geometry></visual>"};
 constexpr int kMostNesting = 400, kMostCopies = 1500;
 
-void Collect(TiXmlElement* element, std::map<std::string, std::vector<TiXmlElement*>>* found) {
-  for (TiXmlElement* e = element->FirstChildElement(); e; e = e->NextSiblingElement()) {
-    (*found)[e->ValueStr()].push_back(e);
+void Collect(tinyxml2::XMLElement* element,
+             std::map<std::string, std::vector<tinyxml2::XMLElement*>>* found) {
+  for (tinyxml2::XMLElement* e = element->FirstChildElement(); e; e = e->NextSiblingElement()) {
+    (*found)[e->Value()].push_back(e);
     Collect(e, found);
   }
 }
@@ -102,14 +103,18 @@ std::string Joined(const std::vector<std::string>& words) {
   return text;
 }
 
-/// The element goes from its parent, and `take` its copy.
-void Remove(TiXmlElement* element) { element->Parent()->RemoveChild(element); }
+void Remove(tinyxml2::XMLElement* element) { element->Parent()->DeleteChild(element); }
+
+/// A copy with all that is in it, to be inserted into its document.
+tinyxml2::XMLElement* Copy(const tinyxml2::XMLElement& element, tinyxml2::XMLDocument* document) {
+  return element.DeepClone(document)->ToElement();
+}
 
 }  // namespace
 
 size_t FileDamage::Below(size_t n) { return n < 2 ? 0 : random_() % n; }
 
-TiXmlElement* FileDamage::Any(TiXmlDocument* document) {
+tinyxml2::XMLElement* FileDamage::Any(tinyxml2::XMLDocument* document) {
   std::map<std::string, Elements> found;
   if (document->RootElement() != nullptr) Collect(document->RootElement(), &found);
   if (found.empty()) return nullptr;
@@ -118,9 +123,9 @@ TiXmlElement* FileDamage::Any(TiXmlDocument* document) {
   return of_name[Below(of_name.size())];
 }
 
-std::string FileDamage::AnyAttribute(const TiXmlElement& element) {
+std::string FileDamage::AnyAttribute(const tinyxml2::XMLElement& element) {
   std::vector<std::string> names;
-  for (const TiXmlAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     names.push_back(a->Name());
   }
   return names.empty() ? "" : names[Below(names.size())];
@@ -128,70 +133,69 @@ std::string FileDamage::AnyAttribute(const TiXmlElement& element) {
 
 std::string FileDamage::AnyToken() { return kTokens[Below(kTokens.size())]; }
 
-std::string FileDamage::AnyNameOf(TiXmlDocument* document) {
+std::string FileDamage::AnyNameOf(tinyxml2::XMLDocument* document) {
   for (int i = 0; i < 20; ++i) {
-    const TiXmlElement* const element = Any(document);
+    const tinyxml2::XMLElement* const element = Any(document);
     const char* const name = element ? element->Attribute("name") : nullptr;
     if (name != nullptr) return name;
   }
   return "nobody";
 }
 
-void FileDamage::DropElement(TiXmlDocument* document) {
-  if (TiXmlElement* const element = Any(document)) Remove(element);
+void FileDamage::DropElement(tinyxml2::XMLDocument* document) {
+  if (tinyxml2::XMLElement* const element = Any(document)) Remove(element);
 }
 
-void FileDamage::DuplicateElement(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::DuplicateElement(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
-  const TiXmlElement copy(*element);
-  element->Parent()->InsertAfterChild(element, copy);
+  element->Parent()->InsertAfterChild(element, Copy(*element, document));
 }
 
-void FileDamage::RenameElement(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
-  const TiXmlElement* const other = Any(document);
+void FileDamage::RenameElement(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
+  const tinyxml2::XMLElement* const other = Any(document);
   if (element == nullptr) return;
-  element->SetValue(Below(3) == 0 ? "xacro:macro" : other->ValueStr());
+  element->SetValue(Below(3) == 0 ? "xacro:macro" : other->Value());
 }
 
-void FileDamage::MoveElement(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::MoveElement(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
-  const TiXmlElement copy(*element);
+  tinyxml2::XMLElement* const copy = Copy(*element, document);
   Remove(element);
-  TiXmlElement* const to = Below(4) == 0 ? document->RootElement() : Any(document);
+  tinyxml2::XMLElement* const to = Below(4) == 0 ? document->RootElement() : Any(document);
   (to ? to : document->RootElement())->InsertEndChild(copy);
 }
 
-void FileDamage::DropAttribute(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::DropAttribute(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
   const std::string name = AnyAttribute(*element);
-  if (!name.empty()) element->RemoveAttribute(name.c_str());
+  if (!name.empty()) element->DeleteAttribute(name.c_str());
 }
 
-void FileDamage::RenameAttribute(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
-  const TiXmlElement* const other = Any(document);
+void FileDamage::RenameAttribute(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
+  const tinyxml2::XMLElement* const other = Any(document);
   if (element == nullptr) return;
   const std::string name = AnyAttribute(*element), wanted = AnyAttribute(*other);
   if (name.empty() || wanted.empty()) return;
   const std::string value = element->Attribute(name.c_str());
-  element->RemoveAttribute(name.c_str());
+  element->DeleteAttribute(name.c_str());
   element->SetAttribute(wanted.c_str(), value.c_str());
 }
 
-void FileDamage::SetAttribute(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::SetAttribute(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
   const std::string name = AnyAttribute(*element);
   if (!name.empty()) element->SetAttribute(name.c_str(), AnyToken().c_str());
 }
 
-void FileDamage::SetNumber(TiXmlDocument* document) {
+void FileDamage::SetNumber(tinyxml2::XMLDocument* document) {
   for (int i = 0; i < 20; ++i) {
-    TiXmlElement* const element = Any(document);
+    tinyxml2::XMLElement* const element = Any(document);
     if (element == nullptr) return;
     const std::string name = AnyAttribute(*element);
     if (name.empty()) continue;
@@ -203,9 +207,9 @@ void FileDamage::SetNumber(TiXmlDocument* document) {
   }
 }
 
-void FileDamage::ChangeLength(TiXmlDocument* document) {
+void FileDamage::ChangeLength(tinyxml2::XMLDocument* document) {
   for (int i = 0; i < 20; ++i) {
-    TiXmlElement* const element = Any(document);
+    tinyxml2::XMLElement* const element = Any(document);
     if (element == nullptr) return;
     const std::string name = AnyAttribute(*element);
     if (name.empty()) continue;
@@ -218,11 +222,11 @@ void FileDamage::ChangeLength(TiXmlDocument* document) {
   }
 }
 
-void FileDamage::SetName(TiXmlDocument* document) {
+void FileDamage::SetName(tinyxml2::XMLDocument* document) {
   constexpr std::array kReferences = {"name",   "link",   "joint",  "class", "childclass", "mesh",
                                       "joint1", "joint2", "parent", "site",  "material",   "type"};
   for (int i = 0; i < 20; ++i) {
-    TiXmlElement* const element = Any(document);
+    tinyxml2::XMLElement* const element = Any(document);
     if (element == nullptr) return;
     const char* const reference = kReferences[Below(kReferences.size())];
     if (element->Attribute(reference) == nullptr) continue;
@@ -233,15 +237,16 @@ void FileDamage::SetName(TiXmlDocument* document) {
   }
 }
 
-void FileDamage::CloseLoop(TiXmlDocument* document) {
+void FileDamage::CloseLoop(tinyxml2::XMLDocument* document) {
   Elements joints;
-  TiXmlElement* const root = document->RootElement();
-  for (TiXmlElement* j = root->FirstChildElement("joint"); j; j = j->NextSiblingElement("joint")) {
+  tinyxml2::XMLElement* const root = document->RootElement();
+  for (tinyxml2::XMLElement* j = root->FirstChildElement("joint"); j;
+       j = j->NextSiblingElement("joint")) {
     if (j->FirstChildElement("parent") && j->FirstChildElement("child")) joints.push_back(j);
   }
   if (joints.empty()) return MoveElement(document);  // MJCF's tree cannot close
-  TiXmlElement* const joint = joints[Below(joints.size())];
-  const auto link = [](TiXmlElement* j, const char* end) {
+  tinyxml2::XMLElement* const joint = joints[Below(joints.size())];
+  const auto link = [](tinyxml2::XMLElement* j, const char* end) {
     const char* const name = j->FirstChildElement(end)->Attribute("link");
     return std::string(name ? name : "");
   };
@@ -256,66 +261,67 @@ void FileDamage::CloseLoop(TiXmlDocument* document) {
       break;
     }
     default: {  // a second way to a link
-      TiXmlElement more(*joint);
-      more.SetAttribute("name", "closing");
-      more.FirstChildElement("parent")->SetAttribute(
+      tinyxml2::XMLElement* const more = Copy(*joint, document);
+      more->SetAttribute("name", "closing");
+      more->FirstChildElement("parent")->SetAttribute(
           "link", link(joints[Below(joints.size())], "child").c_str());
       root->InsertEndChild(more);
     }
   }
 }
 
-void FileDamage::NestDeeply(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::NestDeeply(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
   const size_t depth = 1 + Below(kMostNesting);
-  TiXmlElement nested(*element);
+  tinyxml2::XMLElement* nested = Copy(*element, document);
   for (size_t i = 0; i < depth; ++i) {
-    TiXmlElement outer(element->ValueStr());
+    tinyxml2::XMLElement* const outer = document->NewElement(element->Value());
     if (const char* const name = element->Attribute("name")) {
-      outer.SetAttribute("name", (name + std::to_string(i)).c_str());
+      outer->SetAttribute("name", (name + std::to_string(i)).c_str());
     }
-    outer.InsertEndChild(nested);
+    outer->InsertEndChild(nested);
     nested = outer;
   }
-  element->Parent()->ReplaceChild(element, nested);
+  element->Parent()->InsertAfterChild(element, nested);
+  Remove(element);
 }
 
-void FileDamage::RepeatOften(TiXmlDocument* document) {
-  TiXmlElement* const element = Any(document);
+void FileDamage::RepeatOften(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLElement* const element = Any(document);
   if (element == nullptr) return;
   const size_t copies = Below(6) == 0 ? kMostCopies : 1 + Below(40);
-  TiXmlElement copy(*element);
-  copy.Clear();  // without what is in it
-  for (const TiXmlElement* c = element->FirstChildElement(); c; c = c->NextSiblingElement()) {
-    if (c->ValueStr() != "body") copy.InsertEndChild(*c);
-  }
-  const std::string name = copy.Attribute("name") ? copy.Attribute("name") : "";
-  TiXmlElement* const child = copy.FirstChildElement("child");
+  const std::string name = element->Attribute("name") ? element->Attribute("name") : "";
   for (size_t i = 0; i < copies; ++i) {
+    tinyxml2::XMLElement* const copy = element->ShallowClone(document)->ToElement();
+    for (const tinyxml2::XMLElement* c = element->FirstChildElement(); c;
+         c = c->NextSiblingElement()) {
+      if (std::string_view(c->Value()) != "body") copy->InsertEndChild(Copy(*c, document));
+    }
+    tinyxml2::XMLElement* const child = copy->FirstChildElement("child");
     const std::string number = std::to_string(i);
-    if (!name.empty()) copy.SetAttribute("name", (name + number).c_str());
+    if (!name.empty()) copy->SetAttribute("name", (name + number).c_str());
     if (child != nullptr && child->Attribute("link") && !name.empty()) {
       // A joint brings a link of its own, so that the tree grows.
       const std::string link = name + number + "_end";
       child->SetAttribute("link", link.c_str());
-      TiXmlElement added("link");
-      added.SetAttribute("name", link.c_str());
+      tinyxml2::XMLElement* const added = document->NewElement("link");
+      added->SetAttribute("name", link.c_str());
       document->RootElement()->InsertEndChild(added);
     }
     element->Parent()->InsertEndChild(copy);
   }
 }
 
-void FileDamage::BreakMass(TiXmlDocument* document) {
+void FileDamage::BreakMass(tinyxml2::XMLDocument* document) {
   std::map<std::string, Elements> found;
   Collect(document->RootElement(), &found);
   const Elements& inertials = found["inertial"];
   if (inertials.empty()) return;
-  TiXmlElement* const inertial = inertials[Below(inertials.size())];
+  tinyxml2::XMLElement* const inertial = inertials[Below(inertials.size())];
   const char* const number = kNumbers[Below(kNumbers.size())];
-  if (TiXmlElement* const mass = inertial->FirstChildElement("mass")) {
-    TiXmlElement* const inertia = inertial->FirstChildElement("inertia");
+  if (tinyxml2::XMLElement* const mass = inertial->FirstChildElement("mass")) {
+    tinyxml2::XMLElement* const inertia = inertial->FirstChildElement("inertia");
     if (Below(2) == 0 || inertia == nullptr) {
       mass->SetAttribute("value", number);
     } else {
@@ -331,7 +337,7 @@ void FileDamage::BreakMass(TiXmlDocument* document) {
   }
 }
 
-void FileDamage::PutMesh(TiXmlDocument* document) {
+void FileDamage::PutMesh(tinyxml2::XMLDocument* document) {
   std::map<std::string, Elements> found;
   Collect(document->RootElement(), &found);
   constexpr std::array kFiles = {"package://nobody/meshes/x.stl",
@@ -345,30 +351,32 @@ void FileDamage::PutMesh(TiXmlDocument* document) {
                                  "."};
   const char* const file = kFiles[Below(kFiles.size())];
   if (const Elements& geometries = found["geometry"]; !geometries.empty()) {
-    TiXmlElement* const geometry = geometries[Below(geometries.size())];
-    geometry->Clear();
-    TiXmlElement mesh("mesh");
-    mesh.SetAttribute("filename", file);
-    if (Below(3) == 0) mesh.SetAttribute("scale", kNumbers[Below(kNumbers.size())]);
+    tinyxml2::XMLElement* const geometry = geometries[Below(geometries.size())];
+    geometry->DeleteChildren();
+    tinyxml2::XMLElement* const mesh = document->NewElement("mesh");
+    mesh->SetAttribute("filename", file);
+    if (Below(3) == 0) mesh->SetAttribute("scale", kNumbers[Below(kNumbers.size())]);
     geometry->InsertEndChild(mesh);
   } else if (const Elements& geoms = found["geom"]; !geoms.empty()) {
-    TiXmlElement* const geom = geoms[Below(geoms.size())];
+    tinyxml2::XMLElement* const geom = geoms[Below(geoms.size())];
     geom->SetAttribute("type", "mesh");
     geom->SetAttribute("mesh", "nobody");
     if (Below(2) == 0) return;
-    TiXmlElement asset("asset"), mesh("mesh");
-    mesh.SetAttribute("name", "nobody");
-    mesh.SetAttribute("file", file);
-    asset.InsertEndChild(mesh);
+    tinyxml2::XMLElement* const asset = document->NewElement("asset");
+    tinyxml2::XMLElement* const mesh = document->NewElement("mesh");
+    mesh->SetAttribute("name", "nobody");
+    mesh->SetAttribute("file", file);
+    asset->InsertEndChild(mesh);
     document->RootElement()->InsertEndChild(asset);
   }
 }
 
-void FileDamage::AddForeign(TiXmlDocument* document) {
-  TiXmlDocument foreign;
-  foreign.Parse(kForeign[Below(kForeign.size())], nullptr, TIXML_ENCODING_UTF8);
-  TiXmlElement* const to = Below(3) == 0 ? document->RootElement() : Any(document);
-  if (to != nullptr && foreign.RootElement() != nullptr) to->InsertEndChild(*foreign.RootElement());
+void FileDamage::AddForeign(tinyxml2::XMLDocument* document) {
+  tinyxml2::XMLDocument foreign;
+  foreign.Parse(kForeign[Below(kForeign.size())]);
+  tinyxml2::XMLElement* const to = Below(3) == 0 ? document->RootElement() : Any(document);
+  if (to != nullptr && foreign.RootElement() != nullptr)
+    to->InsertEndChild(Copy(*foreign.RootElement(), document));
 }
 
 std::string FileDamage::EntityBomb(std::string text) {
@@ -413,10 +421,10 @@ std::string FileDamage::Bytes(std::string text) {
   return text;
 }
 
-std::string FileDamage::Xml(const TiXmlDocument& whole, std::string* done) {
+std::string FileDamage::Xml(const tinyxml2::XMLDocument& whole, std::string* done) {
   struct Kind {
     const char* name;
-    void (FileDamage::*damage)(TiXmlDocument*);
+    void (FileDamage::*damage)(tinyxml2::XMLDocument*);
   };
   constexpr std::array kKinds = {Kind{"drop element", &FileDamage::DropElement},
                                  Kind{"duplicate element", &FileDamage::DuplicateElement},
@@ -438,15 +446,16 @@ std::string FileDamage::Xml(const TiXmlDocument& whole, std::string* done) {
   const auto did = [&](const char* name) {
     *done += (done->empty() ? "" : ", ") + std::string(name);
   };
-  TiXmlDocument document(whole);
+  tinyxml2::XMLDocument document;
+  whole.DeepCopy(&document);
   for (size_t edits = 1 + Below(3); edits > 0 && document.RootElement(); --edits) {
     const Kind& kind = kKinds[Below(kKinds.size())];
     (this->*kind.damage)(&document);
     did(kind.name);
   }
-  TiXmlPrinter printer;
+  tinyxml2::XMLPrinter printer;
   document.Accept(&printer);
-  std::string text = printer.Str();
+  std::string text = printer.CStr();
   if (Below(10) == 0) {
     text = Bytes(std::move(text));
     did("bytes");

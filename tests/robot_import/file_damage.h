@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
-class TiXmlDocument;
-class TiXmlElement;
+namespace tinyxml2 {
+class XMLDocument;
+class XMLElement;
+}  // namespace tinyxml2
 
 namespace poise {
 
@@ -17,7 +19,7 @@ class FileDamage {
   explicit FileDamage(unsigned seed) : random_(seed) {}
 
   /// XML with one to three damages; `done` gets their names, "drop element, byte".
-  std::string Xml(const TiXmlDocument& whole, std::string* done);
+  std::string Xml(const tinyxml2::XMLDocument& whole, std::string* done);
   /// Protobuf text, line by line.
   std::string Text(const std::string& whole, std::string* done);
   /// Bytes alone, of any file.
@@ -26,30 +28,30 @@ class FileDamage {
   size_t Below(size_t n);
 
  private:
-  using Elements = std::vector<TiXmlElement*>;
+  using Elements = std::vector<tinyxml2::XMLElement*>;
   /// One of a name that stands in the document, each name as likely as another.
-  TiXmlElement* Any(TiXmlDocument* document);
+  tinyxml2::XMLElement* Any(tinyxml2::XMLDocument* document);
   /// The attribute's name; empty when there is none.
-  std::string AnyAttribute(const TiXmlElement& element);
+  std::string AnyAttribute(const tinyxml2::XMLElement& element);
   std::string AnyToken();
-  std::string AnyNameOf(TiXmlDocument* document);
+  std::string AnyNameOf(tinyxml2::XMLDocument* document);
 
-  void DropElement(TiXmlDocument* document);
-  void DuplicateElement(TiXmlDocument* document);
-  void RenameElement(TiXmlDocument* document);
-  void MoveElement(TiXmlDocument* document);
-  void DropAttribute(TiXmlDocument* document);
-  void RenameAttribute(TiXmlDocument* document);
-  void SetAttribute(TiXmlDocument* document);
-  void SetNumber(TiXmlDocument* document);
-  void ChangeLength(TiXmlDocument* document);
-  void SetName(TiXmlDocument* document);
-  void CloseLoop(TiXmlDocument* document);
-  void NestDeeply(TiXmlDocument* document);
-  void RepeatOften(TiXmlDocument* document);
-  void BreakMass(TiXmlDocument* document);
-  void PutMesh(TiXmlDocument* document);
-  void AddForeign(TiXmlDocument* document);
+  void DropElement(tinyxml2::XMLDocument* document);
+  void DuplicateElement(tinyxml2::XMLDocument* document);
+  void RenameElement(tinyxml2::XMLDocument* document);
+  void MoveElement(tinyxml2::XMLDocument* document);
+  void DropAttribute(tinyxml2::XMLDocument* document);
+  void RenameAttribute(tinyxml2::XMLDocument* document);
+  void SetAttribute(tinyxml2::XMLDocument* document);
+  void SetNumber(tinyxml2::XMLDocument* document);
+  void ChangeLength(tinyxml2::XMLDocument* document);
+  void SetName(tinyxml2::XMLDocument* document);
+  void CloseLoop(tinyxml2::XMLDocument* document);
+  void NestDeeply(tinyxml2::XMLDocument* document);
+  void RepeatOften(tinyxml2::XMLDocument* document);
+  void BreakMass(tinyxml2::XMLDocument* document);
+  void PutMesh(tinyxml2::XMLDocument* document);
+  void AddForeign(tinyxml2::XMLDocument* document);
   std::string EntityBomb(std::string text);
 
   std::mt19937 random_;

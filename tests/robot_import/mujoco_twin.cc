@@ -1,7 +1,7 @@
 #include "tests/robot_import/mujoco_twin.h"
 
 #include <fmt/format.h>
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -46,7 +46,7 @@ std::string ForMujoco(std::string text, const std::string& root) {
   return text;
 }
 
-Vector3d Three(const TiXmlElement* element, const char* name) {
+Vector3d Three(const tinyxml2::XMLElement* element, const char* name) {
   Vector3d numbers = Vector3d::Zero();
   const char* const text = element ? element->Attribute(name) : nullptr;
   std::istringstream in(text ? text : "");
@@ -132,24 +132,24 @@ void MujocoTwin::TakeInertias(const Robot& robot, const std::string& text) {
     std::copy_n(quaternion, 4, m_->body_iquat + 4 * body);
     m_->body_sameframe[body] = 0;  // the axes may not be the body's any more
   };
-  TiXmlDocument document;
-  document.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
-  const TiXmlElement* const root = document.RootElement();
-  if (root->ValueStr() != "robot") {
+  tinyxml2::XMLDocument document;
+  document.Parse(text.data(), text.size());
+  const tinyxml2::XMLElement* const root = document.RootElement();
+  if (std::string_view(root->Value()) != "robot") {
     if (!repairs.empty()) throw std::runtime_error("repairs of MJCF are not put into MuJoCo");
     const mjtNum total = mj_getTotalmass(m_.get());
     if (std::abs(total - model_.total_mass()) > 1e-9 * total) throw std::runtime_error("mass");
     return;
   }
-  for (const TiXmlElement* link = root->FirstChildElement("link"); link;
+  for (const tinyxml2::XMLElement* link = root->FirstChildElement("link"); link;
        link = link->NextSiblingElement("link")) {
-    const TiXmlElement* const inertial = link->FirstChildElement("inertial");
+    const tinyxml2::XMLElement* const inertial = link->FirstChildElement("inertial");
     if (inertial == nullptr) {
       put(link->Attribute("name"), 0, Vector3d::Zero(), Matrix3d::Zero());
       continue;
     }
-    const TiXmlElement* const origin = inertial->FirstChildElement("origin");
-    const TiXmlElement* const moments = inertial->FirstChildElement("inertia");
+    const tinyxml2::XMLElement* const origin = inertial->FirstChildElement("origin");
+    const tinyxml2::XMLElement* const moments = inertial->FirstChildElement("inertia");
     const auto number = [&](const char* name) { return std::stod(moments->Attribute(name)); };
     Matrix3d inertia;
     inertia << number("ixx"), number("ixy"), number("ixz"), number("ixy"), number("iyy"),

@@ -136,7 +136,7 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
   session->jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   CLI::App* benchmark = app->add_subcommand(
       "benchmark", "measure how well a controller balances, by a fixed set of disturbances");
-  benchmark->add_option("set", arguments->set, "of deploy/benchmarks, or a .pbtxt file")
+  benchmark->add_option("benchmark", arguments->set, "of deploy/benchmarks, or a .pbtxt file")
       ->capture_default_str();
   benchmark
       ->add_option("--robot", subject->robot,

@@ -1,6 +1,6 @@
 #include "tools/robot/maker_shapes.h"
 
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <cmath>
 #include <sstream>
@@ -20,7 +20,7 @@ using robot::SourceShape;
 constexpr int kMostFolders = 8;  // above the maker's file that are searched for meshes
 
 /// Numbers of an attribute; those that are missing or no number stay as in `missing`.
-Vector3d Numbers(const TiXmlElement& element, const char* name, Vector3d missing) {
+Vector3d Numbers(const tinyxml2::XMLElement& element, const char* name, Vector3d missing) {
   std::istringstream text(Attribute(element, name));
   for (int i = 0; i < 3; ++i) {
     double number = 0;
@@ -30,13 +30,13 @@ Vector3d Numbers(const TiXmlElement& element, const char* name, Vector3d missing
   return missing;
 }
 
-double NumberOf(const TiXmlElement& element, const char* name) {
+double NumberOf(const tinyxml2::XMLElement& element, const char* name) {
   return Numbers(element, name, Vector3d::Zero()).x();
 }
 
-Isometry3d Origin(const TiXmlElement& element) {
+Isometry3d Origin(const tinyxml2::XMLElement& element) {
   Isometry3d pose = Isometry3d::Identity();
-  const TiXmlElement* const origin = element.FirstChildElement("origin");
+  const tinyxml2::XMLElement* const origin = element.FirstChildElement("origin");
   if (origin == nullptr) return pose;
   const Vector3d rpy = Numbers(*origin, "rpy", Vector3d::Zero());
   pose.translation() = Numbers(*origin, "xyz", Vector3d::Zero());
@@ -47,16 +47,16 @@ Isometry3d Origin(const TiXmlElement& element) {
   return pose;
 }
 
-void AddShape(const TiXmlElement& element, const std::string& link, bool collides,
+void AddShape(const tinyxml2::XMLElement& element, const std::string& link, bool collides,
               std::vector<SourceShape>* shapes) {
-  const TiXmlElement* const geometry = element.FirstChildElement("geometry");
-  const TiXmlElement* const solid = geometry ? geometry->FirstChildElement() : nullptr;
+  const tinyxml2::XMLElement* const geometry = element.FirstChildElement("geometry");
+  const tinyxml2::XMLElement* const solid = geometry ? geometry->FirstChildElement() : nullptr;
   if (solid == nullptr) return;
   SourceShape shape;
   shape.link = link;
   shape.pose = Origin(element);
   shape.collides = collides;
-  const std::string& kind = solid->ValueStr();
+  const std::string kind = solid->Value();
   const double radius = NumberOf(*solid, "radius");
   if (kind == "box") {
     shape.size = Numbers(*solid, "size", Vector3d::Zero());
@@ -89,13 +89,14 @@ fs::path Below(const fs::path& folder, const fs::path& relative) {
 
 }  // namespace
 
-std::vector<SourceShape> UrdfShapes(const TiXmlElement& robot) {
+std::vector<SourceShape> UrdfShapes(const tinyxml2::XMLElement& robot) {
   std::vector<SourceShape> shapes;
-  for (const TiXmlElement* e = robot.FirstChildElement("link"); e;
+  for (const tinyxml2::XMLElement* e = robot.FirstChildElement("link"); e;
        e = e->NextSiblingElement("link")) {
     const std::string link = Attribute(*e, "name");
     for (const char* what : {"collision", "visual"}) {
-      for (const TiXmlElement* s = e->FirstChildElement(what); s; s = s->NextSiblingElement(what)) {
+      for (const tinyxml2::XMLElement* s = e->FirstChildElement(what); s;
+           s = s->NextSiblingElement(what)) {
         AddShape(*s, link, std::string_view(what) == "collision", &shapes);
       }
     }
@@ -104,11 +105,11 @@ std::vector<SourceShape> UrdfShapes(const TiXmlElement& robot) {
 }
 
 MakerShapes ReadShapes(std::string_view maker_text) {
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   robot::ParseXml(maker_text, "the maker's file", &document);
-  const TiXmlElement* const root = document.RootElement();
+  const tinyxml2::XMLElement* const root = document.RootElement();
   if (root == nullptr) return {};
-  if (root->ValueStr() == "mujoco") {
+  if (std::string_view(root->Value()) == "mujoco") {
     robot::MjcfDocument mjcf = robot::ReadMjcf(maker_text, nullptr);
     return {std::move(mjcf.shapes), mjcf.mesh_folder};
   }

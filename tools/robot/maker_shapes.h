@@ -8,7 +8,9 @@
 
 #include "components/robot/robot_source.h"
 
-class TiXmlElement;
+namespace tinyxml2 {
+class XMLElement;
+}
 
 namespace poise {
 
@@ -21,7 +23,7 @@ struct MeshPlaces {
 
 /// Solids of a URDF's <visual> and <collision>. Numbers that are missing or none stay 0, and a
 /// solid with such a size is no solid: HasSize.
-std::vector<robot::SourceShape> UrdfShapes(const TiXmlElement& robot);
+std::vector<robot::SourceShape> UrdfShapes(const tinyxml2::XMLElement& robot);
 
 struct MakerShapes {
   std::vector<robot::SourceShape> shapes;

@@ -1,6 +1,6 @@
 #include "tools/robot_import/maker_file.h"
 
-#include <tinyxml.h>
+#include <tinyxml2.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,20 +21,20 @@ using robot::Attribute;
 
 /// Shapes, sensors and transmissions of a URDF, which the robot's loader does not look at.
 void ReadExtensions(MakerFile* maker) {
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   robot::ParseXml(maker->text, "URDF", &document);
-  const TiXmlElement* const root = document.FirstChildElement("robot");
+  const tinyxml2::XMLElement* const root = document.FirstChildElement("robot");
   if (root == nullptr) return;
   maker->shapes = UrdfShapes(*root);
-  const auto sensor = [&](const TiXmlElement& element, const std::string& place) {
+  const auto sensor = [&](const tinyxml2::XMLElement& element, const std::string& place) {
     const std::string kind = Attribute(element, "type");
     if (!place.empty()) maker->sensors.push_back({kind, place, 0});
   };
-  for (const TiXmlElement* e = root->FirstChildElement(); e; e = e->NextSiblingElement()) {
-    const std::string& kind = e->ValueStr();
+  for (const tinyxml2::XMLElement* e = root->FirstChildElement(); e; e = e->NextSiblingElement()) {
+    const std::string kind = e->Value();
     if (kind == "gazebo") {
       const std::string place = Attribute(*e, "reference");
-      for (const TiXmlElement* s = e->FirstChildElement("sensor"); s;
+      for (const tinyxml2::XMLElement* s = e->FirstChildElement("sensor"); s;
            s = s->NextSiblingElement("sensor")) {
         sensor(*s, place);
       }
@@ -43,11 +43,11 @@ void ReadExtensions(MakerFile* maker) {
         maker->sensors.push_back({"feedback", place, 0});
       }
     } else if (kind == "sensor") {
-      const TiXmlElement* const parent = e->FirstChildElement("parent");
+      const tinyxml2::XMLElement* const parent = e->FirstChildElement("parent");
       if (parent == nullptr) continue;
       sensor(*e, Attribute(*parent, parent->Attribute("joint") ? "joint" : "link"));
     } else if (kind == "transmission") {
-      for (const TiXmlElement* j = e->FirstChildElement("joint"); j;
+      for (const tinyxml2::XMLElement* j = e->FirstChildElement("joint"); j;
            j = j->NextSiblingElement("joint")) {
         maker->actuated.insert(Attribute(*j, "name"));
       }
@@ -56,19 +56,19 @@ void ReadExtensions(MakerFile* maker) {
 }
 
 void ReadSrdf(const fs::path& path, MakerFile* maker) {
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   const std::string format = "SRDF " + path.filename().string();
   robot::ParseXml(ReadFile(path.string()), format.c_str(), &document);
-  const TiXmlElement* const root = document.RootElement();
-  if (root == nullptr || root->ValueStr() != "robot") {
+  const tinyxml2::XMLElement* const root = document.RootElement();
+  if (root == nullptr || std::string_view(root->Value()) != "robot") {
     throw ConfigError(path.string() + ": is no SRDF: its outermost element must be <robot>");
   }
   maker->postures_from = path.filename().string();
-  for (const TiXmlElement* e = root->FirstChildElement("group_state"); e;
+  for (const tinyxml2::XMLElement* e = root->FirstChildElement("group_state"); e;
        e = e->NextSiblingElement("group_state")) {
     robot::MjcfKey key;
     key.name = Attribute(*e, "name");
-    for (const TiXmlElement* j = e->FirstChildElement("joint"); j;
+    for (const tinyxml2::XMLElement* j = e->FirstChildElement("joint"); j;
          j = j->NextSiblingElement("joint")) {
       std::istringstream values(Attribute(*j, "value"));
       double value = 0, more = 0;
@@ -114,10 +114,11 @@ std::string FilesWithin(const fs::path& folder) {
 }
 
 /// The first element of xacro; null without.
-const TiXmlElement* Macro(const TiXmlElement& element) {
-  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) {
-    if (e->ValueStr().starts_with("xacro:")) return e;
-    if (const TiXmlElement* const within = Macro(*e)) return within;
+const tinyxml2::XMLElement* Macro(const tinyxml2::XMLElement& element) {
+  for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
+       e = e->NextSiblingElement()) {
+    if (std::string_view(e->Value()).starts_with("xacro:")) return e;
+    if (const tinyxml2::XMLElement* const within = Macro(*e)) return within;
   }
   return nullptr;
 }
@@ -142,20 +143,21 @@ MakerFile ReadMakerFile(const fs::path& path, const fs::path& srdf) {
         "{}: is no XML: a URDF or MJCF file is needed{}", path.string(),
         path.extension() == ".pbtxt" ? "; `poise robot check` takes a robot's text" : ""));
   }
-  TiXmlDocument document;
+  tinyxml2::XMLDocument document;
   robot::ParseXml(maker.text, "the file", &document);
-  const TiXmlElement* const root = document.RootElement();
+  const tinyxml2::XMLElement* const root = document.RootElement();
   if (root == nullptr) throw ConfigError(path.string() + ": has no XML element");
-  const std::string kind = robot::OneLine(root->ValueStr());
+  const std::string kind = robot::OneLine(root->Value());
   if (kind != "robot" && kind != "mujoco") {
     throw ConfigError(fmt::format(
         "{}: begins with <{}>; a URDF begins with <robot>, MJCF with <mujoco>{}", path.string(),
         kind, kind == "sdf" ? ": SDF is not read, take the URDF that it was made of" : ""));
   }
-  if (const TiXmlElement* const macro = Macro(*root)) {
+  if (const tinyxml2::XMLElement* const macro = Macro(*root)) {
     throw ConfigError(fmt::format(
         "{}: line {}: <{}> is of xacro: expand it first, `xacro {} > robot.urdf`, and import that",
-        path.string(), macro->Row(), robot::OneLine(macro->ValueStr()), path.filename().string()));
+        path.string(), macro->GetLineNum(), robot::OneLine(macro->Value()),
+        path.filename().string()));
   }
   maker.is_mjcf = kind == "mujoco";
   if (maker.is_mjcf) {
