@@ -170,6 +170,46 @@ class AsProcess(unittest.TestCase):
                     np.testing.assert_array_equal(processes[name][path], inline[name][path], f"{name} {path}")
         self.assertEqual(processes.metric("fallen"), 0)
 
+    def sweep(self, end, out, *more):
+        """A sweep of two runs, whose program does `end` when it has been told to stop."""
+        with open(self.program, "w") as file:
+            text = PROGRAM.format(python=sys.executable)
+            file.write(text.replace("    sys.exit(poise.main(Springs))", f"    status = poise.main(Springs)\n    {end}\n    sys.exit(status)"))
+        return self.poise("sweep", "sprung", "--set", "duration=0.2", "--vary", "seed=1,2", "--out", out, *more)
+
+    # How long a process takes to go is the machine's affair; that it crashes then, when all is done, its own.
+    def test_a_run_whose_ticks_are_done_has_its_outcome_from_them(self):
+        tables = []
+        ends = {"good": "pass", "slow": "__import__('time').sleep(30)", "crash": "__import__('os').abort()"}
+        for name, end in ends.items():
+            done = self.sweep(end, name)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            with open(os.path.join(self.folder, name, "table.csv")) as file:
+                tables.append(file.read())
+            self.assertEqual(tables[-1], tables[0])
+        self.assertEqual(tables[0].count(",stands,"), 2, tables[0])
+
+    def test_a_program_that_dies_in_a_run_is_named(self):
+        with open(self.program) as file:
+            text = file.read()
+        with open(self.program, "w") as file:
+            file.write(text.replace("        state = inputs.robot_state\n",
+                                    "        state = inputs.robot_state\n"
+                                    "        if tick.index == 50:\n            __import__('os').abort()\n"))
+        done = self.poise("sweep", "sprung", "--set", "duration=0.2", "--vary", "seed=1,2", "--out", "dead")
+        self.assertEqual(done.returncode, 1)
+        with open(os.path.join(self.folder, "dead", "table.csv")) as file:
+            rows = file.read().splitlines()[1:]
+        self.assertEqual(len(rows), 2)
+        for row in rows:
+            self.assertRegex(row, r",crashed,.*was ended by signal 6 \(Aborted\),task_controller,")
+
+    def test_another_program_does_not_go_on_with_a_sweep(self):
+        self.assertEqual(self.sweep("pass", "mine").returncode, 0)
+        again = self.sweep("pass  # changed", "mine", "--resume")
+        self.assertEqual(again.returncode, 2)
+        self.assertIn("another build of poise", again.stderr)
+
     def test_descriptions_are_read_and_refused(self):
         listed = self.poise("list", "components")
         self.assertIn("springs", listed.stdout)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <random>
 
 #include "tests/test_seed.h"
@@ -21,7 +22,7 @@ Limit MakeLimit(double min, double max, int samples, double tolerance) {
   return limit;
 }
 
-using Survives = std::function<bool(double)>;
+using Survives = std::function<std::optional<bool>(double)>;
 
 /// Answers one wanted value after the other, picked by `pick`.
 LimitSearch Search(const Limit& limit, const Survives& survives,
@@ -49,7 +50,7 @@ TEST(LimitSearch, FindsAMonotoneBoundary) {
     EXPECT_GE(*search.limit(), boundary - 0.5);
     EXPECT_GE(*search.fails_at(), boundary);
     EXPECT_LE(*search.fails_at() - *search.limit(), 0.5);
-    EXPECT_TRUE(search.monotone());
+    EXPECT_EQ(search.monotone(), true);
     EXPECT_LE(search.tried(), LimitSearch::ExpectedRuns(limit));
   }
 }
@@ -59,13 +60,13 @@ TEST(LimitSearch, TellsThatAllOrNothingIsSurvived) {
   const LimitSearch all = Search(limit, [](double) { return true; });
   EXPECT_EQ(all.limit(), 2);
   EXPECT_FALSE(all.fails_at());
-  EXPECT_TRUE(all.monotone());
+  EXPECT_EQ(all.monotone(), true);
   EXPECT_EQ(all.tried(), 5);
   const LimitSearch none = Search(limit, [](double) { return false; });
   EXPECT_FALSE(none.limit());
   EXPECT_EQ(none.fails_at(), 1);
   EXPECT_FALSE(none.largest_survived());
-  EXPECT_TRUE(none.monotone());
+  EXPECT_EQ(none.monotone(), true);
 }
 
 // Survived below 42.3 and in an island from 55 to 78.4.
@@ -78,7 +79,7 @@ TEST(LimitSearch, FindsBothEndsOfWhatIsNotMonotone) {
   EXPECT_NEAR(*search.fails_at(), 42.3, 0.1);
   EXPECT_NEAR(*search.largest_survived(), 78.4, 0.1);
   EXPECT_LT(*search.largest_survived(), 78.4);
-  EXPECT_FALSE(search.monotone());
+  EXPECT_TRUE(search.survived_again());
 }
 
 TEST(LimitSearch, AnIslandAboveANothing) {
@@ -87,7 +88,7 @@ TEST(LimitSearch, AnIslandAboveANothing) {
   EXPECT_FALSE(search.limit());
   EXPECT_EQ(search.fails_at(), 0);
   EXPECT_NEAR(*search.largest_survived(), 61.7, 0.1);
-  EXPECT_FALSE(search.monotone());
+  EXPECT_TRUE(search.survived_again());
 }
 
 TEST(LimitSearch, AGapBelowTheTop) {
@@ -95,11 +96,12 @@ TEST(LimitSearch, AGapBelowTheTop) {
       Search(MakeLimit(0, 100, 11, 0.1), [](double x) { return x < 48 || x > 53; });
   EXPECT_NEAR(*search.limit(), 48, 0.1);
   EXPECT_EQ(search.largest_survived(), 100);  // nothing above is known
-  EXPECT_FALSE(search.monotone());
+  EXPECT_TRUE(search.survived_again());
 }
 
 TEST(LimitSearch, AsksTheSameWhateverTheOrderOfAnswers) {
-  const Limit limit = MakeLimit(0, 100, 11, 0.1);
+  Limit limit = MakeLimit(0, 100, 11, 0.1);
+  limit.set_cap(300);
   const LimitSearch first = Search(limit, Island);
   std::mt19937 random(TestSeed(3));
   for (int i = 0; i < 100; ++i) {
@@ -109,6 +111,46 @@ TEST(LimitSearch, AsksTheSameWhateverTheOrderOfAnswers) {
     EXPECT_EQ(other.fails_at(), first.fails_at());
     EXPECT_EQ(other.largest_survived(), first.largest_survived());
   }
+}
+
+TEST(LimitSearch, ARunThatDoesNotTellMakesTheLimitUnknown) {
+  const Limit limit = MakeLimit(0, 100, 11, 0.5);
+  // Where bisection comes to between 40 and 50.
+  const LimitSearch beside = Search(limit, [](double x) -> std::optional<bool> {
+    if (x > 43 && x < 46) return {};
+    return x < 45;
+  });
+  EXPECT_FALSE(beside.known());
+  EXPECT_FALSE(beside.limit());
+  EXPECT_FALSE(beside.fails_at());
+  EXPECT_FALSE(beside.monotone());
+  // Above the limit it leaves open whether something is survived again.
+  const LimitSearch above = Search(limit, [](double x) -> std::optional<bool> {
+    if (x == 80) return {};
+    return x < 45;
+  });
+  EXPECT_TRUE(above.known());
+  EXPECT_NEAR(*above.limit(), 45, 0.5);
+  EXPECT_FALSE(above.monotone());
+  EXPECT_FALSE(above.largest_survived());
+}
+
+TEST(LimitSearch, RaisesTheTopUntilSomethingFallsOrTheCapIsMet) {
+  Limit limit = MakeLimit(0, 100, 11, 0.5);
+  limit.set_cap(1000);
+  for (const double boundary : {103.0, 250.0, 999.0}) {
+    const LimitSearch search = Search(limit, [&](double x) { return x < boundary; });
+    EXPECT_LT(*search.limit(), boundary);
+    EXPECT_GE(*search.fails_at(), boundary);
+    EXPECT_LE(*search.fails_at() - *search.limit(), 0.5);
+  }
+  const LimitSearch all = Search(limit, [](double) { return true; });
+  EXPECT_EQ(all.limit(), 1000);
+  EXPECT_FALSE(all.fails_at());
+  // What falls below max is searched as without a cap.
+  const LimitSearch low = Search(limit, [](double x) { return x < 37.2; });
+  limit.clear_cap();
+  EXPECT_EQ(low.tried(), Search(limit, [](double x) { return x < 37.2; }).tried());
 }
 
 TEST(LimitSearch, EndsAtAToleranceBelowWhatNumbersCanTell) {

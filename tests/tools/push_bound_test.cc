@@ -110,7 +110,7 @@ TEST(PushBound, DistanceIsToTheHullOfWhatBears) {
   const double length = both.robot.feet()[0].length, width = both.robot.feet()[0].width;
   const auto distance = [&](const std::string& direction, const logging::RunRecord& run) {
     const auto bound = FindPushBound(PushScenario(direction), run);
-    return bound ? bound->distance : NAN;
+    return bound && bound->bounded() ? bound->distance : NAN;
   };
   EXPECT_NEAR(distance("direction_x: 1", both), length / 2 - 0.03, 1e-12);
   EXPECT_NEAR(distance("direction_x: -1", both), length / 2 + 0.03, 1e-12);
@@ -124,6 +124,19 @@ TEST(PushBound, DistanceIsToTheHullOfWhatBears) {
   EXPECT_TRUE(std::isnan(distance("direction_y: 1", Standing(0, 0, false, false))));
   // Outside what bears there is no distance to its edge.
   EXPECT_TRUE(std::isnan(distance("direction_y: 1", Standing(0, 0.1, true, false))));
+}
+
+// A robot that hops, or whose capture point is outside its soles, is pushed by as much as one that
+// stands.
+TEST(PushBound, TheImpulseNeedsNoBound) {
+  const auto known = FindPushBound(PushScenario("direction_y: 1"), Standing(0, 0));
+  for (const auto& run : {Standing(0, 0, false, false), Standing(0, 0.1, true, false)}) {
+    const auto push = FindPushBound(PushScenario("direction_y: 1"), run);
+    ASSERT_TRUE(push);
+    EXPECT_FALSE(push->bounded());
+    EXPECT_EQ(push->impulse, known->impulse);
+    EXPECT_EQ(push->mass, known->mass);
+  }
 }
 
 TEST(PushBound, AMovingRobotHasItsCapturePointInstead) {

@@ -144,9 +144,67 @@ TEST_F(SweepMapsTest, TheEdgeByDirection) {
     Add(stands, 1);
   const std::vector<std::string> sentences = SurvivalSentences(header, rows);
   ASSERT_EQ(sentences.size(), 2u);
-  EXPECT_EQ(sentences[1],
-            "It stands up to a force of 50 N at the least (direction 90°), of 100 N at the most "
-            "(direction 0°); in 1 of 3 places it stands at every value.");
+  EXPECT_EQ(
+      sentences[1],
+      "It stands up to a force of 50 N (direction 90°), 100 N (direction 0°); in 1 of 3 places "
+      "it stands at every value.");
+}
+
+// A later push does not separate what stands from what falls, a larger one does.
+TEST_F(SweepMapsTest, SurvivalIsToldAlongTheVariableThatEndsIt) {
+  Vary("force", "N", {100, 200, 300});
+  Vary("start", "s", {1, 2});
+  for (const bool stands : {true, true, false, true, false, false}) Add(stands, 1);
+  EXPECT_EQ(SurvivalSentences(header, rows).at(1),
+            "It stands up to a force of 100 N (start 1 s), 200 N (start 2 s).");
+  rows.at({3, 0}).outcome = kFell;
+  EXPECT_EQ(SurvivalSentences(header, rows).at(1),
+            "It stands up to a force of 100 N in each of 2 places.");
+}
+
+TEST_F(SweepMapsTest, WhatDoesNotTellCountsForNothing) {
+  Vary("force", "N", {50, 100, 150});
+  for (const double error : {1.0, 7.0, 3.0}) Add(true, error);
+  SweepRow& hung = rows.at({1, 0});
+  hung.outcome = kHung;
+  hung.component = "policy";
+  hung.stage = "walk";
+  hung.ended_at = 1.5;
+  EXPECT_THAT(SurvivalSentences(header, rows),
+              ElementsAre("All 2 runs stand.",
+                          "1 run does not tell whether the robot stood: stopped, crashed, hung, or "
+                          "not to be run."));
+  const SweepMaps maps = MapCharts(header, rows);
+  for (const std::string& chart : maps.all()) {
+    EXPECT_EQ(Count(chart, "class='u'"), 2u) << chart;  // the run and the legend
+    EXPECT_EQ(Count(chart, "class='f'"), 0u);
+    EXPECT_THAT(chart, HasSubstr("hung in policy, stage walk, at 1.500 s"));
+  }
+  EXPECT_THAT(maps.constants, Contains(HasSubstr(": 7 N")));
+}
+
+TEST_F(SweepMapsTest, AShareIsBetweenZeroAndOne) {
+  Vary("force", "N", {50, 100, 150});
+  for (int i = 0; i < 3; ++i) Add(true, 1);
+  const std::vector<std::string> texts = Texts(MapCharts(header, rows).survival.at(0));
+  EXPECT_THAT(texts, Contains("0"));
+  EXPECT_THAT(texts, Contains("1"));
+  for (const char* beyond : {"1.2", "1.5", "2"}) EXPECT_THAT(texts, Not(Contains(beyond)));
+}
+
+TEST_F(SweepMapsTest, AMarkTellsTheCommandThatMakesItsRunAgain) {
+  Vary("", "", {50, 100})->set_field("sim.push[0].peak");
+  header.sweep.set_scenario("my/push.pbtxt");
+  header.sweep.set_ideal(true);
+  header.sweep.add_set("sim.push[0].direction_y=-1");
+  Add(true, 1);
+  Add(false, 1);
+  const std::string chart = MapCharts(header, rows).survival.at(0);
+  EXPECT_THAT(chart, HasSubstr("poise run my/push.pbtxt --ideal --set "
+                               "&#39;sim.push[0].direction_y=-1&#39; --set "
+                               "&#39;sim.push[0].peak=100&#39;"));
+  EXPECT_THAT(MapCharts(header, rows, "set/a.pbtxt --robot g1").survival.at(0),
+              HasSubstr("poise run set/a.pbtxt --robot g1 --ideal"));
 }
 
 TEST_F(SweepMapsTest, WhereRandomRunsFall) {

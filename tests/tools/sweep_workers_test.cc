@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <stdexcept>
 #include <thread>
@@ -25,11 +26,11 @@ std::map<int64_t, ForkedTasks::Result> WaitForAll(ForkedTasks* tasks) {
 TEST(ForkedTasks, GiveTheirAnswers) {
   ForkedTasks tasks(4);
   const std::string large(3'000'000, 'x');  // more than a pipe holds
-  tasks.Start(7, [] { return std::string("seven"); });
-  tasks.Start(8, [] { return std::string(); });
-  tasks.Start(9, [&] { return large; });
+  tasks.Start(7, [](TaskStatus*) { return std::string("seven"); });
+  tasks.Start(8, [](TaskStatus*) { return std::string(); });
+  tasks.Start(9, [&](TaskStatus*) { return large; });
   EXPECT_FALSE(tasks.full());
-  tasks.Start(10, [] { return std::string("a\0b", 3); });
+  tasks.Start(10, [](TaskStatus*) { return std::string("a\0b", 3); });
   EXPECT_TRUE(tasks.full());
   auto results = WaitForAll(&tasks);
   EXPECT_EQ(results[7].answer, "seven");
@@ -40,24 +41,23 @@ TEST(ForkedTasks, GiveTheirAnswers) {
 
 TEST(ForkedTasks, ACrashIsItsOwn) {
   ForkedTasks tasks(5);
-  tasks.Start(0, []() -> std::string { std::abort(); });
-  tasks.Start(1, []() -> std::string {
+  tasks.Start(0, [](TaskStatus*) -> std::string { std::abort(); });
+  tasks.Start(1, [](TaskStatus*) -> std::string {
     raise(SIGSEGV);
     return "not reached";
   });
-  tasks.Start(2, []() -> std::string {
+  tasks.Start(2, [](TaskStatus*) -> std::string {
     raise(SIGKILL);
     return "not reached";
   });
-  tasks.Start(3, []() -> std::string { throw std::runtime_error("no room"); });
-  tasks.Start(4, [] { return std::string("good"); });
+  tasks.Start(3, [](TaskStatus*) -> std::string { throw std::runtime_error("no room"); });
+  tasks.Start(4, [](TaskStatus*) { return std::string("good"); });
   auto results = WaitForAll(&tasks);
   EXPECT_FALSE(results[0].answer);
   EXPECT_TRUE(results[0].crashed);
   EXPECT_NE(results[0].problem.find("Aborted"), std::string::npos) << results[0].problem;
   EXPECT_TRUE(results[1].crashed);
-  // The system's doing, not the program's.
-  EXPECT_FALSE(results[2].crashed);
+  EXPECT_TRUE(results[2].crashed) << "whoever killed it";
   EXPECT_FALSE(results[2].answer);
   EXPECT_FALSE(results[3].answer);
   EXPECT_FALSE(results[3].crashed);
@@ -65,11 +65,75 @@ TEST(ForkedTasks, ACrashIsItsOwn) {
   EXPECT_EQ(results[4].answer, "good");
 }
 
+TEST(ForkedTasks, ACrashTellsWhereItWas) {
+  ForkedTasks tasks(1);
+  tasks.Start(0, [](TaskStatus* status) -> std::string {
+    status->SetRun({{"estimator", "estimate"}, {"controller", "control"}}, 0.002, 50);
+    status->position()->tick.store(150);
+    status->position()->stage.store(1);
+    std::abort();
+  });
+  const RunPlace place = WaitForAll(&tasks)[0].place;
+  EXPECT_EQ(place.component, "controller");
+  EXPECT_EQ(place.stage, "control");
+  EXPECT_EQ(place.time, 0.2);
+}
+
+constexpr int64_t kOneSecond = 1'000'000'000;  // ns
+
+/// Looks at `status` every 0.1 s for `seconds`, and lets `go_on` happen before each look; how often
+/// it hangs.
+int Looks(const TaskStatus& status, int seconds, StallWatch* watch, int64_t* now,
+          const std::function<void()>& go_on = {}) {
+  int hangs = 0;
+  for (int i = 0; i < 10 * seconds; ++i) {
+    if (go_on) go_on();
+    *now += kOneSecond / 10;
+    hangs += status.Hangs(watch, *now) > 0 ? 1 : 0;
+  }
+  return hangs;
+}
+
+TEST(TaskStatus, HangsWhereAStageDoesNotReturn) {
+  TaskStatus status;
+  StallWatch watch;
+  int64_t now = kOneSecond;
+  EXPECT_EQ(Looks(status, 100, &watch, &now), 0) << "outside the ticks a step may be long";
+  status.position()->tick.store(0);
+  status.position()->stage.store(3);
+  EXPECT_EQ(Looks(status, 19, &watch, &now), 0);
+  EXPECT_GT(Looks(status, 3, &watch, &now), 0);
+  // However slow a busy machine makes it, it goes on.
+  int64_t tick = 0;
+  EXPECT_EQ(Looks(status, 1000, &watch, &now, [&] { status.position()->tick.store(++tick / 100); }),
+            0);
+}
+
+// Ctrl-Z, a debugger or a frozen container halt the one who looks, too.
+TEST(TaskStatus, AHaltOfTheWatcherIsNone) {
+  TaskStatus status;
+  StallWatch watch;
+  int64_t now = kOneSecond;
+  status.position()->stage.store(3);
+  for (int i = 0; i < 20; ++i) {
+    now += 3600 * kOneSecond;
+    EXPECT_EQ(status.Hangs(&watch, now), 0);
+  }
+}
+
+TEST(TaskStatus, ARunOfProcessesIsWatchedByItsLauncher) {
+  TaskStatus status;
+  StallWatch watch;
+  int64_t now = kOneSecond;
+  status.SetWatchedElsewhere();
+  EXPECT_EQ(Looks(status, 1000, &watch, &now), 0);
+}
+
 TEST(ForkedTasks, LeaveNothingBehind) {
   ForkedTasks tasks(1);
   int count = 0;
   for (int i = 0; i < 3; ++i) {
-    tasks.Start(i, [&] { return std::to_string(++count); });
+    tasks.Start(i, [&](TaskStatus*) { return std::to_string(++count); });
     EXPECT_EQ(WaitForAll(&tasks)[i].answer, "1");
   }
   EXPECT_EQ(count, 0);
@@ -81,7 +145,7 @@ TEST(ForkedTasks, EndWithTheirOwner) {
   {
     ForkedTasks tasks(2);
     for (int i = 0; i < 2; ++i) {
-      tasks.Start(i, []() -> std::string {
+      tasks.Start(i, [](TaskStatus*) -> std::string {
         while (true) pause();
       });
     }

@@ -55,6 +55,13 @@ test('the edge of survival comes first, the marks tell their values, and no text
     await page.mouse.move(2, 2);
     assert.equal(await page.locator('#tip').isVisible(), false);
   }
+  // A click keeps it, with the command that makes the run again, until the next one elsewhere.
+  const mark = await page.locator('details circle').first().boundingBox();
+  await page.mouse.click(mark.x + mark.width / 2, mark.y + mark.height / 2);
+  await page.mouse.move(2, 2);
+  assert.match(await page.locator('#tip').innerText(), /poise run push_double_support --set duration=1\.5 --set 'sim\.push\[0\]\.peak=20'/);
+  await page.mouse.click(2, 2);
+  assert.equal(await page.locator('#tip').isVisible(), false);
   const overlaps = await page.evaluate(() => [...document.querySelectorAll('svg')].flatMap((svg) => {
     const texts = [...svg.querySelectorAll('text')].map((t) => [t.textContent, t.getBoundingClientRect()]);
     const frame = svg.getBoundingClientRect();

@@ -3,6 +3,7 @@
 #include <gnu/libc-version.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "components/framework/build_info.h"
@@ -10,6 +11,7 @@
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/shell_word.h"
 #include "tools/maps/sweep_charts.h"
 #include "tools/maps/sweep_maps.h"
 #include "tools/maps/sweep_page.h"
@@ -64,6 +66,28 @@ ordered_json SubjectJson(const BenchmarkSet& set) {
   return json;
 }
 
+ordered_json FigureJson(const BenchmarkFigure& figure) {
+  ordered_json json = {{"point", figure.point}};
+  if (figure.untold != nullptr) {
+    json["outcome"] = figure.untold->outcome;
+    json["component"] = figure.untold->component;
+    json["stage"] = figure.untold->stage;
+    json["reason"] = figure.untold->reason;
+    return json;
+  }
+  const auto add = [&](const char* name, const std::optional<double>& value) {
+    json[name] = value ? ordered_json(*value) : ordered_json(nullptr);
+  };
+  add("value", figure.value);
+  json["unit"] = figure.unit;
+  json["bound"] = figure.bound;
+  add("impulse", figure.impulse);
+  add("impulse_per_mass", figure.per_mass);
+  add("share_of_lip", figure.of_pendulum);
+  add("share_of_lip_of_duration", figure.of_duration);
+  return json;
+}
+
 ordered_json PartJson(const BenchmarkResult& result) {
   const Sweep& sweep = result.header.sweep;
   ordered_json json = {{"name", result.part.name()},
@@ -74,7 +98,21 @@ ordered_json PartJson(const BenchmarkResult& result) {
   std::string rows;
   for (const auto& [key, row] : result.rows) rows += SweepRow::RowText(row) + "\n";
   json["rows_sha1"] = Sha1(rows);
+  ordered_json figures = ordered_json::array(), untold = ordered_json::array();
+  for (const BenchmarkFigure& figure : BenchmarkFigures(result)) {
+    (figure.untold != nullptr ? untold : figures).push_back(FigureJson(figure));
+  }
+  json["figures"] = figures;
+  json["untold"] = untold;
   return json;
+}
+
+/// What `poise run` is to be told in the benchmark's folder, beside the sweep's own changes.
+std::string RunOf(const BenchmarkSet& set, const BenchmarkPart& part) {
+  std::string what =
+      fmt::format("set/{}_scenario.pbtxt --robot {}", part.name(), ShellWord(set.subject().robot));
+  if (!set.subject().drives.empty()) what += " --drives " + set.subject().drives;
+  return what;
 }
 
 }  // namespace
@@ -112,7 +150,8 @@ std::string WriteBenchmark(const fs::path& folder, const BenchmarkSet& set,
   page.tables.push_back(FormatBenchmark(results));
   fs::create_directories(folder / "maps");
   for (const BenchmarkResult& result : results) {
-    const std::vector<std::string> charts = MapCharts(result.header, result.rows).all();
+    const std::vector<std::string> charts =
+        MapCharts(result.header, result.rows, RunOf(set, result.part)).all();
     for (size_t i = 0; i < charts.size(); ++i) {
       const std::string name = fmt::format("{}_{}.svg", result.part.name(), i + 1);
       WriteFile(folder / "maps" / name, StandaloneSvg(charts[i]));

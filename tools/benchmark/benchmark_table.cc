@@ -11,118 +11,149 @@
 namespace poise {
 namespace {
 
-/// A line of the results. Empty cells: not known, or not of this part.
-struct Figure {
-  std::string part, point, unit;
-  std::optional<double> value = {};
-  bool at_least = false;  // all that was tried was survived
-  std::optional<double> impulse = {}, per_mass = {}, of_pendulum = {}, of_duration = {};
-};
+constexpr char kAtLeast[] = "at least";
+constexpr char kBelow[] = "below";
 
-std::string PlaceText(const SweepPoints& points, int64_t run) {
-  std::string text;
-  const std::vector<SweepValue> values = points.At(run);
-  for (size_t i = 0; i < values.size(); ++i) {
-    const Variable& variable = points.sweep().vary(static_cast<int>(i));
-    text += fmt::format("{}{} {}{}", text.empty() ? "" : ", ", NameOf(variable),
-                        points.Text(i, values[i]), variable.angle() ? "°" : "");
-  }
-  return text;
-}
+using Pick = std::optional<double> BenchmarkFigure::*;
+constexpr Pick kPicks[] = {&BenchmarkFigure::value, &BenchmarkFigure::impulse,
+                           &BenchmarkFigure::per_mass, &BenchmarkFigure::of_pendulum,
+                           &BenchmarkFigure::of_duration};
 
-/// `pick` of those of `figures` that have it, as `sum` makes it.
-template <class Sum>
-std::optional<double> Of(const std::vector<Figure>& figures, std::optional<double> Figure::*pick,
-                         const Sum& sum) {
+/// `pick` of all figures; empty where one does not have it.
+std::vector<double> AllOf(const std::vector<BenchmarkFigure>& figures, Pick pick) {
   std::vector<double> values;
-  for (const Figure& figure : figures) {
-    if (figure.*pick) values.push_back(*(figure.*pick));
+  for (const BenchmarkFigure& figure : figures) {
+    if (!(figure.*pick)) return {};
+    values.push_back(*(figure.*pick));
   }
-  if (values.empty() || values.size() < figures.size()) return {};
-  return sum(values);
+  return values;
 }
 
-double Mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
+BenchmarkFigure MeanOf(const std::vector<BenchmarkFigure>& points) {
+  BenchmarkFigure mean{"mean", points[0].unit};
+  for (const BenchmarkFigure& point : points) {
+    if (point.bound.empty() || point.bound == mean.bound) continue;
+    if (!mean.bound.empty()) return {"mean", points[0].unit};  // some above, some below
+    mean.bound = point.bound;
+  }
+  for (const Pick pick : kPicks) {
+    const std::vector<double> values = AllOf(points, pick);
+    if (values.empty()) continue;
+    double sum = 0;
+    for (const double value : values) sum += value;
+    mean.*pick = sum / static_cast<double>(values.size());
+  }
+  return mean;
 }
 
-double Least(const std::vector<double>& values) {
-  return *std::min_element(values.begin(), values.end());
+BenchmarkFigure LeastOf(const std::vector<BenchmarkFigure>& points) {
+  BenchmarkFigure least{"least", points[0].unit};
+  for (const Pick pick : kPicks) {
+    const std::vector<double> values = AllOf(points, pick);
+    if (!values.empty()) least.*pick = *std::ranges::min_element(values);
+  }
+  // That of the smallest, of equal ones the one that says most.
+  const auto rank = [](const std::string& bound) {
+    return bound == kBelow ? 0 : bound.empty() ? 1 : 2;
+  };
+  int best = 3;
+  for (const BenchmarkFigure& point : points) {
+    if (point.value != least.value || rank(point.bound) >= best) continue;
+    best = rank(point.bound);
+    least.bound = point.bound;
+  }
+  return least;
+}
+
+/// Without the value of a limit.
+std::string PlaceOf(const SweepPoints& points, int64_t run) {
+  SweepRow row;
+  row.run = run;
+  return PlaceText(points, row);
 }
 
 /// A part's points, and below them their mean and the least.
-std::vector<Figure> OfLimits(const BenchmarkResult& result) {
+std::vector<BenchmarkFigure> OfLimits(const BenchmarkResult& result) {
   const SweepPoints points(result.header.sweep);
-  std::vector<Figure> figures;
+  const Limit& limit = result.header.sweep.limit();
+  std::vector<BenchmarkFigure> figures;
   // The push is what is measured; else it only disturbs.
-  const bool push = result.header.sweep.limit().field().starts_with("sim.push");
+  const bool push = limit.field().starts_with("sim.push");
   for (const LimitPoint& point : LimitPoints(result.header, result.rows)) {
-    Figure figure{result.part.name(), PlaceText(points, point.run),
-                  result.header.sweep.limit().unit()};
-    // Not even the smallest one: nothing was survived.
-    figure.value = point.search.limit().value_or(0);
-    figure.at_least = !point.search.fails_at();
-    if (push) {
-      const bool known = point.at_limit != nullptr && point.at_limit->push;
-      const PushBound bound = known ? *point.at_limit->push : PushBound();
-      figure.impulse = bound.impulse;
-      figure.per_mass = known ? bound.impulse / bound.mass : 0;
-      figure.of_pendulum = known ? bound.impulse / bound.lip_impulse : 0;
-      figure.of_duration = known ? bound.impulse / bound.lip_impulse_of_duration : 0;
+    BenchmarkFigure figure{PlaceOf(points, point.run), limit.unit()};
+    const SweepRow* const row = point.at_limit != nullptr ? point.at_limit : point.at_fall;
+    if (row != nullptr) {
+      figure.value = row->limit;
+      figure.bound = point.at_limit == nullptr ? kBelow : point.at_fall == nullptr ? kAtLeast : "";
+    }
+    if (push && row != nullptr && row->push) {
+      figure.impulse = row->push->impulse;
+      figure.per_mass = row->push->impulse / row->push->mass;
+      if (row->push->bounded()) {
+        figure.of_pendulum = row->push->impulse / row->push->lip_impulse;
+        figure.of_duration = row->push->impulse / row->push->lip_impulse_of_duration;
+      }
     }
     figures.push_back(figure);
   }
   if (figures.empty()) return figures;
-  const std::vector<Figure> each = figures;
-  const bool at_least =
-      std::any_of(each.begin(), each.end(), [](const Figure& f) { return f.at_least; });
-  for (const auto& [name, sum] : {std::pair{"mean", &Mean}, std::pair{"least", &Least}}) {
-    Figure figure{result.part.name(), name, each[0].unit};
-    for (const auto pick : {&Figure::value, &Figure::impulse, &Figure::per_mass,
-                            &Figure::of_pendulum, &Figure::of_duration}) {
-      figure.*pick = Of(each, pick, sum);
-    }
-    figure.at_least = at_least;
-    figures.push_back(figure);
-  }
+  const std::vector<BenchmarkFigure> sums = {MeanOf(figures), LeastOf(figures)};
+  figures.insert(figures.end(), sums.begin(), sums.end());
   return figures;
 }
 
 /// How many of a part's runs stand.
-std::vector<Figure> OfRuns(const BenchmarkResult& result) {
-  if (result.rows.empty()) return {};
-  const auto stand = std::count_if(result.rows.begin(), result.rows.end(),
-                                   [](const auto& row) { return row.second.stands(); });
-  Figure figure{result.part.name(), fmt::format("stand, of {}", result.rows.size()), "runs"};
-  figure.value = static_cast<double>(stand);
+std::vector<BenchmarkFigure> OfRuns(const BenchmarkResult& result) {
+  int64_t told = 0, stand = 0;
+  for (const auto& [key, row] : result.rows) {
+    told += row.survived() ? 1 : 0;
+    stand += row.stands() ? 1 : 0;
+  }
+  BenchmarkFigure figure{fmt::format("stand, of {}", told), "runs"};
+  if (told > 0) figure.value = static_cast<double>(stand);
   return {figure};
-}
-
-std::vector<Figure> FiguresOf(const BenchmarkResult& result) {
-  return result.header.sweep.has_limit() ? OfLimits(result) : OfRuns(result);
 }
 
 std::string Cell(const std::optional<double>& value) {
   return value ? fmt::format("{}", *value) : "";
 }
 
+template <class Format>
+std::string Known(const std::optional<double>& value, const Format& format) {
+  return value ? format(*value) : std::string("–");
+}
+
 std::string Percent(const std::optional<double>& share) {
-  return share ? fmt::format("{:.1f} %", 100 * *share) : "";
+  return Known(share, [](double v) { return fmt::format("{:.1f} %", 100 * v); });
 }
 
 }  // namespace
 
+std::vector<BenchmarkFigure> BenchmarkFigures(const BenchmarkResult& result) {
+  if (result.rows.empty()) return {};
+  std::vector<BenchmarkFigure> figures =
+      result.header.sweep.has_limit() ? OfLimits(result) : OfRuns(result);
+  const SweepPoints points(result.header.sweep);
+  for (const auto& [key, row] : result.rows) {
+    if (row.survived()) continue;
+    figures.push_back({fmt::format("run {}: {}", row.run, PlaceText(points, row)), ""});
+    figures.back().untold = &row;
+  }
+  return figures;
+}
+
 std::string BenchmarkCsv(const std::vector<BenchmarkResult>& results) {
   std::string csv =
-      "part,point,value,unit,at_least,impulse,impulse_per_mass,share_of_lip,"
-      "share_of_lip_of_duration\n";
+      "part,point,value,unit,bound,impulse,impulse_per_mass,share_of_lip,"
+      "share_of_lip_of_duration,outcome,component,stage,reason\n";
   for (const BenchmarkResult& result : results) {
-    for (const Figure& f : FiguresOf(result)) {
-      csv += fmt::format("{},{},{},{},{},{},{},{},{}\n", f.part, CsvCell(f.point), Cell(f.value),
-                         CsvCell(f.unit), f.at_least ? 1 : 0, Cell(f.impulse), Cell(f.per_mass),
-                         Cell(f.of_pendulum), Cell(f.of_duration));
+    for (const BenchmarkFigure& f : BenchmarkFigures(result)) {
+      const SweepRow none;
+      const SweepRow& run = f.untold != nullptr ? *f.untold : none;
+      csv += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", result.part.name(),
+                         CsvCell(f.point), Cell(f.value), CsvCell(f.unit), f.bound, Cell(f.impulse),
+                         Cell(f.per_mass), Cell(f.of_pendulum), Cell(f.of_duration), run.outcome,
+                         CsvCell(run.component), CsvCell(run.stage), CsvCell(run.reason));
     }
   }
   return csv;
@@ -131,24 +162,30 @@ std::string BenchmarkCsv(const std::vector<BenchmarkResult>& results) {
 std::string FormatBenchmark(const std::vector<BenchmarkResult>& results) {
   std::string text;
   for (const BenchmarkResult& result : results) {
-    const std::vector<Figure> figures = FiguresOf(result);
+    const std::vector<BenchmarkFigure> figures = BenchmarkFigures(result);
     if (figures.empty()) continue;
     text += fmt::format("{}{}: {}\n\n", text.empty() ? "" : "\n", result.part.name(),
                         result.part.title());
-    const bool push = figures[0].impulse.has_value();
+    const bool push = std::ranges::any_of(
+        figures, [](const BenchmarkFigure& figure) { return figure.impulse.has_value(); });
     std::vector<TableRow> rows = {{"", figures[0].unit}};
     if (push) {
       rows[0].insert(rows[0].end(), {"N·s", "N·s/kg", "of the bound", "for the duration"});
     }
-    for (const Figure& f : figures) {
-      const char* const least = f.at_least ? "at least " : "";
-      rows.push_back({f.point, f.value ? least + FormatNumber(*f.value) : ""});
+    for (const BenchmarkFigure& f : figures) {
+      if (f.untold != nullptr) continue;
+      const std::string bound = f.bound.empty() ? "" : f.bound + " ";
+      rows.push_back(
+          {f.point, f.value ? bound + FormatNumber(*f.value) : std::string("not known")});
       if (!push) continue;
-      rows.back().insert(rows.back().end(), {f.impulse ? fmt::format("{:.2f}", *f.impulse) : "",
-                                             f.per_mass ? fmt::format("{:.3f}", *f.per_mass) : "",
-                                             Percent(f.of_pendulum), Percent(f.of_duration)});
+      rows.back().insert(rows.back().end(),
+                         {Known(f.impulse, [](double v) { return fmt::format("{:.2f}", v); }),
+                          Known(f.per_mass, [](double v) { return fmt::format("{:.3f}", v); }),
+                          Percent(f.of_pendulum), Percent(f.of_duration)});
     }
     text += FormatColumns(rows);
+    const std::string untold = FormatUntold(result.header, result.rows);
+    if (!untold.empty()) text += "\n" + untold;
   }
   return text;
 }

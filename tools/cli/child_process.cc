@@ -78,6 +78,14 @@ std::string ChildProcess::HowItEnded() const {
   return fmt::format("exited with code {}", WEXITSTATUS(status_));
 }
 
+int64_t ChildProcess::WaitedForProcessor() const {
+  int64_t on_processor = 0;
+  int64_t waited = 0;
+  std::ifstream in(fmt::format("/proc/{}/schedstat", pid_));
+  in >> on_processor >> waited;
+  return in ? waited : 0;
+}
+
 void ChildProcess::Signal(int signal) {
   if (!ended()) kill(-pid_, signal);
 }

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,9 @@ class ChildProcess {
   bool succeeded() const;
   /// "exited with code 3", "was killed by signal 9 (Killed)". Precondition: ended().
   std::string HowItEnded() const;
+  /// ns that its first thread was ready to run and had to wait for a processor; 0 where the system
+  /// does not tell, or it has ended.
+  int64_t WaitedForProcessor() const;
   /// To the whole process group; nothing when it has ended.
   void Signal(int signal);
 

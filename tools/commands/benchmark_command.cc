@@ -5,6 +5,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
@@ -12,7 +13,9 @@
 #include "fmt/format.h"
 #include "tools/benchmark/benchmark_folder.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/shell_word.h"
 #include "tools/cli/signals.h"
+#include "tools/cli/temporary_dir.h"
 #include "tools/commands/commands.h"
 #include "tools/maps/sweep_output.h"
 #include "tools/run/run_dir.h"
@@ -25,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct BenchmarkArguments {
-  std::string set = "balance_2";
+  std::string set = "balance_3";
   BenchmarkSubject subject;
   std::vector<std::string> parts;  // empty: all
   SessionOptions session;
@@ -40,8 +43,7 @@ std::string CommandLine() {
   for (size_t at = text.find('\0'); at != std::string::npos && at + 1 < text.size();) {
     const size_t end = text.find('\0', at + 1);
     const std::string word = text.substr(at + 1, end - at - 1);
-    const bool plain = word.find_first_of(" '\"$&|;<>()[]*?\\") == std::string::npos;
-    command += plain && !word.empty() ? " " + word : " '" + word + "'";
+    command += " " + ShellWord(word);
     at = end;
   }
   return command;
@@ -68,23 +70,55 @@ fs::path MakeFolder(const BenchmarkArguments& arguments, const std::string& name
   if (error || !fs::is_directory(folder)) {
     throw ConfigError(fmt::format("--out {}: cannot be made", session.out));
   }
-  if (session.force && !session.resume) fs::remove_all(folder / "parts");
+  if (session.force && !session.resume) {
+    for (const char* old :
+         {"parts", "set", "maps", kBenchmarkCsv, kBenchmarkPage, kBenchmarkJson}) {
+      fs::remove_all(folder / old);
+    }
+  }
   return folder;
+}
+
+/// Throws ConfigError where `place` has results of another robot, controller or program.
+void CheckSame(const SweepDefinition& definition, const fs::path& place) {
+  const std::optional<SweepResults> found = ReadResults(place);
+  if (!found) return;
+  const SweepHeader header{found->header.kind, definition.sweep(), definition.columns(),
+                           definition.digest(), ProgramDigest()};
+  const std::string problem = HeaderProblem(header, found->header);
+  if (problem.empty()) return;
+  throw ConfigError(fmt::format("{}: {}; choose another folder with --out",
+                                (place / kResultsFile).string(), problem));
 }
 
 int RunBenchmark(const BenchmarkArguments& arguments) {
   const BenchmarkSet set(arguments.set, arguments.subject);
   const Benchmark& benchmark = set.benchmark();
   CheckParts(benchmark, arguments.parts);
-  const fs::path folder = MakeFolder(arguments, benchmark.name());
-  set.Write(SetFolder(folder));
-  // All of them, before an hour's work begins.
-  std::vector<SweepDefinition> definitions;
-  std::vector<BenchmarkPart> parts;
+  std::vector<int> indexes;
   for (int i = 0; i < benchmark.part_size(); ++i) {
     const std::vector<std::string>& wanted = arguments.parts;
     const std::string& name = benchmark.part(i).name();
-    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), name) == wanted.end()) continue;
+    if (wanted.empty() || std::ranges::find(wanted, name) != wanted.end()) indexes.push_back(i);
+  }
+  // All of them, before an hour's work begins, and before anything is written.
+  {
+    const TemporaryDir tried("poise-benchmark");
+    set.Write(tried.path());
+    for (int i = 0; i < benchmark.part_size(); ++i) {
+      const bool wanted = std::ranges::find(indexes, i) != indexes.end();
+      const fs::path place = PartFolder(arguments.session.out, benchmark.part(i));
+      const bool there = arguments.session.resume && fs::exists(place / kResultsFile);
+      if (!wanted && !there) continue;
+      const SweepDefinition definition = set.Definition(i, tried.path());
+      if (there) CheckSame(definition, place);
+    }
+  }
+  const fs::path folder = MakeFolder(arguments, benchmark.name());
+  set.Write(SetFolder(folder));
+  std::vector<SweepDefinition> definitions;
+  std::vector<BenchmarkPart> parts;
+  for (const int i : indexes) {
     definitions.push_back(set.Definition(i, SetFolder(folder)));
     parts.push_back(benchmark.part(i));
   }

@@ -206,8 +206,8 @@ bool SweepWorlds(const std::string& sweep, const WorldsArguments& arguments,
     }
     WriteFile(session.folder() / "table.csv", SweepCsv(session.header(), session.rows()));
     for (const auto& [key, row] : session.rows()) {
-      if (row.outcome != kInvalid && row.outcome != kCrashed) continue;
-      if (passed) fmt::print(stderr, "poise: {}: run {}: {}\n", engine, row.run, row.reason);
+      if (row.survived()) continue;
+      if (passed) fmt::print(stderr, "poise: {}: run {}: {}\n", engine, row.run, row.Ending());
       passed = false;
     }
     swept = definition.sweep();

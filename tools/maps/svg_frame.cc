@@ -197,6 +197,13 @@ std::string FallenMark(double x, double y, const std::string& tip) {
                      y - 3.5, tip.empty() ? "" : SvgTip(tip));
 }
 
+std::string UntoldMark(double x, double y, const std::string& tip) {
+  return fmt::format("<circle class='u' cx='{:.1f}' cy='{:.1f}' r='4'>{}</circle>", x, y,
+                     tip.empty() ? "" : SvgTip(tip));
+}
+
+LegendEntry UntoldEntry() { return {UntoldMark(0, 0, ""), "does not tell"}; }
+
 std::string ColourBar(const SvgFrame& frame, const ChartScale& scale, const std::string& unit,
                       const std::vector<LegendEntry>& above) {
   std::string svg;

@@ -79,6 +79,10 @@ LegendEntry FallenEntry();
 /// A cross, the mark of what fell.
 std::string FallenMark(double x, double y, const std::string& tip);
 
+/// A broken ring, the mark of a run that does not tell whether the robot stood.
+std::string UntoldMark(double x, double y, const std::string& tip);
+LegendEntry UntoldEntry();
+
 /// `above`: what has another mark than a colour of the scale.
 std::string ColourBar(const SvgFrame& frame, const ChartScale& scale, const std::string& unit,
                       const std::vector<LegendEntry>& above);

@@ -48,7 +48,9 @@ std::pair<double, double> Range(const Items& items, const Get& get) {
 }
 
 std::optional<double> XOf(const ChartPoint& point) { return point.x; }
-std::optional<double> YOf(const ChartPoint& point) { return point.fallen ? std::nullopt : point.y; }
+std::optional<double> YOf(const ChartPoint& point) {
+  return point.fallen || point.untold ? std::nullopt : point.y;
+}
 
 std::vector<ChartPoint> AllPoints(const std::vector<ChartSeries>& series) {
   std::vector<ChartPoint> all;
@@ -59,27 +61,36 @@ std::vector<ChartPoint> AllPoints(const std::vector<ChartSeries>& series) {
 }
 
 bool AnyFell(const std::vector<ChartPoint>& points) {
-  return std::ranges::any_of(points, [](const ChartPoint& p) { return p.fallen; });
+  return std::ranges::any_of(points, &ChartPoint::fallen);
 }
 
-/// The axes of curves and points: the strip of what fell is above the range of the others.
+bool AnyUntold(const std::vector<ChartPoint>& points) {
+  return std::ranges::any_of(points, &ChartPoint::untold);
+}
+
+/// The axes of curves and points: the strip of what has no value is above the range of the others.
 struct PlotAxes {
   SvgAxis x, y;
-  double strip;  ///< pixel, of what fell
+  double strip;  ///< pixel, of what fell or does not tell
 
-  PlotAxes(const SvgFrame& frame, const std::vector<ChartPoint>& points, bool from_zero)
+  PlotAxes(const SvgFrame& frame, const std::vector<ChartPoint>& points, bool from_zero, bool share)
       : x(Range(points, XOf).first, Range(points, XOf).second, frame.left, frame.right_edge()),
-        y(from_zero ? std::min(0.0, Range(points, YOf).first) : Range(points, YOf).first,
-          Range(points, YOf).second, kBase, kTop + (AnyFell(points) ? SvgFrame::kStrip : 0)),
+        y(share       ? 0
+          : from_zero ? std::min(0.0, Range(points, YOf).first)
+                      : Range(points, YOf).first,
+          share ? 1 : Range(points, YOf).second, kBase,
+          kTop + (AnyFell(points) || AnyUntold(points) ? SvgFrame::kStrip : 0)),
         strip(kTop + SvgFrame::kStrip / 2) {}
 };
 
-std::vector<LegendEntry> SeriesEntries(const std::vector<ChartSeries>& series, bool fallen) {
+std::vector<LegendEntry> SeriesEntries(const std::vector<ChartSeries>& series,
+                                       const std::vector<ChartPoint>& all) {
   std::vector<LegendEntry> entries;
   for (size_t i = 0; i < series.size(); ++i) {
     if (!series[i].name.empty()) entries.push_back(SwatchEntry(SeriesFill(i), series[i].name));
   }
-  if (fallen) entries.push_back(FallenEntry());
+  if (AnyFell(all)) entries.push_back(FallenEntry());
+  if (AnyUntold(all)) entries.push_back(UntoldEntry());
   return entries;
 }
 
@@ -128,7 +139,7 @@ std::string Spokes(const SvgFrame& frame) {
 /// Whether each cell is one run that stands or does not: a bar of shares would tell nothing more.
 bool AllOrNothing(const std::vector<ChartCell>& cells, const ChartScale& scale) {
   return scale.share && std::ranges::all_of(cells, [](const ChartCell& c) {
-           return c.value && (*c.value == 0 || *c.value == 1);
+           return c.untold || (c.value && (*c.value == 0 || *c.value == 1));
          });
 }
 
@@ -136,8 +147,9 @@ bool AllOrNothing(const std::vector<ChartCell>& cells, const ChartScale& scale) 
 std::string ScaleLegend(const SvgFrame& frame, const std::vector<ChartCell>& cells,
                         const ChartScale& scale, const std::string& unit,
                         const LegendEntry& fallen) {
+  std::vector<LegendEntry> above;
+  if (std::ranges::any_of(cells, &ChartCell::untold)) above.push_back(UntoldEntry());
   if (!AllOrNothing(cells, scale)) {
-    std::vector<LegendEntry> above;
     if (std::ranges::any_of(cells, &ChartCell::fallen)) above.push_back(fallen);
     if (std::ranges::any_of(cells, &ChartCell::some_fallen)) {
       above.push_back({FallenMark(0, 0, ""), "some did not"});
@@ -147,7 +159,8 @@ std::string ScaleLegend(const SvgFrame& frame, const std::vector<ChartCell>& cel
   const auto swatch = [&](double value, const char* text) {
     return SwatchEntry(fmt::format("fill='{}'", scale.Colour(value)), text);
   };
-  return Legend(frame, {swatch(1, "stands"), swatch(0, "does not")});
+  above.insert(above.begin(), {swatch(1, "stands"), swatch(0, "does not")});
+  return Legend(frame, above);
 }
 
 std::string CellFill(const ChartCell& cell, const ChartScale& scale) {
@@ -197,11 +210,11 @@ ChartScale ScaleOf(const std::vector<ChartCell>& cells, bool share) {
 
 std::string CurveChart(const ChartLabels& labels, const std::vector<ChartSeries>& series) {
   const std::vector<ChartPoint> all = AllPoints(series);
-  const std::vector<LegendEntry> entries = SeriesEntries(series, AnyFell(all));
+  const std::vector<LegendEntry> entries = SeriesEntries(series, all);
   SvgFrame frame;
   FitRight(entries, &frame);
-  FitLeft(PlotAxes(frame, all, true).y.texts(), &frame);
-  const PlotAxes axes(frame, all, true);
+  FitLeft(PlotAxes(frame, all, true, labels.share).y.texts(), &frame);
+  const PlotAxes axes(frame, all, true, labels.share);
   std::string svg = OpenSvg(frame, labels) + SvgGrid(frame, axes.x, axes.y) +
                     AxisLabels(frame, labels) + Legend(frame, entries);
   for (size_t i = 0; i < series.size(); ++i) {
@@ -212,6 +225,8 @@ std::string CurveChart(const ChartLabels& labels, const std::vector<ChartSeries>
       places.emplace_back();
       if (point.fallen) {
         marks += FallenMark(x, axes.strip, point.tip);
+      } else if (point.untold) {
+        marks += UntoldMark(x, axes.strip, point.tip);
       } else if (point.y && std::isfinite(*point.y)) {
         places.back() = {x, axes.y(*point.y)};
         marks += Dot(x, axes.y(*point.y), i, point.tip);
@@ -225,15 +240,18 @@ std::string CurveChart(const ChartLabels& labels, const std::vector<ChartSeries>
 std::string PointChart(const ChartLabels& labels, const std::vector<ChartPoint>& points) {
   std::vector<LegendEntry> entries = {SwatchEntry(SeriesFill(0), "stands")};
   if (AnyFell(points)) entries.push_back(FallenEntry());
+  if (AnyUntold(points)) entries.push_back(UntoldEntry());
   SvgFrame frame;
   FitRight(entries, &frame);
-  FitLeft(PlotAxes(frame, points, false).y.texts(), &frame);
-  const PlotAxes axes(frame, points, false);
+  FitLeft(PlotAxes(frame, points, false, labels.share).y.texts(), &frame);
+  const PlotAxes axes(frame, points, false, labels.share);
   std::string svg = OpenSvg(frame, labels) + SvgGrid(frame, axes.x, axes.y) +
                     AxisLabels(frame, labels) + Legend(frame, entries);
   for (const ChartPoint& point : points) {
     if (point.fallen) {
       svg += FallenMark(axes.x(point.x), axes.strip, point.tip);
+    } else if (point.untold) {
+      svg += UntoldMark(axes.x(point.x), axes.strip, point.tip);
     } else if (point.y && std::isfinite(*point.y)) {
       svg += Dot(axes.x(point.x), axes.y(*point.y), 0, point.tip);
     }
@@ -243,10 +261,11 @@ std::string PointChart(const ChartLabels& labels, const std::vector<ChartPoint>&
 
 std::string PolarChart(const ChartLabels& labels, const std::vector<ChartSeries>& series) {
   const std::vector<ChartPoint> all = AllPoints(series);
-  const std::vector<LegendEntry> entries = SeriesEntries(series, AnyFell(all));
+  const std::vector<LegendEntry> entries = SeriesEntries(series, all);
   SvgFrame frame;
   FitRight(entries, &frame);
-  const SvgAxis radius(0, std::max(Range(all, YOf).second, 1e-12), 0, SvgFrame::radius());
+  const double most = labels.share ? 1 : std::max(Range(all, YOf).second, 1e-12);
+  const SvgAxis radius(0, most, 0, SvgFrame::radius());
   std::string svg = OpenSvg(frame, labels) + Spokes(frame) + Legend(frame, entries);
   const std::vector<std::string> texts = radius.texts();
   for (size_t i = 1; i < texts.size(); ++i) {
@@ -261,9 +280,9 @@ std::string PolarChart(const ChartLabels& labels, const std::vector<ChartSeries>
     std::string marks;
     for (const ChartPoint& point : series[i].points) {
       places.emplace_back();
-      if (point.fallen) {
+      if (point.fallen || point.untold) {
         const auto [x, y] = PolarPlace(frame, point.x, SvgFrame::radius() + 8);
-        marks += FallenMark(x, y, point.tip);
+        marks += point.fallen ? FallenMark(x, y, point.tip) : UntoldMark(x, y, point.tip);
       } else if (point.y && std::isfinite(*point.y)) {
         places.back() = PolarPlace(frame, point.x, radius(std::max(0.0, *point.y)));
         marks += Dot(places.back()->first, places.back()->second, i, point.tip);
@@ -295,6 +314,7 @@ std::string HeatMap(const ChartLabels& labels, const std::vector<std::string>& c
     svg += fmt::format("<rect x='{:.2f}' y='{:.2f}' width='{:.2f}' height='{:.2f}' {}>{}</rect>", x,
                        y, width + 0.2, height + 0.2, CellFill(cell, scale), SvgTip(cell.tip));
     if (cell.some_fallen) svg += FallenMark(x + width / 2, y + height / 2, cell.tip);
+    if (cell.untold) svg += UntoldMark(x + width / 2, y + height / 2, cell.tip);
   }
   std::vector<std::pair<double, std::string>> below, beside;
   for (size_t i = 0; i < columns.size(); ++i) {
@@ -331,9 +351,9 @@ std::string PolarHeatMap(const ChartLabels& labels, const std::vector<double>& a
         "L{:.2f} {:.2f} A{:.2f} {:.2f} 0 {} 1 {:.2f} {:.2f} Z' {}>{}</path>",
         ax, ay, bx, by, outer, outer, large, cx, cy, dx, dy, inner, inner, large, ax, ay,
         CellFill(cell, scale), SvgTip(cell.tip));
-    if (!cell.some_fallen) continue;
     const auto [x, y] = PolarPlace(frame, cell.x, (inner + outer) / 2);
-    svg += FallenMark(x, y, cell.tip);
+    if (cell.some_fallen) svg += FallenMark(x, y, cell.tip);
+    if (cell.untold) svg += UntoldMark(x, y, cell.tip);
   }
   svg += Spokes(frame);
   double free = SvgFrame::center_y() + 1e9;
@@ -366,8 +386,9 @@ std::string ScatterChart(const ChartLabels& labels, const std::vector<ChartCell>
     return a->value.value_or(INFINITY) > b->value.value_or(INFINITY);
   });
   for (const ChartCell* cell : order) {
-    if (cell->fallen) {
-      svg += FallenMark(x(cell->x), y(cell->y), cell->tip);
+    if (cell->fallen || cell->untold) {
+      svg += cell->fallen ? FallenMark(x(cell->x), y(cell->y), cell->tip)
+                          : UntoldMark(x(cell->x), y(cell->y), cell->tip);
       continue;
     }
     svg += fmt::format("<circle class='o' cx='{:.1f}' cy='{:.1f}' r='4' fill='{}'>{}</circle>",
@@ -385,8 +406,9 @@ std::string ChartStyle(bool dark) {
   const auto series = [](const auto& colours) {
     std::string css;
     for (size_t i = 0; i < colours.size(); ++i) {
-      css += fmt::format(".s{0}{{fill:{1}}} .l{0}{{fill:none;stroke:{1};stroke-width:1.5}}\n", i,
-                         colours[i]);
+      css += fmt::format(
+          ".s{0}{{fill:{1}}} .l{0}{{fill:none;stroke:{1};stroke-width:1;stroke-dasharray:2 5}}\n",
+          i, colours[i]);
     }
     return css;
   };
@@ -394,6 +416,7 @@ std::string ChartStyle(bool dark) {
       "text{font:11px system-ui,sans-serif;fill:#333} .t{font-size:13px;font-weight:600}\n"
       ".r{fill:#555;font-size:10px} .h{paint-order:stroke;stroke:#fff;stroke-width:3px}\n"
       ".g{stroke:#ddd;stroke-width:1} .o{fill-opacity:.85;stroke:#333;stroke-width:.4}\n"
+      ".u{fill:none;stroke:#777;stroke-width:2;stroke-dasharray:3 2}\n"
       ".f{fill:none;stroke:#c81e1e;stroke-width:2} .ff{fill:#e9b4b4;stroke:#c81e1e;"
       "stroke-width:.5}\n" +
       series(kLight);

@@ -11,20 +11,24 @@ namespace poise {
 /// `text` for HTML and SVG.
 std::string HtmlText(std::string_view text);
 
-/// title: what is shown, in words; x, y: the axes with their units; unit: of the values.
+/// title: what is shown, in words; x, y: the axes with their units; unit: of the values; share: the
+/// values are shares, whose axis is 0 to 1.
 struct ChartLabels {
   std::string title, x, y, unit;
+  bool share = false;
 };
 
-/// `fallen`: of a run that did not stand. It has a mark of its own and no part in an axis' range.
+/// `fallen`: of a run that did not stand, `untold`: of one that does not tell. Each has a mark of
+/// its own and no part in an axis' range.
 struct ChartPoint {
   double x = 0;
   std::optional<double> y;
   std::string tip;  ///< what it says under the mouse
-  bool fallen = false;
+  bool fallen = false, untold = false;
 };
 
-/// A curve: points in the order in which they are joined; what fell interrupts it.
+/// A curve: points in the order in which a dashed line guides the eye, since nothing is known
+/// between them; what fell interrupts it.
 struct ChartSeries {
   std::string name;
   std::vector<ChartPoint> points;
@@ -37,6 +41,7 @@ struct ChartCell {
   std::string tip;
   bool fallen = false;       ///< none of its runs stands: no value of the scale
   bool some_fallen = false;  ///< the value is of those that stand
+  bool untold = false;       ///< none of its runs tells
 };
 
 /// Colours of values: from low to high, or of shares from 0 (orange: none stands) to 1 (blue).

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double kTelling = 0.7;  // of a variable's range: failures spread wider tell nothing
 constexpr size_t kMostStretches = 6;
+constexpr size_t kMostGroups = 8;  // that are told one by one
 
 /// Runs at one value of the variable, of which some may stand.
 struct Level {
@@ -24,17 +25,32 @@ struct Level {
 };
 using Levels = std::map<double, Level>;
 
+/// The runs that the other variables have in common.
+struct Group {
+  std::string place;  ///< those variables in words
+  Levels levels;
+  Levels::const_iterator edge() const {
+    return std::ranges::find_if(levels, [](const auto& level) { return !level.second.stands(); });
+  }
+  /// Whether the boundary lies between two of its levels.
+  bool tells() const { return edge() != levels.begin() && edge() != levels.end(); }
+};
+
 class Sentences {
  public:
   Sentences(const SweepHeader& header, const SweepRows& rows)
       : header_(header), rows_(rows), points_(header.sweep) {
-    for (const auto& [key, row] : rows) standing_ += row.stands() ? 1 : 0;
+    for (const auto& [key, row] : rows) {
+      standing_ += row.stands() ? 1 : 0;
+      untold_ += row.survived() ? 0 : 1;
+    }
   }
 
-  std::vector<std::string> OfSweep() const;
-  std::vector<std::string> OfLimits() const;
+  std::vector<std::string> All() const;
 
  private:
+  std::vector<std::string> OfSweep() const;
+  std::vector<std::string> OfLimits() const;
   const Variable& variable(size_t i) const { return header_.sweep.vary(static_cast<int>(i)); }
   size_t count() const { return static_cast<size_t>(header_.sweep.vary_size()); }
   bool IsNumber(size_t i) const { return variable(i).choice_size() == 0; }
@@ -45,15 +61,16 @@ class Sentences {
   }
   std::string Place(const std::vector<SweepValue>& point, std::optional<size_t> without) const;
   std::string Stretches(const Levels& levels, bool standing, const std::string& unit) const;
-  std::string Along(size_t i) const;
-  std::string AlongInGroups(size_t i, const std::map<std::string, Levels>& groups) const;
-  std::optional<size_t> Graded() const;
+  using Groups = std::map<std::vector<double>, Group>;  // by the other variables' values
+  Groups GroupsAlong(size_t i) const;
+  std::string Along(size_t i, const Groups& groups) const;
+  std::string AlongInGroups(size_t i, const Groups& groups) const;
   std::string Failures(size_t i) const;
 
   const SweepHeader& header_;
   const SweepRows& rows_;
   SweepPoints points_;
-  size_t standing_ = 0;
+  size_t standing_ = 0, untold_ = 0;  // runs
 };
 
 /// "direction 90°, law paper".
@@ -94,42 +111,63 @@ std::string Sentences::Stretches(const Levels& levels, bool standing,
   return text;
 }
 
-/// The variable along which survival is told: the last number that is no angle.
-std::optional<size_t> Sentences::Graded() const {
-  std::optional<size_t> graded;
-  for (size_t i = 0; i < count(); ++i) {
-    if (IsNumber(i) && (!variable(i).angle() || count() == 1)) graded = i;
+Sentences::Groups Sentences::GroupsAlong(size_t i) const {
+  Groups groups;
+  for (const auto& [key, row] : rows_) {
+    if (!row.survived()) continue;
+    const std::vector<SweepValue> point = points_.At(row.run);
+    std::vector<double> others;
+    for (size_t k = 0; k < point.size(); ++k) {
+      if (k != i) others.push_back(point[k].number);
+    }
+    Group& group = groups[others];
+    group.place = Place(point, i);
+    Level& level = group.levels[point[i].number];
+    ++level.runs;
+    level.standing += row.stands() ? 1 : 0;
   }
-  return graded;
+  return groups;
 }
 
-std::string Sentences::AlongInGroups(size_t i, const std::map<std::string, Levels>& groups) const {
+std::string Sentences::AlongInGroups(size_t i, const Groups& groups) const {
   const std::string name = PlainName(variable(i)), unit = UnitOf(variable(i));
-  std::optional<std::pair<double, std::string>> least, most;  // up to which value it stands, where
+  const Group* least = nullptr;
+  const Group* most = nullptr;
+  std::map<double, std::string> by_value;  // up to which it stands, where
   size_t all = 0, none = 0, broken = 0;
-  for (const auto& [place, levels] : groups) {
-    const auto edge =
-        std::ranges::find_if(levels, [](const auto& l) { return !l.second.stands(); });
-    if (edge == levels.end()) {
+  const auto limit = [](const Group& group) { return std::prev(group.edge())->first; };
+  for (const auto& [others, group] : groups) {
+    const auto edge = group.edge();
+    if (edge == group.levels.end()) {
       ++all;
-    } else if (edge == levels.begin()) {
+    } else if (edge == group.levels.begin()) {
       ++none;
     } else {
-      const double value = std::prev(edge)->first;
-      if (!least || value < least->first) least = {value, place};
-      if (!most || value > most->first) most = {value, place};
+      if (least == nullptr || limit(group) < limit(*least)) least = &group;
+      if (most == nullptr || limit(group) > limit(*most)) most = &group;
+      std::string& places = by_value[limit(group)];
+      places += (places.empty() ? "" : "; ") + group.place;
     }
-    broken +=
-        std::any_of(edge, levels.end(), [](const auto& l) { return l.second.stands(); }) ? 1 : 0;
+    broken += std::any_of(edge, group.levels.end(), [](const auto& l) { return l.second.stands(); })
+                  ? 1
+                  : 0;
   }
   std::string text;
-  if (least) {
-    text = least->first == most->first
-               ? fmt::format("It stands up to a {} of {}, wherever it falls at all", name,
-                             Quantity(least->first, unit))
-               : fmt::format("It stands up to a {} of {} at the least ({}), of {} at the most ({})",
-                             name, Quantity(least->first, unit), least->second,
-                             Quantity(most->first, unit), most->second);
+  if (least != nullptr && by_value.size() == 1) {
+    text = fmt::format("It stands up to a {} of {}{}", name, Quantity(limit(*least), unit),
+                       all + none == 0 ? fmt::format(" in each of {} places", groups.size())
+                                       : fmt::format(" ({})", by_value.begin()->second));
+  } else if (least != nullptr && groups.size() <= kMostGroups) {
+    text = fmt::format("It stands up to a {} of", name);
+    const char* before = " ";
+    for (const auto& [value, places] : by_value) {
+      text += fmt::format("{}{} ({})", before, Quantity(value, unit), places);
+      before = ", ";
+    }
+  } else if (least != nullptr) {
+    text = fmt::format("It stands up to a {} of {} at the least ({}), of {} at the most ({})", name,
+                       Quantity(limit(*least), unit), least->place, Quantity(limit(*most), unit),
+                       most->place);
   }
   const auto add = [&](size_t number, const std::string& what) {
     if (number == 0) return;
@@ -137,24 +175,28 @@ std::string Sentences::AlongInGroups(size_t i, const std::map<std::string, Level
                         groups.size(), what);
   };
   add(all, "it stands at every value");
-  add(none, fmt::format("not even at {}", Quantity(groups.begin()->second.begin()->first, unit)));
+  add(none,
+      fmt::format("not even at {}", Quantity(groups.begin()->second.levels.begin()->first, unit)));
   add(broken, "it stands again beyond a value at which it does not");
   return text + ".";
 }
 
-std::string Sentences::Along(size_t i) const {
-  std::map<std::string, Levels> groups;  // by the other variables
-  for (const auto& [key, row] : rows_) {
-    const std::vector<SweepValue> point = points_.At(row.run);
-    Level& level = groups[Place(point, i)][point[i].number];
-    ++level.runs;
-    level.standing += row.stands() ? 1 : 0;
-  }
+std::string Sentences::Along(size_t i, const Groups& groups) const {
   if (groups.size() > 1) return AlongInGroups(i, groups);
-  const Levels& levels = groups.begin()->second;
+  const Levels& levels = groups.begin()->second.levels;
   const std::string unit = UnitOf(variable(i));
   return fmt::format("{}: stands at {}; does not at {}.", PlainName(variable(i)),
                      Stretches(levels, true, unit), Stretches(levels, false, unit));
+}
+
+std::vector<std::string> Sentences::All() const {
+  std::vector<std::string> sentences = header_.sweep.has_limit() ? OfLimits() : OfSweep();
+  if (untold_ > 0) {
+    sentences.push_back(fmt::format(
+        "{} run{} not tell whether the robot stood: stopped, crashed, hung, or not to be run.",
+        untold_, untold_ == 1 ? " does" : "s do"));
+  }
+  return sentences;
 }
 
 /// Where the runs that do not stand lie, if that is a part of the range; else empty.
@@ -164,7 +206,7 @@ std::string Sentences::Failures(size_t i) const {
     const double value = points_.At(row.run)[i].number;
     low = std::min(low, value);
     high = std::max(high, value);
-    if (row.stands()) continue;
+    if (!row.fell()) continue;
     from = std::min(from, value);
     to = std::max(to, value);
   }
@@ -176,14 +218,32 @@ std::string Sentences::Failures(size_t i) const {
 }
 
 std::vector<std::string> Sentences::OfSweep() const {
-  const size_t runs = rows_.size();
-  if (runs == 0) return {"No run is there yet."};
+  const size_t runs = rows_.size() - untold_;
+  if (rows_.empty()) return {"No run is there yet."};
+  if (runs == 0) return {};
   if (standing_ == runs) return {fmt::format("All {} runs stand.", runs)};
   if (standing_ == 0) return {fmt::format("None of {} runs stands.", runs)};
   std::vector<std::string> sentences = {
       fmt::format("{} of {} runs stand, {} do not.", standing_, runs, runs - standing_)};
   if (!header_.sweep.has_random()) {
-    if (const auto graded = Graded()) sentences.push_back(Along(*graded));
+    // Survival is told along the number whose values separate the most runs that stand from those
+    // that do not: a larger force does, a later push does not.
+    std::optional<size_t> best;
+    Groups best_groups;
+    double best_share = -1;
+    for (size_t i = 0; i < count(); ++i) {
+      const bool order = !variable(i).angle() && !IsSeed(variable(i));
+      if (!IsNumber(i) || (count() > 1 && !order)) continue;
+      Groups groups = GroupsAlong(i);
+      const auto tell =
+          std::ranges::count_if(groups, [](const auto& each) { return each.second.tells(); });
+      const double share = static_cast<double>(tell) / static_cast<double>(groups.size());
+      if (share <= best_share) continue;
+      best = i;
+      best_groups = std::move(groups);
+      best_share = share;
+    }
+    if (best) sentences.push_back(Along(*best, best_groups));
     return sentences;
   }
   std::string where;
@@ -200,13 +260,21 @@ std::vector<std::string> Sentences::OfLimits() const {
   const Limit& limit = header_.sweep.limit();
   const std::string name = PlainName(limit), unit = UnitOf(limit);
   std::optional<std::pair<double, std::string>> least, most;
-  size_t none = 0, open = 0, broken = 0;
+  std::optional<double> highest;  // of what fell nowhere
+  size_t none = 0, open = 0, broken = 0, unknown = 0;
   const std::vector<LimitPoint> found = LimitPoints(header_, rows_);
   if (found.empty()) return {"No run is there yet."};
   for (const LimitPoint& point : found) {
     const std::optional<double> value = point.search.limit();
-    open += value && !point.search.fails_at() ? 1 : 0;
-    broken += point.search.monotone() ? 0 : 1;
+    broken += point.search.survived_again() ? 1 : 0;
+    if (!point.search.known()) {
+      ++unknown;
+      continue;
+    }
+    if (value && !point.search.fails_at()) {
+      ++open;
+      if (!highest || *value > *highest) highest = value;
+    }
     if (!value) {
       ++none;
       continue;
@@ -221,8 +289,9 @@ std::vector<std::string> Sentences::OfLimits() const {
   std::vector<std::string> sentences;
   // What lies between two values that were tried is not known.
   const std::string every =
-      fmt::format(" (tried: {} values from {} to {}, then finer about where survival ends)",
-                  limit.samples(), Quantity(limit.min(), unit), Quantity(limit.max(), unit));
+      fmt::format(" (tried: {} values from {} to {}{}, then finer about where survival ends)",
+                  limit.samples(), Quantity(limit.min(), unit), Quantity(limit.max(), unit),
+                  limit.has_cap() ? ", larger ones where all of them are survived" : "");
   if (least && least->first == most->first) {
     sentences.push_back(fmt::format("Nothing fell up to a {} of {}{}{}.", name,
                                     Quantity(least->first, unit),
@@ -238,19 +307,22 @@ std::vector<std::string> Sentences::OfLimits() const {
     }
   };
   add(none, fmt::format("not even {} is survived", Quantity(limit.min(), unit)));
-  add(open, fmt::format("{} is survived, the most that was tried", Quantity(limit.max(), unit)));
+  if (highest) {
+    add(open, fmt::format("{} is survived, the most that was tried", Quantity(*highest, unit)));
+  }
+  const std::optional<double> again = found.front().search.largest_survived();
   add(broken, broken == 1 && found.size() == 1
                   ? fmt::format("{} is survived again, beyond one that was not",
-                                Quantity(*found.front().search.largest_survived(), unit))
+                                again ? Quantity(*again, unit) : "something")
                   : "something beyond one that was not is survived again");
+  add(unknown, "the limit is not known");
   return sentences;
 }
 
 }  // namespace
 
 std::vector<std::string> SurvivalSentences(const SweepHeader& header, const SweepRows& rows) {
-  const Sentences sentences(header, rows);
-  return header.sweep.has_limit() ? sentences.OfLimits() : sentences.OfSweep();
+  return Sentences(header, rows).All();
 }
 
 }  // namespace poise

@@ -2,22 +2,28 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/cli/shell_word.h"
 #include "tools/cli/text_table.h"
 #include "tools/maps/sweep_charts.h"
 #include "tools/maps/sweep_edge.h"
 #include "tools/maps/sweep_labels.h"
 #include "tools/maps/sweep_page.h"
+#include "tools/scenario/catalog.h"
 #include "tools/sweep/sweep_points.h"
 #include "tools/sweep/sweep_table.h"
 
 namespace poise {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr char kStandsValue[] = "stands";
 
@@ -29,8 +35,12 @@ std::string Capital(std::string text) {
 /// What the charts need of the rows.
 class Maps {
  public:
-  Maps(const SweepHeader& header, const SweepRows& rows)
-      : header_(header), sweep_(header.sweep), rows_(rows), points_(sweep_) {}
+  Maps(const SweepHeader& header, const SweepRows& rows, const std::string& what)
+      : header_(header),
+        sweep_(header.sweep),
+        rows_(rows),
+        points_(sweep_),
+        command_(CommandOf(sweep_, what)) {}
 
   SweepMaps OfSweep() const;
   std::vector<std::string> OfLimits() const;
@@ -48,8 +58,12 @@ class Maps {
   std::optional<double> Value(const SweepRow& row, const std::string& value) const;
   /// Its value says what happened after it fell: no part of a scale.
   static bool OffScale(const SweepRow& row, const std::string& value) {
-    return value != kStandsValue && !row.stands();
+    return value != kStandsValue && row.fell();
   }
+  /// "poise run ..." of all that its runs have in common.
+  static std::string CommandOf(const Sweep& sweep, const std::string& what);
+  /// The command that makes the run again.
+  std::string Command(const SweepRow& row) const;
   std::string Tip(const SweepRow& row, const std::string& value) const;
   ChartLabels Labels(const std::string& value, const std::string& x, const std::string& y) const;
   std::string Curve(size_t x, const std::string& value) const;
@@ -74,7 +88,42 @@ class Maps {
   const Sweep& sweep_;
   const SweepRows& rows_;
   SweepPoints points_;
+  std::string command_;
 };
+
+std::string Maps::CommandOf(const Sweep& sweep, const std::string& what) {
+  std::string command = "poise run ";
+  if (!what.empty()) {
+    command += what;
+  } else {
+    // Its name, where that leads to the same file.
+    std::string scenario = sweep.scenario();
+    const std::string name = fs::path(scenario).stem().string();
+    try {
+      if (FindFile("scenarios", name, fs::current_path()) == fs::path(scenario)) scenario = name;
+    } catch (const ConfigError&) {
+      // Then the file itself is named.
+    }
+    command += ShellWord(scenario);
+  }
+  if (sweep.has_variant()) command += " --variant " + ShellWord(sweep.variant());
+  for (const std::string& part : sweep.without()) command += " --without " + ShellWord(part);
+  if (sweep.ideal()) command += " --ideal";
+  for (const std::string& set : sweep.set()) command += " --set " + ShellWord(set);
+  return command;
+}
+
+std::string Maps::Command(const SweepRow& row) const {
+  std::string command = command_;
+  try {
+    for (const std::string& set : points_.Changes(row.run, row.limit)) {
+      command += " --set " + ShellWord(set);
+    }
+  } catch (const ConfigError&) {
+    return "";  // an expression without a value: the run is invalid
+  }
+  return command;
+}
 
 size_t Maps::Find(const std::string& name) const {
   size_t i = 0;
@@ -83,6 +132,7 @@ size_t Maps::Find(const std::string& name) const {
 }
 
 std::optional<double> Maps::Value(const SweepRow& row, const std::string& value) const {
+  if (!row.survived()) return {};
   if (value == kStandsValue) return row.stands() ? 1 : 0;
   const auto metric = row.metrics.find(value);
   if (metric == row.metrics.end()) return {};
@@ -95,7 +145,7 @@ std::string Maps::Tip(const SweepRow& row, const std::string& value) const {
   for (size_t i = 0; i < point.size(); ++i) {
     tip += fmt::format("\n{}: {}", Label(i), ValueText(i, point[i]));
   }
-  tip += "\n" + row.outcome;
+  tip += "\n" + (row.survived() ? row.outcome : row.Ending());
   if (row.fell_at) tip += fmt::format(" at {} s", FormatNumber(*row.fell_at));
   if (!row.phase.empty()) tip += fmt::format(", phase {}", row.phase);
   if (!row.trouble.empty()) tip += ", " + row.trouble;
@@ -103,14 +153,15 @@ std::string Maps::Tip(const SweepRow& row, const std::string& value) const {
     tip += fmt::format("\n{}: {}", MetricLabel(value),
                        FormatNumber(*Value(row, value), MetricUnit(value)));
   }
-  return tip;
+  const std::string command = Command(row);
+  return command.empty() ? tip : tip + "\n" + command;
 }
 
 /// Labels of a map of `value`; an empty `y`: the value itself is the vertical axis.
 ChartLabels Maps::Labels(const std::string& value, const std::string& x,
                          const std::string& y) const {
   if (value == kStandsValue) {
-    return {"What stands", x, y.empty() ? "share of the runs that stand" : y, ""};
+    return {"What stands", x, y.empty() ? "share of the runs that stand" : y, "", y.empty()};
   }
   const std::string unit = MetricUnit(value);
   return {Capital(MetricLabel(value)), x, y.empty() ? unit : y, unit};
@@ -134,11 +185,12 @@ Maps::Levels Maps::LevelsOf(size_t i) const {
 class Means {
  public:
   void Add(std::pair<size_t, size_t> place, const std::optional<double>& value, bool off_scale,
-           const std::string& tip) {
+           bool untold, const std::string& tip) {
     Entry& entry = entries_[place];
     ++entry.runs;
     entry.tip = tip;
     entry.off += off_scale ? 1 : 0;
+    entry.untold += untold ? 1 : 0;
     if (!value || off_scale) return;
     entry.sum += *value;
     ++entry.values;
@@ -146,9 +198,11 @@ class Means {
   std::vector<ChartCell> Cells() const {
     std::vector<ChartCell> cells;
     for (const auto& [place, entry] : entries_) {
-      ChartCell cell{
-          static_cast<double>(place.first), static_cast<double>(place.second),      {}, "",
-          entry.off == entry.runs,          entry.off > 0 && entry.off < entry.runs};
+      const int told = entry.runs - entry.untold;
+      ChartCell cell{static_cast<double>(place.first), static_cast<double>(place.second), {}, ""};
+      cell.untold = told == 0;
+      cell.fallen = told > 0 && entry.off == told;
+      cell.some_fallen = entry.off > 0 && entry.off < told;
       if (entry.values > 0) cell.value = entry.sum / entry.values;
       cell.tip = entry.runs == 1 ? entry.tip : Text(entry, cell.value);
       cells.push_back(std::move(cell));
@@ -158,13 +212,14 @@ class Means {
 
  private:
   struct Entry {
-    int runs = 0, values = 0, off = 0;
+    int runs = 0, values = 0, off = 0, untold = 0;
     double sum = 0;
     std::string tip;
   };
   static std::string Text(const Entry& entry, const std::optional<double>& mean) {
     std::string text = fmt::format("{} runs", entry.runs);
     if (entry.off > 0) text += fmt::format(", of which {} did not stand", entry.off);
+    if (entry.untold > 0) text += fmt::format(", {} do not tell", entry.untold);
     return text + fmt::format("\nmean: {}", mean ? FormatNumber(*mean) : "none");
   }
   std::map<std::pair<size_t, size_t>, Entry> entries_;
@@ -178,7 +233,7 @@ std::string Maps::Curve(size_t x, const std::string& value) const {
     std::vector<ChartPoint> points;
     for (const auto& [key, row] : rows_) {
       points.push_back({points_.At(row.run)[x].number, Value(row, value), Tip(row, value),
-                        OffScale(row, value)});
+                        OffScale(row, value), !row.survived()});
     }
     return PointChart(labels, points);
   }
@@ -186,7 +241,7 @@ std::string Maps::Curve(size_t x, const std::string& value) const {
   Means means;
   for (const auto& [key, row] : rows_) {
     means.Add({levels.Index(points_.At(row.run)[x].number), 0}, Value(row, value),
-              OffScale(row, value), Tip(row, value));
+              OffScale(row, value), !row.survived(), Tip(row, value));
   }
   const std::vector<ChartCell> cells = means.Cells();
   if (variable(x).choice_size() > 0) {
@@ -195,8 +250,8 @@ std::string Maps::Curve(size_t x, const std::string& value) const {
   }
   ChartSeries series;
   for (const ChartCell& cell : cells) {
-    series.points.push_back(
-        {levels.numbers[static_cast<size_t>(cell.x)], cell.value, cell.tip, cell.fallen});
+    series.points.push_back({levels.numbers[static_cast<size_t>(cell.x)], cell.value, cell.tip,
+                             cell.fallen, cell.untold});
   }
   return variable(x).angle() ? PolarChart(labels, {series}) : CurveChart(labels, {series});
 }
@@ -206,7 +261,7 @@ std::string Maps::Scatter(size_t x, size_t y, const std::string& value) const {
   for (const auto& [key, row] : rows_) {
     const std::vector<SweepValue> point = points_.At(row.run);
     cells.push_back({point[x].number, point[y].number, Value(row, value), Tip(row, value),
-                     OffScale(row, value)});
+                     OffScale(row, value), false, !row.survived()});
   }
   return ScatterChart(Labels(value, Label(x), Label(y)), cells,
                       ScaleOf(cells, value == kStandsValue));
@@ -221,7 +276,7 @@ std::string Maps::Pair(size_t x, size_t y, const std::string& value) const {
   for (const auto& [key, row] : rows_) {
     const std::vector<SweepValue> point = points_.At(row.run);
     means.Add({columns.Index(point[x].number), rows.Index(point[y].number)}, Value(row, value),
-              OffScale(row, value), Tip(row, value));
+              OffScale(row, value), !row.survived(), Tip(row, value));
   }
   std::vector<ChartCell> cells = means.Cells();
   const ChartLabels labels = Labels(value, Label(x), Label(y));
@@ -284,7 +339,7 @@ std::vector<std::string> Maps::OfLimits() const {
   if (!along) return {};
   using Get = std::optional<double> (*)(const LimitPoint&);
   const auto bound_share = [](const LimitPoint& p, double PushBound::*of) -> std::optional<double> {
-    if (p.at_limit == nullptr || !p.at_limit->push) return {};
+    if (p.at_limit == nullptr || !p.at_limit->push || !p.at_limit->push->bounded()) return {};
     return p.at_limit->push->impulse / (*p.at_limit->push).*of;
   };
   static const auto share = bound_share;
@@ -316,7 +371,9 @@ std::vector<std::string> Maps::OfLimits() const {
     std::map<std::vector<double>, ChartSeries> series;  // by the other variables
     for (const LimitPoint& point : points) {
       const std::optional<double> value = get(point);
-      if (!value) continue;
+      // Where it is not known it is so in the first chart; the others have what they can tell.
+      const bool unknown = !point.search.known() && charts.empty();
+      if (!value && !unknown) continue;
       const std::vector<SweepValue> place = points_.At(point.run);
       std::vector<double> others;
       std::string name;
@@ -330,9 +387,12 @@ std::vector<std::string> Maps::OfLimits() const {
       ChartSeries& one = series[others];
       one.name = name;
       std::string tip = name.empty() ? "" : name + "\n";
-      tip += fmt::format("{}: {}\n{}: {}", Label(*along), ValueText(*along, place[*along]), label,
-                         FormatNumber(*value));
-      one.points.push_back({place[*along].number, *value, tip});
+      const bool at_least = value && !point.search.fails_at();
+      tip += fmt::format("{}: {}\n{}: {}{}", Label(*along), ValueText(*along, place[*along]), label,
+                         at_least ? "at least " : "", value ? FormatNumber(*value) : "not known");
+      const std::string command = Command(*point.any);
+      if (!command.empty()) tip += "\n" + command;
+      one.points.push_back({place[*along].number, value, tip, false, unknown});
     }
     if (series.empty()) continue;
     std::vector<ChartSeries> all;
@@ -351,8 +411,8 @@ std::vector<std::string> SweepMaps::all() const {
   return charts;
 }
 
-SweepMaps MapCharts(const SweepHeader& header, const SweepRows& rows) {
-  const Maps maps(header, rows);
+SweepMaps MapCharts(const SweepHeader& header, const SweepRows& rows, const std::string& what) {
+  const Maps maps(header, rows, what);
   if (!header.sweep.has_limit()) return maps.OfSweep();
   SweepMaps limits;
   limits.survival = maps.OfLimits();

@@ -19,7 +19,9 @@ struct SweepMaps {
 
 /// The maps that the sweep asks for, or one of each pair of variables, or of one variable a curve
 /// of each metric; of limits, the limit over the variables. Polar where a variable is an angle.
-SweepMaps MapCharts(const SweepHeader& header, const SweepRows& rows);
+/// Each mark tells the command that runs it again; `what`: scenario, and flags that the sweep does
+/// not know, as that command names them; empty: the sweep's scenario.
+SweepMaps MapCharts(const SweepHeader& header, const SweepRows& rows, const std::string& what = "");
 
 /// A page of them that opens without a network; it begins with where survival ends.
 std::string MapsPage(const SweepHeader& header, const SweepRows& rows, const SweepMaps& maps);

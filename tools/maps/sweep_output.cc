@@ -123,13 +123,29 @@ class MapFiles {
   std::string problem_;
 };
 
-void PrintOutput(const fs::path& folder, const SweepHeader& header, const SweepRows& rows) {
+/// The tables and the page; false: there is no map, and so no page.
+bool WriteFiles(const fs::path& folder, const SweepHeader& header, const SweepRows& rows,
+                const SweepMaps& maps) {
+  WriteFile(folder / kTableFile, SweepCsv(header, rows));
+  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
+  const fs::path page = folder / kMapsFile;
+  if (maps.all().empty()) {
+    std::error_code error;
+    fs::remove(page, error);  // of what --force replaces
+    return false;
+  }
+  WriteFile(page, MapsPage(header, rows, maps));
+  return true;
+}
+
+void PrintOutput(const fs::path& folder, const SweepHeader& header, const SweepRows& rows,
+                 bool page) {
   for (const std::string& sentence : SurvivalSentences(header, rows)) fmt::print("{}\n", sentence);
   fmt::print("\n{}", FormatOutcomes(header, rows));
   if (header.sweep.has_limit()) fmt::print("\n{}", FormatLimits(header, rows));
   fmt::print("\n{}\n", (folder / kTableFile).string());
   if (header.sweep.has_limit()) fmt::print("{}\n", (folder / kLimitsFile).string());
-  fmt::print("{}\n", (folder / kMapsFile).string());
+  if (page) fmt::print("{}\n", (folder / kMapsFile).string());
   std::fflush(stdout);
 }
 
@@ -138,11 +154,11 @@ void PrintOutput(const fs::path& folder, const SweepHeader& header, const SweepR
 bool AllRan(const SweepRows& rows) {
   int problems = 0;
   for (const auto& [key, row] : rows) {
-    if (row.outcome != kInvalid && row.outcome != kCrashed) continue;
+    if (row.survived()) continue;
     if (++problems > kShownProblems) continue;
-    fmt::print(stderr, "poise: run {}{}: {}: {}\n", row.run,
-               row.limit ? fmt::format(" at {}", *row.limit) : "", row.outcome,
-               logging::LinesForTerminal(row.reason));
+    fmt::print(stderr, "poise: run {}{}: {}\n", row.run,
+               row.limit ? fmt::format(" at {}", *row.limit) : "",
+               logging::LinesForTerminal(row.Ending()));
   }
   if (problems > kShownProblems) {
     fmt::print(stderr, "poise: and {} more\n", problems - kShownProblems);
@@ -151,23 +167,19 @@ bool AllRan(const SweepRows& rows) {
 }
 
 void WriteSweepFiles(const fs::path& folder, const SweepHeader& header, const SweepRows& rows) {
-  WriteFile(folder / kTableFile, SweepCsv(header, rows));
-  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
-  WriteFile(folder / kMapsFile, MapsPage(header, rows, MapCharts(header, rows)));
+  WriteFiles(folder, header, rows, MapCharts(header, rows));
 }
 
 bool Deliver(const fs::path& folder, const SweepHeader& header, const SweepRows& rows,
              bool all_pictures) {
-  WriteFile(folder / kTableFile, SweepCsv(header, rows));
-  if (header.sweep.has_limit()) WriteFile(folder / kLimitsFile, LimitCsv(header, rows));
   const SweepMaps maps = MapCharts(header, rows);
-  WriteFile(folder / kMapsFile, MapsPage(header, rows, maps));
+  const bool page = WriteFiles(folder, header, rows, maps);
   const std::vector<std::string> charts = maps.all();
   // A curve of each metric, which nobody asked for, is drawn as SVG alone: a converter's start is
   // most of its time.
   const bool all = all_pictures || header.sweep.map_size() > 0;
   MapFiles files(folder, charts, all ? charts.size() : maps.survival.size());
-  PrintOutput(folder, header, rows);
+  PrintOutput(folder, header, rows, page);
   files.Finish();
   return AllRan(rows);
 }

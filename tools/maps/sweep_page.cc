@@ -23,6 +23,7 @@ pre{font:12px/1.4 ui-monospace,"DejaVu Sans Mono",monospace;overflow-x:auto;back
 summary{cursor:pointer;font-weight:600;margin:18px 0 8px}
 #tip{position:fixed;z-index:9;pointer-events:none;white-space:pre-line;max-width:min(320px,90vw);font-size:12px;padding:6px 9px;border-radius:6px;background:var(--ink);color:var(--page)}
 #tip[hidden]{display:none}
+#tip.kept{pointer-events:auto;user-select:text;overflow-wrap:anywhere;max-width:min(640px,90vw);border:1px solid var(--line)}
 @media print{body{max-width:none}.c svg{break-inside:avoid}}
 )";
 
@@ -44,9 +45,11 @@ constexpr std::string_view kScript = R"(
     return best;
   };
   const show = (e) => {
+    if (e.target.closest?.('#tip.kept') || (tip.classList.contains('kept') && e.type !== 'pointerdown')) return;
     const svg = e.target.closest?.('.c svg');
     const mark = svg && (e.target.closest('[data-tip]') ?? near(svg, e));
     tip.hidden = !mark;
+    tip.classList.toggle('kept', !!mark && e.type === 'pointerdown');
     if (!mark) return;
     tip.textContent = mark.dataset.tip;
     const {width, height} = tip.getBoundingClientRect();
@@ -54,7 +57,7 @@ constexpr std::string_view kScript = R"(
     tip.style.top = `${e.clientY + 18 + height > innerHeight ? Math.max(4, e.clientY - height - 12) : e.clientY + 18}px`;
   };
   for (const event of ['pointermove', 'pointerdown']) document.addEventListener(event, show);
-  document.addEventListener('scroll', () => { tip.hidden = true; }, {passive: true});
+  document.addEventListener('scroll', () => { tip.hidden = true; tip.classList.remove('kept'); }, {passive: true});
   addEventListener('beforeprint', () => document.querySelectorAll('details').forEach((d) => { d.open = true; }));
 })();
 )";
@@ -78,9 +81,15 @@ std::string FormatMapsPage(const MapsPageContent& content) {
   if (!content.description.empty()) {
     html += "<p class='soft'>" + HtmlText(content.description) + "</p>\n";
   }
-  html += "<h2>Where survival ends</h2>\n";
+  if (!content.edge.empty()) html += "<h2>Where survival ends</h2>\n";
   for (const std::string& sentence : content.edge) {
     html += "<p class='edge'>" + HtmlText(sentence) + "</p>\n";
+  }
+  if (!content.survival.empty() || !content.metrics.empty()) {
+    html +=
+        "<p class='soft'>Each mark is what was run; nothing is known between two marks. Under the "
+        "mouse it tells the command that runs it again, and a click keeps that there to be "
+        "copied.</p>\n";
   }
   html += Grid(content.survival);
   for (const std::string& table : content.tables) html += "<pre>" + HtmlText(table) + "</pre>\n";

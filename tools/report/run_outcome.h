@@ -28,10 +28,22 @@ struct ProcessReport {
   int64_t resident_last = 0;   ///< bytes
 };
 
+/// Why a run ended before its plan, in words that are the same whenever it ends so again: without
+/// times of this machine and files.
+struct RunFault {
+  enum class Kind { kStopped, kCrashed, kHung };
+  Kind kind = Kind::kStopped;
+  std::string component;  ///< empty: none alone is to blame
+  std::string what;
+};
+
 struct RunOutcome {
   bool completed = false;    ///< the planned end was reached, or a component ended the run well
+  bool ticks_done = false;   ///< all ticks until that end are computed and in the log
   bool interrupted = false;  ///< by a signal
   std::string message;       ///< why the run ended; empty after the planned end
+  RunFault fault;            ///< what the message says, for comparison
+  std::string warning;       ///< of what changed nothing about the run; empty: nothing
   std::vector<std::string> details;  ///< last lines of the output of the process at fault
   int64_t refused = 0;               ///< packets that the launcher refused on the service port
   std::vector<InjectedFault> faults;

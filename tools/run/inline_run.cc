@@ -1,7 +1,14 @@
 #include "tools/run/inline_run.h"
 
+#include <unistd.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <mutex>
+#include <thread>
 
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
@@ -9,9 +16,83 @@
 #include "fmt/format.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/signals.h"
+#include "tools/run/stall_watch.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
+namespace {
+
+/// Ends the program where a stage does not return, which nothing else can: it says whose stage, and
+/// leaves the log of what came before.
+class InlineWatch {
+ public:
+  /// All outlive the watch. `log_path`: of `recorder`.
+  InlineWatch(const RunSpec& spec, const std::string& log_path, InlineRunner* runner,
+              logging::InlineRecorder* recorder, Progress* progress)
+      : spec_(spec),
+        log_path_(log_path),
+        stages_(runner->StageNames()),
+        recorder_(recorder),
+        progress_(progress) {
+    runner->set_position(&position_);
+    thread_ = std::thread([this] { Run(); });
+  }
+  ~InlineWatch() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  InlineWatch(const InlineWatch&) = delete;
+  InlineWatch& operator=(const InlineWatch&) = delete;
+
+ private:
+  void Run() {
+    constexpr std::chrono::milliseconds kLook{200};
+    StallWatch watch;
+    std::unique_lock lock(mutex_);
+    while (!changed_.wait_for(lock, kLook, [this] { return over_; })) {
+      const int32_t stage = position_.stage.load(std::memory_order_relaxed);
+      const int64_t tick = position_.tick.load(std::memory_order_relaxed);
+      const auto stages = static_cast<int64_t>(stages_.size());
+      const int64_t stood = watch.Stood(tick * (stages + 1) + stage, NowNanoseconds());
+      // Between the stages it writes the log: there the disk is waited for.
+      if (stage != RunPosition::kNoStage && stood > kStallPatience) End(tick, stage);
+    }
+  }
+  [[noreturn]] void End(int64_t tick, int32_t stage) {
+    progress_->Clear();
+    std::string log = fmt::format("the log has what came before: {}", log_path_);
+    try {
+      recorder_->Flush();
+    } catch (const std::exception& error) {
+      log = error.what();
+    }
+    const InlineRunner::StageName& name = stages_[static_cast<size_t>(stage)];
+    fmt::print(stderr,
+               "poise: run failed: {} hangs: its stage {} has not returned for {} s, at tick {} "
+               "({:.3f} s); {}\n",
+               name.component, name.stage, kStallPatience / 1'000'000'000, tick,
+               MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time, log);
+    std::fflush(nullptr);
+    _exit(1);
+  }
+
+  const RunSpec& spec_;
+  const std::string log_path_;
+  const std::vector<InlineRunner::StageName> stages_;
+  logging::InlineRecorder* const recorder_;
+  Progress* const progress_;
+  RunPosition position_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+}  // namespace
 
 RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
                      const std::string& log_path, Progress* progress,
@@ -28,6 +109,7 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   }
   logging::InlineRecorder recorder(log_path, spec, info, &runner, kept ? &*kept : nullptr);
   RunOutcome outcome;
+  std::optional<InlineWatch> watch(std::in_place, spec, log_path, &runner, &recorder, progress);
   const int64_t start = NowNanoseconds();
   int64_t next_flush = start;
   bool more = true;
@@ -46,6 +128,7 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
       progress->Show(next.time, static_cast<double>(now - start) * 1e-9);
     }
   }
+  watch.reset();
   outcome.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
   progress->Clear();
   recorder.Close(spec);

@@ -11,15 +11,15 @@
 #include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
+#include "tools/run/stall_watch.h"
 
 namespace poise {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000'000;  // ns
-constexpr int64_t kReadyTimeout = 30 * kSecond;
-constexpr int64_t kStartTimeout = 10 * kSecond;
-constexpr int64_t kStallTimeout = 20 * kSecond;  // of wall time without a tick
-constexpr int64_t kRecordTimeout = 10 * kSecond;
+constexpr int64_t kSecond = 1'000'000'000;       // ns
+constexpr int64_t kReadyTimeout = 30 * kSecond;  // and what the machine let it wait
+constexpr int64_t kStartTimeout = 30 * kSecond;
+constexpr int64_t kRecordTimeout = 30 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
 constexpr int64_t kSettled = 10 * kSecond;      // memory is measured from here on
 constexpr int64_t kSilence = 2 * kSecond;       // of a process that can be replaced
@@ -83,29 +83,50 @@ void Launcher::StartProcesses() {
   }
 }
 
-void Launcher::Fail(std::string message, std::vector<std::string> details) {
+void Launcher::Fail(RunFault fault, std::string message, std::vector<std::string> details) {
   if (!outcome_.message.empty()) return;
+  outcome_.fault = std::move(fault);
   outcome_.message = std::move(message);
   outcome_.details = std::move(details);
+}
+
+void Launcher::Fail(std::string message) {
+  RunFault fault{RunFault::Kind::kStopped, "", message};
+  Fail(std::move(fault), std::move(message));
 }
 
 void Launcher::FailProcess(ComponentProcess& component_process) {
   for (const std::string& name : component_process.components()) {
     const health_t& health = control_.statuses().at(name).health;
     if (health.state == health_t::STATE_FAILED && !health.detail.empty()) {
-      Fail(fmt::format("{}: {}", name, health.detail));
+      Fail({RunFault::Kind::kStopped, name, health.detail},
+           fmt::format("{}: {}", name, health.detail));
       return;
     }
   }
   ChildProcess& process = component_process.process();
   const int64_t tick = Tick();
-  Fail(fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
+  Fail({RunFault::Kind::kCrashed, process.name(), process.HowItEnded()},
+       fmt::format("{} {}{}; its output: {}", process.name(), process.HowItEnded(),
                    tick < 0
                        ? " before the start"
                        : fmt::format(" at {:.3f} s",
                                      MakeTick(tick, spec_.tick_period(), spec_.lead_ticks()).time),
                    process.log_path()),
        LastLines(process.log_path(), kDetailLines));
+}
+
+std::vector<std::string> Launcher::WaitedFor(int64_t now) const {
+  std::vector<std::string> silent, last;
+  int64_t least = INT64_MAX;
+  for (const auto& [name, status] : control_.statuses()) {
+    // Who waits still says so, ten times a second.
+    if (!status.seen || now - status.last_seen > kStallPatience / 2) silent.push_back(name);
+    if (status.health.tick < least) last.clear();
+    least = std::min(least, status.health.tick);
+    if (status.health.tick == least) last.push_back(name);
+  }
+  return silent.empty() ? last : silent;
 }
 
 bool Launcher::Healthy() {
@@ -132,7 +153,8 @@ bool Launcher::RecorderFailed() {
   if (!log_) return false;
   const health_t& health = control_.statuses().at(kRecorderName).health;
   if (health.state != health_t::STATE_FAILED) return false;
-  Fail(fmt::format("the recorder cannot go on: {}", health.detail));
+  Fail({RunFault::Kind::kStopped, kRecorderName, health.detail},
+       fmt::format("the recorder cannot go on: {}", health.detail));
   return true;
 }
 
@@ -151,10 +173,14 @@ bool Launcher::Ready() const {
 }
 
 bool Launcher::WaitUntilReady() {
-  const int64_t deadline = NowNanoseconds() + kReadyTimeout;
+  const int64_t start = NowNanoseconds();
   while (!Ready()) {
     if (!Healthy()) return false;
-    if (NowNanoseconds() > deadline) {
+    int64_t kept = 0;
+    for (const auto& process : processes_) {
+      kept = std::max(kept, process->process().WaitedForProcessor());
+    }
+    if (NowNanoseconds() > start + kReadyTimeout + kept) {
       std::string names;
       std::vector<std::string> details;
       for (const auto& process : processes_) {
@@ -167,8 +193,9 @@ bool Launcher::WaitUntilReady() {
           details.push_back(process->name() + ": " + line);
         }
       }
-      Fail(fmt::format("not ready after {} s: {}; run: poise doctor", kReadyTimeout / kSecond,
-                       names),
+      Fail({RunFault::Kind::kHung, names, "was not ready in time"},
+           fmt::format("not ready after {} s: {}; run: poise doctor",
+                       (NowNanoseconds() - start) / kSecond, names),
            details);
       return false;
     }
@@ -204,8 +231,7 @@ bool Launcher::Start() {
 
 void Launcher::Watch() {
   const auto start = static_cast<int64_t>(outcome_.wall_time);
-  int64_t last_tick = -1;
-  int64_t last_change = NowNanoseconds();
+  StallWatch stall;
   int64_t ended_at = 0;  // all components, or the run by one of them
   while (true) {
     Wait(kSpin);
@@ -224,6 +250,7 @@ void Launcher::Watch() {
     // A component with a reason ends the run for all; without, each has come to the planned end.
     bool all_ended = true;
     bool failed = false;
+    RunFault fault;
     std::string reason;
     int index = 0;
     for (const ComponentInstance& instance : spec_.graph().component()) {
@@ -233,32 +260,36 @@ void Launcher::Watch() {
       all_ended = all_ended && (!counts || health.state >= health_t::STATE_FINISHED);
       if (health.state >= health_t::STATE_FINISHED && !health.detail.empty()) {
         failed = failed || health.state == health_t::STATE_FAILED;
+        fault = {RunFault::Kind::kStopped, instance.name(), health.detail};
         reason = fmt::format("{}: {}", instance.name(), health.detail);
       }
     }
-    if (ended_at == 0 && (all_ended || !reason.empty())) ended_at = last_change = now;
+    if (ended_at == 0 && (all_ended || !reason.empty())) ended_at = now;
     const bool recorded =
         !log_ || control_.statuses().at(kRecorderName).health.state == health_t::STATE_FINISHED;
     if (ended_at > 0 && recorded) {
-      outcome_.completed = !failed;
-      if (!reason.empty()) Fail(reason);
+      outcome_.completed = outcome_.ticks_done = !failed;
+      if (!reason.empty()) Fail(fault, reason);
       return;
     }
     if (ended_at > 0 && now > ended_at + kRecordTimeout) {
-      if (!reason.empty()) Fail(reason);
+      if (!reason.empty()) Fail(fault, reason);
       Fail(fmt::format("the recorder still lacks messages {} s after the end",
                        kRecordTimeout / kSecond));
       return;
     }
-    if (tick != last_tick) {
-      last_tick = tick;
-      last_change = now;
-    } else if (now > last_change + kStallTimeout) {
-      std::string standing;
-      for (const auto& [name, status] : control_.statuses()) {
-        standing += fmt::format("{}{} {}", standing.empty() ? "" : ", ", name, status.health.tick);
-      }
-      Fail(fmt::format("no tick for {} s; last ticks: {}", kStallTimeout / kSecond, standing));
+    if (ended_at == 0 && stall.Stood(tick, now) > kStallPatience) {
+      const std::vector<std::string> waited_for = WaitedFor(now);
+      const std::string names = fmt::format("{}", fmt::join(waited_for, ", "));
+      const std::string what =
+          fmt::format("no tick for {} s: {} waited for", kStallPatience / kSecond,
+                      waited_for.size() == 1 ? "it is" : "they are");
+      const int64_t theirs = control_.statuses().at(waited_for.front()).health.tick;
+      Fail({RunFault::Kind::kHung, names, what},
+           fmt::format("no tick for {} s: {} {} waited for, {} last word is of tick {}; the others "
+                       "have come to tick {}",
+                       kStallPatience / kSecond, names, waited_for.size() == 1 ? "is" : "are",
+                       waited_for.size() == 1 ? "its" : "their", theirs, tick));
       return;
     }
   }
@@ -332,16 +363,18 @@ void Launcher::StopProcesses() {
     for (const auto& component : processes_) {
       ChildProcess* const process = &component->process();
       if (process->ended() && process->succeeded()) continue;
+      if (!process->ended()) {
+        // It has done all its work: how long it takes to go is the machine's affair.
+        outcome_.warning = fmt::format("{} had not stopped {} s after the end and was killed",
+                                       process->name(), 2 * kStopPatience / kSecond);
+        continue;
+      }
       outcome_.completed = false;
       const std::string reason = outcome_.message;
+      const RunFault fault = outcome_.fault;  // the run's; its ticks are done
       outcome_.message.clear();
-      if (process->ended()) {
-        FailProcess(*component);
-      } else {
-        Fail(fmt::format("{} did not stop after the end and was killed; its output: {}",
-                         process->name(), process->log_path()),
-             LastLines(process->log_path(), kDetailLines));
-      }
+      FailProcess(*component);
+      outcome_.fault = fault;
       if (!reason.empty()) outcome_.details.push_back("before that: " + reason);
       break;
     }

@@ -56,7 +56,11 @@ class Launcher {
   bool Healthy();
   /// Notes the end of the run when the recorder says that it cannot go on.
   bool RecorderFailed();
-  void Fail(std::string message, std::vector<std::string> details = {});
+  /// The first failure counts. `message`: what is wrong, with times and files.
+  void Fail(RunFault fault, std::string message, std::vector<std::string> details = {});
+  void Fail(std::string message);  ///< without times and files, and nobody's
+  /// Components whose silence the others wait for; all at the lowest tick where none is silent.
+  std::vector<std::string> WaitedFor(int64_t now) const;
   void FailProcess(ComponentProcess& process);
   int64_t Tick() const;  ///< last tick that any component has completed
 

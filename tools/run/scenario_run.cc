@@ -50,6 +50,7 @@ std::string ProcessesText(const Graph& graph) {
 }
 
 void PrintOutcome(const std::string& what, const RunOutcome& outcome) {
+  if (!outcome.warning.empty()) fmt::print(stderr, "warning: {}\n", outcome.warning);
   if (outcome.message.empty()) return;
   fmt::print(stderr, "poise: {} {}: {}\n", what, outcome.completed ? "ended" : "failed",
              outcome.message);

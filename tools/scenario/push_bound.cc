@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "components/messages/conversions.h"
@@ -59,6 +60,13 @@ std::optional<PushBound> BoundOf(const Push& push, const Scenario& scenario,
   if (sim.push_size() > 1 && tick >= run.num_ticks) return {};
   const ground_truth_t* truth = run.truth.at(std::min(tick, run.num_ticks - 1));
   if (truth == nullptr) return {};
+  PushBound bound;
+  const robot::RobotModel simulated = WithModelErrors(run.robot, sim);
+  bound.mass = simulated.total_mass();
+  // The start's posture is solved again only where the impulse is a share of what it gives.
+  const double scale =
+      push.has_scaled_impulse() ? ImpulseScale(simulated, SolveStart(simulated, sim.start())) : 0;
+  bound.impulse = HorizontalImpulse(push, scale);
   std::vector<Vector2d> corners;
   double ground = 0;
   for (size_t f = 0; f < run.robot.feet().size(); ++f) {
@@ -70,22 +78,17 @@ std::optional<PushBound> BoundOf(const Push& push, const Scenario& scenario,
       ground += corner.z();
     }
   }
-  if (corners.empty()) return {};
-  PushBound bound;
+  if (corners.empty()) return bound;
   const Eigen::Vector3d com = GetVector3(truth->com_position);
-  bound.height = com.z() - ground / static_cast<double>(corners.size());
-  if (!(bound.height > 0)) return {};
-  const double frequency = std::sqrt(robot::kGravity / bound.height);
+  const double height = com.z() - ground / static_cast<double>(corners.size());
+  if (!(height > 0)) return bound;
+  const double frequency = std::sqrt(robot::kGravity / height);
   const Vector2d capture_point =
       com.head<2>() + GetVector3(truth->com_velocity).head<2>() / frequency;
-  bound.distance = DistanceToEdge(corners, capture_point, along).value_or(0);
-  if (!(bound.distance > 0)) return {};
-  const robot::RobotModel simulated = WithModelErrors(run.robot, sim);
-  bound.mass = simulated.total_mass();
-  // The start's posture is solved again only where the impulse is a share of what it gives.
-  const double scale =
-      push.has_scaled_impulse() ? ImpulseScale(simulated, SolveStart(simulated, sim.start())) : 0;
-  bound.impulse = HorizontalImpulse(push, scale);
+  const double distance = DistanceToEdge(corners, capture_point, along).value_or(0);
+  if (!(distance > 0)) return bound;
+  bound.height = height;
+  bound.distance = distance;
   bound.lip_impulse = bound.mass * frequency * bound.distance;
   bound.lip_impulse_of_duration =
       bound.lip_impulse / PendulumShare(push.profile(), push.duration(), frequency);
@@ -118,8 +121,11 @@ std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::
   for (const Push& push : sim.push()) {
     const std::optional<PushBound> bound = BoundOf(push, scenario, step_time, run);
     if (!bound) continue;
-    const auto share = [](const PushBound& of) { return of.impulse / of.lip_impulse_of_duration; };
-    if (!nearest || share(*bound) > share(*nearest)) nearest = bound;
+    const auto rank = [](const PushBound& of) {
+      const double share = of.bounded() ? of.impulse / of.lip_impulse_of_duration : of.impulse;
+      return std::pair(of.bounded(), share);
+    };
+    if (!nearest || rank(*bound) > rank(*nearest)) nearest = bound;
   }
   return nearest;
 }

@@ -26,12 +26,15 @@ struct PushBound {
   /// make (FarthestSupport), s from the push's begin to the first touch-down, and
   /// N·s, m w (d + reach e^(-w time)): what one step catches of a push at once.
   double reach = 0, step_time = 0, step_impulse = 0;
+
+  /// Whether there is such a bound. Else impulse and mass alone are known.
+  bool bounded() const { return lip_impulse > 0; }
 };
 
 /// Of several pushes the one that is nearest to its bound, or farthest beyond it: each has the
-/// robot as it stands when it begins, those to come after the run's end do not count. Empty without
-/// feet that bear at a push's start, with a capture point beyond them, or when the scenario has
-/// hands, no push or but vertical ones: then there is no such bound.
+/// robot as it stands when it begins, those to come after the run's end do not count; without any
+/// bound, the largest. Without feet that bear at a push's start, or with a capture point beyond
+/// them, it has no bound. Empty when the scenario has hands, no push or but vertical ones.
 std::optional<PushBound> FindPushBound(const Scenario& scenario, const logging::RunRecord& run);
 
 /// N·s, horizontal impulse of a push; `impulse_scale`: ImpulseScale (N·s), of which scaled_impulse

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace poise {
 namespace {
 
 constexpr double kDefaultTolerance = 1.0 / 200;  // of max - min
+// Beyond max each value is farther from min than the one before by this share, or by a step of the
+// samples if that is more.
+constexpr double kRaise = 0.25;
 
 double ToleranceOf(const Limit& limit) {
   return limit.has_tolerance() ? limit.tolerance()
@@ -15,7 +19,8 @@ double ToleranceOf(const Limit& limit) {
 
 }  // namespace
 
-LimitSearch::LimitSearch(const Limit& limit) : tolerance_(ToleranceOf(limit)) {
+LimitSearch::LimitSearch(const Limit& limit)
+    : tolerance_(ToleranceOf(limit)), cap_(limit.has_cap() ? limit.cap() : limit.max()) {
   const int last = limit.samples() - 1;
   for (int i = 0; i < last; ++i) {
     samples_.push_back(limit.min() + (limit.max() - limit.min()) * i / last);
@@ -29,6 +34,12 @@ std::vector<double> LimitSearch::Wanted() const {
     if (!answers_.contains(value)) wanted.push_back(value);
   }
   if (!wanted.empty()) return wanted;
+  if (Edge() == answers_.end()) {
+    const double top = answers_.rbegin()->first, min = samples_.front();
+    const double step = (samples_.back() - min) / static_cast<double>(samples_.size() - 1);
+    if (top < cap_) wanted.push_back(std::min(cap_, top + std::max(step, kRaise * (top - min))));
+    return wanted;
+  }
   const auto bisect = [&](double survived, double failed) {
     const double middle = survived + (failed - survived) / 2;
     if (failed - survived > tolerance_ && middle > survived && middle < failed) {
@@ -36,34 +47,50 @@ std::vector<double> LimitSearch::Wanted() const {
     }
   };
   if (limit() && fails_at()) bisect(*limit(), *fails_at());
-  if (!monotone()) {
+  if (survived_again() && largest_survived()) {
     const auto above = answers_.upper_bound(*largest_survived());
     if (above != answers_.end()) bisect(*largest_survived(), above->first);
   }
   return wanted;
 }
 
+LimitSearch::Answers::const_iterator LimitSearch::Edge() const {
+  return std::ranges::find_if(answers_, [](const auto& answer) { return answer.second != true; });
+}
+
+bool LimitSearch::known() const {
+  const auto edge = Edge();
+  return edge == answers_.end() || edge->second.has_value();
+}
+
 std::optional<double> LimitSearch::limit() const {
-  std::optional<double> limit;
-  for (const auto& [value, survived] : answers_) {
-    if (!survived) break;
-    limit = value;
-  }
-  return limit;
+  const auto edge = Edge();
+  if (!known() || edge == answers_.begin()) return {};
+  return std::prev(edge)->first;
 }
 
 std::optional<double> LimitSearch::fails_at() const {
-  const auto failed = std::find_if(answers_.begin(), answers_.end(),
-                                   [](const auto& answer) { return !answer.second; });
-  if (failed == answers_.end()) return {};
-  return failed->first;
+  const auto edge = Edge();
+  if (!known() || edge == answers_.end()) return {};
+  return edge->first;
 }
 
 std::optional<double> LimitSearch::largest_survived() const {
-  const auto survived = std::find_if(answers_.rbegin(), answers_.rend(),
-                                     [](const auto& answer) { return answer.second; });
-  if (survived == answers_.rend()) return {};
-  return survived->first;
+  for (auto answer = answers_.rbegin(); answer != answers_.rend(); ++answer) {
+    if (!answer->second) return {};
+    if (*answer->second) return answer->first;
+  }
+  return {};
+}
+
+std::optional<bool> LimitSearch::monotone() const {
+  bool fell = false, told = known();
+  for (const auto& [value, survived] : answers_) {
+    if (fell && survived == true) return false;
+    fell = fell || survived == false;
+    told = told && survived.has_value();
+  }
+  return told ? std::optional(true) : std::nullopt;
 }
 
 int LimitSearch::ExpectedRuns(const Limit& limit) {

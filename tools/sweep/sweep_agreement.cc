@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -17,10 +18,12 @@ namespace {
 constexpr size_t kShownRuns = 10;
 
 /// Largest value of `variable` that stands, by the place of the other variables; empty: none does.
+/// Places with a run that does not tell are left out.
 using Largest = std::map<std::vector<std::pair<double, int>>, std::optional<double>>;
 
 Largest LargestSurvived(const SweepPoints& points, size_t variable, const SweepRows& rows) {
   Largest largest;
+  std::set<Largest::key_type> untold;
   for (const auto& [key, row] : rows) {
     const std::vector<SweepValue> place = points.At(row.run);
     std::vector<std::pair<double, int>> others;
@@ -29,8 +32,10 @@ Largest LargestSurvived(const SweepPoints& points, size_t variable, const SweepR
     }
     std::optional<double>& value = largest[others];
     const double number = place[variable].number;
+    if (!row.survived()) untold.insert(others);
     if (row.stands()) value = value ? std::max(*value, number) : number;
   }
+  for (const Largest::key_type& place : untold) largest.erase(place);
   return largest;
 }
 
@@ -59,11 +64,15 @@ std::string LargestText(const Variable& variable, const Largest& first, const La
 
 std::string FormatAgreement(const Sweep& sweep, const EngineRows& first, const EngineRows& second) {
   std::map<std::pair<std::string, std::string>, std::vector<int64_t>> differ;
-  size_t runs = 0, same = 0, stand_first = 0, stand_second = 0;
+  size_t runs = 0, same = 0, stand_first = 0, stand_second = 0, untold = 0;
   for (const auto& [key, row] : first.rows) {
     const auto found = second.rows.find(key);
     if (found == second.rows.end()) continue;
     const SweepRow& other = found->second;
+    if (!row.survived() || !other.survived()) {
+      ++untold;
+      continue;
+    }
     ++runs;
     stand_first += row.stands() ? 1 : 0;
     stand_second += other.stands() ? 1 : 0;
@@ -73,11 +82,18 @@ std::string FormatAgreement(const Sweep& sweep, const EngineRows& first, const E
       differ[{row.outcome, other.outcome}].push_back(row.run);
     }
   }
-  if (runs == 0) return "no run to compare\n";
+  const std::string lacking =
+      untold == 0 ? ""
+                  : fmt::format(
+                        "{} run{} that were stopped, crashed, hung or cannot be made, in one "
+                        "engine or both, {} left out\n",
+                        untold, untold == 1 ? "" : "s", untold == 1 ? "is" : "are");
+  if (runs == 0) return "no run to compare\n" + lacking;
   std::string text =
       fmt::format("the same outcome in {} of {} runs ({:.1f} %); stand: {} {}, {} {}\n", same, runs,
                   100.0 * static_cast<double>(same) / static_cast<double>(runs), first.engine,
                   stand_first, second.engine, stand_second);
+  text += lacking;
   for (const auto& [outcomes, which] : differ) {
     const std::vector<int64_t> shown(
         which.begin(),

@@ -8,11 +8,13 @@
 #include <boost/uuid/uuid_io.hpp>
 #include <charconv>
 #include <filesystem>
+#include <set>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/added_fields.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
+#include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
 #include "tools/cli/text_table.h"
@@ -162,18 +164,36 @@ Assignment ParseExpression(const std::string& text) {
   return assign;
 }
 
-/// Shared libraries of this process that are Poise's or a user's, in the order they were loaded.
-std::vector<fs::path> OwnLibraries() {
+/// What runs beside this program's file: shared libraries that are Poise's, a user's or linked by a
+/// user's, in the order they were loaded; and the programs of a user's components. The system's
+/// libraries are told by their versions.
+std::vector<fs::path> OwnFiles() {
   std::vector<fs::path> files;
   dl_iterate_phdr(
       [](dl_phdr_info* info, size_t, void* to) {
         const fs::path file(info->dlpi_name);
+        const std::string text = file.string();
+        const bool system = text.starts_with("/lib") || text.starts_with("/usr/lib");
         const bool own = file.filename().string().starts_with("libpoise") ||
                          file.parent_path().filename() == "modules";
-        if (own) static_cast<std::vector<fs::path>*>(to)->push_back(file);
+        std::error_code error;
+        if (own || (!system && fs::is_regular_file(file, error))) {
+          static_cast<std::vector<fs::path>*>(to)->push_back(file);
+        }
         return 0;
       },
       &files);
+  for (const fs::path& folder : PoisePath()) {
+    if (folder == InstalledPrefix()) continue;
+    for (const char* place : {"lib/poise/components", "lib/poise/bin"}) {
+      std::set<fs::path> programs;
+      std::error_code error;
+      for (const auto& entry : fs::directory_iterator(folder / place, error)) {
+        if (entry.is_regular_file()) programs.insert(entry.path());
+      }
+      files.insert(files.end(), programs.begin(), programs.end());
+    }
+  }
   return files;
 }
 
@@ -410,8 +430,8 @@ RunChanges SweepDefinition::ChangesOf(int64_t run, const std::optional<double>& 
 
 std::string ProgramDigest() {
   std::string all = ReadFile("/proc/self/exe");
-  // Most of the program is in Poise's library; users' components are in modules.
-  for (const fs::path& file : OwnLibraries()) all += Digest(ReadFile(file.string()));
+  // Most of the program is in Poise's library.
+  for (const fs::path& file : OwnFiles()) all += Digest(ReadFile(file.string()));
   return Digest(fmt::format("{} {}", all, fmt::join(LibraryVersions(), " ")));
 }
 

@@ -59,7 +59,9 @@ class SweepDefinition {
   std::string digest_;
 };
 
-/// A digest of this program's file, Poise's library, the modules, and the libraries' versions.
+/// A digest of this program's file, Poise's library, the modules with the libraries they bring, the
+/// programs of POISE_PATH, and the system's libraries' versions. What a program reads besides, such
+/// as a policy's weights, is not part of it.
 std::string ProgramDigest();
 
 }  // namespace poise

@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kFullTurn = 360;
 // What a table has beside the variables.
-constexpr const char* kReserved[] = {"run",   "outcome", "fell_at", "ended_at",
-                                     "phase", "trouble", "reason",  "stands"};
+constexpr const char* kReserved[] = {"run",     "outcome", "fell_at", "ended_at",  "phase",
+                                     "trouble", "reason",  "stands",  "component", "stage"};
 
 bool IsFullTurn(const Variable& v) { return v.angle() && std::abs(v.to() - v.from()) == kFullTurn; }
 
@@ -110,6 +110,9 @@ std::optional<SweepProblem> CheckLimit(const Limit& limit) {
   if (!(limit.max() > limit.min())) return SweepProblem{"limit.max", "must be more than min"};
   if (limit.samples() < 2 || limit.samples() > 10000) {
     return SweepProblem{"limit.samples", fmt::format("is {}; must be 2 to 10000", limit.samples())};
+  }
+  if (limit.has_cap() && !(std::isfinite(limit.cap()) && limit.cap() >= limit.max())) {
+    return SweepProblem{"limit.cap", "must be finite, and max or more"};
   }
   const double range = limit.max() - limit.min();
   if (limit.has_tolerance() && !(limit.tolerance() >= 1e-9 * range && limit.tolerance() <= range)) {

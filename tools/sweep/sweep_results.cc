@@ -47,6 +47,10 @@ SweepHeader ParseHeader(const std::string& text, const std::string& source) {
 void AddRow(const SweepRow& row, const std::string& source, SweepRows* rows) {
   const auto [there, added] = rows->try_emplace({row.run, row.limit.value_or(0)}, row);
   if (added || there->second == row) return;
+  if (!there->second.survived() || !row.survived()) {
+    if (!there->second.survived()) there->second = row;
+    return;
+  }
   throw ConfigError(fmt::format("{}: run {} has other results here than before", source, row.run));
 }
 

@@ -39,7 +39,8 @@ struct SweepResults {
 /// ConfigError naming the line: unreadable, or a run twice with different results.
 std::optional<SweepResults> ReadResults(const std::filesystem::path& folder);
 
-/// Adds `row`; one that is there already must be the same. Throws ConfigError naming `source`.
+/// Adds `row`; one that is there already must be the same, or one of the two does not tell
+/// (SweepRow::survived) and makes room. Throws ConfigError naming `source`.
 void AddRow(const SweepRow& row, const std::string& source, SweepRows* rows);
 
 /// Appends rows. A row is on the disk before Append returns.

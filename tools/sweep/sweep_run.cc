@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/runners/inline_runner.h"
 #include "components/robot/robot_model.h"
+#include "fmt/format.h"
 #include "logging/metrics/events.h"
 #include "logging/metrics/metrics.h"
 #include "logging/metrics/schedule_plan.h"
@@ -46,9 +49,11 @@ bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
                      [](const ComponentInstance& each) { return IsDescribed(TypeOf(each)); });
 }
 
-/// Runs as processes and reads the log.
-logging::RunRecord RecordOfProcesses(const std::string& scenario, const RunChanges& changes,
-                                     const std::string& log_dir, std::string* end_detail) {
+/// Runs as processes and reads the log; empty where not all ticks until the run's end were done:
+/// `row` says why.
+std::optional<logging::RunRecord> RecordOfProcesses(const std::string& scenario,
+                                                    const RunChanges& changes,
+                                                    const std::string& log_dir, SweepRow* row) {
   std::optional<TemporaryDir> temporary;
   if (log_dir.empty()) temporary.emplace("poise-sweep");
   const fs::path folder = temporary ? temporary->path() / "run" : fs::path(log_dir);
@@ -57,19 +62,35 @@ logging::RunRecord RecordOfProcesses(const std::string& scenario, const RunChang
   options.quiet = true;
   options.force = true;
   const RunOutcome outcome = ScenarioRun(scenario, options).RunOnly(folder.string());
-  if (!outcome.completed) *end_detail = outcome.message;
-  return logging::ReadRun(folder / "run.lcm");
+  if (outcome.interrupted) throw std::runtime_error(outcome.message);
+  row->component = outcome.fault.component;
+  row->reason = outcome.fault.what;
+  if (outcome.ticks_done) return logging::ReadRun(folder / "run.lcm");
+  using Kind = RunFault::Kind;
+  row->outcome = outcome.fault.kind == Kind::kCrashed ? kCrashed
+                 : outcome.fault.kind == Kind::kHung  ? kHung
+                                                      : kStopped;
+  return {};
 }
 
 /// Runs to the end and takes the record, from memory or from the log in `log_dir`.
-logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir,
-                          std::string* end_detail) {
+logging::RunRecord Record(const Prepared& prepared, const std::string& log_dir, TaskStatus* status,
+                          SweepRow* row) {
   const std::string text = ScenarioText(prepared.loaded.scenario);
   InlineRunner runner(prepared.spec, Components());
+  std::vector<std::pair<std::string, std::string>> stages;
+  for (const InlineRunner::StageName& name : runner.StageNames()) {
+    stages.emplace_back(name.component, name.stage);
+  }
+  status->SetRun(stages, prepared.spec.tick_period(), prepared.spec.lead_ticks());
+  runner.set_position(status->position());
   const auto run = [&] {
     while (runner.Step()) {
     }
-    *end_detail = runner.end_detail();
+    row->component = runner.end_component();
+    row->reason = runner.end_detail().substr(
+        std::min(runner.end_detail().size(),
+                 row->component.empty() ? 0 : row->component.size() + std::strlen(": ")));
   };
   if (log_dir.empty()) {
     logging::InlineRecord record(prepared.spec, text, &runner);
@@ -120,8 +141,8 @@ void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
 }  // namespace
 
 SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
-                  const std::vector<std::string>& metrics, const std::string& log_dir,
-                  SweepRow row) {
+                  const std::vector<std::string>& metrics, const std::string& log_dir, SweepRow row,
+                  TaskStatus* status) {
   std::optional<Prepared> prepared;
   try {
     LoadedScenario loaded = LoadScenario(scenario, changes);
@@ -138,24 +159,45 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
     return row;
   }
   const Scenario& merged = prepared->loaded.scenario;
-  logging::RunRecord run = NeedsProcesses(prepared->spec, changes)
-                               ? RecordOfProcesses(scenario, changes, log_dir, &row.reason)
-                               : Record(*prepared, log_dir, &row.reason);
+  std::optional<logging::RunRecord> record;
+  if (NeedsProcesses(prepared->spec, changes)) {
+    status->SetWatchedElsewhere();  // by the launcher
+    record = RecordOfProcesses(scenario, changes, log_dir, &row);
+    if (!record) return row;
+  } else {
+    record = Record(*prepared, log_dir, status, &row);
+  }
+  logging::RunRecord& run = *record;
+  status->Step();
   run.first_tick = FirstCheckedTick(merged, run);
   ReadEvents(run, &row);
   const bool whole = run.num_ticks >= run.spec.num_ticks() && row.reason.empty();
   row.outcome = row.fell_at ? kFell : whole ? kStands : kStopped;
+  if (row.fell_at && !row.component.empty()) {  // who tells of the fall
+    row.reason = fmt::format("{}: {}", row.component, row.reason);
+    row.component.clear();
+  }
   row.ended_at = run.time(run.num_ticks);
   row.phase = PhaseAtEnd(run);
   std::vector<const logging::Metric*> measured;
   for (const std::string& name : metrics) measured.push_back(logging::FindMetric(name));
   AddOtherEstimates(measured, &run);
   for (const logging::Metric* metric : measured) {
+    status->Step();
     const logging::Answer value = metric->compute(run);
     if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
   }
+  status->Step();
   row.push = FindPushBound(merged, run);
   return row;
+}
+
+std::string SweepRow::Ending() const {
+  std::string text = outcome;
+  if (!component.empty()) text += " in " + component;
+  if (!stage.empty()) text += ", stage " + stage;
+  if (!component.empty() && ended_at != 0) text += fmt::format(", at {:.3f} s", ended_at);
+  return text + (reason.empty() ? "" : ": " + reason);
 }
 
 std::string SweepRow::RowText(const SweepRow& row) {
@@ -167,14 +209,17 @@ std::string SweepRow::RowText(const SweepRow& row) {
   json["phase"] = row.phase;
   json["trouble"] = row.trouble;
   json["reason"] = row.reason;
+  if (!row.component.empty()) json["component"] = row.component;
+  if (!row.stage.empty()) json["stage"] = row.stage;
   json["metrics"] = row.metrics;
   if (row.push) {
-    json["push"] = {{"impulse", row.push->impulse},
-                    {"mass", row.push->mass},
-                    {"height", row.push->height},
-                    {"distance", row.push->distance},
-                    {"lip_impulse", row.push->lip_impulse},
-                    {"lip_impulse_of_duration", row.push->lip_impulse_of_duration}};
+    json["push"] = {{"impulse", row.push->impulse}, {"mass", row.push->mass}};
+    if (row.push->bounded()) {
+      json["push"]["height"] = row.push->height;
+      json["push"]["distance"] = row.push->distance;
+      json["push"]["lip_impulse"] = row.push->lip_impulse;
+      json["push"]["lip_impulse_of_duration"] = row.push->lip_impulse_of_duration;
+    }
     if (row.push->step_time > 0) {
       json["push"]["reach"] = row.push->reach;
       json["push"]["step_time"] = row.push->step_time;
@@ -196,18 +241,17 @@ SweepRow SweepRow::Parse(const std::string& text) {
   row.phase = json.at("phase").get<std::string>();
   row.trouble = json.at("trouble").get<std::string>();
   row.reason = json.at("reason").get<std::string>();
+  row.component = json.value("component", "");
+  row.stage = json.value("stage", "");
   row.metrics = json.at("metrics").get<std::map<std::string, double>>();
   if (json.contains("push")) {
     const nlohmann::json& push = json["push"];
-    row.push = PushBound{push.at("impulse").get<double>(),
-                         push.at("mass").get<double>(),
-                         push.at("height").get<double>(),
-                         push.at("distance").get<double>(),
-                         push.at("lip_impulse").get<double>(),
-                         push.at("lip_impulse_of_duration").get<double>(),
-                         push.value("reach", 0.0),
-                         push.value("step_time", 0.0),
-                         push.value("step_impulse", 0.0)};
+    row.push =
+        PushBound{push.at("impulse").get<double>(), push.at("mass").get<double>(),
+                  push.value("height", 0.0),        push.value("distance", 0.0),
+                  push.value("lip_impulse", 0.0),   push.value("lip_impulse_of_duration", 0.0),
+                  push.value("reach", 0.0),         push.value("step_time", 0.0),
+                  push.value("step_impulse", 0.0)};
   }
   return row;
 }

@@ -8,6 +8,7 @@
 
 #include "tools/scenario/push_bound.h"
 #include "tools/scenario/scenario_loading.h"
+#include "tools/sweep/sweep_workers.h"
 
 namespace poise {
 
@@ -16,7 +17,8 @@ inline constexpr char kStands[] = "stands";
 inline constexpr char kFell[] = "fell";
 inline constexpr char kStopped[] = "stopped";  ///< ended early, but not by a fall
 inline constexpr char kInvalid[] = "invalid";  ///< its configuration cannot be run
-inline constexpr char kCrashed[] = "crashed";  ///< the program did
+inline constexpr char kCrashed[] = "crashed";  ///< the program did, or was killed
+inline constexpr char kHung[] = "hung";        ///< no tick came any more
 
 /// A finished run: a row of the table without its variables.
 struct SweepRow {
@@ -29,10 +31,19 @@ struct SweepRow {
   /// Names of what went wrong until the end (logging::Events), in order, each once, joined by +.
   std::string trouble;
   std::string reason;  ///< why it ended early
+  /// Of a run that was stopped, crashed or hung: in whose stage; empty: in none, or not known.
+  std::string component, stage;
   std::map<std::string, double> metrics;
   std::optional<PushBound> push;
 
   bool stands() const { return outcome == kStands; }
+  bool fell() const { return outcome == kFell; }
+  /// Whether the robot stood; empty: the run does not tell, and counts for nothing.
+  std::optional<bool> survived() const {
+    return stands() || fell() ? std::optional(stands()) : std::nullopt;
+  }
+  /// "hung in policy, stage walk, at 1.234 s: its stage ...".
+  std::string Ending() const;
   bool operator==(const SweepRow& other) const { return RowText(*this) == RowText(other); }
 
   /// The row as a line of JSON, without its end.
@@ -44,10 +55,10 @@ struct SweepRow {
 /// Runs `scenario` with `changes` in this process, without a log, or with a run's folder in
 /// `log_dir`; as processes, in lockstep, where drives are emulated or a component is a program of
 /// its own (described_components.h): the row is the same. What cannot be run is kInvalid. `row`:
-/// its run and limit are taken from it. Throws what only the machine can be blamed for: memory,
-/// disk.
+/// its run and limit are taken from it; `status` shows where it is. Throws what only the machine
+/// can be blamed for: memory, disk.
 SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
-                  const std::vector<std::string>& metrics, const std::string& log_dir,
-                  SweepRow row);
+                  const std::vector<std::string>& metrics, const std::string& log_dir, SweepRow row,
+                  TaskStatus* status);
 
 }  // namespace poise

@@ -3,15 +3,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <deque>
 #include <filesystem>
 #include <map>
 #include <numeric>
+#include <set>
 #include <stdexcept>
 #include <thread>
 
 #include "components/framework/clock.h"
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/progress.h"
@@ -63,6 +66,19 @@ RunDir MakeSweepDir(const SessionOptions& options, const std::string& kind,
     CheckFolderFree("--out", out, options.force);
   }
   return RunDir(path);
+}
+
+/// Rows and what was made of them: tables of an earlier sweep beside rows of this one would tell of
+/// another.
+void RemoveResults(const fs::path& folder) {
+  std::vector<fs::path> old;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    const bool made = name == kResultsFile || name == "table.csv" || name == "limits.csv" ||
+                      name == "maps.html" || name.starts_with("map_");
+    if (made && entry.is_regular_file()) old.push_back(entry.path());
+  }
+  for (const fs::path& file : old) fs::remove(file);
 }
 
 std::string Duration(double seconds) {
@@ -219,7 +235,7 @@ bool RunLimits(const std::vector<int64_t>& points, SweepSession* session) {
   const auto add = [&](const SweepRow& row) {
     const auto found = std::find_if(searches.begin(), searches.end(),
                                     [&](const PointSearch& each) { return each.run == row.run; });
-    if (found != searches.end()) found->search.Add(*row.limit, row.stands());
+    if (found != searches.end()) found->search.Add(*row.limit, row.survived());
   };
   for (const auto& [key, row] : session->rows()) add(row);
   size_t open = 0;  // first search that is not finished
@@ -257,7 +273,7 @@ SweepSession::SweepSession(const SweepDefinition& definition, const std::string&
       options_(options),
       header_{kind, definition.sweep(), definition.columns(), definition.digest(), ProgramDigest()},
       dir_(MakeSweepDir(options, kind, definition.name())) {
-  if (options_.force && !options_.resume) fs::remove(folder() / kResultsFile);
+  if (options_.force && !options_.resume) RemoveResults(folder());
   std::optional<SweepResults> results = ReadResults(folder());
   if (results) {
     const std::string where = (folder() / kResultsFile).string();
@@ -272,9 +288,13 @@ SweepSession::SweepSession(const SweepDefinition& definition, const std::string&
       throw ConfigError(fmt::format("{}: {}; choose another folder with --out", where, problem));
     }
     rows_ = results->rows;
+    // What did not tell is tried again; what cannot be run stays so.
+    std::erase_if(rows_, [](const auto& row) {
+      return !row.second.survived() && row.second.outcome != kInvalid;
+    });
     found_ = rows_.size();
   }
-  writer_.emplace(folder(), header_, results);
+  on_disk_ = std::move(results);
 }
 
 std::string SweepSession::RoomForLogs(double runs) const {
@@ -292,14 +312,16 @@ std::string SweepSession::RoomForLogs(double runs) const {
   return CheckSpace(folder(), sizes, options_.force);
 }
 
-SweepRow SweepSession::RowOf(const Request& request, const std::string& answer,
-                             const std::string& crash) {
-  if (crash.empty()) return SweepRow::Parse(answer);
+SweepRow SweepSession::RowOf(const Request& request, const ForkedTasks::Result& result) {
+  if (result.answer) return SweepRow::Parse(*result.answer);
   SweepRow row;
   row.run = request.run;
   row.limit = request.limit;
-  row.outcome = kCrashed;
-  row.reason = crash;
+  row.outcome = result.hung ? kHung : kCrashed;
+  row.component = result.place.component;
+  row.stage = result.place.stage;
+  row.ended_at = result.place.time;
+  row.reason = result.problem;
   return row;
 }
 
@@ -310,6 +332,8 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
   StatusLine status(options_.quiet);
   ForkedTasks tasks(options_.jobs);
   std::map<int64_t, Request> requests;
+  std::deque<Request> again;  // once more
+  std::set<int64_t> second;   // ids of those that are made once more
   int64_t id = 0;
   bool exhausted = false;
   std::string failure;
@@ -320,13 +344,21 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
     const std::string room = RoomForLogs(first.total - first.done);
     if (!room.empty() && !options_.quiet) fmt::print("{}\n", room);
   }
+  if (!writer_) writer_.emplace(folder(), header_, on_disk_);
   while (StopSignal() == 0) {
     while (!tasks.full() && failure.empty()) {
-      const std::optional<Request> request = next();
-      exhausted = !request;
-      if (!request) break;
+      std::optional<Request> request;
+      if (again.empty()) {
+        request = next();
+        exhausted = !request;
+        if (!request) break;
+      } else {
+        request = again.front();
+        again.pop_front();
+        second.insert(id);
+      }
       requests[id] = *request;
-      tasks.Start(id++, [this, request] {
+      tasks.Start(id++, [this, request](TaskStatus* shown) {
         std::string logs;
         if (options_.logs) {
           logs = (folder() / "logs" / std::to_string(request->run)).string();
@@ -336,22 +368,32 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
         row.run = request->run;
         row.limit = request->limit;
         row = RunPoint(definition_.scenario(), definition_.ChangesOf(request->run, request->limit),
-                       definition_.columns(), logs, std::move(row));
+                       definition_.columns(), logs, std::move(row), shown);
         return SweepRow::RowText(row);
       });
     }
-    if (tasks.running() == 0 && (exhausted || !failure.empty())) break;
+    if (tasks.running() == 0 && ((exhausted && again.empty()) || !failure.empty())) break;
     for (const ForkedTasks::Result& result : tasks.Wait(kPoll)) {
       const Request& request = requests.at(result.id);
-      if (!result.answer && !result.crashed) {
+      if (!result.answer && !result.crashed && !result.hung) {
         failure = fmt::format("run {}: {}", request.run, result.problem);
         continue;
       }
-      const SweepRow row = RowOf(request, result.answer.value_or(""), result.problem);
+      const SweepRow row = RowOf(request, result);
+      if (!row.survived() && row.outcome != kInvalid && !second.contains(result.id)) {
+        again.push_back(request);
+        status.Clear();
+        fmt::print(stderr, "poise: run {}{}: {}; it is made once more\n", row.run,
+                   row.limit ? fmt::format(" at {}", *row.limit) : "",
+                   logging::LinesForTerminal(row.Ending()));
+        requests.erase(result.id);
+        continue;
+      }
       writer_->Append(row);
       AddRow(row, kResultsFile, &rows_);
       done(row);
       requests.erase(result.id);
+      second.erase(result.id);
     }
     const double wall = static_cast<double>(NowNanoseconds() - start) * 1e-9;
     if (status.Due(wall)) {

@@ -11,6 +11,7 @@
 #include "tools/run/run_dir.h"
 #include "tools/sweep/sweep_definition.h"
 #include "tools/sweep/sweep_results.h"
+#include "tools/sweep/sweep_workers.h"
 
 namespace CLI {
 class App;
@@ -58,8 +59,9 @@ class SweepSession {
                const SessionOptions& options);
 
   /// Runs what `next` gives until it gives nothing and nothing runs; `done` gets each row when it
-  /// is on the disk. False when a signal ended it. Throws std::runtime_error when a run could not
-  /// be made for want of memory or disk.
+  /// is on the disk. A run that was stopped, crashed or hung is made once more. False when a signal
+  /// ended it. Throws std::runtime_error when a run could not be made for want of memory or disk,
+  /// ConfigError where the disk cannot hold the logs.
   bool Run(const std::function<std::optional<Request>()>& next,
            const std::function<void(const SweepRow&)>& done,
            const std::function<Progress()>& progress);
@@ -74,7 +76,8 @@ class SweepSession {
   /// What to say of the room that `runs` logs take, from the first point's; empty: little. Throws
   /// ConfigError where the disk cannot hold them, unless --force.
   std::string RoomForLogs(double runs) const;
-  SweepRow RowOf(const Request& request, const std::string& answer, const std::string& crash);
+  /// Of a process that has ended: its answer, or that it crashed or hung.
+  static SweepRow RowOf(const Request& request, const ForkedTasks::Result& result);
 
   const SweepDefinition& definition_;
   SessionOptions options_;
@@ -82,7 +85,8 @@ class SweepSession {
   RunDir dir_;
   SweepRows rows_;
   size_t found_ = 0;
-  std::optional<SweepResultsWriter> writer_;
+  std::optional<SweepResults> on_disk_;
+  std::optional<SweepResultsWriter> writer_;  // from the first Run on
 };
 
 /// Points `first` to `end` - 1.

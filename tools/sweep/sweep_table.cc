@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "fmt/format.h"
+#include "logging/printable.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {
@@ -48,7 +49,8 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   const bool limit = header.sweep.has_limit();
   std::vector<std::string> names = PlaceNames(header.sweep);
   if (limit) names.push_back(NameOf(header.sweep.limit()));
-  for (const char* name : {"outcome", "fell_at", "ended_at", "phase", "trouble", "reason"}) {
+  for (const char* name :
+       {"outcome", "fell_at", "ended_at", "phase", "trouble", "reason", "component", "stage"}) {
     names.emplace_back(name);
   }
   names.insert(names.end(), header.columns.begin(), header.columns.end());
@@ -57,7 +59,7 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
     std::vector<std::string> cells = Place(points, row.run);
     if (limit) cells.push_back(Cell(row.limit));
     cells.insert(cells.end(), {row.outcome, Cell(row.fell_at), fmt::format("{}", row.ended_at),
-                               row.phase, row.trouble, row.reason});
+                               row.phase, row.trouble, row.reason, row.component, row.stage});
     for (const std::string& name : header.columns) {
       const auto metric = row.metrics.find(name);
       cells.push_back(metric == row.metrics.end() ? "" : fmt::format("{}", metric->second));
@@ -72,8 +74,10 @@ std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& 
   for (const auto& [key, row] : rows) {
     if (points.empty() || points.back().run != row.run) {
       points.push_back({row.run, LimitSearch(header.sweep.limit())});
+      points.back().any = &row;
     }
-    points.back().search.Add(*row.limit, row.stands());
+    points.back().search.Add(*row.limit, row.survived());
+    points.back().untold += row.survived() ? 0 : 1;
   }
   for (LimitPoint& point : points) {
     const auto row_at = [&](const std::optional<double>& value) {
@@ -82,7 +86,9 @@ std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& 
     point.at_limit = row_at(point.search.limit());
     point.at_fall = row_at(point.search.fails_at());
     point.at_largest = row_at(point.search.largest_survived());
-    point.any = point.at_limit != nullptr ? point.at_limit : point.at_fall;
+    for (const SweepRow* const row : {point.at_fall, point.at_limit}) {
+      if (row != nullptr) point.any = row;
+    }
   }
   return points;
 }
@@ -95,6 +101,7 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
                            "largest_survived",
                            "monotone",
                            "runs",
+                           "untold",
                            "impulse",
                            "largest_survived_impulse",
                            "mass",
@@ -118,9 +125,10 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
     std::vector<std::string> cells = Place(points, point.run);
     cells.insert(cells.end(),
                  {Cell(point.search.limit()), Cell(point.search.fails_at()),
-                  Cell(point.search.largest_survived()), point.search.monotone() ? "true" : "false",
-                  Cell(std::optional(point.search.tried()))});
-    const std::optional<PushBound> bound = point.any->push;
+                  Cell(point.search.largest_survived()), Cell(point.search.monotone()),
+                  Cell(std::optional(point.search.tried())), fmt::format("{}", point.untold)});
+    const std::optional<PushBound> push = point.any->push;
+    const std::optional<PushBound> bound = push && push->bounded() ? push : std::nullopt;
     const auto impulse = [](const SweepRow* row) {
       return row != nullptr && row->push ? std::optional(row->push->impulse) : std::nullopt;
     };
@@ -134,7 +142,7 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
       of_bound(field);
       cells.push_back(bound && at_limit ? Share(*at_limit, (*bound).*field) : "");
     };
-    of_bound(&PushBound::mass);
+    cells.push_back(push ? fmt::format("{}", push->mass) : "");
     of_bound(&PushBound::height);
     of_bound(&PushBound::distance);
     share(&PushBound::lip_impulse);
@@ -211,7 +219,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     if (row.outcome == kFell) ++ways[{row.phase, row.trouble}];
   }
   std::string text = fmt::format("{} runs", rows.size());
-  for (const char* outcome : {kStands, kFell, kStopped, kInvalid, kCrashed}) {
+  for (const char* outcome : {kStands, kFell, kStopped, kInvalid, kCrashed, kHung}) {
     if (outcomes[outcome] == 0) continue;
     text += fmt::format(", {} {} ({:.1f} %)", outcome, outcomes[outcome],
                         100.0 * outcomes[outcome] / static_cast<double>(rows.size()));
@@ -221,6 +229,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     return std::ranges::find(header.columns, column) != header.columns.end();
   };
   if (has("step_needed_time") && has("step_warning_time")) text += FormatWarnings(rows);
+  text += FormatUntold(header, rows);
   if (ways.empty()) return text;
   std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
   std::stable_sort(sorted.begin(), sorted.end(),
@@ -239,12 +248,16 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
   const std::string unit = limit.has_unit() ? fmt::format(" [{}]", limit.unit()) : "";
   heading.push_back(NameOf(limit) + unit);
   const std::vector<LimitPoint> found = LimitPoints(header, rows);
-  const bool again =
-      std::ranges::any_of(found, [](const LimitPoint& point) { return !point.search.monotone(); });
+  const bool again = std::ranges::any_of(
+      found, [](const LimitPoint& point) { return point.search.survived_again(); });
   if (again) heading.emplace_back("survived again");
   const bool push = std::any_of(found.begin(), found.end(),
                                 [](const LimitPoint& p) { return p.any->push.has_value(); });
-  if (push) heading.insert(heading.end(), {"N·s", "of pendulum", "for the duration"});
+  const bool bounded = std::ranges::any_of(found, [](const LimitPoint& p) {
+    return p.at_limit != nullptr && p.at_limit->push && p.at_limit->push->bounded();
+  });
+  if (push) heading.emplace_back("N·s");
+  if (bounded) heading.insert(heading.end(), {"of pendulum", "for the duration"});
   const bool step = std::any_of(found.begin(), found.end(), [](const LimitPoint& p) {
     return p.at_limit != nullptr && p.at_limit->push && p.at_limit->push->step_time > 0;
   });
@@ -254,25 +267,63 @@ std::string FormatLimits(const SweepHeader& header, const SweepRows& rows) {
     std::vector<std::string> cells = Place(points, point.run);
     const LimitSearch& search = point.search;
     const auto number = [](const std::optional<double>& value) {
-      return value ? FormatNumber(*value) : "none";
+      return value ? FormatNumber(*value) : "–";
     };
-    cells.push_back(
-        fmt::format("{}{}", search.fails_at() ? "" : "at least ", number(search.limit())));
-    if (again) cells.push_back(search.monotone() ? "" : number(search.largest_survived()));
-    if (push) {
-      const bool known = point.at_limit != nullptr && point.at_limit->push;
-      const PushBound bound = known ? *point.at_limit->push : PushBound();
-      const auto percent = [&](double of) {
-        return known ? fmt::format("{:.1f} %", 100 * bound.impulse / of) : "";
-      };
-      cells.push_back(known ? FormatNumber(bound.impulse) : "");
-      cells.push_back(percent(bound.lip_impulse));
-      cells.push_back(percent(bound.lip_impulse_of_duration));
-      if (step) cells.push_back(bound.step_time > 0 ? percent(bound.step_impulse) : "no step");
+    cells.push_back(!search.known()     ? "not known"
+                    : !search.limit()   ? fmt::format("below {}", number(search.fails_at()))
+                    : search.fails_at() ? number(search.limit())
+                                        : "at least " + number(search.limit()));
+    if (again) {
+      cells.push_back(search.survived_again() ? number(search.largest_survived()) : "");
+    }
+    const std::optional<PushBound> pushed =
+        point.at_limit != nullptr ? point.at_limit->push : std::nullopt;
+    const auto percent = [&](bool known, double PushBound::*of) {
+      return known ? fmt::format("{:.1f} %", 100 * pushed->impulse / (*pushed).*of) : "–";
+    };
+    if (push) cells.push_back(pushed ? FormatNumber(pushed->impulse) : "–");
+    if (bounded) {
+      const bool known = pushed && pushed->bounded();
+      cells.push_back(percent(known, &PushBound::lip_impulse));
+      cells.push_back(percent(known, &PushBound::lip_impulse_of_duration));
+    }
+    if (step) {
+      const bool stepped = pushed && pushed->step_time > 0;
+      cells.push_back(stepped ? percent(true, &PushBound::step_impulse) : pushed ? "no step" : "–");
     }
     table.emplace_back(cells.begin(), cells.end());
   }
   return FormatColumns(table);
+}
+
+std::string PlaceText(const SweepPoints& points, const SweepRow& row) {
+  std::string text;
+  const auto add = [&](const std::string& name, const std::string& value) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, value);
+  };
+  const std::vector<SweepValue> values = points.At(row.run);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const Variable& variable = points.sweep().vary(static_cast<int>(i));
+    add(NameOf(variable), points.Text(i, values[i]) + (variable.angle() ? "°" : ""));
+  }
+  if (row.limit) add(NameOf(points.sweep().limit()), fmt::format("{}", *row.limit));
+  return text;
+}
+
+std::string FormatUntold(const SweepHeader& header, const SweepRows& rows) {
+  constexpr int kMost = 20;
+  const SweepPoints points(header.sweep);
+  std::string text;
+  int count = 0;
+  for (const auto& [key, row] : rows) {
+    if (row.survived() || ++count > kMost) continue;
+    text += fmt::format("  run {}, {}: {}\n", row.run, PlaceText(points, row),
+                        logging::LinesForTerminal(row.Ending()));
+  }
+  if (count == 0) return "";
+  if (count > kMost) text += fmt::format("  and {} more\n", count - kMost);
+  return fmt::format("{} run{} not tell whether the robot stood, and count{} for nothing:\n{}",
+                     count, count == 1 ? " does" : "s do", count == 1 ? "s" : "", text);
 }
 
 }  // namespace poise

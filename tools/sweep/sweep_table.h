@@ -12,7 +12,7 @@
 namespace poise {
 
 /// A row a run, in their order: run, the variables, outcome, fell_at, ended_at, phase, trouble,
-/// reason, the metrics. The same rows give the same bytes.
+/// reason, component, stage, the metrics. The same rows give the same bytes.
 std::string SweepCsv(const SweepHeader& header, const SweepRows& rows);
 
 /// A point of the grid, for which a limit is sought.
@@ -23,13 +23,15 @@ struct LimitPoint {
   const SweepRow* at_fall = nullptr;   ///< of the run at fails_at
   const SweepRow* at_largest = nullptr;
   const SweepRow* any = nullptr;  ///< of some run
+  int untold = 0;                 ///< runs that do not tell whether the robot stood
 };
 /// Of those points that have rows. Pointers are into `rows`.
 std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& rows);
 
 /// A row a point. After the variables: the limit under its name, fails_at, largest_survived,
-/// monotone, runs; of a push, also its impulse and the pendulum's bounds (push_bound.h) with the
-/// shares reached; the phase, trouble and reason of the run at fails_at.
+/// monotone, runs, and how many of these do not tell; of a push, also its impulse and the
+/// pendulum's bounds (push_bound.h) with the shares reached; the phase, trouble and reason of the
+/// run at fails_at.
 std::string LimitCsv(const SweepHeader& header, const SweepRows& rows);
 
 /// How many of which outcome, and the fallen ones by phase and trouble. Where step_needed_time and
@@ -39,5 +41,13 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows);
 
 /// The limits in aligned columns.
 std::string FormatLimits(const SweepHeader& header, const SweepRows& rows);
+
+/// "direction 90, force 120": the variables of a run, and at which value of the quantity whose
+/// limit is sought.
+std::string PlaceText(const SweepPoints& points, const SweepRow& row);
+
+/// The runs that do not tell whether the robot stood, a line each with what is known of their end;
+/// empty: there are none.
+std::string FormatUntold(const SweepHeader& header, const SweepRows& rows);
 
 }  // namespace poise

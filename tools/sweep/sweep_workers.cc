@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,14 +12,19 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <new>
 #include <system_error>
 
+#include "components/framework/clock.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 
 namespace poise {
 namespace {
 
 constexpr int kThrew = 3;  // exit code of a task whose work threw
+// Outside the ticks one step may be long: a robot's file is read, a figure of a long run made.
+constexpr int64_t kStepPatience = 15 * kStallPatience;
 
 bool WriteAll(int fd, const std::string& text) {
   size_t written = 0;
@@ -31,7 +37,8 @@ bool WriteAll(int fd, const std::string& text) {
   return true;
 }
 
-[[noreturn]] void Work(const std::function<std::string()>& work, int pipe, pid_t parent) {
+[[noreturn]] void Work(const std::function<std::string(TaskStatus*)>& work, TaskStatus* status,
+                       int pipe, pid_t parent) {
   setpgid(0, 0);  // Ctrl-C is the parent's
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kThrew);
@@ -39,7 +46,7 @@ bool WriteAll(int fd, const std::string& text) {
   std::string text;
   int code = 0;
   try {
-    text = work();
+    text = work(status);
   } catch (const std::exception& error) {
     text = error.what();
     code = kThrew;
@@ -49,30 +56,80 @@ bool WriteAll(int fd, const std::string& text) {
 
 }  // namespace
 
+void TaskStatus::SetRun(const std::vector<std::pair<std::string, std::string>>& stages,
+                        double period, int64_t lead) {
+  size_t at = 0;
+  for (const auto& [component, stage] : stages) {
+    if (at + component.size() + stage.size() + 4 > kRoom) break;
+    for (const std::string& name : {component, stage}) {
+      std::memcpy(names_ + at, name.c_str(), name.size() + 1);
+      at += name.size() + 1;
+    }
+  }
+  lead_.store(lead);
+  period_.store(period);
+}
+
+RunPlace TaskStatus::Place() const {
+  const int64_t tick = position_.tick.load();
+  RunPlace place;
+  if (tick >= 0) place.time = MakeTick(tick, period_.load(), lead_.load()).time;
+  const char* name = names_;
+  for (int32_t i = position_.stage.load(); i >= 0 && *name != '\0'; --i) {
+    place.component = name;
+    name += place.component.size() + 1;
+    place.stage = name;
+    name += place.stage.size() + 1;
+  }
+  return place;
+}
+
+int64_t TaskStatus::Hangs(StallWatch* watch, int64_t now) const {
+  const int32_t stage = position_.stage.load(std::memory_order_relaxed);
+  const int64_t tick = position_.tick.load(std::memory_order_relaxed);
+  constexpr int64_t kMostStages = 1 << 10;
+  const int64_t stood = watch->Stood((tick + steps_.load()) * kMostStages + stage, now);
+  const int64_t patience = stage == RunPosition::kNoStage ? kStepPatience : kStallPatience;
+  return stood > patience && !elsewhere_.load() ? stood : 0;
+}
+
 ForkedTasks::~ForkedTasks() {
   for (const Task& task : tasks_) kill(task.pid, SIGKILL);
   for (Task& task : tasks_) Finish(&task);
 }
 
-void ForkedTasks::Start(int64_t id, const std::function<std::string()>& work) {
+void ForkedTasks::Start(int64_t id, const std::function<std::string(TaskStatus*)>& work) {
+  void* const shared =
+      mmap(nullptr, sizeof(TaskStatus), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) {
+    throw std::system_error(errno, std::generic_category(), "memory of a run");
+  }
+  Task task;
+  task.id = id;
+  task.status = new (shared) TaskStatus;
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) {
-    throw std::system_error(errno, std::generic_category(), "pipe of a run");
+    const int error = errno;
+    munmap(shared, sizeof(TaskStatus));
+    throw std::system_error(error, std::generic_category(), "pipe of a run");
   }
   std::fflush(nullptr);  // else the child would hold a copy
   const pid_t parent = getpid();
   const pid_t pid = fork();
   if (pid == 0) {
     close(ends[0]);
-    Work(work, ends[1], parent);
+    Work(work, task.status, ends[1], parent);
   }
   const int error = errno;
   close(ends[1]);
   if (pid < 0) {
     close(ends[0]);
+    munmap(shared, sizeof(TaskStatus));
     throw std::system_error(error, std::generic_category(), "process of a run");
   }
-  tasks_.push_back({id, pid, ends[0], ""});
+  task.pid = pid;
+  task.pipe = ends[0];
+  tasks_.push_back(std::move(task));
 }
 
 ForkedTasks::Result ForkedTasks::Finish(Task* task) {
@@ -86,12 +143,13 @@ ForkedTasks::Result ForkedTasks::Finish(Task* task) {
     result.answer = std::move(task->text);
   } else if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
-    constexpr int kOwn[] = {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL};
-    result.crashed = std::find(std::begin(kOwn), std::end(kOwn), signal) != std::end(kOwn);
+    result.crashed = true;
+    result.place = task->status->Place();
     result.problem = fmt::format("ended by signal {} ({})", signal, sigdescr_np(signal));
   } else {
     result.problem = task->text.empty() ? "ended without an answer" : std::move(task->text);
   }
+  munmap(task->status, sizeof(TaskStatus));
   return result;
 }
 
@@ -99,9 +157,26 @@ std::vector<ForkedTasks::Result> ForkedTasks::Wait(int milliseconds) {
   std::vector<pollfd> polls;
   for (const Task& task : tasks_) polls.push_back({task.pipe, POLLIN, 0});
   std::vector<Result> results;
-  if (poll(polls.data(), polls.size(), milliseconds) <= 0) return results;
+  const int ready = poll(polls.data(), polls.size(), milliseconds);
+  const int64_t now = NowNanoseconds();
   for (size_t i = polls.size(); i-- > 0;) {
-    if (polls[i].revents == 0) continue;
+    if (ready <= 0 || polls[i].revents == 0) {
+      Task& task = tasks_[i];
+      const int64_t stood = task.status->Hangs(&task.watch, now);
+      if (stood == 0) continue;
+      kill(task.pid, SIGKILL);
+      Result result = Finish(&task);
+      result.hung = true;
+      result.crashed = false;
+      result.answer.reset();
+      const bool in_stage = !result.place.stage.empty();
+      result.problem = fmt::format(
+          "{} for {} s", in_stage ? "its stage has not returned" : "the program has not gone on",
+          (in_stage ? kStallPatience : kStepPatience) / 1'000'000'000);
+      results.push_back(std::move(result));
+      tasks_.erase(tasks_.begin() + static_cast<std::ptrdiff_t>(i));
+      continue;
+    }
     char buffer[65536];
     const ssize_t count = read(tasks_[i].pipe, buffer, sizeof buffer);
     if (count > 0) {

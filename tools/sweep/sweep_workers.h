@@ -3,13 +3,51 @@
 
 #include <sys/types.h>
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "components/framework/runners/run_position.h"
+#include "tools/run/stall_watch.h"
+
 namespace poise {
+
+/// Where a run was when it ended before its time.
+struct RunPlace {
+  std::string component, stage;  ///< empty: in none
+  double time = 0;               ///< s, of the scenario
+};
+
+/// What a task shows its owner while it works, in memory that they share.
+class TaskStatus {
+ public:
+  /// Its owner waits without an end: whoever works for the task watches itself.
+  void SetWatchedElsewhere() { elsewhere_.store(true); }
+  /// Stages by their index in `position`, as many as there is room for; period in s, lead in ticks.
+  void SetRun(const std::vector<std::pair<std::string, std::string>>& stages, double period,
+              int64_t lead);
+  /// That it goes on, where no ticks tell.
+  void Step() { steps_.fetch_add(1); }
+  RunPosition* position() { return &position_; }
+
+  RunPlace Place() const;
+  /// ns, for how long it has stood still, if that is longer than it may; else 0. `now`: ns.
+  int64_t Hangs(StallWatch* watch, int64_t now) const;
+
+ private:
+  static constexpr size_t kRoom = 16384;  // bytes
+
+  RunPosition position_;
+  std::atomic<bool> elsewhere_{false};
+  std::atomic<int64_t> steps_{0};
+  std::atomic<double> period_{0};
+  std::atomic<int64_t> lead_{0};
+  char names_[kRoom] = {};  // component, stage, component, ..., each ended by a zero
+};
 
 /// Each task starts from this process's state as it is and leaves nothing behind, so that it gives
 /// the same answer whatever ran before it, and its crash is its own. This process must have one
@@ -20,7 +58,9 @@ class ForkedTasks {
     int64_t id = 0;
     std::optional<std::string> answer;
     std::string problem;   ///< without an answer: how the process ended, and its last words
-    bool crashed = false;  ///< it ended by a signal that programs send themselves, e.g. SIGSEGV
+    bool crashed = false;  ///< a signal ended it
+    bool hung = false;     ///< it stood still and was ended
+    RunPlace place;        ///< where it was, of one that crashed or hung
   };
 
   explicit ForkedTasks(int at_once) : at_once_(at_once) {}
@@ -32,8 +72,9 @@ class ForkedTasks {
   bool full() const { return running() >= at_once_; }
   /// `work` gives the answer; what it throws is its problem. Precondition: not full(). Throws
   /// std::system_error.
-  void Start(int64_t id, const std::function<std::string()>& work);
-  /// Those that have ended, after waiting at most `milliseconds` for the first one.
+  void Start(int64_t id, const std::function<std::string(TaskStatus*)>& work);
+  /// Those that have ended, or hang and are ended now, after waiting at most `milliseconds` for the
+  /// first one.
   std::vector<Result> Wait(int milliseconds);
 
  private:
@@ -42,6 +83,8 @@ class ForkedTasks {
     pid_t pid = -1;
     int pipe = -1;
     std::string text;
+    TaskStatus* status = nullptr;  // shared memory
+    StallWatch watch;
   };
   static Result Finish(Task* task);
 

@@ -123,7 +123,9 @@ bool InlineRunner::RunStage(BoundStage& bound, const Tick& tick) {
     input.port->Bind(message);
   }
   for (OutputPort* output : bound.stage->outputs) output->Stamp(run_id_, tick.index, tick.utime);
+  position_->stage.store(static_cast<int32_t>(&bound - stages_.data()), std::memory_order_relaxed);
   bound.stage->run(tick);
+  position_->stage.store(RunPosition::kNoStage, std::memory_order_relaxed);
   // Outside its stage an input shows nothing, as in a graph of processes.
   for (const BoundStage::BoundInput& input : bound.inputs) input.port->Bind(nullptr);
   latency_[static_cast<size_t>(bound.component)].Add(NowNanoseconds() - start);
@@ -132,26 +134,39 @@ bool InlineRunner::RunStage(BoundStage& bound, const Tick& tick) {
   for (size_t o = 0; o < bound.stage->outputs.size(); ++o) {
     const OutputPort& output = *bound.stage->outputs[o];
     if (!output.Finite()) {
-      ended_ = failed_ = true;
-      end_detail_ = fmt::format("{}: output {} is not finite at tick {}", configured.name,
-                                output.name(), tick.index);
+      Stop(configured, true,
+           fmt::format("output {} is not finite at tick {}", output.name(), tick.index));
       return false;
     }
     if (tap_) tap_(bound.output_channels[o], output, tick);
   }
   const std::string_view finished = configured.component->finished();
   if (!finished.empty() && !ended_) {
-    ended_ = true;
-    failed_ = configured.component->failed();
-    end_detail_ = fmt::format("{}: {}", configured.name, finished);
+    Stop(configured, configured.component->failed(), std::string(finished));
   }
   return true;
+}
+
+void InlineRunner::Stop(const ConfiguredComponent& component, bool failed, const std::string& why) {
+  ended_ = true;
+  failed_ = failed;
+  end_component_ = component.name;
+  end_detail_ = fmt::format("{}: {}", component.name, why);
+}
+
+std::vector<InlineRunner::StageName> InlineRunner::StageNames() {
+  std::vector<StageName> names;
+  for (const BoundStage& stage : stages_) {
+    names.push_back({graph_.component(stage.component).name, stage.stage->name});
+  }
+  return names;
 }
 
 bool InlineRunner::Step() {
   if (ended_) return false;
   const int64_t start = NowNanoseconds();
   const Tick tick = MakeTick(next_tick_, period_, lead_);
+  position_->tick.store(tick.index, std::memory_order_relaxed);
   for (BoundStage& stage : stages_) {
     if (!RunStage(stage, tick)) return false;
   }

@@ -13,6 +13,7 @@
 #include "components/framework/graph.h"
 #include "components/framework/operator_acts.h"
 #include "components/framework/runners/latency_histogram.h"
+#include "components/framework/runners/run_position.h"
 
 namespace poise {
 
@@ -34,6 +35,14 @@ class InlineRunner {
   using ExternalTap = std::function<void(int channel, std::span<const uint8_t> data)>;
   void set_external_tap(ExternalTap tap) { external_tap_ = std::move(tap); }
 
+  /// Keeps `position`, which must outlive the last Step, at the stage that runs.
+  void set_position(RunPosition* position) { position_ = position; }
+  struct StageName {
+    std::string component, stage;
+  };
+  /// In the order in which they run.
+  std::vector<StageName> StageNames();
+
   /// Runs one tick, all stages. False when the run has ended (before or in this tick).
   bool Step();
   /// Runs up to `ticks` ticks; ends early when the run ends or `*stop` becomes true. Returns the
@@ -49,6 +58,8 @@ class InlineRunner {
   bool ended() const { return ended_; }
   bool failed() const { return failed_; }
   const std::string& end_detail() const { return end_detail_; }
+  /// Name of the component that has ended the run; empty: none has.
+  const std::string& end_component() const { return end_component_; }
 
   const GraphPlan& plan() const { return graph_.plan(); }
   BoundGraph& graph() { return graph_; }
@@ -64,6 +75,7 @@ class InlineRunner {
 
   /// False when an output is not finite: the tick ends there.
   bool RunStage(BoundStage& stage, const Tick& tick);
+  void Stop(const ConfiguredComponent& component, bool failed, const std::string& why);
   void TakeAnswers();
 
   int64_t run_id_ = 0;
@@ -73,6 +85,8 @@ class InlineRunner {
   BoundGraph graph_;
   Tap tap_;
   ExternalTap external_tap_;
+  RunPosition own_position_;
+  RunPosition* position_ = &own_position_;
   std::vector<ActInput*> acts_;
   int answer_channel_ = -1;  // -1: the graph has none
   std::vector<uint8_t> answer_bytes_;
@@ -84,7 +98,7 @@ class InlineRunner {
   int64_t next_tick_ = 0;
   bool ended_ = false;
   bool failed_ = false;
-  std::string end_detail_;
+  std::string end_detail_, end_component_;
 };
 
 }  // namespace poise

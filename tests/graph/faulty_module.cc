@@ -1,0 +1,62 @@
+// A module whose component fails on purpose. POISE_TEST_FAULT says how and when:
+//   hang:TICK    its stage loops for ever
+//   crash:TICK   SIGSEGV
+//   slip:SPEED   SIGSEGV as soon as the base moves faster, m/s
+// With POISE_TEST_FAULT_ONCE only where that file is not there yet; the fault makes it.
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+#include "components/framework/component_type.h"
+#include "components/framework/module_entry.h"
+#include "components/messages/robot_resource.h"
+#include "poise/message_traits.hpp"
+#include "poise/robot_state_t.hpp"
+
+namespace {
+
+class Faulty : public poise::Component {
+ public:
+  void Configure(const poise::ComponentContext& context, poise::Wiring* wiring) override {
+    const auto model = poise::LoadRobot(context);
+    const char* const fault = std::getenv("POISE_TEST_FAULT");
+    if (fault != nullptr) std::sscanf(fault, "%7[a-z]:%lf", kind_, &at_);
+    wiring->AddInput(&robot_state_, "robot_state", poise::JointAndFootCounts(*model));
+    wiring->AddStage("watch", {&robot_state_}, {},
+                     [this](const poise::Tick& tick) { Watch(tick.index); });
+  }
+
+ private:
+  void Watch(int64_t tick) {
+    const std::string_view kind = kind_;
+    const double* const v = robot_state_->base_linear_velocity;
+    const bool slips = kind == "slip" && std::hypot(v[0], v[1]) > at_;
+    const bool due = slips || (kind != "slip" && static_cast<double>(tick) == at_);
+    if (!due || kind.empty()) return;
+    if (const char* const once = std::getenv("POISE_TEST_FAULT_ONCE"); once != nullptr) {
+      if (access(once, F_OK) == 0) return;
+      std::fclose(std::fopen(once, "w"));
+    }
+    if (kind != "hang") std::raise(SIGSEGV);
+    for (std::atomic<bool> go{true}; go.load();) continue;
+  }
+
+  poise::Input<poise::robot_state_t> robot_state_;
+  char kind_[8] = {};
+  double at_ = -1;
+};
+
+}  // namespace
+
+POISE_MODULE {
+  poise::AddComponent({"faulty",
+                       "fails on purpose",
+                       [] { return std::make_unique<Faulty>(); },
+                       {},
+                       {poise::Reads<poise::robot_state_t>("robot_state")}});
+}

@@ -1,0 +1,152 @@
+// Runs that crash, hang or are killed: they are made once more, named in every result, and count
+// for nothing.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "tests/graph/poise_program.h"
+
+namespace poise {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class SweepFaultTest : public testing::Test {
+ protected:
+  SweepFaultTest() {
+    setenv("POISE_PATH", FAULTY_MODULE, 1);
+    std::ofstream(Out("faulty.pbtxt"))
+        << "# proto-file: components/framework/graph.proto\n# proto-message: poise.Graph\n"
+           "base: \"balance\" name: \"faulty\"\n"
+           "component { name: \"faulty\" input { port: \"robot_state\" channel: \"ROBOT_STATE\" } "
+           "}\n";
+    deploy_.Scenario("faulty", "base: \"base/stand\" name: \"faulty\" duration: 0.3 graph: \"" +
+                                   Out("faulty.pbtxt") + "\"\ncheck { metric: \"push_peak\" }\n");
+  }
+  ~SweepFaultTest() override {
+    for (const char* name : {"POISE_PATH", "POISE_TEST_FAULT", "POISE_TEST_FAULT_ONCE"}) {
+      unsetenv(name);
+    }
+  }
+  std::string Out(const std::string& name) const { return deploy_ / name; }
+  static std::string Read(const std::string& folder, const char* file) {
+    return ReadAll(fs::path(folder) / file);
+  }
+
+  TestDeploy deploy_;
+};
+
+TEST_F(SweepFaultTest, ACrashIsNamedInEveryResult) {
+  setenv("POISE_TEST_FAULT", "crash:100", 1);
+  const std::string out = Out("out");
+  const ProgramResult result =
+      RunPoise({"sweep", "faulty", "--vary", "sim.push[0].peak=20,40", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("it is made once more"));
+  const std::vector<CsvRow> rows = ReadCsv(out + "/table.csv");
+  ASSERT_EQ(rows.size(), 2u);
+  for (const CsvRow& row : rows) {
+    EXPECT_EQ(row.at("outcome"), "crashed");
+    EXPECT_EQ(row.at("component"), "faulty");
+    EXPECT_EQ(row.at("stage"), "watch");
+    EXPECT_EQ(std::stod(row.at("ended_at")), 0.2);  // tick 100
+    EXPECT_THAT(row.at("reason"), HasSubstr("signal 11"));
+  }
+  const std::string page = Read(out, "maps.html");
+  EXPECT_THAT(page, HasSubstr("2 runs do not tell whether the robot stood"));
+  EXPECT_THAT(page, HasSubstr("crashed in faulty, stage watch, at 0.200 s"));
+  EXPECT_THAT(page, Not(HasSubstr("did not stand")));
+}
+
+TEST_F(SweepFaultTest, WhatCrashesOnceOnlyIsMadeOnceMore) {
+  const std::vector<std::string> sweep = {"sweep",  "faulty", "--vary", "sim.push[0].peak=20,40",
+                                          "--jobs", "1",      "--out"};
+  const auto run = [&](const std::string& out) {
+    std::vector<std::string> arguments = sweep;
+    arguments.push_back(Out(out));
+    return RunPoise(arguments);
+  };
+  EXPECT_EQ(run("good").exit_code, 0);
+  setenv("POISE_TEST_FAULT", "crash:100", 1);
+  setenv("POISE_TEST_FAULT_ONCE", Out("once").c_str(), 1);
+  const ProgramResult result = run("once_more");
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  EXPECT_THAT(result.output, HasSubstr("run 0: crashed in faulty, stage watch, at 0.200 s"));
+  EXPECT_EQ(Read(Out("once_more"), "table.csv"), Read(Out("good"), "table.csv"));
+}
+
+TEST_F(SweepFaultTest, ResumeTriesAgainWhatDidNotTell) {
+  std::vector<std::string> sweep = {"sweep", "faulty",  "--vary", "sim.push[0].peak=20,40",
+                                    "--out", Out("out")};
+  setenv("POISE_TEST_FAULT", "crash:100", 1);
+  EXPECT_EQ(RunPoise(sweep).exit_code, 1);
+  unsetenv("POISE_TEST_FAULT");
+  sweep.push_back("--resume");
+  const ProgramResult result = RunPoise(sweep);
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  for (const CsvRow& row : ReadCsv(Out("out") + "/table.csv")) {
+    EXPECT_EQ(row.at("outcome"), "stands");
+  }
+}
+
+// From some force on the component crashes, long before the robot would fall.
+TEST_F(SweepFaultTest, ALimitOverACrashIsNotKnown) {
+  setenv("POISE_TEST_FAULT", "slip:0.1", 1);
+  const std::string out = Out("out");
+  const ProgramResult result = RunPoise({"limit", "faulty", "--field", "sim.push[0].peak", "--min",
+                                         "10", "--max", "910", "--samples", "4", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const std::vector<CsvRow> limits = ReadCsv(out + "/limits.csv");
+  ASSERT_EQ(limits.size(), 1u);
+  for (const char* name : {"sim.push[0].peak", "fails_at", "impulse", "monotone"}) {
+    EXPECT_EQ(limits[0].at(name), "") << name;
+  }
+  EXPECT_NE(limits[0].at("untold"), "0");
+  EXPECT_THAT(result.output, HasSubstr("not known"));
+  EXPECT_THAT(result.output, HasSubstr("crashed in faulty, stage watch"));
+  EXPECT_FALSE(fs::exists(out + "/maps.html")) << "there is no map";
+}
+
+// Each takes the 20 s after which a run hangs, twice where it is made once more.
+TEST_F(SweepFaultTest, AStageThatLoopsForEverIsNamedAndTheOthersGoOn) {
+  setenv("POISE_TEST_FAULT", "hang:100", 1);
+  const std::string out = Out("out");
+  const ProgramResult result =
+      RunPoise({"sweep", "faulty", "--vary", "duration=0.1,0.3", "--out", out});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  const std::vector<CsvRow> rows = ReadCsv(out + "/table.csv");
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0].at("outcome"), "stands");
+  EXPECT_EQ(rows[1].at("outcome"), "hung");
+  EXPECT_EQ(rows[1].at("component"), "faulty");
+  EXPECT_EQ(rows[1].at("stage"), "watch");
+  EXPECT_EQ(std::stod(rows[1].at("ended_at")), 0.2);
+}
+
+TEST_F(SweepFaultTest, AnInlineRunThatHangsEndsAndNamesTheStage) {
+  setenv("POISE_TEST_FAULT", "hang:100", 1);
+  const ProgramResult result = RunPoise({"run", "faulty", "--inline", "--out", Out("run")});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_THAT(result.output,
+              HasSubstr("faulty hangs: its stage watch has not returned for 20 s, at tick 100"));
+  EXPECT_GT(fs::file_size(Out("run") + "/run.lcm"), 100'000u);  // what came before
+}
+
+// The one that does not answer is named, not the others, which wait for it.
+TEST_F(SweepFaultTest, AProcessThatStandsStillIsTheOneThatIsNamed) {
+  unsetenv("POISE_PATH");
+  PoiseProgram program({"run", "base/stand", "--duration", "1000", "--out", Out("run")});
+  ASSERT_TRUE(WaitForLog(Out("run"), kUnderWay));
+  kill(ComponentProcess(Out("run"), "task_controller"), SIGSTOP);
+  const ProgramResult result = program.Wait();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("no tick for 20 s: task_controller is waited for"));
+}
+
+}  // namespace
+}  // namespace poise
