@@ -182,6 +182,15 @@ std::string CompareWrenches(const std::string& scenario, const std::vector<World
   return lines;
 }
 
+/// Throws ConfigError, RobotError.
+SweepDefinition DefineSweep(const std::string& sweep, const std::string& engine,
+                            const WorldsArguments& arguments) {
+  SweepArguments what;
+  what.what = sweep;
+  what.changes = ChangesFor(engine, arguments.options.changes);
+  return SweepDefinition(what, /*limit=*/false);
+}
+
 /// Runs a sweep in every engine and prints where they agree. False when a run could not be made or
 /// a signal ended it. Throws ConfigError, RobotError.
 bool SweepWorlds(const std::string& sweep, const WorldsArguments& arguments,
@@ -190,10 +199,7 @@ bool SweepWorlds(const std::string& sweep, const WorldsArguments& arguments,
   bool passed = true;
   Sweep swept;
   for (const std::string& engine : engines) {
-    SweepArguments what;
-    what.what = sweep;
-    what.changes = ChangesFor(engine, arguments.options.changes);
-    const SweepDefinition definition(what, /*limit=*/false);
+    const SweepDefinition definition = DefineSweep(sweep, engine, arguments);
     const auto [first, end] = SelectedRuns(arguments.session, definition.points().size());
     SessionOptions session_options = arguments.session;
     session_options.out = (folder / engine).string();
@@ -255,6 +261,12 @@ int Worlds(WorldsArguments arguments) {
   CheckSpace(arguments.out.empty() ? RunsDir() : fs::path(arguments.out), sizes, options.force);
   if (sweeps.empty() && !arguments.session.range.empty()) {
     throw ConfigError("--range: is of a sweep, and none is named");
+  }
+  // Refused before anything is written.
+  for (const std::string& sweep : sweeps) {
+    for (const std::string& engine : engines) {
+      SelectedRuns(arguments.session, DefineSweep(sweep, engine, arguments).points().size());
+    }
   }
   const RunDir folder = MakeRunDir(arguments.out, "worlds", options.force);
   CatchStopSignals();

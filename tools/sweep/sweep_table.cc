@@ -219,10 +219,13 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     if (row.outcome == kFell) ++ways[{row.phase, row.trouble}];
   }
   std::string text = fmt::format("{} runs", rows.size());
+  const int told = outcomes[kStands] + outcomes[kFell];
   for (const char* outcome : {kStands, kFell, kStopped, kInvalid, kCrashed, kHung}) {
     if (outcomes[outcome] == 0) continue;
-    text += fmt::format(", {} {} ({:.1f} %)", outcome, outcomes[outcome],
-                        100.0 * outcomes[outcome] / static_cast<double>(rows.size()));
+    text += fmt::format(", {} {}", outcome, outcomes[outcome]);
+    if (outcome == kStands || outcome == kFell) {
+      text += fmt::format(" ({:.1f} %)", 100.0 * outcomes[outcome] / told);
+    }
   }
   text += "\n";
   const auto has = [&](const char* column) {
