@@ -58,8 +58,11 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   for (const auto& [key, row] : rows) {
     std::vector<std::string> cells = Place(points, row.run);
     if (limit) cells.push_back(Cell(row.limit));
-    cells.insert(cells.end(), {row.outcome, Cell(row.fell_at), fmt::format("{}", row.ended_at),
-                               row.phase, row.trouble, row.reason, row.component, row.stage});
+    // Of a run that does not tell it may not be known.
+    const bool ended = row.survived() || row.ended_at != 0;
+    cells.insert(cells.end(),
+                 {row.outcome, Cell(row.fell_at), ended ? fmt::format("{}", row.ended_at) : "",
+                  row.phase, row.trouble, row.reason, row.component, row.stage});
     for (const std::string& name : header.columns) {
       const auto metric = row.metrics.find(name);
       cells.push_back(metric == row.metrics.end() ? "" : fmt::format("{}", metric->second));
