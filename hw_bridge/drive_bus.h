@@ -33,9 +33,10 @@ struct DriveReport {
   int8_t stop = bridge_status_t::REASON_NONE;  ///< REASON_*: it asks for a stop, with this reason
 };
 
-/// Sensors of the robot that a bus reads by itself, in its feedback.
+/// What a bus reads by itself, in its feedback, beside the drives' positions and currents.
 struct SensorsOfBus {
   bool imu = false, feet = false;
+  bool velocity = false;  ///< of the joints, as the drives measure it
 };
 
 /// Start, Idle until the first cycle, Receive and Send once a cycle, Idle after the last, Stop.

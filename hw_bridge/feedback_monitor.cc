@@ -33,6 +33,7 @@ FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
       velocity_gain_(1 - std::exp(-2 * std::numbers::pi * config.velocity_cutoff * config.period)),
       counts_(motors.size(), 0),
       velocity_(motors.size(), 0.0),
+      raw_velocity_(motors.size(), 0.0),
       commanded_(motors.size(), 0.0),
       enabled_(motors.size(), 0),
       still_cycles_(motors.size(), 0),
@@ -43,8 +44,8 @@ FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
 FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback) const {
   const size_t n = motors_.size();
   const Problem unusable{bridge_status_t::REASON_FEEDBACK_NOT_FINITE, -1};
-  if (feedback.position_counts.size() != n || feedback.current.size() != n ||
-      feedback.drive_status.size() != n ||
+  if (feedback.position_counts.size() != n || feedback.velocity.size() != n ||
+      feedback.current.size() != n || feedback.drive_status.size() != n ||
       feedback.foot_wrench.size() != static_cast<size_t>(config_.num_feet) ||
       feedback.foot_sensor.size() != static_cast<size_t>(config_.num_feet)) {
     return unusable;
@@ -53,7 +54,9 @@ FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback)
     return {bridge_status_t::REASON_ENCODER_JUMP, joint};
   }
   for (size_t j = 0; j < n; ++j) {
-    if (!Plausible(feedback.current[j])) return {unusable.reason, static_cast<int>(j)};
+    if (!Plausible(feedback.current[j]) || !Plausible(feedback.velocity[j])) {
+      return {unusable.reason, static_cast<int>(j)};
+    }
   }
   // A foot's sensor may fail: the robot stands without it (HwBridge::Sense).
   const bool rest =
@@ -108,8 +111,8 @@ FeedbackMonitor::Problem FeedbackMonitor::Update(const drive_feedback_t& feedbac
     const int64_t counts = feedback.position_counts[j];
     if (consecutive_) {
       const double change = static_cast<double>(counts) - static_cast<double>(counts_[j]);
-      const double raw = change / CountsPerRadian(motors_[j]) / config_.period;
-      velocity_[j] += velocity_gain_ * (raw - velocity_[j]);
+      raw_velocity_[j] = change / CountsPerRadian(motors_[j]) / config_.period;
+      velocity_[j] += velocity_gain_ * (raw_velocity_[j] - velocity_[j]);
     }
     counts_[j] = counts;
   }

@@ -55,6 +55,8 @@ class FeedbackMonitor {
   const std::vector<int64_t>& counts() const { return counts_; }
   /// rad/s, filtered, from the encoder counts.
   const std::vector<double>& velocity() const { return velocity_; }
+  /// rad/s, likewise unfiltered: over the last two cycles that followed each other.
+  const std::vector<double>& raw_velocity() const { return raw_velocity_; }
 
  private:
   Problem Find(const drive_feedback_t& feedback) const;
@@ -65,7 +67,7 @@ class FeedbackMonitor {
   std::vector<robot::MotorModel> motors_;
   double velocity_gain_;  // of the first-order low-pass, per cycle
   std::vector<int64_t> counts_;
-  std::vector<double> velocity_;
+  std::vector<double> velocity_, raw_velocity_;
   std::vector<double> commanded_;  // A, in the cycle before
   std::vector<char> enabled_;
   std::vector<int> still_cycles_, error_cycles_;

@@ -402,6 +402,7 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
   const drive_feedback_t* drives = bus_->Receive();
   if (drives == nullptr || !has_bus()) return drives;
   feedback_.position_counts = drives->position_counts;
+  feedback_.velocity = drives->velocity;
   feedback_.current = drives->current;
   feedback_.drive_status = drives->drive_status;
   // Sensors from the bus where it has them, else from the port.
@@ -410,6 +411,8 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
               feedback_.imu_angular_velocity);
     std::copy(std::begin(from.imu_acceleration), std::end(from.imu_acceleration),
               feedback_.imu_acceleration);
+    std::copy(std::begin(from.imu_orientation), std::end(from.imu_orientation),
+              feedback_.imu_orientation);
   };
   const SensorsOfBus own = bus_->sensors();
   if (own.imu) {
@@ -445,6 +448,8 @@ void HwBridge::Sense(const Tick& tick) {
   const std::vector<robot::MotorModel>& motors = model_->motors();
   for (size_t j = 0; j < motors.size(); ++j) {
     sensors.joint_position[j] = JointPositionOf(motors[j], feedback->position_counts[j]);
+    sensors.joint_velocity[j] =
+        own.velocity ? feedback->velocity[j] : supervisor_->raw_joint_velocity()[j];
     // What was ordered a cycle ago, where the drive does not say what flows.
     sensors.joint_torque[j] = motors[j].current_sensor
                                   ? JointTorque(motors[j], feedback->current[j])
@@ -454,6 +459,11 @@ void HwBridge::Sense(const Tick& tick) {
             sensors.imu_angular_velocity);
   std::copy(std::begin(feedback->imu_acceleration), std::end(feedback->imu_acceleration),
             sensors.imu_acceleration);
+  // Poise does not rest on it: what is no orientation is none, and stops nothing.
+  const Eigen::Map<const Eigen::Vector4d> orientation(feedback->imu_orientation);
+  const bool unit = std::abs(orientation.norm() - 1) < 0.01;  // false for NaN
+  Eigen::Map<Eigen::Vector4d>(sensors.imu_orientation) =
+      unit ? orientation.normalized() : Eigen::Vector4d::Zero().eval();
   ReadFootSensors(*feedback);
 }
 

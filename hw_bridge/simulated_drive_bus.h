@@ -17,6 +17,7 @@ class SimulatedDriveBus final : public DriveBus {
   /// The message that the bridge publishes is the command.
   void Send(const drive_command_t&) override {}
   bool impedance() const override { return true; }
+  SensorsOfBus sensors() const override { return {.velocity = true}; }
   const BusHealth& health() const override { return health_; }
 
  private:

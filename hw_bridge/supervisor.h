@@ -122,6 +122,8 @@ class Supervisor {
   bool at_rest() const { return latched() && ramp_left_ == 0; }
   /// rad/s, filtered, from the encoder counts.
   const std::vector<double>& joint_velocity() const { return monitor_.velocity(); }
+  /// rad/s, likewise unfiltered: over the last two cycles that followed each other.
+  const std::vector<double>& raw_joint_velocity() const { return monitor_.raw_velocity(); }
   /// N·m that the drive of a joint gave at the last reading, as it was last commanded.
   double OrderedTorque(size_t joint, const drive_command_t& command) const;
 

@@ -15,8 +15,10 @@ constexpr uint64_t kSensorStream = 2;
 
 SensorReadings::SensorReadings(int num_joints)
     : position_counts(static_cast<size_t>(num_joints), 0),
+      velocity(Eigen::VectorXd::Zero(num_joints)),
       imu_angular_velocity(Vector3d::Zero()),
       imu_acceleration(Vector3d::Zero()),
+      imu_orientation(Eigen::Quaterniond::Identity()),
       push_force(Vector3d::Zero()) {
   foot_wrench.fill(robot::Vector6d::Zero());
 }
@@ -41,9 +43,15 @@ void Sensors::Measure(const SimulationTruth& truth, SensorReadings* readings) {
     const double position = truth.encoder_position[static_cast<Eigen::Index>(j)];
     readings->position_counts[j] = std::llround(position * counts_per_radian_[j]);
   }
+  readings->velocity = truth.encoder_velocity;
   readings->imu_angular_velocity = truth.imu_angular_velocity + gyro_bias_ + Noise(noise_.gyro);
   readings->imu_acceleration =
       truth.imu_specific_force + accelerometer_bias_ + Noise(noise_.accelerometer);
+  // The filter levels by the accelerometer, whose bias looks like a tilt.
+  const Vector3d up = truth.imu_orientation.conjugate() * Vector3d::UnitZ();
+  const Vector3d seen_up = up + accelerometer_bias_ / robot::kGravity;
+  readings->imu_orientation =
+      truth.imu_orientation * Eigen::Quaterniond::FromTwoVectors(seen_up, up);
   for (size_t f = 0; f < 2; ++f) {
     readings->foot_wrench[f] = truth.foot_wrench[f];
     readings->foot_wrench[f].head<3>() += Noise(noise_.force);

@@ -1,7 +1,7 @@
 // From the truth to what encoders, IMU, foot sensors and the push sensor report.
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -17,8 +17,10 @@ struct SensorReadings {
   explicit SensorReadings(int num_joints);
 
   std::vector<int64_t> position_counts;        ///< at the motor shaft, multi-turn
+  Eigen::VectorXd velocity;                    ///< rad/s, of the joint
   Eigen::Vector3d imu_angular_velocity;        ///< rad/s, IMU frame
   Eigen::Vector3d imu_acceleration;            ///< m/s², IMU frame, specific force
+  Eigen::Quaterniond imu_orientation;          ///< IMU to world, of the IMU's own filter
   std::array<robot::Vector6d, 2> foot_wrench;  ///< environment on robot, sole frame
   std::array<int8_t, 2> foot_sensor{};         ///< drive_feedback_t::SENSOR_*
   Eigen::Vector3d push_force;                  ///< N, world

@@ -143,6 +143,7 @@ void SimComponent::PublishFeedback() {
   drive_feedback_t& message = *drive_feedback_;
   for (size_t j = 0; j < message.current.size(); ++j) {
     message.position_counts[j] = readings_->position_counts[j];
+    message.velocity[j] = readings_->velocity[static_cast<Eigen::Index>(j)];
     // A drive that reports no current reports zero.
     message.current[j] = current_sensor_[j] != 0
                              ? simulation_->measured().motor_current[static_cast<Eigen::Index>(j)]
@@ -151,6 +152,7 @@ void SimComponent::PublishFeedback() {
   }
   SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);
   SetVector3(readings_->imu_acceleration, message.imu_acceleration);
+  SetQuaternion(readings_->imu_orientation, message.imu_orientation);
   for (size_t f = 0; f < message.foot_wrench.size(); ++f) {
     SetWrench(readings_->foot_wrench[f], &message.foot_wrench[f]);
     message.foot_sensor[f] = readings_->foot_sensor[f];
@@ -167,9 +169,7 @@ void SimComponent::PublishTruth() {
   const SimulationTruth& truth = simulation_->truth();
   const robot::RobotState& state = truth.state;
   SetVector3(state.base_position, message.base_position);
-  const Eigen::Quaterniond& q = state.base_orientation;
-  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
-  std::copy_n(orientation, 4, message.base_orientation);
+  SetQuaternion(state.base_orientation, message.base_orientation);
   SetVector3(state.base_linear_velocity, message.base_linear_velocity);
   SetVector3(state.base_angular_velocity, message.base_angular_velocity);
   for (size_t j = 0; j < message.joint_position.size(); ++j) {

@@ -92,11 +92,13 @@ SimulationTruth::SimulationTruth(int num_joints)
       com_velocity(Vector3d::Zero()),
       contact_points{0, 0},
       encoder_position(Eigen::VectorXd::Zero(num_joints)),
+      encoder_velocity(Eigen::VectorXd::Zero(num_joints)),
       motor_current(Eigen::VectorXd::Zero(num_joints)),
       motor_torque(Eigen::VectorXd::Zero(num_joints)),
       friction_torque(Eigen::VectorXd::Zero(num_joints)),
       imu_angular_velocity(Vector3d::Zero()),
       imu_specific_force(Vector3d::Zero()),
+      imu_orientation(Eigen::Quaterniond::Identity()),
       push_force(Vector3d::Zero()),
       push_point(Vector3d::Zero()),
       crane_point(Vector3d::Zero()),
@@ -419,10 +421,14 @@ void Simulation::ReadTruth() {
     const bool rotor = drivetrain.elastic() && !drive_train_.link_encoder();
     truth_.encoder_position[j] =
         rotor ? drivetrain.rotor_position() : truth_.state.joint_position[j];
+    truth_.encoder_velocity[j] =
+        rotor ? drivetrain.rotor_velocity() : truth_.state.joint_velocity[j];
     truth_.friction_torque[j] = drivetrain.friction_torque();
   }
   const robot::ImuModel& imu = model_.imu();
-  const Matrix3d to_imu = (world_->rotation(imu.body) * imu.pose.linear()).transpose();
+  const Matrix3d from_imu = world_->rotation(imu.body) * imu.pose.linear();
+  const Matrix3d to_imu = from_imu.transpose();
+  truth_.imu_orientation = from_imu;
   truth_.imu_angular_velocity = to_imu * world_->angular_velocity(imu.body);
   truth_.imu_specific_force = to_imu * (imu_acceleration_ + kGravity * Vector3d::UnitZ());
 

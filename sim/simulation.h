@@ -37,14 +37,16 @@ struct SimulationTruth {
   std::array<robot::Vector6d, 2> foot_wrench;
   std::array<int, 2> contact_points;
   Eigen::VectorXd encoder_position;      ///< rad at the joint, where the encoders sit
+  Eigen::VectorXd encoder_velocity;      ///< rad/s, likewise
   Eigen::VectorXd motor_current;         ///< A, mean over the last step
   Eigen::VectorXd motor_torque;          ///< N·m at the joint, likewise
   Eigen::VectorXd friction_torque;       ///< N·m on the joint, likewise
   Eigen::Vector3d imu_angular_velocity;  ///< rad/s, IMU frame
   /// m/s², IMU frame: velocity gained over the last step divided by the step, minus gravity.
   Eigen::Vector3d imu_specific_force;
-  Eigen::Vector3d push_force;  ///< N, world, sum of the pushes and hands at this instant
-  Eigen::Vector3d push_point;  ///< m, world, of the strongest of them
+  Eigen::Quaterniond imu_orientation;  ///< IMU to world
+  Eigen::Vector3d push_force;          ///< N, world, sum of the pushes and hands at this instant
+  Eigen::Vector3d push_point;          ///< m, world, of the strongest of them
   /// The crane's at this instant, all zero without one: where it holds the robot (m, world), its
   /// force on the robot (N, world), and how much of its stiffness is left.
   Eigen::Vector3d crane_point, crane_force;

@@ -45,11 +45,7 @@ bool ReadState(const robot_state_t& message, robot::RobotState* state) {
 
 void SetPose(const Eigen::Isometry3d& pose, pose_t* message) {
   SetVector3(pose.translation(), message->position);
-  const Eigen::Quaterniond q(pose.linear());
-  message->orientation[0] = q.w();
-  message->orientation[1] = q.x();
-  message->orientation[2] = q.y();
-  message->orientation[3] = q.z();
+  SetQuaternion(Eigen::Quaterniond(pose.linear()), message->orientation);
 }
 
 Eigen::Isometry3d GetPose(const pose_t& message) {
@@ -85,6 +81,13 @@ void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]) {
 
 Eigen::Vector3d GetVector3(const double (&array)[3]) {
   return Eigen::Map<const Eigen::Vector3d>(array);
+}
+
+void SetQuaternion(const Eigen::Quaterniond& quaternion, double (&array)[4]) {
+  array[0] = quaternion.w();
+  array[1] = quaternion.x();
+  array[2] = quaternion.y();
+  array[3] = quaternion.z();
 }
 
 double SoleMargin(const robot::RobotModel& model) {

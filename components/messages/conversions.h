@@ -32,6 +32,9 @@ void SetMargins(const balance::ContactMargins& margins, contact_margins_t* messa
 void SetVector3(const Eigen::Vector3d& vector, double (&array)[3]);
 Eigen::Vector3d GetVector3(const double (&array)[3]);
 
+/// In the messages' order: w, x, y, z.
+void SetQuaternion(const Eigen::Quaterniond& quaternion, double (&array)[4]);
+
 /// m, off the edges of a sole, that its own centre of pressure keeps: the sole rocks on its edge.
 double SoleMargin(const robot::RobotModel& model);
 /// m, off the edges of the soles' hull, that the centre of pressure of both keeps, so that it can

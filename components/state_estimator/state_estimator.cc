@@ -315,9 +315,7 @@ void StateEstimator::PublishCalibration() {
 void StateEstimator::PublishState(const robot::RobotState& state) {
   robot_state_t& out = *robot_state_;
   SetVector3(state.base_position, out.base_position);
-  const Eigen::Quaterniond& q = state.base_orientation;
-  const double orientation[4] = {q.w(), q.x(), q.y(), q.z()};
-  std::copy_n(orientation, 4, out.base_orientation);
+  SetQuaternion(state.base_orientation, out.base_orientation);
   SetVector3(state.base_linear_velocity, out.base_linear_velocity);
   SetVector3(state.base_angular_velocity, out.base_angular_velocity);
   std::copy_n(state.joint_position.data(), state.joint_position.size(), out.joint_position.data());

@@ -298,16 +298,7 @@ void DriveEmulator::Sense(const Tick& tick) {
       shafts_[i]->SetCounts(drive_feedback_->position_counts[joint_[i]], period_seconds_);
       shafts_[i]->SetMeasuredCurrent(drive_feedback_->current[joint_[i]]);
     }
-    drive_feedback_t& message = *sensor_feedback_;
-    message.position_counts = drive_feedback_->position_counts;
-    message.current = drive_feedback_->current;
-    message.drive_status = drive_feedback_->drive_status;
-    std::copy(std::begin(drive_feedback_->imu_angular_velocity),
-              std::end(drive_feedback_->imu_angular_velocity), message.imu_angular_velocity);
-    std::copy(std::begin(drive_feedback_->imu_acceleration),
-              std::end(drive_feedback_->imu_acceleration), message.imu_acceleration);
-    message.foot_wrench = drive_feedback_->foot_wrench;
-    message.foot_sensor = drive_feedback_->foot_sensor;
+    *sensor_feedback_ = *drive_feedback_;
   } else {
     sensor_feedback_.Withhold();
   }

@@ -170,6 +170,7 @@ void UnitreeDriveBus::TakeMotors() {
     const auto position = static_cast<double>(state.q);
     const bool readable = std::abs(position) <= kMostPosition;
     if (readable) feedback_.position_counts[j] = EncoderCounts(motor.model, position);
+    feedback_.velocity[j] = static_cast<double>(state.dq);
     // What is no position is no reading: the supervisor stops at a current that is no number.
     feedback_.current[j] = readable ? MotorCurrent(motor.model, static_cast<double>(state.tau_est))
                                     : std::numeric_limits<double>::quiet_NaN();
@@ -209,6 +210,7 @@ void UnitreeDriveBus::TakeImu() {
     feedback_.imu_angular_velocity[i] = old ? kNone : static_cast<double>(imu.gyroscope[i]);
     feedback_.imu_acceleration[i] = old ? kNone : static_cast<double>(imu.accelerometer[i]);
   }
+  std::copy(std::begin(imu.quaternion), std::end(imu.quaternion), feedback_.imu_orientation);
 }
 
 bool UnitreeDriveBus::TakeState() {

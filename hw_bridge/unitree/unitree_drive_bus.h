@@ -35,7 +35,7 @@ class UnitreeDriveBus final : public DriveBus {
   void Send(const drive_command_t& command) override;
   bool impedance() const override { return true; }
   /// The robot has an IMU; its feet have no sensors.
-  SensorsOfBus sensors() const override { return {.imu = true, .feet = true}; }
+  SensorsOfBus sensors() const override { return {.imu = true, .feet = true, .velocity = true}; }
   std::span<const DriveReport> reports() const override { return reports_; }
   const BusHealth& health() const override { return health_; }
   void RequestFaultReset() override;

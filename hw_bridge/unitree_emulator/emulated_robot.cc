@@ -27,7 +27,6 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
     : config_(config),
       motors_(model.motors()),
       slots_(MotorSlots(model, config.layout(), config.slot())),
-      period_(period),
       watchdog_cycles_(0) {
   if (config.state_delay() > kMostDelay) throw ConfigError("state_delay", "must be at most 100");
   if (config.command_delay() > kMostDelay) {
@@ -81,12 +80,8 @@ const EmulatedRobot::Trouble* EmulatedRobot::Find(UnitreeTrouble::Kind kind) con
 void EmulatedRobot::FillMotors(const drive_feedback_t& feedback) {
   for (size_t j = 0; j < slots_.size(); ++j) {
     MotorState& motor = now_.motor_state[slots_[j]];
-    const auto q = static_cast<float>(JointPositionOf(motors_[j], feedback.position_counts[j]));
-    motor.dq =
-        known_
-            ? static_cast<float>((static_cast<double>(q) - static_cast<double>(motor.q)) / period_)
-            : 0;
-    motor.q = q;
+    motor.q = static_cast<float>(JointPositionOf(motors_[j], feedback.position_counts[j]));
+    motor.dq = static_cast<float>(feedback.velocity[j]);
     motor.tau_est = static_cast<float>(JointTorque(motors_[j], feedback.current[j]));
     motor.mode = taken_.motor_cmd[slots_[j]].mode;
     motor.temperature[0] = motor.temperature[1] = static_cast<int16_t>(config_.temperature());
@@ -97,6 +92,9 @@ void EmulatedRobot::FillMotors(const drive_feedback_t& feedback) {
   for (size_t i = 0; i < 3; ++i) {
     now_.imu_state.gyroscope[i] = static_cast<float>(feedback.imu_angular_velocity[i]);
     now_.imu_state.accelerometer[i] = static_cast<float>(feedback.imu_acceleration[i]);
+  }
+  for (size_t i = 0; i < 4; ++i) {
+    now_.imu_state.quaternion[i] = static_cast<float>(feedback.imu_orientation[i]);
   }
 }
 
@@ -136,7 +134,6 @@ void EmulatedRobot::ApplyTroubles() {
 const LowState* EmulatedRobot::State(const drive_feedback_t& feedback, uint32_t tick,
                                      uint32_t cycle) {
   now_.mode_machine = static_cast<uint8_t>(config_.mode_machine());
-  now_.imu_state.quaternion[0] = 1;
   const bool first = !known_;
   FillMotors(feedback);
   if (first) std::fill(states_.begin(), states_.end(), now_);

@@ -22,7 +22,7 @@ class EmulatedRobot {
 
   /// Begins, goes on with and ends the troubles of this time, s.
   void SetTime(double time);
-  /// The robot is somewhere else from the next state on, and has not moved there.
+  /// The robot is somewhere else from the next state on, which comes without delay.
   void Place() { known_ = false; }
   /// What the robot says `tick` ms after its start, of what the motors report. nullptr: nothing.
   /// `cycle`: of the run, from 1, in simulated time; else 0.
@@ -57,7 +57,6 @@ class EmulatedRobot {
   std::vector<robot::MotorModel> motors_;  // by joint
   std::vector<size_t> slots_;
   std::vector<Trouble> troubles_;
-  double period_;
   int64_t watchdog_cycles_;
   LowState now_{}, sent_{};
   std::vector<LowState> states_;  // by cycle, a ring of state_delay

@@ -52,6 +52,7 @@ void UnitreeEmulator::Configure(const ComponentContext& context, Wiring* wiring)
     last_feedback_.position_counts[i] =
         EncoderCounts(model->motors()[i], model->stance().joint_position[j]);
   }
+  last_feedback_.imu_orientation[0] = 1;
   wiring->AddInput(&drive_feedback_, "drive_feedback", counts);
   wiring->AddInput(&bridge_command_, "bridge_command", {model->num_joints()});
   wiring->AddOutput(&sensor_feedback_, "sensor_feedback", counts);
@@ -106,16 +107,7 @@ void UnitreeEmulator::Sense(const Tick& tick) {
   last_feedback_ = *drive_feedback_;
   cycle_ = static_cast<uint32_t>(tick.index + 1);
   Publish();
-  drive_feedback_t& message = *sensor_feedback_;
-  message.position_counts = last_feedback_.position_counts;
-  message.current = last_feedback_.current;
-  message.drive_status = last_feedback_.drive_status;
-  std::copy(std::begin(last_feedback_.imu_angular_velocity),
-            std::end(last_feedback_.imu_angular_velocity), message.imu_angular_velocity);
-  std::copy(std::begin(last_feedback_.imu_acceleration), std::end(last_feedback_.imu_acceleration),
-            message.imu_acceleration);
-  message.foot_wrench = last_feedback_.foot_wrench;
-  message.foot_sensor = last_feedback_.foot_sensor;
+  *sensor_feedback_ = last_feedback_;
 }
 
 void UnitreeEmulator::Act(const Tick&) {

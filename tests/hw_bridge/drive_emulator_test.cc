@@ -183,6 +183,9 @@ TEST(DriveEmulator, GivesInEachTickTheTorqueOfItsFrames) {
     ASSERT_EQ(pair.status().drive_state[0], bridge_status_t::DRIVE_ENABLED);
     // Counts come through 32 bits, sign and zero; rad of 50 × 8192 counts a turn.
     ASSERT_NEAR(pair.sensors().joint_position[2], 40 * (50 - tick) * 2 * M_PI / (50 * 8192), 1e-12);
+    // The drives tell no velocity: 40 counts a tick of 2 ms.
+    const double velocity = tick > 0 ? -40 * 2 * M_PI / (50 * 8192) / 0.002 : 0;
+    ASSERT_NEAR(pair.sensors().joint_velocity[2], velocity, 1e-9) << tick;
     for (size_t j = 0; j < kJoints; ++j) {
       // Per mille of 15 A; 5 N·m/A.
       ASSERT_EQ(pair.drives().enabled[j], 1);

@@ -98,6 +98,9 @@ TEST(HwBridge, SensesInSiUnitsAndAsRobotOnEnvironment) {
   bridge.feedback.position_counts[3] = 50 * 8192 / 4;  // a quarter turn of the joint
   bridge.feedback.position_counts[4] = -50 * 8192 / 8;
   bridge.feedback.current[2] = -15;  // rated: 75 N·m
+  bridge.feedback.velocity[3] = -0.7;
+  bridge.feedback.imu_orientation[0] = 0.6;
+  bridge.feedback.imu_orientation[3] = -0.8;
   for (int i = 0; i < 3; ++i) {
     bridge.feedback.imu_angular_velocity[i] = 0.1 + i;
     bridge.feedback.imu_acceleration[i] = 9 + i;
@@ -109,12 +112,26 @@ TEST(HwBridge, SensesInSiUnitsAndAsRobotOnEnvironment) {
   EXPECT_NEAR(sensors.joint_position[3], std::numbers::pi / 2, 1e-12);
   EXPECT_NEAR(sensors.joint_position[4], -std::numbers::pi / 4, 1e-12);
   EXPECT_DOUBLE_EQ(sensors.joint_torque[2], -75);
+  EXPECT_EQ(sensors.joint_velocity[3], -0.7);
+  EXPECT_THAT(sensors.imu_orientation,
+              ::testing::Pointwise(::testing::DoubleEq(), {0.6, 0.0, 0.0, -0.8}));
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(sensors.imu_angular_velocity[i], 0.1 + i);
     EXPECT_EQ(sensors.imu_acceleration[i], 9 + i);
     EXPECT_EQ(sensors.foot_wrench[0].force[i], -100 - i);
     EXPECT_EQ(sensors.foot_wrench[1].moment[i], 3 + i);
     EXPECT_EQ(sensors.foot_wrench[1].force[i], 0);
+  }
+}
+
+// Poise stands without it: the estimator finds its own.
+TEST(HwBridge, AnOrientationOfTheImuThatIsNoneIsZeroAndStopsNothing) {
+  Bridge bridge;
+  for (const double w : {std::numeric_limits<double>::quiet_NaN(), 0.0, 3.0}) {
+    bridge.feedback.imu_orientation[0] = w;
+    bridge.Step();
+    EXPECT_THAT(bridge.sensors().imu_orientation, ::testing::Each(0.0)) << w;
+    EXPECT_EQ(bridge.status().reason, bridge_status_t::REASON_NONE) << w;
   }
 }
 

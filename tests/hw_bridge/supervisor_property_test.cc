@@ -56,11 +56,13 @@ class Hostile {
     for (size_t j = 0; j < kJoints; ++j) {
       feedback.position_counts[j] = Rarely(20) ? Integer(0) : Choose(200000);
       if (Rarely(60)) feedback.current[j] = Real();
+      if (Rarely(60)) feedback.velocity[j] = Real();
       if (Rarely(60)) feedback.drive_status[j] = static_cast<int32_t>(Integer(1));
     }
     if (Rarely(60)) feedback.imu_acceleration[Choose(3)] = Real();
     if (Rarely(60)) feedback.foot_wrench[static_cast<size_t>(Choose(2))].force[Choose(3)] = Real();
     if (Rarely(100)) feedback.position_counts.resize(static_cast<size_t>(Choose(6)));
+    if (Rarely(100)) feedback.velocity.resize(static_cast<size_t>(Choose(6)));
     if (Rarely(100)) feedback.drive_status.resize(static_cast<size_t>(Choose(6)));
     return feedback;
   }

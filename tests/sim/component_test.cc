@@ -107,6 +107,7 @@ TEST(SimComponent, TickZeroReportsTheStartAtRest) {
   for (int j = 0; j < 12; ++j) {
     const auto i = static_cast<size_t>(j);
     EXPECT_EQ(truth.joint_velocity[i], 0);
+    EXPECT_EQ(feedback.velocity[i], 0);
     EXPECT_EQ(feedback.position_counts[i],
               std::llround(truth.joint_position[i] * 50 * 8192 / (2 * std::numbers::pi)));
     EXPECT_EQ(feedback.drive_status[i], drive_feedback_t::DRIVE_ENABLED);
@@ -127,6 +128,7 @@ TEST(SimComponent, AppliesTheCommandOfTheTickBefore) {
   EXPECT_EQ(bench.feedback().current[4], 0);
   EXPECT_NEAR(bench.truth().joint_torque[3], 1.5 * 50 * 0.10, 1e-12) << "(54)";
   EXPECT_NE(bench.truth().joint_velocity[3], 0);
+  EXPECT_EQ(bench.feedback().velocity, bench.truth().joint_velocity);
   bench.Run(nullptr);
   EXPECT_EQ(bench.feedback().current[3], 0) << "no command: motors free";
 }

@@ -75,9 +75,13 @@ TEST_F(SensorsTest, EncodersCountTurnsOfTheMotor) {
 
 TEST_F(SensorsTest, WithoutNoiseTheTruth) {
   Sensors sensors(model_, Noise(model_, false, 0.2), 1);
+  truth_.encoder_velocity.setLinSpaced(-1, 2);
+  truth_.imu_orientation = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 3).normalized());
   sensors.Measure(truth_, &readings_);
   EXPECT_EQ(readings_.imu_acceleration, truth_.imu_specific_force);
   EXPECT_EQ(readings_.imu_angular_velocity, truth_.imu_angular_velocity);
+  EXPECT_EQ(readings_.velocity, truth_.encoder_velocity);
+  EXPECT_LT(readings_.imu_orientation.angularDistance(truth_.imu_orientation), 1e-12);
   EXPECT_EQ(readings_.foot_wrench[0], truth_.foot_wrench[0]);
   EXPECT_EQ(readings_.push_force, truth_.push_force);
 }
@@ -113,6 +117,22 @@ TEST_F(SensorsTest, NoiseHasTheDeviationsOfTheRobotFile) {
   EXPECT_NEAR(accelerometer.mean(), sensors.accelerometer_bias().z(),
               5 * 1.7e-2 / std::sqrt(kSamples));
   EXPECT_NEAR(force.mean(), 0, 5 / std::sqrt(kSamples));
+}
+
+// What the accelerometer reads at rest is up to the IMU's filter: both say the same.
+TEST_F(SensorsTest, TheOrientationIsLevelAsTheAccelerometerSeesIt) {
+  truth_.imu_orientation = Eigen::AngleAxisd(0.7, Vector3d(1, -2, 3).normalized());
+  truth_.imu_specific_force = truth_.imu_orientation.conjugate() * Vector3d(0, 0, robot::kGravity);
+  const robot::RobotModel quiet = EditedRobot(
+      [](Robot* description) { description->mutable_imu()->set_accelerometer_noise(0); });
+  Sensors sensors(quiet, Noise(quiet, true, 0), 3);
+  sensors.Measure(truth_, &readings_);
+  const Vector3d up = readings_.imu_orientation * readings_.imu_acceleration.normalized();
+  EXPECT_LT((up - Vector3d::UnitZ()).norm(), 1e-12);
+  // The file's bias of 0.1 m/s² is some 10 mrad of tilt.
+  const double off = readings_.imu_orientation.angularDistance(truth_.imu_orientation);
+  EXPECT_GT(off, 1e-4);
+  EXPECT_LT(off, 0.05);
 }
 
 TEST_F(SensorsTest, BiasIsDrawnOncePerSeed) {

@@ -257,6 +257,19 @@ TEST(UnitreeStop, DamagedAndRepeatedStatesAreNone) {
   }
 }
 
+TEST(UnitreeStates, TellTheMotorsVelocityAndTheOrientationOfTheImu) {
+  RobotRig rig;
+  rig.Start(5);
+  rig.state_of(3).dq = 0.25F;
+  rig.robot.state.imu_state.quaternion[0] = 0.6F;
+  rig.robot.state.imu_state.quaternion[2] = 0.8F;
+  rig.Step();
+  EXPECT_EQ(rig.readings().joint_velocity[3], 0.25);
+  EXPECT_NEAR(rig.readings().imu_orientation[0], 0.6, 1e-7);
+  EXPECT_NEAR(rig.readings().imu_orientation[2], 0.8, 1e-7);
+  EXPECT_EQ(rig.status().state, Status::STATE_RUNNING);
+}
+
 TEST(UnitreeStop, APositionThatIsNoNumberStopsByName) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), 1e30F}) {
     RobotRig rig;
