@@ -44,9 +44,10 @@ function(poise_messages name)
 endfunction()
 
 # poise_module(NAME SOURCES ... [PROTOS ...] [MESSAGES target ...] [DEPS target ...] [COMPONENTS type ...] [FILES folder]): one shared
-# library that `poise` loads (POISE_PATH), and a program for each component type. One source has POISE_MODULE
+# library that `poise` loads (POISE_PATH), and a program for each component type, which links it. One source has POISE_MODULE
 # (components/framework/module_entry.h). PROTOS, of configurations, are included as "FILE.pb.h"; with them comes std::string_view
-# poise::NAME_schema(). FILES holds scenarios/, graphs/, robots/, sweeps/, drives/.
+# poise::NAME_schema(). DEPS are libraries of any origin that SOURCES use. FILES holds scenarios/, graphs/, robots/, sweeps/, drives/.
+# The library shows POISE_MODULE alone: what it and its DEPS compute is their own code, whatever the process has beside them.
 function(poise_module name)
   cmake_parse_arguments(A "" "FILES" "SOURCES;PROTOS;MESSAGES;DEPS;COMPONENTS" ${ARGN})
   if(A_UNPARSED_ARGUMENTS OR NOT A_SOURCES)
@@ -77,14 +78,14 @@ function(poise_module name)
       DEPENDS ${dir}/${name}.binpb VERBATIM)
     set(generated ${outputs} ${dir}/${name}_schema.cc)
   endif()
-  add_library(${name}_objects OBJECT ${A_SOURCES} ${generated})
-  set_target_properties(${name}_objects PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  target_include_directories(${name}_objects PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-  target_include_directories(${name}_objects SYSTEM PUBLIC ${dir})
-  target_link_libraries(${name}_objects PUBLIC poise::poise ${A_MESSAGES} ${A_DEPS})
-  add_library(${name} MODULE)
-  target_link_libraries(${name} PRIVATE ${name}_objects ${A_MESSAGES})  # objects are linked by those who name them
-  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/poise/modules)
+  file(CONFIGURE OUTPUT ${dir}/exports CONTENT "{ global: poise_module; local: *; };\n")
+  add_library(${name} SHARED ${A_SOURCES} ${generated})
+  target_include_directories(${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+  target_include_directories(${name} SYSTEM PRIVATE ${dir})
+  target_link_libraries(${name} PRIVATE ${A_MESSAGES} ${A_DEPS} poise::poise)
+  target_link_options(${name} PRIVATE -Wl,--version-script=${dir}/exports -Wl,--no-undefined)
+  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/poise/modules
+                        INSTALL_RPATH_USE_LINK_PATH ON)
   install(TARGETS ${name} DESTINATION lib/poise/modules)
   foreach(component ${A_COMPONENTS})
     file(CONFIGURE OUTPUT ${dir}/${component}_main.cc CONTENT [[
@@ -96,12 +97,11 @@ int main(int argc, char** argv) {
 }
 ]] @ONLY)
     add_executable(${component} ${dir}/${component}_main.cc)
-    target_link_libraries(${component} PRIVATE ${name}_objects ${A_MESSAGES})
+    target_link_libraries(${component} PRIVATE ${name} poise::poise)
     set_target_properties(${component} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/poise/bin
-                          INSTALL_RPATH_USE_LINK_PATH ON)
+                          INSTALL_RPATH "$ORIGIN/../modules" INSTALL_RPATH_USE_LINK_PATH ON)
     install(TARGETS ${component} DESTINATION lib/poise/bin)
   endforeach()
-  set_property(TARGET ${name} PROPERTY INSTALL_RPATH_USE_LINK_PATH ON)
   if(A_FILES)
     cmake_path(ABSOLUTE_PATH A_FILES)
     file(GLOB folders LIST_DIRECTORIES true ${A_FILES}/*)

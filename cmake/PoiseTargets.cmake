@@ -124,7 +124,10 @@ function(poise_shared_library name)
   add_library(${name} SHARED ${PROJECT_BINARY_DIR}/${name}.cc)
   # As files: named as targets they would be linked again for each other's sake.
   target_link_libraries(${name} PRIVATE -Wl,--whole-archive ${files} -Wl,--no-whole-archive ${A_LIBRARIES})
-  target_link_options(${name} PRIVATE -Wl,-Bsymbolic-functions -Wl,--no-undefined)
+  # Eigen's functions of a library that a user's module links are not replaced by ours, which may have other bits.
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/${name}.exports CONTENT "{ global: *; local: _ZN5Eigen*; _ZNK5Eigen*; };\n")
+  target_link_options(${name} PRIVATE -Wl,-Bsymbolic-functions -Wl,--no-undefined
+                      -Wl,--version-script=${PROJECT_BINARY_DIR}/${name}.exports)
   add_dependencies(${name} ${own})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME poise LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib
                         LINK_DEPENDS "${files}" INSTALL_RPATH "$ORIGIN")

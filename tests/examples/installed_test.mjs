@@ -144,6 +144,29 @@ test('a module of another Poise is refused by name', () => {
   assert.match(poise(['list', 'graphs'], {env: {POISE_PATH: other}, exit: 2}), /gait_lab\.so: is no module of Poise/);
 });
 
+const fused = readFileSync('/proc/cpuinfo', 'utf8').match(/\bfma\b/) ? false : 'this processor has no fused multiply-add';
+test('libraries of other compiler flags give the same bits however the run is made', {skip: fused}, () => {
+  const source = join(root, 'tests/examples/other_flags'), made = join(folder, 'other_flags');
+  run('cmake', ['-S', source, '-B', made, '-G', 'Ninja', `-DCMAKE_PREFIX_PATH=${prefix}`]);
+  run('cmake', ['--build', made]);
+  const ways = {inline: ['--inline'], processes: [], host: ['--host', 'shared=sums,step_planner']};
+  const sums = Object.entries(ways).map(([name, flags]) => {
+    const out = join(folder, `flags_${name}`), env = {POISE_PATH: made};
+    poise(['run', 'stand', '--set', 'graph=other_flags', '--duration', '0.4', ...flags, '--out', out], {env});
+    return poise(['echo', 'SUMS', 'plain', 'of_static', 'of_shared', '--csv', '--log', out], {env});
+  });
+  const counted = poise(['run', 'stand', '--set', 'graph=other_flags', '--duration', '0.4', '--inline', '--count-allocations',
+                         '--out', join(folder, 'counted')], {env: {POISE_PATH: made}});
+  assert.match(counted, /sums\.sum +\d+\.\d a tick, \d+ at most, in 200 ticks/);  // Eigen's matrices of no fixed size
+  assert.match(counted, /task_controller\.\w+ +none/);
+  assert.equal(sums[1], sums[0]);
+  assert.equal(sums[2], sums[0]);
+  // The shared library's rounding is its own, not replaced by that of the same functions elsewhere.
+  const [head, ...rows] = sums[0].trim().split('\n').map((line) => line.split(','));
+  const [plain, shared] = ['plain', 'of_shared'].map((name) => head.findIndex((each) => each.endsWith(name)));
+  assert.ok(rows.length > 150 && rows.some((row) => row[plain] !== row[shared]), sums[0].slice(0, 400));
+});
+
 test('what was installed of the project is found there', () => {
   const installed = join(folder, 'installed');
   run('cmake', ['--install', own, '--prefix', installed]);
