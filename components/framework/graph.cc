@@ -138,8 +138,8 @@ void CheckConnections(const Graph& graph, Problems* problems) {
     } else if (!channel.external() && use.writers.empty()) {
       problems->push_back(
           {field, use.readers.empty()
-                      ? fmt::format("channel {}: nobody writes it; remove it or mark "
-                                    "it external",
+                      ? fmt::format("channel {0}: nobody writes it; remove it (of a base's: "
+                                    "remove: \"{0}\") or mark it external",
                                     channel.name())
                       : fmt::format("channel {}: {} reads it, but nobody writes it", channel.name(),
                                     fmt::join(use.readers, ", "))});

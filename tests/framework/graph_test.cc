@@ -197,9 +197,10 @@ TEST_F(GraphTest, AnInputNobodyWrites) {
   Channel* channel = graph_.add_channel();
   channel->set_name("SPARE");
   channel->set_type("external_push_t");
-  EXPECT_EQ(
-      Problems(graph_),
-      "graph toy_loop: channel[6]: channel SPARE: nobody writes it; remove it or mark it external");
+  EXPECT_EQ(Problems(graph_),
+            "graph toy_loop: channel[6]: channel SPARE: nobody writes it; remove it (of a base's: "
+            "remove: \"SPARE\") "
+            "or mark it external");
 }
 
 TEST_F(GraphTest, TwoWriters) {

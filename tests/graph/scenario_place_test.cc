@@ -137,5 +137,129 @@ TEST_F(ScenarioPlaceTest, ANewScenarioMayBeACopy) {
   ExpectGood("second");
 }
 
+constexpr char kGraphHead[] =
+    "# proto-file: components/framework/graph.proto\n# proto-message: poise.Graph\n";
+
+TEST_F(ScenarioPlaceTest, AGraphLeavesOutWhatItNamesOfItsBase) {
+  const std::string head = std::string(kGraphHead) + "name: \"mine\"\nbase: \"balance\"\n";
+  Write("own/mine.pbtxt", head + "remove: \"redistributer\"\n");
+  ExpectUsageError({"graph", "check", "own/mine.pbtxt"},
+                   {Full("own/mine.pbtxt") + ":5: remove[0]: the base has no component or channel "
+                                             "'redistributer'; did you mean redistributor"});
+  Write("own/mine.pbtxt", std::string(kGraphHead) + "name: \"mine\"\nremove: \"sim\"\n");
+  ExpectUsageError({"graph", "check", "own/mine.pbtxt"}, {":4: remove[0]: there is no base"});
+  // What nobody writes then is told where it is declared.
+  Write("own/mine.pbtxt", head + "remove: \"redistributor\"\n");
+  ExpectUsageError({"graph", "check", "own/mine.pbtxt"},
+                   {(kDeploy / "graphs/balance.pbtxt").string() + ":1",
+                    "channel JOINT_COMMAND: hw_bridge reads it, but nobody writes it"});
+  Write("own/mine.pbtxt", head +
+                              "remove: \"contact_wrench_monitor\"\nremove: \"redistributor\"\n"
+                              "remove: \"task_controller\"\nremove: \"TASK_TORQUE\"\n"
+                              "remove: \"JOINT_COMMAND\"\n"
+                              "channel { name: \"JOINT_COMMAND\" type: \"joint_command_t\" "
+                              "external: true }\n");
+  ExpectUsageError(
+      {"graph", "check", "own/mine.pbtxt"},
+      {"nobody writes it; remove it (of a base's: remove: \"BALANCE_TORQUE\")",
+       "hw_bridge: input joint_command waits for its message, but channel JOINT_COMMAND"});
+  // Another takes the place of one of its name; a fault in it is found in its own line.
+  const std::string component =
+      "component {\n  name: \"task_controller\"\n"
+      "  input { port: \"robot_state\" channel: \"ROBOT_STATE\" }\n"
+      "  input { port: \"support_plan\" channel: \"SUPPORT_PLAN\" }\n"
+      "  output { port: \"task_torque\" channel: \"TASK_TORQUE\" }\n}\n";
+  Write("own/mine.pbtxt", head + "remove: \"task_controller\"\n" + component);
+  ExpectGood("own/mine.pbtxt", "names, types and connections are good");
+  std::string wrong = component;
+  wrong.replace(wrong.find("\"SUPPORT_PLAN\""), 14, "\"SUPORT_PLAN\"");
+  Write("own/mine.pbtxt", head + "remove: \"task_controller\"\n" + wrong);
+  ExpectUsageError({"graph", "check", "own/mine.pbtxt"},
+                   {Full("own/mine.pbtxt") + ":9: component[0].input[1].channel",
+                    "unknown channel 'SUPORT_PLAN'"});
+}
+
+// The maker's page has it (docs/unitree.md).
+TEST_F(ScenarioPlaceTest, AGraphForARealRobotIsBalanceWithoutItsSimulator) {
+  const std::string page = ReadFile(POISE_SOURCE_DIR "/docs/unitree.md");
+  const size_t begin = page.find("    base: \"balance\"\n");
+  ASSERT_NE(begin, std::string::npos);
+  Write("own/g1.pbtxt", page.substr(begin, page.find("\n\nWith", begin) - begin));
+  ExpectGood("own/g1.pbtxt", "names, types and connections are good");
+}
+
+TEST_F(ScenarioPlaceTest, AFileIsCheckedAsWhatItsHeaderSays) {
+  std::string graph = ReadFile((kDeploy / "graphs/balance.pbtxt").string());
+  size_t at = 0;
+  for (int line = 1; line < 20; ++line) at = graph.find('\n', at) + 1;
+  graph[graph.find('{', at)] = '[';
+  Write("own/broken.pbtxt", graph);
+  ExpectUsageError({"graph", "check", "own/broken.pbtxt"}, {Full("own/broken.pbtxt") + ":20:"});
+}
+
+TEST_F(ScenarioPlaceTest, AGraphMayHaveItsScenariosName) {
+  fs::copy_file(StandScenario(), "own/stand.pbtxt");
+  Write("own/policy.pbtxt",
+        "# proto-message: poise.Scenario\nbase: \"stand\"\ngraph: \"policy\"\n");
+  ExpectUsageError({"graph", "check", "own/policy.pbtxt"},
+                   {Full("own/policy.pbtxt") + ":3: graph: no graph named 'policy'",
+                    Full("own/policy.pbtxt") + " (which says that it is a Scenario)"});
+  Write("path/share/poise/graphs/policy.pbtxt",
+        std::string(kGraphHead) + "name: \"policy\"\nbase: \"balance\"\n");
+  setenv("POISE_PATH", fs::absolute("path").c_str(), 1);
+  ExpectGood("own/policy.pbtxt", Full("path/share/poise/graphs/policy.pbtxt"));
+  unsetenv("POISE_PATH");
+}
+
+TEST_F(ScenarioPlaceTest, DrivesKeepTheScenariosOwnGraphAndTypeOrRefuseThem) {
+  fs::copy_file(StandScenario(), "own/stand.pbtxt");
+  Write("own/springs.pbtxt", std::string(kGraphHead) + "name: \"springs\"\nbase: \"balance\"\n");
+  Write("own/mine.pbtxt", "base: \"stand\"\ngraph: \"springs\"\nduration: 0.02\n");
+  ExpectUsageError({"run", "own/mine.pbtxt", "--drives", "ethercat"},
+                   {Full("own/mine.pbtxt") + ":2: graph", "springs", "balance_ethercat"});
+  ExpectUsageError({"run", "own/stand.pbtxt", "--drives", "ethercat", "--set", "graph=balance"},
+                   {"--set graph", "balance_ethercat"});
+  // One that has the drives is run.
+  Write("own/springs.pbtxt",
+        std::string(kGraphHead) + "name: \"springs\"\nbase: \"balance_ethercat\"\n");
+  const ProgramResult own =
+      RunPoise({"run", "own/mine.pbtxt", "--drives", "ethercat", "--out", "own_graph"});
+  EXPECT_THAT(ReadFile("own_graph/run_spec.pbtxt"), HasSubstr("name: \"springs\"")) << own.output;
+
+  const auto profile = [](const std::string& scenario, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"run",      scenario,     "--drives",
+                                          "ethercat", "--out",      "of_profile",
+                                          "--force",  "--duration", "0.02"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    RunPoise(arguments);
+    return ReadFile("of_profile/scenario.pbtxt");
+  };
+  EXPECT_THAT(profile("own/stand.pbtxt", {}), HasSubstr("name: \"elmo_gold\""));
+  EXPECT_THAT(profile("own/stand.pbtxt", {"--set", "drive_profile=synapticon_somanet"}),
+              HasSubstr("name: \"synapticon_somanet\""));
+  Write("own/mine.pbtxt", "base: \"stand\"\ndrive_profile: \"synapticon_somanet\"\n");
+  EXPECT_THAT(profile("own/mine.pbtxt", {}), HasSubstr("name: \"synapticon_somanet\""));
+  const std::string by_hand = ReadFile((kDeploy / "drives/elmo_gold.pbtxt").string());
+  std::string renamed = by_hand;
+  renamed.replace(renamed.find("\"elmo_gold\""), 11, "\"my_drives\"");
+  const std::string group = "hw_bridge { ethercat { master { profile {\n" + renamed + "\n} } } }\n";
+  Write("own/mine.pbtxt", "base: \"stand\"\n" + group);
+  EXPECT_THAT(profile("own/mine.pbtxt", {}), HasSubstr("name: \"my_drives\""));
+  Write("own/mine.pbtxt", "base: \"stand\"\ndrive_profile: \"elmo_gold\"\n" + group);
+  ExpectUsageError({"run", "own/mine.pbtxt", "--drives", "ethercat"},
+                   {Full("own/mine.pbtxt") + ":2: drive_profile", "leave one of both out"});
+  // What nothing of the run reads is refused.
+  ExpectUsageError(
+      {"run", "own/stand.pbtxt", "--drives", "ethercat", "--set", "drive_profile=none"},
+      {"drive_profile", "none"});
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{}, std::vector<std::string>{"--drives", "unitree"}}) {
+    std::vector<std::string> arguments = {"run", "own/stand.pbtxt", "--set",
+                                          "drive_profile=elmo_gold"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    ExpectUsageError(arguments, {"drive_profile", "--drives ethercat"});
+  }
+}
+
 }  // namespace
 }  // namespace poise

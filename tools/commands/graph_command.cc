@@ -17,8 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files are told apart by what they hold, whatever folder they lie in.
+/// Files are told apart by what they say they are, else by what they hold, whatever folder they lie
+/// in.
 bool IsScenario(const std::string& file) {
+  const std::string message = MessageNamedIn(file);
+  if (message == "Scenario" || message == "Graph") return message == "Scenario";
   Scenario scenario;
   try {
     ReadTextProto(file, &scenario);

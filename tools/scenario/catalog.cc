@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <fstream>
 #include <set>
 
 #include "components/framework/configuration/configuration.h"
@@ -16,6 +17,23 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr char kEnding[] = ".pbtxt";
+
+/// The kind of files that hold this message; empty: one of several, or of none here.
+std::string_view KindOf(std::string_view message) {
+  for (const auto& [kind, name] : {std::pair{"scenarios", "Scenario"},
+                                   {"graphs", "Graph"},
+                                   {"sweeps", "Sweep"},
+                                   {"robots", "Robot"}}) {
+    if (message == name) return kind;
+  }
+  return "";
+}
+
+/// True of a file that says itself to be of another kind: a scenario of a graph's name.
+bool IsOtherKind(const std::string& kind, const fs::path& file) {
+  const std::string_view own = KindOf(MessageNamedIn(file));
+  return !own.empty() && own != kind && kind != "drives";
+}
 
 /// True for "base/NAME".
 bool IsBase(const fs::path& name) {
@@ -74,6 +92,20 @@ std::set<std::string> NamesThere(const std::vector<fs::path>& candidates, const 
 
 }  // namespace
 
+std::string MessageNamedIn(const fs::path& file) {
+  std::ifstream text(file);
+  for (std::string line; std::getline(text, line) && line.starts_with('#');) {
+    constexpr std::string_view kMark = "proto-message:";
+    const size_t mark = line.find(kMark);
+    if (mark == std::string::npos) continue;
+    const size_t begin = line.find_first_not_of(' ', mark + kMark.size());
+    if (begin == std::string::npos) return "";
+    const std::string name = line.substr(begin, line.find_first_of(" \r", begin) - begin);
+    return name.substr(name.rfind('.') + 1);  // with a package or without: rfind's npos + 1 is 0
+  }
+  return "";
+}
+
 fs::path DeployDir() {
   const char* const dir = std::getenv("POISE_DEPLOY_DIR");
   if (dir != nullptr && *dir != '\0') return dir;
@@ -93,12 +125,13 @@ std::vector<fs::path> DataFolders() {
 
 std::optional<fs::path> LookForFile(const std::string& kind, const std::string& name,
                                     const fs::path& beside, BaseFiles bases) {
-  // A path with its ending says that this very file is meant.
-  const bool refused = bases == BaseFiles::kRefused && !name.ends_with(kEnding) && IsBase(name);
+  const bool with_ending = name.ends_with(kEnding);
+  const bool refused = bases == BaseFiles::kRefused && !with_ending && IsBase(name);
   if (name.empty() || refused) return {};
   std::error_code error;
+  // A path with its ending says that this very file is meant.
   for (const fs::path& file : Candidates(kind, name, beside)) {
-    if (fs::is_regular_file(file, error)) return file;
+    if (fs::is_regular_file(file, error) && (with_ending || !IsOtherKind(kind, file))) return file;
   }
   return {};
 }
@@ -135,9 +168,12 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
   for (const std::string& kind : kinds) {
     const std::vector<fs::path> candidates = Candidates(kind, name, beside);
     for (const fs::path& file : candidates) {
-      if (std::find(searched.begin(), searched.end(), file.string()) == searched.end()) {
-        searched.push_back(file.string());
-      }
+      std::error_code error;
+      const bool other = fs::is_regular_file(file, error) && IsOtherKind(kind, file);
+      const std::string place = other ? fmt::format("{} (which says that it is a {})",
+                                                    file.string(), MessageNamedIn(file))
+                                      : file.string();
+      if (std::ranges::find(searched, place) == searched.end()) searched.push_back(place);
     }
     // A file beside may be of any kind: it is named where its name is near alone.
     names.merge(NamesThere(candidates, name));

@@ -24,7 +24,8 @@ enum class BaseFiles { kRefused, kTaken };
 /// them: NAME or NAME.pbtxt beside the file that names it, in `beside` (for a name of the command
 /// line: the current folder), then in `kind` of each of DataFolders. A name that ends in .pbtxt
 /// means no other ending; an absolute one is looked for only there. A robot's name may be that of
-/// its folder, which holds the text.
+/// its folder, which holds the text. A file that says itself to be of another kind (MessageNamedIn)
+/// is meant with its ending alone: a graph may have its scenario's name.
 std::optional<std::filesystem::path> LookForFile(const std::string& kind, const std::string& name,
                                                  const std::filesystem::path& beside,
                                                  BaseFiles bases = BaseFiles::kRefused);
@@ -37,6 +38,10 @@ std::filesystem::path FindFile(const std::string& kind, const std::string& name,
 /// FindFile of a name that may be of several kinds: the first kind that has it.
 std::filesystem::path FindFileOfKinds(const std::vector<std::string>& kinds,
                                       const std::string& name, const std::filesystem::path& beside);
+
+/// "Graph" where the comments that a file begins with have "proto-message: poise.Graph"; empty:
+/// they name none.
+std::string MessageNamedIn(const std::filesystem::path& file);
 
 /// Names of the files in `kind` of DataFolders, sorted, those in a folder named base aside.
 std::vector<std::string> ListNames(const std::string& kind);

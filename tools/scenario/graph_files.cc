@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "tools/scenario/catalog.h"
 
@@ -13,14 +14,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "channel[3].type" less `count` elements that other files have: "channel[1].type". Empty: it is
-/// one of them.
-std::string WithoutFirst(const std::string& field, const char* list, int count) {
-  const std::string begin = fmt::format("{}[", list);
-  if (!field.starts_with(begin)) return field;
-  const int index = std::atoi(field.c_str() + begin.size());
-  if (index < count) return {};
-  return fmt::format("{}{}{}", begin, index - count, field.substr(field.find(']')));
+/// Removes the element of that name from a list and its places. False: there is none.
+template <class List, class Places>
+bool Remove(const std::string& name, List* list, Places* places) {
+  const auto found = std::ranges::find(*list, name, [](const auto& each) { return each.name(); });
+  if (found == list->end()) return false;
+  places->erase(places->begin() + (found - list->begin()));
+  list->erase(found);
+  return true;
 }
 
 }  // namespace
@@ -31,11 +32,8 @@ GraphFiles::GraphFiles(const std::string& file) {
     File read{name, ReadFile(name), {}};
     ParseTextProto(read.text, name, &read.graph);
     files_.insert(files_.begin(), read);
-    if (!read.graph.has_base()) return;
-    const auto fail = [&](const std::string& problem) {
-      throw ConfigError(
-          fmt::format("{}:{}: base: {}", name, LocateField(read.text, "base", Graph()), problem));
-    };
+    if (!read.graph.has_base()) break;
+    const auto fail = [&](const std::string& problem) { Fail(read, "base", problem); };
     fs::path base;
     try {
       base = FindFile("graphs", read.graph.base(), fs::path(name).parent_path());
@@ -46,26 +44,51 @@ GraphFiles::GraphFiles(const std::string& file) {
     if (std::any_of(files_.begin(), files_.end(), same)) fail("the bases form a loop");
     name = base.string();
   }
+  Merge();
 }
 
-Graph GraphFiles::Merged() const {
-  Graph merged;
-  for (const File& file : files_) merged.MergeFrom(file.graph);
-  merged.clear_base();
-  return merged;
+void GraphFiles::Fail(const File& file, const std::string& field, const std::string& problem) {
+  throw ConfigError(fmt::format("{}:{}: {}: {}", file.name,
+                                LocateField(file.text, field, file.graph), field, problem));
+}
+
+void GraphFiles::Merge() {
+  for (size_t f = 0; f < files_.size(); ++f) {
+    const Graph& graph = files_[f].graph;
+    for (int i = 0; i < graph.remove_size(); ++i) {
+      const std::string& name = graph.remove(i);
+      if (Remove(name, merged_.mutable_component(), &components_) ||
+          Remove(name, merged_.mutable_channel(), &channels_)) {
+        continue;
+      }
+      std::vector<std::string> names;
+      for (const ComponentInstance& each : merged_.component()) names.push_back(each.name());
+      for (const Channel& each : merged_.channel()) names.push_back(each.name());
+      Fail(files_[f], fmt::format("remove[{}]", i),
+           names.empty() ? "there is no base to remove from; name one with base"
+                         : fmt::format("the base has no component or channel '{}'; {}", name,
+                                       Suggest(name, names)));
+    }
+    merged_.MergeFrom(graph);
+    for (int i = 0; i < graph.channel_size(); ++i) channels_.push_back({f, i});
+    for (int i = 0; i < graph.component_size(); ++i) components_.push_back({f, i});
+  }
+  merged_.clear_base();
+  merged_.clear_remove();
 }
 
 std::string GraphFiles::Line(const GraphError::Problem& problem) const {
   const File* place = &files_.back();
   std::string field = problem.field;
-  for (auto file = files_.begin(); file != files_.end(); ++file) {
-    const int channels = file->graph.channel_size();
-    const int components = file->graph.component_size();
-    const std::string later =
-        WithoutFirst(WithoutFirst(field, "channel", channels), "component", components);
-    place = &*file;
-    if (later.empty() || file + 1 == files_.end()) break;
-    field = later;
+  const size_t bracket = field.find('[');
+  const std::vector<Place>& places = field.starts_with("channel") ? channels_ : components_;
+  const size_t index = bracket == std::string::npos
+                           ? places.size()
+                           : static_cast<size_t>(std::atoi(field.c_str() + bracket + 1));
+  if (index < places.size()) {  // else a run has added it, or the problem is of the whole graph
+    place = &files_[places[index].file];
+    field = fmt::format("{}[{}{}", field.substr(0, bracket), places[index].index,
+                        field.substr(field.find(']')));
   }
   const int line = LocateField(place->text, field, Graph());
   const std::string where = line > 0 ? fmt::format("{}:{}", place->name, line) : place->name;

@@ -21,6 +21,7 @@
 #include "components/robot_files/robot_files.h"
 #include "components/step_planner/walk_config.h"
 #include "fmt/format.h"
+#include "tools/scenario/catalog.h"
 #include "tools/scenario/graph_files.h"
 #include "tools/scenario/library_versions.h"
 #include "tools/scenario/registry.h"
@@ -183,6 +184,23 @@ void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
   }
 }
 
+/// Refuses a graph without what emulates the drives of --drives: its bridge would look for a robot.
+void CheckDrivesOf(const RunChanges& changes, const LoadedScenario& loaded, const Graph& graph) {
+  if (changes.drives.empty()) return;
+  for (const ComponentInstance& instance : graph.component()) {
+    for (const DriveLink& end : Components().TraitsOf(TypeOf(instance)).drive_links) {
+      if (end.drives && HasField(loaded.scenario, end.group)) return;
+    }
+  }
+  const fs::path overlay = FindFile("drives", changes.drives, fs::current_path());
+  Scenario drives;
+  ReadTextProto(overlay.string(), &drives);
+  FailField(loaded, "graph",
+            fmt::format("the graph {} ({}) has no emulated drives; --drives {} runs {}: base yours "
+                        "on that, or leave --drives out",
+                        graph.name(), loaded.graph_file, changes.drives, drives.graph()));
+}
+
 /// Refuses what another engine than the run's is told: it would change nothing.
 void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) {
   std::string engine;
@@ -330,6 +348,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   *spec.mutable_graph() = GraphFiles(loaded.graph_file).Merged();
   ChooseEngine(loaded, spec.mutable_graph());
   CheckEngineOf(changes.set, spec.graph());
+  CheckDrivesOf(changes, loaded, spec.graph());
   HostComponents(changes, spec.mutable_graph());
   for (int i = 0; i < spec.graph().component_size(); ++i) {
     ConnectWhere(scenario, spec.mutable_graph()->mutable_component(i), spec.mutable_graph());

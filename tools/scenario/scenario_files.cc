@@ -99,10 +99,14 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
   }
   own_ = files_.size() - 1;
   if (overlay.empty()) return;
+  const Scenario own = Merged();
   File read;
   read.name = overlay.string();
   read.text = ReadFile(read.name);
   ParseScenario(read.text, read.name, &read.fields);
+  // A graph or a type of drives of the scenario's own is not to be replaced.
+  if (own.graph() != Scenario().graph()) read.fields.clear_graph();
+  if (own.has_drive_profile()) read.fields.clear_drive_profile();
   files_.push_back(std::move(read));
 }
 

@@ -22,7 +22,8 @@ class ScenarioFiles {
  public:
   /// Reads `file`, its base (FindFile), and so on. Throws ConfigError "file:line: base: problem":
   /// no such file, bases that form a loop; and ParseTextProto's. `overlay`: a file of the same kind
-  /// without a base, whose fields come last; empty: none.
+  /// without a base, whose fields come last, but for `graph` (other than the default) and
+  /// `drive_profile` where the scenario has its own; empty: none.
   explicit ScenarioFiles(const std::filesystem::path& file,
                          const std::filesystem::path& overlay = {});
 

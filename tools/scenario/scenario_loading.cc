@@ -191,6 +191,8 @@ std::string Describe(const LoadedScenario& loaded, const FieldChange& change,
   return fmt::format("{}:{}: {}: {}: {}", place.file, place.line, place.field, field, problem);
 }
 
+void ReadDriveProfile(LoadedScenario* loaded);
+
 void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
   const size_t equals = change.set.find('=');
   if (equals == std::string::npos || equals == 0) {
@@ -218,6 +220,7 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
         Describe(*loaded, change, error.field(), fmt::format("{}{}", error.problem(), hint)));
   }
   loaded->changes.push_back(change);
+  if (path == "drive_profile") ReadDriveProfile(loaded);
 }
 
 std::vector<std::string> VariantNames(const Scenario& scenario) {
@@ -336,7 +339,26 @@ std::vector<DriveLink> DriveLinksOf(const Scenario& scenario) {
   return result;
 }
 
-/// The drives' type, their link, and whose time they follow.
+/// Puts the type of drives that drive_profile names into the configuration of who speaks to them.
+void ReadDriveProfile(LoadedScenario* loaded) {
+  Scenario* const scenario = &loaded->scenario;
+  if (!scenario->has_drive_profile()) return;
+  bool read = false;
+  for (const DriveLink& end : DriveLinksOf(*scenario)) {
+    if (end.profile.empty()) continue;
+    ReadTextProto(Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile()),
+                  Group(scenario, end.profile));
+    read = true;
+  }
+  if (!read) {
+    FailField(*loaded, "drive_profile",
+              "the run has no drives that take a type; run it with --drives ethercat, or leave it "
+              "out");
+  }
+  scenario->clear_drive_profile();  // a run's record has the profile alone, and can be run again
+}
+
+/// The drives' link, and whose time they follow.
 void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   Scenario* const scenario = &loaded->scenario;
   constexpr std::string_view kRaw = "raw:";
@@ -359,10 +381,6 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
     throw ConfigError("--capture: these drives have no frames");
   }
   for (const DriveLink& end : ends) {
-    if (scenario->has_drive_profile() && !end.profile.empty()) {
-      ReadTextProto(Resolve(*loaded, "drives", "drive_profile", scenario->drive_profile()),
-                    Group(scenario, end.profile));
-    }
     if (!changes.realtime && !end.simulated_time.empty()) {
       ApplyChange({end.simulated_time + "=true", "--drives"}, loaded);
     }
@@ -378,6 +396,22 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
       SetField(scenario, end.capture, changes.capture);
     }
   }
+}
+
+/// The profile that drive_profile names, unless the scenario tells it field by field and
+/// drive_profile is that of --drives.
+void ReadFirstProfile(const fs::path& overlay, LoadedScenario* loaded) {
+  if (!loaded->scenario.has_drive_profile()) return;
+  for (const DriveLink& end : DriveLinksOf(loaded->scenario)) {
+    if (end.profile.empty() || !HasField(loaded->scenario, end.profile)) continue;
+    if (loaded->files.Locate("drive_profile").file == overlay.string()) {
+      loaded->scenario.clear_drive_profile();
+      return;
+    }
+    FailField(*loaded, "drive_profile",
+              fmt::format("the scenario has {} as well; leave one of both out", end.profile));
+  }
+  ReadDriveProfile(loaded);
 }
 
 /// What the variant sets in the group of fields at `parent`.
@@ -428,6 +462,7 @@ LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) 
   Scenario* const scenario = &loaded.scenario;
   CheckVariants(loaded);
   if (!changes.drives.empty()) ApplyDrives(changes, &loaded);
+  ReadFirstProfile(overlay, &loaded);
   if (changes.realtime) ApplyRealtime(&loaded);
   for (const FieldChange& change : AblationChanges(changes.without, changes.ideal)) {
     ApplyChange(change, &loaded);
