@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "logging/run_log_writer.h"
 
@@ -51,8 +52,9 @@ void CheckLogSpec(const RunSpec& spec, const std::string& path) {
     }
     if (type == nullptr || type->has_strings || type->run_id_offset < 0 ||
         static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
-      throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts", path,
-                                 channel.name(), channel.type()));
+      throw LogError(fmt::format("{}: RUN_INFO: channel {} has no known type '{}' and counts{}",
+                                 path, channel.name(), channel.type(),
+                                 type == nullptr ? "; " + ModulesSearched() : ""));
     }
     for (size_t i = 0; i < type->count_names.size(); ++i) {
       const int32_t count = channel.count(static_cast<int>(i));
@@ -72,6 +74,7 @@ bool IsKept(const RunSpec& spec, const std::string& channel) {
 
 ChannelTicks::ChannelTicks(const RunSpec& spec, const Channel& channel, uint64_t log_size)
     : filter_(MakeFilter(spec, channel)),
+      fingerprint_(ChannelType(channel).fingerprint),
       first_tick_(spec.cut().first_tick()),
       end_tick_(spec.num_ticks() > 0 ? std::min(spec.num_ticks(), kMaxTicks) : kMaxTicks) {
   const auto records = static_cast<int64_t>(log_size) / kMinRecordSize;
@@ -83,6 +86,8 @@ std::optional<int64_t> ChannelTicks::Check(std::span<const uint8_t> data) {
   if (filter_.Check(data.data(), data.size(), first_tick_, end_tick_ - 1) !=
       PacketVerdict::kAccepted) {
     ++completeness_.refused;
+    const bool other = data.size() >= 8 && ReadInt64(data.data()) != fingerprint_;
+    completeness_.other_type += other ? 1 : 0;
     return {};
   }
   const int64_t tick = filter_.tick(data.data());

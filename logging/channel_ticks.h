@@ -21,6 +21,7 @@ struct ChannelCompleteness {
   int64_t duplicate = 0;     ///< messages of a tick that was there already
   int64_t out_of_order = 0;  ///< messages of an earlier tick than the one before
   int64_t refused = 0;       ///< wrong size, fingerprint, counts, run or tick, or not finite
+  int64_t other_type = 0;    ///< of the refused: another type's, or another version's of the type
 };
 
 /// First and last tick of a gap.
@@ -62,8 +63,9 @@ class ChannelTicks {
 
  private:
   PacketFilter filter_;
-  int64_t first_tick_;  // that may be
-  int64_t end_tick_;    // first that may not
+  int64_t fingerprint_;  // of the channel's type
+  int64_t first_tick_;   // that may be
+  int64_t end_tick_;     // first that may not
   std::vector<bool> seen_;
   int64_t newest_ = -1;
   ChannelCompleteness completeness_;

@@ -177,6 +177,13 @@ std::string Describe(const DamageSurvey& damage) {
 void AddChannelProblems(const ChannelSurvey& channel, size_t limit,
                         std::vector<std::string>* problems) {
   const ChannelCompleteness& ticks = channel.ticks;
+  if (ticks.messages == 0 && ticks.other_type > 0 && ticks.other_type == ticks.refused) {
+    problems->push_back(
+        fmt::format("{}: all {} messages are of another version of their type, as a Poise of "
+                    "another commit wrote them; that one reads them",
+                    ticks.name, ticks.refused));
+    return;
+  }
   if (!channel.missing.empty()) {
     std::vector<std::string> ranges;
     for (const TickRange& range : channel.missing) {

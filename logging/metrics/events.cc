@@ -435,6 +435,29 @@ void AddBridge(const RunRecord& run, EventList* events) {
   }
 }
 
+/// Once: whoever commands more than the drives may close is not to learn it from the motion.
+void AddImpedance(const RunRecord& run, EventList* events) {
+  const ElementNames names(run.robot);
+  std::map<int, int64_t> first;  // tick, by joint
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bridge_status_t* bridge = run.bridge.at(tick);
+    if (bridge == nullptr) continue;
+    for (size_t j = 0; j < bridge->saturated.size(); ++j) {
+      if ((bridge->saturated[j] & bridge_status_t::LIMIT_IMPEDANCE) == 0) continue;
+      first.emplace(static_cast<int>(j), tick);
+    }
+  }
+  if (first.empty()) return;
+  const auto earliest =
+      std::ranges::min_element(first, {}, [](const auto& at) { return at.second; });
+  const std::string others =
+      first.size() > 1 ? fmt::format(" and {} others", first.size() - 1) : std::string();
+  events->Add(earliest->second, "impedance_cut",
+              fmt::format("stiffness, damping, position or velocity commanded for {}{} is beyond "
+                          "what the bridge allows, and was cut",
+                          names.Joint(earliest->first), others));
+}
+
 Answer PushForce(const RunRecord& run, int64_t tick) {
   const external_push_t* push = run.push.at(tick);
   if (push == nullptr) return {};
@@ -574,6 +597,7 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddCapturePoint(run, &events);
   AddSteps(run, &events);
   AddBridge(run, &events);
+  AddImpedance(run, &events);
   AddPush(run, ended, &events);
   AddCrane(run, &events);
   AddRefusals(run, &events);

@@ -426,6 +426,19 @@ TEST_F(EventsTest, AStopNamesTheJointThatItIsAbout) {
                              "running to stopping: joint too fast (right_knee_pitch)")));
 }
 
+TEST_F(EventsTest, AnImpedanceThatIsCutIsSaidOnce) {
+  EXPECT_TRUE(Named("impedance_cut").empty());
+  for (size_t t = 60; t < kTicks; ++t) {
+    bridge_[t].saturated[3] = bridge_status_t::LIMIT_IMPEDANCE | bridge_status_t::LIMIT_TORQUE;
+    bridge_[t].saturated[5] = t > 70 ? bridge_status_t::LIMIT_IMPEDANCE : 0;
+  }
+  EXPECT_THAT(Named("impedance_cut"),
+              ElementsAre(Is(0.12, "impedance_cut",
+                             "stiffness, damping, position or velocity commanded for "
+                             "right_knee_pitch and 1 others is beyond what the bridge allows, and "
+                             "was cut")));
+}
+
 TEST_F(EventsTest, APushStandsOutOfItsSensorsNoise) {
   // Noise of a sign that changes: differences of 0.4 N everywhere; a push of 20 ticks upon it.
   for (size_t t = 0; t < kTicks; ++t) push_[t].force[0] = t % 2 == 0 ? 0.2 : -0.2;

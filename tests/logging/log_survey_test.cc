@@ -82,6 +82,18 @@ TEST_F(LogSurveyTest, CountsDoubleDisorderedAndRefused) {
       << problems[1];
 }
 
+TEST_F(LogSurveyTest, SaysThatAChannelIsOfAnotherVersion) {
+  std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
+  for (int64_t tick = 0; tick < kLogSurveyTicks; ++tick) {
+    std::vector<uint8_t>& data = events[PushOf(tick)].data;
+    data[0] ^= 0xFF;               // of its fingerprint
+    data.resize(data.size() - 8);  // a field less
+  }
+  EXPECT_EQ(Problem(events),
+            "PUSH: all 10 messages are of another version of their type, as a Poise of another "
+            "commit wrote them; that one reads them");
+}
+
 TEST_F(LogSurveyTest, SaysWhatDamageTookAndWhere) {
   const std::vector<RawEvent> events = SmallLog(kLogSurveyTicks);
   WriteRawLog(path_, events);

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/run/run_registry.h"
@@ -89,8 +90,9 @@ LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::stri
         static_cast<size_t>(channel.count_size()) != type->count_names.size()) {
       throw ConfigError(
           fmt::format("{}: channel {} has no known type '{}' with its counts; is the run of "
-                      "another version of Poise?",
-                      (dir_ / "run_spec.pbtxt").string(), channel.name(), channel.type()));
+                      "another version of Poise?{}",
+                      (dir_ / "run_spec.pbtxt").string(), channel.name(), channel.type(),
+                      type == nullptr ? " " + ModulesSearched() : ""));
     }
     const std::vector<int32_t> counts(channel.count().begin(), channel.count().end());
     lanes_.emplace(channel.name(), Lane{i, type,
