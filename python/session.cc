@@ -12,6 +12,8 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
+#include "logging/metrics/bridge_words.h"
+#include "poise/bridge_status_t.hpp"
 #include "sim/push.h"
 #include "tools/cli/output_place.h"
 #include "tools/scenario/registry.h"
@@ -176,6 +178,10 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
   override_.assign(static_cast<size_t>(model_->num_joints()),
                    std::numeric_limits<double>::quiet_NaN());
   const GraphPlan& plan = runner_->plan();
+  written_.assign(plan.channels.size(), false);
+  for (const ComponentInstance& instance : spec_.graph().component()) {
+    replaced_.push_back(options.replaced.contains(instance.name()));
+  }
   for (size_t c = 0; c < plan.channels.size(); ++c) {
     const MessageType* const type = FindMessageType(plan.channels[c].type);
     layouts_.push_back(type == nullptr || type->has_strings
@@ -199,13 +205,9 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     record_ = std::make_unique<logging::InlineRecord>(spec_, info, runner_.get());
   }
   runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
-    if (overrides_ && channel == command_channel_) {
-      // The port's own message, which nobody has read yet.
-      auto& command =
-          *const_cast<joint_command_t*>(static_cast<const joint_command_t*>(output.message()));
-      for (size_t j = 0; j < override_.size() && j < command.torque.size(); ++j) {
-        if (!std::isnan(override_[j])) command.torque[j] = override_[j];
-      }
+    written_[static_cast<size_t>(channel)] = true;
+    if (channel == command_channel_) {
+      Override(const_cast<joint_command_t*>(static_cast<const joint_command_t*>(output.message())));
     }
     if (recorder_) recorder_->Add(channel, output, tick);
     if (store_) store_->Add(channel, tick.index, output);
@@ -241,7 +243,7 @@ void Session::Push(const std::string& body, const Eigen::Vector3d& force,
   const int index = body.empty() ? 0 : FindBody(*model_, body, "body");
   operate::act_t act{};
   act.run_id = spec_.run_id();
-  act.tick = runner_->ticks_completed();
+  act.tick = runner_->ticks_completed() + (runner_->begun() ? 1 : 0);
   act.id = next_act_++;
   act.component = sim_index_;
   act.kind = operate::act_t::KIND_PUSH;
@@ -279,6 +281,51 @@ void Session::OverrideTorque(int joint, std::optional<double> torque) {
   overrides_ = std::ranges::any_of(override_, [](double t) { return !std::isnan(t); });
 }
 
+void Session::SetCommand(std::optional<Command> command) {
+  const Lock lock(this);
+  if (command_channel_ < 0) throw ConfigError("the graph has no joint_command_t");
+  std::optional<joint_command_t> whole;  // the rest would tell of the controller's own torque
+  if (command) {
+    const auto check = [&](const char* field, const std::vector<double>& values, bool negative) {
+      if (values.size() != override_.size()) {
+        throw ConfigError(fmt::format("{}: has {} numbers, the robot {} joints", field,
+                                      values.size(), override_.size()));
+      }
+      for (const double value : values) {
+        if (std::isfinite(value) && (negative || value >= 0)) continue;
+        throw ConfigError(fmt::format("{}: {} is not a finite number{}", field, value,
+                                      negative ? "" : ", 0 or more"));
+      }
+    };
+    check("torque", command->torque, true);
+    check("position", command->position, true);
+    check("velocity", command->velocity, true);
+    check("stiffness", command->stiffness, false);
+    check("damping", command->damping, false);
+    MessageTraits<joint_command_t>::Resize(
+        whole.emplace(), runner_->plan().channels[static_cast<size_t>(command_channel_)].counts);
+    whole->torque = std::move(command->torque);
+    whole->position = std::move(command->position);
+    whole->velocity = std::move(command->velocity);
+    whole->stiffness = std::move(command->stiffness);
+    whole->damping = std::move(command->damping);
+  }
+  command_ = std::move(whole);
+}
+
+void Session::Override(joint_command_t* command) {
+  if (command_) {
+    command_->run_id = command->run_id;
+    command_->tick = command->tick;
+    command_->utime = command->utime;
+    *command = *command_;
+  }
+  if (!overrides_) return;
+  for (size_t j = 0; j < override_.size() && j < command->torque.size(); ++j) {
+    if (!std::isnan(override_[j])) command->torque[j] = override_[j];
+  }
+}
+
 void Session::Inject(const std::string& channel, const std::vector<uint8_t>& bytes) {
   const Lock lock(this);
   if (!runner_->Inject(channel, bytes)) {
@@ -314,10 +361,20 @@ const OutputPort* Session::Writer(int channel) {
 
 std::vector<uint8_t> Session::Message(const std::string& channel) {
   const Lock lock(this);
-  const OutputPort* const port = Writer(FindChannel(channel));
+  const int index = FindChannel(channel);
+  const OutputPort* const port = Writer(index);
   if (port == nullptr) throw ConfigError(fmt::format("{}: nobody in the graph writes it", channel));
   if (runner_->ticks_completed() == 0) {
-    throw ConfigError(fmt::format("{}: has no message before the first tick; call step", channel));
+    runner_->BeginTick([&](int component) {
+      return replaced_[static_cast<size_t>(component)] ||
+             (command_channel_ >= 0 &&
+              component ==
+                  runner_->plan().channels[static_cast<size_t>(command_channel_)].writer.component);
+    });
+  }
+  if (!written_[static_cast<size_t>(index)]) {
+    throw ConfigError(
+        fmt::format("{}: has no message before the first tick's command; call step", channel));
   }
   std::vector<uint8_t> bytes(static_cast<size_t>(port->encoded_size()));
   port->Encode(bytes.data(), static_cast<int>(bytes.size()));
@@ -382,7 +439,20 @@ bool Session::failed() {
 
 std::string Session::detail() {
   const Lock lock(this);
-  return runner_->end_detail();
+  std::string detail = runner_->end_detail();
+  const std::vector<GraphPlan::ChannelPlan>& channels = runner_->plan().channels;
+  const auto status = std::ranges::find(channels, "bridge_status_t", &GraphPlan::ChannelPlan::type);
+  const auto at = static_cast<size_t>(status - channels.begin());
+  if (at >= channels.size() || !written_[at]) return detail;
+  const OutputPort* const port = Writer(static_cast<int>(at));
+  if (port == nullptr) return detail;
+  const auto& bridge = *static_cast<const bridge_status_t*>(port->message());
+  if (bridge.state < bridge_status_t::STATE_STOPPING ||
+      bridge.reason == bridge_status_t::REASON_SHUTDOWN) {
+    return detail;
+  }
+  return fmt::format("{}{}hw_bridge has stopped the robot: {}", detail, detail.empty() ? "" : "; ",
+                     logging::BridgeReasonText(bridge, names_));
 }
 
 }  // namespace poise::python

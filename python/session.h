@@ -15,6 +15,7 @@
 #include "components/framework/runners/inline_runner.h"
 #include "components/messages/foreign_component.h"
 #include "logging/recording/inline_recorder.h"
+#include "poise/joint_command_t.hpp"
 #include "python/run_store.h"
 #include "sim/sim_component.h"
 #include "tools/run/run_dir.h"
@@ -57,9 +58,19 @@ class Session {
   /// The joint's commanded torque (N·m) in place of the redistributor's; empty: no longer. Throws
   /// ConfigError: no such joint, not finite.
   void OverrideTorque(int joint, std::optional<double> torque);
+  /// What the bridge is commanded from the next tick on, in the controller's place, by joint: N·m,
+  /// rad, rad/s, N·m/rad, N·m·s/rad.
+  struct Command {
+    std::vector<double> torque, position, velocity, stiffness, damping;
+  };
+  /// Empty: the controller's again. Throws ConfigError: not the robot's number of joints, not
+  /// finite, stiffness or damping negative.
+  void SetCommand(std::optional<Command> command);
   /// Shows a message to the readers of an external channel. Throws ConfigError when it is refused.
   void Inject(const std::string& channel, const std::vector<uint8_t>& bytes);
-  /// The last message of a channel. Throws ConfigError: no such channel, none yet.
+  /// The last message of a channel. Before the first tick those are there that come before any
+  /// command: its stages up to the first replaced component, or the command's writer, are run.
+  /// Throws ConfigError: no such channel, none yet.
   std::vector<uint8_t> Message(const std::string& channel);
   const MessageLayout& Layout(const std::string& channel) const;
   const MessageType& Type(const std::string& channel) const;
@@ -83,6 +94,8 @@ class Session {
   void Replace(const SessionOptions& options, ComponentRegistry* registry);
   int FindChannel(const std::string& name) const;
   const OutputPort* Writer(int channel);
+  /// Puts what is commanded from outside into the controller's message, which nobody has read yet.
+  void Override(joint_command_t* command);
 
   RunSpec spec_;
   std::string scenario_;
@@ -98,7 +111,10 @@ class Session {
   int64_t next_act_ = 1;
   std::vector<double> override_;  // by joint; NaN: none
   bool overrides_ = false;
+  std::optional<joint_command_t> command_;
   int command_channel_ = -1;
+  std::vector<bool> written_;   // by channel: a message is there
+  std::vector<bool> replaced_;  // by component
 
   SessionOptions::Keep keep_;
   std::optional<RunDir> dir_;

@@ -116,6 +116,18 @@ void BindSession(py::module_* module) {
                return 0;
              });
            })
+      .def("set_command",
+           [](Session& session, const std::optional<std::array<std::vector<double>, 5>>& fields) {
+             std::optional<Session::Command> command;
+             if (fields) {
+               const auto& [torque, position, velocity, stiffness, damping] = *fields;
+               command = {torque, position, velocity, stiffness, damping};
+             }
+             Unlocked([&] {
+               session.SetCommand(std::move(command));
+               return 0;
+             });
+           })
       .def("inject",
            [](Session& session, const std::string& channel, const py::bytes& bytes) {
              const std::string text = bytes;

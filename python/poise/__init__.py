@@ -7,7 +7,18 @@
 docs/python.md says what there is.
 """
 
-from ._poise import ConfigError, Error, LogError, RobotError, __version__, metrics, names, version
+import os
+import sys
+
+try:
+    import numpy  # noqa: F401
+
+    from ._poise import ConfigError, Error, LogError, RobotError, __version__, metrics, names, version
+except ModuleNotFoundError as error:
+    if os.path.realpath(sys.executable) == os.path.realpath("/usr/bin/python3"):
+        raise
+    raise ModuleNotFoundError(f"{error}, for {sys.executable}: poise is made for Debian's Python and numpy; run /usr/bin/python3",
+                              name=error.name) from error
 from . import balance, plots
 from .components import Component, main
 from .environment import Environment, run

@@ -17,6 +17,8 @@ def _changes(changes, **others):
             value = "true" if value else "false"
         elif isinstance(value, (float, np.floating)):
             value = repr(float(value))
+        elif value is None:
+            value = ""  # a list or a group without elements
         settings.append(f"{field}={value}")
     without = others.pop("without", ())
     others["without"] = [without] if isinstance(without, str) else list(without)
@@ -59,7 +61,7 @@ class Environment:
         env["GROUND_TRUTH"].com_position
 
     scenario: a name (poise.names("scenarios")) or a file.
-    changes: {"sim.push[0].peak": 120}: fields as `poise list fields` names them.
+    changes: {"sim.push[0].peak": 120}: fields as `poise list fields` names them; None empties a list or a group.
     robot, engine, variant, seed, ideal, without: as the flags of `poise run`. duration: s; None: it does not end by itself.
     components: {"task_controller": object}: poise.Component objects in the place of the graph's.
     plant: a Run whose sensors are played, over and over, in the place of the simulated robot: nothing is simulated.
@@ -103,7 +105,7 @@ class Environment:
         return self._session.step(ticks)
 
     def __getitem__(self, channel):
-        """The last message of a channel."""
+        """The last message of a channel. Before the first tick: what the first command will answer."""
         return Snapshot(self._session.message(channel), channel)
 
     observe = __getitem__
@@ -127,6 +129,19 @@ class Environment:
                 raise _poise.ConfigError(f"the robot has no joint '{joint}'; it has {', '.join(names)}")
             joint = names.index(joint)
         self._session.override_torque(joint, None if torque is None else float(torque))
+
+    def command(self, *, torque=None, position=None, velocity=None, stiffness=None, damping=None):
+        """What the bridge is commanded in the controller's place from now on: torque + stiffness (position - q) +
+        damping (velocity - qd), closed by the drives. By joint (joint_names), or one number for all: N·m, rad, rad/s,
+        N·m/rad, N·m·s/rad; what is not given is 0. Without arguments: the controller commands again.
+        """
+        given = (torque, position, velocity, stiffness, damping)
+        if all(field is None for field in given):
+            self._session.set_command(None)
+            return
+        joints = len(self.joint_names)
+        self._session.set_command([np.broadcast_to(np.asarray(0.0 if field is None else field, float), joints).tolist()
+                                   for field in given])
 
     def finish(self):
         """Ends the run. Returns it as a Run where it was recorded, else None."""
@@ -169,7 +184,7 @@ class Environment:
 
     @property
     def detail(self):
-        """Why it ended: "sim: the robot fell at 1.234 s (...)"."""
+        """Why it ended, "sim: the robot fell at 1.234 s (...)", and why the bridge has stopped the robot; empty: neither."""
         return self._session.detail
 
     @property

@@ -222,6 +222,10 @@ class AsProcess(unittest.TestCase):
             refused = self.poise("run", "sprung")
             self.assertEqual(refused.returncode, 2)
             self.assertIn("springs.json: is no description of a component", refused.stderr)
+            self.assertIn("unknown component type 'springs'", refused.stderr)
+            listed = self.poise("list", "robots")  # what has nothing to do with it goes on
+            self.assertEqual(listed.returncode, 0)
+            self.assertIn("springs.json: is no description of a component", listed.stderr)
         self.describe(self.told.replace("task_torque_t", "health_t"))
         self.assertEqual(self.poise("run", "sprung").returncode, 2)
 

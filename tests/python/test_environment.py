@@ -105,6 +105,85 @@ class Steps(unittest.TestCase):
         with self.assertRaisesRegex(poise.ConfigError, "nothing is simulated"):
             env.push([1, 0, 0])
 
+    def test_what_is_seen_before_the_first_tick_is_what_its_command_answers(self):
+        looked, stepped = (poise.Environment("stand", seed=5, record=True) for _ in range(2))
+        for env in (looked, looked.reset(seed=5)):
+            first = env["ROBOT_SENSORS"].joint_position, env["ROBOT_STATE"].q, env["GROUND_TRUTH"].com_position
+            self.assertEqual(env.tick, 0)
+        looked.step(100)
+        stepped.step(100)
+        run, other = looked.finish(), stepped.finish()
+        np.testing.assert_array_equal(first[0], run["ROBOT_SENSORS"].joint_position[0])
+        np.testing.assert_array_equal(first[1], run["ROBOT_STATE"].q[0])
+        np.testing.assert_array_equal(first[2], run["GROUND_TRUTH"].com_position[0])
+        for name in run:  # looking changes nothing
+            for path in run[name].fields:
+                if path != "run_id":
+                    np.testing.assert_array_equal(run[name][path], other[name][path], f"{name} {path}")
+
+    def test_a_push_after_a_look_acts_from_the_next_tick_on(self):
+        env = poise.Environment("stand")
+        env["ROBOT_STATE"]
+        env.push([0, 60, 0], duration=0.1)
+        env.step(2)
+        np.testing.assert_allclose(env["GROUND_TRUTH"].push_force, [0, 60, 0])
+
+    def test_a_component_sees_its_first_tick_once(self):
+        class Counted(poise.Component):
+            def configure(self, context):
+                self.ticks = []
+
+            def step(self, tick, inputs, outputs):
+                self.ticks.append(tick.index)
+
+        counted = Counted()
+        env = poise.Environment("stand", components={"redistributor": counted})
+        env["ROBOT_STATE"], env["ROBOT_STATE"]
+        self.assertEqual(counted.ticks, [])
+        env.step(3)
+        self.assertEqual(counted.ticks, [0, 1, 2])
+
+    def test_a_command_in_the_controllers_place_is_what_the_drives_close(self):
+        env = poise.Environment("stand", {"sim.sensor_noise": False})
+        start = env["ROBOT_SENSORS"].joint_position
+        env.command(position=start, stiffness=400, damping=10)
+        env.step(250)
+        self.assertFalse(env.ended, env.detail)
+        command = env["JOINT_COMMAND"]
+        np.testing.assert_array_equal(command.position, start)
+        np.testing.assert_array_equal(command.stiffness, np.full(start.size, 400))
+        np.testing.assert_array_equal(command.torque, np.zeros(start.size))
+        self.assertFalse(command.in_contact.any())  # nothing computed is left of the controller's
+        np.testing.assert_array_equal(env["DRIVE_COMMAND"].position, start)
+        # The springs carry the robot: their torque is the joints'.
+        truth = env["GROUND_TRUTH"]
+        springs = 400 * (start - truth.joint_position) - 10 * truth.joint_velocity
+        self.assertGreater(abs(springs).max(), 10)
+        np.testing.assert_allclose(truth.joint_torque, springs, atol=0.05 * abs(springs).max())
+        np.testing.assert_allclose(env["ROBOT_SENSORS"].joint_velocity, truth.joint_velocity, atol=0.2)
+        env.command()
+        env.step(1)
+        self.assertTrue(env["JOINT_COMMAND"].torque.any())
+        with self.assertRaisesRegex(poise.ConfigError, "stiffness: -1"):
+            env.command(stiffness=-1)
+        with self.assertRaises(ValueError):
+            env.command(position=[0, 0])
+
+    def test_none_empties_a_list(self):
+        pushed, quiet = poise.Environment("push_double_support"), poise.Environment("push_double_support", {"sim.push": None})
+        for env in (pushed, quiet):
+            env.step(300)
+        self.assertTrue(pushed["EXTERNAL_PUSH"].force.any())
+        self.assertLess(abs(quiet["EXTERNAL_PUSH"].force).max(), 2)  # the sensor's noise
+
+    def test_the_detail_says_why_the_bridge_has_stopped_the_robot(self):
+        env = poise.Environment("stand", {"hw_bridge.velocity_trip": 0.02})
+        env.step(50)
+        self.assertEqual(env.detail, "")
+        env.command(torque=0)  # limp: it sinks
+        env.step(100)
+        self.assertIn("hw_bridge has stopped the robot: joint too fast (", env.detail)
+
     def test_a_thread_steps_and_others_look(self):
         env = poise.Environment("stand")
         env.step(1)
@@ -127,7 +206,7 @@ class Steps(unittest.TestCase):
             poise.Environment("stand", robot="no_such")
         env = poise.Environment("stand")
         with self.assertRaisesRegex(poise.ConfigError, "no message before the first tick"):
-            env["ROBOT_STATE"]
+            env["JOINT_COMMAND"]
         env.step()
         with self.assertRaisesRegex(poise.ConfigError, "no channel 'NO'"):
             env["NO"]

@@ -6,6 +6,7 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/commands/commands.h"
 #include "tools/live/interactive_run.h"
+#include "tools/run/inline_run.h"
 #include "tools/run/scenario_run.h"
 #include "tools/run/several_runs.h"
 #include "tools/scenario/ablations.h"
@@ -19,10 +20,12 @@ struct RunArguments {
   RunOptions options;
   bool no_reference = false;
   bool interactive = false;
+  bool count_allocations = false;
   InteractiveOptions page;
 };
 
 int Run(RunArguments arguments) {
+  if (arguments.count_allocations) CountAllocations();
   if (arguments.interactive) {
     if (arguments.scenarios.size() != 1 || arguments.scenarios.front() == kAllScenarios) {
       throw ConfigError("--interactive: one scenario at a time");
@@ -66,6 +69,9 @@ void AddRunCommand(CLI::App* app, Command* command) {
                   "dated one under runs/");
   CLI::Option* in_process = run->add_flag("--inline", options->in_process,
                                           "the same graph inside one process, without the network");
+  run->add_flag("--count-allocations", arguments->count_allocations,
+                "tell how often each stage allocates memory, which none should in a tick")
+      ->needs(in_process);
   CLI::Option* const interactive =
       run->add_flag("--interactive", arguments->interactive,
                     "in one process at wall speed with a page in control: push, change settings, "

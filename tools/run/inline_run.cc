@@ -1,16 +1,23 @@
 #include "tools/run/inline_run.h"
 
+#include <dlfcn.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include "components/framework/clock.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/modules.h"
 #include "components/framework/run.h"
 #include "components/framework/runners/inline_runner.h"
 #include "fmt/format.h"
@@ -92,7 +99,41 @@ class InlineWatch {
   std::thread thread_;
 };
 
+using Counter = int64_t (*)();
+
+Counter AllocationCounter() {
+  return reinterpret_cast<Counter>(dlsym(RTLD_DEFAULT, "poise_allocations"));
+}
+
+void TellAllocations(const InlineRunner& runner) {
+  const int64_t ticks = std::max<int64_t>(runner.ticks_completed(), 1);
+  fmt::print("allocations in {} ticks, by stage:\n", runner.ticks_completed());
+  for (const InlineRunner::StageAllocations& each : runner.allocations()) {
+    fmt::print("  {:<44} {}\n", each.component + "." + each.stage,
+               each.total == 0
+                   ? "none"
+                   : fmt::format("{:.1f} a tick, {} at most, in {} ticks",
+                                 static_cast<double>(each.total) / static_cast<double>(ticks),
+                                 each.most, each.ticks));
+  }
+}
+
 }  // namespace
+
+void CountAllocations() {
+  if (AllocationCounter() != nullptr) return;
+  const std::string library = FindProgram("libpoise_allocations.so").string();
+  const char* const before = std::getenv("LD_PRELOAD");
+  setenv("LD_PRELOAD", (before == nullptr ? library : library + ":" + before).c_str(), 1);
+  const std::string line = ReadFile("/proc/self/cmdline");  // arguments end with \0
+  std::vector<char*> arguments;
+  for (size_t at = 0; at < line.size(); at = line.find('\0', at) + 1) {
+    arguments.push_back(const_cast<char*>(line.c_str() + at));
+  }
+  arguments.push_back(nullptr);
+  execv("/proc/self/exe", arguments.data());
+  throw ConfigError(fmt::format("--count-allocations: {}", std::strerror(errno)));
+}
 
 RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
                      const std::string& log_path, Progress* progress,
@@ -102,6 +143,8 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   // need not read the log back: that took a seventh of a short run.
   constexpr int64_t kMostKept = 30'000;
   InlineRunner runner(spec, Components());
+  const Counter counter = AllocationCounter();
+  runner.CountAllocations(counter);
   const run_info_t info = logging::MakeRunInfo(spec, scenario_text);
   std::optional<logging::InlineRecord> kept;
   if (record != nullptr && spec.num_ticks() > 0 && spec.num_ticks() <= kMostKept) {
@@ -131,6 +174,7 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
   watch.reset();
   outcome.wall_time = static_cast<double>(NowNanoseconds() - start) * 1e-9;
   progress->Clear();
+  if (counter != nullptr) TellAllocations(runner);
   recorder.Close(spec);
   if (kept) *record = kept->Take(/*latencies=*/true);
   outcome.interrupted = !runner.ended();

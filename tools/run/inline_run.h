@@ -18,4 +18,8 @@ RunOutcome RunInline(const RunSpec& spec, const std::string& scenario_text,
                      const std::string& log_path, Progress* progress,
                      std::optional<logging::RunRecord>* record = nullptr);
 
+/// Starts this program anew with the same arguments and a library that counts allocations, of which
+/// RunInline then tells. Returns where it is there already. Throws ConfigError: there is none.
+void CountAllocations();
+
 }  // namespace poise

@@ -1,10 +1,12 @@
 #include "tools/scenario/described_components.h"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
+#include "components/framework/say_error.h"
 #include "components/messages/foreign_component.h"
 #include "fmt/format.h"
 
@@ -74,9 +76,16 @@ void LoadDescriptions() {
       if (entry.path().extension() == ".json") files.insert(entry.path());
     }
     for (const fs::path& file : files) {
-      ComponentType type = ReadDescription(file);
-      Described().insert(type.name);
-      AddComponent(std::move(type));
+      std::optional<ComponentType> type;
+      try {
+        type = ReadDescription(file);
+      } catch (const ConfigError& broken) {
+        // The program that is to write it anew loads all of them, too.
+        SayError(fmt::format("{}; the component is left out", broken.what()));
+        continue;
+      }
+      Described().insert(type->name);
+      AddComponent(std::move(*type));
     }
   }
 }

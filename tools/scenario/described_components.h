@@ -10,7 +10,7 @@ namespace poise {
 
 /// Makes known the types of lib/poise/components/NAME.json in each folder of POISE_PATH: what
 /// `lib/poise/bin/NAME --describe` prints (name, summary, inputs, outputs). Once, after LoadModules
-/// and before Components. Throws ConfigError naming the file: it is no such description.
+/// and before Components. A file that is no such description is said on stderr and left out.
 void LoadDescriptions();
 
 /// Whether the type is one of them: it cannot run in another's process.

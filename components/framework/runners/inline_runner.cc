@@ -35,6 +35,7 @@ struct InlineRunner::BoundStage {
   const Stage* stage;
   std::vector<BoundInput> inputs;
   std::vector<int> output_channels;
+  StageAllocations allocations = {};
 };
 
 InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registry)
@@ -82,7 +83,9 @@ InlineRunner::InlineRunner(const RunSpec& spec, const ComponentRegistry& registr
   for (const GraphPlan::StageRef& ref : plan.order) {
     const auto c = static_cast<size_t>(ref.component);
     const Wiring& wiring = graph_.component(ref.component).wiring;
-    BoundStage bound{ref.component, &wiring.stages()[static_cast<size_t>(ref.stage)], {}, {}};
+    BoundStage bound{ref.component, &wiring.stages()[static_cast<size_t>(ref.stage)], {}, {}, {}};
+    bound.allocations.component = graph_.component(ref.component).name;
+    bound.allocations.stage = bound.stage->name;
     for (InputPort* input : bound.stage->inputs) {
       const auto k = std::find(wiring.inputs().begin(), wiring.inputs().end(), input) -
                      wiring.inputs().begin();
@@ -124,8 +127,15 @@ bool InlineRunner::RunStage(BoundStage& bound, const Tick& tick) {
   }
   for (OutputPort* output : bound.stage->outputs) output->Stamp(run_id_, tick.index, tick.utime);
   position_->stage.store(static_cast<int32_t>(&bound - stages_.data()), std::memory_order_relaxed);
+  const int64_t before = count_allocations_ != nullptr ? count_allocations_() : 0;
   bound.stage->run(tick);
   position_->stage.store(RunPosition::kNoStage, std::memory_order_relaxed);
+  if (count_allocations_ != nullptr) {
+    const int64_t made = count_allocations_() - before;
+    bound.allocations.ticks += made > 0 ? 1 : 0;
+    bound.allocations.total += made;
+    bound.allocations.most = std::max(bound.allocations.most, made);
+  }
   // Outside its stage an input shows nothing, as in a graph of processes.
   for (const BoundStage::BoundInput& input : bound.inputs) input.port->Bind(nullptr);
   latency_[static_cast<size_t>(bound.component)].Add(NowNanoseconds() - start);
@@ -167,9 +177,10 @@ bool InlineRunner::Step() {
   const int64_t start = NowNanoseconds();
   const Tick tick = MakeTick(next_tick_, period_, lead_);
   position_->tick.store(tick.index, std::memory_order_relaxed);
-  for (BoundStage& stage : stages_) {
-    if (!RunStage(stage, tick)) return false;
+  for (; next_stage_ < stages_.size(); ++next_stage_) {
+    if (!RunStage(stages_[next_stage_], tick)) return false;
   }
+  next_stage_ = 0;
   for (Delayed& delayed : delayed_)
     delayed.port->CopyMessage(delayed.output, delayed.message.get());
   TakeAnswers();
@@ -177,6 +188,14 @@ bool InlineRunner::Step() {
   if (num_ticks_ > 0 && next_tick_ >= num_ticks_) ended_ = true;
   tick_latency_.Add(NowNanoseconds() - start);
   return !ended_;
+}
+
+void InlineRunner::BeginTick(const std::function<bool(int component)>& until) {
+  const Tick tick = MakeTick(next_tick_, period_, lead_);
+  while (!ended_ && next_stage_ < stages_.size() && !until(stages_[next_stage_].component) &&
+         RunStage(stages_[next_stage_], tick)) {
+    ++next_stage_;
+  }
 }
 
 int64_t InlineRunner::Run(int64_t ticks, const std::atomic<bool>* stop) {
@@ -219,6 +238,12 @@ void InlineRunner::TakeAnswers() {
       external_tap_(answer_channel_, answer_bytes_);
     }
   }
+}
+
+std::vector<InlineRunner::StageAllocations> InlineRunner::allocations() const {
+  std::vector<StageAllocations> result;
+  for (const BoundStage& stage : stages_) result.push_back(stage.allocations);
+  return result;
 }
 
 const LatencyHistogram& InlineRunner::latency(int component) const {

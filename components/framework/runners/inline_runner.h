@@ -45,6 +45,11 @@ class InlineRunner {
 
   /// Runs one tick, all stages. False when the run has ended (before or in this tick).
   bool Step();
+  /// Runs the stages of the next tick that come before the first one of a component for which
+  /// `until` holds. Step goes on from there.
+  void BeginTick(const std::function<bool(int component)>& until);
+  /// Whether stages of the next tick have run.
+  bool begun() const { return next_stage_ > 0; }
   /// Runs up to `ticks` ticks; ends early when the run ends or `*stop` becomes true. Returns the
   /// ticks run.
   int64_t Run(int64_t ticks, const std::atomic<bool>* stop = nullptr);
@@ -65,6 +70,15 @@ class InlineRunner {
   BoundGraph& graph() { return graph_; }
   /// Time in a component's stages, outputs' tap not counted.
   const LatencyHistogram& latency(int component) const;
+  /// Has the calls of `count`, this thread's allocations so far, told apart by stage from now on.
+  void CountAllocations(int64_t (*count)()) { count_allocations_ = count; }
+  struct StageAllocations {
+    std::string component, stage;
+    int64_t ticks = 0;  ///< that allocate
+    int64_t total = 0, most = 0;
+  };
+  /// In the order of the tick.
+  std::vector<StageAllocations> allocations() const;
   /// Time of whole ticks.
   const LatencyHistogram& tick_latency() const { return tick_latency_; }
 
@@ -96,6 +110,8 @@ class InlineRunner {
   std::vector<LatencyHistogram> latency_;
   LatencyHistogram tick_latency_;
   int64_t next_tick_ = 0;
+  size_t next_stage_ = 0;  // of that tick
+  int64_t (*count_allocations_)() = nullptr;
   bool ended_ = false;
   bool failed_ = false;
   std::string end_detail_, end_component_;
