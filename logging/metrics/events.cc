@@ -450,12 +450,14 @@ void AddImpedance(const RunRecord& run, EventList* events) {
   if (first.empty()) return;
   const auto earliest =
       std::ranges::min_element(first, {}, [](const auto& at) { return at.second; });
-  const std::string others =
-      first.size() > 1 ? fmt::format(" and {} others", first.size() - 1) : std::string();
+  const size_t others = first.size() - 1;
+  const std::string more = others == 0   ? ""
+                           : others == 1 ? " and one other"
+                                         : fmt::format(" and {} others", others);
   events->Add(earliest->second, "impedance_cut",
               fmt::format("stiffness, damping, position or velocity commanded for {}{} is beyond "
                           "what the bridge allows, and was cut",
-                          names.Joint(earliest->first), others));
+                          names.Joint(earliest->first), more));
 }
 
 Answer PushForce(const RunRecord& run, int64_t tick) {

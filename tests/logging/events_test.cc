@@ -435,7 +435,7 @@ TEST_F(EventsTest, AnImpedanceThatIsCutIsSaidOnce) {
   EXPECT_THAT(Named("impedance_cut"),
               ElementsAre(Is(0.12, "impedance_cut",
                              "stiffness, damping, position or velocity commanded for "
-                             "right_knee_pitch and 1 others is beyond what the bridge allows, and "
+                             "right_knee_pitch and one other is beyond what the bridge allows, and "
                              "was cut")));
 }
 
