@@ -7,6 +7,7 @@
 
 #include "components/balance/contact_conditions.h"
 #include "components/messages/conversions.h"
+#include "logging/metrics/contact_history.h"
 
 namespace poise::logging {
 namespace {
@@ -84,6 +85,18 @@ std::optional<BalancingIntervals> Balancing(const RunRecord& run) {
   return result;
 }
 
+bool TellsFoot(const joint_command_t& command, size_t foot) {
+  if (command.conditions_met[foot] != 0) return true;
+  if (command.in_contact[foot] == 0) return false;
+  const contact_margins_t& m = command.margins[foot];
+  return !GetWrench(command.foot_wrench[foot]).isZero(0) || m.normal != 0 || m.friction != 0 ||
+         m.yaw != 0 || m.roll != 0 || m.pitch != 0;
+}
+
+bool TellsRatio(const joint_command_t& command) {
+  return command.eta_feasible != 0 || command.eta_max != 0;  // 1 where none is feasible
+}
+
 std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, size_t foot,
                                                        int64_t tick) {
   const robot_state_t* state = run.state.at(tick);
@@ -92,42 +105,93 @@ std::optional<Eigen::Matrix<double, 6, 1>> KnownWrench(const RunRecord& run, siz
     return GetWrench(state->foot_wrench[foot]);
   }
   const robot_sensors_t* sensors = run.sensors.at(tick);
-  if (sensors == nullptr) return {};
+  if (sensors == nullptr || !run.robot.feet()[foot].force_sensor) return {};
   return GetWrench(sensors->foot_wrench[foot]);
 }
 
-std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
-  const robot_sensors_t* sensors = run.sensors.at(tick);
-  const support_plan_t* plan = run.plan.at(tick - 1);
-  const balance_torque_t* balance = run.balance.at(tick - 1);
-  if (sensors == nullptr || plan == nullptr || balance == nullptr) return {};
-  const Eigen::Isometry3d frame = GetPose(balance->frame_o);
+namespace {
+
+/// The soles in the world: as estimated for the plan; in a run without plan the true ones.
+std::optional<std::array<Eigen::Isometry3d, 2>> Soles(const RunRecord& run, int64_t tick) {
+  const auto poses = [](const auto* message) -> std::optional<std::array<Eigen::Isometry3d, 2>> {
+    if (message == nullptr) return {};
+    return std::array{GetPose(message->foot_pose[0]), GetPose(message->foot_pose[1])};
+  };
+  return run.plan.empty() ? poses(run.truth.at(tick)) : poses(run.plan.at(tick));
+}
+
+using FootWrenches = std::array<std::optional<balance::Vector6d>, 2>;  // empty: out of contact
+
+/// Of wrenches on soles that stood so at `tick`; empty in the air.
+std::optional<Eigen::Vector2d> CopOf(const RunRecord& run, int64_t tick,
+                                     const FootWrenches& wrenches) {
+  const auto soles = Soles(run, tick);
+  if (!soles) return {};
+  Eigen::Isometry3d frame;
+  if (!run.balance.empty()) {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    frame = GetPose(balance->frame_o);
+  } else if (!balance::FrameO(*soles, {wrenches[0].has_value(), wrenches[1].has_value()}, &frame)) {
+    return {};
+  }
   balance::Vector6d resultant = balance::Vector6d::Zero();
-  for (int foot = 0; foot < plan->num_feet; ++foot) {
-    if (!InContact(*plan, foot)) continue;
-    const auto f = static_cast<size_t>(foot);
-    resultant +=
-        balance::WrenchTransform(frame, GetPose(plan->foot_pose[f])) * *KnownWrench(run, f, tick);
+  for (size_t foot = 0; foot < 2; ++foot) {
+    if (!wrenches[foot]) continue;
+    resultant += balance::WrenchTransform(frame, (*soles)[foot]) * *wrenches[foot];
   }
   if (!(std::abs(resultant(2)) > 1.0)) return {};  // in the air
   return balance::CenterOfPressure(resultant);
 }
 
+}  // namespace
+
+std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick) {
+  if (!run.balance.empty()) {
+    const balance_torque_t* balance = run.balance.at(tick);
+    if (balance == nullptr) return {};
+    return Eigen::Vector2d(balance->cop[0], balance->cop[1]);
+  }
+  const joint_command_t* command = run.command.at(tick);
+  if (command == nullptr) return {};
+  FootWrenches wrenches;
+  for (size_t foot = 0; foot < 2; ++foot) {
+    if (command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) continue;
+    wrenches[foot] = GetWrench(command->foot_wrench[foot]);
+  }
+  return CopOf(run, tick, wrenches);
+}
+
+std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick) {
+  const support_plan_t* plan = run.plan.at(tick - 1);
+  if (!run.plan.empty() && plan == nullptr) return {};
+  FootWrenches wrenches;
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto wrench = KnownWrench(run, foot, tick);
+    if (!wrench) return {};
+    const bool carries = plan != nullptr ? InContact(*plan, static_cast<int>(foot))
+                                         : -(*wrench)[2] > LeastReadLoad(run);
+    if (carries) wrenches[foot] = *wrench;
+  }
+  return CopOf(run, tick - 1, wrenches);
+}
+
 std::optional<Eigen::Matrix<double, 6, 1>> WrenchError(const RunRecord& run, int foot,
                                                        int64_t tick) {
-  const robot_sensors_t* sensors = run.sensors.at(tick);
   const support_plan_t* plan = run.plan.at(tick - 1);
   const joint_command_t* command = run.command.at(tick - 1);
-  if (sensors == nullptr || plan == nullptr || command == nullptr) return {};
-  if (!InContact(*plan, foot)) return {};
+  if (plan == nullptr || command == nullptr) return {};
   const auto f = static_cast<size_t>(foot);
-  return *KnownWrench(run, f, tick) - GetWrench(command->foot_wrench[f]);
+  if (!InContact(*plan, foot) || !TellsFoot(*command, f)) return {};
+  const auto wrench = KnownWrench(run, f, tick);
+  if (!wrench) return {};
+  return *wrench - GetWrench(command->foot_wrench[f]);
 }
 
 Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick) {
   const joint_command_t* command = run.command.at(tick);
   const auto f = static_cast<size_t>(foot);
-  if (command == nullptr || command->in_contact[f] == 0) return {};
+  if (command == nullptr || command->in_contact[f] == 0 || !TellsFoot(*command, f)) return {};
   const contact_margins_t& m = command->margins[f];
   const std::array<double, 5> margins = {m.normal, m.friction, m.yaw, m.roll, m.pitch};
   return margins[static_cast<size_t>(margin)];
@@ -143,14 +207,23 @@ balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance) {
 
 std::optional<bool> Violated(const RunRecord& run, int64_t tick) {
   const joint_command_t* command = run.command.at(tick);
-  const balance_torque_t* balance = run.balance.at(tick);
-  if (command == nullptr || balance == nullptr) return {};
+  if (command == nullptr) return {};
+  bool tells = false;
   for (int foot = 0; foot < command->num_feet; ++foot) {
-    if (command->conditions_met[static_cast<size_t>(foot)] == 0) return true;
+    const auto f = static_cast<size_t>(foot);
+    if (!TellsFoot(*command, f)) continue;
+    tells = true;
+    if (command->conditions_met[f] == 0) return true;
     for (int margin = 0; margin < 5; ++margin) {
       const Answer m = FootMargin(run, foot, margin, tick);
       if (m && !(*m >= -kWrenchTolerance)) return true;
     }
+  }
+  if (!tells) return {};
+  const balance_torque_t* balance = run.balance.at(tick);
+  if (balance == nullptr) {
+    if (run.balance.empty()) return false;
+    return {};
   }
   if (balance->region == balance_torque_t::REGION_POLYGON) {
     const Eigen::Vector2d cop(balance->cop[0], balance->cop[1]);

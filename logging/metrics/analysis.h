@@ -34,9 +34,20 @@ struct BalancingIntervals {
 /// Empty without BALANCE_TORQUE messages; activations 0 when it was never on.
 std::optional<BalancingIntervals> Balancing(const RunRecord& run);
 
-/// m, centre of pressure (r_x, r_y) in frame O, (37), (38), of what the feet's sensors read at
-/// `tick`, of the feet in contact. A reading shows the command of the tick before, so frame O and
-/// the soles' poses are those of the tick before.
+/// What a command says of contacts, wrenches, conditions and ratio is for the log alone, and a
+/// controller that computes none of it leaves it zero. True when this one tells of the foot; of the
+/// ratio.
+bool TellsFoot(const joint_command_t& command, size_t foot);
+bool TellsRatio(const joint_command_t& command);
+
+/// m, centre of pressure (r_x, r_y) in frame O, (37), (38), of the computed resultant:
+/// BALANCE_TORQUE's; in a run without any, that of the command's wrenches.
+std::optional<Eigen::Vector2d> ComputedCop(const RunRecord& run, int64_t tick);
+
+/// m, the same of what the feet's sensors read at `tick`, of the feet in contact: as planned, in a
+/// run without plan those that read a load. A reading shows the command of the tick before, so
+/// frame O and the soles' poses are those of the tick before: as estimated, in a run without plan
+/// and balancing the true ones.
 std::optional<Eigen::Vector2d> MeasuredCop(const RunRecord& run, int64_t tick);
 
 /// The foot's wrench at `tick` as the controller knows it, robot on environment, sole frame: the
@@ -57,7 +68,8 @@ Answer FootMargin(const RunRecord& run, int foot, int margin, int64_t tick);
 balance::ConvexPolygon AcceptableRegion(const balance_torque_t& balance);
 
 /// True when a computed wrench of a foot in contact, or the computed resultant's CoP, breaks its
-/// conditions at `tick`: (29)-(33) by more than 1e-6 N or N·m; (37), (38) by more than 1 nm.
+/// conditions at `tick`: (29)-(33) by more than 1e-6 N or N·m; (37), (38) by more than 1 nm, where
+/// there is BALANCE_TORQUE. Empty where the command tells of no foot.
 std::optional<bool> Violated(const RunRecord& run, int64_t tick);
 
 /// N·m, smaller of the URDF's effort and what the motor gives at peak current.

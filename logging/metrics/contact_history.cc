@@ -60,6 +60,8 @@ class ReferenceEnds {
 
 }  // namespace
 
+double LeastReadLoad(const RunRecord& run) { return kNoiseDeviations * run.robot.force_noise(); }
+
 std::string FootName(const RunRecord& run, size_t foot) {
   return run.robot.feet()[foot].name + " foot";
 }
@@ -120,16 +122,16 @@ std::vector<TouchDown> TouchDowns(const RunRecord& run) {
 
 std::optional<bool> ContactLost(const RunRecord& run, size_t foot, int64_t tick) {
   const joint_command_t* command = run.command.at(tick - 1);
-  const robot_sensors_t* sensors = run.sensors.at(tick);
-  if (command == nullptr || sensors == nullptr || command->in_contact[foot] == 0) return {};
+  if (command == nullptr || command->in_contact[foot] == 0) return {};
   const double weight = run.robot.total_mass() * robot::kGravity;
   if (-command->foot_wrench[foot].force[2] < kLoadedShare * weight) return {};
   const robot_state_t* state = run.state.at(tick);
   const bool observed = state != nullptr && foot < state->foot_wrench_source.size() &&
                         state->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER;
-  const double noise = observed ? state->foot_wrench_deviation[foot].force[2]
-                                : kNoiseDeviations * run.robot.force_noise();
-  return -(*KnownWrench(run, foot, tick))[2] <= noise;
+  const double noise = observed ? state->foot_wrench_deviation[foot].force[2] : LeastReadLoad(run);
+  const auto wrench = KnownWrench(run, foot, tick);
+  if (!wrench) return {};
+  return -(*wrench)[2] <= noise;
 }
 
 std::vector<Interval> Intervals(const RunRecord& run,

@@ -15,6 +15,9 @@ namespace poise::logging {
 /// below it the sensor's noise and the model's error decide what its wrench looks like.
 inline constexpr double kLoadedShare = 0.05;
 
+/// N, above which a foot's sensor reads a load: five standard deviations of its noise.
+double LeastReadLoad(const RunRecord& run);
+
 /// "left foot", by the robot's name for it.
 std::string FootName(const RunRecord& run, size_t foot);
 

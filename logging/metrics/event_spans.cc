@@ -21,6 +21,10 @@ constexpr Pair kPairs[] = {
     {"eta_infeasible_begins", {"eta_infeasible_ends"}, false},
     {"cop_not_achieved_begins", {"cop_not_achieved_ends"}, false},
     {"step_needed", {"step_needed_ends"}, false},
+    {"motor_limited", {"motor_limited_ends"}, true},
+    {"motor_hot", {"motor_hot_ends"}, true},
+    {"impedance_cut", {"impedance_cut_ends"}, true},
+    {"sole_on_edge", {"sole_on_edge_ends"}, true},
     // Nothing says that a search ends but the foot that lands.
     {"searching", {"touch_down", "step_lands", "no_surface"}, true},
     {"no_surface", {"touch_down", "step_lands", "searching"}, true},

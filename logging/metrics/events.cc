@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "components/balance/contact_conditions.h"
 #include "components/balance/convex_polygon.h"
 #include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
@@ -20,6 +21,7 @@
 #include "logging/metrics/operator_words.h"
 #include "logging/metrics/planner_steps.h"
 #include "logging/metrics/schedule_plan.h"
+#include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
 namespace {
@@ -40,6 +42,12 @@ double Tenths(double value) {
   const double tenths = std::round(10 * value) / 10;
   return tenths == 0 ? 0 : tenths;
 }
+
+constexpr double kLimitGap = 0.1;  // s between two limits of a motor that are one
+
+// A sole that tips: of its load in the weight, of its centre of pressure from its edge (m), and how
+// long (s).
+constexpr double kTipsShare = 0.3, kTipsDistance = 1e-3, kTipsGap = 0.01, kLeastTipping = 0.03;
 
 constexpr double kKnownHeight = 5;  // mm, standard deviation of a COM that is known
 
@@ -435,29 +443,113 @@ void AddBridge(const RunRecord& run, EventList* events) {
   }
 }
 
-/// Once: whoever commands more than the drives may close is not to learn it from the motion.
-void AddImpedance(const RunRecord& run, EventList* events) {
-  const ElementNames names(run.robot);
-  std::map<int, int64_t> first;  // tick, by joint
+/// A limit of the bridge that changed what a controller wanted of a joint.
+struct MotorLimit {
+  int bit;
+  const char *begins, *ends;
+};
+constexpr MotorLimit kMotorLimits[] = {
+    {bridge_status_t::LIMIT_TORQUE, "motor_limited", "motor_limited_ends"},
+    {bridge_status_t::LIMIT_THERMAL, "motor_hot", "motor_hot_ends"},
+    {bridge_status_t::LIMIT_IMPEDANCE, "impedance_cut", "impedance_cut_ends"},
+};
+
+/// N·m that the command wants of a joint, with its stiffness and damping at the estimated joint.
+Answer WantedTorque(const RunRecord& run, int64_t tick, size_t joint) {
+  const joint_command_t* const command = run.command.at(tick);
+  const robot_state_t* const state = run.state.at(tick);
+  if (command == nullptr || joint >= command->torque.size()) return {};
+  if (command->stiffness[joint] == 0 && command->damping[joint] == 0) return command->torque[joint];
+  if (state == nullptr) return {};
+  return command->torque[joint] +
+         command->stiffness[joint] * (command->position[joint] - state->joint_position[joint]) +
+         command->damping[joint] * (command->velocity[joint] - state->joint_velocity[joint]);
+}
+
+/// "left_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted", over the interval.
+std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& limit,
+                        const Interval& interval) {
+  const std::string& name = run.robot.joints()[joint].name;
+  if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) {
+    return fmt::format("{}: stiffness, damping, position or velocity cut to what the robot bears",
+                       name);
+  }
+  const auto applied = [&](int64_t tick) -> Answer {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr) return {};
+    return bridge->applied_torque[joint];
+  };
+  double from = applied(interval.begin - 1).value_or(*applied(interval.begin)), to = from;
+  Answer wanted;
+  for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr || (bridge->saturated[joint] & limit.bit) == 0) continue;
+    const double now = bridge->applied_torque[joint];
+    // A cold motor is held at its largest torque, a hot one to ever less.
+    const bool more = limit.bit == bridge_status_t::LIMIT_TORQUE
+                          ? std::abs(now) >= std::abs(to) || tick == interval.begin
+                          : std::abs(now) <= std::abs(to) || tick == interval.begin;
+    if (more) to = now;
+    const Answer want = WantedTorque(run, tick, joint);
+    if (want && (!wanted || std::abs(*want) > std::abs(*wanted))) wanted = want;
+  }
+  return fmt::format("{}: {:.1f} to {:.1f} N·m{}", name, Tenths(from), Tenths(to),
+                     wanted ? fmt::format(", of {:.1f} N·m wanted", Tenths(*wanted)) : "");
+}
+
+void AddMotors(const RunRecord& run, EventList* events) {
+  const size_t joints = run.robot.joints().size();
+  const auto gap = static_cast<int64_t>(std::ceil(kLimitGap / run.spec.tick_period()));
+  std::array<std::vector<std::vector<Interval>>, std::size(kMotorLimits)> limited;
+  limited.fill(std::vector<std::vector<Interval>>(joints));
   for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const bridge_status_t* bridge = run.bridge.at(tick);
-    if (bridge == nullptr) continue;
-    for (size_t j = 0; j < bridge->saturated.size(); ++j) {
-      if ((bridge->saturated[j] & bridge_status_t::LIMIT_IMPEDANCE) == 0) continue;
-      first.emplace(static_cast<int>(j), tick);
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr || bridge->state != bridge_status_t::STATE_RUNNING) continue;
+    for (size_t joint = 0; joint < joints; ++joint) {
+      if (bridge->saturated[joint] == 0) continue;
+      for (size_t i = 0; i < limited.size(); ++i) {
+        if ((bridge->saturated[joint] & kMotorLimits[i].bit) == 0) continue;
+        std::vector<Interval>& intervals = limited[i][joint];
+        if (intervals.empty() || tick - *intervals.back().end > gap)
+          intervals.push_back({tick, {}});
+        intervals.back().end = tick + 1;
+      }
     }
   }
-  if (first.empty()) return;
-  const auto earliest =
-      std::ranges::min_element(first, {}, [](const auto& at) { return at.second; });
-  const size_t others = first.size() - 1;
-  const std::string more = others == 0   ? ""
-                           : others == 1 ? " and one other"
-                                         : fmt::format(" and {} others", others);
-  events->Add(earliest->second, "impedance_cut",
-              fmt::format("stiffness, damping, position or velocity commanded for {}{} is beyond "
-                          "what the bridge allows, and was cut",
-                          names.Joint(earliest->first), more));
+  for (size_t i = 0; i < limited.size(); ++i) {
+    const MotorLimit& limit = kMotorLimits[i];
+    for (size_t joint = 0; joint < joints; ++joint) {
+      for (Interval& interval : limited[i][joint]) {
+        if (*interval.end == run.num_ticks) interval.end.reset();
+        events->Add(interval.begin, limit.begins, LimitedText(run, joint, limit, interval));
+        events->AddEndOf(interval, limit.ends, run.robot.joints()[joint].name);
+      }
+    }
+  }
+}
+
+/// A loaded sole whose true centre of pressure is at its edge: it tips, whatever was computed.
+void AddSoles(const RunRecord& run, EventList* events) {
+  const double least = kTipsShare * run.robot.total_mass() * robot::kGravity;
+  const auto gap = static_cast<int64_t>(std::ceil(kTipsGap / run.spec.tick_period()));
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const balance::ConvexPolygon sole = balance::SolePolygon(run.robot.feet()[foot], 0);
+    const auto tips = [&](int64_t tick) -> std::optional<bool> {
+      const ground_truth_t* const truth = run.truth.at(tick);
+      if (truth == nullptr) return {};
+      const balance::Vector6d wrench = GetWrench(truth->foot_wrench[foot]);
+      if (truth->fallen != 0 || -wrench[2] < least) return false;
+      return balance::SignedDistance(sole, balance::CenterOfPressure(wrench)) < kTipsDistance;
+    };
+    std::vector<Interval> intervals = Intervals(run, tips, gap);
+    std::erase_if(intervals, [&](const Interval& i) {
+      return run.duration(i.end.value_or(run.num_ticks) - i.begin) < kLeastTipping;
+    });
+    events->AddIntervals(intervals, "sole_on_edge", "sole_on_edge_ends", [&](int64_t tick) {
+      return fmt::format("{}, which carried {:.0f} N", FootName(run, foot),
+                         -run.truth.at(tick)->foot_wrench[foot].force[2]);
+    });
+  }
 }
 
 Answer PushForce(const RunRecord& run, int64_t tick) {
@@ -565,11 +657,9 @@ void AddRefusals(const RunRecord& run, EventList* events) {
 }
 
 void AddEnd(const RunRecord& run, bool ended, EventList* events) {
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const ground_truth_t* truth = run.truth.at(tick);
-    if (truth == nullptr || truth->fallen == 0) continue;
-    events->Add(tick, "fall", fmt::format("true COM {:.3f} m high", truth->com_position[2]));
-    break;
+  if (const std::optional<int64_t> down = DownTick(run)) {
+    events->Add(*down, "fall",
+                fmt::format("true COM {:.3f} m high", run.truth.at(*down)->com_position[2]));
   }
   if (!ended) return;
   if (run.spec.has_cut()) {
@@ -598,8 +688,9 @@ std::vector<Event> Events(const RunRecord& run, bool ended) {
   AddBalancing(run, &events);
   AddCapturePoint(run, &events);
   AddSteps(run, &events);
+  AddMotors(run, &events);
+  AddSoles(run, &events);
   AddBridge(run, &events);
-  AddImpedance(run, &events);
   AddPush(run, ended, &events);
   AddCrane(run, &events);
   AddRefusals(run, &events);

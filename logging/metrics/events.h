@@ -22,8 +22,9 @@ struct Event {
 /// waiting_ends, searching, touch_down, contact_early, contact_late, no_surface, contact_lost,
 /// contact_regained, balancing_on, balancing_off, eta_infeasible_begins, eta_infeasible_ends,
 /// cop_not_achieved_begins, cop_not_achieved_ends, step_needed, step_needed_ends, step_begins,
-/// step_lands, step_rests, bridge_state, impedance_cut, push_begins, push_peak, push_ends,
-/// crane_let_go, act_refused (an operator's), fall, run_ended, log_ends.
+/// step_lands, step_rests, motor_limited, motor_limited_ends, motor_hot, motor_hot_ends,
+/// impedance_cut, impedance_cut_ends, sole_on_edge, sole_on_edge_ends, bridge_state, push_begins,
+/// push_peak, push_ends, crane_let_go, act_refused (an operator's), fall, run_ended, log_ends.
 std::vector<Event> Events(const RunRecord& run, bool ended = true);
 
 }  // namespace poise::logging

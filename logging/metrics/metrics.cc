@@ -5,6 +5,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/metric_needs.h"
 
 namespace poise::logging {
 namespace {
@@ -26,6 +27,7 @@ MetricList MakeMetrics() {
   AddStepping(&list);
   AddWalking(&list);
   AddLog(&list);
+  for (Metric& metric : list) metric.needs = NeedsOf(metric.name);
   return list;
 }
 

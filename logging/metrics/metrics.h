@@ -18,6 +18,9 @@ struct Metric {
   bool needs_other_estimates = false;  ///< RunRecord::other_estimates
   /// The joint that the figure is of; none: it is of no single one.
   std::function<std::string(const RunRecord& run)> joint = {};
+  /// What it is computed from: "CHANNEL.field, field", several with ";", those of which one will do
+  /// with "|", best first (metric_needs.h). Empty: not said; without a value it fails its check.
+  std::string needs = {};
 };
 
 /// Makes a metric known, before the first table; called by a module's POISE_MODULE. Throws

@@ -5,6 +5,7 @@
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
 namespace {
@@ -52,7 +53,14 @@ void AddCop(MetricList* list) {
   };
   add("cop_task_max", "largest CoP that the task torque alone would give",
       of(&balance_torque_t::cop_task));
-  add("cop_max", "largest CoP of the computed resultant", of(&balance_torque_t::cop));
+  const auto size = [](const auto& cop, int axis) -> Answer {
+    if (!cop) return {};
+    return std::abs((*cop)(axis));
+  };
+  add("cop_max", "largest CoP of the computed resultant",
+      [size](const RunRecord& run, int64_t t, int axis) {
+        return size(ComputedCop(run, t), axis);
+      });
   add("cop_limit", "limit of the CoP, (37), (38)", of(&balance_torque_t::cop_limit));
   add("cop_excess", "largest computed CoP beyond its limit (negative: inside)",
       [](const RunRecord& run, int64_t t, int axis) -> Answer {
@@ -61,20 +69,9 @@ void AddCop(MetricList* list) {
         return std::abs(balance->cop[axis]) - balance->cop_limit[axis];
       });
   add("cop_measured_max", "largest CoP of the measured resultant",
-      [](const RunRecord& run, int64_t t, int axis) -> Answer {
-        const auto cop = MeasuredCop(run, t);
-        if (!cop) return {};
-        return std::abs((*cop)(axis));
+      [size](const RunRecord& run, int64_t t, int axis) {
+        return size(MeasuredCop(run, t), axis);
       });
-}
-
-/// First tick of the run in which the robot has fallen.
-std::optional<int64_t> FallTick(const RunRecord& run) {
-  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-    const ground_truth_t* truth = run.truth.at(tick);
-    if (truth != nullptr && truth->fallen != 0) return tick;
-  }
-  return {};
 }
 
 std::vector<Interval> StepNeeded(const RunRecord& run) {
@@ -87,7 +84,7 @@ std::vector<Interval> StepNeeded(const RunRecord& run) {
 
 /// s from the last begin of "step needed" to the fall, 0 when a fall was not announced.
 Answer WarningTime(const RunRecord& run) {
-  const std::optional<int64_t> fall = FallTick(run);
+  const std::optional<int64_t> fall = DownTick(run);
   if (!fall || run.plan.empty()) return {};
   double warning = 0;
   for (const Interval& interval : StepNeeded(run)) {

@@ -1,4 +1,5 @@
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
 
@@ -7,14 +8,13 @@ void AddOutcome(MetricList* list) {
   list->push_back({"duration_reached", "s", "simulated time of the run", duration});
   list->push_back({"duration_reached_reference", "s", "simulated time of the reference run",
                    [=](const RunRecord& run) { return OfReference(run, duration); }});
-  list->push_back({"fallen", "", "ticks in which the robot lay fallen (ground truth)",
-                   [](const RunRecord& run) {
-                     return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
-                       const ground_truth_t* truth = run.truth.at(t);
-                       if (truth == nullptr) return {};
-                       return truth->fallen != 0;
-                     });
-                   }});
+  list->push_back(
+      {"fallen", "",
+       "ticks in which the robot was down, in truth: as the simulator says, tilted by more than 1 "
+       "rad from its stance at time 0, or with less than half of its COM's height above the soles",
+       [](const RunRecord& run) {
+         return CountTicks(run, [&](int64_t t) { return IsDown(run, t); });
+       }});
   const auto count_all = [&](const char* name, const char* text, auto holds) {
     list->push_back({name, "", text, [holds](const RunRecord& run) -> Answer {
                        Answer count;

@@ -1,6 +1,10 @@
+#include <algorithm>
+#include <vector>
+
 #include "components/messages/conversions.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
 namespace {
@@ -49,12 +53,12 @@ std::optional<Interval> FirstStep(const RunRecord& run) {
 }  // namespace
 
 void AddStepping(MetricList* list) {
-  list->push_back({"steps", "", "steps of the planner's own, begun", [](const RunRecord& run) {
-                     return Maximum(run, [&](int64_t t) -> Answer {
-                       const support_plan_t* plan = run.plan.at(t);
-                       if (plan == nullptr) return {};
-                       return plan->num_steps;
-                     });
+  list->push_back({"steps", "", "feet that left the ground and carried again, in truth",
+                   [](const RunRecord& run) -> Answer {
+                     if (run.truth.empty()) return {};
+                     const std::vector<TrueStep> steps = TrueSteps(run);
+                     return static_cast<double>(std::ranges::count_if(
+                         steps, [&](const TrueStep& s) { return s.lifted >= run.first_tick; }));
                    }});
   list->push_back({"step_decision", "s", "from the push's begin to the decision for a step",
                    [](const RunRecord& run) -> Answer {

@@ -49,9 +49,18 @@ bool Stopped(const RunRecord& run, int64_t tick) {
   return bridge != nullptr && bridge->state > bridge_status_t::STATE_RUNNING;
 }
 
-/// None while the bridge does not follow.
-const joint_command_t* FollowedCommand(const RunRecord& run, int64_t tick) {
-  return Stopped(run, tick) ? nullptr : run.command.at(tick);
+/// N·m that a joint's motor gave: in truth; of a real robot as the bridge ordered it, with what the
+/// drive adds by stiffness and damping; without a bridge as commanded. None while the bridge does
+/// not follow.
+Answer Torque(const RunRecord& run, int64_t tick, size_t joint) {
+  if (Stopped(run, tick)) return {};
+  const auto of = [joint](const auto* message, auto field) -> Answer {
+    if (message == nullptr) return {};
+    return (message->*field)[joint];
+  };
+  if (!run.truth.empty()) return of(run.truth.at(tick), &ground_truth_t::joint_torque);
+  if (!run.bridge.empty()) return of(run.bridge.at(tick), &bridge_status_t::applied_torque);
+  return of(run.command.at(tick), &joint_command_t::torque);
 }
 
 /// The true positions or velocities, else the estimated ones; none while the bridge does not
@@ -86,20 +95,19 @@ Answer VelocityShare(const RunRecord& run, int64_t tick, size_t joint) {
 
 void AddTorques(MetricList* list) {
   list->push_back(LargestOfJoints("joint_torque_max", "N·m",
-                                  "largest joint torque commanded while the bridge follows",
+                                  "largest torque of a joint's motor while the bridge follows",
                                   [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
-                                    const joint_command_t* command = FollowedCommand(run, t);
-                                    if (command == nullptr) return {};
-                                    return std::abs(command->torque[joint]);
+                                    const Answer torque = Torque(run, t, joint);
+                                    return torque ? Answer(std::abs(*torque)) : torque;
                                   }));
-  list->push_back(LargestOfJoints(
-      "joint_torque_share", "%",
-      "largest joint torque commanded while the bridge follows, of its limit",
-      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
-        const joint_command_t* command = FollowedCommand(run, t);
-        if (command == nullptr) return {};
-        return 100 * std::abs(command->torque[joint]) / JointTorqueLimit(run, joint);
-      }));
+  list->push_back(
+      LargestOfJoints("joint_torque_share", "%",
+                      "largest torque of a joint's motor while the bridge follows, of its limit",
+                      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+                        const Answer torque = Torque(run, t, joint);
+                        if (!torque) return {};
+                        return 100 * std::abs(*torque) / JointTorqueLimit(run, joint);
+                      }));
   list->push_back(LargestOfJoints("joint_position_beyond", "rad",
                                   "largest distance of a joint beyond its limit of position while "
                                   "the bridge follows; negative: "
@@ -111,15 +119,14 @@ void AddTorques(MetricList* list) {
                                     const Answer share = VelocityShare(run, t, joint);
                                     return share ? Answer(std::abs(*share)) : share;
                                   }));
-  list->push_back(
-      LargestOfJoints("torque_step_max", "N·m",
-                      "largest change of a joint's command in one tick while the bridge follows",
-                      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
-                        const joint_command_t* now = FollowedCommand(run, t);
-                        const joint_command_t* before = FollowedCommand(run, t - 1);
-                        if (now == nullptr || before == nullptr) return {};
-                        return std::abs(now->torque[joint] - before->torque[joint]);
-                      }));
+  list->push_back(LargestOfJoints(
+      "torque_step_max", "N·m",
+      "largest change of the torque of a joint's motor in one tick while the bridge follows",
+      [](const RunRecord& run, int64_t t, size_t joint) -> Answer {
+        const Answer now = Torque(run, t, joint), before = Torque(run, t - 1, joint);
+        if (!now || !before) return {};
+        return std::abs(*now - *before);
+      }));
   list->push_back({"torque_step_at_switch", "N·m",
                    "largest change of a joint's command in a tick in which the support changes",
                    TorqueStepAtSwitch});

@@ -6,24 +6,23 @@
 
 #include "components/messages/conversions.h"
 #include "components/robot/robot_model.h"
-#include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
 namespace {
 
 using Eigen::Vector2d;
 
-bool Walks(const support_plan_t& plan) {
-  return plan.stepping != support_plan_t::STEPPING_NONE &&
-         plan.step_reason == support_plan_t::REASON_WALK;
-}
+// s on both feet after which a robot has stopped walking.
+constexpr double kStands = 1;
 
 /// From a foot's landing to its next: two steps.
 struct Stride {
   int64_t begin = 0, end = 0;             ///< ticks
   Vector2d way = Vector2d::Zero();        ///< m, of the true COM, world
   Vector2d commanded = Vector2d::Zero();  ///< m, the same as commanded along the true heading
+  bool planned = false;                   ///< the planner walks, too: `commanded` is known
   double duration = 0;                    ///< s
 };
 
@@ -34,30 +33,20 @@ double Heading(const ground_truth_t& truth) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
-bool StandsBetween(const RunRecord& run, int64_t begin, int64_t end) {
-  for (int64_t t = begin; t < end; ++t) {
-    const support_plan_t* plan = run.plan.at(t);
-    if (plan != nullptr && !Walks(*plan)) return true;
-  }
-  return false;
-}
-
 std::vector<Stride> Strides(const RunRecord& run) {
-  std::vector<int64_t> landings;
-  for (int64_t t = run.first_tick + 1; t < run.num_ticks; ++t) {
-    const support_plan_t *before = run.plan.at(t - 1), *plan = run.plan.at(t);
-    if (before == nullptr || plan == nullptr || !Walks(*plan)) continue;
-    if (plan->stepping == support_plan_t::STEPPING_LOADING && before->stepping != plan->stepping) {
-      landings.push_back(t);
-    }
-  }
+  const std::vector<TrueStep> steps = TrueSteps(run);
+  const auto follows = [&](const TrueStep& before, const TrueStep& step) {
+    return step.foot != before.foot && run.duration(step.lifted - before.landed) <= kStands;
+  };
   std::vector<Stride> strides;
-  for (size_t i = 0; i + 2 < landings.size(); i += 2) {
-    const int64_t begin = landings[i], end = landings[i + 2];
+  for (size_t i = 0; i + 2 < steps.size();) {
+    const int64_t begin = steps[i].landed, end = steps[i + 2].landed;
     const ground_truth_t *from = run.truth.at(begin), *to = run.truth.at(end);
-    if (from == nullptr || to == nullptr) continue;
-    // Between two walks the robot stands.
-    if (StandsBetween(run, begin, end)) continue;
+    const bool walks = follows(steps[i], steps[i + 1]) && follows(steps[i + 1], steps[i + 2]);
+    if (begin < run.first_tick || !walks || from == nullptr || to == nullptr) {
+      ++i;
+      continue;
+    }
     Stride stride{begin, end};
     stride.way = (GetVector3(to->com_position) - GetVector3(from->com_position)).head<2>();
     stride.duration = run.duration(end - begin);
@@ -65,10 +54,12 @@ std::vector<Stride> Strides(const RunRecord& run) {
       const support_plan_t* plan = run.plan.at(t);
       const ground_truth_t* truth = run.truth.at(t);
       if (plan == nullptr || truth == nullptr) continue;
+      stride.planned = stride.planned || plan->step_reason == support_plan_t::REASON_WALK;
       const Vector2d velocity(plan->walk_velocity[0], plan->walk_velocity[1]);
       stride.commanded += run.duration(1) * (Eigen::Rotation2Dd(Heading(*truth)) * velocity);
     }
     strides.push_back(stride);
+    i += 2;
   }
   return strides;
 }
@@ -109,15 +100,17 @@ void AddWalking(MetricList* list) {
                      }
                      return fastest;
                    }});
-  list->push_back(
-      {"walk_velocity_error_rms", "mm/s",
-       "walking, mean velocity of two steps less the commanded one, RMS", [](const RunRecord& run) {
-         MeanSquare square;
-         for (const Stride& stride : Strides(run)) {
-           square.Add(((stride.way - stride.commanded) / stride.duration).squaredNorm());
-         }
-         return Scaled(square.Root(), kMilli);
-       }});
+  list->push_back({"walk_velocity_error_rms", "mm/s",
+                   "walking, mean velocity of two steps less the planner's commanded one, RMS",
+                   [](const RunRecord& run) {
+                     MeanSquare square;
+                     for (const Stride& stride : Strides(run)) {
+                       if (!stride.planned) continue;
+                       square.Add(
+                           ((stride.way - stride.commanded) / stride.duration).squaredNorm());
+                     }
+                     return Scaled(square.Root(), kMilli);
+                   }});
   list->push_back({"walk_way", "m", "walking, way of the COM from step to step", Way});
   list->push_back({"walk_cost_of_transport", "",
                    "walking, positive work of the joints over weight and way", CostOfTransport});

@@ -77,7 +77,7 @@ void AddFootErrors(MetricList* list) {
 /// command before.
 Answer FootLoad(const RunRecord& run, size_t foot, bool measured, int64_t tick) {
   const joint_command_t* command = run.command.at(measured ? tick - 1 : tick);
-  if (command == nullptr || command->in_contact[foot] == 0) return {};
+  if (command == nullptr || command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) return {};
   if (!measured) return 0.0 - command->foot_wrench[foot].force[2];
   const auto wrench = KnownWrench(run, foot, tick);
   if (!wrench) return {};
@@ -108,7 +108,9 @@ void AddTangential(MetricList* list) {
                          const joint_command_t* command = run.command.at(t);
                          Answer largest;
                          for (size_t foot = 0; command != nullptr && foot < 2; ++foot) {
-                           if (command->in_contact[foot] == 0) continue;
+                           if (command->in_contact[foot] == 0 || !TellsFoot(*command, foot)) {
+                             continue;
+                           }
                            const double value = size(command->foot_wrench[foot]);
                            largest = std::max(largest.value_or(0), value);
                          }
@@ -126,7 +128,10 @@ void AddTangential(MetricList* list) {
 Answer RatioSpan(const RunRecord& run) {
   const auto ratio = [&](int64_t t) -> Answer {
     const joint_command_t* command = run.command.at(t);
-    if (command == nullptr || command->in_contact[0] == 0 || command->in_contact[1] == 0) return {};
+    if (command == nullptr || command->in_contact[0] == 0 || command->in_contact[1] == 0 ||
+        !TellsRatio(*command)) {
+      return {};
+    }
     return command->eta;
   };
   const Answer lowest = Minimum(run, ratio), highest = Maximum(run, ratio);
@@ -145,14 +150,14 @@ void AddWrenches(MetricList* list) {
                    [](const RunRecord& run) {
                      return CountTicks(run, [&](int64_t t) -> std::optional<bool> {
                        const joint_command_t* command = run.command.at(t);
-                       if (command == nullptr) return {};
+                       if (command == nullptr || !TellsRatio(*command)) return {};
                        return command->eta_feasible == 0;
                      });
                    }});
   const auto eta = [](const RunRecord& run) {
     return [&run](int64_t t) -> Answer {
       const joint_command_t* command = run.command.at(t);
-      if (command == nullptr) return {};
+      if (command == nullptr || !TellsRatio(*command)) return {};
       return command->eta;
     };
   };

@@ -107,22 +107,22 @@ std::optional<double> MetricValue(const RunStore& run, const std::string& name) 
   return metric->compute(record);
 }
 
-py::list Checks(const RunStore& run) {
-  std::vector<CheckResult> checks;
-  {
-    const py::gil_scoped_release released;
-    const std::lock_guard lock(run.record_mutex());
-    const Scenario scenario = ScenarioOf(run);
-    logging::RunRecord& record = run.record();
-    if (run.log().empty()) {
-      record.first_tick = FirstCheckedTick(scenario, record);
-    } else {
-      PrepareRecord(run.log(), scenario, &record);
-    }
-    checks = EvaluateChecks(scenario, record);
+std::vector<CheckResult> Evaluate(const RunStore& run) {
+  const py::gil_scoped_release released;
+  const std::lock_guard lock(run.record_mutex());
+  const Scenario scenario = ScenarioOf(run);
+  logging::RunRecord& record = run.record();
+  if (run.log().empty()) {
+    record.first_tick = FirstCheckedTick(scenario, record);
+  } else {
+    PrepareRecord(run.log(), scenario, &record);
   }
+  return EvaluateChecks(scenario, record);
+}
+
+py::list Checks(const RunStore& run) {
   py::list list;
-  for (const CheckResult& check : checks) {
+  for (const CheckResult& check : Evaluate(run)) {
     py::dict entry;
     entry["name"] = check.name;
     entry["label"] = check.label;
@@ -132,6 +132,7 @@ py::list Checks(const RunStore& run) {
     entry["at_most"] = check.at_most;
     entry["paper"] = check.paper;
     entry["passed"] = check.passed;
+    entry["missing"] = check.missing;
     list.append(entry);
   }
   return list;
@@ -203,6 +204,7 @@ void BindRun(py::module_* module) {
            })
       .def("metric", &MetricValue)
       .def("checks", &Checks)
+      .def("passed", [](const RunStore& run) { return ChecksPass(Evaluate(run)); })
       .def("info", &Info)
       .def("scenario_text", [](const RunStore& run) { return run.scenario(); })
       .def("robot_texts",

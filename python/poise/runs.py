@@ -183,12 +183,14 @@ class Run:
 
     @property
     def checks(self):
-        """The scenario's checks and those of every run, a dict each: name, measured, limits, passed."""
+        """The scenario's checks and those of every run, a dict each: name, measured, limits, passed, and missing: what the
+        run lacks for it to be known. What is not known has passed: True and measured: None."""
         return self._store.checks()
 
     @property
     def passed(self):
-        return all(check["passed"] for check in self.checks)
+        """Whether `poise report` says so: no check is broken, and not all of the scenario's own are unknown."""
+        return self._store.passed()
 
     def __repr__(self):
         return f"<poise.Run {self.name}: {', '.join(self.channels)}>"

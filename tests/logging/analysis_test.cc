@@ -118,14 +118,22 @@ TEST_F(AnalysisTest, ViolatedTicksCountEveryCondition) {
 }
 
 TEST_F(AnalysisTest, TorquesAndTheirSteps) {
-  command_[40].torque[3] = -60;
-  command_[41].torque[3] = 15;
+  // The truth, whatever was ordered and commanded; of a real robot what the bridge ordered.
+  truth_[40].joint_torque[3] = -60;
+  truth_[41].joint_torque[3] = 15;
+  bridge_[50].applied_torque[4] = -20;
+  command_[60].torque[5] = 10;
   bridge_[kTicks - 1].saturations = 7;
   EXPECT_EQ(Measure("joint_torque_max"), 60);
   EXPECT_EQ(Measure("torque_step_max"), 75);
   // Joint 3 is a knee: 150 N·m by its effort, and 50 * 0.10 * 30 by its motor.
   EXPECT_NEAR(Measure("joint_torque_share"), 40, 1e-12);
   EXPECT_EQ(Measure("saturations"), 7);
+  without_ = {"GROUND_TRUTH"};
+  EXPECT_EQ(Measure("joint_torque_max"), 20);
+  without_.insert("BRIDGE_STATUS");
+  EXPECT_EQ(Measure("joint_torque_max"), 10);
+  EXPECT_EQ(Measure("torque_step_max"), 10);
 }
 
 TEST_F(AnalysisTest, JointsBeyondTheirLimitsAreNamed) {

@@ -87,6 +87,44 @@ TEST_F(EventsTest, ARunThatFallsEndsEarly) {
                                           Is(0.2, "run_ended", "0.200 s before")));
 }
 
+// A hot ankle that gives ever less, a knee at its limit for some ticks with a break of one.
+TEST_F(EventsTest, MotorsAtTheirLimitsAreNamedWithTheirTorques) {
+  const std::string ankle = Read().robot.joints()[4].name, knee = Read().robot.joints()[3].name;
+  for (size_t t = 0; t < kTicks; ++t) {
+    bridge_[t].state = bridge_status_t::STATE_RUNNING;
+    command_[t].torque[4] = 14;
+    bridge_[t].applied_torque[4] = t < 40 ? 12.7 : std::max(7.5, 12.7 - 0.2 * double(t - 39));
+    if (t >= 40) bridge_[t].saturated[4] = bridge_status_t::LIMIT_THERMAL;
+    command_[t].stiffness[3] = 100;
+    command_[t].position[3] = -0.5;
+    bridge_[t].applied_torque[3] = t < 20 ? -20 : -30;
+    if (t >= 20 && t < 25 && t != 22) bridge_[t].saturated[3] = bridge_status_t::LIMIT_TORQUE;
+  }
+  EXPECT_THAT(Named("motor_hot"),
+              ElementsAre(Is(0.08, "motor_hot", ankle + ": 12.7 to 7.5 N·m, of 14.0 N·m wanted")));
+  EXPECT_THAT(Named("motor_hot_ends"), testing::IsEmpty());
+  EXPECT_THAT(
+      Named("motor_limited"),
+      ElementsAre(Is(0.04, "motor_limited", knee + ": -20.0 to -30.0 N·m, of -50.0 N·m wanted")));
+  EXPECT_THAT(Named("motor_limited_ends"),
+              ElementsAre(Is(0.05, "motor_limited_ends", knee + ", after 0.010 s")));
+  for (bridge_status_t& bridge : bridge_) bridge.state = bridge_status_t::STATE_DAMPING;
+  EXPECT_THAT(Named("motor_hot"), testing::IsEmpty()) << "nobody wants anything then";
+}
+
+TEST_F(EventsTest, ALoadedSoleThatTipsIsTold) {
+  const robot::RobotModel robot = Read().robot;
+  const double half = 0.5 * robot.feet()[1].length, weight = robot.total_mass() * robot::kGravity;
+  for (size_t t = 0; t < kTicks; ++t) {
+    const double load = t < 70 ? 0.5 * weight : 0.1 * weight;
+    truth_[t].foot_wrench[1].force[2] = -load;
+    truth_[t].foot_wrench[1].moment[1] = (t < 30 ? 0.9 : 1.0) * half * load;
+    truth_[t].foot_wrench[0].force[2] = -load;
+  }
+  EXPECT_THAT(Named("sole_on_edge"), ElementsAre(Is(0.06, "sole_on_edge", "left foot, which")));
+  EXPECT_THAT(Named("sole_on_edge_ends"), ElementsAre(Is(0.14, "sole_on_edge_ends")));
+}
+
 TEST_F(EventsTest, PhasesCarryTheirNames) {
   LiftLeft();
   EXPECT_THAT(Named("phase_began"),
@@ -424,19 +462,6 @@ TEST_F(EventsTest, AStopNamesTheJointThatItIsAbout) {
   EXPECT_THAT(Named("bridge_state"),
               ElementsAre(Is(0.1, "bridge_state",
                              "running to stopping: joint too fast (right_knee_pitch)")));
-}
-
-TEST_F(EventsTest, AnImpedanceThatIsCutIsSaidOnce) {
-  EXPECT_TRUE(Named("impedance_cut").empty());
-  for (size_t t = 60; t < kTicks; ++t) {
-    bridge_[t].saturated[3] = bridge_status_t::LIMIT_IMPEDANCE | bridge_status_t::LIMIT_TORQUE;
-    bridge_[t].saturated[5] = t > 70 ? bridge_status_t::LIMIT_IMPEDANCE : 0;
-  }
-  EXPECT_THAT(Named("impedance_cut"),
-              ElementsAre(Is(0.12, "impedance_cut",
-                             "stiffness, damping, position or velocity commanded for "
-                             "right_knee_pitch and one other is beyond what the bridge allows, and "
-                             "was cut")));
 }
 
 TEST_F(EventsTest, APushStandsOutOfItsSensorsNoise) {

@@ -54,15 +54,18 @@ RecordTest::RecordTest() {
 RunRecord RecordTest::Read() {
   std::vector<RawEvent> events = {RunInfoEvent(spec_)};
   for (size_t t = 0; t < kTicks; ++t) {
-    Add("ROBOT_SENSORS", sensors_[t], &events);
-    Add("ROBOT_STATE", state_[t], &events);
-    Add("SUPPORT_PLAN", plan_[t], &events);
-    Add("TASK_TORQUE", task_[t], &events);
-    Add("BALANCE_TORQUE", balance_[t], &events);
-    Add("JOINT_COMMAND", command_[t], &events);
-    Add("BRIDGE_STATUS", bridge_[t], &events);
-    Add("EXTERNAL_PUSH", push_[t], &events);
-    Add("GROUND_TRUTH", truth_[t], &events);
+    const auto add = [&](const char* channel, const auto& message) {
+      if (!without_.contains(channel)) Add(channel, message, &events);
+    };
+    add("ROBOT_SENSORS", sensors_[t]);
+    add("ROBOT_STATE", state_[t]);
+    add("SUPPORT_PLAN", plan_[t]);
+    add("TASK_TORQUE", task_[t]);
+    add("BALANCE_TORQUE", balance_[t]);
+    add("JOINT_COMMAND", command_[t]);
+    add("BRIDGE_STATUS", bridge_[t]);
+    add("EXTERNAL_PUSH", push_[t]);
+    add("GROUND_TRUTH", truth_[t]);
   }
   for (const operate::answer_t& answer : answers_) Add("OPERATOR_ANSWER", answer, &events);
   WriteRawLog(path_, events);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ class RecordTest : public testing::Test {
   TemporaryFolder folder_;
   std::string path_ = folder_.path("run.lcm");
   RunSpec spec_ = MakeTestSpec();
+  std::set<std::string> without_;  ///< channels that have no messages
   std::vector<robot_sensors_t> sensors_;
   std::vector<robot_state_t> state_;
   std::vector<support_plan_t> plan_;

@@ -87,6 +87,23 @@ TEST(FallStory, EachFootHasItsOwnContact) {
   EXPECT_FALSE(troubles.front().end);
 }
 
+// The motor was hot before anything else went wrong; what it could not give in the fall itself is
+// not why it fell.
+TEST(FallStory, BeginsWithTheMotorThatSetInFirst) {
+  const std::vector<Event> events = {
+      {1.84, "motor_limited", "left_ankle_roll: 18.0 to 19.0 N·m, of 24.0 N·m wanted"},
+      {1.9, "motor_limited_ends", "left_ankle_roll, after 0.060 s"},
+      {3.112, "motor_hot", "right_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted"},
+      {3.2, "motor_limited", "left_ankle_roll: 18.0 to 19.0 N·m, of 25.0 N·m wanted"},
+      {3.3, "motor_limited_ends", "left_ankle_roll, after 0.100 s"},
+      {3.888, "step_needed", "a foot at (0.10, 0.45) m within 0.70 s"},
+      {4.2, "motor_limited", "right_hip_yaw: 18.0 to 88.0 N·m, of 325.0 N·m wanted"},
+      {4.3, "fall", ""}};
+  EXPECT_THAT(TroublesBefore(4.3, events),
+              ElementsAre(Named("motor_hot", 3.112), Named("motor_limited", 3.2),
+                          Named("step_needed", 3.888)));
+}
+
 /// Fall() with `steps` of a walk in it.
 std::vector<Event> LongFall(int steps) {
   std::vector<Event> events;

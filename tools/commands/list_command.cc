@@ -8,6 +8,7 @@
 #include "components/framework/optional_ports.h"
 #include "components/robot_files/robot.pb.h"
 #include "fmt/format.h"
+#include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/printable.h"
 #include "tools/cli/output_style.h"
@@ -103,9 +104,39 @@ int ListMessages(const ListRequest& request) {
 }
 
 int ListMetricsAsMarkdown() {
-  fmt::print("| metric | unit | meaning |\n|---|---|---|\n");
+  fmt::print("| metric | unit | meaning | computed from |\n|---|---|---|---|\n");
   for (const logging::Metric& metric : logging::Metrics()) {
-    fmt::print("| `{}` | {} | {} |\n", metric.name, metric.unit, metric.description);
+    fmt::print("| `{}` | {} | {} | {} |\n", metric.name, metric.unit, metric.description,
+               fmt::join(logging::TellNeeds(metric), "; "));
+  }
+  return kExitOk;
+}
+
+/// One metric, or those whose name holds a word, with what each is computed from.
+int ListMetric(const std::string& name) {
+  const auto print = [](const logging::Metric& metric) {
+    const int columns = ScreenStyle().columns;
+    fmt::print("{}{}\n{}\n", metric.name, metric.unit.empty() ? "" : ", " + metric.unit,
+               Wrapped(fmt::format("  {}", metric.description), columns, 2));
+    for (const std::string& need : logging::TellNeeds(metric)) {
+      fmt::print("{}\n", Wrapped(fmt::format("  from {}", need), columns, 7));
+    }
+  };
+  if (const logging::Metric* const metric = logging::FindMetric(name)) {
+    print(*metric);
+    return kExitOk;
+  }
+  std::vector<std::string> names;
+  bool found = false;
+  for (const logging::Metric& metric : logging::Metrics()) {
+    names.push_back(metric.name);
+    if (metric.name.find(name) == std::string::npos) continue;
+    print(metric);
+    found = true;
+  }
+  if (!found) {
+    throw ConfigError(
+        fmt::format("there is no metric '{}'; {}", name, Suggest(name, std::move(names))));
   }
   return kExitOk;
 }
@@ -194,8 +225,9 @@ int List(const ListRequest& request) {
   if (what == "fields") return ListFields(request);
   if (what == "messages") return ListMessages(request);
   if (what == "components" && !request.name.empty()) return ListComponent(request.name);
+  if (what == "metrics" && !request.name.empty()) return ListMetric(request.name);
   if (!request.name.empty()) {
-    throw ConfigError("NAME goes with `poise list fields`, `messages` and `components`");
+    throw ConfigError("NAME goes with `poise list fields`, `messages`, `components` and `metrics`");
   }
   if (request.markdown) {
     if (what == "metrics") return ListMetricsAsMarkdown();
@@ -287,7 +319,8 @@ void AddListCommand(CLI::App* app, Command* command) {
   list->add_option("name", request->name,
                    "of fields: a path or its beginning (sim.push), or a part of a field's "
                    "name (stiffness); of messages: a type or a channel (ROBOT_STATE); of "
-                   "components: a type, whose ports and settings are shown");
+                   "components: a type, whose ports and settings are shown; of metrics: one, or a "
+                   "part of its name: what it is computed from");
   list->add_option("--schema", request->schema, "of fields: whose; default: scenario")
       ->check(CLI::IsMember({"scenario", "robot", "sweep", "graph"}));
   list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");

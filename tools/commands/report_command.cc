@@ -88,7 +88,7 @@ int Report(const ReportOptions& options) {
                                "not judged here",
                                ScreenStyle().columns));
   } else {
-    fmt::print("{}", FormatVerdictLines(run.checks, "", options.full));
+    fmt::print("{}", FormatVerdictLines(run.scenario, run.checks, "", options.full));
   }
   if (!options.no_html) {
     const std::filesystem::path html =
@@ -98,10 +98,7 @@ int Report(const ReportOptions& options) {
     line.End();
     fmt::print("\nThe run, step by step: {}\n", FileAddress(html));
   }
-  for (const CheckResult& check : run.checks) {
-    if (!check.passed) return kExitFailed;
-  }
-  return kExitOk;
+  return ChecksPass(run.checks) ? kExitOk : kExitFailed;
 }
 
 }  // namespace

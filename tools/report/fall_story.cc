@@ -37,6 +37,10 @@ constexpr TroubleWords kTrouble[] = {
     {"cop_not_achieved_begins", "the centre of pressure could not be kept in its limits"},
     {"step_needed",
      "the capture point was outside the soles, which only another step could answer"},
+    {"motor_limited", "a motor was at its largest torque ({})"},
+    {"motor_hot", "a motor was too hot for more than its rated current ({})"},
+    {"impedance_cut", "a drive's impedance was cut ({})"},
+    {"sole_on_edge", "a foot stood on the edge of its sole ({})"},
     {"bridge_state", "the bridge went from {}"},
 };
 
@@ -128,19 +132,38 @@ std::vector<Trouble> TroublesBefore(double fall, const std::vector<Event>& event
     since = std::max(since, first->begin - kLedTo);
   }
   std::vector<Trouble> told;
-  // What did not end comes first: where there is too much, the rest is left out.
+  // What did not end comes first: where there is too much, the rest is left out. But what a motor
+  // could not give while it stood may be why, and what it cannot give in the fall is not.
   for (const bool lasting : {true, false}) {
     for (const Trouble& trouble : all) {
-      if (open(trouble) != lasting || told.size() == kMostTroubles) continue;
+      if (open(trouble) != lasting) continue;
       if (!lasting && *trouble.end < since) continue;
-      const bool same = std::ranges::any_of(
-          told, [&](const Trouble& other) { return other.name == trouble.name; });
-      if (!same || (lasting && trouble.name == "contact_lost")) told.push_back(trouble);
+      const auto same = std::ranges::find(told, trouble.name, &Trouble::name);
+      if (same != told.end() && trouble.begin < same->begin && trouble.name.starts_with("motor_")) {
+        *same = trouble;
+        continue;
+      }
+      if (told.size() == kMostTroubles) continue;
+      if (same == told.end() || (lasting && trouble.name == "contact_lost")) {
+        told.push_back(trouble);
+      }
     }
   }
   std::ranges::stable_sort(told, {}, &Trouble::begin);
   return told;
 }
+
+namespace {
+
+/// "; for the first time at 1.840 s", of a motor that had come to its limit before.
+std::string FirstTime(const Trouble& trouble, const std::vector<Event>& events) {
+  const auto first = std::ranges::find(events, trouble.name, &Event::name);
+  const bool before = trouble.name.starts_with("motor_") && first != events.end() &&
+                      first->time < trouble.begin - kSameTrouble;
+  return before ? fmt::format(", a motor for the first time at {:.3f} s", first->time) : "";
+}
+
+}  // namespace
 
 std::string TellFall(const logging::RunRecord& run, double fall, const std::vector<Event>& events) {
   const std::vector<Trouble> troubles = TroublesBefore(fall, events);
@@ -154,8 +177,9 @@ std::string TellFall(const logging::RunRecord& run, double fall, const std::vect
         &trouble == &troubles.front() ? Meanwhile(run, trouble.begin) : "";
     const bool moment = trouble.end && *trouble.end == trouble.begin;
     parts.push_back(fmt::format(
-        "at {:.3f} s{} {}{}", trouble.begin, meanwhile, Told(trouble),
-        trouble.end && !moment ? fmt::format(", for {:.3f} s", *trouble.end - trouble.begin) : ""));
+        "at {:.3f} s{} {}{}{}", trouble.begin, meanwhile, Told(trouble),
+        trouble.end && !moment ? fmt::format(", for {:.3f} s", *trouble.end - trouble.begin) : "",
+        FirstTime(trouble, events)));
   }
   return fmt::format("Before it fell: {}.{}", Joined(parts, "; "),
                      Balanced(troubles.front().begin, events));

@@ -94,13 +94,13 @@ std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
     text += fmt::format("crane: let go at {:.3f} s\n", *outcome.crane_let_go);
   }
   text += MachineLine(JudgeMachine(spec, outcome));
-  const auto limited = [](const CheckResult& check) { return check.limited(); };
-  const auto holds = [](const CheckResult& check) { return check.limited() && check.passed; };
+  const auto limited = [](const CheckResult& check) { return check.limited() && check.known(); };
+  const auto holds = [&](const CheckResult& check) { return limited(check) && check.passed; };
   const auto number = std::ranges::count_if(checks, limited);
   const auto good = std::ranges::count_if(checks, holds);
   if (number == 0) {
     return text + fmt::format("controller: {}\n",
-                              outcome.completed ? "the robot stood to the end" : outcome.message);
+                              outcome.completed ? "the run reached its end" : outcome.message);
   }
   text += fmt::format("controller: {} of {} checks hold\n", good, number);
   if (lost.ticks > 0 && lost.late == lost.ticks) {

@@ -6,6 +6,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
@@ -28,8 +29,9 @@ void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, Chec
   result->unit = metric.unit;
   if (result->label.empty()) result->label = metric.description;
   result->measured = metric.compute(run);
+  if (!result->measured) result->missing = logging::MissingFor(metric, run);
   if (metric.joint) result->joint = metric.joint(run);
-  if (!result->limited()) return;
+  if (!result->limited() || !result->known()) return;
   result->passed = result->measured.has_value() &&
                    (!result->at_most || *result->measured <= *result->at_most) &&
                    (!result->at_least || *result->measured >= *result->at_least);
@@ -117,7 +119,8 @@ Json ChecksJson(const std::vector<CheckResult>& checks) {
                     {"at_least", Optional(check.at_least)},
                     {"paper", check.paper.empty() ? Json(nullptr) : Json(check.paper)},
                     {"paper_value", Optional(check.paper_value)},
-                    {"passed", check.passed}});
+                    {"passed", check.passed},
+                    {"missing", check.missing}});
   }
   return json;
 }
@@ -206,6 +209,28 @@ std::string FormatLimit(const CheckResult& check) {
   return "";
 }
 
+bool ChecksPass(const std::vector<CheckResult>& checks) {
+  const auto judges = [](const CheckResult& check) {
+    return check.limited() && !check.of_every_run;
+  };
+  return std::ranges::all_of(checks, &CheckResult::passed) &&
+         (std::ranges::none_of(checks, judges) ||
+          std::ranges::any_of(
+              checks, [&](const CheckResult& check) { return judges(check) && check.known(); }));
+}
+
+std::string FormatUnknown(const std::vector<CheckResult>& checks, bool all) {
+  std::string text;
+  for (const CheckResult& check : checks) {
+    if (check.known() || (!all && !check.limited())) continue;
+    text += Wrapped(fmt::format("  not known: {} ({}), which needs {}", check.label, check.name,
+                                fmt::join(check.missing, " and ")),
+                    ScreenStyle().columns, 4) +
+            "\n";
+  }
+  return text;
+}
+
 std::string FormatTable(const std::vector<CheckResult>& checks) {
   std::vector<TableRow> rows = {{"what", "measured", "limit", "paper", "verdict"}};
   for (const CheckResult& check : checks) {
@@ -217,12 +242,12 @@ std::string FormatTable(const std::vector<CheckResult>& checks) {
 
 TableCell VerdictCell(const CheckResult& check) {
   if (!check.limited()) return "";
+  if (!check.known()) return "not known";
   return check.passed ? TableCell("ok", Tone::kGood) : TableCell("FAILED", Tone::kBad);
 }
 
 std::string FormatMeasured(const CheckResult& check) {
-  // A count is always known of a run that was seen; a time, of what never happened, is not.
-  if (!check.measured) return check.unit.empty() ? "not known" : "none";
+  if (!check.measured) return check.known() ? "none" : "not known";
   const std::string number = FormatNumber(*check.measured, check.unit);
   return check.joint.empty() ? number : fmt::format("{}, {}", number, check.joint);
 }
@@ -303,6 +328,8 @@ std::vector<CheckResult> ChecksOf(const nlohmann::json& summary) {
     if (!json.at("paper").is_null()) check.paper = json.at("paper").get<std::string>();
     check.paper_value = number(json.at("paper_value"));
     check.passed = json.at("passed").get<bool>();
+    // A summary of an earlier version has none.
+    if (json.contains("missing")) check.missing = json["missing"].get<std::vector<std::string>>();
     checks.push_back(std::move(check));
   }
   return checks;

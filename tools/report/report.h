@@ -28,10 +28,18 @@ struct CheckResult {
   std::optional<double> at_least;
   std::string paper;
   std::optional<double> paper_value;
-  bool passed = true;         ///< a row without limit always passes
+  /// What the run lacks to know `measured` ("GROUND_TRUTH.com_position"); empty: it is known, or
+  /// what it is of never happened.
+  std::vector<std::string> missing;
+  bool passed = true;  ///< false: it breaks a limit; what is not known or has no limit breaks none
   bool of_every_run = false;  ///< no check of the scenario's own
   bool limited() const { return at_most || at_least; }
+  bool known() const { return missing.empty(); }
 };
+
+/// True when no check is broken, and of the scenario's own checks with a limit, if it has any, at
+/// least one is known.
+bool ChecksPass(const std::vector<CheckResult>& checks);
 
 /// First tick at or after check_from.
 int64_t FirstCheckedTick(const Scenario& scenario, const logging::RunRecord& run);
@@ -43,13 +51,16 @@ const logging::Metric* MetricOfCheck(const Scenario& scenario, int index);
 /// its reference, its log is whole, and each component did its work.
 std::vector<CheckResult> EvaluateChecks(const Scenario& scenario, const logging::RunRecord& run);
 
+/// A line for each figure that is not known: what it needs. `all`: those without a limit, too.
+std::string FormatUnknown(const std::vector<CheckResult>& checks, bool all);
+
 /// Columns what, measured, limit, paper, verdict; every row.
 std::string FormatTable(const std::vector<CheckResult>& checks);
-/// "12.3 mm", "0.1 rad, left_knee_pitch", or "none".
+/// "12.3 mm", "0.1 rad, left_knee_pitch"; "not known", or "none" of what never happened.
 std::string FormatMeasured(const CheckResult& check);
 /// "≤ 45 mm", "0.35 … 0.6 s"; empty without a limit.
 std::string FormatLimit(const CheckResult& check);
-/// "ok", "FAILED", or nothing without a limit.
+/// "ok", "FAILED", "not known", or nothing without a limit.
 TableCell VerdictCell(const CheckResult& check);
 /// The faults that were injected, and how long control was lost by each; empty when there were
 /// none.

@@ -36,7 +36,9 @@ std::string Sentences(const ShownRun& run) {
 }
 
 struct Count {
-  size_t limited = 0;
+  size_t limited = 0;  // of those that are known
+  size_t unknown = 0;
+  bool judged = false;  // ChecksPass, but for those that failed
   std::vector<const CheckResult*> failed;
 };
 
@@ -44,9 +46,10 @@ Count CountChecks(const std::vector<CheckResult>& checks) {
   Count count;
   for (const CheckResult& check : checks) {
     if (!check.limited()) continue;
-    ++count.limited;
+    ++(check.known() ? count.limited : count.unknown);
     if (!check.passed) count.failed.push_back(&check);
   }
+  count.judged = !count.failed.empty() || ChecksPass(checks);
   return count;
 }
 
@@ -55,23 +58,64 @@ std::string Failure(const CheckResult& check) {
                                           FormatMeasured(check), FormatLimit(check)));
 }
 
+std::string Unknown(const Count& count) {
+  return count.unknown == 0 ? "" : fmt::format(", {} not known", count.unknown);
+}
+
 std::string Hold(const Count& count) {
-  return fmt::format("{} of {} checks hold", count.limited - count.failed.size(), count.limited);
+  return fmt::format("{} of {} checks hold{}", count.limited - count.failed.size(), count.limited,
+                     Unknown(count));
+}
+
+std::string ProblemOf(const std::string& problem, const Count& count) {
+  if (!problem.empty() || count.judged) return problem;
+  return "none of the scenario's own checks is known";
+}
+
+/// The run has rows of the paper's, and so its short table has them.
+bool ShowsPaper(const Scenario& scenario, const std::vector<CheckResult>& checks) {
+  return scenario.has_paper_section() &&
+         std::ranges::any_of(checks, [](const CheckResult& check) { return !check.paper.empty(); });
+}
+
+bool InShortTable(const CheckResult& check, bool paper) {
+  return paper ? !check.paper.empty() : check.limited() && !check.of_every_run;
 }
 
 /// What this run has of the paper, or of its scenario.
 std::string ShortTable(const Scenario& scenario, const std::vector<CheckResult>& checks) {
-  const bool paper =
-      scenario.has_paper_section() &&
-      std::ranges::any_of(checks, [](const CheckResult& check) { return !check.paper.empty(); });
-  std::vector<TableRow> rows = {{"what", "measured", paper ? "paper" : "limit", ""}};
+  const bool paper = ShowsPaper(scenario, checks);
+  std::vector<TableRow> rows = {{"what", "measured", "limit", ""}};
+  if (paper) rows[0].insert(rows[0].begin() + 2, "paper");
   for (const CheckResult& check : checks) {
-    const bool shown = paper ? !check.paper.empty() : check.limited() && !check.of_every_run;
-    if (!shown) continue;
-    rows.push_back({check.label, FormatMeasured(check), paper ? check.paper : FormatLimit(check),
-                    VerdictCell(check)});
+    if (!InShortTable(check, paper)) continue;
+    rows.push_back({check.label, FormatMeasured(check), FormatLimit(check), VerdictCell(check)});
+    if (paper) rows.back().insert(rows.back().begin() + 2, check.paper);
   }
   return rows.size() == 1 ? "" : FormatColumns(rows);
+}
+
+/// ", 9 of them above", of checks that a short table leaves out.
+std::string Above(const Scenario& scenario, const std::vector<CheckResult>& checks) {
+  const bool paper = ShowsPaper(scenario, checks);
+  const auto of_limited = [&](bool all) {
+    return std::ranges::count_if(checks, [&](const CheckResult& check) {
+      return check.limited() && check.known() && (all || InShortTable(check, paper));
+    });
+  };
+  const auto shown = of_limited(false);
+  return shown == of_limited(true) ? "" : fmt::format(", {} of them above", shown);
+}
+
+/// Whose checks they are, where they are not the scenario's.
+std::string ChecksOfVariant(const Scenario& scenario) {
+  const auto& variants = scenario.variant();
+  const auto found = std::ranges::find_if(variants, [&](const Variant& variant) {
+    return scenario.applied().has_variant() && variant.name() == scenario.applied().variant();
+  });
+  if (found == variants.end() || found->check_size() == 0) return "";
+  return Paragraph(fmt::format(
+      "The checks are those of the variant {}, in place of the scenario's.", found->name()));
 }
 
 bool SameFile(const fs::path& a, const fs::path& b) {
@@ -107,20 +151,23 @@ std::string FormatEngine(const Scenario& scenario, const Graph& graph) {
 
 std::string FormatScreen(const ShownRun& run) {
   const std::string table = ShortTable(run.scenario, run.checks);
-  return Sentences(run) + (table.empty() ? table : fmt::format("\n{}", table));
+  return Sentences(run) + (table.empty() ? table : fmt::format("\n{}", table)) +
+         ChecksOfVariant(run.scenario);
 }
 
 std::string FormatFullScreen(const ShownRun& run) {
-  return fmt::format("{}\n{}\n{}{}", Sentences(run), FormatTable(run.checks),
+  return fmt::format("{}\n{}{}{}\n{}{}", Sentences(run), FormatTable(run.checks),
+                     FormatUnknown(run.checks, /*all=*/true), ChecksOfVariant(run.scenario),
                      logging::LinesForTerminal(FormatEvents(run.events)),
                      logging::LinesForTerminal(FormatAssumptions(run.scenario)) +
                          Paragraph(FormatEngine(run.scenario, run.record.spec.graph())));
 }
 
-std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem) {
+std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& of_run) {
   const Count count = CountChecks(checks);
+  const std::string problem = ProblemOf(of_run, count);
   if (problem.empty() && count.failed.empty()) {
-    return count.limited == 0 ? "passed" : fmt::format("passed: {}", Hold(count));
+    return count.limited + count.unknown == 0 ? "passed" : fmt::format("passed: {}", Hold(count));
   }
   std::vector<std::string> parts;
   if (!problem.empty()) parts.push_back(problem);
@@ -136,27 +183,28 @@ std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::str
   return fmt::format("FAILED: {}", Joined(parts, "; "));
 }
 
-std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem,
-                               bool below_full_table) {
+std::string FormatVerdictLines(const Scenario& scenario, const std::vector<CheckResult>& checks,
+                               const std::string& of_run, bool below_full_table) {
   const Count count = CountChecks(checks);
+  const std::string problem = ProblemOf(of_run, count);
   const int width = ScreenStyle().columns;
-  if (problem.empty() && count.failed.empty()) {
-    return Toned(FormatVerdict(checks, problem), Tone::kGood) + "\n";
-  }
+  const std::string above = below_full_table ? "" : Above(scenario, checks);
   std::string text;
-  if (!problem.empty()) {
-    text += Toned(Wrapped(fmt::format("FAILED: {}", problem), width, 2), Tone::kBad) + "\n";
+  if (problem.empty() && count.failed.empty()) {
+    text = Toned(FormatVerdict(checks, problem) + above, Tone::kGood) + "\n";
+  } else {
+    if (!problem.empty()) {
+      text += Toned(Wrapped(fmt::format("FAILED: {}", problem), width, 2), Tone::kBad) + "\n";
+    }
+    if (!count.failed.empty()) {
+      const std::string failed = fmt::format("{} of {} checks", count.failed.size(), count.limited);
+      text += (problem.empty() ? Toned(fmt::format("FAILED: {}", failed), Tone::kBad)
+                               : fmt::format("{} failed", failed)) +
+              Unknown(count) + "\n";
+    } else if (count.limited > 0) {
+      text += Hold(count) + above + "\n";
+    }
   }
-  if (count.failed.empty()) {
-    if (count.limited > 0) text += Hold(count) + "\n";
-    return text;
-  }
-  const std::string failed =
-      fmt::format("FAILED: {} of {} checks", count.failed.size(), count.limited);
-  text += (problem.empty()
-               ? Toned(failed, Tone::kBad)
-               : fmt::format("{} of {} checks failed", count.failed.size(), count.limited)) +
-          "\n";
   for (size_t i = 0; i < std::min(count.failed.size(), kFailures); ++i) {
     text += Wrapped(fmt::format("  {}", Failure(*count.failed[i])), width, 4) + "\n";
   }
@@ -164,7 +212,7 @@ std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std
     text += fmt::format("  and {} more, in the {}\n", count.failed.size() - kFailures,
                         below_full_table ? "table above" : "full table (--full)");
   }
-  return text;
+  return text + (below_full_table ? "" : FormatUnknown(checks, /*all=*/false));
 }
 
 std::string FormatNext(const Scenario& scenario, const fs::path& dir, bool latest) {

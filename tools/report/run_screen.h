@@ -25,7 +25,7 @@ struct ShownRun {
 };
 
 /// Two sentences, the notes, and the rows that the paper has a figure for (of a scenario without
-/// such: its own checks).
+/// such: its own checks), each with its limit.
 std::string FormatScreen(const ShownRun& run);
 
 /// The same with every row, the events and the assumptions.
@@ -35,13 +35,15 @@ std::string FormatFullScreen(const ShownRun& run);
 /// ground's friction; empty: nothing is simulated.
 std::string FormatEngine(const Scenario& scenario, const Graph& graph);
 
-/// "passed: 22 of 22 checks hold", or "FAILED: 1 of 22: NAME measured X, limit Y", one line.
+/// "passed: 12 of 12 checks hold, 3 not known", or "FAILED: 1 of 22: NAME measured X, limit Y", one
+/// line.
 /// `problem`: what else made the run fail; empty when nothing did.
 std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::string& problem);
 
-/// The same for a person: what failed by name in lines of its own, in colour.
-std::string FormatVerdictLines(const std::vector<CheckResult>& checks, const std::string& problem,
-                               bool below_full_table = false);
+/// The same for a person: what failed, and what is not known for want of what, by name in lines of
+/// its own, in colour; how many of the checks the short table above shows.
+std::string FormatVerdictLines(const Scenario& scenario, const std::vector<CheckResult>& checks,
+                               const std::string& problem, bool below_full_table);
 
 /// Where to look next, for a run in `dir`; `latest`: the commands find it without a name.
 std::string FormatNext(const Scenario& scenario, const std::filesystem::path& dir, bool latest);

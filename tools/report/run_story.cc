@@ -7,6 +7,7 @@
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metrics.h"
+#include "logging/metrics/true_contacts.h"
 #include "logging/recording/inline_recorder.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
@@ -20,6 +21,7 @@ using logging::RunRecord;
 
 constexpr size_t kFigures = 3;            // in the second sentence
 constexpr size_t kSupports = 5;           // named one by one
+constexpr double kFalls = 1;              // s before a fall that belong to it
 constexpr double kReferenceMoved = 5e-3;  // m, of a reference that is none to stand at
 
 struct Words {
@@ -104,38 +106,61 @@ struct SupportStory {
   std::string last;   ///< empty: not known
 };
 
+/// What the feet carried: in truth; of a real robot as its controller says, if it does.
 SupportStory Supports(const RunRecord& run) {
+  std::vector<std::array<bool, 2>> supports;
+  if (!run.truth.empty()) {
+    // What a falling robot's feet do is the fall.
+    const std::optional<int64_t> down = logging::DownTick(run);
+    for (const logging::TrueSupport& support : logging::TrueSupports(run)) {
+      if (!supports.empty() && down && run.duration(*down - support.tick) < kFalls) break;
+      supports.push_back(support.carries);
+    }
+  } else {
+    for (const logging::SupportChange& change : logging::SupportChanges(run)) {
+      if (supports.empty()) supports.push_back(change.before);
+      supports.push_back(change.after);
+    }
+    for (int64_t tick = 0; tick < run.num_ticks && supports.empty(); ++tick) {
+      const joint_command_t* command = run.command.at(tick);
+      if (command == nullptr || command->num_feet < 2) continue;
+      supports.push_back({command->in_contact[0] != 0, command->in_contact[1] != 0});
+    }
+    if (supports.size() == 1 && !supports[0][0] && !supports[0][1]) return {};  // it does not say
+  }
+  if (supports.empty()) return {};
   const auto name = [&](const std::array<bool, 2>& contacts) {
     const std::string support = logging::SupportName(run, contacts);
     return support == "both feet" || support == "no foot" ? support
                                                           : fmt::format("the {}", support);
   };
-  const std::vector<logging::SupportChange> changes = logging::SupportChanges(run);
-  if (changes.empty()) {
-    for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
-      const joint_command_t* command = run.command.at(tick);
-      if (command == nullptr || command->num_feet < 2) continue;
-      return {"", name({command->in_contact[0] != 0, command->in_contact[1] != 0})};
-    }
-    return {};
-  }
   std::string moves;
-  if (changes.size() < kSupports) {
-    moves = fmt::format("went from {}", name(changes.front().before));
-    for (const logging::SupportChange& change : changes)
-      moves += fmt::format(" to {}", name(change.after));
-  } else {
-    moves = fmt::format("changed its support {} times", changes.size());
+  if (supports.size() > kSupports) {
+    moves = fmt::format("changed its support {} times", supports.size() - 1);
+  } else if (supports.size() > 1) {
+    moves = fmt::format("went from {}", name(supports[0]));
+    for (size_t i = 1; i < supports.size(); ++i) moves += fmt::format(" to {}", name(supports[i]));
   }
-  return {moves, name(changes.back().after)};
+  return {moves, name(supports.back())};
 }
 
 /// What the simulator says of a fall in brackets: "(body tilt 0.71 rad)".
 std::string HowItFell(const RunRecord& run) {
   const std::string reason = EndReason(run);
   const size_t begin = reason.find('(');
-  if (reason.find("fell") == std::string::npos || begin == std::string::npos) return "";
-  return fmt::format(" {}", reason.substr(begin));
+  if (reason.find("fell") != std::string::npos && begin != std::string::npos) {
+    return fmt::format(" {}", reason.substr(begin));
+  }
+  // The simulator went on.
+  const std::optional<int64_t> down = logging::DownTick(run);
+  if (!down || run.truth.at(*down)->fallen != 0) return "";
+  const ground_truth_t* const last = run.truth.at(run.num_ticks - 1);
+  const ground_truth_t* const start = run.truth.at(run.spec.lead_ticks());
+  if (last == nullptr || start == nullptr) return "";
+  return fmt::format(
+      " (at the end its centre of mass was {:.2f} m above its lower sole, at first "
+      "{:.2f} m; the simulator did not call it fallen)",
+      logging::ComHeight(*last), logging::ComHeight(*start));
 }
 
 std::string Capital(std::string text) {
@@ -177,6 +202,15 @@ std::string Figure(const CheckResult& check, bool moved) {
   return paper.empty() ? text : fmt::format("{} ({})", text, paper);
 }
 
+/// True when the bridge followed as the run ended, or nobody says so.
+bool BridgeFollows(const RunRecord& run) {
+  for (int64_t tick = run.num_ticks - 1; tick >= 0; --tick) {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge != nullptr) return bridge->state <= bridge_status_t::STATE_RUNNING;
+  }
+  return true;
+}
+
 /// Where the bridge no longer followed though the robot did not fall, an emergency stop for one.
 std::string BridgeTrouble(const std::vector<Event>& events) {
   for (const Event& event : events) {
@@ -212,7 +246,11 @@ std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks
     figure.name = name;
     figure.unit = metric->unit;
     figure.measured = metric->compute(run);
-    if (figure.measured && parts.size() < kFigures) parts.push_back(Figure(figure, moved));
+    // Nobody asks for how long what never was on was on.
+    const bool nothing = figure.name == "balancing_active" && figure.measured == 0.0;
+    if (figure.measured && !nothing && parts.size() < kFigures) {
+      parts.push_back(Figure(figure, moved));
+    }
   }
   return parts.empty() ? "" : Capital(Joined(parts, "; ")) + ".";
 }
@@ -244,7 +282,10 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
   std::string first = pushes.empty() ? "the robot" : pushes + ", the robot";
   if (!support.moves.empty()) first += fmt::format(" {},", support.moves);
   const std::string and_ = support.moves.empty() ? "" : " and";
-  const char* const stood = run.truth.empty() ? "ran" : "stood";  // else nobody saw whether it fell
+  // Whether it fell nobody saw, or it is held up without its motors.
+  const char* const stood = run.truth.empty()     ? "ran"
+                            : !BridgeFollows(run) ? "did not fall"
+                                                  : "stood";
   if (run.spec.has_cut()) {
     const double begin = run.time(run.spec.cut().first_tick());
     return Capital(fmt::format("{} {}. The log is a part of a run: {} to {} of {}.", first,
@@ -259,8 +300,10 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
                        TellFall(run, fall->time, events));
   }
   const std::string reason = end.empty() ? EndReason(run) : end;
-  const std::string on =
-      support.moves.empty() && !support.last.empty() ? fmt::format(" on {}", support.last) : "";
+  const bool stands = stood == std::string_view("stood") || run.truth.empty();
+  const std::string on = stands && support.moves.empty() && !support.last.empty()
+                             ? fmt::format(" on {}", support.last)
+                             : "";
   if (early) {
     first +=
         fmt::format("{} {}{} until the run ended at {} of {}{}", and_, stood, on, Seconds(reached),

@@ -9,6 +9,7 @@
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metrics.h"
 #include "logging/metrics/planner_steps.h"
+#include "logging/metrics/true_contacts.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {
@@ -39,8 +40,9 @@ std::string TellStep(const logging::RunRecord& run, const PlannerStep& step) {
 }
 
 std::string TellWalk(const logging::RunRecord& run, std::ptrdiff_t steps) {
-  std::string text = fmt::format("It walked {} step{}", steps, steps == 1 ? "" : "s");
   const std::optional<double> way = Figure(run, "walk_way");
+  std::string text =
+      fmt::format("It {} {} step{}", way ? "walked" : "made", steps, steps == 1 ? "" : "s");
   const std::optional<double> fastest = Figure(run, "walk_speed_max");
   const std::optional<double> error = Figure(run, "walk_velocity_error_rms");
   if (way) text += fmt::format(", a way of {}", FormatNumber(*way, "m"));
@@ -52,21 +54,29 @@ std::string TellWalk(const logging::RunRecord& run, std::ptrdiff_t steps) {
   return text + ".";
 }
 
+/// Steps that no planner planned: of a controller that moves its feet by itself.
+std::ptrdiff_t UnplannedSteps(const logging::RunRecord& run) {
+  return std::ranges::count_if(logging::TrueSteps(run), [&](const logging::TrueStep& step) {
+    const support_plan_t* const plan = run.plan.at((step.lifted + step.landed) / 2);
+    return plan == nullptr || plan->in_contact[step.foot] != 0;
+  });
+}
+
 }  // namespace
 
 bool MadeSteps(const logging::RunRecord& run) {
-  for (int64_t tick = run.num_ticks - 1; tick >= 0; --tick) {
-    const support_plan_t* const plan = run.plan.at(tick);
-    if (plan != nullptr) return plan->num_steps > 0;
-  }
-  return false;
+  return !logging::PlannerSteps(run).empty() || UnplannedSteps(run) > 0;
 }
 
 std::string TellSteps(const logging::RunRecord& run) {
-  if (!MadeSteps(run)) return "";
   const std::vector<PlannerStep> steps = logging::PlannerSteps(run);
+  if (steps.empty()) {
+    const std::ptrdiff_t made = UnplannedSteps(run);
+    return made == 0 ? "" : TellWalk(run, made);
+  }
   std::vector<std::string> sentences;
-  const auto walked = std::ranges::count_if(steps, IsWalked);
+  const bool stood = !run.truth.empty() && logging::TrueSteps(run).empty();
+  const auto walked = stood ? 0 : std::ranges::count_if(steps, IsWalked);
   if (walked > 0) sentences.push_back(TellWalk(run, walked));
   size_t told = 0;
   for (const PlannerStep& step : steps) {

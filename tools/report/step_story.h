@@ -1,4 +1,4 @@
-// What the planner's own steps came to: of a push that was met by steps, and of a walk.
+// What steps came to: of a push that was met by them, and of a walk, whoever made them.
 #pragma once
 
 #include <string>
@@ -7,8 +7,9 @@
 
 namespace poise {
 
-/// True when the planner made a step of its own: the COM's reference then leads the COM or follows
-/// it, and the distance between the two is not how far the COM went.
+/// True when the planner made a step of its own, or a foot made one that no planner planned: the
+/// COM's reference then leads the COM or follows it, and the distance between the two is not how
+/// far the COM went.
 bool MadeSteps(const logging::RunRecord& run);
 
 /// Sentences: of steps that caught a push when, why and where each foot came down, and how far the

@@ -186,7 +186,7 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
                        summary.events,        outcome.message, {}};
   fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
              Wrapped(realtime, ScreenStyle().columns, 2),
-             FormatVerdictLines(summary.checks, problem, options_.full));
+             FormatVerdictLines(main_.loaded.scenario, summary.checks, problem, options_.full));
   if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
   fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
              record.duration(record.num_ticks), outcome.wall_time,
@@ -267,8 +267,8 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     record.spec = main_.spec;
   }
   summary.passed = (recorded || !options_.launch.log) && outcome.completed &&
-                   (!summary.reference || summary.reference->completed);
-  for (const CheckResult& check : summary.checks) summary.passed &= check.passed;
+                   (!summary.reference || summary.reference->completed) &&
+                   ChecksPass(summary.checks);
   summary.failed_by_machine =
       !summary.passed && outcome.completed && FailedByMachine(summary.checks, summary.lost);
   // What is known is said first: a full disk takes the summary along with the log.

@@ -1,0 +1,244 @@
+#include "logging/metrics/metric_needs.h"
+
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+#include "fmt/format.h"
+#include "logging/metrics/schedule_plan.h"
+
+namespace poise::logging {
+namespace {
+
+struct Needs {
+  const char* metrics;  // a pattern with *
+  const char* needs;    // as Metric::needs
+};
+
+// The first row that fits.
+constexpr Needs kNeeds[] = {
+    {"duration_reached", ""},
+    {"duration_reached_reference", "a reference run"},
+    {"real_time_factor", "the run's wall time"},
+    {"log_*", ""},
+    {"packets_refused", "HEALTH"},
+    {"gaps", "HEALTH"},
+    {"messages_dropped", "HEALTH"},
+    {"publish_errors", "HEALTH"},
+    {"fallen", "GROUND_TRUTH.fallen, base_orientation, com_position, foot_pose"},
+    {"task_not_ok_ticks", "TASK_TORQUE.status"},
+    {"balance_not_ok_ticks", "BALANCE_TORQUE.status"},
+    {"command_not_ok_ticks", "JOINT_COMMAND.status"},
+    {"waiting_ti*", "SUPPORT_PLAN.status"},
+    {"last_phase", "SUPPORT_PLAN.phase"},
+    // COM, body, swing foot
+    {"com_error_max_?", "SUPPORT_PLAN.com_position, com_reference"},
+    {"com_error_*", "GROUND_TRUTH.com_position; SUPPORT_PLAN.com_reference"},
+    {"com_motion_max", "GROUND_TRUTH.com_position"},
+    {"com_motion_reference_max", "a reference run; GROUND_TRUTH.com_position"},
+    {"com_difference_max", "a reference run; GROUND_TRUTH.com_position"},
+    {"orientation_error_max", "TASK_TORQUE.body_orientation_error"},
+    {"body_rotation_x_*", "TASK_TORQUE.body_orientation_error; SUPPORT_PLAN.in_contact"},
+    {"*_foot_error_max_?", "SUPPORT_PLAN.in_contact, foot_pose, foot_reference"},
+    // balancing
+    {"balancing_*", "BALANCE_TORQUE.active_x, active_y"},
+    {"cop_max_?",
+     "BALANCE_TORQUE.cop | JOINT_COMMAND.foot_wrench; "
+     "BALANCE_TORQUE.frame_o | SUPPORT_PLAN.foot_pose | GROUND_TRUTH.foot_pose"},
+    {"cop_measured_max_?",
+     "ROBOT_SENSORS.foot_wrench | ROBOT_STATE.foot_wrench; SUPPORT_PLAN.foot_pose | "
+     "GROUND_TRUTH.foot_pose"},
+    {"cop_task_max_?", "BALANCE_TORQUE.cop_task"},
+    {"cop_*", "BALANCE_TORQUE.cop, cop_limit"},
+    {"capture_margin_min", "SUPPORT_PLAN.capture_margin"},
+    {"step_needed_*", "SUPPORT_PLAN.step_needed"},
+    {"step_warning_time", "SUPPORT_PLAN.step_needed; GROUND_TRUTH.fallen"},
+    // computed and measured wrenches
+    {"violated_ticks", "JOINT_COMMAND.conditions_met, margins"},
+    {"eta_span", "JOINT_COMMAND.eta, eta_feasible, eta_max; JOINT_COMMAND.in_contact"},
+    {"eta_*", "JOINT_COMMAND.eta, eta_feasible, eta_max"},
+    {"*_foot_*_margin", "JOINT_COMMAND.in_contact, foot_wrench, margins"},
+    {"*_foot_load_computed_*", "JOINT_COMMAND.in_contact, foot_wrench, margins"},
+    {"*_foot_load_measured_*",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench"},
+    {"*foot_*_computed_max", "JOINT_COMMAND.in_contact, foot_wrench, margins"},
+    {"*foot_*_error_*rms",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact"},
+    {"*_foot_*_violation_after_contact",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.foot_state"},
+    {"*_foot_*_violation_*",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench"},
+    {"contact_lost_ticks",
+     "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
+     "ROBOT_STATE.foot_wrench"},
+    // joints and drives
+    {"joint_torque_*",
+     "GROUND_TRUTH.joint_torque | BRIDGE_STATUS.applied_torque | JOINT_COMMAND.torque"},
+    {"torque_step_max",
+     "GROUND_TRUTH.joint_torque | BRIDGE_STATUS.applied_torque | JOINT_COMMAND.torque"},
+    {"torque_step_at_switch", "JOINT_COMMAND.in_contact, torque"},
+    {"torque_step_*", "a reference run; JOINT_COMMAND.in_contact, torque"},
+    {"joint_position_beyond", "GROUND_TRUTH.joint_position | ROBOT_STATE.joint_position"},
+    {"joint_velocity_share", "GROUND_TRUTH.joint_velocity | ROBOT_STATE.joint_velocity"},
+    {"saturations", "BRIDGE_STATUS.saturations"},
+    {"bridge_not_running_ticks", "BRIDGE_STATUS.state"},
+    {"drive_torque_step", "DRIVE_COMMAND.current"},
+    {"drive_*", "DRIVE_COMMAND.current; BRIDGE_STATUS.applied_torque"},
+    {"bus_frames_sent", "BRIDGE_STATUS.frames_sent"},
+    {"bus_frames_lost", "BRIDGE_STATUS.frames_lost"},
+    {"bus_working_counter_errors", "BRIDGE_STATUS.working_counter_errors"},
+    {"bridge_overruns", "BRIDGE_STATUS.overruns"},
+    // contacts
+    {"foot_lift_motion_z", "JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
+    {"foot_lift_motion_z_reference",
+     "a reference run; JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
+    {"*_foot_sink", "SUPPORT_PLAN.foot_state; JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
+    {"touch_down", "SUPPORT_PLAN.foot_state"},
+    {"early_contacts", "SUPPORT_PLAN.foot_state, foot_pose; the phases of step_planner"},
+    {"late_contacts", "SUPPORT_PLAN.foot_state, foot_pose; the phases of step_planner"},
+    {"no_surface_stops", "SUPPORT_PLAN.foot_state"},
+    {"touch_down_delay_max", "SUPPORT_PLAN.foot_state; GROUND_TRUTH.foot_wrench"},
+    {"false_touch_downs", "SUPPORT_PLAN.foot_state; GROUND_TRUTH.foot_wrench"},
+    // steps
+    {"steps", "GROUND_TRUTH.foot_wrench, com_position"},
+    {"walk_velocity_error_rms",
+     "GROUND_TRUTH.foot_wrench, com_position; SUPPORT_PLAN.walk_velocity, step_reason"},
+    {"walk_cost_of_transport",
+     "GROUND_TRUTH.foot_wrench, com_position, joint_torque, joint_velocity"},
+    {"walk_*", "GROUND_TRUTH.foot_wrench, com_position"},
+    {"step_duration", "SUPPORT_PLAN.stepping"},
+    {"foothold_margin_min", "SUPPORT_PLAN.stepping, foothold_margin"},
+    {"step_*", "SUPPORT_PLAN.stepping; EXTERNAL_PUSH.force"},
+    {"push_*", "EXTERNAL_PUSH.force"},
+    // estimates
+    {"mass_error_*", "ROBOT_STATE.load_mass; GROUND_TRUTH.foot_pose, foot_wrench"},
+    {"com_estimate_error_*", "SUPPORT_PLAN.com_position; GROUND_TRUTH.com_position"},
+    {"imu_tilt_*", "ESTIMATOR_STATUS.imu_tilt, calibration"},
+    {"observer_*", "ESTIMATOR_STATUS.observed_wrench; GROUND_TRUTH.foot_wrench"},
+    {"foot_sensor_fault_*", "ESTIMATOR_STATUS.foot_sensor"},
+    {"estimator_*foot_slip_time", "ESTIMATOR_STATUS.foot_contact"},
+    {"estimator_nees*", "ROBOT_STATE; ESTIMATOR_STATUS.covariance; GROUND_TRUTH.base_position"},
+    {"estimator_*", "ROBOT_STATE.base_position; GROUND_TRUTH.base_position"},
+    {"anchored_feet_*", "ESTIMATOR_STATUS.method; ROBOT_SENSORS; GROUND_TRUTH.base_position"},
+    {"invariant_ekf_*foot_slip_time", "ESTIMATOR_STATUS.method; ROBOT_SENSORS"},
+    {"invariant_ekf_*", "ESTIMATOR_STATUS.method; ROBOT_SENSORS; GROUND_TRUTH.base_position"},
+};
+
+std::vector<std::string_view> Split(std::string_view text, char separator) {
+  std::vector<std::string_view> parts;
+  while (!text.empty()) {
+    const size_t end = std::min(text.find(separator), text.size());
+    std::string_view part = text.substr(0, end);
+    while (part.starts_with(' ')) part.remove_prefix(1);
+    while (part.ends_with(' ')) part.remove_suffix(1);
+    if (!part.empty()) parts.push_back(part);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return parts;
+}
+
+std::string Told(std::string_view need) {
+  return fmt::format("{}", fmt::join(Split(need, '|'), ", else "));
+}
+
+bool AnyCommand(const RunRecord& run, const std::function<bool(const joint_command_t&)>& tells) {
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const joint_command_t* const command = run.command.at(tick);
+    if (command != nullptr && tells(*command)) return true;
+  }
+  return false;
+}
+
+/// What a controller leaves zero where it computes no wrenches.
+bool CommandTells(const RunRecord& run, std::string_view field) {
+  if (field.starts_with("eta")) return AnyCommand(run, TellsRatio);
+  if (field.starts_with("in_contact, torque") || field == "in_contact") {
+    return AnyCommand(run, [](const joint_command_t& command) {
+      return command.in_contact[0] != 0 || command.in_contact[1] != 0;
+    });
+  }
+  if (field == "torque" || field == "status") return true;
+  return AnyCommand(run, [](const joint_command_t& command) {
+    return TellsFoot(command, 0) || TellsFoot(command, 1);
+  });
+}
+
+bool ObservesFeet(const RunRecord& run) {
+  for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
+    const robot_state_t* const state = run.state.at(tick);
+    if (state != nullptr &&
+        std::ranges::count(state->foot_wrench_source, robot_state_t::SOURCE_OBSERVER) > 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Of "CHANNEL.field, field": whether the run has it.
+bool Has(const RunRecord& run, std::string_view what) {
+  if (what == "the phases of step_planner") return ReadSchedulePlan(run).has_value();
+  const size_t dot = std::min(what.find('.'), what.size());
+  const std::string_view channel = what.substr(0, dot);
+  const std::string_view field = what.substr(std::min(dot + 1, what.size()));
+  const std::pair<std::string_view, bool> kSeries[] = {
+      {"ROBOT_SENSORS", !run.sensors.empty()},
+      {"ROBOT_STATE", !run.state.empty()},
+      {"ESTIMATOR_STATUS", !run.estimator.empty()},
+      {"SUPPORT_PLAN", !run.plan.empty()},
+      {"TASK_TORQUE", !run.task.empty()},
+      {"BALANCE_TORQUE", !run.balance.empty()},
+      {"JOINT_COMMAND", !run.command.empty()},
+      {"DRIVE_COMMAND", !run.drive.empty()},
+      {"BRIDGE_STATUS", !run.bridge.empty()},
+      {"EXTERNAL_PUSH", !run.push.empty()},
+      {"GROUND_TRUTH", !run.truth.empty()},
+      {"HEALTH", !run.health.empty()},
+      {"a reference run", run.reference != nullptr},
+      {"the run's wall time", false},
+  };
+  const auto* const found =
+      std::ranges::find(kSeries, channel, &std::pair<std::string_view, bool>::first);
+  if (found == std::end(kSeries)) return run.other.find(channel) != run.other.end();
+  if (!found->second) return false;
+  if (channel == "JOINT_COMMAND") return CommandTells(run, field);
+  if (field != "foot_wrench") return true;
+  if (channel == "ROBOT_STATE") return ObservesFeet(run);
+  return channel != "ROBOT_SENSORS" ||
+         std::ranges::any_of(run.robot.feet(), &robot::FootModel::force_sensor);
+}
+
+}  // namespace
+
+std::string NeedsOf(std::string_view metric) {
+  const std::string name(metric);
+  for (const Needs& row : kNeeds) {
+    if (fnmatch(row.metrics, name.c_str(), 0) == 0) return row.needs;
+  }
+  return "";
+}
+
+std::vector<std::string> TellNeeds(const Metric& metric) {
+  std::vector<std::string> needs;
+  for (const std::string_view need : Split(metric.needs, ';')) needs.push_back(Told(need));
+  return needs;
+}
+
+std::vector<std::string> MissingFor(const Metric& metric, const RunRecord& run) {
+  std::vector<std::string> missing;
+  for (const std::string_view need : Split(metric.needs, ';')) {
+    const std::vector<std::string_view> fields = Split(need, '|');
+    if (std::ranges::any_of(fields, [&](std::string_view field) { return Has(run, field); })) {
+      continue;
+    }
+    missing.push_back(fmt::format("{}", fmt::join(fields, " or ")));
+  }
+  return missing;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,148 @@
+#include "logging/metrics/true_contacts.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace poise::logging {
+namespace {
+
+constexpr double kUnloadedShare = 0.02;             // of the weight
+constexpr double kLeastSwing = 0.1, kTouch = 0.02;  // s
+constexpr double kDownTilt = 1, kDownShare = 0.5;   // rad; of the COM's height at time 0
+constexpr double kLeastHeight = 0.05;               // m, of a COM whose height is known
+
+int64_t Ticks(const RunRecord& run, double time) {
+  return std::llround(time / run.spec.tick_period());
+}
+
+Eigen::Vector3d Up(const ground_truth_t& truth) {
+  const double* q = truth.base_orientation;
+  return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).conjugate() * Eigen::Vector3d::UnitZ();
+}
+
+/// At time 0, or where a part of a run begins; nullptr: there is none.
+const ground_truth_t* Start(const RunRecord& run) {
+  for (int64_t tick = run.spec.lead_ticks(); tick < run.num_ticks; ++tick) {
+    if (const ground_truth_t* truth = run.truth.at(tick)) return truth;
+  }
+  return nullptr;
+}
+
+/// What IsDown compares with, found once.
+class Stance {
+ public:
+  explicit Stance(const RunRecord& run) {
+    const ground_truth_t* const start = Start(run);
+    if (start == nullptr) return;
+    up_ = Up(*start);
+    height_ = ComHeight(*start);
+  }
+  bool Left(const ground_truth_t& truth) const {
+    if (truth.fallen != 0) return true;
+    if (!(height_ > kLeastHeight)) return false;
+    return Up(truth).dot(up_) < std::cos(kDownTilt) || ComHeight(truth) < kDownShare * height_;
+  }
+
+ private:
+  Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ();
+  double height_ = 0;
+};
+
+}  // namespace
+
+double ComHeight(const ground_truth_t& truth) {
+  double lower = HUGE_VAL;
+  for (const pose_t& foot : truth.foot_pose) lower = std::min(lower, foot.position[2]);
+  return truth.com_position[2] - (truth.foot_pose.empty() ? 0 : lower);
+}
+
+std::optional<bool> IsDown(const RunRecord& run, int64_t tick) {
+  const ground_truth_t* const now = run.truth.at(tick);
+  if (now == nullptr) return {};
+  const ground_truth_t truth = *now;  // of a paged series, whose others are read meanwhile
+  if (tick < run.spec.lead_ticks()) return truth.fallen != 0;
+  return Stance(run).Left(truth);
+}
+
+std::optional<int64_t> DownTick(const RunRecord& run) {
+  const Stance stance(run);
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const ground_truth_t* const truth = run.truth.at(tick);
+    if (truth == nullptr) continue;
+    if (tick < run.spec.lead_ticks() ? truth->fallen != 0 : stance.Left(*truth)) return tick;
+  }
+  return {};
+}
+
+std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run) {
+  std::array<std::vector<Interval>, 2> off;
+  if (run.truth.empty()) return off;
+  const int64_t down = DownTick(run).value_or(run.num_ticks);
+  const double least = kUnloadedShare * run.robot.total_mass() * robot::kGravity;
+  for (size_t foot = 0; foot < 2; ++foot) {
+    const auto unloaded = [&](int64_t tick) -> std::optional<bool> {
+      if (tick >= down) return false;
+      const ground_truth_t* const truth = run.truth.at(tick);
+      if (truth == nullptr) return {};
+      return -truth->foot_wrench[foot].force[2] < least;
+    };
+    off[foot] = Intervals(run, unloaded, Ticks(run, kTouch));
+    // What the fall ends is no landing.
+    for (Interval& interval : off[foot]) {
+      if (interval.end && *interval.end >= down) interval.end.reset();
+    }
+    std::erase_if(off[foot], [&](const Interval& i) {
+      return i.end.value_or(down) - i.begin < Ticks(run, kLeastSwing);
+    });
+  }
+  return off;
+}
+
+std::vector<TrueStep> TrueSteps(const RunRecord& run) {
+  std::vector<TrueStep> steps;
+  const auto off = OffTheGround(run);
+  for (size_t foot = 0; foot < 2; ++foot) {
+    for (const Interval& interval : off[foot]) {
+      // What hung from a crane, or was off the ground from the start, was not lifted.
+      if (!interval.end || interval.begin <= run.spec.lead_ticks()) continue;
+      steps.push_back({foot, interval.begin, *interval.end});
+    }
+  }
+  std::ranges::stable_sort(steps, {}, &TrueStep::landed);
+  return steps;
+}
+
+std::vector<TrueSupport> TrueSupports(const RunRecord& run) {
+  const auto off = OffTheGround(run);
+  const int64_t start = run.spec.lead_ticks();
+  const auto carries = [&](int64_t tick) {
+    std::array<bool, 2> feet{};
+    for (size_t foot = 0; foot < 2; ++foot) {
+      feet[foot] = std::ranges::none_of(off[foot], [&](const Interval& i) {
+        return i.begin <= tick && tick < i.end.value_or(run.num_ticks);
+      });
+    }
+    return feet;
+  };
+  std::vector<int64_t> ticks = {start};
+  for (const auto& intervals : off) {
+    for (const Interval& interval : intervals) {
+      if (interval.begin > start) ticks.push_back(interval.begin);
+      if (interval.end && *interval.end > start) ticks.push_back(*interval.end);
+    }
+  }
+  std::ranges::sort(ticks);
+  std::vector<TrueSupport> supports;
+  bool known = false;
+  for (const int64_t tick : ticks) {
+    const std::array<bool, 2> feet = carries(tick);
+    if (!supports.empty() && supports.back().carries == feet) continue;
+    supports.push_back({tick, feet});
+    known = known || feet[0] || feet[1];
+  }
+  if (run.truth.empty() || !known) supports.clear();
+  return supports;
+}
+
+}  // namespace poise::logging

@@ -1,0 +1,150 @@
+"""Controllers that are not Poise's, in graphs without any of its own: by torque and by impedance they are judged by the truth."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+FOLDER = tempfile.mkdtemp()
+PROGRAM = '''#!{python}
+import sys
+import numpy as np
+import poise
+
+
+class Holder(poise.Component):
+    """Holds the first posture of the joints."""
+    inputs = {{"robot_state": "robot_state_t"}}
+    outputs = {{"joint_command": "joint_command_t"}}
+    impedance = {impedance}
+
+    def configure(self, context):
+        self.robot, self.start = context.robot, None
+
+    def step(self, tick, inputs, outputs):
+        state, command = inputs.robot_state, outputs.joint_command
+        if self.start is None:
+            self.start = np.array(state.joint_position)
+        if self.impedance:
+            command.position, command.stiffness, command.damping = self.start, 1500, 40
+            return
+        gravity = self.robot.gravity_torque(state.joint_position, None, state.base_position, state.base_orientation)
+        command.torque = gravity + 600 * (self.start - state.joint_position) - 30 * state.joint_velocity
+
+
+if __name__ == "__main__":
+    sys.exit(poise.main(Holder))
+'''
+
+
+def make_types():
+    """Both programs and graphs in FOLDER, before poise is imported: it then knows their types."""
+    for place in ("lib/poise/bin", "lib/poise/components", "share/poise/graphs"):
+        os.makedirs(os.path.join(FOLDER, place))
+    with open(os.path.join(os.environ["POISE_GRAPHS"], "balance.pbtxt")) as file:
+        graph = file.read()
+    for name in ("step_planner", "task_controller", "contact_wrench_monitor", "redistributor"):
+        graph = re.sub(r'component \{\n  name: "%s"\n(.*\n)*?\}\n' % name, "", graph)
+    for channel in ("SUPPORT_PLAN", "TASK_TORQUE", "BALANCE_TORQUE"):
+        graph = re.sub(r'channel \{ name: "%s" .*\n' % channel, "", graph)
+    for name, impedance in (("impedance", True), ("torque", False)):
+        program = os.path.join(FOLDER, "lib/poise/bin", name)
+        with open(program, "w") as file:
+            file.write(PROGRAM.format(python=sys.executable, impedance=impedance))
+        os.chmod(program, 0o755)
+        told = subprocess.run([program, "--describe"], check=True, capture_output=True, text=True).stdout
+        with open(os.path.join(FOLDER, "lib/poise/components", name + ".json"), "w") as file:
+            file.write(told)
+        with open(os.path.join(FOLDER, "share/poise/graphs", name + ".pbtxt"), "w") as file:
+            file.write(graph + 'component {\n  name: "holder"\n  type: "%s"\n'
+                       '  input { port: "robot_state" channel: "ROBOT_STATE" }\n'
+                       '  output { port: "joint_command" channel: "JOINT_COMMAND" }\n}\n' % name)
+    os.environ["POISE_PATH"] = FOLDER
+
+
+make_types()
+import numpy as np  # noqa: E402
+import poise  # noqa: E402
+
+
+def tearDownModule():
+    shutil.rmtree(FOLDER)
+
+
+def holder(impedance, **more):
+    scope = {}
+    exec(compile(PROGRAM.format(python="", impedance=impedance), "holder", "exec"), {"__name__": "holder"}, scope)
+    return type("Told", (scope["Holder"],), more)()
+
+
+class Judged(unittest.TestCase):
+    def run_it(self, scenario, kind, controller, changes=None):
+        out = os.path.join(FOLDER, f"{scenario}_{kind}_{self.id().rsplit('.', 1)[-1]}")
+        run = poise.run(scenario, {"graph": kind, **(changes or {})}, components={"holder": controller}, out=out)
+        shown = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "report", out, "--no-html"],
+                               capture_output=True, text=True, env={**os.environ, "COLUMNS": "200"})
+        return run, {check["name"]: check for check in run.checks}, shown
+
+    def test_stand_and_push_are_passed_by_torque_and_by_impedance(self):
+        for kind in ("torque", "impedance"):
+            for scenario in ("stand", "push"):
+                with self.subTest(kind=kind, scenario=scenario):
+                    run, checks, shown = self.run_it(scenario, kind, holder(kind == "impedance"))
+                    self.assertTrue(run.passed, shown.stdout)
+                    self.assertEqual(shown.returncode, 0, shown.stdout + shown.stderr)
+                    self.assertIn("the robot stood on both feet to the end".lower(), shown.stdout.lower())
+                    self.assertNotIn("balancing", shown.stdout)
+                    self.assertRegex(shown.stdout, r"passed: (\d+) of \1 checks hold, 2 not known")
+                    # What its own words would have to tell.
+                    self.assertIsNone(checks["violated_ticks"]["measured"])
+                    self.assertEqual(checks["violated_ticks"]["missing"], ["JOINT_COMMAND.conditions_met, margins"])
+                    self.assertEqual(checks["com_error_end"]["missing"], ["SUPPORT_PLAN.com_reference"])
+                    self.assertIn("SUPPORT_PLAN.com_reference", shown.stdout)
+                    # What the truth tells.
+                    self.assertEqual(checks["fallen"]["measured"], 0)
+                    truth = run["GROUND_TRUTH"]
+                    torque = abs(truth.joint_torque)
+                    self.assertGreater(torque.max(), 20)
+                    self.assertAlmostEqual(run.metric("joint_torque_max"), torque.max(), places=9)
+                    self.assertAlmostEqual(run.metric("torque_step_max"), abs(np.diff(truth.joint_torque, axis=0)).max(), places=9)
+                    self.assertGreater(checks["joint_torque_share"]["measured"], 5)
+
+    def test_conditions_that_a_controller_tells_are_judged(self):
+        def tells(met):
+            def step(self, tick, inputs, outputs):
+                super(type(self), self).step(tick, inputs, outputs)
+                command = outputs.joint_command
+                command.in_contact, command.conditions_met, command["margins.normal"][...] = 1, met, 1
+
+            return step
+
+        for met, ticks in ((1, 0), (0, 250)):
+            run, checks, shown = self.run_it("stand", "torque", holder(False, step=tells(met)), {"duration": 0.5 + met})
+            self.assertEqual(checks["violated_ticks"]["measured"], ticks)
+            self.assertEqual(run.passed, met == 1)
+            self.assertEqual(shown.returncode, 1 - met, shown.stdout)
+
+    def test_why_a_robot_that_is_stopped_lies_there_is_told(self):
+        env = poise.Environment("stand", {"graph": "impedance", "sim.fall_height": 0.01, "sim.fall_tilt": 4},
+                                components={"holder": holder(True)}, out=os.path.join(FOLDER, "pushed_over"))
+        self.assertEqual(env.detail, "")
+        env.step(500)
+        self.assertEqual(env.detail, "")
+        env.push([0, 400, 0], duration=0.3)
+        env.step(2000)
+        self.assertFalse(env.ended)
+        self.assertRegex(env.detail, r"^hw_bridge: \w.* \(\w")
+        run = env.finish()
+        self.assertGreater(run.metric("fallen"), 0)
+        shown = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "report", os.path.join(FOLDER, "pushed_over"),
+                                "--no-html"], capture_output=True, text=True, env={**os.environ, "COLUMNS": "200"})
+        self.assertEqual(shown.returncode, 1)
+        self.assertNotIn("stood", shown.stdout)
+        self.assertIn("fell at ", shown.stdout)
+        self.assertIn("did not call it fallen", shown.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
