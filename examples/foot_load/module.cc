@@ -20,6 +20,9 @@ poise::logging::Answer LargestLoad(const poise::logging::RunRecord& run) {
 
 POISE_MODULE {
   poise::AddComponent(gait_lab::FootLoadType());
-  poise::logging::AddMetric(
-      {"foot_load_peak", "N", "largest filtered load of a foot", LargestLoad});
+  poise::logging::AddMetric({.name = "foot_load_peak",
+                             .unit = "N",
+                             .description = "largest filtered load of a foot",
+                             .compute = LargestLoad,
+                             .needs = "FOOT_LOAD.load"});
 }

@@ -48,8 +48,8 @@ constexpr Needs kNeeds[] = {
      "BALANCE_TORQUE.cop | JOINT_COMMAND.foot_wrench; "
      "BALANCE_TORQUE.frame_o | SUPPORT_PLAN.foot_pose | GROUND_TRUTH.foot_pose"},
     {"cop_measured_max_?",
-     "ROBOT_SENSORS.foot_wrench | ROBOT_STATE.foot_wrench; SUPPORT_PLAN.foot_pose | "
-     "GROUND_TRUTH.foot_pose"},
+     "ROBOT_SENSORS.foot_wrench | ROBOT_STATE.foot_wrench; "
+     "BALANCE_TORQUE.frame_o | SUPPORT_PLAN.foot_pose | GROUND_TRUTH.foot_pose"},
     {"cop_task_max_?", "BALANCE_TORQUE.cop_task"},
     {"cop_*", "BALANCE_TORQUE.cop, cop_limit"},
     {"capture_margin_min", "SUPPORT_PLAN.capture_margin"},
@@ -70,7 +70,7 @@ constexpr Needs kNeeds[] = {
      "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.in_contact"},
     {"*_foot_*_violation_after_contact",
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
-     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.foot_state"},
+     "ROBOT_STATE.foot_wrench; SUPPORT_PLAN.foot_state | JOINT_COMMAND.in_contact"},
     {"*_foot_*_violation_*",
      "JOINT_COMMAND.in_contact, foot_wrench, margins; ROBOT_SENSORS.foot_wrench | "
      "ROBOT_STATE.foot_wrench"},
@@ -98,7 +98,7 @@ constexpr Needs kNeeds[] = {
     {"foot_lift_motion_z", "JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
     {"foot_lift_motion_z_reference",
      "a reference run; JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
-    {"*_foot_sink", "SUPPORT_PLAN.foot_state; JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
+    {"*_foot_sink", "SUPPORT_PLAN.foot_state | JOINT_COMMAND.in_contact; GROUND_TRUTH.foot_pose"},
     {"touch_down", "SUPPORT_PLAN.foot_state"},
     {"early_contacts", "SUPPORT_PLAN.foot_state, foot_pose; the phases of step_planner"},
     {"late_contacts", "SUPPORT_PLAN.foot_state, foot_pose; the phases of step_planner"},

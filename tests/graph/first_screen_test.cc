@@ -98,7 +98,8 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
   EXPECT_THAT(run.output, HasSubstr("\nPushed from "));
   EXPECT_THAT(Flat(run.output), HasSubstr(text));
   EXPECT_THAT(Flat(run.output), HasSubstr("the robot stood"));
-  std::snprintf(text, sizeof text, "passed: %d of %d checks hold\n", limited, limited);
+  std::snprintf(text, sizeof text, "passed: %d of %d checks hold, 2 of them above\n", limited,
+                limited);
   EXPECT_THAT(run.output, HasSubstr(text));
   // The paper's rows alone; all with --full.
   EXPECT_THAT(run.output, HasSubstr("\npush, largest"));
