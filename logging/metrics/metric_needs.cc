@@ -82,6 +82,7 @@ constexpr Needs kNeeds[] = {
      "GROUND_TRUTH.joint_torque | BRIDGE_STATUS.applied_torque | JOINT_COMMAND.torque"},
     {"torque_step_max",
      "GROUND_TRUTH.joint_torque | BRIDGE_STATUS.applied_torque | JOINT_COMMAND.torque"},
+    {"torque_limited", "BRIDGE_STATUS.saturated"},
     {"torque_step_at_switch", "JOINT_COMMAND.in_contact, torque"},
     {"torque_step_*", "a reference run; JOINT_COMMAND.in_contact, torque"},
     {"joint_position_beyond", "GROUND_TRUTH.joint_position | ROBOT_STATE.joint_position"},

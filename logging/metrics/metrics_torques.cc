@@ -143,6 +143,22 @@ void AddTorques(MetricList* list) {
                      if (!here || !there || *there <= 0) return {};
                      return 100 * *here / *there;
                    }});
+  list->push_back({"torque_limited", "",
+                   "joint-ticks in which a motor's largest torque, or a hot one's rated current, "
+                   "was less than wanted",
+                   [](const RunRecord& run) -> Answer {
+                     Answer count;
+                     for (int64_t t = run.first_tick; t < run.num_ticks; ++t) {
+                       const bridge_status_t* bridge = run.bridge.at(t);
+                       if (bridge == nullptr) continue;
+                       constexpr int kLimits =
+                           bridge_status_t::LIMIT_TORQUE | bridge_status_t::LIMIT_THERMAL;
+                       const auto limited = std::ranges::count_if(
+                           bridge->saturated, [](int8_t bits) { return (bits & kLimits) != 0; });
+                       count = count.value_or(0) + static_cast<double>(limited);
+                     }
+                     return count;
+                   }});
   list->push_back({"saturations", "", "joint-ticks in which the bridge limited the torque",
                    [](const RunRecord& run) {
                      return Maximum(run, [&](int64_t t) -> Answer {

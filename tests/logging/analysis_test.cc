@@ -129,6 +129,10 @@ TEST_F(AnalysisTest, TorquesAndTheirSteps) {
   // Joint 3 is a knee: 150 N·m by its effort, and 50 * 0.10 * 30 by its motor.
   EXPECT_NEAR(Measure("joint_torque_share"), 40, 1e-12);
   EXPECT_EQ(Measure("saturations"), 7);
+  bridge_[60].saturated[2] = bridge_status_t::LIMIT_TORQUE | bridge_status_t::LIMIT_SLEW;
+  bridge_[61].saturated[2] = bridge_status_t::LIMIT_THERMAL;
+  bridge_[62].saturated[2] = bridge_status_t::LIMIT_SLEW;
+  EXPECT_EQ(Measure("torque_limited"), 2);
   without_ = {"GROUND_TRUTH"};
   EXPECT_EQ(Measure("joint_torque_max"), 20);
   without_.insert("BRIDGE_STATUS");
