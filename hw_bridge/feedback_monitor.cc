@@ -34,9 +34,11 @@ FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
       counts_(motors.size(), 0),
       velocity_(motors.size(), 0.0),
       raw_velocity_(motors.size(), 0.0),
-      commanded_(motors.size(), 0.0),
+      commanded_(static_cast<size_t>(std::max(1, config.current_cycles)),
+                 std::vector<double>(motors.size(), 0.0)),
       enabled_(motors.size(), 0),
       still_cycles_(motors.size(), 0),
+      changed_cycles_(motors.size(), 0),
       error_cycles_(motors.size(), 0),
       least_torque_(motors.size(), 0.0),
       greatest_torque_(motors.size(), 0.0) {}
@@ -79,22 +81,29 @@ int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
 
 FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feedback) {
   for (size_t j = 0; j < motors_.size(); ++j) {
-    const double torque = JointTorque(motors_[j], commanded_[j]);
+    const double torque = JointTorque(motors_[j], commanded_.front()[j]);
     if (enabled_[j] == 0 || !consecutive_ || feedback.position_counts[j] != counts_[j]) {
-      still_cycles_[j] = 0;
+      still_cycles_[j] = changed_cycles_[j] = 0;
     } else {
       if (still_cycles_[j] == 0) least_torque_[j] = greatest_torque_[j] = torque;
       still_cycles_[j] = std::min(still_cycles_[j] + 1, config_.frozen_cycles);
       least_torque_[j] = std::min(least_torque_[j], torque);
       greatest_torque_[j] = std::max(greatest_torque_[j], torque);
+      const bool changed = greatest_torque_[j] - least_torque_[j] > config_.frozen_torque;
+      changed_cycles_[j] = changed ? std::min(changed_cycles_[j] + 1, config_.response_cycles) : 0;
     }
     if (still_cycles_[j] >= config_.frozen_cycles &&
-        greatest_torque_[j] - least_torque_[j] > config_.frozen_torque) {
+        changed_cycles_[j] >= config_.response_cycles) {
       return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
     }
+    double least = commanded_.front()[j], greatest = least;
+    for (const std::vector<double>& commanded : commanded_) {
+      least = std::min(least, commanded[j]);
+      greatest = std::max(greatest, commanded[j]);
+    }
+    const double beyond = feedback.current[j] - std::clamp(feedback.current[j], least, greatest);
     const bool differs = motors_[j].current_sensor && enabled_[j] != 0 &&
-                         std::abs(JointTorque(motors_[j], feedback.current[j] - commanded_[j])) >
-                             config_.torque_error;
+                         std::abs(JointTorque(motors_[j], beyond)) > config_.torque_error;
     error_cycles_[j] = differs ? std::min(error_cycles_[j] + 1, config_.torque_error_cycles) : 0;
     if (differs && error_cycles_[j] >= config_.torque_error_cycles) {
       return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};
@@ -121,8 +130,9 @@ FeedbackMonitor::Problem FeedbackMonitor::Update(const drive_feedback_t& feedbac
 }
 
 void FeedbackMonitor::EndCycle(std::span<const double> current, std::span<const int8_t> enabled) {
-  for (size_t j = 0; j < commanded_.size(); ++j) {
-    commanded_[j] = current[j];
+  std::ranges::rotate(commanded_, commanded_.end() - 1);  // moves the vectors, not their numbers
+  for (size_t j = 0; j < enabled_.size(); ++j) {
+    commanded_.front()[j] = current[j];
     enabled_[j] = enabled[j] != 0 ? 1 : 0;
   }
   consecutive_ = updated_;
@@ -131,6 +141,7 @@ void FeedbackMonitor::EndCycle(std::span<const double> current, std::span<const 
 
 void FeedbackMonitor::Reset() {
   std::fill(still_cycles_.begin(), still_cycles_.end(), 0);
+  std::fill(changed_cycles_.begin(), changed_cycles_.end(), 0);
   std::fill(error_cycles_.begin(), error_cycles_.end(), 0);
 }
 

@@ -20,13 +20,15 @@ struct FeedbackMonitorConfig {
   double velocity_cutoff = 60;  ///< Hz
   int num_feet = 2;
   double period = 0.002;  ///< s, of a cycle
-  /// An encoder is frozen when it has not moved by a count for `frozen_cycles` in which the torque
-  /// changed by more than `frozen_torque`, N·m.
-  int frozen_cycles = 50;
+  /// An encoder is frozen when it has not moved by a count for `frozen_cycles`, the last
+  /// `response_cycles` of them after the torque has changed by more than `frozen_torque`, N·m: a
+  /// joint that stands still takes some time until such a change has moved it.
+  int frozen_cycles = 50, response_cycles = 10;
   double frozen_torque = std::numeric_limits<double>::infinity();
-  /// A torque is implausible when it has differed from the commanded one by more than
-  /// `torque_error`, N·m, for `torque_error_cycles` in a row.
-  int torque_error_cycles = 10;
+  /// A torque is implausible when it has differed by more than `torque_error`, N·m, from all that
+  /// was commanded in the last `current_cycles`, as old as a reading may be, for
+  /// `torque_error_cycles` in a row.
+  int torque_error_cycles = 10, current_cycles = 1;
   double torque_error = std::numeric_limits<double>::infinity();
 };
 
@@ -68,9 +70,9 @@ class FeedbackMonitor {
   double velocity_gain_;  // of the first-order low-pass, per cycle
   std::vector<int64_t> counts_;
   std::vector<double> velocity_, raw_velocity_;
-  std::vector<double> commanded_;  // A, in the cycle before
+  std::vector<std::vector<double>> commanded_;  // A, in the cycles before, the last one first
   std::vector<char> enabled_;
-  std::vector<int> still_cycles_, error_cycles_;
+  std::vector<int> still_cycles_, changed_cycles_, error_cycles_;
   std::vector<double> least_torque_, greatest_torque_;  // N·m, commanded since the last movement
   bool known_ = false, updated_ = false;
   bool consecutive_ = false;  // counts_ are those of the cycle before

@@ -21,6 +21,10 @@ namespace poise {
 std::string_view hw_bridge_proto_schema();  // generated
 namespace {
 
+// s: by then a torque beyond friction has moved a joint by a count, with the readings' delay and a
+// rotor of 0.5 kg·m² on the coarsest encoder at the joint.
+constexpr double kResponseTime = 0.02;
+
 void Require(bool condition, const char* field, const char* problem) {
   if (!condition) throw ConfigError(field, problem);
 }
@@ -107,7 +111,11 @@ FeedbackMonitorConfig MakeMonitorConfig(const HwBridgeConfig& config,
   result.frozen_cycles = std::max(1, Cycles(config.frozen_time(), period));
   result.frozen_torque =
       config.has_frozen_torque() ? config.frozen_torque() : derived.frozen_torque;
+  result.response_cycles = std::max(1, Cycles(kResponseTime, period));
   result.torque_error_cycles = config.torque_error_cycles();
+  // What was commanded a cycle ago is read as old as the readings are, and settles in a cycle more.
+  const double delay = model.drive_train().sensor_delay;
+  result.current_cycles = delay > 0 ? 2 + Cycles(delay, period) : 1;
   result.torque_error = config.has_torque_error() ? config.torque_error() : derived.torque_error;
   return result;
 }

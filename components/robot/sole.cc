@@ -12,6 +12,8 @@ using Eigen::Vector2d;
 
 // m: a corner that stands out by less is a rounding of a straight edge.
 constexpr double kLeastCorner = 1e-5;
+// m: what a corner of an outline stands out by, so that rounding does not make it less than that.
+constexpr double kSureCorner = 2 * kLeastCorner;
 
 double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -59,6 +61,40 @@ std::string SoleProblem(std::span<const Vector2d> vertices) {
     }
   }
   return {};
+}
+
+std::vector<Vector2d> SoleOutline(std::vector<Vector2d> points, size_t most) {
+  // Andrew's monotone chain: the lower side, then the upper one.
+  std::ranges::sort(points, [](const Vector2d& a, const Vector2d& b) {
+    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+  });
+  std::vector<Vector2d> hull;
+  for (int side = 0; side < 2; ++side) {
+    const size_t begin = hull.size();
+    for (const Vector2d& point : points) {
+      while (hull.size() >= begin + 2 &&
+             !(Cross(hull.back() - hull[hull.size() - 2], point - hull.back()) > 0)) {
+        hull.pop_back();
+      }
+      hull.push_back(point);
+    }
+    if (!hull.empty()) hull.pop_back();
+    std::ranges::reverse(points);
+  }
+  while (hull.size() >= 3) {
+    const size_t n = hull.size();
+    size_t least = n;
+    double area = HUGE_VAL;
+    for (size_t i = 0; i < n; ++i) {
+      const Vector2d &before = hull[(i + n - 1) % n], &after = hull[(i + 1) % n];
+      const bool sure = LeftOf(before, after, hull[i]) <= -kSureCorner;
+      const double cost = Cross(hull[i] - before, after - before);
+      if ((n > most || !sure) && cost < area) area = cost, least = i;
+    }
+    if (least == n) break;
+    hull.erase(hull.begin() + static_cast<std::ptrdiff_t>(least));
+  }
+  return hull;
 }
 
 std::vector<Vector2d> SoleCorners(const FootModel& foot) {

@@ -14,6 +14,11 @@ namespace poise::robot {
 /// to kMaxSoleVertices corners of a strictly convex polygon, anticlockwise, around the origin.
 std::string SoleProblem(std::span<const Eigen::Vector2d> vertices);
 
+/// The convex hull of `points` (m) as SoleProblem takes it, also after its coordinates are rounded
+/// to a micrometre: anticlockwise, of at most `most` corners, those left out that cost least area.
+/// Fewer than three where the points span no area.
+std::vector<Eigen::Vector2d> SoleOutline(std::vector<Eigen::Vector2d> points, size_t most);
+
 /// Corners, m, sole frame: a polygon's anticlockwise, a rectangle's row by row.
 std::vector<Eigen::Vector2d> SoleCorners(const FootModel& foot);
 

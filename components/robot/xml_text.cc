@@ -55,8 +55,8 @@ std::string Attribute(const tinyxml2::XMLElement& element, const char* name) {
 
 void ParseXml(std::string_view xml, const char* format, tinyxml2::XMLDocument* document) {
   if (xml.size() > kMaxBytes) {
-    throw RobotError(fmt::format("{0} has {1} bytes, more than {2}: is it a {0}?", format,
-                                 xml.size(), kMaxBytes));
+    throw RobotError(fmt::format("{} has {} bytes, more than {}: no robot's file needs as many",
+                                 format, xml.size(), kMaxBytes));
   }
   if (const size_t nul = xml.find('\0'); nul != std::string_view::npos) {
     throw RobotError(

@@ -15,6 +15,7 @@ namespace poise::robot {
 namespace {
 
 constexpr size_t kMaxElements = 20000;
+constexpr size_t kFreeCoordinates = 7;  // position and quaternion
 
 // A class of defaults: what the reader itself must resolve.
 struct DefaultClass {
@@ -42,9 +43,15 @@ class Cleaner {
                       "<size njmax='1' nconmax='1'/>";
     Sections(root, "default", [&](const tinyxml2::XMLElement& e) { Defaults(e, "", &xml); });
     Sections(root, "asset", [&](const tinyxml2::XMLElement& e) { Assets(e); });
-    const tinyxml2::XMLElement& robot = RobotBody(root);
+    const Place robot = RobotBody(root);
     xml += "<worldbody>";
-    Body(robot, -1, "", &xml);
+    std::string child_class;
+    for (const tinyxml2::XMLElement* frame : robot.frames) {
+      if (frame->Attribute("childclass")) child_class = Attribute(*frame, "childclass");
+      xml += BodyTag("", *frame);
+    }
+    Body(*robot.body, -1, child_class, &xml);
+    for (size_t i = 0; i < robot.frames.size(); ++i) xml += "</body>";
     xml += "</worldbody><actuator>";
     Sections(root, "actuator", [&](const tinyxml2::XMLElement& e) { Actuators(e, &xml); });
     xml += "</actuator></mujoco>";
@@ -210,54 +217,85 @@ class Cleaner {
     return "";
   }
 
-  bool IsFree(const tinyxml2::XMLElement& joint) const {
-    return Resolved(joint, "type", "", &DefaultClass::joint) == "free";
-  }
-
-  bool HasFreeJoint(const tinyxml2::XMLElement& body) const {
-    if (body.FirstChildElement("freejoint")) return true;
-    const tinyxml2::XMLElement* joint = body.FirstChildElement("joint");
-    return joint != nullptr && IsFree(*joint);
+  /// Numbers in a keyframe of the joints with which a body of the world floats: a free one, or
+  /// three slides and a ball or three hinges. 0: it does not.
+  size_t BaseCoordinates(const tinyxml2::XMLElement& body, const std::string& child_class) const {
+    if (body.FirstChildElement("freejoint")) return kFreeCoordinates;
+    std::map<std::string, int> count;
+    for (const tinyxml2::XMLElement* j = body.FirstChildElement("joint"); j;
+         j = j->NextSiblingElement("joint")) {
+      const std::string type = Resolved(*j, "type", child_class, &DefaultClass::joint);
+      ++count[type.empty() ? "hinge" : type];
+    }
+    using Count = std::map<std::string, int>;
+    if (count == Count{{"free", 1}} || count == Count{{"slide", 3}, {"ball", 1}}) {
+      return kFreeCoordinates;
+    }
+    return count == Count{{"slide", 3}, {"hinge", 3}} ? 6 : 0;
   }
 
   static bool HasJoints(const tinyxml2::XMLElement& body) {
     if (body.FirstChildElement("joint")) return true;
-    for (const tinyxml2::XMLElement* b = body.FirstChildElement("body"); b;
-         b = b->NextSiblingElement("body")) {
-      if (HasJoints(*b)) return true;
+    for (const tinyxml2::XMLElement* e = body.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      if ((std::string_view(e->Value()) == "body" || std::string_view(e->Value()) == "frame") &&
+          HasJoints(*e))
+        return true;
     }
     return false;
   }
 
-  const tinyxml2::XMLElement& RobotBody(const tinyxml2::XMLElement& root) {
-    const tinyxml2::XMLElement* robot = nullptr;
-    const tinyxml2::XMLElement* first = nullptr;
-    Sections(root, "worldbody", [&](const tinyxml2::XMLElement& world) {
-      for (const tinyxml2::XMLElement* e = world.FirstChildElement(); e;
-           e = e->NextSiblingElement()) {
-        CheckStructure(*e);
-        if (std::string_view(e->Value()) != "body") continue;
-        if (HasFreeJoint(*e)) {
-          if (robot != nullptr) {
-            FailMjcf(*e, "body '{}' floats, and so does '{}': leave one in the file",
-                     Attribute(*e, "name"), Attribute(*robot, "name"));
-          }
-          robot = e;
-        } else if (first == nullptr && HasJoints(*e)) {
-          first = e;
-        }
+  struct Place {
+    const tinyxml2::XMLElement* body = nullptr;
+    std::vector<const tinyxml2::XMLElement*> frames = {};  // around it, the outermost first
+  };
+
+  /// Bodies of the world in `at`, which is <worldbody> or a <frame> of it.
+  void WorldBodies(const tinyxml2::XMLElement& at, const Place& around, std::string child_class,
+                   Place* robot, Place* first) {
+    for (const tinyxml2::XMLElement* e = at.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      CheckStructure(*e);
+      const bool is_frame = std::string_view(e->Value()) == "frame";
+      if (!is_frame && std::string_view(e->Value()) != "body") continue;
+      std::string inner = Attribute(*e, "childclass");
+      if (inner.empty()) inner = child_class;
+      Place place = around;
+      if (is_frame) {
+        place.frames.push_back(e);
+        WorldBodies(*e, place, inner, robot, first);
+        continue;
       }
+      place.body = e;
+      if (const size_t coordinates = BaseCoordinates(*e, inner); coordinates > 0) {
+        if (robot->body != nullptr) {
+          FailMjcf(*e, "body '{}' floats, and so does '{}': leave one in the file",
+                   Attribute(*e, "name"), Attribute(*robot->body, "name"));
+        }
+        *robot = place;
+        base_coordinates_ = coordinates;
+      } else if (first->body == nullptr && HasJoints(*e)) {
+        *first = place;
+      }
+    }
+  }
+
+  Place RobotBody(const tinyxml2::XMLElement& root) {
+    Place robot, first;
+    Sections(root, "worldbody", [&](const tinyxml2::XMLElement& world) {
+      WorldBodies(world, {}, "", &robot, &first);
     });
-    if (robot != nullptr) return *robot;
-    if (first == nullptr) FailMjcf(root, "no body of <worldbody> has joints: where is the robot?");
-    Note(*first, "body '{}' has no free joint: it floats here", Attribute(*first, "name"));
-    return *first;
+    if (robot.body != nullptr) return robot;
+    if (first.body == nullptr) {
+      FailMjcf(root, "no body of <worldbody> has joints: where is the robot?");
+    }
+    Note(*first.body, "body '{}' has no free joint: it floats here",
+         Attribute(*first.body, "name"));
+    return first;
   }
 
   // Elements that would put bodies where the reader sees none.
   void CheckStructure(const tinyxml2::XMLElement& element) const {
-    static const std::set<std::string> kUnknown = {"frame",     "replicate", "attach",
-                                                   "composite", "flexcomp",  "include"};
+    static const std::set<std::string> kUnknown = {"replicate", "attach", "composite", "flexcomp",
+                                                   "include"};
     if (kUnknown.contains(element.Value())) {
       FailMjcf(element, "<{}> is not supported: save the file as MuJoCo writes it out, without it",
                Shown(element));
@@ -290,19 +328,18 @@ class Cleaner {
       ClassAttribute(element, "childclass");
       child_class = Attribute(element, "childclass");
     }
-    *xml += fmt::format("<body name='b{}'{}{}>", index, ClassAttribute(element, "childclass"),
-                        KeptAttributes(element, "body"));
+    *xml += BodyTag(fmt::format(" name='b{}'", index), element);
     bool has_inertial = false;
     for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
          e = e->NextSiblingElement()) {
       const std::string kind = e->Value();
       CheckStructure(*e);
-      if (kind == "body") continue;
+      if (kind == "body" || kind == "frame") continue;
       if (kind == "inertial") {
         if (has_inertial) FailMjcf(*e, "body '{}' has two <inertial>", result_.bodies.back().name);
         has_inertial = true;
         Inertial(*e, &result_.bodies[static_cast<size_t>(index)], xml);
-      } else if (kind == "joint" && !(parent < 0 && IsFree(*e))) {
+      } else if (kind == "joint" && !(parent < 0 && base_coordinates_ > 0)) {
         Joint(*e, index, child_class, xml);
       } else if (kind == "freejoint" && parent >= 0) {
         FailMjcf(*e, "body '{}' floats within another: move it to <worldbody>",
@@ -313,10 +350,53 @@ class Cleaner {
         Site(*e, index, xml);
       }
     }
-    for (const tinyxml2::XMLElement* e = element.FirstChildElement("body"); e;
-         e = e->NextSiblingElement("body")) {
-      Body(*e, index, child_class, xml);
+    Within(element, index, has_inertial, child_class, xml);
+    *xml += "</body>";
+  }
+
+  std::string BodyTag(const std::string& name, const tinyxml2::XMLElement& element) const {
+    return fmt::format("<body{}{}{}>", name, ClassAttribute(element, "childclass"),
+                       KeptAttributes(element, "body"));
+  }
+
+  /// Bodies and frames of a body or a frame.
+  void Within(const tinyxml2::XMLElement& element, int owner, bool weighed,
+              const std::string& child_class, std::string* xml) {
+    for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
+      if (std::string_view(e->Value()) == "body") Body(*e, owner, child_class, xml);
+      if (std::string_view(e->Value()) == "frame") Frame(*e, owner, weighed, child_class, xml);
     }
+  }
+
+  /// A <frame>, which newer MuJoCo dissolves, is a body without a joint: that moves what it holds
+  /// as well. `weighed`: the body around it has an <inertial>, and shapes then weigh nothing.
+  void Frame(const tinyxml2::XMLElement& element, int parent, bool weighed, std::string child_class,
+             std::string* xml) {
+    Count(element);
+    const int index = static_cast<int>(result_.bodies.size());
+    CleanBody& frame = result_.bodies.emplace_back();
+    frame.name = Attribute(element, "name");
+    if (frame.name.empty()) frame.name = fmt::format("frame_{}", index);
+    while (!links_.insert(frame.name).second) frame.name += "_frame";
+    frame.parent = parent;
+    frame.has_inertial = weighed;
+    if (element.Attribute("childclass")) child_class = Attribute(element, "childclass");
+    *xml += BodyTag(fmt::format(" name='b{}'", index), element);
+    for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
+         e = e->NextSiblingElement()) {
+      const std::string kind = e->Value();
+      CheckStructure(*e);
+      if (kind == "geom") {
+        Geom(*e, index, child_class, xml);
+      } else if (kind == "site") {
+        Site(*e, index, xml);
+      } else if (kind == "joint" || kind == "freejoint" || kind == "inertial") {
+        FailMjcf(*e, "<{}> within <frame> is not supported: move it out, turned as the frame is",
+                 Shown(*e));
+      }
+    }
+    Within(element, index, weighed, child_class, xml);
     *xml += "</body>";
   }
 
@@ -487,9 +567,10 @@ class Cleaner {
       const std::vector<double> position = MjcfNumbers(element, "qpos");
       const std::string name = Attribute(element, "name");
       const size_t joints = result_.joints.size();
-      const bool floats = position.size() == joints + 7;
       if (position.empty()) return;
-      if (position.size() != joints && !floats) {
+      const size_t base = position.size() - std::min(position.size(), joints);
+      if (position.size() != joints + base ||
+          (base != 0 && base != kFreeCoordinates && base != base_coordinates_)) {
         Note(element, "keyframe '{}' has {} numbers for {} joints: it is left out", name,
              position.size(), joints);
         return;
@@ -497,7 +578,7 @@ class Cleaner {
       MjcfKey& key = result_.keys.emplace_back();
       key.name = name;
       for (size_t j = 0; j < joints; ++j) {
-        key.joint[result_.joints[j].name] = position[j + (floats ? 7 : 0)];
+        key.joint[result_.joints[j].name] = position[j + base];
       }
     });
   }
@@ -512,6 +593,7 @@ class Cleaner {
   std::map<std::string, std::array<double, 3>> mesh_scale_;   // by class
   std::map<std::string, CleanGeom> meshes_;
   std::set<std::string> links_, joint_names_;
+  size_t base_coordinates_ = 0;  // in a keyframe; 0: no joint floats the robot
   size_t elements_ = 0;
 };
 

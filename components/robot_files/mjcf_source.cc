@@ -47,8 +47,11 @@ class Assembler {
     result_.sensors = clean_.sensors;
     result_.keys = clean_.keys;
     const int root = Id(mjOBJ_BODY, 'b', 0);
-    result_.root_orientation =
-        Quaterniond(ToPose(m_.body_pos + 3 * root, m_.body_quat + 4 * root).linear());
+    Isometry3d place = Isometry3d::Identity();  // in the world, through the frames around it
+    for (int b = root; b > 0; b = m_.body_parentid[b]) {
+      place = ToPose(m_.body_pos + 3 * b, m_.body_quat + 4 * b) * place;
+    }
+    result_.root_orientation = Quaterniond(place.linear());
     for (size_t b = 0; b < clean_.bodies.size(); ++b) Body(b);
     for (size_t s = 0; s < clean_.sites.size(); ++s) Site(s);
     for (size_t g = 0; g < clean_.geoms.size(); ++g) Geom(g);

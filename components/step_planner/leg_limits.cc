@@ -67,10 +67,18 @@ void CheckGap(const std::string& part, double gap, const robot::RobotModel& mode
               const stepping::Reach& reach) {
   const double widest = WidestSpacing(reach);
   if (reach.least_spacing() <= widest) return;
+  const double most = widest - (reach.least_spacing() - gap);
+  if (most <= 0) {
+    throw ConfigError(part + ".gap",
+                      fmt::format("is {} m; robot '{}' stands on one foot with the other {:.3f} m "
+                                  "beside it at most, and its soles are {:.3f} m wide: give less "
+                                  "joint_reserve, or less reach_lower",
+                                  gap, model.name(), widest, reach.least_spacing() - gap));
+  }
   throw ConfigError(part + ".gap",
                     fmt::format("is {} m; robot '{}' cannot stand on one foot with the other "
                                 "so far beside it: give 0 to {:.3f} m",
-                                gap, model.name(), widest - (reach.least_spacing() - gap)));
+                                gap, model.name(), most));
 }
 
 void CheckClearance(const std::string& part, double clearance, const robot::RobotModel& model) {

@@ -95,7 +95,8 @@ constexpr auto kScaledFields = std::to_array<ScaledField>({
     {"turn_acceleration", Unit::kTurnAcceleration},
 });
 
-/// `height`: m, of the standing COM. A field that is given stays.
+}  // namespace
+
 WalkConfig WithRobotDefaults(WalkConfig config, double height) {
   const double length = height / kDefaultHeight, time = std::sqrt(length);
   const auto factor = [&](Unit unit) {
@@ -120,6 +121,8 @@ WalkConfig WithRobotDefaults(WalkConfig config, double height) {
   }
   return config;
 }
+
+namespace {
 
 /// Of WalkSpec: `ratio` of the damping that is critical for an ankle's rotor on the spring that a
 /// sole of half sizes a and b has in the ground, weight a²/sinking and weight b²/sinking.
@@ -292,11 +295,13 @@ stepping::Walk MakeWalk(const WalkConfig& given, const ContactConfirmation& cont
   const stepping::Reach reach(model, height, config.reach_lower(), config.joint_reserve(),
                               config.gap());
   if (reach.empty()) {
-    throw ConfigError("walk.reach_lower",
-                      fmt::format("is {} m; robot '{}' cannot stand {} m lower than {} m with "
-                                  "joint_reserve {} rad: change one of them",
-                                  config.reach_lower(), model.name(), config.reach_lower(), height,
-                                  config.joint_reserve()));
+    // A field that nobody gave is not to blame.
+    throw ConfigError(
+        given.has_reach_lower() ? "walk.reach_lower" : "walk",
+        fmt::format("robot '{}', whose COM stands {:.3f} m high, cannot stand {:.3f} m lower "
+                    "(reach_lower) with {} rad between its joints and their limits "
+                    "(joint_reserve): give less of either",
+                    model.name(), height, config.reach_lower(), config.joint_reserve()));
   }
   stepping::StepLimits limits;
   limits.edge = edge;

@@ -14,6 +14,10 @@ namespace poise {
 /// order or before the run.
 void CheckWalkConfig(const WalkConfig& config);
 
+/// What nobody gave is that of the paper's robot in units of g and `height`, m, of the standing
+/// COM.
+WalkConfig WithRobotDefaults(WalkConfig config, double height);
+
 /// Reach, spacing and thresholds for this robot, whose COM stands at its standing height. Throws
 /// ConfigError when its legs reach nothing or not what is configured, or its soles are smaller than
 /// the edge.

@@ -176,9 +176,46 @@ TEST(SupervisorTrips, AnEncoderThatStandsStillWhileTorqueChangesIsFrozen) {
   bench.Run(60, 31, 0.01);                                 // every joint moves
   bench.Run(200, 20, 0);
   ASSERT_EQ(bench.status().state, Status::STATE_RUNNING);
+  // A step in the torque of a joint that stands still has not moved it yet.
+  bench.Run(9, 41, 0);
+  ASSERT_EQ(bench.status().state, Status::STATE_RUNNING);
   bench.Run(3, 41, 0);
   EXPECT_EQ(bench.status().state, Status::STATE_STOPPING);
   EXPECT_EQ(bench.status().reason, Status::REASON_ENCODER_FROZEN);
+}
+
+// OP3 stands so still that the step in its knees' torque with which a walk begins comes after more
+// than frozen_time without a count; two cycles later they move.
+TEST(SupervisorTrips, AJointThatAStepInItsTorqueMovesIsNotFrozen) {
+  SupervisorConfig config = ThreeJoints();
+  config.monitor.frozen_cycles = 50;
+  config.monitor.frozen_torque = 20;
+  Bench bench(config);
+  bench.Run(200, 10, 0);
+  bench.Run(2, 35, 0);
+  bench.Run(60, 35, 0.01);
+  EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);
+}
+
+// Readings that are a cycle old, while the torque goes up and down in every cycle.
+TEST(SupervisorTrips, AnOldReadingOfATorqueThatChangesIsPlausible) {
+  for (const int cycles : {1, 3}) {
+    SupervisorConfig config = ThreeJoints();
+    config.monitor.torque_error = 15;
+    config.monitor.torque_error_cycles = 10;
+    config.monitor.current_cycles = cycles;
+    Bench bench(config);
+    double old = 0, last = 0;
+    for (int i = 0; i < 40; ++i) {
+      for (size_t j = 0; j < kJoints; ++j) {
+        bench.feedback().current[j] = MotorCurrent(config.motors[j], old);
+      }
+      old = last;
+      last = i % 2 == 0 ? 10 : -10;
+      bench.Run(1, last, 0.01);
+    }
+    EXPECT_EQ(bench.status().state == Status::STATE_RUNNING, cycles == 3);
+  }
 }
 
 TEST(SupervisorTrips, ATorqueThatIsNotTheCommandedOneForTenCycles) {

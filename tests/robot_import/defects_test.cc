@@ -117,7 +117,7 @@ TEST(Defects, AllAreListedAtOnce) {
   EXPECT_THAT(defects, HasSubstr("link 'left_shin' has noise"));
   EXPECT_THAT(defects, HasSubstr("that of its mirror image 'right_shin'"));
   EXPECT_THAT(defects, HasSubstr("link 'base': inertia breaks the triangle inequality"));
-  EXPECT_THAT(defects, HasSubstr("1 joints have no torque limit"));
+  EXPECT_THAT(defects, HasSubstr("1 joint has no torque limit"));
   const robot::RobotModel model = robot::MakeRobot(imported.robot, text);
   EXPECT_NEAR(model.bodies()[static_cast<size_t>(model.FindFrame("left_shin")->body)].inertia(1, 1),
               kShinInertia[1], 1e-12);

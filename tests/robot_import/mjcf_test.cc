@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "components/robot/robot_model.h"
@@ -140,6 +141,73 @@ TEST(Mjcf, AMeshTakesItsClassesScale) {
   EXPECT_EQ(scale("<mesh scale=\"2 3 4\"/>", "<mesh scale=\"5 6 7\"/>"), Eigen::Vector3d(5, 6, 7));
 }
 
+/// Of a link in the root, all joints at zero.
+Eigen::Isometry3d PlaceOf(MjcfDocument* d, const std::string& link) {
+  Eigen::Isometry3d place = Eigen::Isometry3d::Identity();
+  std::string at = link;
+  while (at != d->source.root) {
+    const auto joint = std::ranges::find(d->source.joints, at, &SourceJoint::child);
+    place = joint->origin * place;
+    at = joint->parent;
+  }
+  return place;
+}
+
+TEST(Mjcf, AFrameMovesWhatItHolds) {
+  // A quarter turn about z, degrees as <compiler> says, around all of the robot's upper half.
+  const std::string begin = "<frame pos=\"0.1 0 0.2\" euler=\"90 0 0\">";
+  const std::string whole = kText;
+  const size_t at = whole.find("<body name=\"upper\""), site = whole.find("<site name=\"imu\"");
+  const size_t end = whole.rfind("</body>", whole.find("</worldbody>"));
+  std::string framed = whole;
+  framed.insert(end, "</frame>").insert(at, begin);
+  framed.insert(framed.find("/>", site) + 2, "</frame>").insert(site, begin);
+  MjcfDocument plain = ReadMjcf(whole, nullptr), d = ReadMjcf(framed, nullptr);
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.translation() = Eigen::Vector3d(0.1, 0, 0.2);
+  frame.rotate(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()));
+  for (const char* link : {"imu", "upper", "fore", "finger"}) {
+    EXPECT_TRUE(PlaceOf(&d, link).isApprox(frame * PlaceOf(&plain, link), 1e-12)) << link;
+  }
+  EXPECT_EQ(d.source.FindLink("fore")->mass.mass, 3);
+  EXPECT_EQ(d.keys[0].joint.at("wrist"), 0.2);
+}
+
+TEST(Mjcf, ShapesInAFrameWeighWhatTheyDoWithoutOne) {
+  const std::string box = "<geom type=\"box\" size=\"0.1 0.2 0.3\" mass=\"3\"/>";
+  MjcfDocument d = ReadMjcf(With(box, "<frame pos=\"0 0 0.1\">" + box + "</frame>"), nullptr);
+  double mass = 0;
+  for (const SourceLink& link : d.source.links) mass += link.mass.mass;
+  EXPECT_NEAR(mass, 5 + 2 + 3 + 0.5, 1e-12);
+  // Beside an <inertial> they weigh nothing.
+  d = ReadMjcf(With("<joint name=\"elbow\"", "<frame>" + box + "</frame><joint name=\"elbow\""),
+               nullptr);
+  mass = 0;
+  for (const SourceLink& link : d.source.links) mass += link.mass.mass;
+  EXPECT_NEAR(mass, 5 + 2 + 3 + 0.5, 1e-12);
+}
+
+TEST(Mjcf, AFrameAroundTheRobotTurnsIt) {
+  std::string text = kText;
+  text.insert(text.rfind("</worldbody>"), "</frame>");
+  text.insert(text.find("<body name=\"base\""), "<frame euler=\"90 0 0\">");
+  const Eigen::Matrix3d turn = ReadMjcf(text, nullptr).root_orientation.toRotationMatrix();
+  EXPECT_NEAR(turn(0, 0), -1, 1e-12);  // the body's own quarter turn and the frame's
+}
+
+TEST(Mjcf, ThreeSlidesAndABallAreAFloatingBase) {
+  std::vector<std::string> warnings;
+  const MjcfDocument d = ReadMjcf(
+      With("<freejoint/>",
+           "<joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/><joint "
+           "type=\"slide\" axis=\"0 0 1\"/><joint type=\"ball\"/>"),
+      &warnings);
+  EXPECT_EQ(d.source.root, "base");
+  EXPECT_EQ(d.source.joints.size(), ReadMjcf(kText, nullptr).source.joints.size());
+  EXPECT_EQ(d.keys[0].joint.at("wrist"), 0.2);
+  EXPECT_THAT(warnings, testing::Not(testing::Contains(HasSubstr("floats here"))));
+}
+
 TEST(Mjcf, IsRefusedByLineAndName) {
   const auto problem = [](const std::string& text) -> std::string {
     try {
@@ -152,7 +220,9 @@ TEST(Mjcf, IsRefusedByLineAndName) {
   EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 nan 0\"")),
               HasSubstr("line 23: axis of <joint>"));
   EXPECT_THAT(problem(With("childclass=\"big\"", "childclass=\"huge\"")), HasSubstr("'huge'"));
-  EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><frame/>")), HasSubstr("<frame>"));
+  EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><replicate/>")), HasSubstr("<replicate>"));
+  EXPECT_THAT(problem(With("<freejoint/>", "<freejoint/><frame><inertial/></frame>")),
+              HasSubstr("<inertial> within <frame>"));
   EXPECT_THAT(problem(With("<body name=\"fore\"", "<body name=\"upper\"")), HasSubstr("'upper'"));
   // MuJoCo's own refusals name the file's objects, not those of the text that it was given.
   EXPECT_THAT(problem(With("axis=\"0 1 0\"", "axis=\"0 0 0\"")),

@@ -1,4 +1,6 @@
 // Soles of shapes whose lowest face is known.
+#include "components/robot/sole.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,8 +8,10 @@
 #include <cmath>
 #include <fstream>
 #include <numbers>
+#include <random>
 
 #include "tests/robot_import/import_support.h"
+#include "tests/test_seed.h"
 #include "tools/robot/mesh_file.h"
 #include "tools/robot_import/sole_finder.h"
 
@@ -111,6 +115,39 @@ void WriteWedge(const std::filesystem::path& file, const std::vector<Vector2d>& 
     facet({a.x(), a.y(), -20}, {b.x(), b.y(), -20}, top);
   }
   stl << "endsolid foot\n";
+}
+
+// What import writes is what the robot's loader takes, whatever the foot's points are.
+TEST(Sole, AnOutlineIsASoleAfterRounding) {
+  std::mt19937 random(TestSeed(4));
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int i = 0; i < 300; ++i) {
+    // Points near the edges of a rounded rectangle: most corners stand out by micrometres.
+    std::vector<Vector2d> points;
+    for (int k = 0; k < 400; ++k) {
+      const double angle = std::numbers::pi * unit(random),
+                   power = 0.2 + 0.8 * std::abs(unit(random));
+      const double c = std::cos(angle), s = std::sin(angle);
+      points.emplace_back(0.12 * std::copysign(std::pow(std::abs(c), power), c),
+                          0.05 * std::copysign(std::pow(std::abs(s), power), s));
+      if (k % 3 == 0) points.push_back(points.back() + 1e-6 * Vector2d(unit(random), unit(random)));
+    }
+    std::vector<Vector2d> outline = robot::SoleOutline(points, 12);
+    for (Vector2d& p : outline) p = (1e6 * p).array().round() / 1e6;
+    EXPECT_EQ(robot::SoleProblem(outline), "");
+    EXPECT_LE(outline.size(), 12u);
+    EXPECT_GT(Area(outline), 0.9 * Area(robot::SoleOutline(points, 400)));
+  }
+}
+
+// A triangle's box has its middle on an edge: the frame's origin lies inside nevertheless.
+TEST(Sole, OfATriangleHasItsOriginInside) {
+  FootShape shape;
+  shape.kind = Kind::kMesh;
+  shape.points = {{0, 0, 0}, {0.2, 0, 0}, {0, 0.1, 0}, {0.05, 0.03, 0.1}};
+  const FoundSole sole = FindSole(std::vector{shape}, kDown, kForward);
+  EXPECT_EQ(robot::SoleProblem(sole.polygon), "");
+  EXPECT_NEAR(Area(sole.polygon), 0.01, 1e-12);
 }
 
 TEST(Sole, OfAMesh) {

@@ -8,12 +8,15 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <regex>
 #include <sstream>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
 #include "components/robot_files/robot_files.h"
+#include "fmt/format.h"
 #include "tools/cli/output_style.h"
+#include "tools/scenario/catalog.h"
 
 namespace poise {
 namespace {
@@ -135,6 +138,85 @@ TEST(RobotCheck, NamesWhatIsTooWeakAndWhatStandsAtItsEnd) {
   ASSERT_FALSE(weak.ok());
   EXPECT_NE(FormatRobotCheck(weak, 200).find("knee_pitch needs"), std::string::npos)
       << FormatRobotCheck(weak, 200);
+}
+
+constexpr char kName[] = "name: \"dyros_legs\"\n";
+
+std::string Limit(const std::string& joint, const std::string& what) {
+  return std::string(kName) + "limit { joint: \"" + joint + "\" " + what + " }\n";
+}
+
+TEST(RobotCheck, ForetellsWhatAStepTakes) {
+  const RobotCheck& check = Paper();
+  for (const JointLoad& load : check.loads) {
+    // A slow walk's knee bears about what it does on one foot.
+    if (load.joint.find("knee") != std::string::npos) {
+      EXPECT_NEAR(load.step, load.single_support, 0.5 * load.single_support) << load.joint;
+      EXPECT_GT(load.step_rms, load.double_support);
+      EXPECT_LT(load.step_rms, load.step);
+      EXPECT_GT(load.step_velocity, 0.3);
+    }
+  }
+  // It turns by 0.2 rad in a swing of 0.55 s: 15/8 of the mean speed at least, of one hip.
+  double yaw = 0;
+  for (const JointLoad& load : check.loads) {
+    if (load.joint.find("hip_yaw") != std::string::npos) yaw = std::max(yaw, load.step_velocity);
+  }
+  EXPECT_NEAR(yaw, 0.2 / 0.55 * 15 / 8, 0.25);
+  const RobotCheck slow = Edited(kName, Limit("right_hip_yaw", "velocity: 0.3"));
+  EXPECT_NE(FormatRobotCheck(slow, 300).find("joint right_hip_yaw turns at"), std::string::npos);
+}
+
+TEST(RobotCheck, ForetellsAMotorThatGetsTooHot) {
+  double standing = 0, knee = 0;
+  for (const JointLoad& load : Paper().loads) {
+    standing = std::max(standing, load.double_support);
+    if (load.joint == "right_knee_pitch") knee = load.step_rms;
+  }
+  ASSERT_GT(knee, 1.2 * standing);
+  const double rated = 1.1 * standing * 15 / Paper().loads[0].rated;  // A
+  const RobotCheck hot = Edited("rated_current: 15", fmt::format("rated_current: {}", rated));
+  const std::string text = FormatRobotCheck(hot, 300);
+  EXPECT_NE(text.find("root mean square"), std::string::npos) << text;
+  EXPECT_EQ(text.find("to stand on both feet"), std::string::npos) << text;
+}
+
+TEST(RobotCheck, WhereNoPostureIsOnOneFootNoTorqueIsGiven) {
+  const RobotCheck stiff = Edited(
+      kName, Limit("right_hip_roll", "lower: -0.02 upper: 0.02") +
+                 Limit("left_hip_roll", "lower: -0.02 upper: 0.02").substr(sizeof kName - 1));
+  EXPECT_FALSE(stiff.stands_on_one_foot);
+  EXPECT_NE(FormatRobotCheck(stiff, 300).find("–"), std::string::npos);
+  EXPECT_TRUE(
+      nlohmann::json::parse(RobotCheckJson(stiff).dump())["torque"][0]["single_support"].is_null());
+}
+
+// What the maker's file has beyond a robot is told, and is no defect of it.
+TEST(RobotCheck, WhatIsLeftOutIsNoDefect) {
+  const fs::path folder = fs::path(testing::TempDir()) / "poise_left_out";
+  fs::create_directories(folder);
+  for (const char* end : {".pbtxt", ".xml"}) {
+    std::string text = ReadFile((Robots() / "heron" / "heron").string() + end);
+    if (std::string(end) == ".xml") {
+      text.insert(text.rfind("</actuator>"), "<motor name=\"dummy\" joint=\"nowhere\"/>");
+    } else {
+      text = std::regex_replace(text, std::regex("urdf: \"[^\"]*\""), "mjcf: \"heron.xml\"");
+    }
+    std::ofstream(folder / (std::string("heron") + end)) << text;
+  }
+  const RobotCheck check = CheckRobot(folder / "heron.pbtxt");
+  EXPECT_TRUE(check.ok()) << FormatRobotCheck(check, 200);
+  ASSERT_EQ(check.left_out.size(), 1u);
+  EXPECT_NE(FormatRobotCheck(check, 300).find("'dummy' moves no joint"), std::string::npos);
+}
+
+TEST(RobotCheck, AMakersFileInPlaceOfARobotIsNamed) {
+  try {
+    FindFile("robots", "my/mine.urdf", fs::path());
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_NE(std::string(error.what()).find("poise robot import my/mine.urdf"), std::string::npos);
+  }
 }
 
 TEST(RobotCheck, FitsATerminalAndSaysTheSameAsJson) {

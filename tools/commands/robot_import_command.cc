@@ -7,6 +7,7 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
+#include "tools/cli/shell_text.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/robot_import/robot_import.h"
@@ -32,6 +33,19 @@ Tone ToneOf(Sureness sureness) {
       return Tone::kPlain;
     default:
       return Tone::kBad;
+  }
+}
+
+/// A robot's folder holds one text: with two nobody could say which --robot FOLDER means.
+void CheckOneText(const fs::path& folder, const fs::path& text) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.path().extension() != ".pbtxt" || entry.path().filename() == text.filename())
+      continue;
+    throw ConfigError(
+        fmt::format("--to {}: holds the robot's text {} already; give another folder, or --force "
+                    "to have both there",
+                    folder.string(), entry.path().filename().string()));
   }
 }
 
@@ -62,6 +76,7 @@ int ImportIt(ImportArguments arguments) {
   const fs::path folder = arguments.to.empty() ? fs::path(name) : fs::path(arguments.to);
   const fs::path text = folder / (name + ".pbtxt");
   CheckFileFree("--to", text, arguments.force);
+  if (!arguments.force) CheckOneText(folder, text);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw ConfigError(fmt::format("{}: {}", folder.string(), error.message()));
@@ -83,7 +98,7 @@ int ImportIt(ImportArguments arguments) {
   fmt::print(
       "\n{}: the text; {} lies beside it, untouched\n  to see it stand:  poise run stand --robot "
       "{}\n",
-      text.string(), options.file.filename().string(), folder.string());
+      text.string(), options.file.filename().string(), ShellWord(folder.string()));
   return kExitOk;
 }
 

@@ -150,6 +150,10 @@ bool Receive(int pipe, MeshTriangles* mesh, std::string* problem) {
 
 }  // namespace
 
+bool IsLfsPointer(std::string_view text) {
+  return text.starts_with("version https://git-lfs.github.com/spec/");
+}
+
 MeshTriangles LoadMesh(const fs::path& file, std::string* problem) {
   problem->clear();
   MeshTriangles mesh;
@@ -157,6 +161,13 @@ MeshTriangles LoadMesh(const fs::path& file, std::string* problem) {
   const uintmax_t size = fs::file_size(file, error);
   if (error || size > kMostBytes) {
     *problem = error ? error.message() : fmt::format("it has more than {} MB", kMostBytes >> 20);
+    return mesh;
+  }
+  std::string begin(100, '\0');
+  std::ifstream(file, std::ios::binary)
+      .read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  if (IsLfsPointer(begin)) {
+    *problem = "it is a Git LFS pointer; fetch the file that it stands for, `git lfs pull`";
     return mesh;
   }
   int pipe[2];

@@ -7,9 +7,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace poise {
+
+/// Whether a file that begins so is the pointer that Git LFS puts in a file's place.
+bool IsLfsPointer(std::string_view text);
 
 struct MeshTriangles {
   std::vector<std::array<float, 3>> vertices;  ///< in the file's unit

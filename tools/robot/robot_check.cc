@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -15,6 +16,7 @@
 #include "sim/start_posture.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/text_table.h"
+#include "tools/robot/walking_loads.h"
 
 namespace poise {
 namespace {
@@ -30,10 +32,6 @@ constexpr int kDirections = 16;
 constexpr double kReachStep = 0.005;   // m, that reach is found to
 constexpr double kLongestReach = 1.5;  // m, that is tried
 constexpr double kAtLimit = 0.01;      // rad
-// Shares of the stance's height that a posture on one foot is looked for at, the first that is in
-// reach: sideways over the foot a leg must be longer.
-constexpr std::array kHeights = {1.0, 0.98, 0.95, 0.9};
-
 double Cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 robot::RobotData Evaluate(const RobotModel& model, const RobotState& state) {
@@ -63,40 +61,38 @@ robot::PostureGoal StanceGoal(const RobotCheck& check) {
   return goal;
 }
 
-std::optional<RobotState> OnOneFoot(const RobotCheck& check, size_t foot) {
-  robot::PostureGoal goal = StanceGoal(check);
-  goal.com_xy = goal.foot[foot].translation().head<2>();
-  const double height = goal.com_height;
-  for (const double share : kHeights) {
-    goal.com_height = share * height;
-    if (auto state = TrySolve(check.model, goal)) return state;
-  }
-  return {};
-}
-
-Eigen::VectorXd HoldingTorque(const RobotModel& model, const RobotState& state,
-                              const std::array<bool, 2>& in_contact) {
-  return RestTorques(model, state, RestWrenches(model, state, in_contact)).cwiseAbs();
-}
-
 void FindLoads(RobotCheck* check) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const RobotModel& model = check->model;
   const Eigen::VectorXd both = HoldingTorque(model, check->stance, {true, true});
-  Eigen::VectorXd single = Eigen::VectorXd::Zero(model.num_joints());
-  check->stands_on_one_foot = true;
-  for (size_t foot = 0; foot < 2; ++foot) {
-    const std::optional<RobotState> state = OnOneFoot(*check, foot);
-    if (!state) {
-      check->stands_on_one_foot = false;
-      continue;
+  const std::optional<Eigen::VectorXd> single = OneFootTorque(model, check->stance);
+  check->stands_on_one_foot = single.has_value();
+  std::optional<StepLoads> step;
+  if (single) {
+    try {
+      step = LoadsOfAStep(model, check->stance, both);
+      if (!step) {
+        check->defects.push_back(fmt::format(
+            "a step of the walk at {} m/s is out of the legs' reach: a lower stance, or feet "
+            "nearer to each other, may bring it within",
+            kCheckedSpeed));
+      }
+    } catch (const ConfigError& error) {
+      check->defects.push_back(fmt::format("the walk refuses these legs: {}", error.what()));
     }
-    single = single.cwiseMax(HoldingTorque(model, *state, {foot == 0, foot == 1}));
   }
   for (size_t j = 0; j < model.joints().size(); ++j) {
     const robot::MotorModel& motor = model.motors()[j];
     const auto i = static_cast<Eigen::Index>(j);
-    check->loads.push_back({model.joints()[j].name, TorqueLimit(model, j),
-                            motor.torque_per_ampere() * motor.rated_current, both[i], single[i]});
+    check->loads.push_back({.joint = model.joints()[j].name,
+                            .limit = TorqueLimit(model, j),
+                            .rated = motor.torque_per_ampere() * motor.rated_current,
+                            .double_support = both[i],
+                            .single_support = single ? (*single)[i] : kNone,
+                            .step = step ? step->torque[i] : kNone,
+                            .step_rms = step ? step->rms[i] : kNone,
+                            .step_velocity = step ? step->velocity[i] : kNone,
+                            .velocity_limit = model.joints()[j].velocity_limit});
   }
 }
 
@@ -197,17 +193,33 @@ void FindDefects(RobotCheck* check) {
     const robot::Joint& joint = model.joints()[j];
     const JointLoad& load = check->loads[j];
     const double position = check->stance.joint_position[static_cast<Eigen::Index>(j)];
-    const double worst = std::max(load.double_support, load.single_support);
+    const double worst = std::fmax(load.double_support, load.single_support);
     if (worst > load.limit) {
       check->defects.push_back(fmt::format(
           "joint {} needs {:.3g} N·m to stand and may give {:.3g}: correct effort, gear, "
           "torque_constant or peak_current",
           joint.name, worst, load.limit));
+    } else if (load.step > load.limit) {
+      check->defects.push_back(fmt::format(
+          "joint {} needs {:.3g} N·m in a step at {} m/s and may give {:.3g}: correct effort or "
+          "friction, or give a narrower stance",
+          joint.name, load.step, kCheckedSpeed, load.limit));
     } else if (load.double_support > load.rated) {
       check->defects.push_back(
           fmt::format("joint {} needs {:.3g} N·m to stand on both feet, more than its motor bears "
                       "for good ({:.3g}): correct rated_current, or straighten the stance",
                       joint.name, load.double_support, load.rated));
+    } else if (load.step_rms > load.rated) {
+      check->defects.push_back(fmt::format(
+          "joint {} needs {:.3g} N·m while it walks at {} m/s (root mean square), more than its "
+          "motor bears for good ({:.3g}): correct rated_current",
+          joint.name, load.step_rms, kCheckedSpeed, load.rated));
+    }
+    if (load.step_velocity > load.velocity_limit) {
+      check->defects.push_back(fmt::format(
+          "joint {} turns at {:.3g} rad/s in a step at {} m/s that turns at {} rad/s, and may turn "
+          "at {:.3g}: correct its velocity limit",
+          joint.name, load.step_velocity, kCheckedSpeed, kCheckedTurn, load.velocity_limit));
     }
     const double room = std::min(position - joint.lower, joint.upper - position);
     if (room < kAtLimit && joint.upper > joint.lower) {
@@ -239,20 +251,21 @@ std::string Centimetres(double metres) { return fmt::format("{:.1f} cm", 100 * m
 
 std::string FormatLoads(const RobotCheck& check, int columns) {
   constexpr double kShown = 0.1;  // share of the limit
-  std::vector<TableRow> rows{{"torque to stand, N·m", "both feet", "one foot", "rated", "limit"}};
+  std::vector<TableRow> rows{{"torque, N·m", "both feet", "one foot", "a step", "rated", "limit"}};
   size_t left_out = 0;
   for (const JointLoad& load : check.loads) {
-    const double worst = std::max(load.double_support, load.single_support);
+    const double worst = std::fmax(load.double_support, std::fmax(load.single_support, load.step));
     if (worst < kShown * load.limit) {
       ++left_out;
       continue;
     }
     const auto cell = [&](double torque) {
+      if (std::isnan(torque)) return TableCell("–");
       const Tone tone = torque > load.limit ? Tone::kBad : Tone::kPlain;
       return TableCell(fmt::format("{:.1f} ({:.0f} %)", torque, 100 * torque / load.limit), tone);
     };
     rows.push_back({load.joint, cell(load.double_support), cell(load.single_support),
-                    FormatNumber(load.rated), FormatNumber(load.limit)});
+                    cell(load.step), FormatNumber(load.rated), FormatNumber(load.limit)});
   }
   std::string text = FormatColumns(rows, columns);
   if (left_out > 0)
@@ -288,15 +301,10 @@ std::string FormatPushes(const RobotCheck& check, int columns) {
 
 }  // namespace
 
-double TorqueLimit(const RobotModel& model, size_t joint) {
-  const robot::MotorModel& motor = model.motors()[joint];
-  return std::min(model.joints()[joint].effort, motor.torque_per_ampere() * motor.peak_current);
-}
-
 RobotCheck CheckRobot(const std::filesystem::path& file) {
   RobotCheck check;
   check.file = file.string();
-  check.model = robot::LoadRobotFiles(check.file, &check.defects);
+  check.model = robot::LoadRobotFiles(check.file, &check.left_out);
   Robot description;
   ReadTextProto(check.file, &description);
   check.maker_file = robot::MakerFile(description, check.file);
@@ -353,6 +361,12 @@ std::string FormatRobotCheck(const RobotCheck& check, int columns) {
        fmt::format("by rule: COM {:.3g} 1/s², {:.3g} 1/s", check.gains.com.kp, check.gains.com.kd));
   text += "\n\n" + FormatLoads(check, columns) + "\n" + FormatPushes(check, columns) + "\n" +
           FormatLoops(check, columns) + "\n";
+  if (!check.left_out.empty()) {
+    text +=
+        Wrapped(fmt::format("left out of the maker's file: {}", fmt::join(check.left_out, "; ")),
+                columns, 2) +
+        "\n";
+  }
   if (check.ok()) return text + Toned("no defect was found", Tone::kGood) + "\n";
   text +=
       Toned(fmt::format("{} defect{}", check.defects.size(), check.defects.size() == 1 ? "" : "s"),
@@ -393,8 +407,12 @@ Json RobotCheckJson(const RobotCheck& check) {
     json["torque"].push_back({{"joint", load.joint},
                               {"double_support", load.double_support},
                               {"single_support", load.single_support},
+                              {"step", load.step},
+                              {"step_rms", load.step_rms},
                               {"rated", load.rated},
-                              {"limit", load.limit}});
+                              {"limit", load.limit},
+                              {"step_velocity", load.step_velocity},
+                              {"velocity_limit", load.velocity_limit}});
   }
   json["push"] = Json::array();
   for (const PushLimit& push : check.pushes) {
@@ -414,6 +432,7 @@ Json RobotCheckJson(const RobotCheck& check) {
                                    {"least_damping", loop.least_damping},
                                    {"least_damped_frequency", loop.frequency}});
   }
+  json["left_out"] = check.left_out;
   json["defects"] = check.defects;
   return json;
 }

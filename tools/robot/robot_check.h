@@ -11,20 +11,22 @@
 
 #include "components/balance/gains/gain_rule.h"
 #include "components/robot/robot_model.h"
+#include "tools/robot/standing_loads.h"
 
 namespace poise {
 
-/// N·m: of what the URDF allows and what the motor gives at its peak current, the smaller.
-double TorqueLimit(const robot::RobotModel& model, size_t joint);
-
-/// What holds one joint at rest, N·m, unsigned.
+/// What one joint bears, N·m, unsigned.
 struct JointLoad {
   std::string joint;
   double limit = 0;           ///< TorqueLimit
   double rated = 0;           ///< at the motor's rated current
   double double_support = 0;  ///< in the stance
-  double single_support =
-      0;  ///< on one foot, the COM above its sole's origin: the worse of the two
+  /// On one foot, the COM above its sole's origin: the worse of the two. NaN: no posture.
+  double single_support = 0;
+  double step = 0;            ///< the largest in a step (LoadsOfAStep); NaN: it has none
+  double step_rms = 0;        ///< N·m, root of the mean square of steps; NaN likewise
+  double step_velocity = 0;   ///< rad/s, the largest in a step; NaN likewise
+  double velocity_limit = 0;  ///< rad/s
 };
 
 struct SoleFacts {
@@ -70,11 +72,12 @@ struct RobotCheck {
   std::vector<JointLoad> loads;     ///< by joint
   bool stands_on_one_foot = false;  ///< a posture above one foot was found, for either foot
   StepReach reach;
-  std::vector<PushLimit> pushes;     ///< 16 directions
-  balance::StandingGains gains;      ///< by the rule, at kCheckedTick
-  std::vector<LoopFacts> loops;      ///< those supports in which it can stand
-  robot::RobotState stance;          ///< of the page
-  std::vector<std::string> defects;  ///< what was found wrong, each with what to do
+  std::vector<PushLimit> pushes;      ///< 16 directions
+  balance::StandingGains gains;       ///< by the rule, at kCheckedTick
+  std::vector<LoopFacts> loops;       ///< those supports in which it can stand
+  robot::RobotState stance;           ///< of the page
+  std::vector<std::string> left_out;  ///< of the maker's file: import has told it
+  std::vector<std::string> defects;   ///< what was found wrong, each with what to do
   bool ok() const { return defects.empty(); }
 };
 

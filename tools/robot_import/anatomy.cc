@@ -18,6 +18,9 @@ constexpr size_t kLeastJoints = 6;
 // rad: where the feet stand beside each other to within this, the base faces along its axis; a zero
 // posture need not be symmetric.
 constexpr double kSnap = 0.175;
+// Of the lower foot's depth below the hips, by which the other may be higher with all joints at
+// zero: a hand is.
+constexpr double kMostAbove = 0.3;
 
 std::vector<int> PathTo(const robot::LinkTree& tree, int body) {
   std::vector<int> joints;
@@ -28,8 +31,16 @@ std::vector<int> PathTo(const robot::LinkTree& tree, int body) {
   return joints;
 }
 
-bool Shares(const std::vector<int>& a, const std::vector<int>& b) {
-  return std::ranges::find_first_of(a, b) != a.end();
+/// Number of joints from the base on that both paths have.
+size_t Shared(const std::vector<int>& a, const std::vector<int>& b) {
+  return static_cast<size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
+}
+
+/// Two legs have more joints of their own than they share above them: two toes have not, and a foot
+/// and its shank share all.
+bool AreLegs(const std::vector<int>& a, const std::vector<int>& b) {
+  const size_t shared = Shared(a, b);
+  return std::min(a.size(), b.size()) > 2 * shared;
 }
 
 int SideOfBody(const robot::LinkTree& tree, int body) {
@@ -42,18 +53,34 @@ int SideOfBody(const robot::LinkTree& tree, int body) {
       tree.joints[static_cast<size_t>(tree.bodies[static_cast<size_t>(body)].joint)].name);
 }
 
-void CheckLeg(const robot::LinkTree& tree, const Leg& leg) {
+void CheckLeg(const robot::LinkTree& tree, const Leg& leg, const std::string& locked) {
   if (leg.joints.size() >= kLeastJoints) return;
   std::string names;
   for (const int j : leg.joints) {
     names += (names.empty() ? "" : ", ") + tree.joints[static_cast<size_t>(j)].name;
   }
+  throw robot::RobotError(fmt::format(
+      "{}: the leg to '{}' has {} joint{} ({}): its foot cannot make a six-dimensional "
+      "contact, a leg that balances needs six{}; if another link is the foot, name both "
+      "with --right-foot and --left-foot",
+      tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
+      leg.joints.size() == 1 ? "" : "s", names.empty() ? "none" : names, locked));
+}
+
+/// `height`: m, of the feet's lowest points along up; `hips`: m, of the body where the legs part.
+void CheckLevel(const robot::LinkTree& tree, const std::array<Leg, 2>& legs,
+                const std::array<double, 2>& height, double hips, bool given) {
+  const size_t upper = height[0] > height[1] ? 0 : 1;
+  const double above = height[upper] - height[1 - upper];
+  if (given || !(above > kMostAbove * (hips - height[1 - upper]))) return;
+  const auto name = [&](size_t f) -> const std::string& {
+    return tree.bodies[static_cast<size_t>(legs[f].body)].name;
+  };
   throw robot::RobotError(
-      fmt::format("{}: the leg to '{}' has {} joint{} ({}): its foot cannot make a six-dimensional "
-                  "contact, a leg that balances needs six; if another link is the foot, name both "
+      fmt::format("{}: the branches that reach lowest end at '{}' and, {:.2f} m higher, at '{}', "
+                  "which is no second foot: Poise balances on two; if both are feet, name them "
                   "with --right-foot and --left-foot",
-                  tree.format, tree.bodies[static_cast<size_t>(leg.body)].name, leg.joints.size(),
-                  leg.joints.size() == 1 ? "" : "s", names.empty() ? "none" : names));
+                  tree.format, name(1 - upper), above, name(upper)));
 }
 
 }  // namespace
@@ -101,7 +128,8 @@ std::vector<Isometry3d> BodyPoses(const robot::LinkTree& tree,
 
 Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Isometry3d>& poses,
                     const Vector3d& up, const std::vector<double>& low,
-                    const std::array<std::string, 2>& feet) {
+                    const std::array<std::string, 2>& feet,
+                    const std::function<std::string(const std::string&)>& locked) {
   std::array<Leg, 2> legs;
   for (size_t f = 0; f < 2; ++f) {
     if (feet[f].empty()) continue;
@@ -125,17 +153,25 @@ Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Isometry3d>& 
     for (const int b : by_height) {
       if (legs[f].body >= 0) break;
       const std::vector<int> path = PathTo(tree, b);
-      if (legs[1 - f].body >= 0 && Shares(path, legs[1 - f].joints)) continue;
+      if (legs[1 - f].body >= 0 && !AreLegs(path, legs[1 - f].joints)) continue;
       legs[f] = {b, path};
     }
     if (legs[f].body < 0) {
-      throw robot::RobotError(
-          tree.format +
-          ": there are no two legs that part at the base: Poise balances on two feet");
+      throw robot::RobotError(tree.format +
+                              ": there are no two legs: no two branches part above more joints "
+                              "than lie above them, and Poise balances on two feet");
     }
   }
-  for (const Leg& leg : legs) CheckLeg(tree, leg);
+  const size_t shared = Shared(legs[0].joints, legs[1].joints);
   Anatomy found;
+  if (shared > 0) found.hips = tree.joints[static_cast<size_t>(legs[0].joints[shared - 1])].body;
+  for (Leg& leg : legs) {
+    leg.joints.erase(leg.joints.begin(), leg.joints.begin() + static_cast<std::ptrdiff_t>(shared));
+    CheckLeg(tree, leg, locked(tree.bodies[static_cast<size_t>(leg.body)].name));
+  }
+  CheckLevel(tree, legs, {height(legs[0].body), height(legs[1].body)},
+             poses[static_cast<size_t>(found.hips)].translation().dot(up),
+             !feet[0].empty() && !feet[1].empty());
   const std::array side = {SideOfBody(tree, legs[0].body), SideOfBody(tree, legs[1].body)};
   const auto place = [&](const Leg& leg) {
     return poses[static_cast<size_t>(leg.body)].translation();

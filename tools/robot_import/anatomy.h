@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -17,11 +18,12 @@ const char* SurenessName(Sureness sureness);
 
 struct Leg {
   int body = -1;            ///< of the foot
-  std::vector<int> joints;  ///< from the base to the foot
+  std::vector<int> joints;  ///< from where the legs part to the foot
 };
 
 struct Anatomy {
   std::array<Leg, 2> leg;  ///< right first
+  int hips = 0;            ///< body where they part: the root, or one below a waist
   /// In the root link: x forward, y left, z up.
   Eigen::Matrix3d facing = Eigen::Matrix3d::Identity();
   Sureness sides = Sureness::kGuess, forward = Sureness::kGuess;
@@ -32,13 +34,16 @@ struct Anatomy {
 std::vector<Eigen::Isometry3d> BodyPoses(const robot::LinkTree& tree,
                                          const Eigen::VectorXd& joint_position);
 
-/// Legs are the two branches that reach lowest. `up` is a unit vector of the root link, `low` how
-/// far each body reaches below its frame's origin along -up in `poses` (m), `feet` two links to be
-/// taken instead, or empty ones. Throws robot::RobotError: no two legs, or fewer than six joints in
+/// Legs are the two branches that reach lowest and part above more joints than lie above them.
+/// `up` is a unit vector of the root link, `low` how far each body reaches below its frame's origin
+/// along -up in `poses` (m), `feet` two links to be taken instead, or empty ones. `locked` says of
+/// a link which of the file's joints on the way to it stand still, or nothing: a leg that lacks
+/// joints is told with them. Throws robot::RobotError: no two legs, or fewer than six joints in
 /// one, by name.
 Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Eigen::Isometry3d>& poses,
                     const Eigen::Vector3d& up, const std::vector<double>& low,
-                    const std::array<std::string, 2>& feet);
+                    const std::array<std::string, 2>& feet,
+                    const std::function<std::string(const std::string&)>& locked);
 
 /// -1: the name speaks of the right side, 1: of the left, 0: of none.
 int SideOfName(const std::string& name);

@@ -4,11 +4,13 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <set>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/inertia.h"
 #include "components/robot/robot_model.h"
 #include "fmt/format.h"
+#include "tools/robot_import/anatomy.h"
 #include "tools/robot_import/inertia_repair.h"
 #include "tools/robot_import/motor_guess.h"
 
@@ -27,6 +29,14 @@ using robot::SourceLink;
 constexpr double kPoint = 1e-6;
 constexpr double kDummyMass = 0.02;  // kg, of a link that moves and weighs nothing: a bracket
 constexpr double kMirror = 1e-3;     // share by which masses of both sides may differ
+// Of the robot's mass: what a finger weighs at most (a thumb of 150 g on a G1), and a limb at
+// least.
+constexpr double kFingerShare = 0.0075, kLimbShare = 0.03;
+constexpr double kPelvisShare = 0.14;  // of a person's mass (Winter)
+constexpr double kTrunkShare = 0.25;   // of the robot's mass: what moves more is no arm
+// cosine: two links whose origins lie beside each other within this mirror each other along an
+// axis.
+constexpr double kBeside = 0.97;
 
 double Largest(const Matrix3d& inertia) { return inertia.cwiseAbs().maxCoeff(); }
 
@@ -73,6 +83,7 @@ class Repairer {
         throw ConfigError(fmt::format("--lock {}: the file has no such joint", name));
       Lock(joint, 0, "", "");
     }
+    const std::set<std::string> fingers = Fingers();
     std::map<std::string, int> followers;
     for (const SourceJoint& joint : source_.joints) {
       if (joint.mimic) ++followers[joint.mimic->joint];
@@ -93,13 +104,14 @@ class Repairer {
       } else if (joint.kind == JointKind::kPrismatic) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' is prismatic", joint.name),
              "locked");
-      } else if (followers.contains(joint.name) || IsFinger(joint.name)) {
+      } else if (followers.contains(joint.name) || IsFinger(joint.name) ||
+                 fingers.contains(joint.name)) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' moves a finger", joint.name),
              "locked: it takes no part in balance");
       } else if (maker_.is_mjcf && !maker_.actuated.empty() &&
                  !maker_.actuated.contains(joint.name)) {
-        Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' has no actuator", joint.name),
-             "locked");
+        Lock(&joint, RestOf(joint.name),
+             fmt::format("joint '{}' has no actuator of its own", joint.name), "locked");
       }
     }
   }
@@ -115,8 +127,13 @@ class Repairer {
 
   void Limits() {
     const double mass = Mass();
+    std::map<std::string, double> beyond;  // kg that a joint moves
+    for (const MovingBody& body : MovingBodies()) {
+      if (body.joint != nullptr) beyond[body.joint->name] = body.beyond;
+    }
     std::map<std::pair<double, double>, JointLimit*> same;
     int no_effort = 0, no_velocity = 0, no_range = 0;
+    std::vector<std::string> odd_effort, odd_velocity;
     for (SourceJoint& joint : source_.joints) {
       if (joint.kind == JointKind::kFixed || joint.locked) continue;
       const bool effort = !(joint.effort > 0) || !std::isfinite(joint.effort);
@@ -130,31 +147,56 @@ class Repairer {
         joint.lower = -M_PI, joint.upper = M_PI;
         ++no_range;
       }
-      if (!effort && !velocity && joint.has_limits) continue;
+      const bool leg = IsLeg(joint.name);
+      const bool no_motors = !effort && IsPlaceholderEffort(joint.effort, mass, leg);
+      const bool no_drives = !velocity && joint.velocity > kMostVelocity;
+      if (!effort && !velocity && !no_motors && !no_drives && joint.has_limits) continue;
       no_effort += effort;
       no_velocity += velocity;
-      if (effort) joint.effort = GuessedEffort(mass, IsLeg(joint.name));
+      const auto number = [](double x) { return fmt::format("{:g}", x); };
+      if (no_motors) odd_effort.push_back(number(joint.effort));
+      if (no_drives) odd_velocity.push_back(number(joint.velocity));
+      if (effort || no_motors) {
+        joint.effort = GuessedEffort(mass, leg || beyond[joint.name] > kTrunkShare * mass);
+      }
       if (velocity) joint.velocity = kGuessedVelocity;
+      if (no_drives) joint.velocity = kUsualVelocity;
       joint.has_limits = true;
-      JointLimit*& limit = same[{effort ? joint.effort : 0, velocity ? joint.velocity : 0}];
+      const bool new_effort = effort || no_motors, new_velocity = velocity || no_drives;
+      JointLimit*& limit = same[{new_effort ? joint.effort : 0, new_velocity ? joint.velocity : 0}];
       if (limit == nullptr) {
         limit = result_.robot.add_limit();
-        if (effort) limit->set_effort(joint.effort);
-        if (velocity) limit->set_velocity(joint.velocity);
+        if (new_effort) limit->set_effort(joint.effort);
+        if (new_velocity) limit->set_velocity(joint.velocity);
       }
       limit->add_joint(joint.name);
     }
     const auto tell = [&](int count, const char* what, const char* done) {
-      if (count > 0) Tell(fmt::format("{} joints have no {}", count, what), done);
+      if (count == 0) return;
+      Tell(fmt::format("{} joint{} no {}", count, count == 1 ? " has" : "s have", what), done);
+    };
+    const auto tell_odd = [&](const std::vector<std::string>& odd, const char* what,
+                              const std::string& done) {
+      if (odd.empty()) return;
+      const std::set<std::string> kinds(odd.begin(), odd.end());
+      Tell(fmt::format("{} joint{} {} of {}, a placeholder that no motor of such a robot has",
+                       odd.size(), odd.size() == 1 ? " has" : "s have", what,
+                       fmt::join(kinds, ", ")),
+           done);
     };
     tell(no_range, "range", "guess: half a turn to either side");
     tell(no_effort, "torque limit", "guess: by the robot's mass");
     tell(no_velocity, "velocity limit", "guess: 20 rad/s");
+    tell_odd(odd_effort, "a torque limit in N·m",
+             "guess: by the robot's mass; friction, rotors and drive train follow from that");
+    tell_odd(odd_velocity, "a velocity limit in rad/s",
+             "guess: 15 rad/s; gears and rotors follow from that");
   }
 
   void Inertias() {
+    MirrorMasses();
     for (SourceLink& link : source_.links) RepairLink(&link);
-    for (const auto& [main, parts] : MovingBodies()) RepairBody(main, parts);
+    for (const MovingBody& body : MovingBodies()) RepairBody(body);
     if (!maker_.from_shapes.empty()) {
       Tell(fmt::format("{} bodies have no <inertial>", maker_.from_shapes.size()),
            "their shapes give mass and inertia");
@@ -305,34 +347,130 @@ class Repairer {
     MassProperties mass;  // in the body
   };
 
-  /// By the link that a joint moves, or the root.
-  std::vector<std::pair<SourceLink*, std::vector<Part>>> MovingBodies() {
-    std::vector<std::pair<SourceLink*, std::vector<Part>>> bodies;
+  /// Links that are fixed to each other.
+  struct MovingBody {
+    SourceLink* main;          ///< that the joint moves, or the root
+    const SourceJoint* joint;  ///< null: the root
+    size_t parent;             ///< body
+    std::vector<Part> parts = {};
+    double beyond = 0;               ///< kg, with all that it carries
+    std::vector<size_t> limbs = {};  ///< bodies that it carries
+    int heavy_limbs = 0;             ///< two of them: a pelvis or a trunk
+  };
+
+  /// Parents first.
+  std::vector<MovingBody> MovingBodies() {
+    std::vector<MovingBody> bodies;
     std::map<std::string, std::vector<const SourceJoint*>> children;
     for (const SourceJoint& joint : source_.joints) children[joint.parent].push_back(&joint);
     std::vector<std::pair<std::string, std::pair<size_t, Isometry3d>>> open;
-    const auto begin = [&](const std::string& link) {
+    const auto begin = [&](const std::string& link, const SourceJoint* joint, size_t parent) {
       open.push_back({link, {bodies.size(), Isometry3d::Identity()}});
-      bodies.push_back({source_.FindLink(link), {}});
+      if (joint != nullptr) bodies[parent].limbs.push_back(bodies.size());
+      bodies.push_back({source_.FindLink(link), joint, parent, {}});
     };
-    begin(source_.root);
+    begin(source_.root, nullptr, 0);
     while (!open.empty()) {
       const auto [name, place] = open.back();
       open.pop_back();
       SourceLink* const link = source_.FindLink(name);
-      bodies[place.first].second.push_back({link, robot::Transformed(link->mass, place.second)});
+      bodies[place.first].parts.push_back({link, robot::Transformed(link->mass, place.second)});
       for (const SourceJoint* joint : children[name]) {
         if (joint->kind == JointKind::kFixed || joint->locked) {
           open.push_back({joint->child, {place.first, place.second * joint->origin}});
         } else {
-          begin(joint->child);
+          begin(joint->child, joint, place.first);
         }
       }
+    }
+    const double limb = kLimbShare * Mass();
+    for (size_t b = bodies.size(); b-- > 0;) {
+      for (const Part& part : bodies[b].parts) bodies[b].beyond += std::max(0.0, part.mass.mass);
+      if (b == 0) break;
+      bodies[bodies[b].parent].beyond += bodies[b].beyond;
+      bodies[bodies[b].parent].heavy_limbs += bodies[b].beyond > limb;
     }
     return bodies;
   }
 
-  void RepairBody(SourceLink* main, const std::vector<Part>& parts) {
+  /// Joints of hands, whatever they are called: of light chains that part at one body beyond the
+  /// root. Eyes are such as well.
+  std::set<std::string> Fingers() {
+    const std::vector<MovingBody> bodies = MovingBodies();
+    const double most = kFingerShare * Mass();
+    std::set<std::string> fingers;
+    std::vector<bool> within(bodies.size(), false);
+    for (size_t b = 1; b < bodies.size(); ++b) {
+      const std::vector<size_t>& limbs = bodies[b].limbs;
+      const bool hand = limbs.size() > 1 && std::ranges::all_of(limbs, [&](size_t limb) {
+                          return bodies[limb].beyond < most;
+                        });
+      for (const size_t limb : limbs) {
+        within[limb] = within[b] || hand;
+        if (within[limb]) fingers.insert(bodies[limb].joint->name);
+      }
+    }
+    return fingers;
+  }
+
+  /// Of all links in the root, with joints at zero.
+  std::map<std::string, Isometry3d> ZeroPoses() const {
+    std::map<std::string, std::vector<const SourceJoint*>> children;
+    for (const SourceJoint& joint : source_.joints) children[joint.parent].push_back(&joint);
+    std::map<std::string, Isometry3d> poses{{source_.root, Isometry3d::Identity()}};
+    std::vector<std::string> open{source_.root};
+    while (!open.empty()) {
+      const std::string name = open.back();
+      open.pop_back();
+      for (const SourceJoint* joint : children[name]) {
+        poses[joint->child] = poses.at(name) * joint->origin;
+        open.push_back(joint->child);
+      }
+    }
+    return poses;
+  }
+
+  /// A limb's link without a mass whose mirror image has one weighs as much.
+  void MirrorMasses() {
+    const double least = kFingerShare * Mass();
+    const std::map<std::string, Isometry3d> poses = ZeroPoses();
+    for (SourceLink& link : source_.links) {
+      if (link.mass.mass > 0 && std::isfinite(link.mass.mass)) continue;
+      const auto twin = std::ranges::find_if(source_.links, [&](const SourceLink& other) {
+        return SideOfName(link.name) != 0 && SideOfName(other.name) == -SideOfName(link.name) &&
+               SameBesideSide(link.name, other.name) && other.mass.mass > least &&
+               !IsPoint(other.mass) && robot::WhyImpossible(other.mass).empty();
+      });
+      if (twin == source_.links.end()) continue;
+      const Isometry3d &here = poses.at(link.name), &there = poses.at(twin->name);
+      Vector3d across = here.translation() - there.translation();
+      if (across.norm() < kPoint) across = Vector3d::UnitY();
+      across.normalize();
+      Eigen::Index axis = 0;
+      if (across.cwiseAbs().maxCoeff(&axis) > kBeside) across = Vector3d::Unit(axis);
+      const Matrix3d mirror = here.linear().transpose() *
+                              (Matrix3d::Identity() - 2 * across * across.transpose()) *
+                              there.linear();
+      Tell(fmt::format("link '{}' has a mass of {:g} kg, and its mirror image '{}' {:g} kg",
+                       link.name, link.mass.mass, twin->name, twin->mass.mass),
+           "that of its mirror image, mirrored");
+      Repair* const repair = RepairOf(link.name);
+      repair->set_mass(twin->mass.mass);
+      link.mass.mass = twin->mass.mass;
+      const Vector3d com = mirror * twin->mass.com;
+      const auto digits = [](double x) { return std::round(x * 1e9) / 1e9 + 0.0; };
+      Pose* const place = repair->mutable_com();
+      place->set_x(digits(com.x()));
+      place->set_y(digits(com.y()));
+      place->set_z(digits(com.z()));
+      link.mass.com = {place->x(), place->y(), place->z()};
+      SetInertia(&link, mirror * twin->mass.inertia * mirror.transpose());
+    }
+  }
+
+  void RepairBody(const MovingBody& body) {
+    SourceLink* const main = body.main;
+    const std::vector<Part>& parts = body.parts;
     std::vector<MassProperties> masses;
     for (const Part& part : parts) masses.push_back(part.mass);
     const MassProperties merged = robot::Merged(masses);
@@ -340,6 +478,17 @@ class Repairer {
     SourceLink* heaviest = main;
     for (const Part& part : parts) {
       if (part.mass.mass > heaviest->mass.mass) heaviest = part.link;
+    }
+    if (!(heaviest->mass.mass > 0) && body.heavy_limbs > 1) {
+      const double mass = std::round(kPelvisShare / (1 - kPelvisShare) * Mass() * 1e3) / 1e3;
+      Tell(fmt::format("link '{}' weighs nothing and carries {} limbs", main->name,
+                       body.heavy_limbs),
+           fmt::format("guess: {:g} kg, {:g} % of the robot, as of a person", mass,
+                       100 * kPelvisShare));
+      RepairOf(main->name)->set_mass(mass);
+      main->mass.mass = mass;
+      SetInertia(main, SphereInertia(mass));
+      return;
     }
     if (!(heaviest->mass.mass > 0)) {
       Tell(fmt::format("link '{}' moves and weighs nothing", heaviest->name),
@@ -418,8 +567,8 @@ void RepairDefects(const std::vector<std::string>& lock, MakerFile* maker, Robot
   repairer.Masses();
   repairer.Names();
   repairer.Locks(lock);
-  repairer.Limits();
   repairer.Inertias();
+  repairer.Limits();
 }
 
 }  // namespace poise

@@ -12,6 +12,7 @@
 #include "components/robot/xml_text.h"
 #include "fmt/format.h"
 #include "tools/robot/maker_shapes.h"
+#include "tools/robot/mesh_file.h"
 
 namespace poise {
 namespace {
@@ -55,10 +56,24 @@ void ReadExtensions(MakerFile* maker) {
   }
 }
 
+/// The text of a file that ends: a pipe or a device may not. Throws ConfigError.
+std::string ReadRegularFile(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    throw ConfigError(path.string() + ": is a pipe or a device, no file: name the robot's file");
+  }
+  std::string text = ReadFile(path.string());
+  if (IsLfsPointer(text)) {
+    throw ConfigError(path.string() +
+                      ": is a Git LFS pointer: fetch the file that it stands for, `git lfs pull`");
+  }
+  return text;
+}
+
 void ReadSrdf(const fs::path& path, MakerFile* maker) {
   tinyxml2::XMLDocument document;
   const std::string format = "SRDF " + path.filename().string();
-  robot::ParseXml(ReadFile(path.string()), format.c_str(), &document);
+  robot::ParseXml(ReadRegularFile(path), format.c_str(), &document);
   const tinyxml2::XMLElement* const root = document.RootElement();
   if (root == nullptr || std::string_view(root->Value()) != "robot") {
     throw ConfigError(path.string() + ": is no SRDF: its outermost element must be <robot>");
@@ -133,7 +148,7 @@ MakerFile ReadMakerFile(const fs::path& path, const fs::path& srdf) {
   }
   MakerFile maker;
   maker.path = path;
-  maker.text = ReadFile(path.string());
+  maker.text = ReadRegularFile(path);
   const size_t begin = maker.text.find_first_not_of("\xef\xbb\xbf \t\r\n");
   if (begin == std::string::npos) {
     throw ConfigError(path.string() + ": is empty: a URDF or MJCF file is needed");

@@ -7,11 +7,13 @@
 #include <set>
 #include <utility>
 
+#include "components/balance/contact_dynamics.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "tools/robot/maker_shapes.h"
 #include "tools/robot/mesh_file.h"
+#include "tools/robot/standing_loads.h"
 #include "tools/robot_import/file_defects.h"
 #include "tools/robot_import/maker_file.h"
 #include "tools/robot_import/motor_guess.h"
@@ -32,8 +34,13 @@ constexpr double kSameTurn = 1e-4;  // rad: a frame that is off by less counts a
 // has 0.26, Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length: 0.35, 0.62,
 // 0.57, 0.5.
 constexpr double kSoleOfLeg = 0.28, kWidthOfSole = 0.45;
+// m, from hip to ankle: Atlas has 0.8, OP3 0.2.
+constexpr double kLongestLeg = 5, kShortestLeg = 0.03;
+// kg/m³, a robot's mass over the cube of its leg's length: a person has 100, OP3 300.
+constexpr double kMostDensity = 5000;
 constexpr double kStraight = 0.01;   // rad: a joint that is nearer to zero is left there
 constexpr double kRectangle = 5e-4;  // m: a polygon that differs by less is one
+constexpr double kSameSole = 0.01;   // m: soles whose sizes differ by more are no mirror images
 // Of common sensors, where the file has none: those of the paper's robot.
 constexpr double kGyroNoise = 2e-4, kGyroBias = 7.5e-6;                   // rad/s
 constexpr double kAccelerometerNoise = 1.7e-2, kAccelerometerBias = 0.1;  // m/s²
@@ -166,6 +173,12 @@ class Import {
 
   void FindLegs() {
     const LinkTree tree = Tree();
+    if (tree.joints.size() > static_cast<size_t>(balance::kMaxJoints)) {
+      throw RobotError(
+          fmt::format("{}: {} joints move, and Poise takes {} at most: --lock those "
+                      "that need not",
+                      tree.format, tree.joints.size(), balance::kMaxJoints));
+    }
     const std::vector<Isometry3d> poses = BodyPoses(tree, Posture(tree));
     Vector3d up = maker_.root_orientation.inverse() * Vector3d::UnitZ();
     if (up.z() > std::cos(kSameTurn)) up = Vector3d::UnitZ();
@@ -187,7 +200,9 @@ class Import {
       }
       low.push_back(deepest);
     }
-    anatomy_ = FindAnatomy(tree, poses, up, low, options_.foot);
+    anatomy_ = FindAnatomy(tree, poses, up, low, options_.foot,
+                           [&](const std::string& link) { return LockedOnTheWay(tree, link); });
+    CheckUnits(tree, poses);
     for (size_t f = 0; f < 2; ++f) {
       std::string joints;
       for (const int j : anatomy_.leg[f].joints) {
@@ -213,6 +228,51 @@ class Import {
         anatomy_.forward_from, anatomy_.forward);
   }
 
+  /// Of the file's joints from the root to the links of a body: those that stand still, with why.
+  std::string LockedOnTheWay(const LinkTree& tree, const std::string& body) {
+    std::map<std::string, const robot::SourceJoint*> above;  // by child link
+    for (const robot::SourceJoint& joint : maker_.source.joints) above[joint.child] = &joint;
+    std::set<std::string> locked;
+    for (const auto& [link, place] : tree.links) {
+      if (place.body != tree.links.at(body).body) continue;
+      for (auto up = above.find(link); up != above.end(); up = above.find(up->second->parent)) {
+        if (up->second->locked) locked.insert(up->second->name);
+      }
+    }
+    std::string text;
+    for (const std::string& joint : locked) {
+      const std::string begin = fmt::format("joint '{}' ", joint);
+      for (const Defect& defect : result_.defects) {
+        if (defect.what.starts_with(begin)) text += (text.empty() ? "" : ", ") + defect.what;
+      }
+    }
+    if (text.empty()) return "";
+    const bool tendons = std::ranges::any_of(
+        maker_.left_out, [](const std::string& line) { return Contains(line, "<tendon>"); });
+    return fmt::format("; on its way {}{}", text,
+                       tendons ? ", and what <tendon> moves is left out" : "");
+  }
+
+  /// Lengths and masses in another unit are no robot's.
+  void CheckUnits(const LinkTree& tree, const std::vector<Isometry3d>& poses) {
+    double mass = 0;
+    for (const robot::Body& body : tree.bodies) mass += body.mass;
+    const Leg& leg = anatomy_.leg[0];
+    const auto hip = static_cast<size_t>(tree.joints[static_cast<size_t>(leg.joints[0])].body);
+    const double length =
+        (poses[static_cast<size_t>(leg.body)].translation() - poses[hip].translation()).norm();
+    if (length > kLongestLeg || length < kShortestLeg) {
+      result_.defects.push_back({fmt::format("the legs are {:.3g} m long: are lengths in {}?",
+                                             length, length > kLongestLeg ? "mm" : "another unit"),
+                                 "kept, and nothing can be right before the file has them in m"});
+    } else if (mass > kMostDensity * std::pow(length, 3)) {
+      result_.defects.push_back(
+          {fmt::format("the robot has {:.3g} kg on legs of {:.3g} m: are masses in g?", mass,
+                       length),
+           "kept, and nothing can be right before the file has them in kg"});
+    }
+  }
+
   void AddFacing(const std::string& link, const Matrix3d& turn) {
     Isometry3d pose = Isometry3d::Identity();
     pose.linear() = turn;
@@ -228,37 +288,21 @@ class Import {
   void FindSoles() {
     const LinkTree tree = Tree();  // its root faces forward now
     const std::vector<Isometry3d> poses = BodyPoses(tree, Posture(tree));
+    std::array<FootSole, 2> soles = {SoleOf(tree, poses, 0), SoleOf(tree, poses, 1)};
+    Compare(poses, &soles);
     for (size_t f = 0; f < 2; ++f) {
+      FootSole& sole = soles[f];
       const Leg& leg = anatomy_.leg[f];
-      const Matrix3d in_body = poses[static_cast<size_t>(leg.body)].linear().transpose();
-      const Vector3d down = in_body * -Vector3d::UnitZ(), forward = in_body * Vector3d::UnitX();
-      FoundSole sole;
-      std::string from = "collision shapes";
-      Sureness sureness = Sureness::kSure;
-      missing_.clear();
-      sole = FindSole(ShapesOf(tree, leg.body, true), down, forward);
-      if (sole.polygon.empty()) {
-        sole = FindSole(ShapesOf(tree, leg.body, false), down, forward);
-        from = "visual shapes";
-        sureness = Sureness::kLikely;
+      if (options_.sole) {
+        SetRectangle((*options_.sole)[0], (*options_.sole)[1], &sole.found);
+        sole.from = "as told";
+        sole.sureness = Sureness::kSure;
       }
       Foot* const foot = robot().add_foot();
       foot->set_name(f == 0 ? "right" : "left");
-      std::string frame;
-      if (sole.polygon.empty()) {
-        sureness = Sureness::kGuess;
-        frame = SoleFrame(tree, leg.body);
-        from = "share of the leg's length";
-        if (!missing_.empty()) TellMissing(*missing_.begin());
-        sole = GuessedSole(tree, poses, leg, frame, down, forward);
-      }
-      if (options_.sole) {
-        SetRectangle((*options_.sole)[0], (*options_.sole)[1], &sole);
-        from = "as told";
-        sureness = Sureness::kSure;
-      }
-      WriteSole(tree, leg.body, options_.foot[f].empty() ? frame : options_.foot[f], sole, foot);
-      Say(fmt::format("{} sole", foot->name()), SoleValue(*foot), from, sureness);
+      WriteSole(tree, leg.body, options_.foot[f].empty() ? sole.link : options_.foot[f], sole.found,
+                foot);
+      Say(fmt::format("{} sole", foot->name()), SoleValue(*foot), sole.from, sole.sureness);
       const auto [sensor, why] = ForceSensor(tree, leg);
       foot->set_force_sensor(sensor);
       Say(fmt::format("{} force sensor", foot->name()), sensor ? "yes" : "none", why,
@@ -266,6 +310,73 @@ class Import {
     }
     robot().set_force_noise(kForceNoise);
     robot().set_moment_noise(kMomentNoise);
+  }
+
+  struct FootSole {
+    FoundSole found;
+    std::string from, link;  ///< a link that is named for it, or none
+    Sureness sureness = Sureness::kSure;
+  };
+
+  FootSole SoleOf(const LinkTree& tree, const std::vector<Isometry3d>& poses, size_t f) {
+    const Leg& leg = anatomy_.leg[f];
+    const Matrix3d in_body = poses[static_cast<size_t>(leg.body)].linear().transpose();
+    const Vector3d down = in_body * -Vector3d::UnitZ(), forward = in_body * Vector3d::UnitX();
+    missing_.clear();
+    FootSole sole;
+    sole.found = FindSole(ShapesOf(tree, leg.body, true), down, forward);
+    sole.from = "collision shapes";
+    if (!sole.found.polygon.empty()) return sole;
+    sole.found = FindSole(ShapesOf(tree, leg.body, false), down, forward);
+    sole.from = "visual shapes";
+    sole.sureness = Sureness::kLikely;
+    if (!sole.found.polygon.empty()) return sole;
+    sole.link = SoleFrame(tree, leg.body);
+    sole.from = "share of the leg's length";
+    sole.sureness = Sureness::kGuess;
+    if (!missing_.empty()) TellMissing(*missing_.begin());
+    sole.found = GuessedSole(tree, poses, leg, sole.link, down, forward);
+    return sole;
+  }
+
+  /// Right and left soles are mirror images: where they are of two kinds, the better founded one
+  /// serves for both.
+  void Compare(const std::vector<Isometry3d>& poses, std::array<FootSole, 2>* soles) {
+    const auto size = [&](size_t f) -> Eigen::Vector2d {
+      Eigen::AlignedBox2d box;
+      for (const Eigen::Vector2d& p : (*soles)[f].found.polygon) box.extend(p);
+      return box.sizes();
+    };
+    const auto told = [&](size_t f) {
+      return fmt::format("{:.3g} x {:.3g} m of {}", size(f).x(), size(f).y(), (*soles)[f].from);
+    };
+    const bool alike = (*soles)[0].sureness == (*soles)[1].sureness;
+    if ((alike && (size(0) - size(1)).cwiseAbs().maxCoeff() < kSameSole) || options_.sole) return;
+    const std::string what = fmt::format("the soles differ: right {}, left {}", told(0), told(1));
+    if (alike) {
+      result_.defects.push_back({what, "kept; --sole LENGTH WIDTH says what both are"});
+      return;
+    }
+    const size_t good = (*soles)[0].sureness < (*soles)[1].sureness ? 0 : 1;
+    result_.defects.push_back(
+        {what, fmt::format("both that of the {} foot's {}, mirrored; --sole says better",
+                           good == 0 ? "right" : "left", (*soles)[good].from)});
+    // Across the sagittal plane, each about its foot's own frame.
+    const Isometry3d& from = poses[static_cast<size_t>(anatomy_.leg[good].body)];
+    const Isometry3d& to = poses[static_cast<size_t>(anatomy_.leg[1 - good].body)];
+    const Eigen::DiagonalMatrix<double, 3> mirror(1, -1, 1);
+    const Isometry3d sole = from * (*soles)[good].found.frame;
+    Isometry3d mirrored = Isometry3d::Identity();
+    mirrored.linear() = mirror * sole.linear() * mirror;
+    mirrored.translation() = to.translation() + mirror * (sole.translation() - from.translation());
+    FootSole& other = (*soles)[1 - good];
+    other = (*soles)[good];
+    other.link.clear();
+    other.found.frame = to.inverse() * mirrored;
+    std::ranges::reverse(other.found.polygon);
+    for (Eigen::Vector2d& p : other.found.polygon) p.y() = -p.y();
+    other.from += " of the other foot, mirrored";
+    other.sureness = Sureness::kLikely;
   }
 
   void TellMissing(const std::pair<std::string, std::string>& mesh) {
@@ -370,19 +481,28 @@ class Import {
       }
       return false;
     };
+    std::vector<std::string> places;
+    std::string kind;
     for (const robot::MjcfSensor& sensor : maker_.sensors) {
       const bool force = Contains(sensor.kind, "force") || sensor.kind == "feedback";
-      if (force && at_foot(sensor.site)) {
-        return {true, fmt::format("sensor '{}' at {}", sensor.kind, sensor.site)};
-      }
+      const bool known = std::ranges::find(places, sensor.site) != places.end();
+      if (!force || known || !at_foot(sensor.site)) continue;
+      if (kind.empty()) kind = sensor.kind;
+      places.push_back(sensor.site);
+    }
+    if (places.size() == 1) return {true, fmt::format("sensor '{}' at {}", kind, places[0])};
+    if (places.size() > 1) {
+      return {true, fmt::format("the sum of {} sensors, at {}", places.size(),
+                                fmt::join(places, " and "))};
     }
     for (const auto& [link, place] : tree.links) {
       if (place.body == leg.body && (Contains(link, "ft_sensor") || Contains(link, "force") ||
                                      Contains(link, "_ft_") || Lower(link).ends_with("_ft"))) {
-        return {true, "link " + link};
+        places.push_back(link);
       }
     }
-    return {false, "the file shows none"};
+    if (places.empty()) return {false, "the file shows none"};
+    return {true, fmt::format("link {}", fmt::join(places, ", "))};
   }
 
   void FindImu() {
@@ -411,9 +531,10 @@ class Import {
         offer(sensor.site, "sensor '" + sensor.kind + "'", Sureness::kSure);
       }
     }
-    if (best.empty()) {
+    for (const char* word : {"imu", "gsensor", "gyro", "accelerometer"}) {
+      if (!best.empty()) break;
       for (const auto& [link, place] : tree.links) {
-        if (Contains(link, "imu")) offer(link, "its name", Sureness::kLikely);
+        if (Contains(link, word)) offer(link, "its name", Sureness::kLikely);
       }
     }
     if (best.empty()) offer(tree.root_link, "the file shows none: the root link", Sureness::kGuess);
@@ -438,7 +559,11 @@ class Import {
     }
     robot().set_body_link(options_.body.empty() ? tree.root_link : options_.body);
     Say("body", robot().body_link(),
-        options_.body.empty() ? "the link that carries both legs" : "as told", Sureness::kSure);
+        !options_.body.empty() ? "as told"
+        : anatomy_.hips == 0   ? "the link that carries both legs"
+                               : fmt::format("the root link; the legs part below it, at '{}'",
+                                             tree.bodies[static_cast<size_t>(anatomy_.hips)].name),
+        Sureness::kSure);
   }
 
   void Motors() {
@@ -454,7 +579,8 @@ class Import {
     Say("motors",
         fmt::format("{} joints, {} kind{}", tree.joints.size(), robot().motor_size(),
                     robot().motor_size() == 1 ? "" : "s"),
-        "torques and velocities of the file; gears, currents and encoders by class",
+        "torques and velocities of the file; gears and encoders by class; rated: half of the peak, "
+        "or more where one foot takes it",
         Sureness::kGuess);
     Say("rotor inertia",
         fmt::format("{} from links, the rest {}", rotor_.size(),
@@ -472,13 +598,6 @@ class Import {
       result_.defects.push_back({fmt::format("all {} joints have one torque limit, {:g} N·m",
                                              tree.joints.size(), tree.joints[0].effort),
                                  "kept, but no robot has one motor for legs and wrists"});
-    }
-    if (sources.velocity_placeholder) {
-      result_.defects.push_back(
-          {fmt::format(
-               "all joints have one velocity limit, {:g} rad/s, which no such drive reaches",
-               tree.joints[0].velocity_limit),
-           "kept; gears and rotors are guessed from 15 rad/s"});
     }
   }
 
@@ -501,7 +620,23 @@ class Import {
         from += fmt::format(" ({} '{}' cannot stand level)", maker_.postures_from, key->name);
       }
     }
-    if (!solved) stance = FindStance(model, anatomy_, WithinLimits(model, Posture(tree)), true);
+    try {
+      if (!solved) stance = FindStance(model, anatomy_, WithinLimits(model, Posture(tree)), true);
+    } catch (const RobotError& error) {
+      throw RobotError(fmt::format(
+          "{}; taken for feet were '{}' on the right and '{}' on the left: if others are, name "
+          "both with --right-foot and --left-foot",
+          error.what(), robot().foot(0).link(), robot().foot(1).link()));
+    }
+    if (stance.wider_spacing > 0) {
+      const std::string& joint =
+          model.joints()[static_cast<size_t>(std::max(0, stance.strained))].name;
+      from += fmt::format("; nearer than {:.3f} m, where {}", stance.wider_spacing,
+                          stance.strained < 0 ? "no posture is on one foot"
+                                              : fmt::format("one foot takes {:.0f} % of {}",
+                                                            100 * stance.strain, joint));
+      sureness = Sureness::kLikely;
+    }
     Stance* const written = robot().mutable_stance();
     written->set_com_height(stance.com_height);
     written->set_foot_spacing(stance.foot_spacing);
@@ -511,6 +646,7 @@ class Import {
       joint->set_joint(model.joints()[static_cast<size_t>(j)].name);
       joint->set_position(stance.joint_position[j]);
     }
+    RateMotors(tree, OneFootTorque(model, stance.state), &robot());
     Say("stance",
         fmt::format("COM {:.3f} m high, feet {:.3f} m apart", stance.com_height,
                     stance.foot_spacing),

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "components/robot/sole.h"
+
 namespace poise {
 namespace {
 
@@ -23,32 +25,6 @@ constexpr double kMostTilt = 0.5;       // rad
 constexpr double kLeastArea = 4e-4;     // m²
 constexpr double kLeastSpread = 0.005;  // m, of points that define a plane, across
 constexpr size_t kMostVertices = 12;
-constexpr double kSamePoint = 1e-6;  // m
-
-/// Convex hull, counter-clockwise (Andrew's monotone chain); points on an edge are left out.
-std::vector<Vector2d> Hull(std::vector<Vector2d> points) {
-  std::ranges::sort(points, [](const Vector2d& a, const Vector2d& b) {
-    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-  });
-  std::vector<Vector2d> hull;
-  const auto turns_left = [](const Vector2d& a, const Vector2d& b, const Vector2d& c) {
-    const Vector2d u = b - a, v = c - a;
-    return u.x() * v.y() - u.y() * v.x() > kSamePoint * (u.norm() + v.norm());
-  };
-  for (int side = 0; side < 2; ++side) {
-    const size_t begin = hull.size();
-    for (const Vector2d& point : points) {
-      while (hull.size() >= begin + 2 && !turns_left(hull[hull.size() - 2], hull.back(), point)) {
-        hull.pop_back();
-      }
-      if (hull.size() > begin && (hull.back() - point).norm() < kSamePoint) continue;
-      hull.push_back(point);
-    }
-    if (!hull.empty()) hull.pop_back();
-    std::ranges::reverse(points);
-  }
-  return hull;
-}
 
 double Area(const std::vector<Vector2d>& polygon) {
   double area = 0;
@@ -60,19 +36,20 @@ double Area(const std::vector<Vector2d>& polygon) {
   return area;
 }
 
-/// Leaves out the vertices that cost least area: the polygon stays within the sole.
-void Simplify(std::vector<Vector2d>* polygon) {
-  while (polygon->size() > kMostVertices) {
-    const size_t n = polygon->size();
-    size_t best = 0;
-    double least = 1e9;
-    for (size_t i = 0; i < n; ++i) {
-      const double lost =
-          Area({(*polygon)[(i + n - 1) % n], (*polygon)[i], (*polygon)[(i + 1) % n]});
-      if (lost < least) least = lost, best = i;
-    }
-    polygon->erase(polygon->begin() + static_cast<std::ptrdiff_t>(best));
+/// Where the sole frame's origin lies: in the middle of the polygon's box, or in its centroid where
+/// that middle is near an edge, as a triangle's may be.
+Vector2d Middle(const std::vector<Vector2d>& polygon) {
+  Eigen::AlignedBox2d box;
+  Vector2d centroid = Vector2d::Zero();
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    box.extend(a);
+    centroid += (a.x() * b.y() - a.y() * b.x()) * (a + b) / (6 * Area(polygon));
   }
+  robot::FootModel foot;
+  foot.vertices = polygon;
+  const double inside = robot::DistanceInside(foot, box.center());
+  return inside > 0.5 * robot::DistanceInside(foot, centroid) ? box.center() : centroid;
 }
 
 /// Normal of the least-squares plane, towards `down`; zero where the points lie on a line.
@@ -195,15 +172,12 @@ FoundSole FindSole(std::span<const FootShape> shapes, const Vector3d& down,
   for (const Vector3d& p : touching) {
     flat.emplace_back(p.dot(x), p.dot(sole.frame.linear().col(1)));
   }
-  sole.polygon = Hull(std::move(flat));
+  sole.polygon = robot::SoleOutline(std::move(flat), kMostVertices);
   if (sole.polygon.size() < 3 || Area(sole.polygon) < kLeastArea) {
     sole.polygon.clear();
     return sole;
   }
-  Simplify(&sole.polygon);
-  Eigen::AlignedBox2d box;
-  for (const Vector2d& p : sole.polygon) box.extend(p);
-  const Vector2d centre = box.center();
+  const Vector2d centre = Middle(sole.polygon);
   for (Vector2d& p : sole.polygon) p -= centre;
   sole.frame.translation() = sole.frame.linear() * Vector3d(centre.x(), centre.y(), -lowest);
   return sole;

@@ -18,7 +18,7 @@ struct FootShape {
 };
 
 struct FoundSole {
-  /// In the body: origin at the centre of the polygon's box, z out of the ground, x forward.
+  /// In the body: origin in the middle of the polygon, z out of the ground, x forward.
   Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector2d> polygon;  ///< m, sole frame, convex, counter-clockwise
 };

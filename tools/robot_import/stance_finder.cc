@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
+#include "tools/robot/standing_loads.h"
 
 namespace poise {
 namespace {
@@ -20,6 +22,12 @@ constexpr double kLimitShare = 0.1;     // of its range, that a joint keeps from
 constexpr double kMostMargin = 0.15;    // rad, at most
 constexpr double kRounding = 1e4;       // steps in a metre that a text has
 constexpr double kJointRounding = 1e3;  // in a radian
+
+// Of its torque limit, that a leg's joint may bear on one foot: a step takes more than standing.
+constexpr double kComfort = 0.9;
+constexpr double kNarrowing = 0.01;   // m, by which the feet come nearer at a time
+constexpr double kLeastShare = 0.65;  // of the nominal posture's spacing
+constexpr double kLeastGap = 0.04;    // m between the soles
 
 double Rounded(double value, double steps = kRounding) { return std::round(value * steps) / steps; }
 
@@ -84,6 +92,55 @@ void BendLeg(const RobotModel& model, const Anatomy& anatomy, size_t foot, doubl
   (*joints)[ankle.joint] -= ankle.sign * (turn + lean + std::atan2(-toe.z(), toe.x()));
 }
 
+/// With that spacing, m.
+FoundStance StanceAt(const RobotModel& model, const Anatomy& anatomy,
+                     const Eigen::VectorXd& nominal, bool bend_knees, double spacing) {
+  std::string problem;
+  for (const double bend : kBends) {
+    robot::PostureGoal goal;
+    goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
+    const robot::RobotData data = Kinematics(model, goal.nominal);
+    goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
+                                                    data.foot_pose[1].translation().z()));
+    for (size_t f = 0; f < 2; ++f) {
+      goal.foot[f] = Eigen::Isometry3d(
+          Eigen::Translation3d(0, f == robot::kRightFoot ? -spacing / 2 : spacing / 2, 0));
+    }
+    try {
+      FoundStance found;
+      found.state = robot::SolvePosture(model, goal);
+      found.com_height = goal.com_height;
+      found.foot_spacing = spacing;
+      found.joint_position = found.state.joint_position;
+      for (double& q : found.joint_position) q = Rounded(q, kJointRounding);
+      return found;
+    } catch (const robot::RobotError& error) {
+      if (problem.empty()) problem = error.what();
+    }
+    if (!bend_knees) break;
+  }
+  throw robot::RobotError(problem);
+}
+
+struct Strain {
+  int joint = -1;
+  double share = HUGE_VAL;  // of its torque limit; infinite where no posture is in reach
+};
+
+/// The leg's joint that bears most of its limit on one foot.
+Strain StrainOnOneFoot(const RobotModel& model, const Anatomy& anatomy, const FoundStance& stance) {
+  const std::optional<Eigen::VectorXd> torque = OneFootTorque(model, stance.state);
+  if (!torque) return {};
+  Strain strain{-1, 0};
+  for (const Leg& leg : anatomy.leg) {
+    for (const int j : leg.joints) {
+      const double share = (*torque)[j] / TorqueLimit(model, static_cast<size_t>(j));
+      if (share > strain.share) strain = {j, share};
+    }
+  }
+  return strain;
+}
+
 }  // namespace
 
 Eigen::VectorXd WithinLimits(const RobotModel& model, Eigen::VectorXd wanted) {
@@ -107,28 +164,29 @@ FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
   const robot::RobotData zero = Kinematics(model, nominal);
   const double spacing = Rounded(std::abs(zero.foot_pose[robot::kLeftFoot].translation().y() -
                                           zero.foot_pose[robot::kRightFoot].translation().y()));
-  std::string problem;
-  for (const double bend : kBends) {
-    robot::PostureGoal goal;
-    goal.nominal = bend_knees ? WithBentKnees(model, anatomy, bend, nominal) : nominal;
-    const robot::RobotData data = Kinematics(model, goal.nominal);
-    goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
-                                                    data.foot_pose[1].translation().z()));
-    for (size_t f = 0; f < 2; ++f) {
-      goal.foot[f] = Eigen::Isometry3d(
-          Eigen::Translation3d(0, f == robot::kRightFoot ? -spacing / 2 : spacing / 2, 0));
-    }
+  const FoundStance widest = StanceAt(model, anatomy, nominal, bend_knees, spacing);
+  const Strain strain = StrainOnOneFoot(model, anatomy, widest);
+  if (strain.share <= kComfort) return widest;
+  const double soles = 0.5 * (model.feet()[0].width + model.feet()[1].width) + kLeastGap;
+  const double least = std::max(kLeastShare * spacing, soles);
+  std::optional<FoundStance> bearable;
+  for (int i = 1; spacing - i * kNarrowing >= least; ++i) {
+    FoundStance narrower;
     try {
-      const robot::RobotState state = robot::SolvePosture(model, goal);
-      FoundStance found{state.joint_position, goal.com_height, spacing};
-      for (double& q : found.joint_position) q = Rounded(q, kJointRounding);
-      return found;
-    } catch (const robot::RobotError& error) {
-      if (problem.empty()) problem = error.what();
+      narrower = StanceAt(model, anatomy, nominal, bend_knees, Rounded(spacing - i * kNarrowing));
+    } catch (const robot::RobotError&) {
+      break;
     }
-    if (!bend_knees) break;
+    const double share = StrainOnOneFoot(model, anatomy, narrower).share;
+    if (share > kComfort && (share > 1 || strain.share <= 1 || bearable)) continue;
+    bearable = narrower;
+    if (share <= kComfort) break;
   }
-  throw robot::RobotError(problem);
+  if (!bearable) return widest;
+  bearable->wider_spacing = spacing;
+  bearable->strained = strain.joint;
+  bearable->strain = strain.share;
+  return *bearable;
 }
 
 }  // namespace poise

@@ -163,6 +163,13 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
 [[noreturn]] void FailToFind(const std::vector<std::string>& kinds, const std::string& name,
                              const fs::path& beside, BaseFiles bases) {
   if (name.empty()) throw ConfigError(fmt::format("no {} is named", KindNames(kinds)));
+  const std::string ending = fs::path(name).extension();
+  if (kinds == std::vector<std::string>{"robots"} && (ending == ".urdf" || ending == ".xml")) {
+    throw ConfigError(
+        fmt::format("{}: is a maker's file: `poise robot import {}` writes the robot's folder, and "
+                    "that is named here",
+                    name, name));
+  }
   std::vector<std::string> searched;
   std::set<std::string> names, listed;
   for (const std::string& kind : kinds) {

@@ -365,7 +365,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   }
   Robot robot;
   ReadTextProto(loaded.robot_file, &robot);
-  const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file, warnings);
+  const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file);
   if (warnings != nullptr) {
     for (const std::string& text : WalkWarnings(scenario.step_planner().walk(), model)) {
       warnings->push_back("step_planner." + text);

@@ -131,12 +131,12 @@ function tables(check) {
       .map(([key, name]) => [`left foot reaches ${name}`, cm(check.reach[key])]),
     ['gears', check.gear_stiffness > 0 ? `${formatNumber(check.gear_stiffness, 3)} N·m/rad` : 'rigid'],
     ['readings are old', `${formatNumber(1e3 * check.sensor_delay, 3)} ms`]];
-  const share = (torque, {limit}) => element('span', {class: torque > limit ? 'failed' : null},
+  const share = (torque, {limit}) => torque === null ? '–' : element('span', {class: torque > limit ? 'failed' : null},
     `${formatNumber(torque, 3)} (${formatNumber(100 * torque / limit, 2)} %)`);
   return [table('The robot', ['what', 'value'], rows),
-    table('Torque to stand, N·m', ['joint', 'both feet', 'one foot', 'rated', 'limit'], check.torque.map((t) =>
-      [t.joint, share(t.double_support, t), share(t.single_support, t), formatNumber(t.rated, 3), formatNumber(t.limit, 3)]),
-    {numbers: [1, 2, 3, 4]}),
+    table('Torque, N·m', ['joint', 'both feet', 'one foot', 'a step', 'rated', 'limit'], check.torque.map((t) =>
+      [t.joint, share(t.double_support, t), share(t.single_support, t), share(t.step, t), formatNumber(t.rated, 3), formatNumber(t.limit, 3)]),
+    {numbers: [1, 2, 3, 4, 5]}),
     table('Largest push by the bound m ω d, N·s', ['direction', 'both feet', 'right foot', 'left foot'], check.push.map((p) =>
       [degrees(p.direction), ...[p.double_support, p.right_foot, p.left_foot].map((v) => formatNumber(v, 3))]),
     {numbers: [0, 1, 2, 3]})];
