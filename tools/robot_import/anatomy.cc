@@ -165,13 +165,13 @@ Anatomy FindAnatomy(const robot::LinkTree& tree, const std::vector<Isometry3d>& 
   const size_t shared = Shared(legs[0].joints, legs[1].joints);
   Anatomy found;
   if (shared > 0) found.hips = tree.joints[static_cast<size_t>(legs[0].joints[shared - 1])].body;
+  CheckLevel(tree, legs, {height(legs[0].body), height(legs[1].body)},
+             poses[static_cast<size_t>(found.hips)].translation().dot(up),
+             !feet[0].empty() && !feet[1].empty());
   for (Leg& leg : legs) {
     leg.joints.erase(leg.joints.begin(), leg.joints.begin() + static_cast<std::ptrdiff_t>(shared));
     CheckLeg(tree, leg, locked(tree.bodies[static_cast<size_t>(leg.body)].name));
   }
-  CheckLevel(tree, legs, {height(legs[0].body), height(legs[1].body)},
-             poses[static_cast<size_t>(found.hips)].translation().dot(up),
-             !feet[0].empty() && !feet[1].empty());
   const std::array side = {SideOfBody(tree, legs[0].body), SideOfBody(tree, legs[1].body)};
   const auto place = [&](const Leg& leg) {
     return poses[static_cast<size_t>(leg.body)].translation();

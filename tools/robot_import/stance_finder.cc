@@ -25,9 +25,10 @@ constexpr double kJointRounding = 1e3;  // in a radian
 
 // Of its torque limit, that a leg's joint may bear on one foot: a step takes more than standing.
 constexpr double kComfort = 0.9;
-constexpr double kNarrowing = 0.01;   // m, by which the feet come nearer at a time
-constexpr double kLeastShare = 0.65;  // of the nominal posture's spacing
-constexpr double kLeastGap = 0.04;    // m between the soles
+// Of the nominal posture's spacing: by which the feet come nearer at a time, and how often.
+constexpr double kNarrowing = 0.05;
+constexpr int kNarrowings = 7;
+constexpr double kLeastGap = 0.04;  // m between the soles
 
 double Rounded(double value, double steps = kRounding) { return std::round(value * steps) / steps; }
 
@@ -168,19 +169,20 @@ FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
   const Strain strain = StrainOnOneFoot(model, anatomy, widest);
   if (strain.share <= kComfort) return widest;
   const double soles = 0.5 * (model.feet()[0].width + model.feet()[1].width) + kLeastGap;
-  const double least = std::max(kLeastShare * spacing, soles);
   std::optional<FoundStance> bearable;
-  for (int i = 1; spacing - i * kNarrowing >= least; ++i) {
+  for (int i = 1; i <= kNarrowings; ++i) {
+    const double share = 1 - i * kNarrowing;
+    if (share * spacing < soles) break;
     FoundStance narrower;
     try {
-      narrower = StanceAt(model, anatomy, nominal, bend_knees, Rounded(spacing - i * kNarrowing));
+      narrower = StanceAt(model, anatomy, nominal, bend_knees, Rounded(share * spacing));
     } catch (const robot::RobotError&) {
       break;
     }
-    const double share = StrainOnOneFoot(model, anatomy, narrower).share;
-    if (share > kComfort && (share > 1 || strain.share <= 1 || bearable)) continue;
+    const double borne = StrainOnOneFoot(model, anatomy, narrower).share;
+    if (borne > kComfort && (borne > 1 || strain.share <= 1 || bearable)) continue;
     bearable = narrower;
-    if (share <= kComfort) break;
+    if (borne <= kComfort) break;
   }
   if (!bearable) return widest;
   bearable->wider_spacing = spacing;
