@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "components/framework/bus/channel_collector.h"
-#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
@@ -45,6 +44,12 @@ void WriteReport(const std::string& path, const RunSpec& spec, const RecorderRep
                                 {"duplicates", s.duplicates},
                                 {"refused", s.refused}});
   }
+  json["strangers"] = nlohmann::ordered_json::array();
+  for (const Stranger& stranger : collector.strangers()) {
+    json["strangers"].push_back({{"channel", stranger.channel},
+                                 {"source", ToString(stranger.source)},
+                                 {"packets", stranger.packets}});
+  }
   std::ofstream out(path);
   out << json.dump(2) << "\n";
   if (!out.flush()) {
@@ -54,30 +59,31 @@ void WriteReport(const std::string& path, const RunSpec& spec, const RecorderRep
 
 }  // namespace
 
-RecorderReport Record(const RunSpec& spec, const RecorderOptions& options) {
+RecorderReport Record(const RunSpec& spec, const RunSocket& socket,
+                      const RecorderOptions& options) {
   RecorderReport report;
   RunLogWriter writer(options.log_path, spec, MakeRunInfo(spec, options.scenario));
-  std::optional<BusSender> mirror;
-  if (options.mirror) mirror.emplace(MirrorUrl(spec));
+  std::optional<RunSender> mirror;
+  if (options.mirror) mirror.emplace(socket, MirrorUrl(spec));
   std::vector<std::string> names;
   for (const Channel& channel : spec.graph().channel()) names.push_back(channel.name());
   bool heard = options.mirror && AnyoneListens(MirrorUrl(spec));
-  const auto send = [&](const char* channel, std::span<const uint8_t> data) {
+  const auto send = [&](std::string_view channel, std::span<const uint8_t> data) {
     if (heard && !mirror->Send(channel, data.data(), data.size())) ++report.mirror_errors;
   };
 
   ChannelCollector::Callbacks callbacks;
   callbacks.message = [&](int channel, int64_t tick, std::span<const uint8_t> data) {
     writer.AddMessage(channel, tick, data);
-    send(names[static_cast<size_t>(channel)].c_str(), data);
+    send(names[static_cast<size_t>(channel)], data);
   };
   callbacks.skipped = [&](int channel, int64_t tick) { writer.Skip(channel, tick); };
   callbacks.service = [&](std::string_view channel, std::span<const uint8_t> data) {
     if (!channel.starts_with("HEALTH_")) return;
     writer.AddHealth(channel, data);
-    send(std::string(channel).c_str(), data);
+    send(channel, data);
   };
-  ChannelCollector collector(spec, "recorder", std::move(callbacks));
+  ChannelCollector collector(spec, socket, "recorder", std::move(callbacks));
 
   int64_t next_flush = 0, next_look = 0;
   try {

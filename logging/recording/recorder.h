@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise::logging {
@@ -30,6 +31,6 @@ struct RecorderReport {
 
 /// Records until COMMAND_STOP or *options.stop. The log reaches the system at least every 100 ms.
 /// Throws LogError, BusError or ConfigError.
-RecorderReport Record(const RunSpec& spec, const RecorderOptions& options);
+RecorderReport Record(const RunSpec& spec, const RunSocket& socket, const RecorderOptions& options);
 
 }  // namespace poise::logging

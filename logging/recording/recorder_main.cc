@@ -33,12 +33,14 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", poise::VersionText("recorder"));
   std::string run_file;
   std::string scenario_file;
+  int socket_fd = -1;
   poise::logging::RecorderOptions options;
   options.stop = &stop_asked;
   app.add_option("--run", run_file, "the run: protobuf text of poise.RunSpec")->required();
   app.add_option("--log", options.log_path, "event log to write")->required();
   app.add_option("--report", options.report_path, "counters at the end, as JSON");
   app.add_option("--scenario", scenario_file, "scenario text to keep in the log");
+  app.add_option("--socket", socket_fd, "descriptor of the run's socket; default: it is asked for");
   app.add_flag("--mirror,!--no-mirror", options.mirror, "send everything to the run's public URL");
   try {
     app.parse(argc, argv);
@@ -52,7 +54,9 @@ int main(int argc, char** argv) {
     poise::RunSpec spec;
     poise::ReadTextProto(run_file, &spec);
     if (!scenario_file.empty()) options.scenario = poise::ReadFile(scenario_file);
-    poise::logging::Record(spec, options);
+    const poise::RunSocket socket =
+        socket_fd < 0 ? poise::RunSocket::Ask(spec) : poise::RunSocket(spec, socket_fd);
+    poise::logging::Record(spec, socket, options);
     return 0;
   } catch (const poise::ConfigError& error) {
     poise::SayError(fmt::format("recorder: {}", error.what()));

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <random>
@@ -17,14 +16,10 @@ namespace {
 
 using Bytes = std::vector<uint8_t>;
 
-/// Raw datagrams to the ports of a run.
+/// Raw datagrams to the ports of a run, from its own socket: another's would not be looked at.
 class Attacker {
  public:
-  explicit Attacker(const RunSpec& spec) : spec_(spec), socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
-    const unsigned char ttl = 0;
-    setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_TTL, &ttl, sizeof(ttl));
-  }
-  ~Attacker() { close(socket_); }
+  Attacker(const RunSpec& spec, const RunSocket& socket) : spec_(spec), socket_(socket.fd()) {}
 
   void Send(int port_offset, const Bytes& datagram) {
     sockaddr_in address{};
@@ -112,9 +107,11 @@ class Attacker {
 TEST(HostileNetwork, ALiveGraphStaysCorrectAndCountsWhatItRefuses) {
   const RunSpec spec = ToyRun(ToyLoop(), 1500);
   const Messages expected = RunInline(spec);
-  Attacker attacker(spec);
+  const RunSource source(spec);
+  Attacker attacker(spec, source.socket());
   attacker.Forge(expected);
   HarnessOptions options;
+  options.socket = &source.socket();
   options.while_running = [&] { attacker.Attack(); };
   const ProcessRun run = RunAsProcesses(spec, options);
   ASSERT_FALSE(run.timed_out);

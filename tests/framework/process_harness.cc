@@ -11,6 +11,7 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <optional>
 #include <set>
 
 #include "components/framework/bus/channel_collector.h"
@@ -24,13 +25,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-pid_t Start(const std::vector<std::string>& arguments, int stderr_fd = -1) {
+pid_t Start(const std::vector<std::string>& arguments, int stderr_fd = -1, int kept_fd = -1) {
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
   const pid_t pid = fork();
   if (pid == 0) {
     if (stderr_fd >= 0) dup2(stderr_fd, 2);
+    if (kept_fd >= 0) fcntl(kept_fd, F_SETFD, 0);
     execv(argv[0], argv.data());
     _exit(127);
   }
@@ -42,7 +44,7 @@ int ExitCode(int status) { return WIFEXITED(status) ? WEXITSTATUS(status) : -WTE
 /// The children of one run; ends what is left.
 class Children {
  public:
-  explicit Children(const RunSpec& spec) {
+  Children(const RunSpec& spec, const RunSocket& socket) : socket_(socket.fd()) {
     path_ = testing::TempDir() + "/toy_run_" + std::to_string(getpid()) + ".pbtxt";
     std::string text;
     google::protobuf::TextFormat::PrintToString(spec, &text);
@@ -58,10 +60,10 @@ class Children {
   void StartOne(const Graph& graph, const std::string& process) {
     const std::vector<int> members = ComponentsOf(graph, process);
     const ComponentInstance& first = graph.component(members.front());
-    pids[process] =
-        members.size() > 1
-            ? Start({TOY_PROCESS, "host", "--run", path_, "--process", process})
-            : Start({TOY_PROCESS, TypeOf(first), "--run", path_, "--component", first.name()});
+    std::vector<std::string> command = {TOY_PROCESS, TypeOf(first), "--component", first.name()};
+    if (members.size() > 1) command = {TOY_PROCESS, "host", "--process", process};
+    command.insert(command.end(), {"--run", path_, "--socket", std::to_string(socket_)});
+    pids[process] = Start(command, -1, socket_);
   }
   /// Collects those that have ended.
   void Reap(std::map<std::string, int>* exit_codes) {
@@ -79,6 +81,7 @@ class Children {
 
  private:
   std::string path_;
+  int socket_;
 };
 
 }  // namespace
@@ -106,7 +109,10 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
 
   ProcessRun run;
   run.messages.resize(static_cast<size_t>(spec.graph().channel_size()));
-  ChannelCollector collector(spec, "recorder",
+  std::optional<RunSource> source;
+  if (options.socket == nullptr) source.emplace(spec);
+  const RunSocket& socket = source ? source->socket() : *options.socket;
+  ChannelCollector collector(spec, socket, "recorder",
                              {[&](int channel, int64_t tick, std::span<const uint8_t> data) {
                                 auto& lane = run.messages[static_cast<size_t>(channel)];
                                 if (!spec.graph().channel(channel).external()) {
@@ -120,8 +126,8 @@ ProcessRun RunAsProcesses(RunSpec spec, const HarnessOptions& options) {
                                 lane.emplace_back(data.begin(), data.end());
                               },
                               nullptr});
-  ControlClient control(spec);
-  Children children(spec);
+  ControlClient control(spec, &socket);
+  Children children(spec, socket);
   std::vector<std::string> order = ProcessNames(spec.graph());
   if (options.reverse) std::reverse(order.begin(), order.end());
   bool late = options.late_after_ms > 0;

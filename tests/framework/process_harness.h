@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "poise/health_t.hpp"
 
@@ -31,7 +32,8 @@ struct ProcessRun {
 };
 
 struct HarnessOptions {
-  bool reverse = false;   ///< start the processes in reverse order
+  const RunSocket* socket = nullptr;  ///< of the run; nullptr: one is opened
+  bool reverse = false;               ///< start the processes in reverse order
   int late_after_ms = 0;  ///< start the last process this long after the first COMMAND_START
   bool collect = true;    ///< a recorder takes part
   int max_seconds = 60;   ///< a run that takes longer is ended and marked

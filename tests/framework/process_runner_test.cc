@@ -130,7 +130,9 @@ TEST(ProcessRunner, RealTimeGivesTheSameBytes) {
 
 TEST(ChannelCollector, NeedsTheCountsOfTheCheckedGraph) {
   try {
-    ChannelCollector collector(ToyRun(ToyLoop(), 1), "recorder", {nullptr, nullptr});
+    const RunSpec spec = ToyRun(ToyLoop(), 1);
+    const RunSource source(spec);
+    ChannelCollector collector(spec, source.socket(), "recorder", {nullptr, nullptr});
     FAIL();
   } catch (const ConfigError& error) {
     EXPECT_STREQ(error.what(),

@@ -1,10 +1,10 @@
-// Packets from outside cannot stop or change a run that is going on.
+// Damaged packets from a run's own socket cannot stop or change a run that is going on.
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <random>
 
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/run.h"
 #include "logging/replay/compare.h"
@@ -38,11 +38,12 @@ std::vector<uint8_t> StrangeHealth(int64_t run_id) {
 /// NaN for numbers.
 int64_t Attack(const RunSpec& spec, pid_t program) {
   struct Target {
-    BusSender sender;
+    RunSender sender;
     std::string channel;
     std::vector<uint8_t> message;
     size_t run_id_offset = 0;  // 0: no message of a tick
   };
+  const RunSocket socket = RunSocket::Ask(spec);
   std::vector<Target> targets;
   for (int i = 0; i < spec.graph().channel_size(); ++i) {
     const Channel& channel = spec.graph().channel(i);
@@ -55,16 +56,17 @@ int64_t Attack(const RunSpec& spec, pid_t program) {
     for (size_t c = 0; c < counts.size(); ++c) {
       bytes[8 + 4 * c + 3] = static_cast<uint8_t>(counts[c]);
     }
-    targets.push_back({BusSender(ChannelUrl(spec, i)), channel.name(), std::move(bytes),
+    targets.push_back({RunSender(socket, ChannelUrl(spec, i)), channel.name(), std::move(bytes),
                        // An operator's stop of this run would be heard.
                        channel.external() ? 0 : static_cast<size_t>(type->run_id_offset)});
   }
-  targets.push_back({BusSender(ServiceUrl(spec)), kControlChannel, std::vector<uint8_t>(41, 0)});
   targets.push_back(
-      {BusSender(ServiceUrl(spec)), "HEALTH_REDISTRIBUTOR", std::vector<uint8_t>(80, 0xFF)});
+      {RunSender(socket, ServiceUrl(spec)), kControlChannel, std::vector<uint8_t>(41, 0)});
+  targets.push_back({RunSender(socket, ServiceUrl(spec)), "HEALTH_REDISTRIBUTOR",
+                     std::vector<uint8_t>(80, 0xFF)});
 
   targets.push_back(
-      {BusSender(ServiceUrl(spec)), "HEALTH_REDISTRIBUTOR", StrangeHealth(spec.run_id())});
+      {RunSender(socket, ServiceUrl(spec)), "HEALTH_REDISTRIBUTOR", StrangeHealth(spec.run_id())});
 
   std::mt19937 random(TestSeed(1));
   int64_t sent = 0;
@@ -85,7 +87,7 @@ int64_t Attack(const RunSpec& spec, pid_t program) {
                    &bytes[at + 8]);
           for (size_t k = at + 24; k < bytes.size(); ++k) bytes[k] = 0xFF;  // NaN
         }
-        target.sender.Send(target.channel.c_str(), bytes.data(), bytes.size());
+        target.sender.Send(target.channel, bytes.data(), bytes.size());
         ++sent;
         continue;
       }
@@ -94,7 +96,8 @@ int64_t Attack(const RunSpec& spec, pid_t program) {
       }
       if (random() % 4 == 0) bytes.resize(random() % (bytes.size() + 20));
       const bool own = random() % 8 != 0;
-      target.sender.Send(own ? target.channel.c_str() : "ELSE", bytes.data(), bytes.size());
+      target.sender.Send(own ? std::string_view(target.channel) : "ELSE", bytes.data(),
+                         bytes.size());
       ++sent;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -84,8 +84,9 @@ TEST_P(Takeover, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
     if (channel == 4) pushes[tick] = Decode<external_push_t>(data);
     if (channel == 6) sums[tick] = Decode<external_push_t>(data);
   };
-  ChannelCollector collector(spec, "recorder", callbacks);
-  ControlClient control(spec);
+  const RunSource source(spec);
+  ChannelCollector collector(spec, source.socket(), "recorder", callbacks);
+  ControlClient control(spec, &source.socket());
   std::map<std::string, std::unique_ptr<ComponentProcess>> processes;
   for (const std::string& process : ProcessNames(spec.graph())) {
     const std::vector<int> members = ComponentsOf(spec.graph(), process);
@@ -94,7 +95,7 @@ TEST_P(Takeover, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
                                         run,         "--component", first.name()};
     if (members.size() > 1) command = {TOY_PROCESS, "host", "--run", run, "--process", process};
     processes[process] = std::make_unique<ComponentProcess>(
-        process, command, folder.path(process + ".log"), first.restart());
+        process, command, folder.path(process + ".log"), first.restart(), source.socket());
   }
   ComponentProcess& filter = *processes.at(shared ? "host" : "filter");
   const pid_t first = filter.process().pid();

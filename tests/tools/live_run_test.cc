@@ -45,7 +45,7 @@ class LiveRunTest : public ::testing::Test {
     std::ofstream(folder.path("run_spec.pbtxt")) << text;
   }
   void StartOnTheBus() {
-    ChoosePorts(&spec);
+    source.emplace(ChoosePorts(&spec));
     WriteSpec();
     Start();
   }
@@ -82,12 +82,13 @@ class LiveRunTest : public ::testing::Test {
     }
     return bytes;
   }
-  static void Send(BusSender* sender, const std::string& channel, const Bytes& bytes) {
-    ASSERT_TRUE(sender->Send(channel.c_str(), bytes.data(), bytes.size()));
+  static void Send(RunSender* sender, const std::string& channel, const Bytes& bytes) {
+    ASSERT_TRUE(sender->Send(channel, bytes.data(), bytes.size()));
   }
 
   logging::TemporaryFolder folder;
   RunSpec spec = logging::MakeTestSpec();
+  std::optional<RunSource> source;
 
  private:
   int lock_ = -1;
@@ -130,7 +131,7 @@ TEST_F(LiveRunTest, NamesAllChannels) {
 TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
   StartOnTheBus();
   LiveRun live(folder.path(""), "x", "x");
-  BusSender sender(MirrorUrl(spec));
+  RunSender sender(source->socket(), MirrorUrl(spec));
   health_t health{};
   health.run_id = 42;
   health.tick = 8;
@@ -161,6 +162,10 @@ TEST_F(LiveRunTest, HandsOutTheRunsMessagesAndRefusesAllElse) {
     for (uint8_t& byte : noise) byte = static_cast<uint8_t>(random());
     attack(i % 2 == 0 ? "ROBOT_STATE" : "HEALTH_SIM", noise);
   }
+  BusSender stranger(MirrorUrl(spec));
+  const Bytes forged = Message("ROBOT_STATE", 8);
+  ASSERT_TRUE(stranger.Send("ROBOT_STATE", forged.data(), forged.size()));
+  ++hostile;
   Send(&sender, "ROBOT_STATE", Message("ROBOT_STATE", 9));
   EXPECT_THAT(HearUntil(&live, 9),
               ElementsAre("ROBOT_STATE 7", "HEALTH_SIM 8", "EMERGENCY_STOP 0"));

@@ -55,5 +55,19 @@ TEST(MachineVerdictTest, SaysThatNobodyReported) {
   EXPECT_EQ(FormatRealtime(lockstep, Outcome({}, {}), {}, {}), "");
 }
 
+TEST(MachineVerdictTest, NamesWhoeverMayHaveMadeCommandsLate) {
+  RunOutcome outcome = Outcome({}, {});
+  EXPECT_EQ(CauseOfLateness(outcome), "the machine was late");
+  outcome.takeovers = 7;  // somebody else's kills
+  EXPECT_EQ(CauseOfLateness(outcome),
+            "7 processes died or were killed, and replaced, or the machine was late");
+  outcome.faults = {{.process = "a", .killed = true}, {.process = "b", .killed = false}};
+  EXPECT_EQ(CauseOfLateness(outcome),
+            "2 faults were injected, 6 processes died or were killed, and replaced, or the machine "
+            "was late");
+  outcome.takeovers = 1;
+  EXPECT_EQ(CauseOfLateness(outcome), "2 faults were injected, or the machine was late");
+}
+
 }  // namespace
 }  // namespace poise

@@ -18,7 +18,7 @@ namespace poise {
 namespace {
 
 /// Between fork and exec: only async-signal-safe calls.
-[[noreturn]] void Become(char* const* arguments, int output, pid_t parent) {
+[[noreturn]] void Become(char* const* arguments, int output, int kept, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(126);
@@ -27,6 +27,7 @@ namespace {
   dup2(output, STDERR_FILENO);
   const int null = open("/dev/null", O_RDONLY);
   if (null >= 0) dup2(null, STDIN_FILENO);
+  if (kept >= 0) fcntl(kept, F_SETFD, 0);  // open across exec
   execv(arguments[0], arguments);
   const char* const reason = strerrordesc_np(errno);
   for (const char* text :
@@ -39,7 +40,7 @@ namespace {
 }  // namespace
 
 ChildProcess::ChildProcess(std::string name, const std::vector<std::string>& command,
-                           std::string log_path)
+                           std::string log_path, int kept)
     : name_(std::move(name)), log_path_(std::move(log_path)) {
   std::vector<std::string> copy = command;
   std::vector<char*> arguments;
@@ -49,7 +50,7 @@ ChildProcess::ChildProcess(std::string name, const std::vector<std::string>& com
   if (output < 0) throw std::system_error(errno, std::generic_category(), log_path_);
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) Become(arguments.data(), output, parent);
+  if (pid_ == 0) Become(arguments.data(), output, kept, parent);
   const int error = errno;
   close(output);
   if (pid_ < 0) throw std::system_error(error, std::generic_category(), "starting " + name_);

@@ -15,7 +15,9 @@ class ChildProcess {
  public:
   /// `command[0]` is the program's path. Throws std::system_error when the file or the process
   /// cannot be made; a program that cannot be executed exits with 127 and says so in its log.
-  ChildProcess(std::string name, const std::vector<std::string>& command, std::string log_path);
+  /// `kept`: an open descriptor that the program gets under the same number; -1: none.
+  ChildProcess(std::string name, const std::vector<std::string>& command, std::string log_path,
+               int kept = -1);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;

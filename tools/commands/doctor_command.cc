@@ -64,9 +64,9 @@ Finding CheckMulticast(const RunSpec& spec) {
 
 Finding CheckPorts(RunSpec* spec) {
   try {
-    ChoosePorts(spec);
+    const RunSource source = ChoosePorts(spec);
     return {Level::kGood, "ports", fmt::format("a free block at {}", spec->first_port()), ""};
-  } catch (const ConfigError& error) {
+  } catch (const std::exception& error) {
     return {Level::kBad, "ports", error.what(), "see what holds them: ss -ulpn"};
   }
 }

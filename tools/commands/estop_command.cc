@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/configuration/configuration.h"
@@ -45,9 +46,10 @@ class Line {
   explicit Line(const std::string& run) : run_(run), spec_(ReadNetworkedSpec(run)) {
     const int channel = FindChannel(spec_.graph(), "emergency_stop_t", true);
     name_ = spec_.graph().channel(channel).name();
-    sender_ = std::make_unique<BusSender>(ChannelUrl(spec_, channel));
+    url_ = ChannelUrl(spec_, channel);
+    sender_ = std::make_unique<BusSender>(url_);
     answers_ = std::make_unique<BusReceiver>(
-        ChannelUrl(spec_, FindChannel(spec_.graph(), "bridge_status_t", false)));
+        ChannelUrl(spec_, FindChannel(spec_.graph(), "bridge_status_t", false)), OfRun(spec_));
   }
 
   /// "run 42 (push_double_support, FOLDER)"
@@ -64,8 +66,21 @@ class Line {
     std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     // Noted, not thrown: the other runs get theirs.
-    sent_ = sender_->Send(name_.c_str(), bytes.data(), bytes.size()) || sent_;
+    sent_ = (own_sender_ ? own_sender_->Send(name_, bytes.data(), bytes.size())
+                         : sender_->Send(name_.c_str(), bytes.data(), bytes.size())) ||
+            sent_;
   }
+  /// Sends as one of the run's own from here on: a stop is taken from everybody, its end is not.
+  /// Where that cannot be, refusal() tells why.
+  void JoinRun() {
+    try {
+      socket_.emplace(RunSocket::Ask(spec_));
+      own_sender_.emplace(*socket_, url_);
+    } catch (const BusError& error) {
+      refusal_ = error.what();
+    }
+  }
+  const std::string& refusal() const { return refusal_; }
   bool sent() const { return sent_; }
   /// Nothing holds the lock on the run's folder.
   bool Ended() const {
@@ -98,8 +113,11 @@ class Line {
 
   std::string run_;
   RunSpec spec_;
-  std::string name_;
+  std::string name_, url_;
   std::unique_ptr<BusSender> sender_;
+  std::string refusal_;
+  std::optional<RunSocket> socket_;
+  std::optional<RunSender> own_sender_;
   std::unique_ptr<BusReceiver> answers_;
   std::optional<bridge_status_t> status_;
   bool sent_ = false;
@@ -161,6 +179,7 @@ int Stop(std::vector<Line>& lines) {
 }
 
 int Reset(std::vector<Line>& lines) {
+  for (Line& line : lines) line.JoinRun();
   // The edge: low for a while, then high.
   SendUntil(lines, false, false, kLow, [](size_t, const Line&) { return false; });
   std::vector<int64_t> resets;
@@ -177,12 +196,13 @@ int Reset(std::vector<Line>& lines) {
       continue;
     }
     const std::string problem =
-        !line.sent()     ? kUnsent
-        : line.Ended()   ? "this run has ended"
-        : !line.status() ? "no bridge has answered; does the run's reference still go on?"
-        : !Stops(line)   ? "there is no stop to reset"
-                         : "the bridge keeps its stop; it resets only when its motors are at rest "
-                           "and no torque is commanded";
+        !line.refusal().empty() ? line.refusal()
+        : !line.sent()          ? kUnsent
+        : line.Ended()          ? "this run has ended"
+        : !line.status()        ? "no bridge has answered; does the run's reference still go on?"
+        : !Stops(line)          ? "there is no stop to reset"
+                       : "the bridge keeps its stop; it resets only when its motors are at rest "
+                         "and no torque is commanded";
     fmt::print(stderr, "poise: {}: {}\n", line.Name(), problem);
     exit_code = kExitFailed;
   }

@@ -35,7 +35,7 @@ class Watch {
  public:
   explicit Watch(const std::string& run)
       : live_(run, "poise log info", "poise top"),
-        control_(live_.spec(), {kRecorderName}),
+        control_(live_.spec(), nullptr, {kRecorderName}),
         names_(logging::ElementNames::OfSpec(live_.spec())),
         statistics_(live_.spec(), NowNanoseconds()),
         last_arrival_(NowNanoseconds()) {}

@@ -80,7 +80,7 @@ BusOperator::BusOperator(const RunSpec& spec)
       answer_channel_(OperatorChannel(spec.graph(), kAnswerType, true)),
       push_limit_(PagePushLimit(spec)) {
   if (stop_channel_ >= 0 && status_channel_ >= 0) {
-    stop_sender_ = std::make_unique<BusSender>(ChannelUrl(spec, stop_channel_));
+    stop_sender_ = std::make_unique<RunSender>(line_.socket(), ChannelUrl(spec, stop_channel_));
   }
   for (const LiveField& field : line_.fields()) Ask(field.path);
 }
@@ -95,7 +95,7 @@ void BusOperator::SendStop(bool stop, bool reset) {
   std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   // What gets lost is sent again.
-  stop_sender_->Send(line_.spec().graph().channel(stop_channel_).name().c_str(), bytes.data(),
+  stop_sender_->Send(line_.spec().graph().channel(stop_channel_).name(), bytes.data(),
                      bytes.size());
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "poise/bridge_status_t.hpp"
 #include "tools/live/operator_sink.h"
 #include "tools/run/live_run.h"
@@ -58,7 +58,7 @@ class BusOperator : public OperatorSink {
 
   OperatorLine line_;
   int stop_channel_ = -1, status_channel_ = -1, answer_channel_ = -1;
-  std::unique_ptr<BusSender> stop_sender_;
+  std::unique_ptr<RunSender> stop_sender_;
   std::optional<bridge_status_t> status_;
   std::optional<Pending> pending_;
   Clock::time_point sent_{};

@@ -86,6 +86,16 @@ bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lo
          lost.ticks > 0 && lost.late == lost.ticks;
 }
 
+std::string CauseOfLateness(const RunOutcome& outcome) {
+  const auto killed = std::ranges::count_if(outcome.faults, &InjectedFault::killed);
+  const auto died = outcome.takeovers - killed;
+  std::string cause;
+  if (!outcome.faults.empty())
+    cause = fmt::format("{} faults were injected, ", outcome.faults.size());
+  if (died > 0) cause += fmt::format("{} processes died or were killed, and replaced, ", died);
+  return cause.empty() ? "the machine was late" : cause + "or the machine was late";
+}
+
 std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
                            const std::vector<CheckResult>& checks, const LostTicks& lost) {
   if (!spec.realtime() || outcome.processes.empty()) return "";
@@ -107,10 +117,7 @@ std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,
     text += fmt::format(
         "  the bridge did not follow in {} ticks for want of a command in time, not for a wrong "
         "one:\n  {}\n",
-        lost.ticks,
-        outcome.faults.empty() ? "the machine was late"
-                               : fmt::format("{} faults were injected, or the machine was late",
-                                             outcome.faults.size()));
+        lost.ticks, CauseOfLateness(outcome));
   }
   return text;
 }

@@ -30,6 +30,10 @@ LostTicks CountLostTicks(const logging::RunRecord& run);
 /// did not follow for want of one.
 bool FailedByMachine(const std::vector<CheckResult>& checks, const LostTicks& lost);
 
+/// What may have kept commands from coming in time: what was injected, processes that died or were
+/// killed by somebody, or the machine.
+std::string CauseOfLateness(const RunOutcome& outcome);
+
 /// Lines "crane:", "machine:" and "controller:" of a run in real time; empty of another.
 /// `checks`: none without a log.
 std::string FormatRealtime(const RunSpec& spec, const RunOutcome& outcome,

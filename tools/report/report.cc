@@ -415,6 +415,8 @@ std::string SummaryJson(const Scenario& scenario, const logging::RunRecord& run,
                          {"log", "reference/run.lcm"}};
   }
   json["launcher"]["refused"] = outcome.refused;
+  json["launcher"]["strangers"] = outcome.strangers;
+  json["launcher"]["warnings"] = outcome.warnings;
   json["events"] = EventsJson(summary.events);
   // Names and texts of a log may hold any bytes.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

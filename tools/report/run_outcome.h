@@ -46,6 +46,9 @@ struct RunOutcome {
   std::string warning;       ///< of what changed nothing about the run; empty: nothing
   std::vector<std::string> details;  ///< last lines of the output of the process at fault
   int64_t refused = 0;               ///< packets that the launcher refused on the service port
+  /// What others have sent to the run, and nobody has taken; empty: nothing.
+  std::string strangers;
+  std::vector<std::string> warnings;  ///< of its processes, "hw_bridge: ..."
   std::vector<InjectedFault> faults;
   std::vector<ProcessReport>
       processes;                       ///< by component, in the graph's order; none of a run inline

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "components/framework/bus/packet_filter.h"
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "components/framework/run.h"
 #include "poise/message_traits.hpp"
@@ -28,7 +28,7 @@ class ChannelTap {
   ChannelTap(const RunSpec& spec, int channel)
       : name_(spec.graph().channel(channel).name()),
         filter_(MakeFilter(spec, spec.graph().channel(channel))),
-        receiver_(ChannelUrl(spec, channel)) {}
+        receiver_(ChannelUrl(spec, channel), OfRun(spec)) {}
 
   int fd() const { return receiver_.fd(); }
   /// The next one that has arrived, if any; does not block.

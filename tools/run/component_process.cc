@@ -19,21 +19,23 @@ constexpr int64_t kSuccessorPatience = 5 * kSecondNs;  // for a successor
 }  // namespace
 
 ComponentProcess::ComponentProcess(std::string name, std::vector<std::string> command,
-                                   std::string log_path, bool restart,
+                                   std::string log_path, bool restart, const RunSocket& socket,
                                    std::vector<std::string> components)
     : name_(std::move(name)),
       command_(std::move(command)),
       log_path_(std::move(log_path)),
       restart_(restart),
+      socket_(socket.fd()),
       components_(std::move(components)) {
   if (components_.empty()) components_.push_back(name_);
+  command_.insert(command_.end(), {"--socket", std::to_string(socket_)});
   if (restart_) {
     memory_fd_ = StateStore::MakeMemoryFile(name_);
     const std::string path = fmt::format("/proc/{}/fd/{}", getpid(), memory_fd_);
     store_ = std::make_unique<StateStore>(path);
     command_.insert(command_.end(), {"--state", path});
   }
-  process_ = std::make_unique<ChildProcess>(name_, command_, log_path_);
+  process_ = std::make_unique<ChildProcess>(name_, command_, log_path_, socket_);
   ++started_;
   Watch();
   if (restart_) StartSpare();
@@ -54,8 +56,8 @@ void ComponentProcess::StartSpare() {
   std::vector<std::string> command = command_;
   command.emplace_back("--standby");
   store_->set_standby(0);
-  spare_ =
-      std::make_unique<ChildProcess>(name_, command, fmt::format("{}.{}", log_path_, ++started_));
+  spare_ = std::make_unique<ChildProcess>(name_, command,
+                                          fmt::format("{}.{}", log_path_, ++started_), socket_);
 }
 
 bool ComponentProcess::NoteDeath(int64_t now) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/runners/state_store.h"
 #include "tools/cli/child_process.h"
 
@@ -17,10 +18,10 @@ namespace poise {
 class ComponentProcess {
  public:
   /// Starts. `command[0]` is the program's path; `log_path` gets its output, a successor's goes to
-  /// log_path with a number. `components`: those that it runs, empty: the one of its name. Throws
-  /// std::system_error.
+  /// log_path with a number. Each process gets `socket`, which must outlive this, and --socket.
+  /// `components`: those that it runs, empty: the one of its name. Throws std::system_error.
   ComponentProcess(std::string name, std::vector<std::string> command, std::string log_path,
-                   bool restart, std::vector<std::string> components = {});
+                   bool restart, const RunSocket& socket, std::vector<std::string> components = {});
   ~ComponentProcess();
   ComponentProcess(const ComponentProcess&) = delete;
   ComponentProcess& operator=(const ComponentProcess&) = delete;
@@ -55,6 +56,7 @@ class ComponentProcess {
   std::vector<std::string> command_;
   std::string log_path_;
   bool restart_;
+  int socket_;
   std::vector<std::string> components_;
   int memory_fd_ = -1;
   std::unique_ptr<StateStore> store_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 
 #include "components/framework/clock.h"
 #include "components/framework/modules.h"
@@ -25,15 +26,17 @@ constexpr int64_t kSettled = 10 * kSecond;      // memory is measured from here 
 constexpr int64_t kSilence = 2 * kSecond;       // of a process that can be replaced
 constexpr int kSpin = 20;                       // ms
 constexpr size_t kDetailLines = 5;
+constexpr std::string_view kWarning = "warning: ";  // begins a line that a user should see
 
 }  // namespace
 
-Launcher::Launcher(const RunSpec& spec, LaunchFiles files, const LaunchOptions& options,
-                   Progress* progress)
+Launcher::Launcher(const RunSpec& spec, const RunSocket& socket, LaunchFiles files,
+                   const LaunchOptions& options, Progress* progress)
     : spec_(spec),
+      socket_(socket),
       files_(std::move(files)),
       progress_(progress),
-      control_(spec,
+      control_(spec, &socket,
                options.log ? std::vector<std::string>{kRecorderName} : std::vector<std::string>{}),
       log_(options.log) {
   if (options.kills.count > 0) kills_ = std::make_unique<KillSchedule>(spec, options.kills);
@@ -60,7 +63,7 @@ void Launcher::StartProcesses() {
                          bool restart = false, std::vector<std::string> components = {}) {
     command[0] = FindProgram(command[0]).string();
     processes_.push_back(std::make_unique<ComponentProcess>(
-        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart,
+        name, command, fmt::format("{}/{}.log", files_.run_dir, name), restart, socket_,
         std::move(components)));
   };
   if (log_) {
@@ -379,7 +382,19 @@ void Launcher::StopProcesses() {
       break;
     }
   }
+  for (const auto& process : processes_) {
+    std::ifstream in(process->process().log_path());
+    for (std::string line; std::getline(in, line);) {
+      if (!line.starts_with(kWarning)) continue;
+      outcome_.warnings.push_back(
+          fmt::format("{}: {}", process->name(), line.substr(kWarning.size())));
+    }
+  }
   outcome_.refused = control_.refused();
+  if (log_) {
+    const health_t& recorder = control_.statuses().at(kRecorderName).health;
+    if (recorder.state != health_t::STATE_FAILED) outcome_.strangers = recorder.detail;
+  }
   processes_.clear();  // kills what has not ended
 }
 

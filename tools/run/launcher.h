@@ -33,10 +33,10 @@ struct LaunchOptions {
 /// One run. Leaves no process behind, whatever happens.
 class Launcher {
  public:
-  /// `spec` as written to files.spec_file; `progress` outlives the launcher. Throws BusError, or
-  /// ConfigError for faults that cannot be injected.
-  Launcher(const RunSpec& spec, LaunchFiles files, const LaunchOptions& options,
-           Progress* progress);
+  /// `spec` as written to files.spec_file; `socket` and `progress` outlive the launcher. Throws
+  /// BusError, or ConfigError for faults that cannot be injected.
+  Launcher(const RunSpec& spec, const RunSocket& socket, LaunchFiles files,
+           const LaunchOptions& options, Progress* progress);
   ~Launcher();
 
   /// Starts everything, waits until it is ready, runs, and ends everything. Throws
@@ -65,6 +65,7 @@ class Launcher {
   int64_t Tick() const;  ///< last tick that any component has completed
 
   RunSpec spec_;
+  const RunSocket& socket_;
   LaunchFiles files_;
   Progress* progress_;
   ControlClient control_;

@@ -106,7 +106,8 @@ LiveRun::LiveRun(const std::string& run, std::string_view log_command, std::stri
   }
   health_channels_.push_back(HealthChannel(kRecorderName));
   health_filter_ = std::make_unique<ServiceFilter>(spec_, std::vector<std::string>{});
-  receiver_ = std::make_unique<BusReceiver>(MirrorUrl(spec_));
+  receiver_ = std::make_unique<BusReceiver>(MirrorUrl(spec_), OfRun(spec_));
+  strangers_ = std::make_unique<StrangerWatch>(spec_, StrangerWatch::Ports::kMirror);
 }
 
 std::vector<std::string> LiveRun::ChannelNames() const {
@@ -141,6 +142,7 @@ LiveMessage LiveRun::Identify(const BusReceiver::Packet& packet) {
 }
 
 void LiveRun::Spin(int timeout_ms, const std::function<void(const LiveMessage&)>& handle) {
+  strangers_->Look();
   pollfd fd{receiver_->fd(), POLLIN, 0};
   if (poll(&fd, 1, timeout_ms) <= 0) return;
   BusReceiver::Packet packet;
@@ -151,7 +153,9 @@ void LiveRun::Spin(int timeout_ms, const std::function<void(const LiveMessage&)>
 }
 
 int64_t LiveRun::refused() const {
-  return refused_ + health_filter_->refused() + receiver_->malformed();
+  int64_t refused = refused_ + health_filter_->refused() + receiver_->malformed();
+  for (const Stranger& stranger : strangers_->strangers()) refused += stranger.packets;
+  return refused;
 }
 
 }  // namespace poise

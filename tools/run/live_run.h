@@ -13,6 +13,7 @@
 
 #include "components/framework/bus/packet_filter.h"
 #include "components/framework/bus/service_filter.h"
+#include "components/framework/bus/stranger_watch.h"
 #include "components/framework/bus/udp_bus.h"
 #include "poise/message_traits.hpp"
 
@@ -48,8 +49,8 @@ class LiveRun {
 
   /// Waits up to `timeout_ms`, then hands out what has arrived, one batch at most.
   void Spin(int timeout_ms, const std::function<void(const LiveMessage&)>& handle);
-  /// Packets that failed a check: not of this run, unknown channel, wrong type, size or counts, a
-  /// tick that the run cannot have.
+  /// Packets that failed a check: not sent by the run's processes, not of this run, unknown
+  /// channel, wrong type, size or counts, a tick that the run cannot have.
   int64_t refused() const;
 
  private:
@@ -69,6 +70,7 @@ class LiveRun {
   std::map<std::string, Lane, std::less<>> lanes_;
   std::unique_ptr<ServiceFilter> health_filter_;
   std::unique_ptr<BusReceiver> receiver_;
+  std::unique_ptr<StrangerWatch> strangers_;
   int64_t refused_ = 0;
 };
 

@@ -54,6 +54,24 @@ std::string Why(const answer_t& answer, const LiveField* field) {
   return logging::RefusalReason(answer.kind, answer.verdict);
 }
 
+/// The run, if it takes acts of an operator. Throws ConfigError.
+const RunSpec& Operable(const RunSpec& spec) {
+  if (spec.first_port() == 0) {
+    throw ConfigError(
+        fmt::format("run {}: runs inside one process, which hears nobody: use its page, if it is "
+                    "interactive, or start it without --inline",
+                    spec.run_id()));
+  }
+  const Graph& graph = spec.graph();
+  if (ChannelOfType(graph, kActType) < 0 || ChannelOfType(graph, kAnswerType) < 0) {
+    throw ConfigError(
+        fmt::format("graph {}: has no channels of type {} and {}; its runs take no "
+                    "acts of an operator",
+                    graph.name(), kActType, kAnswerType));
+  }
+  return spec;
+}
+
 }  // namespace
 
 std::vector<LiveField> LiveFields(const RunSpec& spec) {
@@ -93,26 +111,15 @@ std::vector<LiveField> LiveFields(const RunSpec& spec) {
   return fields;
 }
 
-OperatorLine::OperatorLine(RunSpec spec) : spec_(std::move(spec)) {
+OperatorLine::OperatorLine(RunSpec spec)
+    : spec_(std::move(spec)), socket_(RunSocket::Ask(Operable(spec_))) {
   const Graph& graph = spec_.graph();
-  if (spec_.first_port() == 0) {
-    throw ConfigError(
-        fmt::format("run {}: runs inside one process, which hears nobody: use its page, if it is "
-                    "interactive, or start it without --inline",
-                    spec_.run_id()));
-  }
   const int acts = ChannelOfType(graph, kActType), answers = ChannelOfType(graph, kAnswerType);
-  if (acts < 0 || answers < 0) {
-    throw ConfigError(
-        fmt::format("graph {}: has no channels of type {} and {}; its runs take no "
-                    "acts of an operator",
-                    graph.name(), kActType, kAnswerType));
-  }
   fields_ = LiveFields(spec_);
   targets_ = FindActTargets(spec_);
   channel_ = graph.channel(acts).name();
-  sender_ = std::make_unique<BusSender>(ChannelUrl(spec_, acts));
-  answers_ = std::make_unique<BusReceiver>(ChannelUrl(spec_, answers));
+  sender_ = std::make_unique<RunSender>(socket_, ChannelUrl(spec_, acts));
+  answers_ = std::make_unique<BusReceiver>(ChannelUrl(spec_, answers), OfRun(spec_));
   int ticks = ChannelOfType(graph, "bridge_status_t");
   for (int i = 0; ticks < 0 && i < graph.channel_size(); ++i) {
     if (!graph.channel(i).external()) ticks = i;
@@ -125,7 +132,7 @@ OperatorLine::OperatorLine(RunSpec spec) : spec_(std::move(spec)) {
                                   graph.channel(ticks).type()));
   }
   tick_offset_ = type->run_id_offset;
-  ticks_ = std::make_unique<BusReceiver>(ChannelUrl(spec_, ticks));
+  ticks_ = std::make_unique<BusReceiver>(ChannelUrl(spec_, ticks), OfRun(spec_));
   std::random_device random;
   next_id_ = static_cast<int64_t>((uint64_t{random()} << 31) ^ random()) + 1;
 }
@@ -268,7 +275,7 @@ void OperatorLine::Send(Pending* pending, int64_t now) {
   pending->sent = now;
   std::vector<uint8_t> bytes(static_cast<size_t>(act.getEncodedSize()));
   act.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  sender_->Send(channel_.c_str(), bytes.data(), bytes.size());
+  sender_->Send(channel_, bytes.data(), bytes.size());
 }
 
 void OperatorLine::Hear() {

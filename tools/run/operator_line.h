@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "operate/message_traits.hpp"
 #include "tools/run/act_targets.h"
@@ -75,6 +75,7 @@ class OperatorLine {
   std::array<int, 2> fds() const;
 
   const RunSpec& spec() const { return spec_; }
+  const RunSocket& socket() const { return socket_; }
   const std::vector<LiveField>& fields() const { return fields_; }
   int64_t tick() const { return tick_; }  ///< newest heard; -1: none yet
 
@@ -92,10 +93,11 @@ class OperatorLine {
   void Hear();
 
   RunSpec spec_;
+  RunSocket socket_;
   std::vector<LiveField> fields_;
   ActTargets targets_;
   std::string channel_;
-  std::unique_ptr<BusSender> sender_;
+  std::unique_ptr<RunSender> sender_;
   std::unique_ptr<BusReceiver> answers_, ticks_;
   std::string tick_channel_;
   int64_t tick_offset_ = 0;  // bytes

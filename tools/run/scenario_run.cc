@@ -106,17 +106,17 @@ void ScenarioRun::WriteFiles(const Part& part, const fs::path& dir) {
   WriteFile(dir / kScenarioFile, ScenarioText(part.loaded.scenario));
 }
 
-RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, bool in_process, bool quiet,
-                                const LaunchOptions& launch,
+RunOutcome ScenarioRun::RunPart(const Part& part, const fs::path& dir, const RunSocket* socket,
+                                bool quiet, const LaunchOptions& launch,
                                 std::optional<logging::RunRecord>* record) {
   const RunSpec& spec = part.spec;
   Progress progress(static_cast<double>(spec.num_ticks() - spec.lead_ticks()) * spec.tick_period(),
                     quiet, static_cast<double>(spec.lead_ticks()) * spec.tick_period());
-  if (in_process) {
+  if (socket == nullptr) {
     return RunInline(spec, ScenarioText(part.loaded.scenario), dir / "run.lcm", &progress, record);
   }
   const LaunchFiles files{dir.string(), (dir / kSpecFile).string(), (dir / kScenarioFile).string()};
-  return Launcher(spec, files, launch, &progress).Run();
+  return Launcher(spec, *socket, files, launch, &progress).Run();
 }
 
 void ScenarioRun::PrintHeading() const {
@@ -170,7 +170,7 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   } else if (!summary.passed && summary.checks.empty()) {
     problem = "there is no log";
   }
-  const char* const by = summary.failed_by_machine ? ", by the machine alone" : "";
+  const char* const by = summary.failed_by_machine ? ", for want of commands in time alone" : "";
   if (options_.quiet || summary.checks.empty()) {
     if (!options_.quiet) fmt::print("{}", realtime);
     fmt::print("{}{}\n", FormatVerdict(summary.checks, problem), by);
@@ -187,7 +187,9 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   fmt::print("\n{}\n{}{}", options_.full ? FormatFullScreen(shown) : FormatScreen(shown),
              Wrapped(realtime, ScreenStyle().columns, 2),
              FormatVerdictLines(main_.loaded.scenario, summary.checks, problem, options_.full));
-  if (*by != '\0') fmt::print("What failed is{}: the commands came too late.\n", by + 1);
+  if (*by != '\0') {
+    fmt::print("It failed for want of commands in time alone: {}.\n", CauseOfLateness(outcome));
+  }
   fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
              record.duration(record.num_ticks), outcome.wall_time,
              record.real_time_factor.value_or(0));
@@ -203,7 +205,8 @@ LogSizes ScenarioRun::log_sizes() const {
 
 RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const Scenario& scenario = main_.loaded.scenario;
-  if (!options_.in_process) ChoosePorts(&main_.spec);
+  std::optional<RunSource> source;
+  if (!options_.in_process) source.emplace(ChoosePorts(&main_.spec));
   RunResult result;
   const std::string space =
       CheckSpace(out.empty() ? RunsDir() : fs::path(out), log_sizes(), options_.force);
@@ -225,7 +228,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     const RunDir reference = MakeRunDir(ReferenceDir(result.dir).string(), name(), true);
     WriteFiles(*reference_, reference.path());
     summary.reference =
-        RunPart(*reference_, reference.path(), /*in_process=*/true, /*quiet=*/true, {});
+        RunPart(*reference_, reference.path(), /*socket=*/nullptr, /*quiet=*/true, {});
     PrintOutcome(fmt::format("reference run (variant {})", scenario.reference()),
                  *summary.reference);
   }
@@ -236,10 +239,17 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
     summary.outcome = options_.interactive
                           ? options_.interactive(main_.spec, scenario, ScenarioText(scenario),
                                                  result.dir / "run.lcm")
-                          : RunPart(main_, result.dir, options_.in_process, options_.quiet,
-                                    options_.launch, &kept);
+                          : RunPart(main_, result.dir, source ? &source->socket() : nullptr,
+                                    options_.quiet, options_.launch, &kept);
     if (ros2) EndRos2(&*ros2);
     PrintOutcome("run", summary.outcome);
+    for (const std::string& warning : summary.outcome.warnings) {
+      fmt::print(stderr, "warning: {}\n", logging::ForTerminal(warning));
+    }
+    if (!summary.outcome.strangers.empty()) {
+      fmt::print(stderr, "warning: refused {}\n",
+                 logging::LinesForTerminal(summary.outcome.strangers));
+    }
     if (!options_.quiet && !summary.outcome.interrupted) {
       fmt::print("{}", FormatFaults(summary.outcome));
       if (main_.spec.realtime()) fmt::print("{}", FormatProcesses(summary.outcome));
@@ -286,11 +296,13 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
 }
 
 RunOutcome ScenarioRun::RunOnly(const std::string& out) {
-  if (!options_.in_process) ChoosePorts(&main_.spec);
+  std::optional<RunSource> source;
+  if (!options_.in_process) source.emplace(ChoosePorts(&main_.spec));
   const RunDir dir = MakeRunDir(out, name(), options_.force);
   WriteFiles(main_, dir.path());
   CatchStopSignals();
-  return RunPart(main_, dir.path(), options_.in_process, /*quiet=*/true, options_.launch);
+  return RunPart(main_, dir.path(), source ? &source->socket() : nullptr, /*quiet=*/true,
+                 options_.launch);
 }
 
 void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRecord* record) {

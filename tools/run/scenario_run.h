@@ -67,8 +67,9 @@ class ScenarioRun {
   Part Prepare(const std::string& scenario, const RunChanges& changes, bool in_process,
                bool warn) const;
   static void WriteFiles(const Part& part, const std::filesystem::path& dir);
-  static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir, bool in_process,
-                            bool quiet, const LaunchOptions& launch,
+  /// Inside this process without a `socket`.
+  static RunOutcome RunPart(const Part& part, const std::filesystem::path& dir,
+                            const RunSocket* socket, bool quiet, const LaunchOptions& launch,
                             std::optional<logging::RunRecord>* record = nullptr);
   void PrintHeading() const;
   /// What happened, the table, the verdict, where to look next.

@@ -9,7 +9,9 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "components/framework/build_info.h"
 #include "components/framework/configuration/added_fields.h"
@@ -525,6 +527,16 @@ void SetDriveTags(RunSpec* spec) {
   });
 }
 
+/// Empty: somebody has its port.
+std::optional<RunSource> TakeSource(const RunSpec& spec) {
+  CheckBusRoute(ServiceUrl(spec));
+  try {
+    return RunSource(spec);
+  } catch (const BusError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 bool SpeaksToDrives(const RunSpec& spec, int component) {
@@ -537,17 +549,20 @@ bool SpeaksToDrives(const RunSpec& spec, int component) {
                      [&](const DriveLink& end) { return HasField(own, end.group); });
 }
 
-void ChoosePorts(RunSpec* spec) {
-  const int count = 3 + spec->graph().channel_size();  // the last one: EtherCAT over UDP
+RunSource ChoosePorts(RunSpec* spec) {
+  // The last two: what all send from, EtherCAT over UDP.
+  const int count = 4 + spec->graph().channel_size();
   std::mt19937_64 random(static_cast<uint64_t>(spec->run_id()));
   std::uniform_int_distribution<int> first(kFirstPort, kLastPort - count);
   for (int i = 0; i < 200; ++i) {
     const int port = first(random);
     if (!PortsFree(port, count)) continue;
     spec->set_first_port(port);
+    std::optional<RunSource> source = TakeSource(*spec);
+    if (!source) continue;
     SetEthercatPort(port + count - 1, spec);
     SetDriveTags(spec);
-    return;
+    return std::move(*source);
   }
   throw ConfigError(
       fmt::format("no block of {} free UDP ports between {} and {}", count, kFirstPort, kLastPort));

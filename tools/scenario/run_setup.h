@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.h"
 #include "components/framework/graph.pb.h"
 #include "components/framework/optional_ports.h"
@@ -41,7 +42,8 @@ void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec
 /// log holds.
 bool SpeaksToDrives(const RunSpec& spec, int component);
 
-/// A block of free UDP ports for the run's channels. Throws ConfigError when none is found.
-void ChoosePorts(RunSpec* spec);
+/// A block of free UDP ports for the run's channels, and its source port taken. Throws ConfigError
+/// when none is found; BusError when multicast is not routed.
+RunSource ChoosePorts(RunSpec* spec);
 
 }  // namespace poise

@@ -3,6 +3,7 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "components/framework/bus/collected_channel.h"
 #include "components/framework/bus/service_link.h"
@@ -27,13 +28,18 @@ struct Lane {
         name(spec.graph().channel(index).name()),
         external(spec.graph().channel(index).external()),
         packets(spec.graph().channel(index), spec.run_id()),
-        receiver(ChannelUrl(spec, index)) {}
+        receiver(ChannelUrl(spec, index), OfRun(spec)) {
+    if (TakesStopsOfAll(spec.graph().channel(index))) {
+      stops.emplace(ChannelUrl(spec, index), OfOthers(spec));
+    }
+  }
 
   int channel;
   std::string name;
   bool external;
   CollectedChannel packets;
   BusReceiver receiver;
+  std::optional<BusReceiver> stops;  // of others
   int64_t foreign = 0;
   ChannelCollector::ChannelStatistics statistics;
   int64_t waiting_since = 0;  // ns; of next_tick
@@ -46,7 +52,7 @@ struct Lane {
 
 class ChannelCollector::Impl {
  public:
-  Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks);
+  Impl(const RunSpec& spec, const RunSocket& socket, const std::string& name, Callbacks callbacks);
   void Spin(int timeout_ms);
   void Fail(std::string_view reason);
 
@@ -55,9 +61,11 @@ class ChannelCollector::Impl {
   bool complete() const { return final_tick_ >= 0 && recorded_tick() >= final_tick_; }
   bool stopped() const { return stopped_; }
   const std::vector<std::unique_ptr<Lane>>& lanes() const { return lanes_; }
+  const std::vector<Stranger>& strangers() const { return strangers_.strangers(); }
 
  private:
   void Receive(Lane& lane, int64_t now);
+  void ReceiveStops(Lane& lane);
   void Keep(Lane& lane, const BusReceiver::Packet& packet);
   void Deliver(Lane& lane, int64_t now);
   void ReceiveService();
@@ -68,6 +76,7 @@ class ChannelCollector::Impl {
 
   Callbacks callbacks_;
   ServiceLink service_;
+  StrangerWatch strangers_;
   bool realtime_;
   std::vector<std::unique_ptr<Lane>> lanes_;
   std::vector<pollfd> poll_fds_;
@@ -79,12 +88,19 @@ class ChannelCollector::Impl {
   bool stopped_ = false;
 };
 
-ChannelCollector::Impl::Impl(const RunSpec& spec, const std::string& name, Callbacks callbacks)
-    : callbacks_(std::move(callbacks)), service_(spec, {name}), realtime_(spec.realtime()) {
+ChannelCollector::Impl::Impl(const RunSpec& spec, const RunSocket& socket, const std::string& name,
+                             Callbacks callbacks)
+    : callbacks_(std::move(callbacks)),
+      service_(spec, socket, {name}),
+      strangers_(spec, StrangerWatch::Ports::kProcesses),
+      realtime_(spec.realtime()) {
   poll_fds_.push_back({service_.fd(), POLLIN, 0});
   for (int i = 0; i < spec.graph().channel_size(); ++i) {
     lanes_.push_back(std::make_unique<Lane>(spec, i));
     poll_fds_.push_back({lanes_.back()->receiver.fd(), POLLIN, 0});
+  }
+  for (const auto& lane : lanes_) {
+    if (lane->stops) poll_fds_.push_back({lane->stops->fd(), POLLIN, 0});
   }
   service_.health().state = health_t::STATE_READY;
 }
@@ -108,6 +124,7 @@ void ChannelCollector::Impl::Spin(int timeout_ms) {
   const int64_t arrival = NowNanoseconds();
   for (size_t i = 0; i < lanes_.size(); ++i) {
     if (poll_fds_[i + 1].revents != 0) Receive(*lanes_[i], arrival);
+    if (lanes_[i]->stops) ReceiveStops(*lanes_[i]);
   }
   if (poll_fds_[0].revents != 0) ReceiveService();
   Request(arrival);
@@ -146,6 +163,13 @@ void ChannelCollector::Impl::Receive(Lane& lane, int64_t now) {
   lane.statistics.duplicates = lane.packets.duplicates();
   lane.statistics.refused =
       lane.packets.counters().refused() + lane.foreign + lane.receiver.malformed();
+}
+
+void ChannelCollector::Impl::ReceiveStops(Lane& lane) {
+  BusReceiver::Packet packet;
+  for (int i = 0; i < kBatch && lane.stops->Receive(&packet); ++i) {
+    if (packet.channel == lane.name && OnlyStops(packet)) Keep(lane, packet);
+  }
 }
 
 void ChannelCollector::Impl::Keep(Lane& lane, const BusReceiver::Packet& packet) {
@@ -227,6 +251,7 @@ void ChannelCollector::Impl::ReceiveService() {
 
 void ChannelCollector::Impl::PublishHealth(int64_t now) {
   next_health_ = now + kCollectorHealthInterval;
+  if (strangers_.Look()) service_.SetDetail(Describe(strangers_.strangers()));
   health_t& health = service_.health();
   health.state = complete() ? health_t::STATE_FINISHED
                  : started_ ? health_t::STATE_RUNNING
@@ -241,14 +266,15 @@ void ChannelCollector::Impl::PublishHealth(int64_t now) {
     health.messages_refused += lane->statistics.refused;
     health.gaps += lane->statistics.requested;
   }
+  for (const Stranger& stranger : strangers()) health.messages_refused += stranger.packets;
   service_.SendHealth();
   // Also covers a report that was lost.
   service_.SendControl(run_control_t::COMMAND_RECORDED, recorded_tick(), -1);
 }
 
-ChannelCollector::ChannelCollector(const RunSpec& spec, const std::string& name,
-                                   Callbacks callbacks)
-    : impl_(std::make_unique<Impl>(spec, name, std::move(callbacks))) {}
+ChannelCollector::ChannelCollector(const RunSpec& spec, const RunSocket& socket,
+                                   const std::string& name, Callbacks callbacks)
+    : impl_(std::make_unique<Impl>(spec, socket, name, std::move(callbacks))) {}
 ChannelCollector::~ChannelCollector() = default;
 void ChannelCollector::Spin(int timeout_ms) { impl_->Spin(timeout_ms); }
 void ChannelCollector::Fail(std::string_view reason) { impl_->Fail(reason); }
@@ -260,6 +286,8 @@ bool ChannelCollector::stopped() const { return impl_->stopped(); }
 const ChannelCollector::ChannelStatistics& ChannelCollector::statistics(int channel) const {
   return impl_->lanes()[static_cast<size_t>(channel)]->statistics;
 }
+
+const std::vector<Stranger>& ChannelCollector::strangers() const { return impl_->strangers(); }
 
 int64_t ChannelCollector::missing(int64_t last_tick) const {
   int64_t missing = 0;

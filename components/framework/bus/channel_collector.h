@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
+#include "components/framework/bus/stranger_watch.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {
@@ -29,9 +31,10 @@ class ChannelCollector {
     std::function<void(int channel, int64_t tick)> skipped = nullptr;
   };
 
-  /// `spec` must hold the channels' counts (FillPlan). Throws BusError; ConfigError when counts
-  /// are missing.
-  ChannelCollector(const RunSpec& spec, const std::string& name, Callbacks callbacks);
+  /// `spec` must hold the channels' counts (FillPlan); `socket` must outlive this. Throws BusError;
+  /// ConfigError when counts are missing.
+  ChannelCollector(const RunSpec& spec, const RunSocket& socket, const std::string& name,
+                   Callbacks callbacks);
   ~ChannelCollector();
 
   /// Receives for up to `timeout_ms`, delivers, requests and reports. Returns after the first
@@ -60,6 +63,8 @@ class ChannelCollector {
     int64_t next_tick = 0;  ///< first tick neither delivered nor skipped
   };
   const ChannelStatistics& statistics(int channel) const;
+  /// What others have sent to the run, and nobody has taken. HEALTH_<name> tells of it too.
+  const std::vector<Stranger>& strangers() const;
   /// Messages of ticks <= `last_tick` that were not delivered, over all channels, skipped ones
   /// included: 0 in a run without loss.
   int64_t missing(int64_t last_tick) const;

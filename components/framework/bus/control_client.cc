@@ -3,18 +3,20 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "components/framework/bus/service_filter.h"
-#include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 
 namespace poise {
 
 struct ControlClient::Links {
-  Links(const RunSpec& spec, const std::vector<std::string>& others)
-      : sender(ServiceUrl(spec)), receiver(ServiceUrl(spec)), filter(spec, others) {}
-  BusSender sender;
+  Links(const RunSpec& spec, const RunSocket* socket, const std::vector<std::string>& others)
+      : receiver(ServiceUrl(spec), OfRun(spec)), filter(spec, others) {
+    if (socket != nullptr) sender.emplace(*socket, ServiceUrl(spec));
+  }
+  std::optional<RunSender> sender;
   BusReceiver receiver;
   ServiceFilter filter;
 
@@ -25,12 +27,13 @@ struct ControlClient::Links {
     control.channel = -1;
     std::vector<uint8_t> bytes(static_cast<size_t>(control.getEncodedSize()));
     control.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    return sender.Send(kControlChannel, bytes.data(), bytes.size());
+    return sender && sender->Send(kControlChannel, bytes.data(), bytes.size());
   }
 };
 
-ControlClient::ControlClient(const RunSpec& spec, const std::vector<std::string>& others)
-    : run_id_(spec.run_id()), links_(std::make_unique<Links>(spec, others)) {
+ControlClient::ControlClient(const RunSpec& spec, const RunSocket* socket,
+                             const std::vector<std::string>& others)
+    : run_id_(spec.run_id()), links_(std::make_unique<Links>(spec, socket, others)) {
   for (const std::string& name : others) statuses_[name];
   for (const ComponentInstance& instance : spec.graph().component()) statuses_[instance.name()];
 }

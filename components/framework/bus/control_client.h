@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "poise/health_t.hpp"
 
@@ -17,12 +18,14 @@ namespace poise {
 /// Sends commands and collects health. Not thread-safe.
 class ControlClient {
  public:
-  /// Watches the graph's components and `others` (e.g. {"recorder"}). Throws BusError.
-  explicit ControlClient(const RunSpec& spec, const std::vector<std::string>& others = {});
+  /// Watches the graph's components and `others` (e.g. {"recorder"}). `socket` must outlive this;
+  /// nullptr: sends nothing. Throws BusError.
+  ControlClient(const RunSpec& spec, const RunSocket* socket,
+                const std::vector<std::string>& others = {});
   ~ControlClient();
 
   /// Repeat SendStart until every state is beyond STATE_READY, SendStop until every process has
-  /// gone. False when the system refused to send.
+  /// gone. False when the system refused to send, or there is no socket.
   bool SendStart();
   bool SendStop();
 

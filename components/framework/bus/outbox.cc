@@ -5,13 +5,13 @@
 namespace poise {
 
 Outbox::Outbox(OutputPort* port, size_t component, int channel, std::string channel_name,
-               const std::string& url, bool awaited)
+               RunSender sender, bool awaited)
     : port_(port),
       component_(component),
       channel_(channel),
       awaited_(awaited),
       channel_name_(std::move(channel_name)),
-      sender_(url),
+      sender_(sender),
       size_(static_cast<size_t>(port->encoded_size())),
       bytes_(size_ * kSentHistory),
       ticks_(kSentHistory, -1) {}
@@ -21,14 +21,13 @@ bool Outbox::Send(int64_t tick) {
   uint8_t* const data = bytes_.data() + slot * size_;
   const int encoded = port_->Encode(data, static_cast<int>(size_));
   ticks_[slot] = encoded == static_cast<int>(size_) ? tick : -1;
-  return ticks_[slot] == tick && sender_.Send(channel_name_.c_str(), data, size_);
+  return ticks_[slot] == tick && sender_.Send(channel_name_, data, size_);
 }
 
 bool Outbox::Resend(int64_t tick) {
   if (tick < 0) return false;
   const auto slot = static_cast<size_t>(tick % kSentHistory);
-  return ticks_[slot] == tick &&
-         sender_.Send(channel_name_.c_str(), bytes_.data() + slot * size_, size_);
+  return ticks_[slot] == tick && sender_.Send(channel_name_, bytes_.data() + slot * size_, size_);
 }
 
 }  // namespace poise

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/ports.h"
 
 namespace poise {
@@ -15,9 +15,9 @@ namespace poise {
 class Outbox {
  public:
   /// `component`: whose port it is, among those of its process. `awaited`: a component of another
-  /// process reads the channel. Throws BusError.
+  /// process reads the channel.
   Outbox(OutputPort* port, size_t component, int channel, std::string channel_name,
-         const std::string& url, bool awaited);
+         RunSender sender, bool awaited);
 
   OutputPort& port() { return *port_; }
   size_t component() const { return component_; }
@@ -36,7 +36,7 @@ class Outbox {
   int channel_;
   bool awaited_;
   std::string channel_name_;
-  BusSender sender_;
+  RunSender sender_;
   size_t size_;
   std::vector<uint8_t> bytes_;
   std::vector<int64_t> ticks_;  // -1: empty

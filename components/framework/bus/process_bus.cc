@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "components/framework/bus/stranger_watch.h"
 #include "components/framework/clock.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
@@ -52,13 +53,13 @@ bool Awaited(const Graph& graph, const std::string& process, const std::string& 
 
 }  // namespace
 
-ProcessBus::ProcessBus(const RunSpec& spec, const std::string& process,
+ProcessBus::ProcessBus(const RunSpec& spec, const RunSocket& socket, const std::string& process,
                        std::vector<ConfiguredComponent>* components, Join join, bool open)
     : join_(join),
-      service_(spec, NamesOf(*components)),
+      service_(spec, socket, NamesOf(*components)),
       faults_(spec.drop_rate(), InstanceSeed(spec.seed(), process + "/drops")),
       counters_(components->size()) {
-  BindOutputs(spec, *components);
+  BindOutputs(spec, socket, *components);
   std::vector<int> places;  // of stages_, in the tick
   for (size_t i = 0; i < components->size(); ++i) {
     const ConfiguredComponent& configured = (*components)[i];
@@ -87,14 +88,14 @@ ProcessBus::ProcessBus(const RunSpec& spec, const std::string& process,
   for (int i = 0; i < spec.graph().channel_size() && !acts_.empty(); ++i) {
     const Channel& channel = spec.graph().channel(i);
     if (channel.type() != kAnswerType || !channel.external() || answer_sender_) continue;
-    answer_sender_.emplace(ChannelUrl(spec, i));
+    answer_sender_.emplace(socket, ChannelUrl(spec, i));
     answer_channel_ = channel.name();
     answer_bytes_.resize(static_cast<size_t>(operate::answer_t{}.getEncodedSize()));
   }
   if (open) OpenInputs();
 }
 
-void ProcessBus::BindOutputs(const RunSpec& spec,
+void ProcessBus::BindOutputs(const RunSpec& spec, const RunSocket& socket,
                              const std::vector<ConfiguredComponent>& components) {
   const Graph& graph = spec.graph();
   for (size_t i = 0; i < components.size(); ++i) {
@@ -103,7 +104,7 @@ void ProcessBus::BindOutputs(const RunSpec& spec,
       const int channel = ChannelOf(graph, instance.name(), instance.output(), output->name());
       const std::string& name = graph.channel(channel).name();
       outboxes_.push_back(std::make_unique<Outbox>(output, i, channel, name,
-                                                   ChannelUrl(spec, channel),
+                                                   RunSender(socket, ChannelUrl(spec, channel)),
                                                    Awaited(graph, ProcessOf(instance), name)));
     }
   }
@@ -170,21 +171,29 @@ Inbox* ProcessBus::InboxOf(const RunSpec& spec, size_t component, int channel, I
     if (&inbox->port() == input) return inbox.get();  // of a stage before
   }
   inboxes_.push_back(std::make_unique<Inbox>(input, spec.run_id(), join_, component));
-  auto link = std::ranges::find_if(links_, [&](const auto& l) { return l->channel == channel; });
-  if (link == links_.end()) {
-    links_.push_back(std::make_unique<DataLink>());
-    link = links_.end() - 1;
-    (*link)->url = ChannelUrl(spec, channel);
-    (*link)->channel = channel;
-    (*link)->channel_name = spec.graph().channel(channel).name();
+  const Channel& of = spec.graph().channel(channel);
+  std::vector<Origin> origins = {OfRun(spec)};
+  if (TakesStopsOfAll(of)) origins.push_back(OfOthers(spec));
+  for (const Origin& origin : origins) {
+    auto link = std::ranges::find_if(links_, [&](const auto& l) {
+      return l->channel == channel && l->origin.who == origin.who;
+    });
+    if (link == links_.end()) {
+      links_.push_back(std::make_unique<DataLink>());
+      link = links_.end() - 1;
+      (*link)->url = ChannelUrl(spec, channel);
+      (*link)->channel = channel;
+      (*link)->channel_name = of.name();
+      (*link)->origin = origin;
+    }
+    (*link)->inboxes.push_back(inboxes_.back().get());
   }
-  (*link)->inboxes.push_back(inboxes_.back().get());
   return inboxes_.back().get();
 }
 
 void ProcessBus::OpenInputs() {
   for (size_t i = 0; i < links_.size(); ++i) {
-    links_[i]->receiver.emplace(links_[i]->url);
+    links_[i]->receiver.emplace(links_[i]->url, links_[i]->origin);
     poll_fds_[i + 1].fd = links_[i]->receiver->fd();
   }
 }
@@ -222,6 +231,8 @@ void ProcessBus::Receive(DataLink& link, int batch) {
   while (batch-- > 0 && link.receiver->Receive(&packet)) {
     if (packet.channel != link.channel_name) {
       if (packet.channel != "LCM_SELF_TEST") ++link.foreign;
+    } else if (link.origin.who == Origin::kOthers && !OnlyStops(packet)) {
+      ++link.foreign;
     } else if (faults_.Drop()) {
       ++counters_[link.inboxes.front()->component()].dropped;
     } else {
@@ -295,9 +306,8 @@ void ProcessBus::SendAnswers() {
     while (acts->TakeAnswer(&answer)) {
       if (!answer_sender_) continue;
       answer.encode(answer_bytes_.data(), 0, static_cast<int>(answer_bytes_.size()));
-      CountSend(
-          answer_sender_->Send(answer_channel_.c_str(), answer_bytes_.data(), answer_bytes_.size()),
-          0);
+      CountSend(answer_sender_->Send(answer_channel_, answer_bytes_.data(), answer_bytes_.size()),
+                0);
     }
   }
 }

@@ -36,9 +36,10 @@ class FaultInjector {
 /// allocates, throws or locks.
 class ProcessBus {
  public:
-  /// `components`: all that run in `process`; they must outlive this. With `open` false nothing is
-  /// received but on the service port, until OpenInputs. Throws BusError or ConfigError.
-  ProcessBus(const RunSpec& spec, const std::string& process,
+  /// `components`: all that run in `process`; they and `socket` must outlive this. With `open`
+  /// false nothing is received but on the service port, until OpenInputs. Throws BusError or
+  /// ConfigError.
+  ProcessBus(const RunSpec& spec, const RunSocket& socket, const std::string& process,
              std::vector<ConfiguredComponent>* components, Join join, bool open);
 
   /// Opens the input channels (a process that takes over hears nothing of what came before).
@@ -116,6 +117,7 @@ class ProcessBus {
     std::string url;
     int channel;
     std::string channel_name;
+    Origin origin;
     std::optional<BusReceiver> receiver;
     std::vector<Inbox*> inboxes;
     int64_t foreign = 0;  // packets of other channels on this port
@@ -140,7 +142,8 @@ class ProcessBus {
     int64_t tick;
   };
 
-  void BindOutputs(const RunSpec& spec, const std::vector<ConfiguredComponent>& components);
+  void BindOutputs(const RunSpec& spec, const RunSocket& socket,
+                   const std::vector<ConfiguredComponent>& components);
   void BindStages(const RunSpec& spec, size_t component, const ConfiguredComponent& configured);
   void BindInput(const RunSpec& spec, const ComponentInstance& instance, InputPort* input,
                  BoundStage* stage);
@@ -159,7 +162,7 @@ class ProcessBus {
   std::vector<Delayed> delayed_;
   std::vector<BoundStage> stages_;
   std::vector<ActInput*> acts_;
-  std::optional<BusSender> answer_sender_;  // none: the graph has no channel for answers
+  std::optional<RunSender> answer_sender_;  // none: the graph has no channel for answers
   std::string answer_channel_;
   std::vector<uint8_t> answer_bytes_;
   std::vector<Unsent> unsent_;  // as many at most as there are outputs

@@ -4,10 +4,11 @@
 
 namespace poise {
 
-ServiceLink::ServiceLink(const RunSpec& spec, const std::vector<std::string>& components)
+ServiceLink::ServiceLink(const RunSpec& spec, const RunSocket& socket,
+                         const std::vector<std::string>& components)
     : run_id_(spec.run_id()),
-      sender_(ServiceUrl(spec)),
-      receiver_(ServiceUrl(spec)),
+      sender_(socket, ServiceUrl(spec)),
+      receiver_(ServiceUrl(spec), OfRun(spec)),
       filter_(spec, components),
       control_bytes_(static_cast<size_t>(control_.getEncodedSize())) {
   for (const std::string& component : components) {
@@ -39,8 +40,7 @@ bool ServiceLink::SendHealth(size_t component) {
   report.health.run_id = run_id_;
   const int size =
       report.health.encode(report.bytes.data(), 0, static_cast<int>(report.bytes.size()));
-  return size > 0 &&
-         sender_.Send(report.channel.c_str(), report.bytes.data(), static_cast<size_t>(size));
+  return size > 0 && sender_.Send(report.channel, report.bytes.data(), static_cast<size_t>(size));
 }
 
 }  // namespace poise

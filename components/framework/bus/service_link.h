@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/bus/service_filter.h"
-#include "components/framework/bus/udp_bus.h"
 #include "components/framework/graph.pb.h"
 #include "poise/health_t.hpp"
 #include "poise/run_control_t.hpp"
@@ -19,7 +19,8 @@ namespace poise {
 class ServiceLink {
  public:
   /// `components`: those of this process, one at least. Throws BusError.
-  ServiceLink(const RunSpec& spec, const std::vector<std::string>& components);
+  ServiceLink(const RunSpec& spec, const RunSocket& socket,
+              const std::vector<std::string>& components);
 
   int fd() const { return receiver_.fd(); }
   BusReceiver& receiver() { return receiver_; }
@@ -42,7 +43,7 @@ class ServiceLink {
   };
 
   int64_t run_id_;
-  BusSender sender_;
+  RunSender sender_;
   BusReceiver receiver_;
   ServiceFilter filter_;
   std::vector<Report> reports_;

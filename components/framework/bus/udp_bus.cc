@@ -2,14 +2,17 @@
 
 #include <arpa/inet.h>
 #include <lcm/lcm.h>
+#include <linux/filter.h>
+#include <linux/if_packet.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <optional>
 
 #include "fmt/format.h"
 
@@ -19,30 +22,46 @@ namespace {
 constexpr char kAdvice[] =
     "is multicast routed? try: ip link set lo up; ip route add 224.0.0.0/4 dev lo; or run: poise "
     "doctor";
-constexpr uint32_t kShortMagic = 0x4c433032;  // "LC02": magic, sequence number, channel, zero, data
 constexpr size_t kShortHeader = 8;
 constexpr size_t kMaxChannelName = 63;
 constexpr size_t kMaxDatagram = 65536;
 constexpr int kMaxMalformedInARow = 16;
 
-struct Endpoint {
-  in_addr group{};
-  uint16_t port = 0;
-};
+/// Lets the kernel drop all that is not of `origin`: what this machine has sent from the port, or
+/// all but that.
+bool Filter(int fd, Origin origin) {
+  if (origin.who == Origin::kAnyone) return true;
+  const uint32_t taken = origin.who == Origin::kRun ? UINT32_MAX : 0;
+  const uint32_t others = ~taken;
+  // Multicast of this machine comes back as PACKET_LOOPBACK or, where it is routed so, through lo.
+  constexpr auto kAncillary = static_cast<uint32_t>(SKF_AD_OFF);
+  std::array<sock_filter, 8> code = {{
+      BPF_STMT(BPF_LD | BPF_H | BPF_ABS, 0),  // UDP source port
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, origin.port, 0, 5),
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kAncillary + SKF_AD_PKTTYPE),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, PACKET_LOOPBACK, 2, 0),
+      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kAncillary + SKF_AD_IFINDEX),
+      BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, if_nametoindex("lo"), 0, 1),
+      BPF_STMT(BPF_RET | BPF_K, taken),
+      BPF_STMT(BPF_RET | BPF_K, others),
+  }};
+  const sock_fprog program{static_cast<uint16_t>(code.size()), code.data()};
+  return setsockopt(fd, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof(program)) == 0;
+}
 
-/// "udpm://GROUP:PORT?ttl=N".
-Endpoint ParseUrl(const std::string& url) {
-  Endpoint endpoint;
+}  // namespace
+
+BusEndpoint ParseBusUrl(const std::string& url) {
+  in_addr address{};
   const std::string_view prefix = "udpm://";
   const size_t colon = url.find(':', prefix.size());
   int port = 0;
   if (url.starts_with(prefix) && colon != std::string::npos) {
     const std::string group = url.substr(prefix.size(), colon - prefix.size());
     std::from_chars(url.data() + colon + 1, url.data() + url.size(), port);
-    if (inet_pton(AF_INET, group.c_str(), &endpoint.group) == 1 &&
-        IN_MULTICAST(ntohl(endpoint.group.s_addr)) && port > 0 && port < 65536) {
-      endpoint.port = static_cast<uint16_t>(port);
-      return endpoint;
+    if (inet_pton(AF_INET, group.c_str(), &address) == 1 && IN_MULTICAST(ntohl(address.s_addr)) &&
+        port > 0 && port < 65536) {
+      return {address.s_addr, static_cast<uint16_t>(port)};
     }
   }
   throw BusError(fmt::format(
@@ -51,13 +70,14 @@ Endpoint ParseUrl(const std::string& url) {
       url));
 }
 
-/// Asks the kernel, without sending: liblcm would print lines of its own.
-void CheckRoute(const std::string& url, const Endpoint& endpoint) {
+// Asks the kernel: liblcm would send, and print lines of its own.
+void CheckBusRoute(const std::string& url) {
+  const BusEndpoint endpoint = ParseBusUrl(url);
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(endpoint.port);
-  address.sin_addr = endpoint.group;
+  address.sin_addr.s_addr = endpoint.group;
   const bool routed =
       fd >= 0 && connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
   const int reason = errno;
@@ -66,12 +86,16 @@ void CheckRoute(const std::string& url, const Endpoint& endpoint) {
     throw BusError(fmt::format("{}: cannot send: {}: {}", url, std::strerror(reason), kAdvice));
 }
 
-}  // namespace
+std::string ToString(const PacketSource& source) {
+  std::array<char, INET_ADDRSTRLEN> text{};
+  inet_ntop(AF_INET, &source.address, text.data(), text.size());
+  return fmt::format("{}:{}", text.data(), source.port);
+}
 
 void BusSender::Destroy::operator()(lcm_t* lcm) const { lcm_destroy(lcm); }
 
 BusSender::BusSender(const std::string& url) {
-  CheckRoute(url, ParseUrl(url));
+  CheckBusRoute(url);
   lcm_.reset(lcm_create(url.c_str()));
   if (lcm_ == nullptr) throw BusError(fmt::format("{}: cannot send: {}", url, kAdvice));
 }
@@ -80,8 +104,8 @@ bool BusSender::Send(const char* channel, const uint8_t* data, size_t size) {
   return lcm_publish(lcm_.get(), channel, data, static_cast<unsigned int>(size)) == 0;
 }
 
-BusReceiver::BusReceiver(const std::string& url) : buffer_(kMaxDatagram) {
-  const Endpoint endpoint = ParseUrl(url);
+BusReceiver::BusReceiver(const std::string& url, Origin origin) : buffer_(kMaxDatagram) {
+  const BusEndpoint endpoint = ParseBusUrl(url);
   const auto fail = [&](const char* what) {
     const int reason = errno;
     if (fd_ >= 0) close(fd_);
@@ -90,6 +114,7 @@ BusReceiver::BusReceiver(const std::string& url) : buffer_(kMaxDatagram) {
   };
   fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd_ < 0) fail("socket");
+  if (!Filter(fd_, origin)) fail("SO_ATTACH_FILTER");
   const int one = 1;
   const int zero = 0;
   const int receive_buffer = 4 << 20;  // the kernel grants what it may
@@ -101,11 +126,11 @@ BusReceiver::BusReceiver(const std::string& url) : buffer_(kMaxDatagram) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(endpoint.port);
-  address.sin_addr =
+  address.sin_addr.s_addr =
       endpoint.group;  // not INADDR_ANY: other groups and unicast on this port stay out
   if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) fail("bind");
   ip_mreq membership{};
-  membership.imr_multiaddr = endpoint.group;
+  membership.imr_multiaddr.s_addr = endpoint.group;
   membership.imr_interface.s_addr = htonl(INADDR_ANY);
   if (setsockopt(fd_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof(membership)) != 0)
     fail("joining the group");
@@ -122,6 +147,17 @@ bool BusReceiver::Receive(Packet* packet) {
     ++malformed_;
   }
   return false;
+}
+
+bool BusReceiver::ReceiveAny(std::span<const uint8_t>* datagram, PacketSource* source) {
+  sockaddr_in from{};
+  socklen_t length = sizeof(from);
+  const ssize_t size =
+      recvfrom(fd_, buffer_.data(), buffer_.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
+  if (size < 0) return false;
+  *datagram = {buffer_.data(), static_cast<size_t>(size)};
+  *source = {from.sin_addr.s_addr, ntohs(from.sin_port)};
+  return true;
 }
 
 bool ParseDatagram(const uint8_t* datagram, size_t size, BusReceiver::Packet* packet) {

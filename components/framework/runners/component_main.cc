@@ -5,9 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 #include "components/framework/build_info.h"
-#include "components/framework/bus/udp_bus.h"
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/component_description.h"
 #include "components/framework/modules.h"
 #include "components/framework/run.h"
@@ -42,6 +43,7 @@ struct Arguments {
   std::string name;  ///< of a component or of a process
   std::string state;
   bool standby = false;
+  int socket = -1;
 };
 
 /// Adds the options that every process has.
@@ -53,6 +55,8 @@ void AddOptions(CLI::App* app, Arguments* arguments) {
   app->add_flag("--standby", arguments->standby,
                 "wait for SIGUSR2, then take the place of a process that died")
       ->needs(state_option);
+  app->add_option("--socket", arguments->socket,
+                  "descriptor of the run's socket; default: it is asked for");
 }
 
 /// Runs the process that `find` names; returns the exit code.
@@ -70,8 +74,11 @@ int RunProcess(CLI::App* app, int argc, char** argv, const Arguments& arguments,
   try {
     RunSpec spec;
     ReadTextProto(arguments.run_file, &spec);
+    std::optional<RunSocket> socket;
+    if (arguments.socket >= 0) socket.emplace(spec, arguments.socket);
     ProcessRunnerOptions options;
     options.stop = &stop_asked;
+    options.socket = socket ? &*socket : nullptr;
     options.state_path = arguments.state;
     if (arguments.standby) options.take_over = &take_over_asked;
     ProcessRunner runner(spec, find(spec), registry, options);

@@ -100,6 +100,7 @@ class ProcessRunner::Impl {
   RealtimeOptions realtime_options_;
   ComponentGroup group_;
   Timing timing_;  // of all of the group
+  std::optional<RunSocket> asked_;
   ProcessBus bus_;
   std::unique_ptr<StateStore> store_;
   bool can_be_taken_over_ = false;
@@ -130,7 +131,8 @@ ProcessRunner::Impl::Impl(const RunSpec& spec, const std::string& process,
       realtime_options_(spec.realtime_options()),
       group_(spec, process, registry),
       timing_(TimingOf(spec, group_.components().front().index)),
-      bus_(spec, process, &group_.components(), JoinOf(timing_), options.take_over == nullptr),
+      bus_(spec, options.socket != nullptr ? *options.socket : asked_.emplace(RunSocket::Ask(spec)),
+           process, &group_.components(), JoinOf(timing_), options.take_over == nullptr),
       latency_(group_.components().size()) {
   if (!(period_ > 0)) throw ConfigError("run: tick_period must be greater than 0");
   CheckTiming(spec, process);

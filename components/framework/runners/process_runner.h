@@ -6,11 +6,14 @@
 #include <memory>
 #include <string>
 
+#include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.h"
 
 namespace poise {
 
 struct ProcessRunnerOptions {
+  /// The run's, which must outlive the runner. nullptr: it is asked for.
+  const RunSocket* socket = nullptr;
   /// Set (by a signal handler) to end the process cleanly.
   const volatile std::sig_atomic_t* stop = nullptr;
   /// Tick sources wait for the recorder (COMMAND_RECORDED). Default: RunSpec.recorded.
