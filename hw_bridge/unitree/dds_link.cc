@@ -5,7 +5,7 @@ namespace poise::unitree {
 DdsRobotLink::DdsRobotLink(const DdsLink& link)
     : participant_(link),
       commands_(participant_, kCommandTopic),
-      states_(participant_, kStateTopic),
+      states_(participant_, kStateTopic, kMostStates),
       torso_imu_(participant_, kTorsoImuTopic),
       switcher_(participant_) {}
 

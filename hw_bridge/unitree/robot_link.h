@@ -9,6 +9,9 @@
 
 namespace poise::unitree {
 
+/// States that are kept until they are taken: a cycle brings one, and whatever others send.
+inline constexpr int32_t kMostStates = 64;
+
 /// No call but ActiveMode and Release takes longer than its deadline; they block.
 class RobotLink {
  public:
@@ -16,7 +19,8 @@ class RobotLink {
   virtual int64_t Now() const = 0;  ///< ns
   /// False when it could not be handed over.
   virtual bool Send(const LowCmd& command) = 0;
-  /// The newest state that has come since the last one; waits for one until the deadline.
+  /// The oldest of the last kMostStates that have come and not been handed out, whole or not; waits
+  /// for one until the deadline.
   virtual bool Receive(LowState* state, int64_t deadline) = 0;
   /// The newest reading of the torso's IMU, if one has come.
   virtual bool ReceiveTorsoImu(ImuState* imu) = 0;

@@ -131,7 +131,9 @@ std::string UnitreeDriveBus::Stop() {
 }
 
 bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
-  while (link_->Receive(&incoming_, deadline)) {
+  bool taken = false;
+  // All that have come: another's damaged state does not hide a good one.
+  for (int i = 0; i < kMostStates && link_->Receive(&incoming_, taken ? 0 : deadline); ++i) {
     if (incoming_.crc != CrcOf(incoming_)) {
       ++damaged_;
       continue;
@@ -143,9 +145,9 @@ bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
     // An emulated robot numbers the states of the run's cycles; those before are none of it.
     if (in_run && config_.simulated_time() && incoming_.reserve[0] == 0) continue;
     state_ = incoming_;
-    return true;
+    taken = true;
   }
-  return false;
+  return taken;
 }
 
 void UnitreeDriveBus::Judge(bool complete) {

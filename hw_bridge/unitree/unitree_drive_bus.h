@@ -50,8 +50,8 @@ class UnitreeDriveBus final : public DriveBus {
   };
 
   void Release(int64_t deadline);
-  /// Takes states until one is whole and newer than the last; in simulated time, `in_run`, one of
-  /// the run's cycles.
+  /// Takes the newest state that has come, whole and newer than the last; waits for one until
+  /// `deadline`. In simulated time, `in_run`, one of the run's cycles.
   bool ReceiveState(int64_t deadline, bool in_run = false);
   bool TakeState();
   void TakeMotors();

@@ -270,6 +270,24 @@ TEST(UnitreeStates, TellTheMotorsVelocityAndTheOrientationOfTheImu) {
   EXPECT_EQ(rig.status().state, Status::STATE_RUNNING);
 }
 
+TEST(UnitreeStop, AnothersDamagedStatesDoNotHideTheRobots) {
+  RobotRig rig;
+  rig.Start(5);
+  unitree::LowState damaged = rig.robot.state;
+  damaged.motor_state[0].q = 3;
+  damaged.crc ^= 1;
+  rig.robot.others.assign(5, damaged);
+  const int before = rig.status().working_counter_errors;
+  for (int i = 0; i < 50; ++i) {
+    rig.state_of(0).q += 1e-4F;
+    rig.Step();
+    ASSERT_EQ(rig.status().state, Status::STATE_RUNNING) << i;
+    EXPECT_NEAR(rig.readings().joint_position[0], static_cast<double>(rig.state_of(0).q), 1e-4);
+  }
+  EXPECT_EQ(rig.status().frames_lost, 0);
+  EXPECT_EQ(rig.status().working_counter_errors, before + 250);
+}
+
 TEST(UnitreeStop, APositionThatIsNoNumberStopsByName) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), 1e30F}) {
     RobotRig rig;

@@ -68,6 +68,31 @@ TEST(Dds, CarriesStatesCommandsAndRequests) {
   EXPECT_EQ(told.crc, CrcOf(told));
 }
 
+TEST(Dds, StatesWaitUntilTheyAreTaken) {
+  DdsLink there = Loopback();
+  there.set_domain(3);
+  Participant robot(there);
+  Writer<LowState> states(robot, kStateTopic, kMostStates);
+  DdsRobotLink link(there);
+  LowState state{}, heard{};
+  // Whoever is new is not heard at first.
+  bool any = false;
+  for (int i = 0; i < 200 && !any; ++i) {
+    states.Write(state);
+    any = link.Receive(&heard, link.Now() + kSecond / 20);
+  }
+  ASSERT_TRUE(any);
+  for (uint32_t tick = 1; tick <= 10; ++tick) {
+    state.tick = tick;
+    ASSERT_TRUE(states.Write(state));
+  }
+  uint32_t next = 1;
+  while (next <= 10 && link.Receive(&heard, link.Now() + 10 * kSecond)) {
+    if (heard.tick == next) ++next;
+  }
+  EXPECT_EQ(next, 11u);
+}
+
 TEST(Dds, RunsOfOtherTagsAreNotHeard) {
   DdsLink other = Loopback();
   other.set_domain(1);

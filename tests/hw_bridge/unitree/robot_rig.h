@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
@@ -33,6 +34,7 @@ struct RobotInMemory {
   bool silent = false;
   bool own_crc = false;                         // the test has set crc
   const unitree::LowState* verbatim = nullptr;  // said in place of `state`, as it is
+  std::vector<unitree::LowState> others;        // said by somebody else after each state
   std::string mode;                             // of the maker's controller
   bool answers = true, releases = true;
   int releases_asked = 0;
@@ -53,9 +55,14 @@ class MemoryRobotLink final : public unitree::RobotLink {
   }
   bool Receive(unitree::LowState* state, int64_t deadline) override {
     if (robot_->silent || !std::exchange(robot_->fresh, false)) {
+      if (next_other_ < robot_->others.size()) {
+        *state = robot_->others[next_other_++];
+        return true;
+      }
       now_ = std::max(now_, deadline);
       return false;
     }
+    next_other_ = 0;
     if (robot_->verbatim != nullptr) {
       *state = *robot_->verbatim;
       return true;
@@ -77,6 +84,7 @@ class MemoryRobotLink final : public unitree::RobotLink {
  private:
   RobotInMemory* robot_;
   mutable int64_t now_ = 0;
+  size_t next_other_ = 0;
 };
 
 class RobotRig : public BridgeBench {
