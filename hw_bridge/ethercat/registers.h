@@ -91,11 +91,15 @@ inline constexpr uint16_t kEeprom8Bytes = 0x0040;
 namespace sii {
 inline constexpr uint16_t kVendor = 0x08, kProduct = 0x0A, kRevision = 0x0C, kSerial = 0x0E;
 inline constexpr uint16_t kAlias = 0x04;
+inline constexpr uint16_t kChecksum = 0x07;  ///< of the words before it, in the low byte
 inline constexpr uint16_t kMailboxOutOffset = 0x18, kMailboxInOffset = 0x1A;  ///< size: next word
 inline constexpr uint16_t kMailboxProtocols = 0x1C;
 inline constexpr uint16_t kProtocolCoe = 0x0004;
+inline constexpr uint16_t kSize = 0x3E;        ///< KiBit, less one
+inline constexpr uint16_t kVersion = 0x3F;     ///< 1
 inline constexpr uint16_t kCategories = 0x40;  ///< first category: type, words that follow
-inline constexpr uint16_t kCategorySyncManagers = 41;
+inline constexpr uint16_t kCategoryStrings = 10, kCategoryGeneral = 30, kCategoryFmmu = 40,
+                          kCategorySyncManagers = 41;
 inline constexpr uint16_t kCategoryEnd = 0xFFFF;
 }  // namespace sii
 

@@ -92,28 +92,58 @@ void SlaveAccess::ReleaseEeprom() {
   owns_eeprom_ = false;
 }
 
-std::array<SyncManagerEntry, kNumSyncManagers> SlaveAccess::ReadSyncManagers() {
-  std::array<SyncManagerEntry, kNumSyncManagers> managers{};
+std::optional<SlaveAccess::Category> SlaveAccess::FindCategory(uint16_t wanted) {
   constexpr uint32_t kMaxWords = 0x4000;  // of the largest EEPROM in use, 32 KiB
   for (uint32_t word = sii::kCategories; word < kMaxWords;) {
     const uint32_t header = ReadEeprom(static_cast<uint16_t>(word));
     const uint32_t type = header & 0xFFFF, words = header >> 16;
     if (type == sii::kCategoryEnd) break;
-    if (type == sii::kCategorySyncManagers) {
-      constexpr uint32_t kEntryWords = 4;
-      for (uint32_t i = 0; i < words / kEntryWords && i < kNumSyncManagers; ++i) {
-        const auto at = static_cast<uint16_t>(word + 2 + kEntryWords * i);
-        const uint32_t area = ReadEeprom(at), use = ReadEeprom(static_cast<uint16_t>(at + 2));
-        managers[i] = {.start = static_cast<uint16_t>(area),
-                       .length = static_cast<uint16_t>(area >> 16),
-                       .control = static_cast<uint8_t>(use),
-                       .type = static_cast<uint8_t>(use >> 24)};
-      }
-      break;
-    }
-    word += 2 + words;
+    word += 2;
+    if (type == wanted) return Category{static_cast<uint16_t>(word), words};
+    word += words;
+  }
+  return std::nullopt;
+}
+
+std::array<SyncManagerEntry, kNumSyncManagers> SlaveAccess::ReadSyncManagers() {
+  std::array<SyncManagerEntry, kNumSyncManagers> managers{};
+  const std::optional<Category> category = FindCategory(sii::kCategorySyncManagers);
+  if (!category) return managers;
+  constexpr uint32_t kEntryWords = 4;
+  for (uint32_t i = 0; i < category->words / kEntryWords && i < kNumSyncManagers; ++i) {
+    const auto at = static_cast<uint16_t>(category->word + kEntryWords * i);
+    const uint32_t area = ReadEeprom(at), use = ReadEeprom(static_cast<uint16_t>(at + 2));
+    managers[i] = {.start = static_cast<uint16_t>(area),
+                   .length = static_cast<uint16_t>(area >> 16),
+                   .control = static_cast<uint8_t>(use),
+                   .type = static_cast<uint8_t>(use >> 24)};
   }
   return managers;
+}
+
+std::string SlaveAccess::ReadName() {
+  const std::optional<Category> general = FindCategory(sii::kCategoryGeneral);
+  const std::optional<Category> strings = FindCategory(sii::kCategoryStrings);
+  constexpr uint32_t kNameWord = 1;  // its high byte: which of the strings
+  if (!general || !strings || general->words <= kNameWord) return "";
+  const uint32_t wanted = ReadEeprom(general->word) >> 24;
+  uint32_t byte = 0, held = 0;
+  const auto next = [&] {
+    if (byte % 4 == 0) held = ReadEeprom(static_cast<uint16_t>(strings->word + byte / 2));
+    const uint32_t value = held >> (8 * (byte % 4)) & 0xFF;
+    ++byte;
+    return value;
+  };
+  const uint32_t bytes = 2 * strings->words;
+  const uint32_t count = bytes > 0 ? next() : 0;
+  for (uint32_t i = 1; i <= count && byte < bytes; ++i) {
+    std::string text;
+    for (uint32_t left = next(); left > 0 && byte < bytes; --left) {
+      text += static_cast<char>(next());
+    }
+    if (i == wanted) return text;
+  }
+  return "";
 }
 
 SlaveAccess::AlStatus SlaveAccess::ReadAlStatus() {

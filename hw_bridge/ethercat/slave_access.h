@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -94,6 +95,8 @@ class SlaveAccess {
   /// Hands the EEPROM over to the slave's application, which may need it on its way to PRE-OP.
   void ReleaseEeprom();
   Identity ReadIdentity();
+  /// The device's name in the EEPROM, as it stands there; empty: it has none.
+  std::string ReadName();
   /// By number, from the EEPROM; all zero where it has none.
   std::array<SyncManagerEntry, kNumSyncManagers> ReadSyncManagers();
   /// The number that the slave gives when it is asked for its identification (ETG.1020: AL control
@@ -158,6 +161,12 @@ class SlaveAccess {
   int64_t emergencies() const { return emergencies_; }
 
  private:
+  /// Of the EEPROM: its first word behind the header, and how many there are.
+  struct Category {
+    uint16_t word;
+    uint32_t words;
+  };
+  std::optional<Category> FindCategory(uint16_t wanted);
   int64_t Now() const { return transactions_->link()->Now(); }
   bool StateReached(AlState state, int64_t deadline);
   bool TryRequest(AlState state, int64_t deadline);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace poise::ethercat {
 namespace {
@@ -172,6 +173,10 @@ void SlaveSetup::SetTorqueMode(size_t slave, SlaveAccess* access) const {
     } catch (const SdoAbortError& error) {
       // A drive without the object has a limit of its own.
       if (error.code() != static_cast<uint32_t>(SdoAbort::kNoObject)) throw;
+      fmt::print(stderr,
+                 "warning: {}: has no object {:04X}: it does not keep torque within max_torque, {} "
+                 "per mille of its rating; only its own limit does\n",
+                 access->Describe(), object::kMaxTorque, drive.max_torque());
     }
   }
   if (image_->Sends(slave, object::kModeOfOperation) &&

@@ -57,6 +57,30 @@ int32_t Delay(std::span<const SlavePorts> slaves, std::span<const SlavePlace> pl
          static_cast<int32_t>(Between(above, 0, before)) + static_cast<int32_t>(branch - own) / 2;
 }
 
+/// The slave before `swapped` on the cable, which frames enter at port `entry`; -1: none known. It
+/// answers after all that hang behind it, and so its place among the answers does not tell.
+int BeforeOnCable(std::span<const SlavePorts> slaves, size_t swapped, int entry, int open) {
+  const std::vector<int> ports = ActivePorts(slaves[swapped]);
+  if (ports.size() < 2 || !slaves[swapped].has_times) return open;
+  const auto round_trip = [&](const SlavePorts& slave, int from) {
+    uint32_t longest = 0;
+    for (const int port : ActivePorts(slave))
+      longest = std::max(longest, Between(slave, from, port));
+    return longest;
+  };
+  // Of those whose frames are longer on their way, the one for which they are the least so.
+  const uint32_t own = round_trip(slaves[swapped], entry);
+  int before = -1;
+  uint32_t least = UINT32_MAX;
+  for (size_t i = 0; i < swapped; ++i) {
+    const uint32_t way = slaves[i].has_times ? round_trip(slaves[i], 0) : 0;
+    if (way <= own || way > least) continue;
+    least = way;
+    before = static_cast<int>(i);
+  }
+  return before;
+}
+
 }  // namespace
 
 std::vector<SlavePlace> FindTopology(std::span<const SlavePorts> slaves,
@@ -69,10 +93,11 @@ std::vector<SlavePlace> FindTopology(std::span<const SlavePorts> slaves,
   for (size_t i = 0; i < slaves.size(); ++i) {
     const int position = static_cast<int>(i);
     if (const int entry = EntryPort(slaves[i]); entry != 0) {
+      const int before = BeforeOnCable(slaves, i, entry, open.empty() ? -1 : open.back().slave);
       throw EthercatError(fmt::format(
           "{}: frames enter it at port {} instead of port 0: its IN and OUT are swapped, and every "
           "slave behind it is out of its place; plug the cable that comes from the master into IN",
-          describe(position), entry));
+          before >= 0 ? "the slave behind " + describe(before) : "the first slave", entry));
     }
     if (i > 0) {
       if (open.empty()) {

@@ -41,23 +41,30 @@ void ReadMapping(ethercat::SlaveAccess* slave, uint16_t assign, std::vector<uint
   }
 }
 
+/// What of a name can stand in a text file's quotes.
+std::string QuotableName(const std::string& name) {
+  std::string text;
+  for (const char c : name) {
+    if (c >= ' ' && c < 0x7F && c != '"' && c != '\\') text += c;
+  }
+  return text;
+}
+
 ScannedSlave ReadSlave(ethercat::SlaveAccess* slave) {
   ScannedSlave found;
   found.identity = slave->ReadIdentity();
   found.alias = slave->Read<uint16_t>(ethercat::reg::kStationAlias);
   found.identification = slave->ReadIdentification();
+  found.name = QuotableName(slave->ReadName());
   if (!slave->SetUpMailbox()) return found;
   slave->ReleaseEeprom();
   slave->ChangeState(ethercat::AlState::kPreOp);
   try {
-    const std::vector<uint8_t> name = slave->UploadBytes({0x1008, 0});
-    for (const uint8_t byte : name) {
-      if (byte >= ' ' && byte < 0x7F && byte != '"' && byte != '\\') {
-        found.name += static_cast<char>(byte);
-      }
-    }
+    const std::vector<uint8_t> bytes = slave->UploadBytes({0x1008, 0});
+    const std::string name = QuotableName({bytes.begin(), bytes.end()});
+    if (!name.empty()) found.name = name;
   } catch (const ethercat::SdoAbortError&) {
-    found.name.clear();  // a slave need not have one
+    // A slave need not have the object.
   }
   const uint32_t modes = UploadIfThere(slave, {ethercat::object::kSupportedModes, 0}).value_or(0);
   found.is_drive = (modes >> (ethercat::kModeCyclicTorque - 1) & 1) != 0;
@@ -98,9 +105,13 @@ std::vector<ScannedSlave> ScanChain(ethercat::Link* link) {
   std::array<uint8_t, 2> status{};
   const auto count =
       transactions.Execute(ethercat::Command::kBrd, 0, ethercat::reg::kAlStatus, status);
-  if (!count || *count == 0) {
+  if (!count) {
     throw ethercat::EthercatError(
-        "no slave answers; is the cable in, the chain powered, the link the right one?");
+        "no frame comes back; is the cable in, the chain powered, the link the right one?");
+  }
+  if (*count == 0) {
+    throw ethercat::EthercatError(
+        "frames come back, but no slave has touched them; does a switch or a loop send them back?");
   }
   std::array<uint8_t, 2> init{};
   ethercat::Put<uint16_t>(init, 0,

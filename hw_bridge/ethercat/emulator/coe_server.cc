@@ -42,13 +42,21 @@ void CoeServer::Abort(ObjectAddress object, SdoAbort code) {
           .size = 4});
 }
 
-void CoeServer::Handle(std::span<const uint8_t> payload) {
+std::optional<MailboxError> CoeServer::Handle(std::span<const uint8_t> payload) {
+  if (payload.size() < kCoeHeader) return MailboxError::kSizeTooShort;
+  const auto service = static_cast<CoeService>(Get<uint16_t>(payload, 0) >> 12);
+  if (service == static_cast<CoeService>(0)) return MailboxError::kInvalidHeader;
+  if (service != CoeService::kSdoRequest && service != CoeService::kSdoInformation) {
+    return MailboxError::kServiceNotSupported;
+  }
   const std::optional<CoeMessage> coe = DecodeCoe(payload);
-  if (coe && coe->service == CoeService::kSdoRequest) {
+  if (!coe) return MailboxError::kSizeTooShort;
+  if (service == CoeService::kSdoRequest) {
     HandleSdo(coe->sdo);
-  } else if (coe && coe->service == CoeService::kSdoInformation) {
+  } else {
     HandleInfo(coe->info);
   }
+  return std::nullopt;
 }
 
 void CoeServer::HandleSdo(const Sdo& sdo) {

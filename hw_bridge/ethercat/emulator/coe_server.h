@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "hw_bridge/ethercat/coe.h"
@@ -17,8 +18,9 @@ class CoeServer {
   CoeServer(ObjectDictionary* objects, size_t mailbox, bool complete_access)
       : objects_(objects), mailbox_(mailbox), complete_access_(complete_access) {}
 
-  /// Takes a CoE payload; answers are queued. A request that is none is answered by an abort.
-  void Handle(std::span<const uint8_t> payload);
+  /// Takes a CoE payload; answers are queued. A request that is none is answered by an abort, or by
+  /// the mailbox error returned.
+  std::optional<MailboxError> Handle(std::span<const uint8_t> payload);
   /// A message to be sent to the master, whole but for its counter; empty: none.
   bool has_answer() const { return !answers_.empty(); }
   std::vector<uint8_t> TakeAnswer();

@@ -44,9 +44,9 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
   velocity_ = add(object::kVelocity, 4, kTx, "Velocity actual value");
   error_code_ = add(object::kErrorCode, 2, kTx, "Error code");
   error_register_ = add(0x1001, 1, kReadOnly, "Error register");
-  add(object::kTargetPosition, 4, kRx, "Target position");
-  add(object::kTargetVelocity, 4, kRx, "Target velocity");
-  add(0x605A, 2, kRw, "Quick stop option code", kQuickStopSlowDown);
+  Object* const target_position = add(object::kTargetPosition, 4, kRx, "Target position");
+  Object* const target_velocity = add(object::kTargetVelocity, 4, kRx, "Target velocity");
+  Object* const quick_stop = add(0x605A, 2, kRw, "Quick stop option code", kQuickStopSlowDown);
   add(0x6073, 2, kRw, "Max current", config.peak_torque());
   add(object::kRatedCurrent, 4, kRw, "Motor rated current", config.rated_current());
   add(object::kRatedTorque, 4, kRw, "Motor rated torque",
@@ -62,10 +62,15 @@ EmulatedDrive::EmulatedDrive(const EmulatedDriveConfig& config, ObjectDictionary
     dictionary->Add({0x60C2, 2}, 1, kRw, 0xFD)->is_signed = true;
     dictionary->SetName(0x60C2, "Interpolation time period");
   }
-  for (Object* object :
-       {mode_, mode_display_, target_torque_, torque_object_, position_, velocity_}) {
+  for (Object* object : {mode_, mode_display_, target_torque_, torque_object_, position_, velocity_,
+                         target_position, target_velocity, quick_stop}) {
     object->is_signed = true;
   }
+  const auto in_range = [](bool good) { return good ? SdoAbort::kNone : SdoAbort::kValueRange; };
+  mode_->on_write = [in_range](uint32_t mode) {  // one of 6502, or none
+    return in_range(mode == 0 || mode == static_cast<uint32_t>(kModeCyclicTorque));
+  };
+  quick_stop->on_write = [in_range](uint32_t code) { return in_range(code <= 8 && code != 4); };
   Schedule(DriveState::kSwitchOnDisabled, 0);
   Report();
 }

@@ -15,6 +15,45 @@ int64_t Nanoseconds(double milliseconds) { return static_cast<int64_t>(milliseco
 
 uint32_t Mapping(uint16_t index, uint32_t bits) { return uint32_t{index} << 16 | bits; }
 
+/// Polynomial x^8 + x^2 + x + 1, begun with 0xFF, over the bytes of `words`.
+uint8_t SiiChecksum(std::span<const uint16_t> words) {
+  uint32_t crc = 0xFF;
+  for (const uint16_t word : words) {
+    for (const int shift : {0, 8}) {
+      crc ^= word >> shift & 0xFF;
+      for (int bit = 0; bit < 8; ++bit) crc = (crc << 1 ^ ((crc & 0x80) != 0 ? 0x07 : 0)) & 0xFF;
+    }
+  }
+  return static_cast<uint8_t>(crc);
+}
+
+/// Appends a category; `bytes` are filled up to whole words.
+void AddCategory(uint16_t type, std::vector<uint8_t> bytes, std::vector<uint16_t>* words) {
+  if (bytes.size() % 2 != 0) bytes.push_back(0);
+  words->insert(words->end(), {type, static_cast<uint16_t>(bytes.size() / 2)});
+  for (size_t i = 0; i < bytes.size(); i += 2) {
+    words->push_back(static_cast<uint16_t>(bytes[i] | bytes[i + 1] << 8));
+  }
+}
+
+/// ETG.2010. What is not said is zero.
+std::vector<uint8_t> SiiGeneral(const EmulatedDriveConfig& config) {
+  std::vector<uint8_t> general(32);
+  constexpr uint8_t kName = 1;  // the first of the strings
+  constexpr uint8_t kSdo = 1, kSdoInformation = 2, kPdoAssignment = 4, kPdoConfiguration = 8,
+                    kCompleteAccess = 32;
+  const bool free = !config.other() && config.fixed_rx_size() == 0 && config.fixed_tx_size() == 0;
+  general[2] = general[3] = kName;  // order, name
+  if (config.mailbox()) {
+    general[5] = static_cast<uint8_t>(kSdo | kSdoInformation | kPdoAssignment |
+                                      (free ? kPdoConfiguration : 0) |
+                                      (config.complete_access() ? kCompleteAccess : 0));
+  }
+  general[9] = config.other() ? 0 : 1;  // channels of CiA 402
+  general[16] = 0x11;                   // ports 0 and 1: MII
+  return general;
+}
+
 std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
   std::vector<uint16_t> words(sii::kCategories, 0);
   const auto put = [&words](size_t word, uint32_t value) {
@@ -26,6 +65,17 @@ std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
   put(sii::kProduct, config.product_code());
   put(sii::kRevision, config.revision());
   put(sii::kSerial, config.serial());
+  words[sii::kChecksum] = SiiChecksum(std::span(words).first(sii::kChecksum));
+  constexpr uint16_t kKibits = 16;
+  words[sii::kSize] = kKibits - 1;
+  words[sii::kVersion] = 1;
+  const std::string name = config.device_name().substr(0, 255);
+  std::vector<uint8_t> strings = {1, static_cast<uint8_t>(name.size())};
+  strings.insert(strings.end(), name.begin(), name.end());
+  AddCategory(sii::kCategoryStrings, strings, &words);
+  AddCategory(sii::kCategoryGeneral, SiiGeneral(config), &words);
+  constexpr uint8_t kOutputs = 1, kInputs = 2;
+  AddCategory(sii::kCategoryFmmu, {kOutputs, kInputs}, &words);
   // Sync manager category: start, length, control and status, activation and type.
   std::vector<uint16_t> managers;
   const auto add = [&managers](uint16_t start, uint16_t size, uint16_t control, uint16_t type) {
@@ -45,6 +95,8 @@ std::vector<uint16_t> MakeEeprom(const EmulatedDriveConfig& config) {
   words.push_back(sii::kCategoryEnd);
   return words;
 }
+
+SdoAbort InRange(bool good) { return good ? SdoAbort::kNone : SdoAbort::kValueRange; }
 
 int Rank(AlState state) {
   switch (state) {
@@ -123,8 +175,13 @@ void EmulatedSlave::AddCommonObjects() {
     constexpr uint32_t kDcSync0 = 2, kSupported = 0x0006;          // SM event and SYNC0
     constexpr uint32_t kCycle = 2'000'000, kLeastCycle = 125'000;  // ns
     objects_.Add({index, 0}, 1, kReadOnly, 0x20);
-    objects_.Add({index, 1}, 2, kRw, kDcSync0);
-    objects_.Add({index, 2}, 4, kRw, kCycle);
+    const bool inputs = index == 0x1C33;
+    objects_.Add({index, 1}, 2, kRw, kDcSync0, [inputs](uint32_t type) {
+      constexpr uint32_t kSmEvent = 1, kSm2Event = 0x22;
+      return InRange(type == kSmEvent || type == kDcSync0 || (inputs && type == kSm2Event));
+    });
+    objects_.Add({index, 2}, 4, kRw, kCycle,
+                 [](uint32_t cycle) { return InRange(cycle >= kLeastCycle); });
     objects_.Add({index, 4}, 2, kReadOnly, kSupported);
     objects_.Add({index, 5}, 4, kReadOnly, kLeastCycle);
     objects_.Add({index, 6}, 4, kReadOnly, 0);
@@ -183,6 +240,8 @@ void EmulatedSlave::AddFreePdo(uint16_t assign, uint16_t pdo, uint8_t mappable) 
       const SdoAbort abort = CheckMapping(mapping, mappable);
       if (abort != SdoAbort::kNone) return abort;
     }
+    // Entries are given anew: none of an earlier mapping is left to be counted.
+    for (uint8_t i = 1; count == 0 && i <= kMostMapped; ++i) objects_.Find({pdo, i})->value = 0;
     return SdoAbort::kNone;
   });
   for (uint8_t i = 1; i <= kMostMapped; ++i) {
@@ -393,21 +452,21 @@ void EmulatedSlave::AnswerMailbox() {
   if (!request_) {
     const std::span<const uint8_t> bytes = esc_.TakeMailbox();
     const std::optional<MailboxMessage> message = DecodeMailbox(bytes);
+    // Its header tells of more than the mailbox holds.
+    if (!bytes.empty() && !message) SendMailboxError(MailboxError::kInvalidSize);
     const bool repeated = message && message->counter != 0 && message->counter == request_counter_;
     if (message && !repeated) {
       request_counter_ = message->counter;
       reply_at_ = now_ + Nanoseconds(config_.mailbox_time() * 1e-3);
       if (message->type == MailboxType::kCoe) {
         request_.emplace(message->payload.begin(), message->payload.end());
-      } else {
-        std::vector<uint8_t> error(kMailboxHeader + 4);
-        EncodeMailboxError(MailboxError::kUnsupportedProtocol, 0, error);
-        SendMailbox(error);
+      } else if (message->type != MailboxType::kError) {
+        SendMailboxError(MailboxError::kUnsupportedProtocol);
       }
     }
   }
   if (request_ && now_ >= reply_at_) {
-    coe_.Handle(*request_);
+    if (const auto error = coe_.Handle(*request_)) SendMailboxError(*error);
     request_.reset();
   }
   if (!emergencies_.empty()) {
@@ -419,6 +478,12 @@ void EmulatedSlave::AnswerMailbox() {
   } else if (coe_.has_answer() && !esc_.BeginMailboxReply().empty()) {
     SendMailbox(coe_.TakeAnswer());
   }
+}
+
+void EmulatedSlave::SendMailboxError(MailboxError detail) {
+  std::vector<uint8_t> error(kMailboxHeader + 4);
+  EncodeMailboxError(detail, 0, error);
+  SendMailbox(error);
 }
 
 void EmulatedSlave::SendMailbox(const std::vector<uint8_t>& message) {

@@ -69,6 +69,7 @@ class EmulatedSlave {
   void Fail(AlStatusCode code);
   void FinishTransition();
   void AnswerMailbox();
+  void SendMailboxError(MailboxError detail);
   void SendMailbox(const std::vector<uint8_t>& message);
   void ApplyOutputs();
   void UpdateInputs();

@@ -138,8 +138,6 @@ RawLink::RawLink(const std::string& interface, Side side) : side_(side) {
   if (ioctl(socket_, SIOCGIFHWADDR, &request) != 0) fail(std::strerror(errno));
   std::fill_n(out_.begin(), 6, uint8_t{0xFF});  // to all
   std::memcpy(&out_[6], request.ifr_hwaddr.sa_data, 6);
-  // A master's own frames must not look as if they had passed a slave.
-  if (side == Side::kMaster) out_[6] &= static_cast<uint8_t>(~kLocallyAdministered);
   out_[12] = kEtherType >> 8;
   out_[13] = kEtherType & 0xFF;
 }
@@ -167,8 +165,11 @@ size_t RawLink::Receive(std::span<uint8_t> frame, int64_t deadline) {
                                       reinterpret_cast<sockaddr*>(&from), &from_size);
     if (received <= static_cast<ssize_t>(kEthernetHeader)) continue;
     if (from.sll_pkttype == PACKET_OUTGOING) continue;
-    const bool passed_a_slave = (in_[6] & kLocallyAdministered) != 0;
-    if (side_ == Side::kMaster && !passed_a_slave) continue;
+    // Another master's may pass here too. Of its own, what comes in has been at the slaves or been
+    // sent back on the way, which the working counter tells; an ESC changes a bit of the source.
+    const bool own = ((in_[6] ^ out_[6]) & ~kLocallyAdministered) == 0 &&
+                     std::equal(in_.begin() + 7, in_.begin() + 12, out_.begin() + 7);
+    if (side_ == Side::kMaster && !own) continue;
     if (side_ == Side::kSlaves) {
       std::copy_n(in_.begin(), 12, out_.begin());
       out_[6] |= kLocallyAdministered;

@@ -60,7 +60,7 @@ class RawLink final : public SocketLink {
  public:
   /// A slave's side gives frames back with the addresses they came with, the locally administered
   /// bit of the source set, as an ESC does to the frames that pass it (whether it was set before or
-  /// not); a master's side takes only such frames.
+  /// not); a master's side takes only those with its own source, with or without the bit.
   enum class Side { kMaster, kSlaves };
   /// Throws EthercatError: no such interface, interface down, no privilege.
   RawLink(const std::string& interface, Side side);

@@ -117,6 +117,32 @@ TEST_F(EthercatChain, EepromShowsIdentityAfterItsBusyTime) {
   EXPECT_EQ(status[1] & 0x80, 0);
 }
 
+// ETG.2010: a check sum over the first seven words, size, version, categories.
+TEST_F(EthercatChain, EepromIsWhole) {
+  AddressAll();
+  const auto word = [&](uint16_t at) {
+    Do(Command::kFpwr, 1001, reg::kEepromControl,
+       {0x00, 0x01, static_cast<uint8_t>(at), static_cast<uint8_t>(at >> 8), 0x00, 0x00});
+    now_ += kMillisecond;
+    return Read(Command::kFprd, 1001, reg::kEepromData, 4).As<uint16_t>();
+  };
+  EXPECT_EQ(word(0x07), 0x30);  // of seven words of zero
+  EXPECT_EQ(word(0x3F), 1);
+  const int words = (word(0x3E) + 1) * 64;  // KiBit
+  std::vector<int> types;
+  int at = 0x40;
+  for (; at < words && word(static_cast<uint16_t>(at)) != 0xFFFF;
+       at += 2 + word(static_cast<uint16_t>(at + 1))) {
+    types.push_back(word(static_cast<uint16_t>(at)));
+    if (types.back() == 30) {  // General: CoE details, all but upload at startup
+      EXPECT_EQ(word(static_cast<uint16_t>(at + 4)) >> 8, 0x2F);
+    }
+    if (types.back() == 40) EXPECT_EQ(word(static_cast<uint16_t>(at + 2)), 0x0201);  // FMMUs
+  }
+  EXPECT_LT(at, words);
+  EXPECT_EQ(types, (std::vector<int>{10, 30, 40, 41}));
+}
+
 TEST_F(EthercatChain, StateMachineNamesWhyItStays) {
   AddressAll();
   const auto request = [this](uint8_t state) {

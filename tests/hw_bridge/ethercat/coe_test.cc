@@ -54,7 +54,60 @@ TEST_F(CoeSlave, AbortsByAnSdoRequest) {
               ElementsAreArray({0x00, 0x20, 0x80, 0x00, 0x10, 0x00, 0x01, 0x00, 0x04, 0x05}));
 }
 
-// A service 9, or a protocol that is not CoE, is a mailbox error or nothing; the mailbox goes on.
+// ETG.1000.4, table 30: what cannot be answered is a mailbox error, so that no master waits.
+TEST_F(CoeSlave, AnswersDamagedMessagesByMailboxErrors) {
+  const auto error = [&](const Bytes& message) {
+    const Bytes answer = Mailbox(message);
+    return answer.size() == 10 && (answer[5] & 0x0F) == 0 ? int{answer[8]} : -1;
+  };
+  EXPECT_EQ(error({0x00, 0x00, 0, 0, 0, 0x13}), 6);                 // a length of 0
+  EXPECT_EQ(error({0xFF, 0xFF, 0, 0, 0, 0x23, 0, 0x20}), 8);        // of more than there is
+  EXPECT_EQ(error(Message(3, {0x00, 0x90, 0x40, 0x00})), 4);        // service 9
+  EXPECT_EQ(error(Message(4, {0x00, 0x00, 0x40, 0x00})), 5);        // no service
+  EXPECT_EQ(error(Message(5, {0x00, 0x20, 0x40, 0x00, 0x10})), 6);  // half of a request
+  counter_ = 5;
+  EXPECT_EQ(Ask({0x00, 0x20, 0x40, 0x00, 0x10, 0x00, 0, 0, 0, 0})[2], 0x43);
+}
+
+TEST_F(CoeSlave, RefusesValuesOutOfRange) {
+  const auto write = [&](uint16_t index, uint8_t subindex, int size, uint32_t value) {
+    const Bytes answer =
+        Ask({0x00, 0x20, static_cast<uint8_t>(0x23 | (4 - size) << 2), static_cast<uint8_t>(index),
+             static_cast<uint8_t>(index >> 8), subindex, static_cast<uint8_t>(value),
+             static_cast<uint8_t>(value >> 8), static_cast<uint8_t>(value >> 16),
+             static_cast<uint8_t>(value >> 24)});
+    return answer[2] == 0x80 ? Get<uint32_t>(answer, 6) : 0U;
+  };
+  constexpr uint32_t kRange = 0x06090030;
+  EXPECT_EQ(write(0x6060, 0, 1, 99), kRange);
+  EXPECT_EQ(write(0x6060, 0, 1, 8), kRange);  // 6502 has mode 10 alone
+  EXPECT_EQ(write(0x6060, 0, 1, 10), 0U);
+  EXPECT_EQ(write(0x605A, 0, 2, 77), kRange);
+  EXPECT_EQ(write(0x605A, 0, 2, 6), 0U);
+  EXPECT_EQ(write(0x1C32, 1, 2, 99), kRange);
+  EXPECT_EQ(write(0x1C32, 1, 2, 2), 0U);
+  EXPECT_EQ(write(0x1C32, 2, 4, 1000), kRange);
+  // More entries than have been given since the mapping was taken away.
+  for (uint8_t i = 1; i <= 5; ++i) EXPECT_EQ(write(0x1607, i, 4, 0x60400010), 0U);
+  EXPECT_EQ(write(0x1607, 0, 1, 5), 0U);
+  EXPECT_EQ(write(0x1607, 0, 1, 0), 0U);
+  EXPECT_EQ(write(0x1607, 1, 4, 0x60710010), 0U);
+  EXPECT_NE(write(0x1607, 0, 1, 5), 0U);
+  EXPECT_EQ(write(0x1607, 0, 1, 1), 0U);
+}
+
+// ETG.1000.6, table 64: 0003h INTEGER16, 0004h INTEGER32; CiA 402 has these objects signed.
+TEST_F(CoeSlave, TellsSignedObjectsBySdoInformation) {
+  const auto type = [&](uint16_t index) {
+    const Bytes answer = Ask({0x00, 0x80, 0x05, 0, 0, 0, static_cast<uint8_t>(index),
+                              static_cast<uint8_t>(index >> 8), 0, 0});
+    return answer.size() > 11 ? Get<uint16_t>(answer, 10) : uint16_t{0};
+  };
+  for (const uint16_t index : {0x607A, 0x60FF, 0x6064, 0x606C}) EXPECT_EQ(type(index), 4) << index;
+  for (const uint16_t index : {0x605A, 0x6071, 0x6077}) EXPECT_EQ(type(index), 3) << index;
+}
+
+// A protocol that is not CoE is a mailbox error; the mailbox goes on.
 TEST_F(CoeSlave, AnswersAnotherProtocolByAMailboxError) {
   Bytes eoe = {0x04, 0x00, 0, 0, 0, 0x12, 0, 0, 0, 0};  // type 2
   // ETG.1000.4: type 0, then 0001h (mailbox command) and 0002h (unsupported protocol).

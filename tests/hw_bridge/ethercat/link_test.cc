@@ -245,6 +245,45 @@ TEST(RawLink, AnswersAMasterWithALocallyAdministeredAddress) {
   close(master);
 }
 
+// Some slaves, simulated ones above all, send frames back with the source as it was.
+TEST(RawLink, TakesItsOwnFramesBackWithoutThatBitAndNobodyElses) {
+  VethPair pair;
+  if (!pair.created()) {
+    GTEST_SKIP() << "no veth pair can be made here: needs root (CAP_NET_ADMIN) and `ip`";
+  }
+  RawLink master(pair.a(), RawLink::Side::kMaster);
+  const int slaves = socket(AF_PACKET, SOCK_RAW, 0);
+  sockaddr_ll address{};
+  address.sll_family = AF_PACKET;
+  address.sll_protocol = htons(0x88A4);
+  address.sll_ifindex = static_cast<int>(if_nametoindex(pair.b().c_str()));
+  ASSERT_EQ(bind(slaves, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  std::array<uint8_t, 46> sent{0x2C, 0x10};
+  for (const int change : {0, 1, 2}) {  // none; that bit; another master's address
+    sent[2] = static_cast<uint8_t>(change);
+    ASSERT_TRUE(master.Send(sent));
+    std::array<uint8_t, 1500> frame{};
+    sockaddr_ll from{};
+    ssize_t size = 0;
+    do {
+      socklen_t length = sizeof(from);
+      size = recvfrom(slaves, frame.data(), frame.size(), 0, reinterpret_cast<sockaddr*>(&from),
+                      &length);
+      ASSERT_GT(size, 0);
+    } while (from.sll_pkttype == PACKET_OUTGOING);
+    if (change == 1) frame[6] ^= 0x02;
+    if (change == 2) frame[11] ^= 0x01;
+    ASSERT_EQ(send(slaves, frame.data(), static_cast<size_t>(size), 0), size);
+    std::array<uint8_t, 1500> back{};
+    const size_t received = master.Receive(back, master.Now() + kSecond / 5);
+    EXPECT_EQ(received > 0, change != 2) << change;
+    if (received > 0) {
+      EXPECT_EQ(back[2], change);
+    }
+  }
+  close(slaves);
+}
+
 // Two chains on one machine: a link that opens beside a busy one takes nothing of that one's.
 TEST(RawLink, TakesFramesOfItsOwnInterfaceAlone) {
   VethPair busy("x");

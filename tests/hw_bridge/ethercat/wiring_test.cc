@@ -63,12 +63,12 @@ TEST(Topology, NamesWhatCannotBe) {
   };
   // The last slave, whose only plug is in OUT.
   EXPECT_THAT(error({{.dl_status = Open({0, 1})}, {.dl_status = Open({1})}}),
-              AllOf(HasSubstr("slave 1"), HasSubstr("IN and OUT are swapped")));
+              AllOf(HasSubstr("the slave behind slave 0:"), HasSubstr("IN and OUT are swapped")));
   // One in the middle: port 1 had the frame first.
   EXPECT_THAT(error({{.dl_status = Open({0, 1}), .has_times = true, .times = {10, 50, 0, 0}},
                      {.dl_status = Open({0}), .has_times = true, .times = {30, 0, 0, 0}},
                      {.dl_status = Open({0, 1}), .has_times = true, .times = {40, 20, 0, 0}}}),
-              AllOf(HasSubstr("slave 2"), HasSubstr("swapped")));
+              AllOf(HasSubstr("the slave behind slave 0:"), HasSubstr("swapped")));
   // The same without clocks: its place in the chain does not fit its ports.
   EXPECT_THAT(
       error({{.dl_status = Open({0, 1})}, {.dl_status = Open({0})}, {.dl_status = Open({0, 1})}}),
@@ -111,12 +111,32 @@ TEST(EthercatWiring, RefusesADriveWhoseCablesAreSwapped) {
       const std::string error = ErrorOf([&] { bench.master->Start(); });
       EXPECT_THAT(error, HasSubstr("swapped")) << swapped << clocks;
       for (const TestLoad& load : bench.loads) EXPECT_EQ(load.torque_, 0);
-      // It answers after those behind it.
+      // It answers after those behind it; named is its place on the cable.
       if (clocks) {
-        EXPECT_THAT(error, HasSubstr("slave 3"));
+        EXPECT_THAT(error, HasSubstr("the slave behind slave " + std::to_string(swapped - 1)));
       }
     }
   }
+}
+
+TEST(EthercatWiring, NamesTheSixthOfTwelveWhoseCablesAreSwapped) {
+  for (const int swapped : {0, 5}) {
+    Bench bench(12);
+    bench.chain_config.set_hop(700);
+    bench.chain_config.mutable_drive(swapped)->set_swapped(true);
+    bench.Build();
+    const std::string error = ErrorOf([&] { bench.master->Start(); });
+    EXPECT_THAT(error, HasSubstr(swapped == 0 ? "the first slave: frames enter it at port 1"
+                                              : "the slave behind slave 4"));
+  }
+}
+
+TEST(EthercatWiring, ReadsADrivesNameFromItsEeprom) {
+  Bench bench(2);
+  bench.chain_config.mutable_drive(1)->set_device_name("X1");
+  bench.Start();
+  EXPECT_EQ(bench.master->slave(0).ReadName(), "Poise emulated servo drive");
+  EXPECT_EQ(bench.master->slave(1).ReadName(), "X1");
 }
 
 TEST(EthercatWiring, FindsDrivesByTheirIdentification) {
@@ -194,7 +214,10 @@ TEST(EthercatWiring, RunsADriveWhosePdosLackMaxTorqueAndMode) {
   without.master_config = bench.master_config;
   without.chain_config = bench.chain_config;
   without.chain_config.mutable_drive(0)->add_lacks(0x6072);
+  testing::internal::CaptureStderr();
   without.Start();
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              AllOf(HasSubstr("warning: slave 0"), HasSubstr("has no object 6072")));
   without.SetTorque(3000, 0);
   without.Drive(DriveGoal::kEnabled, 20);
   EXPECT_NEAR(without.loads[0].torque_, 2 * 1.5, 1e-9);
