@@ -24,6 +24,7 @@ void Append(Word word, std::vector<uint8_t>* to) {
 EventLogWriter::EventLogWriter(const std::string& path)
     : path_(path), log_(lcm_eventlog_create(path.c_str(), "w")) {
   if (!log_) throw LogError(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  RemoveSums(path);
 }
 
 void EventLogWriter::Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data) {
@@ -38,6 +39,7 @@ void EventLogWriter::Write(std::string_view channel, int64_t utime, std::span<co
   if (std::fwrite(record_.data(), 1, record_.size(), log_->f) != record_.size()) {
     throw LogError(fmt::format("{}: writing failed: {}", path_, std::strerror(errno)));
   }
+  sums_.Add(record_);
   ++events_;
 }
 
@@ -47,9 +49,10 @@ void EventLogWriter::Flush() {
   }
 }
 
-void EventLogWriter::Close() {
+void EventLogWriter::Close(bool sums) {
   Flush();
   log_.reset();
+  if (sums) sums_.Write(path_);
 }
 
 }  // namespace poise::logging

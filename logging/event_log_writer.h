@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "logging/log_sums.h"
+
 namespace poise::logging {
 
 /// A log that cannot be written or read. what() is one line naming the file and the reason.
@@ -23,14 +25,14 @@ class LogError : public std::runtime_error {
 /// function writes it in eight pieces.
 class EventLogWriter {
  public:
-  /// Replaces a file of that name. Throws LogError.
+  /// Replaces a file of that name, and the sums beside it. Throws LogError.
   explicit EventLogWriter(const std::string& path);
   /// `utime` in us. Throws LogError.
   void Write(std::string_view channel, int64_t utime, std::span<const uint8_t> data);
   /// Hands what is written to the system. Throws LogError.
   void Flush();
-  /// Throws LogError.
-  void Close();
+  /// With `sums`, check sums of what is written go beside the log (LogSums). Throws LogError.
+  void Close(bool sums = false);
   int64_t events() const { return events_; }
   bool open() const { return log_ != nullptr; }
 
@@ -40,6 +42,7 @@ class EventLogWriter {
   };
   std::string path_;
   std::vector<uint8_t> record_;
+  LogSums sums_;
   std::unique_ptr<lcm_eventlog_t, CloseLog> log_;
   int64_t events_ = 0;
 };

@@ -127,7 +127,7 @@ void RunLogWriter::Close() {
     WriteTick(tick);
     for (const Lane& lane : lanes_) missing_ += !lane.external && lane.next_tick <= tick ? 1 : 0;
   }
-  log_.Close();
+  log_.Close(/*sums=*/true);
 }
 
 run_info_t MakeRunInfo(const RunSpec& spec, const std::string& scenario) {

@@ -219,6 +219,23 @@ TEST_F(ReplayTest, DamagedRunInfoIsTakenFromTheFolder) {
   EXPECT_HAS(no_scenario, "scenario.pbtxt is not beside it");
 }
 
+TEST_F(ReplayTest, AlteredBytesAreFoundAndALogWithoutSumsIsStillRead) {
+  Run({"--inline"});
+  const ProgramResult whole = RunPoise({"log", "check", run_});
+  EXPECT_HAS(whole, "whole, and as it was written");
+  std::string bytes = ReadAll(run_ + "/run.lcm");
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  std::ofstream(run_ + "/run.lcm", std::ios::binary) << bytes;
+  const ProgramResult altered = RunPoise({"log", "check", run_});
+  EXPECT_EQ(altered.exit_code, 1);
+  EXPECT_HAS(altered, "are not those that were written");
+  const ProgramResult report = RunPoise({"report", run_, "--no-html"});
+  EXPECT_HAS(report, "are not those that were written");
+  std::filesystem::remove(run_ + "/run.lcm.crc32");
+  const ProgramResult unknown = RunPoise({"log", "check", run_});
+  EXPECT_HAS(unknown, "contents not checked");
+}
+
 TEST_F(ReplayTest, InterruptedRunReplaysUpToItsEnd) {
   PoiseProgram program({"run", StandScenario(), "--out", run_, "--duration", "600"});
   ASSERT_TRUE(WaitForLog(run_, 200'000));

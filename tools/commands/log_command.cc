@@ -5,6 +5,7 @@
 #include "fmt/format.h"
 #include "logging/export/log_export.h"
 #include "logging/log_cut.h"
+#include "logging/log_sums.h"
 #include "logging/log_survey.h"
 #include "logging/printable.h"
 #include "logging/replay/log_pack.h"
@@ -103,13 +104,17 @@ int Info(const std::string& run) {
 int Check(const std::string& run, bool all) {
   const std::string log = FindLog(run).string();
   const logging::LogSurvey survey = logging::SurveyLog(log);
-  const std::vector<std::string> problems = survey.Problems(all ? 0 : kPlaces);
+  std::vector<std::string> problems = survey.Problems(all ? 0 : kPlaces);
+  const auto altered = logging::CheckSums(log);
+  if (altered) problems.insert(problems.end(), altered->begin(), altered->end());
   for (const std::string& problem : problems) fmt::print("{}\n", problem);
   int64_t messages = 0;
   for (const logging::ChannelSurvey& channel : survey.channels) messages += channel.ticks.messages;
   fmt::print("{}: {} events; {} messages of {} channels, ticks {} to {}: {}\n", log, survey.events,
              messages, survey.channels.size(), survey.first_tick, survey.end_tick - 1,
-             problems.empty() ? "whole" : "NOT WHOLE");
+             !problems.empty() ? "NOT WHOLE"
+             : altered         ? "whole, and as it was written"
+                               : "whole; contents not checked (no check sums are beside it)");
   if (!problems.empty() && survey.spec.realtime()) {
     fmt::print(
         "The run was in real time: a component sends nothing for ticks that reach it too late. "

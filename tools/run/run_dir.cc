@@ -13,6 +13,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
+#include "logging/log_sums.h"
 #include "logging/printable.h"
 #include "logging/run_info.h"
 #include "tools/cli/output_place.h"
@@ -25,9 +26,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFiles[] = {"run.lcm",       "run.packed",     "summary.json",
-                                  "recorder.json", "run_spec.pbtxt", "scenario.pbtxt",
-                                  "report.html"};
+constexpr const char* kFiles[] = {"run.lcm",        "run.lcm.crc32", "run.packed",
+                                  "summary.json",   "recorder.json", "run_spec.pbtxt",
+                                  "scenario.pbtxt", "report.html"};
 
 /// The folder or log that `run` means. Throws ConfigError.
 fs::path FindRun(const std::string& run) {
@@ -159,6 +160,10 @@ fs::path FindLog(const std::string& run) {
 void WarnOfRunInfo(const fs::path& log) {
   const std::string warning = logging::RunInfoWarning(log.string());
   if (!warning.empty()) fmt::print(stderr, "warning: {}\n", logging::ForTerminal(warning));
+  for (const std::string& problem :
+       logging::CheckSums(log.string()).value_or(std::vector<std::string>{})) {
+    fmt::print(stderr, "warning: {}: {}\n", logging::ForTerminal(log.string()), problem);
+  }
 }
 
 RunSpec ReadRunSpec(const std::string& run) {
