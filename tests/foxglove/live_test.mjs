@@ -161,6 +161,8 @@ test('pages of other sites, other names and other protocols are refused', async 
   }
   assert.match(await firstLine(upgrade('', undefined, '')), /400/);
   assert.match(await firstLine(upgrade('', undefined, 'Sec-WebSocket-Protocol: other\r\n')), /400/);
+  assert.match(await firstLine(upgrade(`Host: 127.0.0.1:${port}\r\n`)), /400/);
+  assert.match(await firstLine(upgrade().replace(/Sec-WebSocket-Key: .*/, 'Sec-WebSocket-Key: abc')), /400/);
   assert.match(await firstLine(get('')), /426/);
   // As fast as they come: who has been refused takes nobody's place.
   for (let i = 0; i < 200; ++i) assert.match(await firstLine(get('')), /426/, `${i}`);

@@ -175,7 +175,8 @@ TEST(ViewAccessTest, ReadsTargetsAndTokens) {
   EXPECT_EQ(target->path, "/stream");
   EXPECT_EQ(target->token, "ab");
   EXPECT_EQ(target->from, 12);
-  for (const char* wrong : {"/?from=", "/?from=-1", "/?from=1x", "/?from=99999999999999999999"}) {
+  for (const char* wrong : {"/?from=", "/?from=-1", "/?from=1x", "/?from=99999999999999999999",
+                            "/?token=x&token=ab", "/?token=ab&token=ab"}) {
     EXPECT_FALSE(ReadTarget(wrong)) << wrong;
   }
   const std::string token = MakeToken();

@@ -92,7 +92,9 @@ void FoxgloveClient::Close() {
 void FoxgloveClient::Answer() {
   const auto& request = parser_.get();
   const auto origin = request.find(http::field::origin);
-  if (!IsHere(View(request[http::field::host]), host_->port())) {
+  if (!IsUnambiguous(request)) {
+    Respond(http::status::bad_request, "one Host and one Origin at most\n");
+  } else if (!IsHere(View(request[http::field::host]), host_->port())) {
     Respond(http::status::forbidden, fmt::format("only as ws://127.0.0.1:{}\n", host_->port()));
   } else if (origin != request.end() && !host_->IsOriginAllowed(View(origin->value()))) {
     Respond(http::status::forbidden,
@@ -101,6 +103,8 @@ void FoxgloveClient::Answer() {
     Respond(
         http::status::upgrade_required,
         fmt::format("open ws://127.0.0.1:{} in Foxglove: \"Open connection\"\n", host_->port()));
+  } else if (!IsWebSocketKey(View(request[http::field::sec_websocket_key]))) {
+    Respond(http::status::bad_request, "Sec-WebSocket-Key is not 16 bytes in base64\n");
   } else if (!Lists(View(request[http::field::sec_websocket_protocol]), kProtocol)) {
     Respond(http::status::bad_request, fmt::format("the subprotocol must be {}\n", kProtocol));
   } else {

@@ -6,12 +6,14 @@
 #include <cerrno>
 #include <charconv>
 #include <system_error>
+#include <utility>
 
 #include "fmt/format.h"
 
 namespace poise {
 std::optional<ViewTarget> ReadTarget(std::string_view target) {
   ViewTarget read;
+  bool token = false;
   const size_t question = target.find('?');
   read.path = target.substr(0, question);
   std::string_view rest = question == target.npos ? "" : target.substr(question + 1);
@@ -22,7 +24,10 @@ std::optional<ViewTarget> ReadTarget(std::string_view target) {
     const size_t equals = pair.find('=');
     if (equals == pair.npos) continue;
     const std::string_view key = pair.substr(0, equals), value = pair.substr(equals + 1);
-    if (key == "token") read.token = value;
+    if (key == "token") {
+      if (std::exchange(token, true)) return {};
+      read.token = value;
+    }
     if (key != "from") continue;
     const char* const last = value.data() + value.size();
     const auto [parsed, error] = std::from_chars(value.data(), last, read.from);

@@ -150,7 +150,9 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
         origin != request.end() && !IsOriginHere(View(origin->value()), server_->port_);
     const std::optional<ViewTarget> target = ReadTarget(View(request.target()));
     const std::string& token = server_->control_.token;
-    if (!IsHere(View(request[http::field::host]), server_->port_) || foreign) {
+    if (!IsUnambiguous(request)) {
+      Respond(http::status::bad_request, "one Host and one Origin at most\n");
+    } else if (!IsHere(View(request[http::field::host]), server_->port_) || foreign) {
       Respond(http::status::forbidden,
               fmt::format("only for http://127.0.0.1:{}/\n", server_->port_));
     } else if (!token.empty() && (!target || !SameToken(target->token, token))) {
@@ -158,6 +160,8 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
     } else if (websocket::is_upgrade(request)) {
       if (!target || target->path != "/stream") {
         Respond(http::status::not_found, "the stream is /stream or /stream?from=TICK\n");
+      } else if (!IsWebSocketKey(View(request[http::field::sec_websocket_key]))) {
+        Respond(http::status::bad_request, "Sec-WebSocket-Key is not 16 bytes in base64\n");
       } else if (server_->streams() >= kMaxStreams) {
         Respond(http::status::service_unavailable, "too many pages are open\n");
       } else {

@@ -1,6 +1,8 @@
 #include "tools/run/loopback.h"
 
+#include <algorithm>
 #include <boost/beast/core/string.hpp>
+#include <cctype>
 #include <cstdint>
 
 #include "components/framework/configuration/configuration.h"
@@ -39,6 +41,13 @@ bool IsHere(std::string_view host, int port) {
     if (port == 80 && SameHost(host, name)) return true;
   }
   return false;
+}
+
+bool IsWebSocketKey(std::string_view key) {
+  constexpr size_t kDigits = 22;
+  return key.size() == kDigits + 2 && key.ends_with("==") &&
+         std::all_of(key.begin(), key.begin() + kDigits,
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '+' || c == '/'; });
 }
 
 bool IsOriginHere(std::string_view origin, int port) {

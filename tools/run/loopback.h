@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/http/field.hpp>
 #include <string_view>
 
 namespace poise {
@@ -16,5 +17,16 @@ int ListenHere(int port, std::string_view flag, std::string_view advice,
 bool IsHere(std::string_view host, int port);
 /// "http://" before one of these.
 bool IsOriginHere(std::string_view origin, int port);
+
+/// Whether a request's fields of which there may be but one are no more: where it goes and comes
+/// from must not depend on who reads it (RFC 9112, 3.2).
+template <class Request>
+bool IsUnambiguous(const Request& request) {
+  namespace http = boost::beast::http;
+  return request.count(http::field::host) <= 1 && request.count(http::field::origin) <= 1 &&
+         request.count(http::field::sec_websocket_key) <= 1;
+}
+/// A key of WebSocket's handshake: 16 bytes in base64 (RFC 6455, 4.2.1).
+bool IsWebSocketKey(std::string_view key);
 
 }  // namespace poise

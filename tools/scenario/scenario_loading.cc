@@ -151,10 +151,11 @@ void CheckScenario(const LoadedScenario& loaded) {
       FailLimits(loaded, i);
     }
   }
+  // As the files have it: an ablation may have cleared what an assumption is about.
+  const Scenario files = s.assumption_size() > 0 ? loaded.files.Merged() : Scenario();
   for (int i = 0; i < s.assumption_size(); ++i) {
     const Assumption& assumption = s.assumption(i);
-    // As the files have it: an ablation may have cleared what the assumption is about.
-    if (!HasField(s, assumption.field()) && !HasField(loaded.files.Merged(), assumption.field())) {
+    if (!HasField(s, assumption.field()) && !HasField(files, assumption.field())) {
       const std::string former = FormerField(assumption.field());
       fail(fmt::format("assumption[{}].field", i),
            fmt::format("the scenario sets no field '{}'{}", assumption.field(),
