@@ -31,13 +31,13 @@ using ::testing::HasSubstr;
 using Bytes = std::vector<uint8_t>;
 
 template <class T>
-Bytes Encode(const T& message) {
+Bytes BytesOf(const T& message) {
   Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   return bytes;
 }
 
-void PutInt64(int64_t value, uint8_t* data) {
+void StoreInt64(int64_t value, uint8_t* data) {
   for (int k = 0; k < 8; ++k) {
     data[k] = static_cast<uint8_t>(static_cast<uint64_t>(value) >> (56 - 8 * k));
   }
@@ -74,12 +74,12 @@ class Forger {
       Bytes bytes(packet.data, packet.data + packet.size);
       if (bytes.size() < at + 24) continue;
       const int64_t tick = ReadInt64(&bytes[at + 8]);
-      PutInt64(tick + 1, &bytes[at + 8]);
+      StoreInt64(tick + 1, &bytes[at + 8]);
       if (of.name() == "JOINT_COMMAND") {
         const double torque = tick % 2 == 0 ? 10'000 : -10'000;  // N*m
         int64_t pattern = 0;
         std::memcpy(&pattern, &torque, sizeof(pattern));
-        for (size_t k = at + 24; k + 8 <= bytes.size(); k += 8) PutInt64(pattern, &bytes[k]);
+        for (size_t k = at + 24; k + 8 <= bytes.size(); k += 8) StoreInt64(pattern, &bytes[k]);
       } else {
         bytes.back() ^= 1;
       }
@@ -90,14 +90,14 @@ class Forger {
     run_control_t control{};
     control.run_id = spec_.run_id();
     control.command = run_control_t::COMMAND_STOP;
-    Send(0, kControlChannel, Encode(control));
+    Send(0, kControlChannel, BytesOf(control));
     for (const ComponentInstance& instance : spec_.graph().component()) {
       health_t health{};
       health.run_id = spec_.run_id();
       health.component = instance.name();
       health.state = health_t::STATE_FAILED;
       health.detail = "forged";
-      Send(0, HealthChannel(instance.name()), Encode(health));
+      Send(0, HealthChannel(instance.name()), BytesOf(health));
     }
     for (int i = 0; i < spec_.graph().channel_size(); ++i) {
       const Channel& channel = spec_.graph().channel(i);
@@ -106,7 +106,7 @@ class Forger {
         emergency_stop_t reset{};
         reset.run_id = spec_.run_id();
         reset.reset = 1;
-        Send(2 + i, channel.name(), Encode(reset));
+        Send(2 + i, channel.name(), BytesOf(reset));
       }
       if (channel.type() == "operate.act_t") {
         operate::act_t push{};
@@ -116,7 +116,7 @@ class Forger {
         push.kind = operate::act_t::KIND_PUSH;
         push.force[1] = 2000;
         push.duration = 50;
-        Send(2 + i, channel.name(), Encode(push));
+        Send(2 + i, channel.name(), BytesOf(push));
       }
     }
   }
@@ -219,7 +219,7 @@ TEST(OpenStop, AnotherUserCanStopARunButNotEndItsStop) {
     emergency_stop_t stop{};
     stop.run_id = spec.run_id();
     stop.stop = 1;
-    const Bytes bytes = Encode(stop);
+    const Bytes bytes = BytesOf(stop);
     BusSender sender(ChannelUrl(spec, channel));
     for (int i = 0; i < 50; ++i) {
       sender.Send("EMERGENCY_STOP", bytes.data(), bytes.size());
