@@ -399,12 +399,15 @@ void ApplyDrives(const RunChanges& changes, LoadedScenario* loaded) {
   }
 }
 
-/// The profile that drive_profile names, unless the scenario tells it field by field and
-/// drive_profile is that of --drives.
+/// The profile that the files' drive_profile names. The scenario's own, field by field, comes
+/// before that of --drives; without drives that take a type it waits for them.
 void ReadFirstProfile(const fs::path& overlay, LoadedScenario* loaded) {
   if (!loaded->scenario.has_drive_profile()) return;
+  bool taken = false;
   for (const DriveLink& end : DriveLinksOf(loaded->scenario)) {
-    if (end.profile.empty() || !HasField(loaded->scenario, end.profile)) continue;
+    if (end.profile.empty()) continue;
+    taken = true;
+    if (!HasField(loaded->scenario, end.profile)) continue;
     if (loaded->files.Locate("drive_profile").file == overlay.string()) {
       loaded->scenario.clear_drive_profile();
       return;
@@ -412,7 +415,7 @@ void ReadFirstProfile(const fs::path& overlay, LoadedScenario* loaded) {
     FailField(*loaded, "drive_profile",
               fmt::format("the scenario has {} as well; leave one of both out", end.profile));
   }
-  ReadDriveProfile(loaded);
+  if (taken) ReadDriveProfile(loaded);
 }
 
 /// What the variant sets in the group of fields at `parent`.

@@ -1,8 +1,10 @@
-// Compiled three times: what Eigen makes of it depends on the flags.
-#include <Eigen/Dense>
+// Compiled three times: what Eigen makes of it depends on the flags. Poise has these functions of Eigen's, too.
+#include <Eigen/Eigenvalues>
 
 double SUMS(const double* values, int size) {
   const Eigen::Map<const Eigen::VectorXd> v(values, size);
-  const Eigen::MatrixXd matrix = v * v.transpose() + Eigen::MatrixXd::Identity(size, size);
-  return (matrix * v).sum() + v.dot(matrix.ldlt().solve(v));
+  Eigen::MatrixXd matrix = v * v.transpose();
+  matrix.diagonal(1).array() += 1;  // not symmetric
+  const Eigen::EigenSolver<Eigen::MatrixXd> solver(matrix);
+  return solver.eigenvalues().cwiseAbs().sum() + solver.pseudoEigenvectors().cwiseAbs().sum();
 }
