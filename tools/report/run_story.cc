@@ -154,13 +154,14 @@ std::string HowItFell(const RunRecord& run) {
   // The simulator went on.
   const std::optional<int64_t> down = logging::DownTick(run);
   if (!down || run.truth.at(*down)->fallen != 0) return "";
-  const ground_truth_t* const last = run.truth.at(run.num_ticks - 1);
-  const ground_truth_t* const start = run.truth.at(run.spec.lead_ticks());
-  if (last == nullptr || start == nullptr) return "";
+  const auto height = [&](int64_t tick) {
+    const ground_truth_t* const truth = run.truth.at(tick);
+    return truth == nullptr ? 0 : logging::ComHeight(*truth);
+  };
   return fmt::format(
-      " (at the end its centre of mass was {:.2f} m above its lower sole, at first "
-      "{:.2f} m; the simulator did not call it fallen)",
-      logging::ComHeight(*last), logging::ComHeight(*start));
+      " (at the end its centre of mass was {:.2f} m above its lower sole, at first {:.2f} m; the "
+      "simulator did not call it fallen)",
+      height(run.num_ticks - 1), height(run.spec.lead_ticks()));
 }
 
 std::string Capital(std::string text) {
