@@ -170,13 +170,14 @@ TEST(ViewAccessTest, TakesThisMachineAlone) {
 }
 
 TEST(ViewAccessTest, ReadsTargetsAndTokens) {
-  const auto target = ReadTarget("/stream?token=ab&x&from=12&=3");
+  const auto target = ReadTarget("/stream?token=ab&x&from=12&=3&before=7");
   ASSERT_TRUE(target);
   EXPECT_EQ(target->path, "/stream");
   EXPECT_EQ(target->token, "ab");
   EXPECT_EQ(target->from, 12);
+  EXPECT_EQ(target->before, 7);
   for (const char* wrong : {"/?from=", "/?from=-1", "/?from=1x", "/?from=99999999999999999999",
-                            "/?token=x&token=ab", "/?token=ab&token=ab"}) {
+                            "/?before=-1", "/?token=x&token=ab", "/?token=ab&token=ab"}) {
     EXPECT_FALSE(ReadTarget(wrong)) << wrong;
   }
   const std::string token = MakeToken();

@@ -49,7 +49,7 @@ class TickRingTest : public ::testing::Test {
   /// EXTERNAL_PUSH.force[0] of the ticks held, read from a batch as docs/report-format.md has it.
   std::vector<double> Pushes(const TickRing& ring) {
     const int64_t count = ring.end_tick() - ring.first_tick();
-    const std::string batch = ring.Encode(ring.first_tick(), ring.end_tick());
+    const std::string batch = ring.Encode(ring.first_tick(), ring.end_tick(), 7.5);
     size_t integers = 0;
     size_t reals = 0;
     size_t place = 0;
@@ -60,18 +60,20 @@ class TickRingTest : public ::testing::Test {
       }
     }
     const auto rows = static_cast<size_t>(count);
-    EXPECT_EQ(batch.size(), 16 + rows * (8 * integers + 4 * reals));
+    EXPECT_EQ(batch.size(), 32 + rows * (8 * integers + 4 * reals));
     uint32_t head[2];
-    double first = 0;
+    double times[3];  // first tick, end, time
     std::memcpy(head, batch.data(), 8);
-    std::memcpy(&first, batch.data() + 8, 8);
-    EXPECT_EQ(head[0], 1u);
+    std::memcpy(times, batch.data() + 8, 24);
+    EXPECT_EQ(head[0], 2u);
     EXPECT_EQ(head[1], rows);
-    EXPECT_EQ(first, static_cast<double>(ring.first_tick()));
+    EXPECT_EQ(times[0], static_cast<double>(ring.first_tick()));
+    EXPECT_EQ(times[1], static_cast<double>(ring.end_tick()));
+    EXPECT_EQ(times[2], 7.5);
     std::vector<double> values;
     for (size_t i = 0; i < rows; ++i) {
       float value = 0;
-      std::memcpy(&value, batch.data() + 16 + 8 * rows * integers + 4 * (rows * place + i), 4);
+      std::memcpy(&value, batch.data() + 32 + 8 * rows * integers + 4 * (rows * place + i), 4);
       values.push_back(value);
     }
     return values;

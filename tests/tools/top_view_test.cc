@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "fmt/format.h"
 #include "tests/logging/log_test_support.h"
 
 namespace poise {
@@ -65,7 +66,8 @@ class TopViewTest : public ::testing::Test {
 TEST_F(TopViewTest, ShowsTheRunsProgress) {
   EXPECT_THAT(Text(), HasSubstr("synthetic  run 42  runs/a\n"));
   // 1521 ticks of 2 ms; 250 ticks/s are half of real time.
-  EXPECT_THAT(Text(), HasSubstr("tick 1521 of 5000  3.042 s  250.0 ticks/s  0.50 x real time"));
+  EXPECT_THAT(Text(),
+              HasSubstr("tick 1521 of 5000  3.042 s of 10 s\n250.0 ticks/s  0.50 x real time"));
   EXPECT_THAT(Text(), HasSubstr("refused here: 3 packets"));
 }
 
@@ -104,13 +106,12 @@ TEST_F(TopViewTest, ShowsTheBridgesState) {
   snapshot.bridge->state = bridge_status_t::STATE_ESTOP;
   snapshot.bridge->reason = bridge_status_t::REASON_OPERATOR;
   EXPECT_THAT(Text(), HasSubstr("bridge: emergency stop, operator\n"));
-  EXPECT_EQ(TopView(spec, names, "", snapshot, 0)[1].style, ViewLine::Style::kFailure);
+  EXPECT_EQ(TopView(spec, names, "", snapshot, 0)[2].style, ViewLine::Style::kFailure);
 }
 
 TEST_F(TopViewTest, ShowsAProcess) {
-  EXPECT_THAT(Row("sim"),
-              ::testing::ElementsAre("sim", "running", "1520", "499.8", "256.5", "565.0", "1278.4",
-                                     "7", "11", "44", "22", "33", "55", "0.1"));
+  EXPECT_THAT(Row("sim"), ::testing::ElementsAre("sim", "running", "499.8", "565", "7", "11", "22",
+                                                 "33", "44", "55", "0.1", "1520", "256", "1278"));
 }
 
 TEST_F(TopViewTest, NamesTheProcessThatAComponentShares) {
@@ -134,8 +135,8 @@ TEST_F(TopViewTest, ShowsRealTimeWhereThereIsAny) {
 
 TEST_F(TopViewTest, ShowsAChannel) {
   EXPECT_THAT(Row("ROBOT_STATE"),
-              ::testing::ElementsAre("ROBOT_STATE", "robot_state_t", "1521", "500.0", "236.0",
-                                     "kB/s", "472", "0.00", "6"));
+              ::testing::ElementsAre("ROBOT_STATE", "500.0", "0.00", "6", "236.0", "kB/s", "472",
+                                     "1521", "robot_state_t"));
 }
 
 TEST_F(TopViewTest, MarksWhatIsWrong) {
@@ -179,14 +180,57 @@ std::string Shown(const std::string& frame) {
   return shown;
 }
 
-TEST(FrameTest, CutsWhatDoesNotFit) {
-  const std::vector<ViewLine> lines = {
-      {"abcdef", ViewLine::Style::kTitle}, {"", ViewLine::Style::kPlain}, {"ghi"}, {"jkl"}};
-  EXPECT_EQ(Shown(Frame(lines, 80, 24)), "abcdef\r\n\r\nghi\r\njkl");
-  EXPECT_EQ(Shown(Frame(lines, 4, 24)), "abcd\r\n\r\nghi\r\njkl");
-  EXPECT_EQ(Shown(Frame(lines, 80, 3)), "abcdef\r\nghi\r\njkl");  // the blank line goes first
-  EXPECT_EQ(Shown(Frame(lines, 2, 1)), "ab");
-  EXPECT_EQ(Shown(Frame(lines, 0, 0)), "a");
+TEST_F(TopViewTest, TellsTheLead) {
+  spec.set_lead_ticks(1000);
+  EXPECT_THAT(Text(), HasSubstr("tick 1521 of 5000  1.042 s of 8 s, after 2 s of lead\n"));
+}
+
+std::string FrameAt(const std::vector<ViewLine>& lines, int columns, int rows, ViewScroll scroll) {
+  return Shown(Frame(lines, columns, rows, &scroll));
+}
+
+TEST(FrameTest, KeepsHeaderAndKeysAndScrollsTheRest) {
+  std::vector<ViewLine> lines = {{"head 1"}, {"head 2"}, {"head 3"}, {"head 4"}, {""}};
+  for (const char c : std::string("abcdef")) {
+    lines.push_back({fmt::format("{}:   0123456789", c), ViewLine::Style::kPlain, 5});
+  }
+  const std::string head = "head 1\r\nhead 2\r\nhead 3\r\nhead 4\r\n";
+  EXPECT_THAT(FrameAt(lines, 80, 24, {}), ::testing::StartsWith(head + "\r\na:   0123456789\r\n"));
+  EXPECT_THAT(FrameAt(lines, 80, 24, {}), ::testing::EndsWith("f:   0123456789\r\nq quit"));
+  EXPECT_EQ(FrameAt(lines, 80, 8, {}),
+            head +
+                "a:   0123456789\r\nb:   0123456789\r\nc:   0123456789\r\n"
+                "q quit  arrows, space: lines 1-3 of 6");
+  EXPECT_EQ(FrameAt(lines, 80, 6, {.line = 2, .column = 0}),
+            head + "c:   0123456789\r\nq quit  arrows, space: lines 3-3 of 6");
+  // The first column stays, and nobody scrolls beyond the end.
+  EXPECT_THAT(FrameAt(lines, 10, 7, {.line = 99, .column = 3}),
+              HasSubstr("e:   34567\r\nf:   34567\r\n"));
+  EXPECT_THAT(FrameAt(lines, 10, 7, {.line = -1, .column = 99}), HasSubstr("a:   56789\r\n"));
+  EXPECT_EQ(FrameAt(lines, 4, 1, {}), "q qu");
+  EXPECT_EQ(FrameAt(lines, 0, 0, {}), "q");
+}
+
+TEST(FrameTest, AUsualTerminalShowsWhatTellsOfAFault) {
+  const RunSpec spec = logging::MakeTestSpec();
+  LiveSnapshot snapshot;
+  snapshot.processes.push_back({"contact_wrench_monitor", true, {}, 500, 0.1});
+  snapshot.channels.push_back({"CONTACT_WRENCH_MONITOR"});
+  const auto names = logging::ElementNames::OfSpec(spec);
+  const std::string shown = FrameAt(TopView(spec, names, "", snapshot, 0), 80, 24, {});
+  for (const char* column : {"P99 us", "LATE", "GAPS", "REFUSED", "DROPPED", "MSG/S", "MISSED"}) {
+    EXPECT_THAT(shown, HasSubstr(column));
+  }
+}
+
+TEST(ViewScrollTest, GoesByKeys) {
+  ViewScroll scroll;
+  for (const char key : {'j', 'j', 'f', 'k', 'l', 'x'}) scroll.Move(key, 10);
+  EXPECT_EQ(scroll.line, 11);
+  EXPECT_EQ(scroll.column, 8);
+  for (const char key : {'b', 'h'}) scroll.Move(key, 10);
+  EXPECT_EQ(scroll.line, 1);
+  EXPECT_EQ(scroll.column, 0);
 }
 
 }  // namespace

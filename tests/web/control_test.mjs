@@ -116,6 +116,7 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
   await until(page, (t) => window.poise.control.standing.run.tick === t + 1, tick);
 
   // Back, to a tick at which nothing had been done; what was left stays, and is whole.
+  await until(page, () => window.poise.feed.missing === 0);
   const base = await page.evaluate(() => window.poise.run.signals.get('GROUND_TRUTH.base_position[1]').values[250 - window.poise.run.firstTick]);
   await page.evaluate(() => window.poise.player.seek(window.poise.run.timeOfTick(251)));
   await page.click('#back');
@@ -124,9 +125,10 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
   assert.equal(await page.evaluate(() => window.poise.run.signals.get('GROUND_TRUTH.base_position[1]').values[250 - window.poise.run.firstTick]), base);
   await picture(page, 'interactive_back');
   await page.selectOption('#run-speed', '0.5');
-  await page.click('#live');
+  // The page goes on with the run.
   await page.click('#go');
-  await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 400);
+  await until(page, () => window.poise.player.following && window.poise.player.tick > 400 && window.poise.scene.row === window.poise.player.row);
+  assert.ok(await page.evaluate(() => Number(document.getElementById('time').innerText.split(' ')[0]) > window.poise.run.timeOfTick(400)));
   assert.equal((await standing(page)).run.speed, 0.5);
   await drag(page, 'interactive_after', -15);
 
@@ -154,6 +156,12 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
 
   // Narrow, by keyboard alone.
   await page.setViewportSize({width: 390, height: 800});
+  await page.evaluate(() => scrollTo(0, 0));
+  const lowest = await page.evaluate(() => document.getElementById('player').getBoundingClientRect().top);
+  for (const [place, bottom] of [['#estop', 800], ['.now h2', lowest], ['.now tr', lowest], ['.events h2', lowest]]) {
+    const box = await page.locator(place).first().boundingBox();
+    assert.ok(box.y >= 0 && box.y + box.height <= bottom, `${place} is not on a phone's first screen: ${JSON.stringify(box)}`);
+  }
   await page.keyboard.press('p');
   await until(page, () => window.poise.control.standing.run.paused);
   await picture(page, 'interactive_narrow');
@@ -177,7 +185,21 @@ test('after a fall the page starts the run again, and goes back to its first tic
   }, at);
   await until(page, () => window.poise.control.standing?.settings.length > 0);
   await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 250);
+  // The page may have come late: while the run waits it gets the rest.
+  const pause = async () => {
+    await page.keyboard.press('p');
+    await until(page, () => window.poise.control.standing.run.paused && window.poise.feed.missing === 0);
+  };
+  await pause();
   const stood = await height(200);
+  await page.keyboard.press('p');
+  // It cannot walk: the buttons are grey, and say why.
+  for (const button of ['#walk', '#stop-walking', 'text="step, left"']) {
+    assert.equal(await page.locator(button).isDisabled(), true, button);
+    assert.match(await page.locator(button).getAttribute('title'), /needs a run with step_planner\.walk\.enabled=true/);
+  }
+  await page.click('.walking summary');
+  assert.match(await page.locator('.reason').innerText(), /needs a run with/);
   const {settings: [setting]} = await standing(page);
   await page.evaluate(([field, value]) => window.poise.control.act('set', {field, value}), [setting.field, 0.9 * setting.value + 0.1 * setting.high]);
   await until(page, ([field, value]) => window.poise.control.setting(field).value !== value, [setting.field, setting.value]);
@@ -189,10 +211,20 @@ test('after a fall the page starts the run again, and goes back to its first tic
   await until(page, () => window.poise.control.standing.run.ended);
   const {run: {detail}} = await standing(page);
   assert.match(detail, /fell/);
-  await page.click('#go');
+  await page.keyboard.press('p');
   await until(page, () => window.poise.control.standing.acts.some((act) => act.do === 'go' && act.state === 'refused'));
+  await until(page, () => /go refused: the run has ended/.test(document.querySelector('.answer.refused').innerText));
   const fallen = await end();
   assert.ok(fallen > 500);
+  // Why it fell is told at once, and nothing is offered that an ended run cannot do.
+  await until(page, () => /fell at [\d.]+ s/.test(document.getElementById('header').innerText));
+  assert.match(await page.locator('.story').innerText(), /the robot fell at/);
+  assert.doesNotMatch(await page.locator('#header').innerText(), /in progress/);
+  await until(page, () => /fall/.test(document.querySelector('.events').innerText));
+  for (const button of ['#go', '#one-tick', '#push']) {
+    assert.equal(await page.locator(button).isDisabled(), true);
+    assert.match(await page.locator(button).getAttribute('title'), /the run has ended/);
+  }
   await picture(page, 'again_fallen');
 
   await page.click('#restart');
@@ -200,25 +232,27 @@ test('after a fall the page starts the run again, and goes back to its first tic
   await until(page, () => window.poise.run.numRows > 250 && !window.poise.control.standing.run.paused);
   const again = await standing(page);
   assert.equal(again.run.ended, false);
+  await until(page, () => /in progress/.test(document.getElementById('header').innerText) && !document.querySelector('.story'));
+  assert.doesNotMatch(await page.locator('#header').innerText(), /fell/);
   assert.equal(again.settings[0].value, setting.value, 'settings are those of the start');
-  assert.equal(await page.evaluate(() => window.poise.run.firstTick < 250), true);
-  assert.equal(await height(200), stood, 'the same bits');
   await picture(page, 'again_stands');
 
   // A run that waits starts again as well.
-  await page.click('#go');
-  await until(page, () => window.poise.control.standing.run.paused);
+  await pause();
+  assert.equal(await page.evaluate(() => window.poise.run.firstTick < 250), true);
+  assert.equal(await height(200), stood, 'the same bits');
   await page.click('#restart');
   await until(page, () => window.poise.control.standing.run.branch === 2 && !window.poise.control.standing.run.paused);
   await until(page, () => window.poise.run.numRows > 100);
+  await pause();
   assert.equal(await page.evaluate(() => window.poise.run.firstTick), 0);
   // Back to tick 0 by the cursor: there the run waits, with nothing to show yet, and goes on from there.
   await page.evaluate(() => window.poise.player.seek(window.poise.run.timeOfTick(0)));
   await page.click('#back');
   await until(page, () => window.poise.control.standing.run.branch === 3 && window.poise.control.standing.run.tick === 0);
-  await page.click('#live');
   await page.click('#go');
   await until(page, () => window.poise.run.numRows > 250);
+  await pause();
   assert.equal(await height(200), stood);
   assert.deepEqual(problems, []);
   await page.context().close();

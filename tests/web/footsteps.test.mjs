@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
-import {Footprints, isInside, plannedAt, regionsAt, stepsThatCatch} from '../../web/src/footsteps.js';
+import {apart, Footprints, isInside, plannedAt, regionsAt, stepsThatCatch} from '../../web/src/footsteps.js';
 import {makeRun} from './fixture.mjs';
 
 const ORIENTATION = [1, 0, 0, 0];
@@ -103,4 +103,12 @@ test('a message with more footholds and corners than it has room for shows those
   await samples.load(run, plannedSignals());
   assert.equal(plannedAt(samples, 0).length, 3);
   assert.deepEqual(regionsAt(samples, 0).map((region) => region.length), [16, 0, 0]);
+});
+
+test('of prints that would hide each other the last is drawn', () => {
+  const print = (foot, from, x) => ({foot, from, pose: {position: [x, 0.1 * foot, 0]}});
+  // The left foot slides by 25 mm at a time, the right one steps on the spot and then ahead.
+  const prints = [print(1, 0, 0), print(0, 0, 0), print(1, 1, 0.025), print(0, 2, 0.001), print(1, 3, 0.05), print(0, 4, 0.2), print(1, 5, 0.075)];
+  assert.deepEqual(apart(prints).map(({foot, from}) => [foot, from]), [[1, 1], [0, 2], [0, 4], [1, 5]]);
+  assert.equal(prints.length, 7);
 });

@@ -160,6 +160,15 @@ test('the page shows the run, plays it, and needs no network', async () => {
   await page.fill('#signal-search', 'joint_command eta_min');
   await page.click('text=into last');
   await page.waitForFunction(() => document.querySelector('.panel .legend').children.length === 2);
+  // The field before its channel; the arrow keys go on from there.
+  await page.fill('#signal-search', 'TASK_TORQUE.torque');
+  const offered = await page.locator('.results .name').allInnerTexts();
+  assert.match(offered[0], /^TASK_TORQUE\.torque\[/);
+  await page.keyboard.press('ArrowDown');
+  await page.keyboard.press('ArrowDown');
+  await page.keyboard.press('ArrowUp');
+  await page.keyboard.press('Enter');
+  assert.equal(await page.locator('.panel h3').first().innerText(), offered[1]);
   await page.fill('#signal-search', 'no such signal');
   assert.match(await page.locator('.results').innerText(), /0 signals/);
   await page.keyboard.press('Escape');
@@ -173,7 +182,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
     return {name: file.suggestedFilename(), bytes: readFileSync(path(file.suggestedFilename()))};
   };
   const csv = await save('External push', 'Save the stretch shown as CSV');
-  assert.match(csv.name, /^fig-9b-.*\.csv$/);
+  assert.match(csv.name, /^push-double-support-fig-9b-.*\.csv$/);
   const rows = csv.bytes.toString().trim().split('\r\n');
   assert.equal(rows[0], 'time (s),measured (N)');
   const shown = await state(page);
@@ -182,6 +191,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
   const png = await save('External push', 'Save as PNG');
   assert.deepEqual([...png.bytes.subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
   assert.ok(png.bytes.length > 3000);
+  assert.equal(png.bytes.readUInt32BE(16), 450, 'its width: 900 CSS pixels of the half that this browser has');
 
   // Latencies: all that the log's last health counted, a sample a stage and tick.
   const label = await page.locator('svg.latencies').getAttribute('aria-label');
@@ -497,6 +507,89 @@ test('a run that grows grows in the plots, the bar and the picture', async () =>
   await page.keyboard.press('End');
   assert.equal((await state(page)).tick, ticks - 1);
   assert.ok(await page.evaluate(() => window.poise.scene.pushArrow.object.visible));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a second run says how it ended, and is told apart from the first', async () => {
+  const fell = poise('run', 'push_double_support', '--inline', '--duration', '2', '--without', 'balancing', '--set', 'sim.push[0].peak=300', '--out', path('fell'));
+  assert.equal(fell.status, 1, fell.stderr);
+  poise('report', path('a'), path('fell'), '-o', path('fell.html'));
+  const {page, problems} = await openPage(browser, path('fell.html'));
+  const [first, second] = await page.locator('.run-head').allInnerTexts();
+  const time = /fell at ([\d.]+) s/.exec(second)[1];
+  for (const text of ['second run', 'without balancing', 'sim.push[0].peak=300', 'fell', `the robot fell at ${time} s`, 'FAILED']) assert.ok(second.includes(text), text);
+  assert.match(first, /first run[^]*robot dyros_legs, a, [^]*stood on both feet/);
+  assert.doesNotMatch(first, /fell/);
+  // Its events are a list of their own, and marks of their own on the bar.
+  const lists = page.locator('.events');
+  assert.equal(await lists.count(), 2);
+  assert.match(await lists.nth(1).innerText(), /Events of the second run[^]*fall/);
+  assert.doesNotMatch(await lists.nth(0).innerText(), /fall/);
+  assert.ok(await page.locator('.track .event.second').count() > 5);
+  assert.equal(await page.locator('.track .event.second.fall').count(), 1);
+  // A time of the story leads there; there its event is the current one, and both runs are told side by side.
+  await page.locator('.run-head.second .time-link', {hasText: `${time} s`}).first().click();
+  near((await state(page)).time, Number(time), 1e-6);
+  assert.match(await lists.nth(1).locator('[aria-current]').first().innerText(), new RegExp(`${time} s`));
+  await page.evaluate(() => window.poise.player.seek(0.6));
+  const bridge = page.locator('.readout tr', {hasText: 'bridge'}).locator('td div');
+  assert.deepEqual(await bridge.allInnerTexts(), ['running', 'stopped']);
+  // Curves, desired ones and limits each have a line of their own.
+  const panel = page.locator('.panel', {hasText: 'COM motion, lateral'}).first();
+  await panel.scrollIntoViewIfNeeded();
+  await panel.locator('.legend .entry').nth(5).waitFor();
+  const dashes = Object.fromEntries(await panel.locator('.entry').evaluateAll((entries) => entries.map((e) => [e.title && e.innerText.replace(/[\d.]+ mm/, '').trim(),
+    e.querySelector('line').getAttribute('stroke-dasharray')])));
+  const limit = await page.locator('.panel', {hasText: 'resultant in frame O (37)'}).first().locator('.entry', {hasText: 'limit'}).locator('line').getAttribute('stroke-dasharray');
+  const kinds = ['estimated', 'desired', 'estimated (second run)', 'desired (second run)'].map((label) => dashes[label]);
+  assert.equal(new Set([...kinds, limit]).size, 5, JSON.stringify([dashes, limit]));
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('the signs are beside the picture, and fold', async () => {
+  poise('report', path('a'));
+  for (const width of [1400, 400]) {
+    const {page} = await openPage(browser, path('a/report.html'), {viewport: {width, height: 800}});
+    const key = page.locator('.scene-key');
+    if (width === 400) assert.equal(await key.locator('ul').isVisible(), false);
+    if (width === 400) await key.locator('summary').click();
+    assert.equal(await key.locator('ul').isVisible(), true);
+    const [signs, picture] = [await key.boundingBox(), await page.locator('#scene').boundingBox()];
+    assert.ok(signs.y >= picture.y + picture.height, `at ${width} px they lie over it`);
+    assert.ok(await page.evaluate(() => [...document.querySelectorAll('.scene-key li')].every((li) => li.innerText.length < 50)));
+    await key.locator('summary').click();
+    assert.equal(await key.locator('ul').isVisible(), false);
+    assert.doesNotMatch(await page.evaluate(() => document.body.innerText), /[\u23e9-\u23fa]/, 'a sign that fonts lack');
+    await page.context().close();
+  }
+});
+
+test('values and events are on the first screen, also of a phone', async () => {
+  for (const [width, height] of [[1400, 900], [400, 800]]) {
+    const {page} = await openPage(browser, path('a/report.html'), {viewport: {width, height}});
+    const bar = await page.evaluate(() => document.getElementById('player').getBoundingClientRect().top);
+    for (const place of ['.now h2', '.now tr', '.events h2', '.events li']) {
+      const box = await page.locator(place).first().boundingBox();
+      assert.ok(box.y >= 0 && box.y + box.height <= bar, `${place} at ${width} px: ${JSON.stringify(box)}`);
+    }
+    await page.context().close();
+  }
+});
+
+test('what a robot has no sensor for is not told as zero', async () => {
+  const run = poise('run', 'stand', '--robot', 'heron/heron', '--inline', '--duration', '0.5', '--out', path('heron'));
+  assert.ok(run.status <= 1, run.stderr);
+  poise('report', path('heron'));
+  const {page, problems} = await openPage(browser, path('heron/report.html'));
+  await page.evaluate(() => window.poise.player.seek(0.3));
+  const value = (name) => page.locator('.readout tr', {hasText: name}).locator('td').innerText();
+  for (const foot of ['right', 'left']) {
+    assert.equal(await value(`${foot} load, measured`), '–');
+    assert.match(await value(`${foot} load, computed`), /^\d{2,} N$/);
+  }
+  assert.match(await page.locator('#header').innerText(), /robot=heron\/heron[^]*robot heron/);
   assert.deepEqual(problems, []);
   await page.context().close();
 });

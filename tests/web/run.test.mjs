@@ -5,6 +5,7 @@ import {Run} from '../../web/src/data.js';
 import {addDerivedSignals, findPhases, lightLoad, noisyLoad} from '../../web/src/derived.js';
 import {figuresFor, panelOf, pitchJoints} from '../../web/src/figures.js';
 import {addBatch, decodeBatch, LiveFeed} from '../../web/src/live/live.js';
+import {liveText} from '../../web/src/bar.js';
 import {searchSignals} from '../../web/src/search.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled, withUnit} from '../../web/src/units.js';
 import {makeRun, messages, robot, valuesOf} from './fixture.mjs';
@@ -373,15 +374,15 @@ test('a live run keeps its last ticks, and what is derived goes on', async () =>
 });
 
 /** A batch as docs/report-format.md says, every number telling its column and tick. */
-function batchOf(run, first, count) {
+function batchOf(run, first, count, {end = first + count, time = 0} = {}) {
   const signals = [...run.signals.values()].filter((s) => s.append);
   const integers = signals.filter((s) => s.integer), reals = signals.filter((s) => !s.integer);
-  const buffer = new ArrayBuffer(16 + count * (8 * integers.length + 4 * reals.length));
+  const buffer = new ArrayBuffer(32 + count * (8 * integers.length + 4 * reals.length));
   const data = new DataView(buffer);
-  data.setUint32(0, 1, true);
+  data.setUint32(0, 2, true);
   data.setUint32(4, count, true);
-  data.setFloat64(8, first, true);
-  let at = 16;
+  [first, end, time].forEach((x, i) => data.setFloat64(8 + 8 * i, x, true));
+  let at = 32;
   integers.forEach((_, k) => { for (let i = 0; i < count; ++i, at += 8) data.setFloat64(at, 1e6 * k + first + i, true); });
   reals.forEach((_, k) => { for (let i = 0; i < count; ++i, at += 4) data.setFloat32(at, 1000 * k + first + i, true); });
   return {buffer, name: reals[3].name};
@@ -402,9 +403,132 @@ test('batches of the stream: in order, with a gap, sent twice, damaged', async (
   const values = await add(5000, 2);
   assert.deepEqual([values.length, run.firstTick, values.at(-3), values.at(-2), values.at(-1)], [100, 4902, NaN, 8000, 8001]);
   const {buffer} = batchOf(run, 5002, 2);
-  for (const damaged of [buffer.slice(0, 8), buffer.slice(0, 16), buffer.slice(0, -4), new ArrayBuffer(buffer.byteLength)]) {
+  for (const damaged of [buffer.slice(0, 8), buffer.slice(0, 32), buffer.slice(0, -4), new ArrayBuffer(buffer.byteLength)]) {
     assert.throws(() => decodeBatch(damaged, run));
   }
+});
+
+/** A feed of `run` whose server is this test: its socket, and what `answer(tick)` says of earlier ticks. */
+function fakeFeed(t, run, answer) {
+  let socket;
+  const asked = [];
+  t.after(() => { for (const name of ['WebSocket', 'location', 'fetch']) delete globalThis[name]; });
+  globalThis.location = {href: 'http://127.0.0.1:1/?token=ab'};
+  globalThis.WebSocket = class extends EventTarget { constructor() { super(); socket = this; } };
+  globalThis.fetch = async (url) => {
+    const query = new URL(url, location.href).searchParams;
+    assert.equal(query.get('token'), 'ab');
+    asked.push(Number(query.get('before')));
+    return {arrayBuffer: async () => answer(asked.at(-1))};
+  };
+  const feed = new LiveFeed(run);
+  const come = (data) => socket.dispatchEvent(Object.assign(new Event('message'), {data}));
+  const text = (more) => come(JSON.stringify({run_id: run.meta.run.run_id, state: 'live', lost: 0, end_tick: 0, ...more}));
+  return {feed, come, text, asked};
+}
+
+const settled = async (condition) => { while (!condition()) await new Promise((done) => { setTimeout(done, 1); }); };
+
+test('a page begins with what is new, and what was before comes behind it', async (t) => {
+  const run = makeRun('', {}, 0, {keep: 2000});
+  const error = run.signals.get('derived.com_error_y');
+  await error.load();
+  // The server holds ticks from 100 on, and gives 50 at a time.
+  const {feed, come, text, asked} = fakeFeed(t, run, (before) => {
+    const first = Math.max(100, Math.min(before, 5000) - 50);
+    return batchOf(run, first, Math.max(0, before - first)).buffer;
+  });
+  text();
+  come(batchOf(run, 1000, 10).buffer);
+  assert.deepEqual([run.firstTick, run.numRows], [1000, 10], 'at once what is new');
+  await settled(() => feed.missing === 0);
+  assert.deepEqual(asked.slice(0, 2), [1000, 950]);
+  assert.deepEqual([run.firstTick, run.numRows], [100, 910]);
+  const {name} = batchOf(run, 0, 1);
+  const all = () => [...run.signals.get(name).values];
+  assert.deepEqual(all(), Array.from({length: 910}, (_, i) => 3100 + i), 'every tick in its row');
+  assert.equal(error.values.length, 910);
+  assert.ok(error.values.every((x) => !Number.isNaN(x)), 'what follows from it, too');
+  // A server that leaves out what it could not send in time: the page shows what is new, then has all of it.
+  come(batchOf(run, 1300, 10).buffer);
+  assert.equal(run.firstTick + run.numRows, 1310);
+  await settled(() => feed.missing === 0);
+  assert.deepEqual(all(), Array.from({length: 1210}, (_, i) => 3100 + i));
+  assert.deepEqual([error.values.length, error.values.filter(Number.isNaN).length], [1210, 0]);
+  // No more than it keeps.
+  come(batchOf(run, 4000, 10).buffer);
+  await settled(() => feed.missing === 0);
+  assert.deepEqual([run.firstTick, run.numRows], [2010, 2000]);
+  assert.deepEqual(all(), Array.from({length: 2000}, (_, i) => 5010 + i));
+});
+
+test('a page is live when it shows what is, and else says how far it is behind', (t) => {
+  const run = makeRun('', {}, 0, {keep: 2000});
+  let now = 50;
+  t.mock.method(performance, 'now', () => 1000 * now);
+  const {feed, come, text} = fakeFeed(t, run, () => batchOf(run, 0, 0).buffer);
+  text();
+  assert.doesNotMatch(liveText(feed)[1], /live/, 'nothing has come yet');
+  come(batchOf(run, 0, 10, {time: 7}).buffer);  // another clock
+  assert.deepEqual(liveText(feed), ['live', '● live']);
+  now += 2;
+  assert.deepEqual(liveText(feed), ['behind', '◐ 2.0 s behind'], 'nothing comes');
+  come(batchOf(run, 10, 10, {time: 7.5}).buffer);  // 1.5 s on its way
+  assert.deepEqual(liveText(feed), ['behind', '◐ 1.5 s behind']);
+  come(batchOf(run, 20, 10, {time: 9, end: 1030}).buffer);  // at once, but the server has 1000 ticks more, 2 s
+  assert.deepEqual(liveText(feed), ['behind', '◐ 2.0 s behind']);
+  come(batchOf(run, 30, 1000, {time: 9}).buffer);
+  assert.deepEqual(liveText(feed), ['live', '● live']);
+  // A run that waits is shown as it is, however long; one that is made again is neither.
+  text({control: {run: {paused: true, tick: 1030, again: -1}, acts: []}});
+  now += 60;
+  assert.deepEqual(liveText(feed), ['live', '● live']);
+  text({control: {run: {paused: true, tick: 1030, again: 500}, acts: []}});
+  assert.deepEqual(liveText(feed), ['again', '○ made again, up to 1.000 s']);
+  text({state: 'ended', end_tick: 1030});
+  assert.match(liveText(feed)[1], /ended/);
+});
+
+test('what is not measured is no number', async () => {
+  const run = makeRun('7.2', {'robot_sensors_t.foot_sensor[0]': 1, 'drive_feedback_t.foot_sensor[0]': 2,
+    'joint_command_t.foot_wrench[0].force[2]': -236, 'joint_command_t.in_contact[1]': 1});
+  const first = async (name) => (await valuesOf(run, name))[0];
+  for (const name of ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'DRIVE_FEEDBACK.foot_wrench[0].moment[1]', 'derived.right_load_measured',
+    'derived.right_roll_ratio_measured', 'JOINT_COMMAND.margins[0].roll', 'ESTIMATOR_STATUS.covariance[0]', 'SUPPORT_PLAN.step_time']) {
+    if (name.includes('margins') && !run.signals.has(name)) continue;
+    assert.ok(Number.isNaN(await first(name)), name);
+  }
+  assert.equal(Math.abs(await first('ROBOT_SENSORS.foot_wrench[1].force[2]')), 0);
+  assert.equal(await first('derived.right_load_computed'), 236);
+  assert.equal(quantity(await first('derived.right_load_measured'), 'N', 3, true), '–');
+  // As it grows, too.
+  const live = makeRun('', {}, 0, {keep: 10});
+  live.appendTicks(2, {'ROBOT_SENSORS.foot_sensor[0]': new Float64Array([0, 1]), 'ROBOT_SENSORS.foot_wrench[0].force[2]': new Float32Array([-5, 0])});
+  assert.deepEqual(await valuesOf(live, 'ROBOT_SENSORS.foot_wrench[0].force[2]'), [-5, NaN]);
+});
+
+test('the search finds the field before its channel, and units before counts', () => {
+  const signals = [...makeRun('').signals.values()];
+  const first = (query) => searchSignals(signals, query)[0].name;
+  assert.equal(first('TASK_TORQUE.torque'), 'TASK_TORQUE.torque[0]');
+  assert.equal(first('torque'), searchSignals(signals, 'torque')[0].name);
+  assert.match(first('torque'), /\.torque/);
+  assert.equal(first('eta'), 'JOINT_COMMAND.eta');
+  assert.equal(first('com_error_y'), 'derived.com_error_y');
+  const ankle = searchSignals(signals, 'ankle_roll');
+  assert.ok(ankle[0].unit && ankle[0].channel.type !== 'drive_feedback_t', ankle[0].name);
+  const counts = ankle.findIndex((s) => s.field.startsWith('position_counts'));
+  assert.ok(counts > ankle.findIndex((s) => s.name === 'ROBOT_STATE.joint_position[1]'));
+});
+
+test('values that are read have a finest', () => {
+  for (const [value, unit, text] of [[3e-9, 'm', '0.00 mm'], [0.145, 'N', '0 N'], [189.1234, 'N', '189 N'], [1234.4, 'N', '1.234 kN'], [-0.0347149, 'm', '-34.71 mm'],
+    [0.26, 'm', '260 mm'], [1.5, 'm', '1.5 m'], [2e-4, 'N·m', '0.0 N·m'], [-2e-7, 'rad', '0.00 mrad'], [0.35, 's', '350 ms'], [0, 'N', '0 N'], [7.123456, 'mm', '7.12 mm'],
+    [0.5, '', '0.5'], [12.345678, '%', '12.35 %'], [NaN, 'm', '–']]) {
+    assert.equal(quantity(value, unit, 4, true), text);
+  }
+  assert.equal(quantity([0, -0.00267e-9, 0], 'm', 3, true), '0.00, 0.00, 0.00 mm');
+  assert.equal(quantity([0.0347, -2e-6, NaN], 'm', 3, true), '34.7, 0, – mm');
 });
 
 test('a page says that the run has ended once its last tick has come', (t) => {

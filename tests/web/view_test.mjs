@@ -40,7 +40,7 @@ const more = async (page, ticks = 20) => until(page, (n) => window.poise.run.fir
 test('a page follows a run in progress, looks back while it goes on, and has all of it in the end', async () => {
   const {run, view} = await start('live', ['--realtime', '--duration', '600']);
   const {page, problems} = await openPage(browser, view.url);
-  assert.match(await page.locator('#live').innerText(), /live/);
+  await until(page, () => /live|behind/.test(document.getElementById('live').innerText));
   await more(page);
 
   // Plots and picture stand at the end.
@@ -98,16 +98,33 @@ test('a page follows a run in progress, looks back while it goes on, and has all
   // A second browser, and the first one closed and opened again.
   const other = await openPage(browser, view.url);
   await more(other.page);
+  // Whoever comes late begins with what is new, and has the rest soon after.
+  await until(page, () => window.poise.run.numRows > 3000);
+  await page.addInitScript(() => {
+    window.batches = [];
+    window.WebSocket = class extends WebSocket {
+      constructor(url) {
+        super(url);
+        this.addEventListener('message', ({data}) => {
+          if (typeof data !== 'string') window.batches.push([8, 16].map((place) => new DataView(data).getFloat64(place, true)));
+        });
+      }
+    };
+  });
   await page.reload();
   await until(page, () => document.documentElement.dataset.ready);
+  const [from, newest] = await page.evaluate(() => window.batches[0]);
+  assert.ok(newest > 3000 && newest - from < 1000, `the first batch begins at tick ${from} of ${newest}`);
   await more(page);
 
   await run.stop();
   await until(page, () => window.poise.feed.state === 'ended');
   await until(other.page, () => window.poise.feed.state === 'ended');
   await view.prints(/the run has ended/);
+  await until(page, () => window.poise.feed.missing === 0 && window.poise.run.numRows > 3000);
   // Its end: what is said of it is now that of the whole log.
   await until(page, () => window.poise.feed.status.ended);
+  assert.match(await page.locator('.story').innerText(), /the robot stood .* until the run ended/);
   assert.doesNotMatch(await page.locator('#header').innerText(), /in progress|being checked/);
   assert.match(await page.locator('#header').innerText(), /FAILED/);  // it was to last longer
   assert.match(await page.locator('.events').innerText(), /run ended .* before its planned end/);
@@ -210,7 +227,9 @@ test('hostile connections end, the server and the run go on', async () => {
     [get('/', undefined, `Host: 127.0.0.1:${port}\r\n`), /400/],
     [get('/', undefined, `Origin: http://127.0.0.1:${port}\r\nOrigin: http://evil.example\r\n`), /400/],
     [upgrade(port).replace(/Sec-WebSocket-Key: .*/, 'Sec-WebSocket-Key: abc'), /400/],
-    [get('/../../etc/passwd'), /404/], [`POST / HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nContent-Length: 0\r\n\r\n`, /405/],
+    [get('/../../etc/passwd'), /404/], [get('/ticks?before=-1'), /404/], [get('/ticks?before=x'), /404/],
+    [get('/ticks?before=10', 'evil.example'), /403/], [get('/ticks?before=9007199254740993'), /200/], [get('/ticks'), /200/],
+    [`POST / HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nContent-Length: 0\r\n\r\n`, /405/],
     [get('/', undefined, `X: ${'x'.repeat(1 << 17)}\r\n`), /^(HTTP\/1\.1 4\d\d.*)?$/],
     [`POST / HTTP/1.1\r\nHost: 127.0.0.1:${port}\r\nContent-Length: 99999999999\r\n\r\n`, /^HTTP\/1\.1 4/],
     [Buffer.alloc(1 << 16, 0), /^(HTTP\/1\.1 400.*)?$/],

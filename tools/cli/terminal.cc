@@ -5,6 +5,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <string>
+#include <utility>
 
 #include "fmt/format.h"
 
@@ -41,8 +43,21 @@ FullScreen::Size FullScreen::size() const {
 char FullScreen::Key() {
   pollfd fd{STDIN_FILENO, POLLIN, 0};
   char key = 0;
-  if (!keys_ || poll(&fd, 1, 0) <= 0 || read(STDIN_FILENO, &key, 1) != 1) return 0;
-  return key;
+  const auto next = [&] { return poll(&fd, 1, 0) > 0 && read(STDIN_FILENO, &key, 1) == 1; };
+  if (!keys_ || !next()) return 0;
+  if (key != '\x1b' || !next() || (key != '[' && key != 'O')) return key;
+  std::string sequence;
+  while (next()) {
+    sequence += key;
+    if (key >= '@' && key <= '~') break;  // its last byte
+  }
+  constexpr std::pair<const char*, char> kKeys[] = {
+      {"A", 'k'},  {"B", 'j'}, {"C", 'l'}, {"D", 'h'},  {"5~", 'b'},
+      {"6~", 'f'}, {"H", 'g'}, {"F", 'G'}, {"1~", 'g'}, {"4~", 'G'}};
+  for (const auto& [name, meaning] : kKeys) {
+    if (sequence == name) return meaning;
+  }
+  return 0;
 }
 
 bool FullScreen::Show(const std::string& frame) {

@@ -21,7 +21,8 @@ class FullScreen {
     int rows = 24;
   };
   Size size() const;
-  /// The next key pressed, 0 for none; does not wait.
+  /// The next key pressed, 0 for none; does not wait. Arrows are h, j, k and l, a page up or down b
+  /// and f, home and end g and G.
   char Key();
   /// False when the terminal has gone.
   bool Show(const std::string& frame);

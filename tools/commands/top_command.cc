@@ -19,7 +19,6 @@
 namespace poise {
 namespace {
 
-constexpr size_t kHintLine = 2;                       // of the view
 constexpr int64_t kMillisecond = 1'000'000;           // ns
 constexpr int64_t kLongestWait = 50;                  // ms, until keys are looked at
 constexpr int64_t kTopSilence = 1000 * kMillisecond;  // then it is asked whether the run goes on
@@ -113,19 +112,23 @@ int Top(const TopOptions& options) {
   {
     FullScreen screen;
     int64_t next = 0;
-    bool quit = false;
+    bool quit = false, moved = false;
+    ViewScroll scroll;
     while (!quit && !ended && StopSignal() == 0) {
-      if (NowNanoseconds() >= next) {
+      const bool due = NowNanoseconds() >= next;
+      if (due) {
         next = NowNanoseconds() + interval;
         view = watch.View();
-        std::vector<ViewLine> lines = view;
-        lines[kHintLine].text += "  q: quit";
-        const FullScreen::Size size = screen.size();
-        quit = !screen.Show(Frame(lines, size.columns, size.rows));
       }
+      const FullScreen::Size size = screen.size();
+      if (due || moved) quit = !screen.Show(Frame(view, size.columns, size.rows, &scroll));
       watch.Spin(next);
-      const char key = screen.Key();
-      quit = quit || key == 'q' || key == 'Q';
+      moved = false;
+      while (const char key = screen.Key()) {
+        quit = quit || key == 'q' || key == 'Q';
+        scroll.Move(key, size.rows / 2);
+        moved = true;
+      }
       ended = watch.Ended();
     }
   }
@@ -140,7 +143,9 @@ int Top(const TopOptions& options) {
 void AddTopCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<TopOptions>();
   CLI::App* top = app->add_subcommand(
-      "top", "live view of a run in progress: its processes and channels; q or Ctrl-C ends it");
+      "top",
+      "live view of a run in progress: its processes and channels; arrows scroll, q or Ctrl-C ends "
+      "it");
   top->add_option("run", options->run,
                   "folder or name of the run; default: the only one that goes on");
   top->add_option("--interval", options->interval, "s between views, over which rates are measured")

@@ -127,9 +127,7 @@ class Viewer {
     std::optional<Json> status = status_.Take();
     if (!status) return;
     if (foxglove_) foxglove_->AddStatus(*status);
-    // Texts of a log may hold any bytes.
-    server_.SetStatus(Json({{"run_id", run_id_}, {"status", std::move(*status)}})
-                          .dump(-1, ' ', false, Json::error_handler_t::replace));
+    server_.SetStatus(StatusText(run_id_, std::move(*status)));
   }
 
   ViewControl Control() {

@@ -17,6 +17,7 @@
 #include "tools/live/control_desk.h"
 #include "tools/live/live_page.h"
 #include "tools/live/local_operator.h"
+#include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_access.h"
 #include "tools/live/view_server.h"
@@ -41,6 +42,7 @@ class InteractiveRun {
   InteractiveRun(const RunSpec& spec, const Scenario& scenario, std::string scenario_text,
                  std::string log, const InteractiveOptions& options)
       : spec_(spec),
+        scenario_(scenario),
         info_(logging::MakeRunInfo(spec, scenario_text)),
         log_(std::move(log)),
         run_id_(std::to_string(spec.run_id())),
@@ -53,6 +55,7 @@ class InteractiveRun {
         options.port, LiveHtml(ReadRunStart(log_), scenario, ChannelsJson(ring_), ring_.capacity()),
         &ring_,
         ViewControl{MakeToken(), [this](std::string_view text) { return desk_.Receive(text); }});
+    status_ = std::make_unique<RunStatus>(log_, scenario_);
   }
 
   RunOutcome Run() {
@@ -180,12 +183,20 @@ class InteractiveRun {
       if (!paused_ && Clock::now() > until) break;
     }
     if (runner_->ended()) paused_ = true;
+    if (runner_->ended() && !finished_) {
+      finished_ = true;
+      recorder_->Flush();
+      status_->Finish();
+    }
   }
 
   /// `tick` ticks done, as they were; waits there unless it goes on.
   void GoBack(int64_t tick, bool go_on) {
+    status_.reset();  // it reads the log
+    server_->SetStatus(StatusText(run_id_, {{"ended", false}}));
     recorder_->Close(spec_);
     ++branch_;
+    again_ = tick;
     const fs::path folder = fs::path(log_).parent_path();
     const auto name = [&](int64_t branch) { return folder / fmt::format("branch_{}.lcm", branch); };
     std::error_code ignored;  // of one that somebody has removed
@@ -205,6 +216,9 @@ class InteractiveRun {
       server_->RunFor(milliseconds(0));
       next_picture = Clock::now() + kPicture;
     }
+    again_ = -1;
+    finished_ = false;
+    status_ = std::make_unique<RunStatus>(log_, scenario_);
     shown_from_ = 0;
     single_ = 0;
     paused_ = !go_on;
@@ -222,6 +236,9 @@ class InteractiveRun {
     if (const std::optional<std::string> text = desk_.Take(run_id_, RunJson())) {
       server_->SetControl(*text);
     }
+    if (auto status = status_ ? status_->Take() : std::nullopt) {
+      server_->SetStatus(StatusText(run_id_, std::move(*status)));
+    }
     server_->SendTicks();
   }
 
@@ -232,11 +249,13 @@ class InteractiveRun {
             {"ended", runner_->ended()},
             {"detail", runner_->end_detail()},
             {"can_go_back", !back_.has_value()},
+            {"again", again_},
             // A tick that changes thirty times a second is the stream's to tell.
             {"tick", paused_ ? runner_->ticks_completed() : -1}};
   }
 
   const RunSpec spec_;
+  const Scenario scenario_;
   const run_info_t info_;
   const std::string log_;
   const std::string run_id_;
@@ -246,6 +265,8 @@ class InteractiveRun {
   std::unique_ptr<InlineRunner> runner_;
   std::unique_ptr<logging::InlineRecorder> recorder_;
   std::unique_ptr<ViewServer> server_;
+  std::unique_ptr<RunStatus> status_;  // null while the run goes back
+  bool finished_ = false;              // status_ has been told of the end
   std::vector<uint8_t> bytes_;
   bool paused_ = false;
   double speed_ = 1;
@@ -253,6 +274,7 @@ class InteractiveRun {
   std::optional<int64_t> back_;
   bool go_on_ = false;  // once it is back
   int64_t branch_ = 0;
+  int64_t again_ = -1;      // tick up to which the run is being made again; -1: it is not
   int64_t shown_from_ = 0;  // tick
   Clock::time_point anchor_time_{};
   int64_t anchor_tick_ = 0;

@@ -11,6 +11,7 @@
 #include "logging/run_record.h"
 #include "tools/report/html_report.h"
 #include "tools/report/report.h"
+#include "tools/report/run_story.h"
 #include "tools/run/scenario_run.h"
 
 namespace poise {
@@ -33,17 +34,25 @@ nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenar
   PrepareRecord(log, scenario, &record);
   std::vector<CheckResult> checks = EvaluateChecks(scenario, record);
   if (!ended) std::erase_if(checks, OnlyAtTheEnd);
+  const std::vector<logging::Event> events = logging::Events(record, ended);
   nlohmann::ordered_json json = {{"ended", ended},
                                  {"checks", ChecksJson(checks)},
-                                 {"events", EventsJson(logging::Events(record, ended))},
+                                 {"events", EventsJson(events)},
                                  {"components", ComponentsJson(record.health)},
                                  {"checked_ticks", record.num_ticks}};
   if (ended) {
     json["run"] = PageRunJson(record, scenario, checks);
+    json["story"] = TellRun(record, checks, events, "");
   } else {
     for (nlohmann::ordered_json& check : json["checks"]) check["passed"] = nullptr;
   }
   return json;
+}
+
+std::string StatusText(const std::string& run_id, nlohmann::ordered_json status) {
+  using Json = nlohmann::ordered_json;
+  return Json({{"run_id", run_id}, {"status", std::move(status)}})
+      .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 RunStatus::RunStatus(std::string log, Scenario scenario)

@@ -15,8 +15,11 @@ namespace poise {
 /// {"ended", "checks", "events", "components", "checked_ticks"} of the log as it is, as in
 /// summary.json. Before the run has ended no check has a verdict (passed: null), and what only its
 /// end decides (its duration, its log being whole) is left out; after it "run" is what a page says
-/// of the run itself. Throws LogError or RobotError.
+/// of the run itself, and "story" what happened. Throws LogError or RobotError.
 nlohmann::ordered_json StatusJson(const std::string& log, const Scenario& scenario, bool ended);
+
+/// The text that tells a page of it; what the log holds may be any bytes.
+std::string StatusText(const std::string& run_id, nlohmann::ordered_json status);
 
 /// Reads the log again and again on a thread of its own, which takes a tenth of one core at most; a
 /// log that has become too large is left as it was read last.

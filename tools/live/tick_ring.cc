@@ -15,13 +15,15 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "a batch is little-endian");
 
-constexpr uint32_t kBatchFormat = 1;
+constexpr uint32_t kBatchFormat = 2;
 constexpr int64_t kMaxTick = int64_t{1} << 52;  // what a batch can tell
 
 struct BatchHeader {
   uint32_t format = kBatchFormat;
   uint32_t count = 0;
   double first_tick = 0;
+  double end_tick = 0;  // of the ring
+  double time = 0;      // s, of the server's clock
 };
 
 /// NaN for what a page takes for no number.
@@ -173,9 +175,10 @@ void TickRing::Finish() {
   if (newest_ >= 0) TakeUntil(newest_ + 1);
 }
 
-std::string TickRing::Encode(int64_t from, int64_t to) const {
+std::string TickRing::Encode(int64_t from, int64_t to, double time) const {
   const auto count = static_cast<size_t>(to - from);
-  const BatchHeader header{kBatchFormat, static_cast<uint32_t>(count), static_cast<double>(from)};
+  const BatchHeader header{kBatchFormat, static_cast<uint32_t>(count), static_cast<double>(from),
+                           static_cast<double>(end_), time};
   std::string batch(sizeof(header) + count * tick_size(), '\0');
   std::memcpy(batch.data(), &header, sizeof(header));
   char* const integers = batch.data() + sizeof(header);

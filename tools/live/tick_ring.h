@@ -48,8 +48,9 @@ class TickRing {
 
   /// Bytes of a tick in a batch.
   size_t tick_size() const { return integers_ * sizeof(double) + reals_ * sizeof(float); }
-  /// The ticks [from, to), which must be held, as a batch of docs/report-format.md.
-  std::string Encode(int64_t from, int64_t to) const;
+  /// The ticks [from, to), which must be held, as a batch of docs/report-format.md that says that
+  /// it was made at `time`, s.
+  std::string Encode(int64_t from, int64_t to, double time) const;
 
  private:
   /// Where a scalar of a message goes, in the order in which it is visited.

@@ -1,6 +1,7 @@
 #include "tools/live/top_view.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
@@ -50,17 +51,25 @@ void AddHeader(const RunSpec& spec, const logging::ElementNames& names, const st
                const LiveSnapshot& snapshot, int64_t refused, std::vector<ViewLine>* lines) {
   const double period = spec.tick_period();
   lines->push_back({fmt::format("{}  run {}  {}", spec.scenario(), spec.run_id(), dir)});
+  const auto seconds = [period](int64_t ticks) { return static_cast<double>(ticks) * period; };
   std::string progress = fmt::format("tick {}", Count(snapshot.tick));
   if (spec.num_ticks() > 0) progress += fmt::format(" of {}", spec.num_ticks());
   if (snapshot.tick >= 0) {
-    progress +=
-        fmt::format("  {:.3f} s", static_cast<double>(snapshot.tick - spec.lead_ticks()) * period);
+    progress += fmt::format("  {:.3f} s", seconds(snapshot.tick - spec.lead_ticks()));
   }
+  if (spec.num_ticks() > 0) {
+    progress += fmt::format(" of {:.6g} s", seconds(spec.num_ticks() - spec.lead_ticks()));
+  }
+  if (spec.lead_ticks() > 0) {
+    progress += fmt::format(", after {:.6g} s of lead", seconds(spec.lead_ticks()));
+  }
+  lines->push_back({progress});
+  progress.clear();
   if (snapshot.tick_rate >= 0) {
-    progress += fmt::format("  {:.1f} ticks/s  {:.2f} x real time", snapshot.tick_rate,
-                            snapshot.tick_rate * period);
+    progress = fmt::format("{:.1f} ticks/s  {:.2f} x real time  ", snapshot.tick_rate,
+                           snapshot.tick_rate * period);
   }
-  progress += spec.realtime() ? "  paced by the wall clock" : "  as fast as it goes";
+  progress += spec.realtime() ? "paced by the wall clock" : "as fast as it goes";
   const bool stopped = snapshot.bridge && snapshot.bridge->state >= bridge_status_t::STATE_STOPPING;
   const bool failing = snapshot.bridge && snapshot.bridge->state > bridge_status_t::STATE_RUNNING;
   if (snapshot.bridge) {
@@ -99,19 +108,21 @@ std::string ProcessLabel(const RunSpec& spec, const std::string& component) {
 }
 
 void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
-  size_t width = 8;
+  size_t width = 7;
   for (const auto& process : snapshot.processes) {
     width = std::max(width, ProcessLabel(spec, process.name).size());
   }
+  const size_t label = width + 1;
+  static constexpr char kRow[] =
+      "{:<{}} {:<8}{:>8}{:>8}{:>6}{:>7}{:>8}{:>8}{:>7}{:>7}{:>7}{:>9}{:>9}{:>10}";
   lines->push_back(
-      {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
-                   "PROCESS", width, "STATE", "TICK", "TICKS/S", "MEDIAN us", "P99 us", "MAX us",
-                   "LATE", "GAPS", "RESENT", "REFUSED", "DROPPED", "UNSENT", "AGE s"),
-       Style::kTitle});
+      {fmt::format(kRow, "PROCESS", width, "STATE", "TICKS/S", "P99 us", "LATE", "GAPS", "REFUSED",
+                   "DROPPED", "RESENT", "UNSENT", "AGE s", "TICK", "MEDIAN us", "MAX us"),
+       Style::kTitle, label});
   for (const auto& process : snapshot.processes) {
-    const std::string label = ProcessLabel(spec, process.name);
+    const std::string name = ProcessLabel(spec, process.name);
     if (!process.seen) {
-      lines->push_back({fmt::format("{:<{}} {}", label, width, "not heard of"), Style::kWarning});
+      lines->push_back({fmt::format("{:<{}} not heard of", name, width), Style::kWarning, label});
       continue;
     }
     const health_t& h = process.health;
@@ -119,15 +130,15 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
     const bool failed = h.state == health_t::STATE_FAILED;
     const bool stale = process.age > kStale && h.state <= health_t::STATE_RUNNING;
     lines->push_back(
-        {fmt::format("{:<{}} {:<9}{:>9}{:>9} {:>9}{:>9}{:>9}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>7}",
-                     label, width, StateName(h.state), Count(h.tick), Number(process.tick_rate, 1),
-                     Number(timed ? h.latency_median : -1, 1),
-                     Number(timed ? h.latency_p99 : -1, 1), Number(timed ? h.latency_max : -1, 1),
-                     h.deadline_misses, h.gaps, h.resends, h.messages_refused, h.messages_dropped,
-                     h.publish_errors, Number(process.age, 1)),
+        {fmt::format(
+             kRow, name, width, StateName(h.state), Number(process.tick_rate, 1),
+             Number(timed ? h.latency_p99 : -1, 0), h.deadline_misses, h.gaps, h.messages_refused,
+             h.messages_dropped, h.resends, h.publish_errors, Number(process.age, 1), Count(h.tick),
+             Number(timed ? h.latency_median : -1, 0), Number(timed ? h.latency_max : -1, 0)),
          failed                           ? Style::kFailure
          : stale || h.deadline_misses > 0 ? Style::kWarning
-                                          : Style::kPlain});
+                                          : Style::kPlain,
+         label});
     AddRealTime(h, lines);
     if (!h.detail.empty()) {
       lines->push_back({fmt::format("  {}", logging::Printable(h.detail)),
@@ -139,10 +150,11 @@ void AddProcesses(const RunSpec& spec, const LiveSnapshot& snapshot, std::vector
 /// A line for each slave of the drives' bus.
 void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
   constexpr int kOperational = 8, kError = 16;
+  constexpr size_t kLabel = 6;
   lines->push_back(
       {fmt::format("{:<6}{:<22}{:>8}{:>10}{:>10}{:>11}{:>10}{:>11}{:>11}", "SLAVE", "STATE", "603F",
                    "EMERGENCY", "COUNT", "CLOCK ns", "RX ERR", "LOST LINK", "RECOVERED"),
-       Style::kTitle});
+       Style::kTitle, kLabel});
   for (size_t i = 0; i < bus.online.size(); ++i) {
     const int status = bus.al_status[i];
     const char* const name = (status & 15) == 1   ? "INIT"
@@ -163,33 +175,34 @@ void AddBus(const bus_status_t& bus, std::vector<ViewLine>* lines) {
                                   bus.recoveries[i]),
                       !good ? Style::kFailure
                       : odd ? Style::kWarning
-                            : Style::kPlain});
+                            : Style::kPlain,
+                      kLabel});
   }
 }
 
 void AddChannels(const LiveSnapshot& snapshot, std::vector<ViewLine>* lines) {
   size_t name = 7;
-  size_t type = 4;
-  for (const auto& channel : snapshot.channels) {
-    name = std::max(name, channel.name.size());
-    type = std::max(type, channel.type.size());
-  }
-  lines->push_back({fmt::format("{:<{}} {:<{}}{:>9}{:>9}{:>12}{:>8}{:>8}{:>8}", "CHANNEL", name,
-                                "TYPE", type, "TICK", "MSG/S", "DATA", "B/MSG", "AGE s", "MISSED"),
-                    Style::kTitle});
+  for (const auto& channel : snapshot.channels) name = std::max(name, channel.name.size());
+  static constexpr char kRow[] = "{:<{}} {:>9}{:>8}{:>8}{:>12}{:>8}{:>9}  {}";
+  const size_t label = name + 1;
+  lines->push_back({fmt::format(kRow, "CHANNEL", name, "MSG/S", "AGE s", "MISSED", "DATA", "B/MSG",
+                                "TICK", "TYPE"),
+                    Style::kTitle, label});
   double bytes = 0;
   double rate = 0;
   for (const auto& channel : snapshot.channels) {
     bytes += channel.bytes_per_second;
     rate += channel.rate;
-    lines->push_back({fmt::format(
-        "{:<{}} {:<{}}{:>9}{:>9.1f}{:>12}{:>8}{:>8}{:>8}", channel.name, name, channel.type, type,
-        Count(channel.tick), channel.rate, Rate(channel.bytes_per_second),
-        channel.bytes_per_message > 0 ? fmt::format("{}", channel.bytes_per_message) : kNothing,
-        Number(channel.age, 2), channel.missed)});
+    lines->push_back(
+        {fmt::format(kRow, channel.name, name, Number(channel.rate, 1), Number(channel.age, 2),
+                     channel.missed, Rate(channel.bytes_per_second),
+                     channel.bytes_per_message > 0 ? fmt::format("{}", channel.bytes_per_message)
+                                                   : kNothing,
+                     Count(channel.tick), channel.type),
+         Style::kPlain, label});
   }
-  lines->push_back({fmt::format("{:<{}} {:<{}}{:>9}{:>9.1f}{:>12}", "all", name, "", type, "", rate,
-                                Rate(bytes))});
+  lines->push_back(
+      {fmt::format("{:<{}} {:>9.1f}{:>28}", "all", name, rate, Rate(bytes)), Style::kPlain, label});
 }
 
 /// SGR sequence of a style.
@@ -231,19 +244,80 @@ std::string PlainText(const std::vector<ViewLine>& lines) {
   return text;
 }
 
-std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows) {
+void ViewScroll::Move(char key, int page) {
+  constexpr int kAside = 8;  // characters
+  switch (key) {
+    case 'k':
+      --line;
+      break;
+    case 'j':
+      ++line;
+      break;
+    case 'b':
+      line -= page;
+      break;
+    case 'f':
+    case ' ':
+      line += page;
+      break;
+    case 'g':
+      line = 0;
+      break;
+    case 'G':
+      line = std::numeric_limits<int>::max() / 2;
+      break;
+    case 'h':
+      column -= kAside;
+      break;
+    case 'l':
+      column += kAside;
+      break;
+    default:
+      break;
+  }
+}
+
+std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, ViewScroll* scroll) {
   const auto width = static_cast<size_t>(std::max(columns, 1));
   const auto height = static_cast<size_t>(std::max(rows, 1));
-  std::string frame = "\x1b[H";
-  size_t shown = 0;
-  for (const ViewLine& line : lines) {
-    if (shown == height) break;
-    if (line.text.empty() && lines.size() > height) continue;
-    // A line feed after the last would scroll.
-    frame += fmt::format("{}{}{}\x1b[0m\x1b[K", shown == 0 ? "" : "\r\n", Color(line.style),
-                         line.text.substr(0, width));
-    ++shown;
+  const size_t header = std::min({kTopHeader, lines.size(), height - 1});
+  std::vector<const ViewLine*> rest;
+  for (size_t i = header; i < lines.size(); ++i) {
+    if (!lines[i].text.empty() || lines.size() < height) rest.push_back(&lines[i]);
   }
+  const size_t room = std::min(rest.size(), height - 1 - header);
+  size_t longest = 0;
+  for (const ViewLine* line : rest) {
+    if (line->label > 0) longest = std::max(longest, line->text.size());
+  }
+  scroll->line = std::clamp(scroll->line, 0, static_cast<int>(rest.size() - room));
+  scroll->column =
+      std::clamp(scroll->column, 0, static_cast<int>(longest - std::min(longest, width)));
+  const auto first = static_cast<size_t>(scroll->line), aside = static_cast<size_t>(scroll->column);
+
+  std::string frame = "\x1b[H";
+  const auto show = [&](const std::string& text, Style style) {
+    frame += fmt::format("{}{}\x1b[0m\x1b[K", Color(style), text.substr(0, width));
+  };
+  for (size_t i = 0; i < header; ++i) {
+    show(lines[i].text, lines[i].style);
+    frame += "\r\n";
+  }
+  for (size_t i = first; i < first + room; ++i) {
+    const auto& [text, style, label] = *rest[i];
+    const bool moves = label > 0 && aside > 0;
+    show(moves ? text.substr(0, label) + text.substr(std::min(text.size(), label + aside)) : text,
+         style);
+    frame += "\r\n";
+  }
+  std::string keys = "q quit";
+  if (room < rest.size()) {
+    keys += fmt::format("  arrows, space: lines {}-{} of {}", first + 1, first + room, rest.size());
+  }
+  if (longest > width) {
+    keys += fmt::format("  left, right: columns {}-{} of {}", aside + 1, aside + width, longest);
+  }
+  show(keys, Style::kTitle);  // a line feed after it would scroll
   return frame + "\x1b[J";
 }
 

@@ -16,9 +16,23 @@ struct ViewLine {
   enum class Style { kPlain, kTitle, kWarning, kFailure };
   std::string text;
   Style style = Style::kPlain;
+  size_t label = 0;  ///< characters of a table's first column, which stays in sight; 0: no table
 };
 
-/// The whole view; `names`: of the run's robot, `dir`: the run's folder, `refused`: packets that
+/// Lines that stay at the top of a frame: what the run as a whole does.
+inline constexpr size_t kTopHeader = 4;
+
+/// How far a reader has gone in a view that is larger than the terminal.
+struct ViewScroll {
+  int line = 0;    ///< of those below the header, the first in sight
+  int column = 0;  ///< characters of tables, behind their first column, that are out of sight
+
+  /// Goes on by a key of FullScreen: k, j, b, f, g, G up and down; h, l to the sides.
+  void Move(char key, int page);
+};
+
+/// The whole view, kTopHeader lines of header first, in tables the columns first by which a fault
+/// is seen; `names`: of the run's robot, `dir`: the run's folder, `refused`: packets that
 /// the listener refused.
 std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& names,
                               const std::string& dir, const LiveSnapshot& snapshot,
@@ -27,8 +41,8 @@ std::vector<ViewLine> TopView(const RunSpec& spec, const logging::ElementNames& 
 /// Plain text, a line feed after each line.
 std::string PlainText(const std::vector<ViewLine>& lines);
 
-/// One frame for a terminal of this size, over the frame before; blank lines go first when there
-/// are too many, then what does not fit.
-std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows);
+/// One frame for a terminal of this size, over the frame before: the header, what `scroll` says of
+/// the rest, and a last line with the keys. `scroll` is kept within the view.
+std::string Frame(const std::vector<ViewLine>& lines, int columns, int rows, ViewScroll* scroll);
 
 }  // namespace poise

@@ -28,10 +28,11 @@ std::optional<ViewTarget> ReadTarget(std::string_view target) {
       if (std::exchange(token, true)) return {};
       read.token = value;
     }
-    if (key != "from") continue;
+    if (key != "from" && key != "before") continue;
+    int64_t& tick = key == "from" ? read.from : read.before;
     const char* const last = value.data() + value.size();
-    const auto [parsed, error] = std::from_chars(value.data(), last, read.from);
-    if (error != std::errc() || parsed != last || read.from < 0) return {};
+    const auto [parsed, error] = std::from_chars(value.data(), last, tick);
+    if (error != std::errc() || parsed != last || tick < 0) return {};
   }
   return read;
 }

@@ -13,6 +13,7 @@ struct ViewTarget {
   std::string_view path;
   std::string_view token;  ///< empty: none
   int64_t from = 0;        ///< the tick that a client wants first
+  int64_t before = 0;      ///< the tick up to which it wants earlier ones
 };
 /// None when it is malformed.
 std::optional<ViewTarget> ReadTarget(std::string_view target);

@@ -35,13 +35,17 @@ constexpr double kActBurst = 60;           // texts at once
 constexpr int kMaxAccepts = 200;           // in each kAcceptWindow: 2,000/s
 constexpr std::chrono::milliseconds kAcceptWindow{100};
 constexpr size_t kMaxBatch = size_t{1} << 20;  // bytes
-constexpr int kSendBuffer = 256 << 10;         // bytes, in the system
+constexpr int64_t kMostBehind = 4;      // batches: then what a client lacks waits until it asks
+constexpr int kSendBuffer = 256 << 10;  // bytes, in the system
 constexpr std::chrono::seconds kRequestPatience{5};
 constexpr std::chrono::seconds kSendPatience{5};
 constexpr std::chrono::milliseconds kAcceptPause{100};  // when the system has no more sockets
 
 std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 beast::string_view BeastView(std::string_view text) { return {text.data(), text.size()}; }
+
+/// s, of a clock that goes on evenly.
+double Seconds() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
 
 }  // namespace
 
@@ -171,9 +175,18 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
       Respond(http::status::method_not_allowed, "only GET\n");
     } else if (target && target->path == "/") {
       Respond(http::status::ok, server_->page_, "text/html; charset=utf-8");
+    } else if (target && target->path == "/ticks") {
+      Respond(http::status::ok, Earlier(target->before), "application/octet-stream");
     } else {
-      Respond(http::status::not_found, "there is only /\n");
+      Respond(http::status::not_found, "there is / and /ticks?before=TICK\n");
     }
+  }
+
+  /// The last batch of the ticks before `tick` that are still held; of no tick where there is none.
+  std::string Earlier(int64_t tick) const {
+    const TickRing& ring = *server_->ring_;
+    const int64_t to = std::clamp(tick, ring.first_tick(), ring.end_tick());
+    return ring.Encode(std::max(ring.first_tick(), to - BatchTicks()), to, Seconds());
   }
 
   /// Sends it and closes. The page is not copied: `body` of other texts is.
@@ -271,7 +284,11 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
       stream_.text(true);
     } else if (next_ < ring.end_tick()) {
       next_ = std::max(next_, ring.first_tick());
-      const int64_t to = std::min(ring.end_tick(), next_ + static_cast<int64_t>(BatchTicks()));
+      // What is new goes first.
+      if (ring.end_tick() - next_ > kMostBehind * BatchTicks()) {
+        next_ = ring.end_tick() - BatchTicks();
+      }
+      const int64_t to = std::min(ring.end_tick(), next_ + BatchTicks());
       outgoing_ = server_->Batch(next_, to);
       next_ = to;
       stream_.binary(true);
@@ -297,10 +314,11 @@ class ViewServer::Impl::Client : public std::enable_shared_from_this<Client> {
   bool Behind() const {
     const int64_t ticks = server_->ring_->end_tick() - next_;  // negative: asked for later ones
     return sent_state_ != server_->state_ || sent_status_ != server_->status_ ||
-           sent_acts_ != server_->acts_ ||
-           ticks >= (sends_text_ ? 1 : static_cast<int64_t>(BatchTicks()));
+           sent_acts_ != server_->acts_ || ticks >= (sends_text_ ? 1 : BatchTicks());
   }
-  size_t BatchTicks() const { return std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()); }
+  int64_t BatchTicks() const {
+    return static_cast<int64_t>(std::max<size_t>(1, kMaxBatch / server_->ring_->tick_size()));
+  }
 
   websocket::stream<beast::tcp_stream> stream_;
   Impl* server_;
@@ -408,7 +426,7 @@ void ViewServer::Impl::Restart() {
 
 std::shared_ptr<const std::string> ViewServer::Impl::Batch(int64_t from, int64_t to) {
   if (from != batch_from_ || to != batch_to_) {
-    batch_ = std::make_shared<const std::string>(ring_->Encode(from, to));
+    batch_ = std::make_shared<const std::string>(ring_->Encode(from, to, Seconds()));
     batch_from_ = from;
     batch_to_ = to;
   }

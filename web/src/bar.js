@@ -1,5 +1,5 @@
 // The bar at the bottom: play, speed, scrub, zoom, and the keys.
-import {element} from './dom.js';
+import {element, icon} from './dom.js';
 import {SPEEDS} from './player.js';
 
 const LONG_STEP = 0.1;  // s
@@ -9,8 +9,9 @@ export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shif
   ['[ ]', 'slower, faster'], ['+ −', 'zoom the plots at the cursor'], ['0', 'all of it in the plots'], ['/', 'search signals']];
 
 function track(shared) {
-  const {run, phases, events} = shared;
-  const inSight = events.filter((e) => e.time >= run.start - run.period);  // a live run lets go of its beginning
+  const {run, phases, events, otherEvents = []} = shared;
+  // A live run lets go of its beginning, and a second one may be longer.
+  const inSight = (list) => list.filter((e) => e.time >= run.start - run.period && e.time <= run.end + run.period);
   const length = Math.max(run.end - run.start, run.period);
   const share = (t) => 100 * Math.min(1, Math.max(0, (t - run.start) / length));
   const span = (name, {from, to}) => {
@@ -23,13 +24,23 @@ function track(shared) {
     ...phases.support.filter((p) => p.value !== 'both feet').map((p) => span('single', p)),
     ...phases.balancing.map((p) => span('balancing', p)),
     ...phases.missing.map((p) => span('missing', p)),
-    ...inSight.map((e) => {
-      const mark = element('span', {class: 'event'});
+    ...[...inSight(events), ...inSight(otherEvents)].map((e) => {
+      const mark = element('span', {class: `event${otherEvents.includes(e) ? ' second' : ''}${e.name === 'fall' ? ' fall' : ''}`});
       mark.style.left = `${share(e.time)}%`;
       return mark;
     }));
 }
 
+const NEAR = 0.008;  // of the bar, from the pointer to an event that it is told of
+
+/** Which events there are about a time, a line each. */
+function eventsNear(time, {run, events, otherEvents = []}) {
+  const length = NEAR * Math.max(run.end - run.start, run.period);
+  return [...events, ...otherEvents].filter((e) => Math.abs(e.time - time) <= length)
+    .map((e) => `${e.time.toFixed(3)} s: ${e.name.replaceAll('_', ' ')}${otherEvents.includes(e) ? ' (second run)' : ''}`).join('\n');
+}
+
+export const LAG_PERIOD = 200;  // ms between looks at how far the page is behind
 const LIVE_TEXTS = {connecting: '○ connecting', live: '● live', ended: '■ run ended',
   waiting: '○ no connection: trying again'};
 
@@ -39,14 +50,25 @@ function liveButton({player, feed}) {
     click: () => player.setFollowing(true)});
   const update = () => {
     const missed = feed.lost > 0 ? `, ${feed.lost} messages missed` : '';
-    button.textContent = LIVE_TEXTS[feed.state] + missed;
-    button.dataset.state = feed.state;
+    const [state, text] = liveText(feed);
+    button.textContent = text + missed;
+    button.dataset.state = state;
     button.setAttribute('aria-pressed', String(player.following));
   };
-  feed.addEventListener('state', update);
+  for (const event of ['state', 'control']) feed.addEventListener(event, update);
   player.addEventListener('state', update);
+  setInterval(update, LAG_PERIOD);
   update();
   return button;
+}
+
+/** [state, words]: live only when the page is; else how far it is behind, or up to where the run is made again. */
+export function liveText(feed) {
+  const again = feed.control?.run?.again ?? -1;
+  if (feed.state !== 'live') return [feed.state, LIVE_TEXTS[feed.state]];
+  if (again >= 0) return ['again', `○ made again, up to ${feed.run.timeOfTick(again).toFixed(3)} s`];
+  if (feed.live) return ['live', LIVE_TEXTS.live];
+  return ['behind', Number.isFinite(feed.behind) ? `◐ ${feed.behind.toFixed(1)} s behind` : LIVE_TEXTS.connecting];
 }
 
 /** Of which ticks a row's picture and numbers are, where it holds several. */
@@ -60,14 +82,18 @@ export function playerBar(host, shared) {
   const {player, view, run} = shared;
   const button = (text, label, action) =>
     element('button', {type: 'button', title: label, 'aria-label': label, click: action}, text);
-  const play = button('▶', 'Play or pause (space)', () => player.toggle());
+  const play = button(icon('play'), 'Play or pause (space)', () => player.toggle());
   play.id = 'play';
   const speed = element('select', {id: 'speed', 'aria-label': 'Speed',
     change: () => player.setSpeed(Number(speed.value))},
   ...SPEEDS.map((s) => element('option', {value: s, selected: s === 1}, `${s}×`)));
   const scrub = element('input', {type: 'range', id: 'scrub', step: 1,
     'aria-label': 'Time', input: () => player.seek(run.timeOfTick(Number(scrub.value))),
-    keydown: (e) => e.preventDefault()});  // the page's own keys step
+    keydown: (e) => e.preventDefault(),  // the page's own keys step
+    pointermove: (e) => {
+      const box = scrub.getBoundingClientRect();
+      scrub.title = eventsNear(run.start + (e.clientX - box.left) / box.width * (run.end - run.start), shared);
+    }});
   const time = element('output', {id: 'time'});
   const scale = () => {
     scrub.min = run.firstTick;
@@ -88,7 +114,7 @@ export function playerBar(host, shared) {
   };
   player.addEventListener('time', showTime);
   player.addEventListener('state', () => {
-    play.textContent = player.playing ? '⏸' : '▶';
+    play.replaceChildren(icon(player.playing ? 'pause' : 'play'));
     speed.value = player.speed;
   });
   showTime();

@@ -16,6 +16,18 @@ export class Column {
 
   get values() { return this.#array.subarray(this.#start, this.#start + this.#length); }
 
+  /** Makes room for `count` rows at the beginning, of NaN. */
+  prepend(count) {
+    const array = new this.#array.constructor(count + this.#length).fill(NaN, 0, count);
+    array.set(this.values, count);
+    this.#array = array;
+    this.#start = 0;
+    this.#length = array.length;
+  }
+
+  /** Other values in the rows from `row` on. */
+  set(row, values) { this.#array.set(values, this.#start + row); }
+
   /** Adds `values` at the end and lets go of the first `dropped`. `keep`: the most rows that there will be. */
   append(values, dropped = 0, keep = Infinity) {
     const length = this.#length + values.length;

@@ -30,6 +30,25 @@ export function describeField(messages, type, path, names = {}) {
   return {...result, label: labels.join('.')};
 }
 
+/**
+ * Fields that hold a zero where there is nothing to tell: [pattern of type.field, field of the message that tells ($1: a list's
+ * index), whether its value says that there is something].
+ */
+const TOLD = [
+  [/^(?:robot_sensors_t|drive_feedback_t)\.foot_wrench\[(\d+)\]\..*/, 'foot_sensor[$1]', (sensor) => sensor === 0],
+  [/^joint_command_t\.margins\[(\d+)\]\..*/, 'in_contact[$1]', (contact) => contact > 0],
+  [/^estimator_status_t\.covariance\[\d+\]/, 'has_covariance', (has) => has > 0],
+  [/^support_plan_t\.step_(?:position\[\d\]|time)/, 'step_needed', (needed) => needed > 0],
+  [/^bus_status_t\.((?:temperature|voltage)\[\d+\])/, '$1', (reported) => reported !== 0],
+];
+
+/** {name, says} of the signal that tells whether this one's value is one; undefined: it always is. */
+function tellerOf(channel, field) {
+  const path = `${channel.type}.${field}`;
+  const [pattern, teller, says] = TOLD.find(([p]) => p.test(path)) ?? [];
+  return pattern && {name: `${channel.name}.${path.replace(pattern, teller)}`, says};
+}
+
 /** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
 export class Signal {
   #column = null;
@@ -48,6 +67,7 @@ export class Signal {
     Object.assign(this, description);
     /** As people read it: joints and feet by their names. */
     this.title = `${channel.name}.${this.label}`;
+    this.teller = tellerOf(channel, spec.field);
     if (channel.run.meta.live) this.#start();
   }
 
@@ -59,9 +79,33 @@ export class Signal {
     const {channel, spec} = this;
     const bounds = spec.least ? [spec.least, spec.largest].map((bound) => channel.read(bound, true)) : [];
     const [values, least, largest] = await Promise.all([channel.read(spec, this.integer), ...bounds]);
+    const teller = this.teller && channel.run.signals.get(this.teller.name);
+    if (teller && teller !== this) await teller.load();
+    const told = teller === this ? values.slice() : teller?.values;
+    for (const column of [values, least, largest].filter(Boolean)) this.#leaveOut(column, told);
     Object.assign(this, {least, largest});
     this.#column = new Column(values);
   }
+
+  /** NaN for what is no value. */
+  #leaveOut(values, told) {
+    for (let i = 0; told && i < values.length; ++i) if (!this.teller.says(told[i])) values[i] = NaN;
+  }
+
+  /** This signal's column of `values` by name, which append and fill take. */
+  columnOf(values) {
+    const own = values[this.name], told = this.teller && values[this.teller.name];
+    if (!own || !told) return own;
+    const known = own.slice();
+    this.#leaveOut(known, told.slice());
+    return known;
+  }
+
+  /** Rows at the beginning that there are no values of yet. */
+  prepend(count) { this.#column.prepend(count); }
+
+  /** Values that come after later ones. */
+  fill(row, values) { this.#column.set(row, values); }
 
   /** Adds `values` at the end and lets go of the first `dropped`. Throws when packed values have not been loaded. */
   append(values, dropped = 0) {
@@ -199,8 +243,8 @@ export class Run extends EventTarget {
     const none = new Float32Array(count).fill(NaN);
     const dropped = Math.max(0, this.numRows + count - this.keep);
     const derived = [];
-    for (const [name, signal] of this.signals) {
-      if (signal.append) signal.append(values[name] ?? none, dropped);
+    for (const signal of this.signals.values()) {
+      if (signal.append) signal.append(signal.columnOf(values) ?? none, dropped);
       else derived.push(signal);
     }
     this.firstTick += dropped;
@@ -209,10 +253,36 @@ export class Run extends EventTarget {
     this.dispatchEvent(new Event('append'));
   }
 
-  /** A live run lets go of all its ticks; others come; `restarts` counts. Fires 'restart'. */
+  /** Ticks that come after later ones: batches {first, count, values}. What finds no room is passed over. Fires 'restart' and 'append'. */
+  fillTicks(batches) {
+    const least = Math.max(0, this.firstTick + this.numRows - this.keep);
+    const own = [...this.signals.values()].filter((s) => s.append), derived = [...this.signals.values()].filter((s) => !s.append);
+    const kept = batches.filter(({first, count}) => count > 0 && first + count > least);
+    const added = Math.max(0, ...kept.map(({first}) => this.firstTick - Math.max(first, least)));
+    for (const signal of added > 0 ? this.signals.values() : []) signal.prepend(added);
+    this.firstTick -= added;
+    this.numRows += added;
+    for (const {first, count, values} of kept) {
+      const skipped = Math.max(0, least - first), row = first + skipped - this.firstTick;
+      for (const signal of own) {
+        const column = signal.columnOf(values);
+        if (column) signal.fill(row, column.subarray(skipped, skipped + Math.max(0, this.numRows - row)));
+      }
+      for (const signal of derived) signal.fill(row, count - skipped);
+    }
+    this.#renumber();
+    this.dispatchEvent(new Event('append'));
+  }
+
+  /** A live run lets go of all its ticks; others come. Fires 'restart'. */
   restart() {
     for (const signal of this.signals.values()) signal.clear();
     this.numRows = 0;
+    this.#renumber();
+  }
+
+  /** Rows hold other ticks than before: `restarts` counts that. */
+  #renumber() {
     this.restarts = (this.restarts ?? 0) + 1;
     this.dispatchEvent(new Event('restart'));
   }

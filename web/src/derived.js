@@ -205,15 +205,23 @@ class DerivedSignal {
     this.#column.append(rows, held + rows.length - this.run.numRows, this.run.keep);
   }
 
+  /** Rows at the beginning that there are no values of yet. */
+  prepend(count) { this.#column?.prepend(count); }
+
+  /** After rows have come that were missing; the one behind them may be of the tick before, too. */
+  fill(row, count) {
+    if (this.#column) this.#column.set(row, this.#rows(row, Math.min(this.run.numRows, row + count + 1)));
+  }
+
   /** Its run starts anew. */
   clear() {
     this.#memory = {};
     if (this.#column) this.#column = new Column(new Float32Array(0));
   }
 
-  #rows(from) {
+  #rows(from, to = this.run.numRows) {
     const arrays = this.#signals.map((s) => s.values);
-    const rows = new Float32Array(this.run.numRows - from);
+    const rows = new Float32Array(to - from);
     for (let i = 0; i < rows.length; ++i) {
       const value = Math.fround(this.compute(arrays, from + i, this.#memory));
       rows[i] = Number.isFinite(value) ? value : NaN;

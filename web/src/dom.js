@@ -22,6 +22,12 @@ export function shape(tag, attributes = {}, ...children) {
   return result;
 }
 
+const ICONS = {play: 'M2 1 11 6.5 2 12Z', pause: 'M2 1h3v11H2ZM8 1h3v11H8Z'};
+
+/** A sign for a button that no font need have. */
+export const icon = (name) => shape('svg', {class: 'icon', viewBox: '0 0 13 13', width: 12, height: 12, 'aria-hidden': 'true'},
+  shape('path', {d: ICONS[name], fill: 'currentColor'}));
+
 /** A captioned table; `numbers`: indices of the columns of numbers. */
 export function table(caption, columns, rows, {numbers = []} = {}) {
   return element('section', {class: 'table'}, element('h2', {}, caption),

@@ -1,5 +1,6 @@
 // A plot as a file.
 import {saveFile} from './dom.js';
+import {changesOf} from './figures.js';
 import {cssColor, styleOf} from './palette.js';
 
 const MARGIN = 12;  // CSS px
@@ -30,7 +31,13 @@ export function csvOf(panel) {
   return rows.join('\r\n') + '\r\n';
 }
 
-/** The plot with its title and legend. */
+/** "push_double_support, without balancing: fall, 2026-11-24T14:22:14Z", a line for each run. */
+function captions({run, overlay}) {
+  return [run, overlay].filter(Boolean).map(({meta: {run: r}}, i) => `${overlay ? `${['first', 'second'][i]} run: ` : ''}`
+    + `${[r.scenario, ...changesOf(r)].join(', ')} (${[r.log?.replace(/\/run\.lcm$/, ''), r.started_at].filter(Boolean).join(', ')})`);
+}
+
+/** The plot with its title, its legend and the names of its runs. */
 export function pngOf(panel) {
   const source = panel.plot.ctx.canvas;
   const scale = source.width / panel.plot.width;
@@ -51,9 +58,9 @@ export function pngOf(panel) {
     x += size;
     return at;
   });
-  const top = LINE + MARGIN;
+  const top = LINE + MARGIN, names = captions(panel.shared);
   canvas.width = source.width;
-  canvas.height = Math.round((top + panel.plot.height + LINE * rows + MARGIN) * scale);
+  canvas.height = Math.round((top + panel.plot.height + LINE * (rows + names.length) + MARGIN) * scale);
   context.scale(scale, scale);
   context.fillStyle = cssColor('--panel');
   context.fillRect(0, 0, width, canvas.height);
@@ -74,13 +81,15 @@ export function pngOf(panel) {
     context.stroke();
     context.fillText(line.label, places[i].x + 28, y);
   });
+  context.fillStyle = cssColor('--ink-soft');
+  names.forEach((name, i) => context.fillText(name, MARGIN, top + panel.plot.height + LINE * (rows + 1 + i) - 4, width - 2 * MARGIN));
   return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
     : failed(new Error('the browser cannot write this plot as PNG')), 'image/png'));
 }
 
 export function savePanel(panel, ending, blob) {
   const {figure, title} = panel.definition;
-  const name = `${figure ? `fig ${figure} ` : ''}${title}`.toLowerCase().normalize('NFKD')
+  const name = `${panel.shared.run.meta.run.scenario} ${figure ? `fig ${figure} ` : ''}${title}`.toLowerCase().normalize('NFKD')
     .replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
   saveFile(`${name || 'plot'}.${ending}`, blob);
 }

@@ -89,11 +89,10 @@ function jointTorque(figure, run, joint) {
 const bodyRoll = (figure, note) => ({figure, title: 'Orientation error of the body about x', unit: 'rad', note,
   series: [series('desired less actual', 'computed', 'task_torque_t', 'body_orientation_error[0]')]});
 
-/** "variant step", "without balancing", "2 settings changed": what the run has besides its scenario. */
+/** "variant step", "without balancing", "sim.push[0].peak=300": what the run has besides its scenario. */
 export function changesOf({variant, ablations = [], changes = []}) {
-  const sets = changes.filter((change) => ['--set', '--robot'].includes(change.by)).length;
   return [variant ? `variant ${variant}` : '', ...ablations.map((flag) => flag.replace(/^--/, '')),
-    sets ? `${sets} setting${sets === 1 ? '' : 's'} changed` : ''].filter(Boolean);
+    ...changes.filter((change) => ['--set', '--robot'].includes(change.by)).map(({set}) => set)].filter(Boolean);
 }
 
 /** The paper's figures by section. */

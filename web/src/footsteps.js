@@ -5,6 +5,7 @@ import {Samples, pose, vector} from './samples.js';
 const BOUNCE = 0.1;  // s without a load that leave a footprint what it is
 const SLID = 0.02;   // m, from above, that make it another one
 const ROLLED = 0.01;  // m that its centre is higher than when it first stood firmly: it rolls off
+const COVERED = 0.04;  // m between two prints of a foot of which one would hide the other
 const FIRM = 5;  // noisy loads, of a foot that stands firmly: a quarter of the weight
 export const FOOTSTEPS = 'steps.footsteps_t';
 export const PLANNED = 3;  // footholds, at the most
@@ -92,6 +93,16 @@ export class Footprints {
     while (end > 0 && this.list[end - 1].from > time) --end;
     return this.list.slice(Math.max(0, end - count), end);
   }
+}
+
+/** Those that can be told apart: of prints of one foot that nearly cover each other, as of one that slides or steps on the spot, the last. */
+export function apart(prints) {
+  const kept = [];
+  for (const print of [...prints].reverse()) {
+    const covers = ({foot, pose: {position: [x, y]}}) => foot === print.foot && Math.hypot(x - print.pose.position[0], y - print.pose.position[1]) < COVERED;
+    if (!kept.some(covers)) kept.unshift(print);
+  }
+  return kept;
 }
 
 /** What FOOTSTEPS says: the names under which Samples has it. */

@@ -16,7 +16,7 @@ import {Printer} from './print.js';
 import {robotPage} from './robot_page.js';
 import {COLORS, SceneView} from './scene.js';
 import {signalSearch} from './search.js';
-import {eventList, Readout} from './side.js';
+import {EventList, Readout, storyText} from './side.js';
 import {TRACE} from './steps_view.js';
 import {liveTables, stateBadges, tables} from './table.js';
 import {quantity} from './units.js';
@@ -32,24 +32,46 @@ function buildOf({versions, poise_commit: commit, instruction_set: instructions}
   return `poise ${versions.poise}${known.length ? ` (${known.join(', ')})` : ''}`;
 }
 
-function header(run, overlay, feed) {
+const CHIPS = 4;  // changes of a run that are each shown
+
+/** What the run has besides its scenario; the last ones, where there are many, under the mouse. */
+function changeChips(changes) {
+  const chip = (text, title) => element('span', {class: 'badge change', title}, text);
+  const rest = changes.slice(CHIPS);
+  return [...changes.slice(0, CHIPS).map((text) => chip(text)),
+    rest.length > 0 ? chip(`${rest.length} more change${rest.length === 1 ? '' : 's'}`, rest.join('\n')) : ''];
+}
+
+/** A run in the header: its names, how it ended and its story. `name`: "first run", of several. */
+function runHead({run, name, feed, player}) {
   const {run: r} = run.meta;
   const changes = changesOf(r);
   const variant = (run.scenario.variant ?? []).find((v) => v.name === r.variant);
-  const state = element('span', {class: 'badges'});
-  const update = () => state.replaceChildren(...stateBadges(run, feed));
-  for (const event of feed ? ['state', 'status'] : []) feed.addEventListener(event, update);
-  document.title = `${[r.scenario, ...changes].join(', ')} – Poise`;
-  document.getElementById('header').append(
-    element('h1', {}, r.scenario), ...changes.map((change) => element('span', {class: 'badge change'}, change)),
-    element('p', {}, variant?.description ? `${variant.description} (a variant of: ${run.scenario.description ?? ''})`
+  const state = element('span', {class: 'badges'}), story = element('div', {class: 'story-place'});
+  const update = () => {
+    state.replaceChildren(...stateBadges(run, feed));
+    const text = (feed ? feed.status.story : run.meta.story) || '';
+    if (text !== story.dataset.text) story.replaceChildren(text ? storyText(text, player) : '');
+    story.dataset.text = text;
+  };
+  for (const event of feed ? ['state', 'status', 'control', 'restart'] : []) feed.addEventListener(event, update);
+  update();
+  return element('section', {class: `run-head${name === 'second run' ? ' second' : ''}`},
+    name ? element('span', {class: 'which'}, name) : '', element(name === 'second run' ? 'h2' : 'h1', {}, r.scenario), ...changeChips(changes), state,
+    element('p', {class: 'description'}, variant?.description ? `${variant.description} (a variant of: ${run.scenario.description ?? ''})`
       : run.scenario.description ?? ''),
     r.paper_section ? element('span', {class: 'badge'}, changes.length ? `changed from the paper's section ${r.paper_section}`
       : `paper, section ${r.paper_section}`) : '',
-    state, element('span', {class: 'soft'}, `${r.started_at}, ${buildOf(r)}`),
-    overlay ? element('span', {class: 'badge second'}, `over it, dashed: ${overlay.meta.run.scenario}, ${overlay.meta.run.started_at}`)
-      : '', run.meta.story ? element('p', {class: 'story'}, run.meta.story) : '');
-  update();
+    element('span', {class: 'soft about'}, [`robot ${run.robot.name}`, feed ? '' : folderOf(r), r.started_at, buildOf(r)].filter(Boolean).join(', ')), story);
+}
+
+/** "stands", of its log's "stands/run.lcm"; of a log on its own its name. */
+const folderOf = ({log}) => log.replace(/\/run\.lcm$/, '');
+
+function header(run, overlay, feed, player) {
+  const runs = overlay ? [{run, name: 'first run'}, {run: overlay, name: 'second run'}] : [{run}];
+  document.title = `${runs.map((one) => [one.run.meta.run.scenario, ...changesOf(one.run.meta.run).slice(0, CHIPS)].join(', ')).join(' and ')} – Poise`;
+  document.getElementById('header').append(...runs.map((one) => runHead({...one, feed, player})));
 }
 
 function sceneToolbar(scene) {
@@ -63,28 +85,36 @@ function sceneToolbar(scene) {
 /** What the regions about the standing foot leave out. */
 function regionsNote(run) {
   if (!run.find(FOOTSTEPS, 'stance')) return '';
-  return element('p', {class: 'soft regions-note'}, 'Regions of 0, 1, 2 steps about the standing foot (Koolen et al. 2012). Approximated: a '
+  return element('details', {class: 'soft regions-note'}, element('summary', {}, 'Regions of 0, 1, 2 steps'), 'About the standing foot (Koolen et al. 2012). Approximated: a '
     + 'pendulum of the COM\'s height; the legs\' reach with the COM above the sole; feet parallel; each step in its least or planned time '
     + 'from beside the sole, the one under way to where it is planned, as far as that can still be moved; the hull of 16 directions.');
 }
 
+/** What the picture's signs mean, beneath it; folded where there is little room. */
 function sceneKey(run, overlay) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
     return element('li', {}, mark, text);
   };
-  return element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
-    entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
-    entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
-    entry('capture', '●', `capture point; ─ its last ${TRACE} s; ○ a step needed there`),
-    entry('support', '▰', 'footprints and when the foot came down: right blue, left orange; ╌ planned'),
-    run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'from inside, 0, ╌ 1, 2 steps bring it to rest (approximate)') : '',
-    entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
-    run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'),
-      'blocks as nothing stands on them (a lane has no outer edge): light soft, dark stiff') : '',
-    run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ what it pulls with') : '',
-    overlay ? entry('desired', '▒', 'second run') : '');
+  return element('details', {class: 'scene-key', open: WIDE.matches}, element('summary', {}, 'Signs in the picture'),
+    element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
+      entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
+      entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
+      entry('capture', '●', `capture point; ─ last ${TRACE} s; ○ step needed`),
+      entry('support', '▰', 'footprints, when they came down; ╌ planned'),
+      run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'at rest in 0, ╌ 1, 2 steps (roughly)') : '',
+      entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
+      run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'), 'blocks: light soft, dark stiff') : '',
+      run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ its pull') : '',
+      overlay ? entry('desired', '▒', 'second run') : ''));
+}
+
+/** Whoever lets the run go on, or takes it back, sees it. */
+function followOwnActs(control, player) {
+  control.addEventListener('answer', ({detail: act}) => {
+    if (act.state === 'accepted' && ['go', 'tick', 'back', 'restart'].includes(act.do)) player.setFollowing(true);
+  });
 }
 
 /** Puts the picture into the side column, small, while the plots are read; the box that switches this off. */
@@ -129,27 +159,36 @@ async function start() {
   if (!run) throw new Error('this page holds no run: write one with poise report');
   for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
   const feed = run.meta.live ? new LiveFeed(run) : undefined;
-  header(run, overlay, feed);
-  if (feed) await firstTicks(feed);
-  const events = run.meta.events ?? [];
   const player = new Player(run);
+  header(run, overlay, feed, player);
+  if (feed) await firstTicks(feed);
+  const events = run.meta.events ?? [], otherEvents = overlay?.meta.events ?? [];
   const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
   const drawn = has3D(), host = document.getElementById('scene');
   const scene = drawn ? new SceneView(host, run, overlay) : new NoPicture(host);
-  if (drawn) host.append(sceneToolbar(scene), sceneKey(run, overlay), element('span', {class: 'inset'}, 'soles from above, forward is up'));
+  if (drawn) {
+    host.append(sceneToolbar(scene), element('span', {class: 'inset'}, 'soles from above, forward is up'));
+    document.getElementById('scene-place').after(sceneKey(run, overlay));
+  }
   const [phases] = await Promise.all([phasesFound, scene.load()]);
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
 
   const view = new TimeView(run);
-  const shared = {run, overlay, player, view, phases, events, feed};
+  const shared = {run, overlay, player, view, phases, events, otherEvents, feed};
   const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
   const printer = new Printer(grid, scene);
-  const readout = new Readout(run);
-  const eventPlace = element('div', {}, eventList(events, player));
+  const readout = new Readout([run, overlay].filter(Boolean));
+  const lists = [[events, overlay ? ' of the first run' : ''], ...(overlay ? [[otherEvents, ' of the second run']] : [])].map(([list, name]) => {
+    const shown = new EventList(player, name);
+    shown.show(list);
+    return shown;
+  });
   const control = feed && new Control(feed);
+  const acting = control && controlPanel(control, shared);
   if (control) {
-    document.getElementById('side').append(controlPanel(control, shared));
+    document.getElementById('player').prepend(acting.stop);
+    followOwnActs(control, player);
     if (drawn) {
       const {show: pull} = grabbing(scene, control, new Hand(control), () => control.can('push') && player.following && feed.state === 'live');
       player.addEventListener('time', pull);
@@ -157,8 +196,10 @@ async function start() {
     control.catchUp();
   }
   const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
-  document.getElementById('side').append(element('h2', {}, 'At the time cursor'), readout.element, regionsNote(run),
-    eventPlace, element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
+  document.getElementById('side').append(acting?.element ?? '',
+    element('section', {class: 'now'}, element('h2', {}, 'At the time cursor'), overlay ? element('p', {class: 'soft'}, 'The second run is beneath the first.') : '',
+      readout.element, regionsNote(run)),
+    ...lists.map((list) => list.element), acting?.settings ?? '', element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
   document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
     element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
@@ -176,7 +217,7 @@ async function start() {
   const update = (now) => {
     if ((player.playing || player.following) && now - shown < READOUT_PERIOD) return;
     shown = now;
-    readout.update(player.row);
+    readout.update(player.time);
     grid.updateValues();
   };
   player.addEventListener('time', () => {
@@ -202,12 +243,11 @@ async function start() {
       live.refresh();
       shared.events = feed.status.events;
       const {ended, checked_ticks: ticks} = feed.status;
-      eventPlace.replaceChildren(eventList(shared.events, player,
-        ended ? '' : ` up to ${run.timeOfTick(ticks).toFixed(1)} s`));
+      lists[0].show(shared.events, ended || ticks === 0 ? '' : ` up to ${run.timeOfTick(ticks).toFixed(1)} s`);
       bar.refresh();
       grid.redraw();
     };
-    feed.addEventListener('status', refreshStatus);
+    for (const event of ['status', 'restart']) feed.addEventListener(event, refreshStatus);
     refreshStatus();
   }
   if (!feed) printer.drawWhenIdle(run);

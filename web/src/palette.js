@@ -22,14 +22,16 @@ export function setPaper(on) {
 export const isDark = () => query.matches && !onPaper;
 export const onThemeChange = (listener) => query.addEventListener('change', listener);
 
+/** By what a line is: of the first run, and of the second. */
+const DASHES = {curve: [undefined, [3, 3]], desired: [[5, 3], [8, 3, 1.5, 3]], limit: [[7, 4], [7, 3, 1.5, 3, 1.5, 3]]};
+
 /** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ... */
 export function styleOf(role, overlay = false) {
   const [, name, variant] = /^(.*?)(?:-(thin))?$/.exec(role);
   const hue = /^hue-(\d+)$/.exec(name);
   const pair = COLORS[hue ? `hue-${hue[1] % HUES}` : name] ?? COLORS.computed;
-  const dash = overlay ? [3, 3] : name === 'limit' ? [7, 4] : name === 'desired' || /^foot-.*-computed$/.test(name) ? [5, 3]
-    : undefined;
-  return {color: () => pair[isDark() ? 1 : 0], dash, width: variant === 'thin' || overlay ? 1 : 1.5};
+  const kind = name === 'limit' ? 'limit' : name === 'desired' || /^foot-.*-computed$/.test(name) ? 'desired' : 'curve';
+  return {color: () => pair[isDark() ? 1 : 0], dash: DASHES[kind][overlay ? 1 : 0], width: variant === 'thin' || overlay ? 1 : 1.5};
 }
 
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -39,7 +39,7 @@ export class Player extends EventTarget {
 
   #grow() {
     if (this.following) this.#move(this.run.end);
-    else if (this.time < this.run.start) this.#move(this.run.start);  // what was there is gone
+    else if (this.time < this.run.start || this.time > this.run.end) this.#move(this.time);  // what was there is gone
   }
 
   #move(time) {

@@ -1,12 +1,13 @@
 // Plots over time: one zoom and one time cursor for all of them.
 import uPlot from 'uplot';
-import {element} from './dom.js';
+import {element, shape} from './dom.js';
 import {csvOf, pngOf, savePanel} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from './units.js';
 
 const HEIGHT = 200;       // px
+const EXPORT_WIDTH = 900; // px, of a PNG
 const CLICK_SLACK = 4;    // px that a click may move
 const ZOOM_STEP = 1.25;
 const SHADE = '4d';       // how opaque a line's colour is between its bounds, 30 %
@@ -79,6 +80,12 @@ function resampled(values, run, other) {
   });
 }
 
+/** Whether a line of the second run is the first one's of the same series, `lines` being those before it. */
+function sameValues({signal, run: other, series}, lines, run) {
+  const first = lines.find((line) => line.series === series).signal.values;
+  return resampled(signal.values, run, other).every((value, row) => value === null || Number.isNaN(first[row]) || value === first[row]);
+}
+
 /** A colour, #rrggbb, that shows what lies beneath it. */
 const translucent = (color) => color + SHADE;
 
@@ -130,16 +137,17 @@ export class Panel {
   async #load() {
     const {run, overlay} = this.shared;
     const {definition} = this;
-    const lines = definition.series.map((s) => ({...s, run, signal: s.signal ?? findSignal(run, s)}));
+    const lines = definition.series.map((s) => ({...s, series: s, run, signal: s.signal ?? findSignal(run, s)}));
     for (const limit of definition.limits ?? []) lines.push({label: 'limit', role: 'limit', constant: limit});
     if (overlay) {
-      for (const s of definition.series.filter((x) => x.role !== 'limit')) {
+      for (const s of definition.series) {
         const signal = findSignal(overlay, {...s, name: s.name ?? undefined});
-        if (signal) lines.push({...s, signal, run: overlay, label: `${s.label} (second run)`, overlay: true});
+        if (signal) lines.push({...s, series: s, signal, run: overlay, label: `${s.label} (second run)`, overlay: true});
       }
     }
     await Promise.all(lines.map((line) => line.signal?.load()));
-    this.lines = lines;
+    // The second run's limits where they are others.
+    this.lines = lines.filter((line, k) => !(line.overlay && line.role === 'limit' && sameValues(line, lines.slice(0, k), run)));
   }
 
   /** The lines' values of the rows from `from` on, and after them the bounds of those that have some. */
@@ -197,7 +205,7 @@ export class Panel {
       width: Math.max(120, this.host.clientWidth), height: HEIGHT, legend: {show: false},
       scales: {x: {time: false, range: () => [view.min, view.max]}, y: {range: (_, low, high) => paddedRange(Math.min(low, end(high)), end(high), least)}},
       axes: [axis({label: 'time (s)', labelSize: 16, size: 26}),
-        axis({label: (u) => shown(u).unit || '1', labelSize: 16, size: 62,
+        axis({label: (u) => shown(u).unit, labelSize: 16, size: 62,
           values: (u, splits) => splits.map((v) => formatNumber(Number((v * shown(u).factor).toPrecision(8)), 6))})],
       cursor: {drag: {x: true, y: false, setScale: false}, points: {size: 5}, sync: {key: 'poise', setSeries: false}},
       series: [{}, ...this.lines.map((line) => {
@@ -247,8 +255,8 @@ export class Panel {
       if (line.constant !== undefined && seen.has('limit')) return '';
       if (line.constant !== undefined) seen.add('limit');
       const style = styleOf(line.role, line.overlay);
-      const swatch = element('span', {class: 'swatch'});
-      swatch.style.borderTop = `2px ${style.dash ? 'dashed' : 'solid'} ${style.color()}`;
+      const swatch = shape('svg', {class: 'swatch', viewBox: '0 0 26 2', width: 26, height: 2}, shape('line', {x1: 0, x2: 26, y1: 1, y2: 1,
+        stroke: style.color(), 'stroke-width': 2, 'stroke-dasharray': (style.dash ?? []).join(' ')}));
       return element('button', {type: 'button', class: 'entry', title: line.signal?.title ?? 'limit',
         'aria-pressed': String(!this.hidden.has(line.label)), click: (e) => {
           const on = this.hidden.delete(line.label);
@@ -272,7 +280,7 @@ export class Panel {
       const {values, integer, channel} = line.signal;
       const row = line.run.rowOf(run.timeAt(at));
       const value = channel.sparse ? lastNumber(values, row) : values[row] ?? NaN;
-      this.values[i].textContent = (integer && this.#nameOf(line.signal, value)) || quantity(value, this.#unitOf(line));
+      this.values[i].textContent = (integer && this.#nameOf(line.signal, value)) || quantity(value, this.#unitOf(line), 4, !this.definition.added);
     });
   }
 
@@ -367,7 +375,11 @@ export class Panel {
   async savePng() {
     await this.show();
     this.redraw();
-    savePanel(this, 'png', await pngOf(this));
+    this.resize(EXPORT_WIDTH);
+    await null;  // uPlot draws
+    const png = await pngOf(this);
+    this.resize();
+    savePanel(this, 'png', png);
   }
 }
 

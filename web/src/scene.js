@@ -34,7 +34,8 @@ const PIECE = 5;       // squares
 const FOG = [3.2, 6];  // m, where the ground begins to fade and where it ends
 const REGION_CORNERS = 16;  // of a message, at the most
 const GROUND_LAYER = 1;  // what the view from above shows
-const FOLLOW = 0.4;      // m that the robot goes from the middle before the view goes with it
+const FOLLOW = 0.15;     // m that the robot goes from the middle before the view goes with it
+const CLIMB = 0.4;       // m likewise, up or down
 
 export const COLORS = {
   computed: {light: '#1f5fd0', dark: '#6ea8ff'}, measured: {light: '#1d1d1f', dark: '#f2f2f2'},
@@ -281,8 +282,8 @@ export class SceneView {
     const {target} = this.controls;
     const away = Math.hypot(x - target.x, y - target.y);
     const up = z - target.z;  // on stairs
-    if (away > FOLLOW || Math.abs(up) > FOLLOW) {
-      const share = Math.max(0, 1 - FOLLOW / away), rise = Math.max(0, 1 - FOLLOW / Math.abs(up));
+    if (away > FOLLOW || Math.abs(up) > CLIMB) {
+      const share = Math.max(0, 1 - FOLLOW / away), rise = Math.max(0, 1 - CLIMB / Math.abs(up));
       const move = new Vector3((x - target.x) * share, (y - target.y) * share, up * rise);
       target.add(move);
       this.camera.position.add(move);
@@ -424,6 +425,7 @@ export class SceneView {
     renderer.setViewport(0, 0, width, height);
     renderer.setScissorTest(false);
     this.scene.background = this.background;
+    this.steps.clear(this.camera, width, height);
     renderer.render(this.scene, this.camera);
     const side = Math.round(INSET * Math.min(width, height));
     const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.row).position);

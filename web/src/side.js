@@ -5,82 +5,127 @@ import {formatNumber, quantity} from './units.js';
 
 const DIGITS = 3;
 
-/** {element, load(), update(row)}. */
+/** What holds at the time cursor, of a second run beneath the first: {element, load(), update(time)}. */
 export class Readout {
-  constructor(run) {
-    this.run = run;
-    this.cells = new Map();
+  constructor(runs) {
+    this.parts = runs.map((run) => ({run, rows: rowsOf(run), cells: new Map()}));
+    const names = [...new Set(this.parts.flatMap(({rows}) => rows.map(([name]) => name)))];
     const row = (name) => {
-      const cell = element('td', {class: 'number'});
-      this.cells.set(name, cell);
-      return element('tr', {}, element('th', {scope: 'row'}, name), cell);
+      const values = this.parts.map(({cells}, i) => {
+        const value = element('div', {class: i > 0 ? 'second' : null}, '–');
+        cells.set(name, value);
+        return value;
+      });
+      return element('tr', {}, element('th', {scope: 'row'}, name), element('td', {class: 'number'}, ...values));
     };
-    this.rows = this.#rows();
-    this.element = element('table', {class: 'readout'}, element('tbody', {}, ...this.rows.map(([name]) => row(name))));
+    this.element = element('table', {class: 'readout'}, element('tbody', {}, ...names.map(row)));
   }
 
-  /** [name, signals, text of their values] */
-  #rows() {
-    const {run} = this;
-    const find = (type, field) => run.find(type, field);
-    const derived = (name) => run.signals.get(`derived.${name}`);
-    const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
-    const metres = (values) => quantity(values, 'm', DIGITS);
-    const newton = (values) => quantity(values, 'N', DIGITS);
-    const plan = find('support_plan_t', 'status');
-    const status = find('task_torque_t', 'status');
-    const bridge = find('bridge_status_t', 'state');
-    const phase = find('support_plan_t', 'phase');
-    const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('support_plan_t', field));
-    const feet = run.robot.feet.map((foot) => foot.name);
-    return [
-      ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
-      ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
-      ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
-      ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
-      ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],
-      ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), metres],
-      ['push', [derived('push_magnitude')], newton],
-      ['step', step, (v) => (v[0] > 0 ? `${feet[v[2]]}, ${step[0].valueNames[v[0]]}: ${step[1].valueNames[v[1]]}` : 'none')],
-      ...this.#stepRows(),
-      ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
-        [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
-    ].filter(([, signals]) => signals.every(Boolean));
+  async load() {
+    await Promise.all(this.parts.flatMap(({rows}) => rows.flatMap(([, signals]) => signals)).map((s) => s.load()));
   }
 
-  /** Of a run whose planner makes steps. */
-  #stepRows() {
-    const {run} = this;
-    if (!run.find(FOOTSTEPS, 'stance')) return [];
-    const names = Object.entries(plannedSignals());
-    const capture = ['0', '1'].map((i) => run.find('support_plan_t', `capture_point[${i}]`));
-    const caught = (values) => {
-      const byName = new Map(names.map(([name], i) => [name, values[i]]));
-      const regions = regionsAt({at: (name) => byName.get(name) ?? NaN}, 0);
-      if (regions.every((region) => region.length === 0)) return 'on both feet';
-      const steps = stepsThatCatch(regions, values.slice(names.length));
-      return steps === undefined ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`;
-    };
-    const signals = names.map(([, [type, field]]) => run.find(type, field));
-    const touchDown = run.find(FOOTSTEPS, 'touch_down[0]'), planned = run.find(FOOTSTEPS, 'planned');
-    return [['capture point within', [...signals, ...capture], caught],
-      ['next touch-down in', [planned, touchDown], ([count, time]) => (count > 0 ? quantity([time], 's', DIGITS) : 'none planned')]];
-  }
-
-  async load() { await Promise.all(this.rows.flatMap(([, signals]) => signals).map((s) => s.load())); }
-
-  update(row) {
-    for (const [name, signals, text] of this.rows) {
-      this.cells.get(name).textContent = text(signals.map((s) => s.values?.[row] ?? NaN));
+  update(time) {
+    for (const {run, rows, cells} of this.parts) {
+      const row = run === this.parts[0].run ? run.rowAt(time) : run.rowOf(time);  // the second run may have ended before
+      for (const [name, signals, text] of rows) cells.get(name).textContent = text(signals.map((s) => s.values?.[row] ?? NaN));
     }
   }
 }
 
-/** Events as a list; a click goes there. `until`: " up to 3 s" where more may come. */
-export function eventList(events, player, until = '') {
-  if (events.length === 0) return '';
-  return element('section', {class: 'events'}, element('h2', {}, `Events${until}`), element('ol', {}, ...events.map((event) =>
-    element('li', {}, element('button', {type: 'button', title: event.detail, click: () => player.seek(event.time)},
-      element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ` ${event.name.replaceAll('_', ' ')}`,
-      event.detail ? element('span', {class: 'text'}, ` ${event.detail}`) : '')))));
+/** [name, signals, text of their values] */
+function rowsOf(run) {
+  const find = (type, field) => run.find(type, field);
+  const derived = (name) => run.signals.get(`derived.${name}`);
+  const named = (signal) => ([v]) => signal.valueNames?.[v] ?? formatNumber(v);
+  const metres = (values) => quantity(values, 'm', DIGITS, true);
+  const newton = (values) => quantity(values, 'N', DIGITS, true);
+  const plan = find('support_plan_t', 'status');
+  const status = find('task_torque_t', 'status');
+  const bridge = find('bridge_status_t', 'state');
+  const phase = find('support_plan_t', 'phase');
+  const step = ['stepping', 'step_reason', 'step_foot'].map((field) => find('support_plan_t', field));
+  const feet = run.robot.feet.map((foot) => foot.name);
+  return [
+    ['phase', [phase], ([i]) => run.scenario.step_planner?.phase?.[i]?.name ?? formatNumber(i)],
+    ['plan', [plan], plan && named(plan)], ['controller', [status], status && named(status)], ['bridge', [bridge], bridge && named(bridge)],
+    ['η', [find('joint_command_t', 'eta')], ([v]) => formatNumber(v, DIGITS)],
+    ['CoP computed x, y', ['cop[0]', 'cop[1]'].map((f) => find('balance_torque_t', f)), metres],
+    ['CoP measured x, y', [derived('cop_measured_x'), derived('cop_measured_y')], metres],
+    ['COM error x, y, z', ['x', 'y', 'z'].map((a) => derived(`com_error_${a}`)), metres],
+    ['push', [derived('push_magnitude')], newton],
+    ['step', step, (v) => (Number.isNaN(v[0]) ? '–' : v[0] > 0 ? `${feet[v[2]]}, ${step[0].valueNames[v[0]]}: ${step[1].valueNames[v[1]]}` : 'none')],
+    ...stepRows(run),
+    ...run.robot.feet.flatMap((foot) => ['measured', 'computed'].map((kind) =>
+      [`${foot.name} load, ${kind}`, [derived(`${foot.name}_load_${kind}`)], newton])),
+  ].filter(([, signals]) => signals.every(Boolean));
+}
+
+/** Of a run whose planner makes steps. */
+function stepRows(run) {
+  if (!run.find(FOOTSTEPS, 'stance')) return [];
+  const names = Object.entries(plannedSignals());
+  const capture = ['0', '1'].map((i) => run.find('support_plan_t', `capture_point[${i}]`));
+  const caught = (values) => {
+    const byName = new Map(names.map(([name], i) => [name, values[i]]));
+    if (Number.isNaN(byName.get('stance'))) return '–';
+    const regions = regionsAt({at: (name) => byName.get(name) ?? NaN}, 0);
+    if (regions.every((region) => region.length === 0)) return 'on both feet';
+    const steps = stepsThatCatch(regions, values.slice(names.length));
+    return steps === undefined ? 'beyond 2 steps' : `${steps} step${steps === 1 ? '' : 's'}`;
+  };
+  const signals = names.map(([, [type, field]]) => run.find(type, field));
+  const touchDown = run.find(FOOTSTEPS, 'touch_down[0]'), planned = run.find(FOOTSTEPS, 'planned');
+  return [['capture point within', [...signals, ...capture], caught],
+    ['next touch-down in', [planned, touchDown], ([count, time]) => (Number.isNaN(count) ? '–' : count > 0 ? quantity([time], 's', DIGITS, true) : 'none planned')]];
+}
+
+/** The events of a run; a click goes there, and what came last before the time cursor is marked. */
+export class EventList {
+  element = element('section', {class: 'events'});
+  #buttons = [];  // [time, element]
+
+  /** `name`: of several runs', which. */
+  constructor(player, name = '') {
+    Object.assign(this, {player, name});
+    if (name.includes('second')) this.element.classList.add('second');
+    player.addEventListener('time', () => this.#mark());
+  }
+
+  /** `until`: " up to 3 s" where more may come. */
+  show(events, until = '') {
+    this.#buttons = events.map((event) => [event.time, element('button', {type: 'button', title: event.detail, click: () => this.player.seek(event.time)},
+      element('span', {class: 'number'}, `${event.time.toFixed(3)} s`), ' ',
+      element('span', {class: event.name === 'fall' ? 'failed' : null}, event.name.replaceAll('_', ' ')),
+      event.detail ? element('span', {class: 'text'}, ` ${event.detail}`) : '')]);
+    this.element.hidden = events.length === 0;
+    this.element.replaceChildren(element('h2', {}, `Events${this.name}${until}`),
+      element('ol', {}, ...this.#buttons.map(([, button]) => element('li', {}, button))));
+    this.#mark();
+  }
+
+  #mark() {
+    const now = this.player.time + this.player.run.period / 2;
+    const last = this.#buttons.findLast(([time]) => time <= now)?.[0];
+    for (const [time, button] of this.#buttons) {
+      if (time === last) button.setAttribute('aria-current', 'time');
+      else button.removeAttribute('aria-current');
+    }
+  }
+}
+
+const TIME = /\b(at|since) (-?\d+(?:\.\d+)?) s\b/gi;
+
+/** A story whose times, as far as the run has them, lead there. */
+export function storyText(text, player) {
+  const {run} = player, parts = [];
+  let end = 0;
+  for (const match of text.matchAll(TIME)) {
+    const time = Number(match[2]);
+    if (time < run.start || time > run.end + run.period) continue;
+    const at = match.index + match[1].length + 1;
+    parts.push(text.slice(end, at), element('button', {type: 'button', class: 'time-link', click: () => player.seek(time)}, `${match[2]} s`));
+    end = at + match[2].length + 2;
+  }
+  return element('p', {class: 'story'}, ...parts, text.slice(end));
 }

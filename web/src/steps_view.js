@@ -1,9 +1,9 @@
 // Footprints with the time of their touch-down, planned footholds, the capture point's trace, and the regions of 0, 1 and 2 steps.
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, DynamicDrawUsage, Group, Line, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, Sprite, SpriteMaterial,
+  MeshBasicMaterial, Sprite, SpriteMaterial, Vector3,
 } from 'three';
-import {Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsAt} from './footsteps.js';
+import {apart, Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsAt} from './footsteps.js';
 import {Outline} from './markers.js';
 import {isDark} from './palette.js';
 import {Samples, vector} from './samples.js';
@@ -65,7 +65,7 @@ class TimeLabel {
   }
 
   set(print, dark) {
-    this.object.visible = print !== undefined;
+    this.object.visible = this.told = print !== undefined;
     if (!print) return;
     const [x, y, z] = print.pose.position;
     this.object.position.set(x, y, z + 0.03);
@@ -85,6 +85,8 @@ class TimeLabel {
     this.texture.needsUpdate = true;
   }
 }
+
+const place = new Vector3();
 
 export class StepsView {
   /** `colored(material, name)` gives a material its colour of the theme. */
@@ -130,7 +132,7 @@ export class StepsView {
     if (!this.shown) return;
     const {run, samples} = this;
     this.footprints.update();
-    const prints = this.footprints.until(run.timeAt(row), SHOWN);
+    const prints = apart(this.footprints.until(run.timeAt(row), SHOWN));
     this.prints.forEach((view, f) => view.set(prints.filter((print) => print.foot === f)));
     const dark = isDark();
     this.labels.forEach((label, i) => label.set(prints[prints.length - 1 - i], dark));
@@ -146,6 +148,21 @@ export class StepsView {
       outline.set(regions[i].flat().every(Number.isFinite) ? regions[i].map(([x, y, z]) => [x, y, z + LIFT]) : []);
     });
     this.#setTrace(row);
+  }
+
+  /** Hides times that others would be drawn over, the latest staying; `width`, `height`: px of the picture. */
+  clear(camera, width, height) {
+    const taken = [];
+    const pixels = height / 2 / Math.tan(camera.fov * Math.PI / 360);
+    for (const {object, told} of this.labels) {
+      if (!told) continue;
+      place.copy(object.position).applyMatrix4(camera.matrixWorldInverse);
+      const w = LABEL.size * pixels / -place.z, h = w * LABEL.height / LABEL.width;
+      place.applyMatrix4(camera.projectionMatrix);
+      const x = (place.x + 1) / 2 * width, y = (1 - place.y) / 2 * height;
+      object.visible = !taken.some((t) => Math.abs(t.x - x) < (t.w + w) / 2 && Math.abs(t.y - y) < (t.h + h) / 2);
+      if (object.visible) taken.push({x, y, w, h});
+    }
   }
 
   #sole({foot, position, yaw}) {

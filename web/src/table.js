@@ -4,8 +4,12 @@ import {latencyFigure, latencyTable} from './live/latency.js';
 import {formatNumber, withUnit} from './units.js';
 
 /** Of a check without a limit none; passed is null until the run has ended. */
-const verdict = ({limit, passed}) => limit === null ? '' : passed === null ? element('span', {class: 'soft'}, 'pending')
-  : element('span', {class: passed ? 'ok' : 'failed'}, passed ? 'ok' : 'FAILED');
+const verdict = ({limit, passed, missing}) => limit === null ? '' : isUnknown({missing}) ? element('span', {class: 'soft'}, unknownText({missing}))
+  : passed === null ? element('span', {class: 'soft'}, 'pending') : element('span', {class: passed ? 'ok' : 'failed'}, passed ? 'ok' : 'FAILED');
+
+/** Whether nobody can say if it holds, for want of what `missing` lists. */
+const isUnknown = ({missing}) => missing?.length > 0;
+const unknownText = ({missing}) => `not known: needs ${missing.join(' and ')}`;
 
 /** "the part from 1.2 s to 3.4 s of a run", or '' of a whole one. */
 function partOf(run) {
@@ -15,9 +19,9 @@ function partOf(run) {
 }
 
 function checkTable(run, overlay, caption = partOf(run) ? `Checks of this part of the run (${partOf(run)})` : 'Checks') {
-  const pending = run.meta.run.checks.some((c) => c.passed === null);
+  const pending = run.meta.run.checks.some((c) => c.passed === null && !isUnknown(c));
   const other = new Map((overlay?.meta.run.checks ?? []).map((c) => [`${c.name}|${c.label}`, c]));
-  const measured = (c) => c.measured !== null ? withUnit(c.measured, c.unit) : pending ? 'none yet' : 'none';
+  const measured = (c) => isUnknown(c) ? 'not known' : c.measured !== null ? withUnit(c.measured, c.unit) : pending ? 'none yet' : 'none';
   return table(caption, ['what', pending ? 'so far' : 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
     run.meta.run.checks.map((c) => [c.label || c.name, measured(c),
       ...(overlay ? [secondValue(other.get(`${c.name}|${c.label}`))] : []), c.limit ?? '', c.paper ?? '', verdict(c)]),
@@ -75,12 +79,13 @@ export function tables(run, overlay) {
 export function liveTables(run, feed) {
   const place = element('div', {class: 'tables'});
   const checks = element('div', {}), latencies = element('div', {});
-  place.append(checks, assumptionTable(run), latencies, information(run, 'This run'));
+  const going = [checks, assumptionTable(run), latencies, information(run, 'This run')].filter(Boolean);
   return {
     elements: [place],
     refresh: () => {
       const {ended, checks: found, components, checked_ticks: ticks, problem} = feed.status;
       run.meta.run.checks = found;
+      if (checks.parentElement !== place) place.replaceChildren(...going);
       if (problem) {
         checks.replaceChildren(element('p', {class: 'failed', role: 'status'},
           `checks and events cannot be told: ${problem}`));
@@ -100,21 +105,30 @@ export function liveTables(run, feed) {
 
 /** "all 31 checks hold", or how many failed, by name under the mouse. */
 export function verdictBadge(run) {
-  const limited = run.meta.run.checks.filter((c) => c.limit !== null);
+  const checks = run.meta.run.checks.filter((c) => c.limit !== null);
+  const unknown = checks.filter(isUnknown), limited = checks.filter((c) => !isUnknown(c));
   const failed = limited.filter((c) => !c.passed);
   const where = partOf(run) ? ' in this part' : '';
   if (limited.length === 0) return element('a', {href: '#tables', class: 'badge'}, 'no check has a limit');
   return element('a', {href: '#tables', class: `badge ${failed.length ? 'failed' : 'ok'}`,
-    title: failed.map((c) => c.label || c.name).join('\n')},
-  failed.length ? `${failed.length} of ${limited.length} checks FAILED${where}` : `all ${limited.length} checks hold${where}`);
+    title: [...failed.map((c) => c.label || c.name), ...unknown.map((c) => `${c.label || c.name}: ${unknownText(c)}`)].join('\n')},
+  (failed.length ? `${failed.length} of ${limited.length} checks FAILED${where}` : `all ${limited.length} checks hold${where}`)
+    + (unknown.length ? `, ${unknown.length} not known` : ''));
+}
+
+/** "fell at 0.810 s"; '' of a robot that did not. */
+function fallBadge(events) {
+  const fall = events.find((e) => e.name === 'fall');
+  return fall ? element('span', {class: 'badge failed'}, `fell at ${fall.time.toFixed(3)} s`) : '';
 }
 
 /** What is known of the run's end: of a run in progress, what its feed says. */
 export function stateBadges(run, feed) {
   const badge = (text) => element('span', {class: 'badge'}, text);
-  if (!feed) return [partOf(run) ? badge(partOf(run)) : '', verdictBadge(run)];
-  const {status, state} = feed;
-  if (status.ended) return [status.problem ? badge('ended; its checks cannot be told') : verdictBadge(run)];
+  if (!feed) return [partOf(run) ? badge(partOf(run)) : '', fallBadge(run.meta.events ?? []), verdictBadge(run)];
+  const {status, state, control} = feed;
+  if (status.ended) return [fallBadge(status.events), status.problem ? badge('ended; its checks cannot be told') : verdictBadge(run)];
+  if (control?.run?.ended) return [element('span', {class: 'badge failed'}, `ended: ${control.run.detail}`)];
   return [badge({connecting: 'connecting', live: 'in progress', ended: 'ended; its log is being checked',
     waiting: 'connection lost: whether it goes on is not known'}[state])];
 }

@@ -14,6 +14,14 @@ const LEAST_SPANS = {
   m: 5e-4, 'm/s': 5e-3, 'm/s²': 0.1, rad: 1e-3, 'rad/s': 1e-2, N: 5, 'N·m': 1, A: 0.1, '%': 2, '': 1e-2,
 };
 
+/**
+ * Finest that a reader of a robot's motion and forces needs, by unit: less is noise or rounding, and reads as 0. It is shown with the
+ * prefix and the decimals given.
+ */
+const FINEST = {
+  m: ['m', 2], 'm/s': ['m', 1], 'm/s²': ['', 2], rad: ['m', 2], 'rad/s': ['m', 1], s: ['m', 0], A: ['m', 0], N: ['', 0], 'N·m': ['', 1],
+};
+
 export const leastSpan = (unit) => LEAST_SPANS[unit] ?? 0;
 
 /** y range around the data, of `least` at least; what is never negative is not shown as if it were. */
@@ -65,17 +73,25 @@ export function scaled(size, unit) {
   return {unit: prefix + base.unit, factor: base.factor / scale};
 }
 
-/** "7.656 µm", "12, 3.4, −0.1 mm" of several values, which share the prefix of the largest; '–' where there is none. */
-export function quantity(values, unit, digits = 4) {
+/**
+ * "7.656 µm", "12, 3.4, −0.1 mm" of several values, which share the prefix of the largest; '–' where there is none. `finest`: no finer
+ * than FINEST has it: "0.00 mm", "189 N".
+ */
+export function quantity(values, unit, digits = 4, finest = false) {
   const list = Array.isArray(values) ? values : [values];
   const finite = list.filter(Number.isFinite);
   if (finite.length === 0) return '–';
-  const shown = scaled(Math.max(...finite.map(Math.abs)), unit);
+  const base = basic(unit);
+  const [prefix, decimals] = (finest && FINEST[base.unit]) || [];
+  const least = prefix === undefined ? 0 : (PREFIXES[base.unit][prefix] ?? 1) / base.factor;
+  const size = Math.max(...finite.map(Math.abs));
+  const shown = scaled(Math.max(size, least), unit);
   // All of them to the last digit of the largest.
-  const largest = Math.max(...finite.map((v) => Math.abs(v * shown.factor)));
-  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(largest || 1)));
-  const texts = list.map((v) => formatNumber(!Number.isFinite(v) ? v : list.length === 1 ? v * shown.factor
-    : Number((v * shown.factor).toFixed(Math.min(20, decimals))), digits));
+  const wanted = Math.max(0, digits - 1 - Math.floor(Math.log10(size * shown.factor || 1)));
+  const places = Math.min(least > 0 ? Math.max(0, Math.round(decimals - Math.log10(least * shown.factor))) : 20, wanted);
+  const nothing = least > 0 && size > 0 && size * shown.factor < 0.5 * 10 ** -places;
+  const texts = list.map((v) => (nothing && Number.isFinite(v) ? (0).toFixed(places) : formatNumber(!Number.isFinite(v) ? v
+    : list.length === 1 && least === 0 ? v * shown.factor : Number((v * shown.factor).toFixed(places)), digits)));
   return shown.unit ? `${texts.join(', ')} ${shown.unit}` : texts.join(', ');
 }
 

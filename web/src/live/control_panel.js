@@ -1,6 +1,7 @@
 // The panel of a page that may act: stop, walk, settings, push, and the pace of an interactive run.
 import {Undo} from './control.js';
-import {element} from '../dom.js';
+import {element, icon} from '../dom.js';
+import {LAG_PERIOD, liveText} from '../bar.js';
 import {formatNumber, withUnit} from '../units.js';
 
 const STEPS = 200;  // of a slider
@@ -9,6 +10,24 @@ const PUSH_SHARE = 0.2;     // of the largest force, first value of the push for
 const PUSH_DURATION = 0.2;  // s, likewise
 const DIRECTIONS = {forward: [1, 0, 0], backward: [-1, 0, 0], left: [0, 1, 0], right: [0, -1, 0], up: [0, 0, 1]};
 const AXES = [['forward', 'm/s'], ['left', 'm/s'], ['turn', 'rad/s']];
+
+/** Why this run cannot do an act; '' where it may. */
+export function obstacle(what, {standing}, run) {
+  const {walk, recovery} = run.scenario.step_planner ?? {};
+  if (standing.run?.ended) return 'the run has ended: go back, or start again';
+  if (['walk', 'step'].includes(what) && !walk?.enabled) return 'needs a run with step_planner.walk.enabled=true';
+  if (what === 'stop_walking' && !walk?.enabled && !recovery?.enabled) {
+    return 'needs a run with step_planner.walk.enabled=true or step_planner.recovery.enabled=true';
+  }
+  return what === 'reset' && !standing.stopped ? 'nothing is stopped' : '';
+}
+
+/** Greys a control; `why` is what its title says then, '' lets it be used. */
+function disable(control, why) {
+  control.dataset.title ??= control.title;
+  control.title = why || control.dataset.title;
+  control.disabled = why !== '';
+}
 
 const button = (text, title, click, more = {}) => element('button', {type: 'button', title, click, ...more}, text);
 
@@ -30,9 +49,10 @@ class SettingRow {
       }});
     this.value = element('output', {class: 'number'});
     this.asked = element('span', {class: 'soft'});
+    this.refused = element('p', {class: 'answer refused', 'aria-live': 'polite'});
     this.element = element('div', {class: 'setting', title: text},
       element('label', {}, element('span', {class: 'name'}, field), this.value), this.slider,
-      element('p', {class: 'soft'}, `${text} `, element('span', {class: 'range'}, `[${formatNumber(low)}, ${formatNumber(high)}] ${unit}`), ' ', this.asked));
+      element('p', {class: 'soft'}, `${text} `, element('span', {class: 'range'}, `[${formatNumber(low)}, ${formatNumber(high)}] ${unit}`), ' ', this.asked), this.refused);
   }
 
   #ask(value) {
@@ -47,8 +67,9 @@ class SettingRow {
     this.value.textContent = valueText(setting);
     const asked = this.control.waiting.findLast((act) => act.do === 'set' && act.field === this.field);
     this.asked.textContent = asked ? `asked: ${withUnit(asked.value, setting.unit)}` : '';
-    if (!asked && document.activeElement !== this.slider) this.slider.value = setting.value;
-    else if (!asked) this.slider.value = setting.value;
+    const last = this.control.standing.acts.findLast((act) => act.do === 'set' && act.name === this.field);
+    this.refused.textContent = !asked && last?.state === 'refused' ? `refused: ${last.reason}` : '';
+    if (!asked) this.slider.value = setting.value;
   }
 }
 
@@ -66,7 +87,8 @@ function pushForm(control, robot) {
   }}, body, direction, force, 'N', duration, 's', element('button', {id: 'push'}, 'Push'));
 }
 
-function walkPad(control) {
+/** Pad, sliders and buttons of a walk, and single steps; what this run cannot do is grey, and says why. */
+function walking(control, run) {
   const {low, high} = control.standing.walk;
   const inputs = AXES.map(([name, unit], i) => element('input', {type: 'range', min: low[i], max: high[i], step: 'any', value: 0,
     'aria-label': `${name}, ${unit}`, input: () => show(), keydown: (e) => e.stopPropagation()}));
@@ -79,7 +101,11 @@ function walkPad(control) {
     show();
   };
   const pad = element('div', {class: 'pad', title: 'velocity: up is forward', 'aria-hidden': 'true',
-    pointerdown: (e) => { pad.setPointerCapture(e.pointerId); toward(e); },
+    pointerdown: (e) => {
+      if (inputs[0].disabled) return;
+      pad.setPointerCapture(e.pointerId);
+      toward(e);
+    },
     pointermove: (e) => { if (pad.hasPointerCapture(e.pointerId)) toward(e); }}, dot);
   const velocity = () => inputs.map((input) => Number(input.value));
   const show = () => {
@@ -89,14 +115,25 @@ function walkPad(control) {
     dot.style.left = `${50 - 50 * v[1] / Math.max(high[1], -low[1], 1e-9)}%`;
   };
   show();
-  return element('div', {class: 'walk'}, pad, element('div', {}, ...AXES.map(([name], i) =>
-    element('label', {}, name, inputs[i], values[i])),
-  element('div', {class: 'line'}, button('Walk', 'Walk with this velocity', () => control.act('walk', {velocity: velocity()}), {id: 'walk'}),
-    button('Stop walking', 'Stand, feet side by side', () => control.act('stop_walking'), {id: 'stop-walking'}))));
+  const walk = button('Walk', 'Walk with this velocity', () => control.act('walk', {velocity: velocity()}), {id: 'walk'});
+  const stop = button('Stop walking', 'Stand, feet side by side', () => control.act('stop_walking'), {id: 'stop-walking'});
+  const steps = run.robot.feet.map(({name}) => button(`step, ${name}`, `A step with the ${name} foot`, () => control.act('step', {foot: name})));
+  const reason = element('p', {class: 'soft reason'});
+  const place = element('details', {class: 'walking', open: !obstacle('walk', control, run)}, element('summary', {}, 'Walk and step'), reason,
+    element('div', {class: 'walk'}, pad, element('div', {}, ...AXES.map(([name], i) => element('label', {}, name, inputs[i], values[i])))),
+    element('div', {class: 'line'}, walk, stop, ...steps));
+  return {element: place, update: () => {
+    const why = obstacle('walk', control, run);
+    reason.textContent = why && `not possible: ${why}`;
+    for (const input of [...inputs, walk]) disable(input, why);
+    pad.classList.toggle('off', why !== '');
+    disable(stop, obstacle('stop_walking', control, run));
+    for (const step of steps) disable(step, obstacle('step', control, run));
+  }};
 }
 
 /** Pause, single tick, slow motion and back: of an interactive run. */
-function pace(control, player) {
+function pace(control, player, run) {
   const go = button('', '', () => control.act(control.standing.run.paused ? 'go' : 'pause'), {id: 'go'});
   const tick = button('one tick', 'Run one tick (.)', () => control.act('tick', {ticks: 1}), {id: 'one-tick'});
   const speed = element('select', {id: 'run-speed', 'aria-label': 'Speed of the run', change: () => {
@@ -108,12 +145,14 @@ function pace(control, player) {
     () => control.act('restart'), {id: 'restart'});
   const state = element('output', {class: 'soft'});
   return {element: element('div', {class: 'line'}, go, tick, speed, back, again, state), update: () => {
-    const {run} = control.standing;
-    go.textContent = run.paused ? '▶ go' : '⏸ pause';
-    go.title = run.paused ? 'The run goes on (p)' : 'The run waits (p)';
-    speed.value = run.speed;
-    back.disabled = again.disabled = !run.can_go_back;
-    state.textContent = `${run.ended ? `ended: ${run.detail}` : run.paused ? `waits at tick ${run.tick}` : `runs at ${run.speed}×`}${run.branch > 0 ? `, branch ${run.branch}` : ''}`;
+    const {run: now} = control.standing;
+    go.replaceChildren(icon(now.paused ? 'play' : 'pause'), now.paused ? ' go' : ' pause');
+    go.dataset.title = now.paused ? 'The run goes on (p)' : 'The run waits (p)';
+    for (const act of [go, tick]) disable(act, obstacle('go', control, run));
+    speed.value = now.speed;
+    back.disabled = again.disabled = !now.can_go_back || now.again >= 0;
+    state.textContent = `${now.again >= 0 ? `made again, up to tick ${now.again}` : now.ended ? `ended: ${now.detail}` : now.paused ? `waits at tick ${now.tick}`
+      : `runs at ${now.speed}×`}${now.branch > 0 ? `, branch ${now.branch}` : ''}`;
   }};
 }
 
@@ -125,52 +164,74 @@ function actText(act) {
   return [what ? what() : act.do.replaceAll('_', ' '), state];
 }
 
-/** The panel's element, which appears when the server tells what may be done. `shared`: as for the page's other parts. */
+/** Beside the buttons of some acts: what became of the last of them. */
+function answer(control, kinds) {
+  const place = element('p', {class: 'answer', 'aria-live': 'polite'});
+  return {element: place, update: () => {
+    const last = actsOf(control).findLast((act) => kinds.includes(act.do));
+    place.textContent = last ? actText(last).join(' ') : '';
+    place.className = `answer ${last?.state ?? ''}`;
+  }};
+}
+
+/** All acts that are known of, the newest last; what could not be sent is one. */
+function actsOf({standing, unsent}) {
+  return [...standing.acts, ...(unsent ? [{...unsent, name: unsent.field ?? unsent.foot ?? unsent.body, state: 'unsent'}] : [])];
+}
+
+/**
+ * {element, settings, stop}: the panel, its settings, and the emergency stop, which appear when the server tells what may be done.
+ * `shared`: as for the page's other parts.
+ */
 export function controlPanel(control, shared) {
-  const {player, run} = shared;
+  const {player, run, feed} = shared;
   const host = element('section', {id: 'control', hidden: true, 'aria-label': 'Control'});
+  const settings = element('div', {}), stopHost = element('span', {class: 'stop'});
   const undo = new Undo(control);
-  let update;
+  let update, tellLag;
 
   const build = () => {
     const {standing} = control;
     const rows = (standing.settings ?? []).map((setting) => new SettingRow(control, setting));
     const undoButton = button('undo', 'Take the last change back (u)', () => undo.undo(), {id: 'undo'});
-    const tempo = control.can('pause') ? pace(control, player) : undefined;
+    const tempo = control.can('pause') ? pace(control, player, run) : undefined;
+    const walk = control.can('walk') ? walking(control, run) : undefined;
+    const reset = control.can('reset') ? button('reset', 'End a stop, when the motors are at rest', () => control.act('reset'), {id: 'reset'}) : undefined;
+    const [paceAnswer, pushAnswer, walkAnswer, stopAnswer] = [['pause', 'go', 'tick', 'speed', 'back', 'restart'], ['push'],
+      ['walk', 'stop_walking', 'step'], ['stop', 'reset']].map((kinds) => answer(control, kinds));
+    const pushing = control.can('push') ? pushForm(control, run.robot) : undefined;
+    const lag = element('p', {class: 'answer refused', role: 'status'});
     const acts = element('ol', {class: 'acts', 'aria-live': 'polite'});
     const filter = element('input', {type: 'search', placeholder: 'setting', 'aria-label': 'Search settings', input: () => {
       const words = filter.value.toLowerCase();
       for (const row of rows) row.element.hidden = !`${row.field} ${row.element.title}`.toLowerCase().includes(words);
     }});
-    const parts = [
-      element('h2', {}, 'Control'),
-      element('div', {class: 'line'},
-        control.can('stop') ? button('EMERGENCY STOP', 'The bridge stops the robot (e)', () => control.act('stop'), {id: 'estop'}) : '',
-        control.can('reset') ? button('reset', 'End a stop, when the motors are at rest', () => control.act('reset'), {id: 'reset'}) : ''),
-      tempo?.element,
-      control.can('push') ? element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`) : '',
-      control.can('push') ? pushForm(control, run.robot) : '',
-      control.can('walk') ? walkPad(control) : '',
-      control.can('step') ? element('div', {class: 'line'}, ...run.robot.feet.map(({name}) =>
-        button(`step, ${name}`, `A step with the ${name} foot`, () => control.act('step', {foot: name})))) : '',
-      rows.length > 0 ? element('details', {class: 'settings', open: true}, element('summary', {}, `${rows.length} settings`),
-        element('div', {class: 'line'}, filter, undoButton), ...rows.map((row) => row.element)) : '',
-      acts,
-    ];
-    host.replaceChildren(...parts.filter(Boolean));
+    host.replaceChildren(...[element('h2', {}, 'Control'), lag,
+      ...(tempo ? [tempo.element, paceAnswer.element] : []),
+      ...(pushing ? [element('p', {class: 'soft'}, `Drag the robot to push it, up to ${formatNumber(standing.push_limit, 3)} N.`), pushing, pushAnswer.element] : []),
+      ...(walk ? [walk.element, walkAnswer.element] : []), acts]);
+    settings.replaceChildren(...(rows.length > 0 ? [element('details', {class: 'settings', open: true}, element('summary', {}, `${rows.length} settings`),
+      element('div', {class: 'line'}, filter, undoButton), ...rows.map((row) => row.element))] : []));
+    stopHost.replaceChildren(...[control.can('stop') ? button('EMERGENCY STOP', 'The bridge stops the robot (e)', () => control.act('stop'), {id: 'estop'}) : '',
+      reset ?? '', stopAnswer.element].filter(Boolean));
     host.hidden = false;
     update = () => {
-      for (const row of rows) row.update();
-      tempo?.update();
+      for (const part of [...rows, tempo, walk, paceAnswer, pushAnswer, walkAnswer, stopAnswer].filter(Boolean)) part.update();
       undoButton.disabled = !undo.next;
       undoButton.textContent = undo.next ? `undo ${undo.next.field}` : 'undo';
-      const unsent = control.unsent ? [{...control.unsent, name: control.unsent.field ?? control.unsent.foot ?? control.unsent.body, state: 'unsent'}] : [];
-      acts.replaceChildren(...[...control.standing.acts.slice(-6), ...unsent].reverse().map((act) => {
+      if (reset) disable(reset, obstacle('reset', control, run));
+      if (pushing) disable(pushing.querySelector('#push'), obstacle('push', control, run));
+      acts.replaceChildren(...actsOf(control).slice(-6).reverse().map((act) => {
         const [what, state] = actText(act);
         return element('li', {class: act.state}, what, element('span', {class: 'text'}, ` ${state}`));
       }));
     };
+    tellLag = () => {
+      const [state, words] = liveText(feed);
+      lag.textContent = state === 'behind' ? `The picture is ${words.replace(/^\W+/, '')}.` : '';
+    };
   };
+  setInterval(() => tellLag?.(), LAG_PERIOD);
 
   let built = '';
   control.addEventListener('change', () => {
@@ -191,7 +252,7 @@ export function controlPanel(control, shared) {
     e.preventDefault();
     keys[e.key]();
   });
-  return host;
+  return {element: host, settings, stop: stopHost};
 }
 
 export const CONTROL_KEYS = [['e', 'emergency stop'], ['u', 'undo a setting'], ['p', 'pause, go on (interactive)'], ['.', 'run one tick (interactive)'],

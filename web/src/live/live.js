@@ -4,15 +4,18 @@ const RETRY = 1000;          // ms
 const SPAN = 10;             // s that the plots show at first
 const GROWTH_PERIOD = 33;    // ms, at least
 const GROWTH_SHARE = 2;      // times what drawing took: the picture goes first
-const FORMAT = 1;
-const HEADER = 16;           // bytes
+const FORMAT = 2;
+const HEADER = 32;           // bytes
+const LIVE = 0.3;            // s behind the run that still count as live: a person's own reaction takes as long
+const FILL_LEAST = 500;      // ticks of the past that are taken over at once, or as many as the page has: each time all is drawn anew
+const FILL_PAUSE = 3;        // times what a request of the past took: the pause after it, while the page is behind
 
-/** {first, count, values by name} of a batch of docs/report-format.md. Throws when it is none of `run`. */
+/** {first, count, end (tick of the server), time (s, of its clock), values by name} of a batch of docs/report-format.md. Throws when it is none of `run`. */
 export function decodeBatch(buffer, run) {
   const head = new DataView(buffer);
   if (buffer.byteLength < HEADER || head.getUint32(0, true) !== FORMAT) throw new Error('the stream is of another version');
   const count = head.getUint32(4, true);
-  const first = head.getFloat64(8, true);
+  const [first, end, time] = [8, 16, 24].map((place) => head.getFloat64(place, true));
   const values = {};
   let at = HEADER;
   const take = (type, wanted) => {
@@ -26,7 +29,7 @@ export function decodeBatch(buffer, run) {
   take(Float64Array, true);
   take(Float32Array, false);
   if (at !== buffer.byteLength) throw new Error('a batch of the stream is too long');
-  return {first, count, values};
+  return {first, count, end, time, values};
 }
 
 /** Adds a batch to the run: ticks that it has are passed over, those that it never got are rows of NaN. */
@@ -44,6 +47,8 @@ export function addBatch(run, {first, count, values}) {
     : Object.fromEntries(Object.entries(values).map(([name, column]) => [name, column.subarray(known)])));
 }
 
+const nothingKnown = () => ({ended: false, checks: [], events: [], components: [], checked_ticks: 0, problem: '', story: ''});
+
 /**
  * Fires 'state': it or the messages lost by the server have changed; 'status': checks, events and components' health have
  * come; 'restart': the run went back, its ticks come anew. A lost connection is made again.
@@ -54,8 +59,12 @@ export class LiveFeed extends EventTarget {
   #branch = 0;  // of an interactive run: how often it went back
   state = 'connecting';  // then 'live', 'ended', or 'waiting' for a lost connection
   lost = 0;
-  status = {ended: false, checks: [], events: [], components: [], checked_ticks: 0, problem: ''};
+  status = nothingKnown();
   #ticks = Infinity;  // of the run, once it has ended
+  #missing = [];      // [from, to): ticks that were passed over, the earliest first
+  #filling = false;
+  #newest;            // of the last batch: {tick: the server's end, time: s of this page's clock at which it was made}
+  #ahead = Infinity;  // s that this page's clock is ahead of the server's, at most
 
   constructor(run) {
     super();
@@ -66,21 +75,77 @@ export class LiveFeed extends EventTarget {
   #connect() {
     const {run} = this;
     const url = new URL('stream', location.href);
-    url.searchParams.set('from', run.firstTick + run.numRows);
-    const token = new URL(location.href).searchParams.get('token');
-    if (token) url.searchParams.set('token', token);
+    url.search = this.#access();
     url.protocol = 'ws:';
     const socket = this.#socket = new WebSocket(url);
     socket.binaryType = 'arraybuffer';
     socket.addEventListener('message', ({data}) => {
       if (typeof data === 'string') this.#tell(JSON.parse(data));
       else this.#add(decodeBatch(data, run));
+      this.#fill();
     });
     socket.addEventListener('close', () => {
       if (this.status.ended && this.#allHasCome()) return;
       this.#setState('waiting');
       setTimeout(() => this.#connect(), RETRY);
     });
+  }
+
+  /** "token=..." of this page's address, or nothing. */
+  #access(more = {}) {
+    const token = new URL(location.href).searchParams.get('token');
+    return new URLSearchParams({...more, ...(token && {token})});
+  }
+
+  /** s that the page is behind the run; of a run that waits, of what it has done. */
+  get behind() {
+    const {run} = this, held = run.firstTick + run.numRows;
+    const {paused, tick} = this.control?.run ?? {};
+    if (paused) return Math.max(0, tick - held) * run.period;
+    if (!this.#newest) return Infinity;
+    return Math.max(0, this.#newest.tick - held) * run.period + Math.max(0, performance.now() / 1000 - this.#newest.time);
+  }
+
+  /** Whether what it shows is what is. */
+  get live() { return this.behind <= LIVE; }
+
+  /** Ticks that the server may have and the page lacks. */
+  get missing() { return this.#missing.reduce((sum, [from, to]) => sum + to - from, 0); }
+
+  /** Asks for what was passed over, the latest first; what is new goes before it. */
+  async #fill() {
+    if (this.#filling) return;
+    this.#filling = true;
+    const branch = this.#branch;
+    try {
+      while (this.#missing.length > 0 && branch === this.#branch) await this.#fillGap(this.#missing.at(-1), branch);
+    } catch (error) {
+      if (!(error instanceof TypeError)) throw error;  // no connection: with the next batch there is one
+    } finally {
+      this.#filling = false;
+    }
+  }
+
+  async #fillGap(gap, branch) {
+    const {run} = this, batches = [];
+    let rows = 0;
+    gap[0] = Math.max(gap[0], run.firstTick + run.numRows - run.keep);
+    while (gap[0] < gap[1] && rows < Math.max(FILL_LEAST, run.numRows)) {
+      const start = performance.now();
+      const answer = await fetch(`ticks?${this.#access({before: gap[1]})}`);
+      const buffer = await answer.arrayBuffer();
+      if (branch !== this.#branch) return;
+      const {first, count, values} = decodeBatch(buffer, run);
+      if (count === 0 || first + count <= gap[0]) gap[1] = gap[0];  // the server has them no more
+      else {
+        batches.push({first, count, values});
+        gap[1] = Math.max(gap[0], first);
+        rows += count;
+      }
+      if (gap[0] < gap[1] && this.state === 'live' && !this.live) await new Promise((done) => { setTimeout(done, FILL_PAUSE * (performance.now() - start)); });
+    }
+    if (gap[0] >= gap[1]) this.#missing.splice(this.#missing.indexOf(gap), 1);
+    if (batches.length > 0) run.fillTicks(batches);
   }
 
   /** A text to the server. False: there is no connection. */
@@ -93,7 +158,7 @@ export class LiveFeed extends EventTarget {
   #tell({run_id: id, state, lost, end_tick: ticks, status, control, branch}) {
     if (id !== this.run.meta.run.run_id) return location.reload();  // another run is served here
     if (status) {
-      Object.assign(this.status, {problem: ''}, status);
+      Object.assign(this.status, {problem: '', story: ''}, status);
       if (status.run) Object.assign(this.run.meta.run, status.run);
       this.dispatchEvent(new Event('status'));
       return;
@@ -106,6 +171,9 @@ export class LiveFeed extends EventTarget {
     if (branch !== undefined && branch !== this.#branch) {
       if (this.run.numRows > 0) this.run.restart();
       this.#branch = branch;
+      this.#missing = [];
+      this.status = nothingKnown();
+      this.run.meta.run.ended = false;
       this.dispatchEvent(new Event('restart'));
     }
     this.lost = lost;
@@ -114,6 +182,12 @@ export class LiveFeed extends EventTarget {
   }
 
   #add(batch) {
+    const {run} = this, held = run.numRows > 0 ? run.firstTick + run.numRows : 0;
+    const from = Math.max(held, batch.first + batch.count - run.keep);
+    if (batch.first > from) this.#missing.push([from, batch.first]);
+    const now = performance.now() / 1000;
+    this.#ahead = Math.min(this.#ahead, now - batch.time);
+    this.#newest = {tick: batch.end, time: batch.time + this.#ahead};
     addBatch(this.run, batch);
     if (this.state === 'live' && this.#allHasCome()) this.#setState('ended');
   }
