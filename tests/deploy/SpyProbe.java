@@ -8,7 +8,11 @@ import java.awt.image.BufferedImage;
 import java.io.File;
 import java.lang.reflect.Array;
 import java.lang.reflect.Field;
+import java.lang.reflect.Modifier;
+import java.nio.file.Files;
+import java.nio.file.Path;
 import java.util.ArrayList;
+import java.util.Collections;
 import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
@@ -159,8 +163,29 @@ public final class SpyProbe {
     Thread.sleep(2000); // for the sparklines to grow
     BufferedImage picture =
         robot.createScreenCapture(new Rectangle(Toolkit.getDefaultToolkit().getScreenSize()));
-    ImageIO.write(picture, "png", new File(System.getProperty("probe.picture")));
+    String file = System.getProperty("probe.picture");
+    ImageIO.write(picture, "png", new File(file));
+    Files.writeString(Path.of(file + ".txt"), shown(channel, message));
     say("opened the fields of " + channel);
+  }
+
+  /** What the picture shows, a line each: the table's channels with their types, the open message's fields. */
+  private static String shown(String channel, Object message) throws Exception {
+    List<String> lines = onSwing(() -> {
+      List<String> rows = new ArrayList<>();
+      JTable table = table();
+      for (int row = 0; row < table.getRowCount(); ++row) {
+        String name = text(table, row, CHANNEL);
+        // liblcm's own, of whoever starts meanwhile
+        if (!name.equals("LCM_SELF_TEST")) rows.add(name + " " + text(table, row, TYPE));
+      }
+      return rows;
+    });
+    for (Field field : message.getClass().getFields()) {
+      if (!Modifier.isStatic(field.getModifiers())) lines.add(channel + "." + field.getName());
+    }
+    Collections.sort(lines);
+    return String.join("\n", lines);
   }
 
   /** Every array of the decoded message has elements: the counts were understood. */

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # deploy/spy on a run in progress, on a display of its own: lcm-spy must know all types, show all channels decoded and
 # open a channel's fields. lcm-logger and lcm-logplayer must get along with the same URL.
-# Usage: spy_test.sh SOURCE_DIR POISE PROBE_JAR WORK_DIR; leaves WORK_DIR/spy.png.
+# docs/lcm_spy.png must show the same channels and fields; with RETAKE=1 the test's picture takes its place.
+# Usage: spy_test.sh SOURCE_DIR POISE PROBE_JAR WORK_DIR; leaves WORK_DIR/spy.png and WORK_DIR/spy.png.txt.
 set -euo pipefail
 source_dir=$1 poise=$2 probe=$3 work=$4
 
@@ -65,6 +66,12 @@ wait_for opened
 wait "$spy" || { cat "$work/spy.txt"; fail "lcm-spy did not show everything"; }
 grep '^probe: ' "$work/spy.txt"
 [ "$(wc -c <"$work/spy.png")" -gt 10000 ] || fail "the picture is empty"
+png_text() { node "$source_dir/tests/docs/png_text.mjs" "$@"; }
+if [ -n "${RETAKE-}" ]; then
+  png_text write "$work/spy.png" "$work/spy.png.txt" "$source_dir/docs/lcm_spy.png"
+else
+  png_text check "$source_dir/docs/lcm_spy.png" "$work/spy.png.txt" || fail "the picture in docs/ is old"
+fi
 
 kill "$logger"
 wait "$logger" || true

@@ -1,5 +1,7 @@
 // Runs what README, docs/reference/README.md and the tutorials show: every command of their ```sh blocks, page by page,
-// in a copy of deploy/ of the test's own. What their ```text blocks quote must have been printed, numbers aside.
+// in a copy of deploy/ of the test's own. What their ```text blocks quote must have been printed, digit for digit, and so
+// must every figure with a unit in their prose, or a command holds it. Of other bits than the recorded ones (another
+// instruction set, compiler or library) only the words are compared.
 // examples.txt lists the commands that are not run, and those that end with another exit code than 0, with the reason.
 // Usage: node examples_test.mjs --poise PROGRAM [--page PAGE]
 import assert from 'node:assert/strict';
@@ -9,22 +11,23 @@ import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {commandsOf, programFacts, repositoryFiles, root, untrueLines} from './markdown.mjs';
+import {commandsOf, figuresOf, isPrinted, linesOf, otherBits, programFacts, proseFigures, repositoryFiles, root,
+  untrueLines} from './markdown.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, page: {type: 'string'}}});
 const LIMIT = 400_000;  // ms for a page
 
-/** {kind, begin, reason}, from the lines "KIND | BEGINNING OR PAGE | REASON"; kind: "page", "skip" or "exit N". */
+/** {kind, begin, reason}, from the lines "KIND | BEGINNING OR PAGE | REASON"; kind: "page", "skip", "figure" or "exit N". */
 const rules = readFileSync(new URL('examples.txt', import.meta.url), 'utf8').split('\n')
     .filter((line) => line.trim() !== '' && !line.startsWith('#')).map((line) => {
       const [kind, begin, reason] = line.split(' | ').map((part) => part.trim());
-      assert.ok(/^(page|skip|exit \d+)$/.test(kind) && begin && reason, `examples.txt: not a rule: ${line}`);
+      assert.ok(/^(page|skip|figure|exit \d+)$/.test(kind) && begin && reason, `examples.txt: not a rule: ${line}`);
       return {kind, begin, reason, used: false};
     });
 
 /** The exit code that a command shall end with; null: it is not run. */
 function expectedExit(page, {text}) {
-  const rule = rules.find((r) => (r.kind === 'page' ? page === r.begin : text.startsWith(r.begin)));
+  const rule = rules.find((r) => (r.kind === 'page' ? page === r.begin : r.kind !== 'figure' && text.startsWith(r.begin)));
   if (rule === undefined) return 0;
   rule.used = true;
   return rule.kind.startsWith('exit') ? Number(rule.kind.slice(5)) : null;
@@ -43,13 +46,27 @@ function sandbox() {
   return folder;
 }
 
+/** Why figures cannot be compared here; undefined: they are. */
+const other = otherBits(options.poise);
+
+/** Figures of a page that none of its commands holds or prints. */
+function untrueFigures(page, output) {
+  const code = linesOf(page).filter((l) => l.code !== null).map((l) => l.text).join('\n');
+  const bare = new Set([...code.matchAll(/\d+(?:\.\d+)?/g)].map((m) => Number(m[0])));
+  const printed = figuresOf(output);
+  return proseFigures(page).filter((figure) => {
+    const excused = rules.some((r) => r.kind === 'figure' && r.begin === `${page} ${figure.text}`);
+    return !excused && !bare.has(figure.value) && !isPrinted(figure, printed);
+  });
+}
+
 const pages = ['README.md', 'docs/reference/README.md',
                ...repositoryFiles('docs/tutorials').filter((f) => f.endsWith('.md'))];
 for (const page of pages) {
   const commands = commandsOf(page).map((command) => ({...command, exit: expectedExit(page, command)}));
   const runnable = commands.filter((c) => c.exit !== null);
   if (runnable.length === 0 || (options.page && options.page !== page)) continue;
-  test(`${page}: ${runnable.length} of ${commands.length} commands`, () => {
+  test(`${page}: ${runnable.length} of ${commands.length} commands`, (t) => {
     const folder = sandbox();
     try {
       // One shell for the page, so that a folder entered or a variable set stays. A mark follows each command.
@@ -68,9 +85,9 @@ for (const page of pages) {
         problems.push(`${page}:${line}: ${text.split('\n')[0]}\n  ended with ${ended ?? 'nothing'}, not ${exit}:\n` +
                       output.split('\n').slice(-15).join('\n'));
       });
-      for (const {number, text} of untrueLines(page, stdout)) {
-        problems.push(`${page}:${number}: nothing printed: ${text}`);
-      }
+      if (other) t.diagnostic(`figures are not compared: ${other}`);
+      const untrue = [...untrueLines(page, stdout, !other), ...(other ? [] : untrueFigures(page, stdout))];
+      for (const {number, text} of untrue) problems.push(`${page}:${number}: nothing printed: ${text}`);
       assert.deepEqual(problems, [], problems.join('\n'));
     } finally {
       rmSync(folder, {recursive: true, force: true});
@@ -118,5 +135,7 @@ test('tutorials write into folders of their own, beside what git knows', () => {
 });
 
 test('examples.txt has no rule that no command needs', () => {
+  const figures = new Set(pages.flatMap((page) => proseFigures(page).map((figure) => `${page} ${figure.text}`)));
+  for (const rule of rules) rule.used ||= rule.kind === 'figure' && figures.has(rule.begin);
   assert.deepEqual(rules.filter((r) => !r.used).map((r) => r.begin), []);
 });

@@ -1,5 +1,5 @@
 // What the documentation's tests read of the repository and of its Markdown files.
-import {execFileSync} from 'node:child_process';
+import {execFileSync, spawnSync} from 'node:child_process';
 import {existsSync, readdirSync, readFileSync, statSync} from 'node:fs';
 import {join} from 'node:path';
 import {fileURLToPath} from 'node:url';
@@ -55,13 +55,73 @@ export function commandsOf(page) {
   return commands;
 }
 
-/** A line without its numbers and its columns' widths, which depend on the machine. */
-const masked = (line) => line.replace(/[\d.]*\d/g, '#').replace(/─+/g, '─').replace(/\s+/g, ' ').trim();
+/** What differs between two runs of the same bits; every other digit is compared. */
+const VARYING = [
+  [/\b\d{4}-\d\d-\d\d[T_ ]?\d\d:?\d\d:?\d\d(\.\d+)?Z?/g, 'DATE'],
+  [/(file:\/\/)?(?<![\w.])(\/[\w.+~-]+){2,}\/?/g, 'PATH'],
+  [/\b[\d.]+ s simulated in [\d.]+ s, [\d.]+ x real time/g, 'WALL TIME'],
+  [/\bruns? in [\d.]+ s\b/g, 'WALL TIME'],
+  [/\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*\d)[0-9a-f]{7,40}\b(\+changes)?/g, 'COMMIT'],
+];
 
-/** Lines of a page's ```text blocks that no line of its commands' output is like: {number, text}. */
-export function untrueLines(page, output) {
-  const said = new Set(output.split('\n').map(masked));
-  return linesOf(page).filter(({text, code, mark}) => code === 'text' && !mark && !said.has(masked(text)));
+/** A line as it is compared; widths of columns depend on a path's length. Without `figures` of no number at all. */
+export function comparable(line, figures = true) {
+  let text = line;
+  for (const [pattern, name] of VARYING) text = text.replace(pattern, name);
+  if (!figures) text = text.replace(/[\d.]*\d/g, '#');
+  return text.replace(/─+/g, '─').replace(/\s+/g, ' ').trim();
+}
+
+/** Lines of a page's ```text blocks that its commands did not print: {number, text}. */
+export function untrueLines(page, output, figures = true) {
+  const said = new Set(output.split('\n').map((line) => comparable(line, figures)));
+  return linesOf(page).filter(({text, code, mark}) =>
+    code === 'text' && !mark && !said.has(comparable(text, figures)));
+}
+
+const UNITS = 'mm/s|m/s|mrad|rad/s|rad|mm|cm|m|N·m/s|N·m|N·s|N|kg|Hz|ms|µs|s|%';
+/** "34.71 mm", but for a bound ("below 1 mm"); a number of several with one unit behind them ("0.386 to 1.406 s") has that unit. */
+const FIGURE = new RegExp(`(?<![\\w.,-]|below |above )(\\d[\\d,]*(?:\\.\\d+)?)(?:(?: to |; |, | and )(?=\\d)|\\s(${UNITS})(?![\\w·/]))`, 'g');
+
+/** Figures with a unit of a text: {value, digits behind the point, unit, text}. */
+export function figuresOf(text) {
+  const plain = text.replace(/`[^`]*`/g, '').replace(/\]\([^)]*\)/g, ']');
+  const figures = [...plain.matchAll(FIGURE)].map(([all, number, unit]) => ({
+    value: Number(number.replaceAll(',', '')), digits: number.split('.')[1]?.length ?? 0, unit, text: all.trim()}));
+  for (let i = figures.length - 2; i >= 0; --i) figures[i].unit ??= figures[i + 1].unit;
+  return figures.filter((f) => f.unit !== undefined);
+}
+
+/** Whether one of `printed` (figuresOf), rounded as the page has it, is the page's figure. */
+export function isPrinted(figure, printed) {
+  const half = 0.5 * 10 ** -figure.digits * (1 + 1e-9);
+  return printed.some((p) => p.unit === figure.unit && Math.abs(p.value - figure.value) <= half);
+}
+
+/** Figures in a page's prose, beside its code: {number, text}. */
+export function proseFigures(page) {
+  return linesOf(page).filter((l) => l.code === null && !l.mark).flatMap(({number, text}) =>
+    figuresOf(text).map((figure) => ({number, ...figure})));
+}
+
+/** Tables of a page: {line, rows (cells), headings (the section's and those that enclose it)}. */
+export function tablesOf(page) {
+  const tables = [];
+  let open = null;
+  let headings = [];
+  for (const {number, text, code, mark} of linesOf(page)) {
+    const heading = code === null && /^(#+) /.exec(text);
+    if (heading) {
+      headings = [...headings.filter((h) => h.level < heading[1].length), {level: heading[1].length, line: number}];
+    }
+    if (code === null && !mark && text.startsWith('|')) {
+      if (open === null) tables.push(open = {line: number, rows: [], headings});
+      open.rows.push(text.replaceAll('\\|', '/').split('|').slice(1, -1).map((cell) => cell.trim()));
+    } else {
+      open = null;
+    }
+  }
+  return tables;
 }
 
 /** GitHub's anchors of a file's headings. */
@@ -77,6 +137,13 @@ export function anchorsOf(file) {
 
 export const isFile = (path) => existsSync(join(root, path)) && statSync(join(root, path)).isFile();
 export const exists = (path) => existsSync(join(root, path));
+
+/** Why this build's figures are others than those of the pages; undefined: they are the same bits. */
+export function otherBits(poise) {
+  const {status, stdout} = spawnSync(poise, ['bits', 'push_double_support', 'mujoco_push_double_support'], {encoding: 'utf8'});
+  // 3: this build has another instruction set, compiler or library than the record's.
+  return status === 3 ? stdout.trim().split('\n').at(-1) : undefined;
+}
 
 /** What the program tells of itself: commands with their flags, fields, messages' fields, metrics. */
 export function programFacts(poise) {

@@ -1,0 +1,100 @@
+// Tables of measured figures say by which commit, when and how they were measured, in a line above them that begins with
+// "Measured:". Those whose line ends with "Compared by the tests." are measured again: every figure with a unit in the
+// columns "ours" and "measured" must be among what the line's commands print.
+// Usage: node figures_test.mjs --poise PROGRAM
+import assert from 'node:assert/strict';
+import {execFileSync, spawnSync} from 'node:child_process';
+import {mkdtempSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {dirname, join, resolve} from 'node:path';
+import {test} from 'node:test';
+import {parseArgs} from 'node:util';
+import {figuresOf, isPrinted, linesOf, otherBits, repositoryFiles, root, tablesOf} from './markdown.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}}});
+const pages = ['README.md', ...repositoryFiles('docs').filter((f) => f.endsWith('.md'))];
+const MEASURED = /^Measured: (by the commit of this line, \d{4}-\d\d-\d\d|[0-9a-f]{7}(?: to [0-9a-f]{7})?, \d{4}-\d\d-\d\d)[,;.]/;
+const COMPARED = /Compared by the tests\.$/;
+
+/** Columns of what was chosen or is prescribed, not measured. */
+const GIVEN = new Set(['use', 'reason', 'points; `--quick`']);
+
+/** Whether most cells of a table, its first column aside, begin with a figure. */
+function isMeasured({rows}) {
+  if (rows[0].some((cell) => GIVEN.has(cell))) return false;
+  const cells = rows.slice(2).flatMap((row) => row.slice(1)).map((cell) => cell.replace(/`[^`]*`/g, '')).filter(Boolean);
+  const figures = cells.filter((cell) => /^\D{0,14}(?<![\w.(])\d+(?:[.,]\d+)?(?!\w*\))/.test(cell));
+  return cells.length >= 4 && figures.length >= 0.54 * cells.length;
+}
+
+/** The "Measured:" line of a table: the nearest one above it below a heading of its own; undefined: none. */
+function measuredLine(lines, {line, headings}) {
+  const begin = headings[0]?.line ?? 1;
+  for (let number = line - 1; number >= begin; --number) {
+    const {text} = lines[number - 1];
+    if (text.startsWith('Measured:')) {
+      // Its paragraph: it may go over several lines.
+      let end = number;
+      while (lines[end]?.text.trim()) end += 1;
+      return {number, text: lines.slice(number - 1, end).map((l) => l.text).join(' ')};
+    }
+    if (/^#+ /.test(text) && !headings.some((h) => h.line === number)) return undefined;
+  }
+  return undefined;
+}
+
+const compared = [];
+for (const page of pages) {
+  const lines = linesOf(page);
+  const tables = tablesOf(page).filter(isMeasured);
+  for (const table of tables) table.measured = measuredLine(lines, table);
+  compared.push(...tables.filter((t) => t.measured && COMPARED.test(t.measured.text)).map((t) => ({page, ...t})));
+  if (tables.length === 0) continue;
+  test(`${page}: ${tables.length} tables say when and how they were measured`, () => {
+    const problems = tables.filter((t) => !t.measured || !MEASURED.test(t.measured.text)).map((t) => t.measured
+      ? `${page}:${t.measured.number}: write "Measured: COMMIT, YYYY-MM-DD, ...": ${t.measured.text}`
+      : `${page}:${t.line}: has no line above it that begins with "Measured:"`);
+    assert.deepEqual(problems, [], problems.join('\n'));
+  });
+}
+
+test('commits of "Measured:" lines are of this history', (t) => {
+  if (spawnSync('git', ['-C', root, 'rev-parse', '--verify', 'HEAD~50'], {stdio: 'ignore'}).status !== 0) {
+    t.skip('a copy without its history');
+    return;
+  }
+  for (const page of pages) {
+    for (const {number, text} of linesOf(page)) {
+      for (const [hash] of (/^Measured: ([0-9a-f]{7})/.exec(text) ? text.matchAll(/\b[0-9a-f]{7}\b(?=,| to )/g) : [])) {
+        assert.doesNotThrow(() => execFileSync('git', ['-C', root, 'cat-file', '-e', `${hash}^{commit}`], {stdio: 'ignore'}),
+            `${page}:${number}: git knows no commit ${hash}`);
+      }
+    }
+  }
+});
+
+const other = compared.length > 0 ? otherBits(options.poise) : undefined;
+for (const {page, line, rows, measured} of compared) {
+  test(`${page}:${line} has the figures of its commands`, {skip: other}, (t) => {
+    const folder = mkdtempSync(join(tmpdir(), 'poise-figures-'));
+    try {
+      const commands = [...measured.text.matchAll(/`((?:deploy\/run|poise) [^`]*)`/g)]
+          .map((m) => m[1].replace(/^deploy\/run/, 'poise run'));
+      assert.ok(commands.length > 0, `${page}:${measured.number}: names no command`);
+      const env = {...process.env, PATH: `${dirname(resolve(options.poise))}:${process.env.PATH}`, COLUMNS: '400',
+        POISE_RUNS_DIR: join(folder, 'runs'), POISE_DEPLOY_DIR: join(root, 'deploy')};
+      const output = commands.map((command) =>
+        spawnSync('bash', ['-c', command], {cwd: folder, env, encoding: 'utf8', maxBuffer: 1 << 28}).stdout).join('\n');
+      const printed = figuresOf(output);
+      const columns = rows[0].flatMap((cell, i) => (['ours', 'measured'].includes(cell) ? [i] : []));
+      assert.ok(columns.length > 0, `${page}:${line}: has no column "ours" or "measured"`);
+      const figures = rows.slice(2).flatMap((row) => columns.flatMap((i) => figuresOf(row[i] ?? '')
+          .map((figure) => ({...figure, cell: row[i]}))));
+      const untrue = figures.filter((figure) => !isPrinted(figure, printed));
+      assert.deepEqual(untrue.map((f) => `${f.text}: ${f.cell}`), []);
+      t.diagnostic(`${figures.length} figures are those of ${commands.join(', ')}`);
+    } finally {
+      rmSync(folder, {recursive: true, force: true});
+    }
+  });
+}
