@@ -81,7 +81,9 @@ TEST(FieldReference, EveryFieldSaysWhatItMeansAndANumberItsUnit) {
   for (const SchemaCase& c : Schemas()) {
     for (const FieldEntry& field : FieldReference(c.schema)) {
       const std::string name = c.prototype->GetTypeName() + ": " + field.path;
-      EXPECT_THAT(field.meaning, HasSubstr(" ")) << name << ": its comment must say what it means";
+      const std::string told = field.meaning.substr(field.unit.size());
+      EXPECT_THAT(told.substr(std::min<size_t>(2, told.size())), HasSubstr(" "))
+          << name << ": its comment must say what it means";
       if (field.type.ends_with("number") || field.type == "list of numbers") {
         const bool whole = field.type.starts_with("whole");
         EXPECT_TRUE(whole || !field.unit.empty() || std::regex_match(field.meaning, without_unit))
@@ -181,13 +183,35 @@ TEST(FieldReference, IsSelectedByPathByBeginningAndByPartOfAName) {
 }
 
 TEST(FieldReference, TheUnitIsWhatACommentBeginsWith) {
-  using Pair = std::pair<std::string, std::string>;
-  EXPECT_EQ(SplitUnit("N·m at the joint"), Pair("N·m", "at the joint"));
-  EXPECT_EQ(SplitUnit("m, l_x/2"), Pair("m", "l_x/2"));
-  EXPECT_EQ(SplitUnit("s"), Pair("s", ""));
-  EXPECT_EQ(SplitUnit("A foot that stands"), Pair("", "A foot that stands"));
-  EXPECT_EQ(SplitUnit("A, of the motor"), Pair("A", "of the motor"));
-  EXPECT_EQ(SplitUnit("share of the load"), Pair("", "share of the load"));
+  EXPECT_EQ(UnitOf("N·m at the joint"), "N·m");
+  EXPECT_EQ(UnitOf("m, l_x/2"), "m");
+  EXPECT_EQ(UnitOf("s"), "s");
+  EXPECT_EQ(UnitOf("A foot that stands"), "");
+  EXPECT_EQ(UnitOf("A, of the motor"), "A");
+  EXPECT_EQ(UnitOf("share of the load"), "");
+}
+
+// Without its first word, the unit, a sentence cannot be read.
+TEST(FieldReference, TheSentenceOfACommentStaysWhole) {
+  const std::string text =
+      FieldsAsText(SelectFields(FieldReference(Schema::kScenario), "lead"), 1000);
+  EXPECT_THAT(
+      text,
+      HasSubstr("lead: number, default 0\n    s that the run begins before the scenario's time 0"))
+      << text;
+}
+
+// "no default" beside a comment that says "Default: a third of the sole" contradicts it.
+TEST(FieldReference, AFieldThatTellsItsDefaultIsNotSaidToHaveNone) {
+  FieldEntry field;
+  field.path = "margin";
+  field.type = "number";
+  field.unit = "m";
+  field.meaning = "m off each edge.";
+  EXPECT_EQ(FieldsAsText({field}, 80), "margin: number, no default\n    m off each edge.\n");
+  field.meaning = "m off each edge. Default: a third of the sole's width.";
+  EXPECT_EQ(FieldsAsText({field}, 80),
+            "margin: number\n    m off each edge. Default: a third of the sole's width.\n");
 }
 
 TEST(FieldReference, TextFitsItsWidth) {

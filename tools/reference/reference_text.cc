@@ -28,6 +28,11 @@ std::string ChannelsOf(const MessageEntry& message, const ChannelsByType& channe
   return found == channels.end() ? "" : Joined(found->second);
 }
 
+/// Whether a comment says itself what holds without a value: "Default: that of the robot".
+bool TellsDefault(std::string_view meaning) {
+  return meaning.find("efault:") != std::string_view::npos;
+}
+
 /// A cell of a Markdown table.
 std::string Cell(std::string text) {
   for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
@@ -62,10 +67,9 @@ std::string FieldsAsText(const std::vector<FieldEntry>& fields, size_t width) {
   std::string text;
   for (const FieldEntry& field : fields) {
     text += fmt::format("{}: {}", field.path, field.type);
-    if (!field.unit.empty()) text += fmt::format(", {}", field.unit);
     if (!field.default_value.empty()) {
       text += fmt::format(", default {}", field.default_value);
-    } else if (!field.group) {
+    } else if (!field.group && !TellsDefault(field.meaning)) {
       text += ", no default";
     }
     text += '\n';

@@ -121,7 +121,8 @@ void Append(const Descriptor& type, const std::string& prefix, std::vector<Field
       }
       comment += of_type;
     }
-    std::tie(entry.unit, entry.meaning) = SplitUnit(comment);
+    entry.unit = UnitOf(comment);
+    entry.meaning = comment;
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_ENUM) {
       const auto& values = *field.enum_type();
       if (entry.meaning.empty()) entry.meaning = Comment(values);
@@ -154,7 +155,7 @@ std::string LastName(const std::string& path) { return path.substr(path.rfind('.
 
 }  // namespace
 
-std::pair<std::string, std::string> SplitUnit(std::string_view comment) {
+std::string UnitOf(std::string_view comment) {
   // Longer ones first where one begins another.
   static constexpr std::array<std::string_view, 47> kUnits = {
       "rad/s/√s", "m/s^2/√s",  "N·m·s/rad", "N·m/rad", "N·m/A",   "N·m/s",  "N·s/m",   "m/(N·s)",
@@ -165,17 +166,13 @@ std::pair<std::string, std::string> SplitUnit(std::string_view comment) {
       "runs",     "turns",     "bytes",     "W",       "rad/s^2", "°C",     "V"};
   for (const std::string_view unit : kUnits) {
     if (!comment.starts_with(unit)) continue;
-    std::string_view rest = comment.substr(unit.size());
+    const std::string_view rest = comment.substr(unit.size());
     // "A" is a word, too, and "s" begins many.
     const bool ends = rest.empty() || rest[0] == ',' || rest[0] == ';' || rest[0] == ':' ||
                       rest[0] == '.' || (rest[0] == ' ' && unit != "A");
-    if (!ends) continue;
-    while (!rest.empty() && std::string_view(",;:. ").find(rest[0]) != std::string_view::npos) {
-      rest.remove_prefix(1);
-    }
-    return {std::string(unit), std::string(rest)};
+    if (ends) return std::string(unit);
   }
-  return {"", std::string(comment)};
+  return "";
 }
 
 void AddSchema(std::string_view descriptor_set) {

@@ -14,7 +14,7 @@ struct FieldEntry {
   std::string type;           ///< "number", "text", "list of groups", ...
   std::string default_value;  ///< as a file has it; empty: none
   std::string unit;           ///< empty: none
-  std::string meaning;        ///< one line
+  std::string meaning;        ///< one line, the comment as it stands: it begins with the unit
   std::vector<std::pair<std::string, std::string>> values;  ///< of an enum: name, meaning
   bool group = false;  ///< holds fields, which follow, and cannot be set itself
 };
@@ -37,8 +37,7 @@ std::vector<FieldEntry> FieldsOfGroup(const std::string& type, const std::string
 std::vector<FieldEntry> SelectFields(const std::vector<FieldEntry>& fields,
                                      std::string_view beginning);
 
-/// The unit that begins a comment, and the rest: {"N·m", "at the joint"} of "N·m at the joint";
-/// {"", comment} when none does.
-std::pair<std::string, std::string> SplitUnit(std::string_view comment);
+/// The unit that begins a comment, "N·m" of "N·m at the joint"; empty when none does.
+std::string UnitOf(std::string_view comment);
 
 }  // namespace poise
