@@ -149,6 +149,40 @@ TEST_F(RunRegistryTest, AnEntryOfARunThatWasKilledGoes) {
   EXPECT_EQ(LatestEndedRun(), dir);
 }
 
+// Whoever is root must not stop or push another person's robot without naming its run.
+TEST_F(RunRegistryTest, AnotherUsersRunIsNotRootsOwn) {
+  if (geteuid() != 0) GTEST_SKIP() << "takes root, to start a run as another user";
+  constexpr uid_t kOther = 65'533;
+  unsetenv("POISE_RUNTIME_DIR");
+  const fs::path dir = Run("theirs");
+  fs::permissions(folder.path(""), fs::perms::others_all, fs::perm_options::add);
+  int ready[2], end[2];
+  ASSERT_EQ(pipe(ready), 0);
+  ASSERT_EQ(pipe(end), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    close(end[1]);
+    if (setuid(kOther) != 0) _exit(1);
+    {
+      const RunRegistration registration(dir);
+      char byte = 1;
+      if (write(ready[1], &byte, 1) != 1) _exit(1);
+      byte = static_cast<char>(read(end[0], &byte, 1));  // until the parent has looked
+    }
+    _exit(0);
+  }
+  close(ready[1]);
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  const std::vector<RunningRun> runs = RunningRuns();
+  const auto theirs = std::ranges::find(runs, dir, &RunningRun::dir);
+  close(end[1]);
+  waitpid(child, nullptr, 0);
+  ASSERT_NE(theirs, runs.end());
+  EXPECT_FALSE(theirs->own);
+  EXPECT_THAT(FormatRun(*theirs), HasSubstr(", of user 65533"));
+}
+
 TEST_F(RunRegistryTest, OddFilesAreNoRuns) {
   const RunRegistration registration(Run("a"));
   std::ofstream(registry + "/run-1-notes") << std::string(100'000, 'x');

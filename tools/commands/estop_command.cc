@@ -261,9 +261,10 @@ int Estop(const std::string& run, bool reset) {
 void AddEstopCommand(CLI::App* app, Command* command) {
   auto run = std::make_shared<std::string>();
   auto reset = std::make_shared<bool>(false);
-  CLI::App* estop =
-      app->add_subcommand("estop", "emergency stop of every run that goes on, or of one (latched)");
-  estop->add_option("run", *run, "folder or name of the run; default: every run that goes on");
+  CLI::App* estop = app->add_subcommand(
+      "estop", "emergency stop of your runs that go on, or of one run (latched)");
+  estop->add_option("run", *run,
+                    "folder or name of the run, also another user's; default: every run of yours");
   estop->add_flag("--reset", *reset,
                   "end a stop: only once the motors are at rest and no torque is commanded");
   estop->callback(

@@ -139,7 +139,8 @@ void AddRuns(const fs::path& dir, uid_t user, std::vector<RunningRun>* runs) {
     RunningRun run;
     run.dir = ReadAll(fd.get());
     run.user = UserName(user);
-    run.own = user == geteuid() || geteuid() == 0;
+    run.own = user == geteuid();
+    run.start = status.st_mtim.tv_sec;
     run.age = AgeOf(status);
     const bool known = std::any_of(runs->begin(), runs->end(),
                                    [&](const RunningRun& other) { return other.dir == run.dir; });
@@ -234,6 +235,8 @@ std::vector<RunningRun> RunningRuns() {
     RunningRun run;
     run.dir = latest;
     run.user = UserName(status.st_uid);
+    run.own = status.st_uid == geteuid();
+    run.start = status.st_mtim.tv_sec;
     run.age = AgeOf(status);
     Describe(&run);
     runs.push_back(std::move(run));
@@ -274,9 +277,9 @@ std::string FormatRun(const RunningRun& run) {
   }
   if (run.user != UserName(geteuid())) what += ", of user " + run.user;
   const double age = std::max(run.age, 0.0);
-  const std::time_t start = std::time(nullptr) - static_cast<std::time_t>(age);
-  const std::string since = age < kDay ? fmt::format("{:%H:%M:%S}", fmt::localtime(start))
-                                       : fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(start));
+  const std::string since = age < kDay
+                                ? fmt::format("{:%H:%M:%S}", fmt::localtime(run.start))
+                                : fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(run.start));
   const std::string lasts =
       age < 10 * kMinute ? fmt::format("{:.0f} s", age) : fmt::format("{:.0f} min", age / kMinute);
   return fmt::format("{}  ({}, since {}, for {})", logging::ForTerminal(run.dir.string()),

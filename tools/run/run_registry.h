@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -36,13 +37,14 @@ class RunRegistration {
 struct RunningRun {
   std::filesystem::path dir;
   std::string user;        ///< whose it is
-  bool own = true;         ///< this user's; root counts every user's as its own
+  bool own = true;         ///< this user's; others' are acted on only when they are named
   bool readable = true;    ///< false: run_spec.pbtxt cannot be read from here
   bool networked = false;  ///< heard and stopped from outside; false: inside one process
   std::string scenario;
   std::string robot;  ///< its file's name, without ending
   int64_t run_id = 0;
-  double age = 0;  ///< s since its start
+  std::time_t start = 0;  ///< in whole seconds, as every command says it
+  double age = 0;         ///< s since its start
 };
 
 /// Every run that is registered and lives, the newest first; entries of runs that died are removed.
