@@ -59,11 +59,13 @@ int main(int argc, char** argv) {
   }
   CLI::App app{"Poise: balance of a torque-controlled humanoid by contact forces and moments",
                "poise"};
+  app.formatter(poise::MakeHelpFormatter());  // before the commands, which take it over
   app.set_version_flag("--version", poise::VersionText("poise"));
   app.require_subcommand(1);
   app.footer(
       "poise COMMAND --help says more. Exit code: 0 good, 1 a check or the run failed, 2 "
-      "wrong usage or configuration, 3 in real time, the machine was too late.");
+      "wrong usage or configuration, 3 in real time, the machine was too late.\n"
+      "Start with: poise run, then poise report");
   poise::Command command;
   poise::AddRunCommand(&app, &command);
   poise::AddMatrixCommand(&app, &command);
@@ -95,6 +97,14 @@ int main(int argc, char** argv) {
     if (!arguments.empty() && arguments.front() == "help") {
       arguments.erase(arguments.begin());
       arguments.emplace_back("--help");
+    }
+    // An unset variable of a script: a default in its place would write elsewhere than was meant.
+    if (const auto empty = std::ranges::find(arguments, ""); empty != arguments.end()) {
+      Fail(empty == arguments.begin()
+               ? "the first argument is empty"
+               : fmt::format("the argument after '{}' is empty; give it a value or leave it out",
+                             *std::prev(empty)));
+      return poise::kExitUsage;
     }
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
     app.parse(arguments);

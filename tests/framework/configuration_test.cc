@@ -137,7 +137,7 @@ TEST(SetField, SaysWhatIsWrongAndWhatWouldBeRight) {
   EXPECT_EQ(SetError("joint", "3"), "joint: ToyConfig has no field 'joint'; did you mean joints?");
   EXPECT_EQ(SetError("gains.kx", "3"), "gains.kx: gains has no field 'kx'; did you mean kd or kp?");
   EXPECT_EQ(SetError("gains.stiffness", "3"),
-            "gains.stiffness: gains has no field 'stiffness'; it has kd, kp, name");
+            "gains.stiffness: gains has no field 'stiffness'; use one of kd, kp, name");
   EXPECT_EQ(SetError("gains", "3"),
             "gains: gains is a group of fields; name one of them: kp, kd, name");
   EXPECT_EQ(SetError("joints.x", "3"),
@@ -186,7 +186,7 @@ TEST(Suggest, NamesTheNearestThreeOrAll) {
   EXPECT_EQ(Suggest("kpp", {"kd", "label", "kp", "kq"}), "did you mean kp or kd or kq?");
   EXPECT_EQ(Suggest("aaaa", {"aaaf", "aaae", "aaad", "aaac"}),
             "did you mean aaac or aaad or aaae?");
-  EXPECT_EQ(Suggest("temperature", {"b", "a"}), "it has a, b");
+  EXPECT_EQ(Suggest("temperature", {"b", "a"}), "use one of a, b");
 }
 
 }  // namespace

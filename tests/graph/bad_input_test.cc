@@ -48,6 +48,34 @@ TEST_F(BadInputTest, UnknownScenarioNamesWhatThereIs) {
   ExpectRefused({"run", "push_double_suport"}, {"push_double_suport", "push_double_support"});
 }
 
+// An unset variable in a script would else write where nobody has asked it to.
+TEST_F(BadInputTest, AnEmptyArgumentIsRefused) {
+  ExpectUsageError({"run", StandScenario(), "--inline", "--out", ""}, {"'--out' is empty"});
+  ExpectUsageError({"report", ""}, {"'report' is empty"});
+}
+
+TEST_F(BadInputTest, AFolderIsNoScenarioAndItsFilesAreNamed) {
+  const std::string folder = folder_ / "mine";
+  std::filesystem::create_directory(folder);
+  ExpectUsageError({"run", folder, "--inline"}, {"is a folder", "no .pbtxt file"});
+  std::filesystem::copy(StandScenario(), folder + "/a.pbtxt");
+  ExpectUsageError({"run", folder, "--inline"}, {"is a folder", folder + "/a.pbtxt"});
+}
+
+TEST_F(BadInputTest, ARobotWithoutItsMakersFileIsListedAsSuch) {
+  const TestDeploy deploy;
+  const std::string robots = folder_ / "own/share/poise/robots";
+  std::filesystem::create_directories(robots);
+  std::ofstream(robots + "/bare.pbtxt") << "urdf: \"bare.urdf\"\n";
+  setenv("POISE_PATH", (folder_ / "own").c_str(), 1);
+  const ProgramResult table = RunPoise({"robot", "list"});
+  const ProgramResult list = RunPoise({"list", "robots"});
+  unsetenv("POISE_PATH");
+  EXPECT_EQ(table.exit_code, 0) << table.output;
+  EXPECT_THAT(table.output, HasSubstr("bare"));
+  EXPECT_THAT(list.output, HasSubstr("URDF bare.urdf, which is not here"));
+}
+
 TEST_F(BadInputTest, UnknownFlagIsNamed) { ExpectRefused({"run", "--nonsense"}, {"--nonsense"}); }
 
 TEST_F(BadInputTest, NoSubcommand) { ExpectRefused({"--nothing"}, {"--help"}); }

@@ -105,7 +105,11 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
   EXPECT_THAT(run.output, HasSubstr("\npush, largest"));
   EXPECT_THAT(run.output, Not(HasSubstr("\njoint torque")));
   EXPECT_THAT(run.output, Not(HasSubstr("for this test")));
-  EXPECT_THAT(run.output, HasSubstr("file://" + run_ + "/report.html"));
+  // The page is not there yet: its address comes with it.
+  EXPECT_THAT(run.output, Not(HasSubstr("file://")));
+  EXPECT_THAT(RunPoise({"report", run_}).output, HasSubstr("file://" + run_ + "/report.html"));
+  std::snprintf(text, sizeof text, "all %d checks with their limits", limited);
+  EXPECT_THAT(Flat(run.output), HasSubstr(text));
   const ProgramResult full = RunPoise({"report", run_, "--no-html", "--full"});
   EXPECT_THAT(full.output, HasSubstr("\njoint torque"));
   EXPECT_THAT(Flat(full.output), HasSubstr("engine ode: contact_erp 0.2"));
@@ -124,6 +128,25 @@ TEST_F(FirstScreenTest, TellsWhatHappenedInTheTerminalsWidth) {
     ExpectFits(RunPoise({"list", "metrics"}).output, static_cast<size_t>(std::atoi(width)));
     ExpectFits(RunPoise({"run", "--help"}).output, static_cast<size_t>(std::atoi(width)));
   }
+}
+
+TEST_F(FirstScreenTest, PointsToAMatrixOfThisVeryRunOrToNone) {
+  const auto hint = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--inline", "--force", "--out", run_});
+    const ProgramResult run = RunPoise(arguments);
+    for (const std::string& line : Lines(run.output)) {
+      if (line.find(" matrix ") != std::string::npos) return line.substr(line.find("matrix "));
+    }
+    return std::string();
+  };
+  EXPECT_EQ(hint({"run", "pushed"}), "matrix pushed");
+  // A file of the user's own that is called as an installed scenario is: the file is meant.
+  const std::string file = deploy_ / "my own.pbtxt";
+  std::ofstream(file) << "base: \"base/stand\" name: \"pushed\" duration: 0.5\n";
+  EXPECT_EQ(hint({"run", file}), "matrix '" + file + "'");
+  EXPECT_EQ(hint({"run", "pushed", "--set", "sim.push[0].peak=50"}), "");
+  EXPECT_EQ(hint({"run", "pushed", "--duration", "0.4"}), "");
+  EXPECT_EQ(hint({"run", "pushed", "--ideal"}), "");
 }
 
 TEST_F(FirstScreenTest, TellsOfAFallWhenAndWhatWentWrongBefore) {

@@ -81,7 +81,8 @@ TEST(FieldSelectionTest, SaysWhatAFieldMayHaveBeen) {
             "foot_wrench is an array of 2; write foot_wrench[0] to foot_wrench[1] or foot_wrench");
   EXPECT_EQ(ProblemWith("foot_wrench[0].forse"),
             "foot_wrench[0] has no field 'forse'; did you mean force?");
-  EXPECT_EQ(ProblemWith("frame_o[0]"), "frame_o has no field '[0]'; it has orientation, position");
+  EXPECT_EQ(ProblemWith("frame_o[0]"),
+            "frame_o has no field '[0]'; use one of orientation, position");
   EXPECT_EQ(ProblemWith("tick.x"), "tick is a single value; leave out '.x'");
   EXPECT_EQ(ProblemWith("torque[1]."), "torque[1] is a single value; leave out '.'");
 }
@@ -111,8 +112,8 @@ TEST(FieldSelectionTest, JointsAndFeetHaveTheirNames) {
   };
   EXPECT_EQ(problem("foot_wrench[rihgt]"),
             "foot_wrench has no element 'rihgt'; did you mean right?");
-  EXPECT_EQ(problem("torque[roll]"), "torque has no element 'roll'; it has right_hip_roll");
-  EXPECT_EQ(problem("foot_wrench[2]"), "foot_wrench has no element '2'; it has left, right");
+  EXPECT_EQ(problem("torque[roll]"), "torque has no element 'roll'; use one of right_hip_roll");
+  EXPECT_EQ(problem("foot_wrench[2]"), "foot_wrench has no element '2'; use one of left, right");
   EXPECT_EQ(problem("foot_wrench.force"),
             "foot_wrench is an array of 2; write foot_wrench[right] to foot_wrench[left] or "
             "foot_wrench");

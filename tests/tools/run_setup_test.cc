@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,18 @@ RunSpec SpecOf(const std::string& scenario, const std::vector<std::string>& set)
   changes.set = set;
   std::vector<std::string> warnings;
   return MakeRunSpec(LoadScenario(scenario, changes), changes, &warnings);
+}
+
+TEST(MakeRunSpec, WarnsOfAPushAfterTheRunsEnd) {
+  for (const auto& [start, warned] : {std::pair{"2.9", false}, {"3", true}, {"10", true}}) {
+    RunChanges changes;
+    changes.set = {std::string("sim.push[0].start=") + start};
+    std::vector<std::string> warnings;
+    MakeRunSpec(LoadScenario("push_double_support", changes), changes, &warnings);
+    const bool said = std::ranges::any_of(
+        warnings, [](const std::string& text) { return text.starts_with("sim.push[0].start: "); });
+    EXPECT_EQ(said, warned) << start;
+  }
 }
 
 struct Change {

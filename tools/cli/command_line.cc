@@ -1,7 +1,9 @@
 #include "tools/cli/command_line.h"
 
 #include <algorithm>
+#include <memory>
 #include <regex>
+#include <set>
 #include <vector>
 
 #include "components/framework/configuration/suggest.h"
@@ -83,6 +85,33 @@ std::string WithoutDoubledTypes(const std::string& help) {
   return std::regex_replace(std::regex_replace(help, kChecked, "$1"), kOff, "$1");
 }
 
+/// "--inline, --hosted".
+std::string FlagNames(const std::set<CLI::Option*>& options) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : options) names.push_back(option->get_name());
+  std::ranges::sort(names);
+  return Joined(names, ", ");
+}
+
+/// An option's meaning first, then what it goes with.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    const std::string text = CLI::Formatter::make_option_opts(option);
+    return text.substr(0, std::min(text.find(" Needs:"), text.find(" Excludes:")));
+  }
+  std::string make_option_desc(const CLI::Option* option) const override {
+    std::string text = option->get_description();
+    if (!option->get_needs().empty()) {
+      text += fmt::format(" (goes with {})", FlagNames(option->get_needs()));
+    }
+    if (!option->get_excludes().empty()) {
+      text += fmt::format(" (not with {})", FlagNames(option->get_excludes()));
+    }
+    return text;
+  }
+};
+
 std::string UnknownCommand(const CLI::App& command, const std::string& name) {
   std::vector<std::string> names;
   for (const CLI::App* each : Subcommands(command)) names.push_back(each->get_name());
@@ -90,6 +119,10 @@ std::string UnknownCommand(const CLI::App& command, const std::string& name) {
 }
 
 }  // namespace
+
+std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter() {
+  return std::make_shared<HelpFormatter>();
+}
 
 std::string HelpText(const CLI::App& app) {
   const int width = ScreenStyle().columns;

@@ -2,9 +2,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 
 namespace poise {
+
+/// The help's layout: an option's meaning before what it goes with. For the root, before its
+/// commands are added: they take it over.
+std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter();
 
 /// The help of the command that was asked about, in the terminal's width.
 std::string HelpText(const CLI::App& app);

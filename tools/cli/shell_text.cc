@@ -105,14 +105,6 @@ void AppendOptions(const CLI::App& app, std::string* text) {
 
 }  // namespace
 
-std::string ShellWord(const std::string& text) {
-  const bool plain = !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
-    return std::isalnum(c) || c >= 0x80 ||
-           std::string_view("_-./:=,+@%").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  return plain ? text : Quoted(text);
-}
-
 std::string ManPage(const CLI::App& app, const std::string& version) {
   const std::string& name = app.get_name();
   std::string title = name;

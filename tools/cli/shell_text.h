@@ -6,9 +6,6 @@
 
 namespace poise {
 
-/// `text` as one word of a command line that is printed for a shell: in quotes where it must be.
-std::string ShellWord(const std::string& text);
-
 /// The manual page of `app` with all its commands, in man's own language. `version` stands below.
 std::string ManPage(const CLI::App& app, const std::string& version);
 

@@ -213,14 +213,13 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
   benchmark->add_flag("--quiet", session->quiet, "no progress");
   benchmark->footer(
       "The controller is any graph of components that speaks Poise's messages: Poise's own, "
-      "modules "
-      "and programs on POISE_PATH; one that has\na program of its own runs as processes, in "
-      "lockstep. Robot, engine and controller are yours, everything else is the set's. OUT has\n"
-      "benchmark.csv (a row a point; its SHA-1 is the same on every machine of one build), "
-      "benchmark.html (table and maps), benchmark.json\n(what is needed to repeat it), set/ (what "
-      "was run) and parts/ (every run). docs/benchmark.md says what is measured and why.\n"
-      "Exit code: 0 measured, whatever fell; 1 interrupted, or a run could not be made; 2 wrong "
-      "usage or configuration.");
+      "modules and programs on POISE_PATH; one that has a program of its own runs as processes, in "
+      "lockstep. Robot, engine and controller are yours, everything else is the set's. OUT has "
+      "benchmark.csv (a row a point; its SHA-1 is the same for one build, as seen on one machine "
+      "so far), benchmark.html (table and maps), benchmark.json (what is needed to repeat it), "
+      "set/ (what was run) and parts/ (every run). docs/benchmark.md says what is measured and "
+      "why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run could not be made; 2 "
+      "wrong usage or configuration.\nExample: poise benchmark --quick --part push_double");
   benchmark->callback(
       [arguments, command] { *command = [arguments] { return RunBenchmark(*arguments); }; });
 }

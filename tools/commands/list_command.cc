@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -7,6 +8,7 @@
 #include "components/framework/configuration/suggest.h"
 #include "components/framework/optional_ports.h"
 #include "components/robot_files/robot.pb.h"
+#include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
@@ -273,7 +275,12 @@ int List(const ListRequest& request) {
   if (wanted("robots")) {
     ListFiles("robots", [](const std::string& file) {
       const Robot robot = ReadMessage<Robot>(file);
-      return robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf();
+      const std::string maker = robot::MakerFile(robot, file);
+      std::error_code error;
+      return fmt::format("{}{}", robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf(),
+                         std::filesystem::exists(maker, error)
+                             ? ""
+                             : fmt::format(", which is not here: {} says where it is from", file));
     });
   }
   if (wanted("graphs")) {

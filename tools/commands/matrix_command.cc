@@ -267,11 +267,12 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       "replace the matrix that --out holds; start though the logs may not fit the disk");
   matrix->footer(
       "Each run is `poise run --inline` with the flags of its column. matrix.csv has a line for "
-      "each check of each run:\nscenario, paper_section, variant, ablation, outcome, fell_at [s], "
-      "simulated_time [s], passed, metric, label, unit,\nmeasured, at_least, at_most, "
-      "check_passed, paper, paper_value.\nExit code: 0 when everything ran; a fall in an ablation "
-      "is a result. 1 when a run could not be made, or an experiment\n(or a variant that has "
-      "checks of its own) fails without ablation. 2 wrong usage or configuration.");
+      "each check of each run: scenario, paper_section, variant, ablation, outcome, fell_at [s], "
+      "simulated_time [s], passed, metric, label, unit, measured, at_least, at_most, check_passed, "
+      "paper, paper_value.\nExit code: 0 when everything ran; a fall in an ablation is a result. 1 "
+      "when a run could not be made, or an experiment (or a variant that has checks of its own) "
+      "fails without ablation. 2 wrong usage or configuration.\nExample: poise matrix "
+      "push_double_support --ablation without_balancing");
   matrix->callback([options, command] { *command = [options] { return Matrix(*options); }; });
 }
 

@@ -182,7 +182,9 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   auto push_options = std::make_shared<RobotPushOptions>();
   CLI::App* push = app->add_subcommand("push", "push the simulated robot of a run that goes on");
   push->add_option("--body", push_options->body, "link that a joint carries; default: the root");
-  push->add_option("--force", push_options->force, "N, world axes: x,y,z")->required();
+  push->add_option("--force", push_options->force,
+                   "N, world axes: x,y,z; at most ten times the robot's weight")
+      ->required();
   push->add_option("--duration", push_options->duration,
                    "s; below 0: until the next push of this body")
       ->capture_default_str();

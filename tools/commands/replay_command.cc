@@ -142,7 +142,8 @@ void AddReplayCommand(CLI::App* app, Command* command) {
       "logged, bit for bit (exit code 1 when it differs)");
   replay->footer(
       "Configurations, robot and seed are those of the log. The components are those of this "
-      "program, so that a changed build shows where it differs.");
+      "program, so that a changed build shows where it differs.\nExample: poise replay runs/latest "
+      "--component task_controller --set task_controller.com.kp=200");
   replay->add_option("run", options->run, "folder of a run or a log; default: the latest run");
   CLI::Option* component =
       replay

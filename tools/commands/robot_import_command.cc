@@ -7,7 +7,7 @@
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
-#include "tools/cli/shell_text.h"
+#include "tools/cli/shell_word.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
 #include "tools/robot_import/robot_import.h"
@@ -111,8 +111,8 @@ void AddRobotImport(CLI::App* robot, Command* command) {
       "import", "write a folder with a maker's URDF or MJCF file and the text that Poise needs");
   app->footer(
       "Asks nothing: what the file does not say is guessed, and told with how sure it is. Exit "
-      "code: "
-      "0 written, 2 the file cannot be used, or the robot cannot balance.");
+      "code: 0 written, 2 the file cannot be used, or the robot cannot balance.\nExample: poise "
+      "robot import maker/robot.urdf --to my/robot");
   app->add_option("file", options->file, "URDF (xacro expanded) or MJCF")->required();
   app->add_option("--to", arguments->to,
                   "folder that is written; default: the robot's name in the current folder");

@@ -57,9 +57,9 @@ void AddRunCommand(CLI::App* app, Command* command) {
   RunOptions* const options = &arguments->options;
   CLI::App* run = app->add_subcommand("run", "run scenarios and check them");
   run->footer(
-      "Exit codes: 0 all checks hold; 1 a check or the run failed; 2 wrong usage or "
-      "configuration; 3 (real time) nothing failed but what the machine was too late for, or an "
-      "injected fault took.");
+      "Exit codes: 0 all checks hold; 1 a check or the run failed; 2 wrong usage or configuration; "
+      "3 (real time) nothing failed but what the machine was too late for, or an injected fault "
+      "took.\nExample: poise run push_double_support --set 'sim.push[0].peak=120'");
   run->add_option("scenario", arguments->scenarios,
                   "names (poise list scenarios) or .pbtxt files; all: every experiment of the "
                   "paper, by section, with an overview")

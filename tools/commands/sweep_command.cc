@@ -111,12 +111,12 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   AddSweepOptions(sweep, arguments.get(), session.get());
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
-      "table.csv (a row a run, the same\nbytes whether resumed, split or in parallel) and "
+      "table.csv (a row a run, the same bytes whether resumed, split or in parallel) and "
       "maps.html, and each map as map_N.svg; as map_N.png, too, those that the sweep's file asks "
       "for and those of what stands; with --png all. A sweep's file: tools/sweep/sweep.proto; "
-      "docs/sweeps.md.\n"
-      "Exit code: 0 when every run was made, fallen or not; 1 when interrupted or a run could not "
-      "be made; 2 wrong usage\nor configuration.");
+      "docs/sweeps.md.\nExit code: 0 when every run was made, fallen or not; 1 when interrupted or "
+      "a run could not be made; 2 wrong usage or configuration.\nExample: poise sweep "
+      "push_double_support --vary 'sim.push[0].peak=100:250:50'");
   CLI::App* merge = sweep->add_subcommand(
       "merge", "one table from the folders of a sweep's, or a limit's, parts");
   sweep->require_subcommand(0, 1);

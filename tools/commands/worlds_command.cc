@@ -317,8 +317,8 @@ void AddWorldsCommand(CLI::App* app, Command* command) {
       "first one's, and how far the measured foot wrenches are apart (worlds.csv, wrenches.csv). "
       "Of a sweep: in how many runs the outcome is the same, and how far the largest values that "
       "stand are apart (table.csv of each engine). A change with --set of an engine's own field "
-      "goes to that engine alone.\n"
-      "Exit code 1 when a check failed in an engine or a run of a sweep could not be made.");
+      "goes to that engine alone.\nExit code 1 when a check failed in an engine or a run of a "
+      "sweep could not be made.\nExample: poise worlds push_double_support");
   worlds
       ->add_option("scenario", arguments->scenarios,
                    "names or .pbtxt files of scenarios and sweeps; all: every experiment of the "

@@ -11,10 +11,10 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/printable.h"
+#include "tools/cli/shell_word.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/event_list.h"
 #include "tools/report/run_story.h"
-#include "tools/scenario/catalog.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {
@@ -215,30 +215,30 @@ std::string FormatVerdictLines(const Scenario& scenario, const std::vector<Check
   return text + (below_full_table ? "" : FormatUnknown(checks, /*all=*/false));
 }
 
-std::string FormatNext(const Scenario& scenario, const fs::path& dir, bool latest) {
+std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>& checks,
+                       const fs::path& dir, bool latest, const std::string& matrix) {
   const std::string program = ProgramName();
   const std::string whole = fs::absolute(dir).lexically_normal().string();
   const std::string near = fs::proximate(dir).string();
   const std::string run =
-      latest ? "" : fmt::format(" {}", near.size() < whole.size() ? near : whole);
+      latest ? "" : fmt::format(" {}", ShellWord(near.size() < whole.size() ? near : whole));
   std::string text = "\nLook further:\n";
   const auto add = [&](const std::string& command, const std::string& what) {
     text += fmt::format("  {} {}\n", program, Toned(command, Tone::kStrong));
     text += Wrapped(fmt::format("      {}", what), ScreenStyle().columns, 6) + "\n";
   };
-  add(fmt::format("report{}", run),
-      fmt::format("draws the run, step by step: {}", FileAddress(dir / "report.html")));
+  add(fmt::format("report{}", run), "draws the run, step by step, as a page for a browser");
   const int assumptions = scenario.assumption_size();
   add(fmt::format("report{} --full", run),
       fmt::format(
-          "every figure and event{}",
+          "all {} checks with their limits, every figure and event{}", CountChecks(checks).limited,
           assumptions == 0 ? ""
           : !scenario.has_paper_section()
               ? fmt::format(", and {} assumed values", assumptions)
               : fmt::format(", and the {} values that the paper does not give", assumptions)));
-  const std::vector<std::string> known = ListNames("scenarios");
-  if (std::find(known.begin(), known.end(), scenario.name()) != known.end()) {
-    add(fmt::format("matrix {}", scenario.name()), "the same without each part of the controller");
+  if (!matrix.empty()) {
+    add(fmt::format("matrix {}", ShellWord(matrix)),
+        "the same without each part of the controller");
   }
   return text;
 }

@@ -45,8 +45,10 @@ std::string FormatVerdict(const std::vector<CheckResult>& checks, const std::str
 std::string FormatVerdictLines(const Scenario& scenario, const std::vector<CheckResult>& checks,
                                const std::string& problem, bool below_full_table);
 
-/// Where to look next, for a run in `dir`; `latest`: the commands find it without a name.
-std::string FormatNext(const Scenario& scenario, const std::filesystem::path& dir, bool latest);
+/// Where to look next, for a run in `dir`, of which `checks` were made; `latest`: the commands find
+/// it without a name. `matrix`: what `poise matrix` takes to repeat this very run; empty: nothing.
+std::string FormatNext(const Scenario& scenario, const std::vector<CheckResult>& checks,
+                       const std::filesystem::path& dir, bool latest, const std::string& matrix);
 
 /// How this program is called from here: "poise" when $PATH has it, else its shortest path.
 std::string ProgramName();

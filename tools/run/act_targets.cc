@@ -41,6 +41,7 @@ ActTargets FindActTargets(const RunSpec& spec) {
     if (std::ranges::any_of(type->ports, plans)) targets.planner = i;
   }
   const robot::RobotModel model = RobotOf(spec);
+  targets.weight = model.total_mass() * robot::kGravity;
   for (const auto& body : model.bodies()) targets.bodies.push_back(body.name);
   for (const auto& foot : model.feet()) targets.feet.push_back(foot.name);
   return targets;

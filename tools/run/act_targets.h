@@ -20,6 +20,7 @@ struct ActTargets {
   int planner = -1;                 ///< likewise steps and walking
   std::vector<std::string> bodies;  ///< of the robot's model, as act_t's body counts them
   std::vector<std::string> feet;    ///< likewise act_t's foot
+  double weight = 0;                ///< N, the robot's
 };
 
 /// Throws RobotError.

@@ -33,6 +33,7 @@ constexpr int kMostTries = 8;                         // each twice as far ahead
 // takes to hand it on. An act that is late all the same goes again, farther ahead.
 constexpr double kAhead = 0.03;
 constexpr int64_t kLeastAhead = 5;
+constexpr double kMostWeights = 10;  // a push beyond is a slip of the hand: no robot withstands one
 
 int ChannelOfType(const Graph& graph, std::string_view type) {
   for (int i = 0; i < graph.channel_size(); ++i) {
@@ -167,6 +168,13 @@ int64_t OperatorLine::Push(const std::string& body, const Eigen::Vector3d& force
   }
   if (!force.allFinite() || !point.allFinite() || !std::isfinite(duration)) {
     throw ConfigError("push: force, point and duration must be finite numbers");
+  }
+  const double most = kMostWeights * targets_.weight;
+  if (force.norm() > most) {
+    throw ConfigError(
+        fmt::format("push: {:.6g} N is more than {:.0f} N, {:.0f} times the robot's "
+                    "weight",
+                    force.norm(), most, kMostWeights));
   }
   const auto found =
       body.empty() ? targets_.bodies.begin() : std::ranges::find(targets_.bodies, body);

@@ -49,7 +49,8 @@ class OperatorLine {
   explicit OperatorLine(RunSpec spec);
 
   /// N, world axes, at `point` (m, body frame) for `duration` s; below 0: until the next push of
-  /// this body. Takes the place of its last push; zero ends it. `body` empty: the root.
+  /// this body. Takes the place of its last push; zero ends it. `body` empty: the root. Throws
+  /// beyond ten times the robot's weight.
   int64_t Push(const std::string& body, const Eigen::Vector3d& force, const Eigen::Vector3d& point,
                double duration);
   /// `path` as LiveField's.

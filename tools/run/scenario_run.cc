@@ -79,7 +79,9 @@ void EndRos2(ChildProcess* ros2) {
 }  // namespace
 
 ScenarioRun::ScenarioRun(const std::string& scenario, const RunOptions& options)
-    : options_(options), main_(Prepare(scenario, options.changes, options.in_process, true)) {
+    : scenario_(scenario),
+      options_(options),
+      main_(Prepare(scenario, options.changes, options.in_process, true)) {
   if (options.launch.kills.count > 0) KillSchedule::Check(main_.spec, options.launch.kills);
   if (!main_.loaded.scenario.has_reference()) return;
   reference_ = Prepare(scenario, ReferenceChanges(main_.loaded, options.changes),
@@ -193,7 +195,9 @@ void ScenarioRun::PrintEnd(const logging::RunRecord& record, const RunResult& re
   fmt::print("{:.3f} s simulated in {:.2f} s, {:.1f} x real time\n",
              record.duration(record.num_ticks), outcome.wall_time,
              record.real_time_factor.value_or(0));
-  fmt::print("{}", FormatNext(main_.loaded.scenario, result.dir, latest));
+  // A matrix knows none of these changes: beside it this run would be another one.
+  const std::string matrix = options_.changes == RunChanges{} ? scenario_ : "";
+  fmt::print("{}", FormatNext(main_.loaded.scenario, summary.checks, result.dir, latest, matrix));
 }
 
 LogSizes ScenarioRun::log_sizes() const {

@@ -75,6 +75,7 @@ class ScenarioRun {
   /// What happened, the table, the verdict, where to look next.
   void PrintEnd(const logging::RunRecord& record, const RunResult& result, bool latest) const;
 
+  const std::string scenario_;  // as it was named
   RunOptions options_;
   Part main_;
   std::optional<Part> reference_;

@@ -170,6 +170,18 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
                     "that is named here",
                     name, name));
   }
+  std::error_code error;
+  if (const fs::path folder = beside / name; fs::is_directory(folder, error)) {
+    std::vector<std::string> texts;
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      if (entry.path().extension() != kEnding) continue;
+      texts.push_back((fs::path(name) / entry.path().filename()).lexically_normal().string());
+    }
+    std::ranges::sort(texts);
+    throw ConfigError(fmt::format("{} is a folder, no {}; {}", name, KindNames(kinds),
+                                  texts.empty() ? "it holds no .pbtxt file"
+                                                : "name one of its files: " + Joined(texts, ", ")));
+  }
   std::vector<std::string> searched;
   std::set<std::string> names, listed;
   for (const std::string& kind : kinds) {

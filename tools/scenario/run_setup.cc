@@ -369,6 +369,14 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   ReadTextProto(loaded.robot_file, &robot);
   const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file);
   if (warnings != nullptr) {
+    for (int i = 0; i < scenario.sim().push_size(); ++i) {
+      const double start = scenario.sim().push(i).start();
+      if (start < scenario.duration() || scenario.duration() == 0) continue;
+      warnings->push_back(
+          fmt::format("sim.push[{}].start: {} s is after the run's end, {} s: it "
+                      "does not push",
+                      i, start, scenario.duration()));
+    }
     for (const std::string& text : WalkWarnings(scenario.step_planner().walk(), model)) {
       warnings->push_back("step_planner." + text);
     }

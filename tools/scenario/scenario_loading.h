@@ -35,6 +35,7 @@ struct RunChanges {
   std::string drives;   ///< "ethercat"; empty: the simulated robot's own
   std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
   std::string capture;  ///< file for all EtherCAT frames; empty: none
+  bool operator==(const RunChanges&) const = default;
 };
 
 /// A scenario read and resolved to files.

@@ -43,7 +43,7 @@ std::string Suggest(std::string_view name, std::vector<std::string> names) {
   const std::vector<std::string> near = Nearest(name, names);
   if (!near.empty()) return fmt::format("did you mean {}?", fmt::join(near, " or "));
   std::sort(names.begin(), names.end());
-  return fmt::format("it has {}", fmt::join(names, ", "));
+  return fmt::format("use one of {}", fmt::join(names, ", "));
 }
 
 }  // namespace poise

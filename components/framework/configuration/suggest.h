@@ -10,7 +10,7 @@ namespace poise {
 /// Up to three of `names` that `name` may have meant, nearest first.
 std::vector<std::string> Nearest(std::string_view name, std::vector<std::string> names);
 
-/// "did you mean x or y?": up to three of `names`, nearest first; "it has ..." with all of them
+/// "did you mean x or y?": up to three of `names`, nearest first; "use one of ..." with all of them
 /// when none is near.
 std::string Suggest(std::string_view name, std::vector<std::string> names);
 
