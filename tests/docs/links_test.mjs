@@ -6,6 +6,7 @@ import {dirname, join, normalize} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {anchorsOf, exists, isFile, linesOf, programFacts, repositoryFiles, root} from './markdown.mjs';
+import {longLines} from './wrap.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}}});
 const files = repositoryFiles();
@@ -136,6 +137,14 @@ for (const page of pages) {
     assert.deepEqual(problems, [], problems.join('\n'));
   });
 }
+
+test('lines of prose have at most 120 characters', () => {
+  const waiting = new Set(text('tests/docs/unwrapped.txt').split('\n').filter((line) => line !== '' && !line.startsWith('#')));
+  const long = (page) => longLines(page).map((number) => `${page}:${number}`);
+  assert.deepEqual(pages.filter((page) => !waiting.has(page)).flatMap(long), [], 'node tests/docs/wrap.mjs PAGE breaks them');
+  assert.deepEqual([...waiting].filter((page) => !pages.includes(page) || long(page).length === 0), [],
+      'tests/docs/unwrapped.txt names pages without long lines: take them out');
+});
 
 test('every page of docs/ is reached from the index', () => {
   const reached = new Set(['README.md']);
