@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "components/framework/configuration/configuration.h"
+#include "fmt/format.h"
 #include "google/protobuf/text_format.h"
 #include "tests/logging/log_test_support.h"
 
@@ -178,6 +179,7 @@ TEST_F(RunRegistryTest, AnotherUsersRunIsNotRootsOwn) {
   const auto theirs = std::ranges::find(runs, dir, &RunningRun::dir);
   close(end[1]);
   waitpid(child, nullptr, 0);
+  fs::remove_all(fmt::format("/tmp/poise-{}", kOther));
   ASSERT_NE(theirs, runs.end());
   EXPECT_FALSE(theirs->own);
   EXPECT_THAT(FormatRun(*theirs), HasSubstr(", of user 65533"));
