@@ -116,7 +116,7 @@ void AddSweepCommand(CLI::App* app, Command* command) {
       "for and those of what stands; with --png all. A sweep's file: tools/sweep/sweep.proto; "
       "docs/sweeps.md.\nExit code: 0 when every run was made, fallen or not; 1 when interrupted or "
       "a run could not be made; 2 wrong usage or configuration.\nExample: poise sweep "
-      "push_double_support --vary 'sim.push[0].peak=100:250:50'");
+      "push_double_support --vary 'sim.push[0].peak=100:250:7'");
   CLI::App* merge = sweep->add_subcommand(
       "merge", "one table from the folders of a sweep's, or a limit's, parts");
   sweep->require_subcommand(0, 1);
