@@ -28,15 +28,6 @@ std::string Defects(const RobotImport& imported) {
   return text;
 }
 
-const Motor& MotorOf(const Robot& robot, const std::string& joint) {
-  for (const Motor& motor : robot.motor()) {
-    for (const std::string& name : motor.joint()) {
-      if (name == joint) return motor;
-    }
-  }
-  throw std::runtime_error("no motor of " + joint);
-}
-
 TEST(Defects, HiddenRotorIsTakenOutOfTheLinkAndGivenToTheMotor) {
   Biped changes;
   changes.shin_rotor = 0.4;
@@ -172,21 +163,6 @@ TEST(Defects, FiveJointsInALegAreRefusedByName) {
     EXPECT_THAT(error.what(), HasSubstr("left_knee_joint"));
     EXPECT_THAT(error.what(), HasSubstr("needs six"));
   }
-}
-
-std::string Refusal(const ImportOptions& options) {
-  try {
-    ImportRobot(options);
-    return "taken";
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-}
-
-std::string RefusalOf(const std::string& text) {
-  ImportOptions options;
-  options.file = WriteMaker("refused", text);
-  return Refusal(options);
 }
 
 TEST(Defects, WhatIsNoRobotsFileIsNamedWithWhatToDo) {

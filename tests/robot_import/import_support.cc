@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <stdexcept>
 
 namespace poise {
 namespace {
@@ -101,6 +103,28 @@ RobotImport ImportText(const std::string& name, const std::string& text) {
   ImportOptions options;
   options.file = WriteMaker(name, text);
   return ImportRobot(options);
+}
+
+std::string Refusal(const ImportOptions& options) {
+  try {
+    ImportRobot(options);
+    return "taken";
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+}
+
+std::string RefusalOf(const std::string& text) {
+  ImportOptions options;
+  options.file = WriteMaker("refused", text);
+  return Refusal(options);
+}
+
+const Motor& MotorOf(const Robot& robot, const std::string& joint) {
+  for (const Motor& motor : robot.motor()) {
+    if (std::ranges::find(motor.joint(), joint) != motor.joint().end()) return motor;
+  }
+  throw std::runtime_error("no motor of " + joint);
 }
 
 fs::path MakersFolder() {

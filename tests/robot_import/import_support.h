@@ -27,6 +27,11 @@ inline constexpr double kShinInertia[3] = {0.03, 0.029, 0.004};  // kg·m², abo
 /// A file of this text in a fresh folder.
 std::filesystem::path WriteMaker(const std::string& name, const std::string& text);
 RobotImport ImportText(const std::string& name, const std::string& text);
+/// What the import says of the file when it refuses it; "taken" when it does not.
+std::string Refusal(const ImportOptions& options);
+std::string RefusalOf(const std::string& text);
+/// Throws std::runtime_error where no motor moves the joint.
+const Motor& MotorOf(const Robot& robot, const std::string& joint);
 
 /// The folder of the makers' files: $POISE_ROBOTS, else ../shared/robots beside the checkout. Empty
 /// when it is not there.

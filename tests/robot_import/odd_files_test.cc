@@ -37,28 +37,6 @@ std::string Told(const RobotImport& imported) {
   return text;
 }
 
-std::string Refusal(const ImportOptions& options) {
-  try {
-    ImportRobot(options);
-    return "taken";
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-}
-
-std::string RefusalOf(const std::string& text) {
-  ImportOptions options;
-  options.file = WriteMaker("odd", text);
-  return Refusal(options);
-}
-
-const Motor& MotorOf(const Robot& robot, const std::string& joint) {
-  for (const Motor& motor : robot.motor()) {
-    if (std::ranges::find(motor.joint(), joint) != motor.joint().end()) return motor;
-  }
-  throw std::runtime_error("no motor of " + joint);
-}
-
 std::string Link(const std::string& name, double mass, const std::string& com = "0 0 0") {
   return fmt::format(
       "<link name='{0}'><inertial><origin xyz='{2}'/><mass value='{1}'/><inertia ixx='{3}' ixy='0' "
