@@ -161,7 +161,8 @@ INSTANTIATE_TEST_SUITE_P(ComponentProcess, Takeover, testing::Bool(), [](const a
 
 TEST(ComponentProcess, OneThatDiesAgainAndAgainHasEnded) {
   logging::TemporaryFolder folder;
-  ComponentProcess process("none", {"/bin/false"}, folder.path("none.log"), true);
+  const RunSource source(Toys(false));
+  ComponentProcess process("none", {"/bin/false"}, folder.path("none.log"), true, source.socket());
   const int64_t deadline = NowNanoseconds() + 30 * kSecond;
   while (process.Alive(NowNanoseconds()) && NowNanoseconds() < deadline) {
   }

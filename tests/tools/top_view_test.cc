@@ -215,7 +215,7 @@ TEST(FrameTest, AUsualTerminalShowsWhatTellsOfAFault) {
   const RunSpec spec = logging::MakeTestSpec();
   LiveSnapshot snapshot;
   snapshot.processes.push_back({"contact_wrench_monitor", true, {}, 500, 0.1});
-  snapshot.channels.push_back({"CONTACT_WRENCH_MONITOR"});
+  snapshot.channels.emplace_back().name = "CONTACT_WRENCH_MONITOR";
   const auto names = logging::ElementNames::OfSpec(spec);
   const std::string shown = FrameAt(TopView(spec, names, "", snapshot, 0), 80, 24, {});
   for (const char* column : {"P99 us", "LATE", "GAPS", "REFUSED", "DROPPED", "MSG/S", "MISSED"}) {

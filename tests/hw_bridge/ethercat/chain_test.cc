@@ -137,7 +137,9 @@ TEST_F(EthercatChain, EepromIsWhole) {
     if (types.back() == 30) {  // General: CoE details, all but upload at startup
       EXPECT_EQ(word(static_cast<uint16_t>(at + 4)) >> 8, 0x2F);
     }
-    if (types.back() == 40) EXPECT_EQ(word(static_cast<uint16_t>(at + 2)), 0x0201);  // FMMUs
+    if (types.back() == 40) {  // FMMUs
+      EXPECT_EQ(word(static_cast<uint16_t>(at + 2)), 0x0201);
+    }
   }
   EXPECT_LT(at, words);
   EXPECT_EQ(types, (std::vector<int>{10, 30, 40, 41}));

@@ -98,13 +98,13 @@ TEST_F(CoeSlave, RefusesValuesOutOfRange) {
 
 // ETG.1000.6, table 64: 0003h INTEGER16, 0004h INTEGER32; CiA 402 has these objects signed.
 TEST_F(CoeSlave, TellsSignedObjectsBySdoInformation) {
-  const auto type = [&](uint16_t index) {
+  const auto type = [&](int index) {
     const Bytes answer = Ask({0x00, 0x80, 0x05, 0, 0, 0, static_cast<uint8_t>(index),
                               static_cast<uint8_t>(index >> 8), 0, 0});
     return answer.size() > 11 ? Get<uint16_t>(answer, 10) : uint16_t{0};
   };
-  for (const uint16_t index : {0x607A, 0x60FF, 0x6064, 0x606C}) EXPECT_EQ(type(index), 4) << index;
-  for (const uint16_t index : {0x605A, 0x6071, 0x6077}) EXPECT_EQ(type(index), 3) << index;
+  for (const int index : {0x607A, 0x60FF, 0x6064, 0x606C}) EXPECT_EQ(type(index), 4) << index;
+  for (const int index : {0x605A, 0x6071, 0x6077}) EXPECT_EQ(type(index), 3) << index;
 }
 
 // A protocol that is not CoE is a mailbox error; the mailbox goes on.

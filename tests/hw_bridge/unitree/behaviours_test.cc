@@ -277,7 +277,7 @@ TEST(UnitreeStop, AnothersDamagedStatesDoNotHideTheRobots) {
   damaged.motor_state[0].q = 3;
   damaged.crc ^= 1;
   rig.robot.others.assign(5, damaged);
-  const int before = rig.status().working_counter_errors;
+  const int64_t before = rig.status().working_counter_errors;
   for (int i = 0; i < 50; ++i) {
     rig.state_of(0).q += 1e-4F;
     rig.Step();
