@@ -5,6 +5,7 @@
 #include "fmt/format.h"
 #include "logging/metrics/contact_history.h"
 #include "logging/metrics/metric_groups.h"
+#include "logging/metrics/schedule_plan.h"
 
 namespace poise::logging {
 namespace {
@@ -170,7 +171,7 @@ void AddTouchDowns(MetricList* list) {
                    }});
   const auto count = [&](const char* name, const char* text, Timing timing) {
     list->push_back({name, "", text, [timing](const RunRecord& run) -> Answer {
-                       if (run.plan.empty()) return {};
+                       if (run.plan.empty() || !ReadSchedulePlan(run)) return {};
                        int found = 0;
                        for (const TouchDown& touch : TouchDowns(run)) {
                          if (touch.tick < run.first_tick) continue;

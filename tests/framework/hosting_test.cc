@@ -131,8 +131,11 @@ struct Prepared {
     FillPlan(BoundGraph(spec, registry).plan(), spec.mutable_graph());
   }
   std::string Error(const std::string& process) const {
+    const RunSource source(spec);
+    ProcessRunnerOptions options;
+    options.socket = &source.socket();
     try {
-      ProcessRunner(spec, process, registry, {});
+      ProcessRunner(spec, process, registry, options);
     } catch (const ConfigError& error) {
       return error.what();
     }

@@ -74,8 +74,8 @@ TEST_F(SweepTest, ARowIsWhatTheRunByItselfGives) {
       "--set",    "sim.push[0].direction_y=" + nlohmann::json(std::sin(angle)).dump()};
   for (const auto& [name, value] : row) {
     const bool metric =
-        !std::set<std::string>{"run",      "direction", "force",   "outcome", "fell_at",
-                               "ended_at", "phase",     "trouble", "reason"}
+        !std::set<std::string>{"run",   "direction", "force",     "outcome", "fell_at", "ended_at",
+                               "phase", "trouble",   "component", "stage",   "reason"}
              .contains(name);
     if (!metric) continue;
     arguments.insert(arguments.end(),

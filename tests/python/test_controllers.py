@@ -74,8 +74,8 @@ def tearDownModule():
 
 
 def holder(impedance, **more):
-    scope = {}
-    exec(compile(PROGRAM.format(python="", impedance=impedance), "holder", "exec"), {"__name__": "holder"}, scope)
+    scope = {"__name__": "holder"}
+    exec(compile(PROGRAM.format(python="", impedance=impedance), "holder", "exec"), scope)
     return type("Told", (scope["Holder"],), more)()
 
 
@@ -136,7 +136,7 @@ class Judged(unittest.TestCase):
         while not env.ended and env["GROUND_TRUTH"].com_position[2] > 0.3:
             env.step(5)
         self.assertFalse(env.ended)
-        self.assertRegex(env.detail, r"^hw_bridge: \w.* \(\w")
+        self.assertRegex(env.detail, r"^hw_bridge has stopped the robot: \w")
         run = env.finish()
         self.assertGreater(run.metric("fallen"), 0)
         shown = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "report", os.path.join(FOLDER, "pushed_over"),

@@ -105,7 +105,7 @@ TEST(TaskStatus, HangsWhereAStageDoesNotReturn) {
   EXPECT_GT(Looks(status, 3, &watch, &now), 0);
   // However slow a busy machine makes it, it goes on.
   int64_t tick = 0;
-  EXPECT_EQ(Looks(status, 1000, &watch, &now, [&] { status.position()->tick.store(++tick / 100); }),
+  EXPECT_EQ(Looks(status, 1000, &watch, &now, [&] { status.position()->tick.store(1 + ++tick / 100); }),
             0);
 }
 

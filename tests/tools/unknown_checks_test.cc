@@ -58,8 +58,8 @@ TEST_F(UnknownChecksTest, TheyPassNothingAndFailNothing) {
   EXPECT_TRUE(ChecksPass(checks));
   EXPECT_EQ(FormatVerdict(checks, ""), "passed: 3 of 3 checks hold, 1 not known");
   EXPECT_THAT(Lines(), HasSubstr("checks hold, 1 not known, 1 of them above"));
-  EXPECT_THAT(Lines(), HasSubstr("not known: the com_error_end (com_error_end), which needs "
-                                 "SUPPORT_PLAN.com_reference"));
+  EXPECT_THAT(Lines(), HasSubstr("not known: the com_error_end (com_error_end), which needs\n"
+                                 "    SUPPORT_PLAN.com_reference"));
   const CheckResult& error = checks.back();
   EXPECT_EQ(FormatMeasured(error), "not known");
   EXPECT_EQ(VerdictCell(error).text, "not known");
@@ -147,9 +147,9 @@ TEST_F(UnknownChecksTest, AWalkIsNoStandWhateverTheCommandSays) {
 
 TEST_F(UnknownChecksTest, ARobotThatLiesOrHangsWithoutMotorsDoesNotStand) {
   Stand();
-  for (size_t t = 50; t < kTicks; ++t) {
-    bridge_[t].state = bridge_status_t::STATE_STOPPED;
-    bridge_[t].reason = bridge_status_t::REASON_OPERATOR;
+  for (size_t t = 0; t < kTicks; ++t) {
+    bridge_[t].state = t < 50 ? bridge_status_t::STATE_RUNNING : bridge_status_t::STATE_STOPPED;
+    bridge_[t].reason = t < 50 ? bridge_status_t::REASON_NONE : bridge_status_t::REASON_OPERATOR;
   }
   EXPECT_THAT(Tell(), HasSubstr("did not fall to the end"));
   EXPECT_THAT(Tell(), HasSubstr("stopped: operator"));

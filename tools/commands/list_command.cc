@@ -275,12 +275,13 @@ int List(const ListRequest& request) {
   if (wanted("robots")) {
     ListFiles("robots", [](const std::string& file) {
       const Robot robot = ReadMessage<Robot>(file);
-      const std::string maker = robot::MakerFile(robot, file);
+      const std::string name = robot.has_mjcf() ? robot.mjcf() : robot.urdf();
       std::error_code error;
-      return fmt::format("{}{}", robot.has_mjcf() ? "MJCF " + robot.mjcf() : "URDF " + robot.urdf(),
-                         std::filesystem::exists(maker, error)
-                             ? ""
-                             : fmt::format(", which is not here: {} says where it is from", file));
+      return fmt::format(
+          "{} {}{}", robot.has_mjcf() ? "MJCF" : "URDF", name,
+          std::filesystem::exists(std::filesystem::path(file).parent_path() / name, error)
+              ? ""
+              : fmt::format(", which is not here: {} says where it is from", file));
     });
   }
   if (wanted("graphs")) {

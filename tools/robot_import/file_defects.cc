@@ -84,10 +84,6 @@ class Repairer {
       Lock(joint, 0, "", "");
     }
     const std::set<std::string> fingers = Fingers();
-    std::map<std::string, int> followers;
-    for (const SourceJoint& joint : source_.joints) {
-      if (joint.mimic) ++followers[joint.mimic->joint];
-    }
     for (SourceJoint& joint : source_.joints) {
       if (joint.kind == JointKind::kFixed || joint.locked) continue;
       if (joint.kind == JointKind::kFloating || joint.kind == JointKind::kOther) {
@@ -104,8 +100,7 @@ class Repairer {
       } else if (joint.kind == JointKind::kPrismatic) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' is prismatic", joint.name),
              "locked");
-      } else if (followers.contains(joint.name) || IsFinger(joint.name) ||
-                 fingers.contains(joint.name)) {
+      } else if (IsFinger(joint.name) || fingers.contains(joint.name)) {
         Lock(&joint, RestOf(joint.name), fmt::format("joint '{}' moves a finger", joint.name),
              "locked: it takes no part in balance");
       } else if (maker_.is_mjcf && !maker_.actuated.empty() &&
@@ -394,13 +389,18 @@ class Repairer {
   }
 
   /// Joints of hands, whatever they are called: of light chains that part at one body beyond the
-  /// root. Eyes are such as well.
+  /// root, and those of less than a limb that others mimic. Eyes are such as well.
   std::set<std::string> Fingers() {
     const std::vector<MovingBody> bodies = MovingBodies();
     const double most = kFingerShare * Mass();
-    std::set<std::string> fingers;
+    std::set<std::string> fingers, mimicked;
+    for (const SourceJoint& joint : source_.joints) {
+      if (joint.mimic) mimicked.insert(joint.mimic->joint);
+    }
     std::vector<bool> within(bodies.size(), false);
     for (size_t b = 1; b < bodies.size(); ++b) {
+      const std::string& name = bodies[b].joint->name;
+      if (mimicked.contains(name) && bodies[b].beyond < kLimbShare * Mass()) fingers.insert(name);
       const std::vector<size_t>& limbs = bodies[b].limbs;
       const bool hand = limbs.size() > 1 && std::ranges::all_of(limbs, [&](size_t limb) {
                           return bodies[limb].beyond < most;

@@ -277,7 +277,7 @@ TEST(EthercatWiring, WritesValuesAtTheStart) {
   };
   value(bench.master_config.mutable_profile()->add_sdo(), 0x60C2, 1, SdoValue::U8, 4);
   value(bench.master_config.add_sdo(), 0x605A, 0, SdoValue::I16, 6);
-  value(bench.master_config.mutable_drive(1)->add_sdo(), 0x605A, 0, SdoValue::I16, -1);
+  value(bench.master_config.mutable_drive(1)->add_sdo(), 0x607A, 0, SdoValue::I32, -1);
   SdoValue& note = *bench.master_config.mutable_drive(1)->add_sdo();
   note.set_index(0x2F00);
   note.set_type(SdoValue::TEXT);
@@ -288,7 +288,7 @@ TEST(EthercatWiring, WritesValuesAtTheStart) {
   };
   EXPECT_EQ(read(0, 0x60C2, 1), 4U);
   EXPECT_EQ(read(0, 0x605A, 0), 6U);
-  EXPECT_EQ(read(1, 0x605A, 0), 0xFFFFU);
+  EXPECT_EQ(read(1, 0x607A, 0), 0xFFFFFFFFU);
   EXPECT_EQ(bench.chain->slave(1).objects().Find({0x2F00, 0})->text.size(), 200U);
 
   Bench bad(1);
