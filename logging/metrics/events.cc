@@ -333,7 +333,7 @@ void AddBalancing(const RunRecord& run, EventList* events) {
                        [&](int64_t tick) { return NotAchievedText(*run.balance.at(tick)); });
   const auto infeasible = [&](int64_t tick) -> std::optional<bool> {
     const joint_command_t* command = run.command.at(tick);
-    if (command == nullptr) return {};
+    if (command == nullptr || !TellsRatio(*command)) return {};
     return command->eta_feasible == 0;
   };
   events->AddIntervals(Intervals(run, infeasible), "eta_infeasible_begins", "eta_infeasible_ends",

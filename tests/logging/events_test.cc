@@ -331,6 +331,7 @@ TEST_F(EventsTest, BalancingOfEachAxis) {
     balance_[t].resultant_task.force[2] = -400;
   }
   command_[26].eta_feasible = 0;
+  command_[26].eta_max = 1;
   EXPECT_THAT(Events(Read()),
               ElementsAre(Is(0, "phase_began"),
                           Is(0.04, "balancing_on", "y: CoP of the task torque -85.0 mm, limit 70"),

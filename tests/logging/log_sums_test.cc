@@ -50,11 +50,10 @@ TEST_F(LogSumsTest, ALogIsAsItWasWrittenUntilAByteIsNot) {
 TEST_F(LogSumsTest, ALogCutShortOrLongerIsTold) {
   WriteLog(true);
   const auto size = std::filesystem::file_size(path_);
-  // Its last block is another one, too.
-  for (const auto other : {size - 100, size + 100}) {
-    std::filesystem::resize_file(path_, other);
-    EXPECT_THAT(*CheckSums(path_), ElementsAre(HasSubstr("were written"), HasSubstr("not those")));
-  }
+  std::filesystem::resize_file(path_, size - 100);
+  EXPECT_THAT(*CheckSums(path_), ElementsAre(HasSubstr("were written")));
+  std::filesystem::resize_file(path_, size + 100);  // zeros, in the last block too
+  EXPECT_THAT(*CheckSums(path_), ElementsAre(HasSubstr("were written"), HasSubstr("not those")));
 }
 
 TEST_F(LogSumsTest, SaysWhenNothingTells) {

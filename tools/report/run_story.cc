@@ -294,8 +294,9 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
                                Seconds(reached), Seconds(planned)));
   }
   if (fall != events.end()) {
-    first += fmt::format("{} fell at {} of {}{}", and_, Seconds(fall->time),
-                         FormatNumber(planned, "s"), HowItFell(run));
+    const bool ends = run.spec.num_ticks() > 0;
+    first += fmt::format("{} fell at {}{}{}", and_, Seconds(fall->time),
+                         ends ? " of " + FormatNumber(planned, "s") : "", HowItFell(run));
     const std::string steps = TellSteps(run);
     return fmt::format("{}. {}{}{}", Capital(first), steps, steps.empty() ? "" : " ",
                        TellFall(run, fall->time, events));

@@ -277,7 +277,7 @@ TEST(EthercatWiring, WritesValuesAtTheStart) {
   };
   value(bench.master_config.mutable_profile()->add_sdo(), 0x60C2, 1, SdoValue::U8, 4);
   value(bench.master_config.add_sdo(), 0x605A, 0, SdoValue::I16, 6);
-  value(bench.master_config.mutable_drive(1)->add_sdo(), 0x607A, 0, SdoValue::I32, -1);
+  value(bench.master_config.mutable_drive(1)->add_sdo(), 0x605A, 0, SdoValue::I16, 5);
   SdoValue& note = *bench.master_config.mutable_drive(1)->add_sdo();
   note.set_index(0x2F00);
   note.set_type(SdoValue::TEXT);
@@ -288,13 +288,18 @@ TEST(EthercatWiring, WritesValuesAtTheStart) {
   };
   EXPECT_EQ(read(0, 0x60C2, 1), 4U);
   EXPECT_EQ(read(0, 0x605A, 0), 6U);
-  EXPECT_EQ(read(1, 0x607A, 0), 0xFFFFFFFFU);
+  EXPECT_EQ(read(1, 0x605A, 0), 5U);
   EXPECT_EQ(bench.chain->slave(1).objects().Find({0x2F00, 0})->text.size(), 200U);
 
   Bench bad(1);
   value(bad.master_config.add_sdo(), 0x605A, 0, SdoValue::U8, 256);
   bad.Build();
   EXPECT_THAT(ErrorOf([&] { bad.master->Start(); }), HasSubstr("between 0 and 255"));
+  // The drive has no such option; that a negative number is sent as it should be is in the answer.
+  Bench negative(1);
+  value(negative.master_config.add_sdo(), 0x605A, 0, SdoValue::I16, -1);
+  negative.Build();
+  EXPECT_THAT(ErrorOf([&] { negative.master->Start(); }), HasSubstr("0x06090030"));
   Bench missing(1);
   value(missing.master_config.add_sdo(), 0x2001, 3, SdoValue::U32, 1);
   missing.Build();
