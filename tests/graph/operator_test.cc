@@ -102,7 +102,6 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
   }
   const ProgramResult after = Poise({"set", "--list"});
   EXPECT_THAT(after.output, HasSubstr("150"));
-  Stop();
   // Wrong before anything is sent.
   for (const auto& [arguments, why] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"set", "task_controller.orientation.kp=1e9"}, "is outside"},
@@ -119,6 +118,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
     EXPECT_EQ(wrong.exit_code, 2) << wrong.output;
     EXPECT_THAT(wrong.output, HasSubstr(why));
   }
+  Stop();
 
   const ProgramResult replay = RunPoise({"replay", run_});
   EXPECT_EQ(replay.exit_code, 0) << replay.output;
