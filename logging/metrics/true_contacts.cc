@@ -102,10 +102,17 @@ std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run) {
 std::vector<TrueStep> TrueSteps(const RunRecord& run) {
   std::vector<TrueStep> steps;
   const auto off = OffTheGround(run);
+  const auto carries = [&](size_t foot, int64_t tick) {
+    return std::ranges::none_of(off[foot], [&](const Interval& i) {
+      return i.begin <= tick && tick < i.end.value_or(run.num_ticks);
+    });
+  };
   for (size_t foot = 0; foot < 2; ++foot) {
     for (const Interval& interval : off[foot]) {
-      // What hung from a crane, or was off the ground from the start, was not lifted.
-      if (!interval.end || interval.begin <= run.spec.lead_ticks()) continue;
+      // A robot that hung from a crane with both feet was put down. On one foot it steps.
+      const bool hung = interval.begin <= run.spec.lead_ticks() &&
+                        !carries(1 - foot, std::max(interval.begin, run.spec.lead_ticks()));
+      if (!interval.end || hung) continue;
       steps.push_back({foot, interval.begin, *interval.end});
     }
   }

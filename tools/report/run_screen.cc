@@ -191,7 +191,7 @@ std::string FormatVerdictLines(const Scenario& scenario, const std::vector<Check
   const std::string above = below_full_table ? "" : Above(scenario, checks);
   std::string text;
   if (problem.empty() && count.failed.empty()) {
-    text = Toned(FormatVerdict(checks, problem) + above, Tone::kGood) + "\n";
+    text = Toned(Wrapped(FormatVerdict(checks, problem) + above, width, 2), Tone::kGood) + "\n";
   } else {
     if (!problem.empty()) {
       text += Toned(Wrapped(fmt::format("FAILED: {}", problem), width, 2), Tone::kBad) + "\n";
