@@ -161,7 +161,7 @@ class SlaveAccess {
   int64_t emergencies() const { return emergencies_; }
 
  private:
-  /// Of the EEPROM: its first word behind the header, and how many there are.
+  /// The first word of the EEPROM behind the header, and the number of words.
   struct Category {
     uint16_t word;
     uint32_t words;

@@ -181,7 +181,7 @@ bool ObservesFeet(const RunRecord& run) {
   return false;
 }
 
-/// Of "CHANNEL.field, field": whether the run has it.
+/// Whether the run has what "CHANNEL.field, field" names.
 bool Has(const RunRecord& run, std::string_view what) {
   if (what == "the phases of step_planner") return ReadSchedulePlan(run).has_value();
   const size_t dot = std::min(what.find('.'), what.size());

@@ -141,7 +141,7 @@ TEST(Mjcf, AMeshTakesItsClassesScale) {
   EXPECT_EQ(scale("<mesh scale=\"2 3 4\"/>", "<mesh scale=\"5 6 7\"/>"), Eigen::Vector3d(5, 6, 7));
 }
 
-/// Of a link in the root, all joints at zero.
+/// The pose of a link in the root, with all joints at zero.
 Eigen::Isometry3d PlaceOf(MjcfDocument* d, const std::string& link) {
   Eigen::Isometry3d place = Eigen::Isometry3d::Identity();
   std::string at = link;

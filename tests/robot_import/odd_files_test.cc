@@ -148,7 +148,7 @@ TEST(OddFiles, SolesOfTwoKindsBecomeMirrorImagesOfTheBetterFounded) {
     EXPECT_NEAR(foot.sole().y(), foot.name() == "left" ? 0.01 : -0.01, 1e-9);
     EXPECT_NEAR(foot.sole().z(), -0.08, 1e-9);
   }
-  // Of one kind nobody can say which is right.
+  // Where both are of one kind, nobody can say which is right.
   std::string uneven = SimpleBiped();
   uneven.replace(uneven.rfind("0.24 0.1 0.02"), 13, "0.20 0.1 0.02");
   EXPECT_THAT(Told(ImportText("uneven", uneven)), HasSubstr("-> kept; --sole LENGTH WIDTH"));

@@ -94,7 +94,7 @@ class BusReceiver {
   };
   /// The next LCM message that has arrived, if any; does not block. Valid until the next call.
   bool Receive(Packet* packet);
-  /// Likewise the next datagram, LCM message or not, with its source. False when none waits.
+  /// Takes the next datagram, LCM message or not, with its source. False when none waits.
   bool ReceiveAny(std::span<const uint8_t>* datagram, PacketSource* source);
   /// Datagrams that were no LCM message.
   int64_t malformed() const { return malformed_; }
