@@ -1,6 +1,6 @@
 # The instruction set that all code is compiled for. It decides the last bits of every result, so it is a named choice
 # and not this machine's own: x86-64-v3 (AVX2, FMA; processors since about 2013) gives the recorded bits everywhere.
-# Of that set only the vector instructions touch a floating-point number. The integer ones (lzcnt, bmi, movbe) are left
+# Only the vector instructions of that set touch a floating-point number. The integer ones (lzcnt, bmi, movbe) are left
 # out: virtual machines hide one or the other, and no bit of a result depends on them.
 # Sets POISE_MARCH (flag, may be empty) and POISE_BITS (what bits a build gives, for `poise --version` and logs).
 set(POISE_INSTRUCTION_SET "" CACHE STRING

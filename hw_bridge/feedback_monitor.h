@@ -53,7 +53,7 @@ class FeedbackMonitor {
 
   bool updated() const { return updated_; }  ///< in this cycle
   bool known() const { return known_; }      ///< counts have been read at least once
-  /// Of the last usable feedback.
+  /// The last usable feedback had these counts.
   const std::vector<int64_t>& counts() const { return counts_; }
   /// rad/s, filtered, from the encoder counts.
   const std::vector<double>& velocity() const { return velocity_; }

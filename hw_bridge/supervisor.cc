@@ -30,7 +30,7 @@ int8_t ReasonOf(Refusal refusal) {
   return Status::REASON_NONE;
 }
 
-/// Of a bus that gives no reports.
+/// Returns the state of a drive whose bus gives no reports.
 int8_t DriveStateOf(int32_t drive_status) {
   switch (drive_status) {
     case drive_feedback_t::DRIVE_DISABLED:

@@ -80,7 +80,7 @@ CutResult CutLog(const std::string& from, const CutRange& range, const std::stri
   CutResult result{0, spec.cut().first_tick(), spec.cut().last_tick(), 0};
   const int64_t first_utime = MakeTick(result.first_tick, spec.tick_period()).utime;
   const int64_t last_utime = MakeTick(result.last_tick, spec.tick_period()).utime;
-  // Of what came before the first tick of all or after the last nothing is cut off.
+  // Nothing is cut off of what came before the first tick of all or after the last.
   const bool from_start = range.first_tick <= survey.first_tick;
   const bool to_end = range.last_tick >= survey.end_tick - 1;
   const auto in_time = [&](int64_t utime) {

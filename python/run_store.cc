@@ -120,7 +120,7 @@ void RunStore::Index() {
         PacketVerdict::kAccepted) {
       continue;
     }
-    // Of the reader's bytes, which are those of this object's mapping.
+    // The offset is one of the reader's bytes, which are those of this object's mapping.
     const auto offset = static_cast<uint64_t>(event.data.data() - reader.bytes());
     if (offset + lane.channel->layout.size() > size_) continue;
     lane.channel->ticks.push_back(

@@ -86,7 +86,7 @@ class Drivetrain {
   double friction_torque_ = 0, stop_torque_ = 0;
 
   double rotor_position_ = 0, rotor_velocity_ = 0, gear_torque_ = 0;
-  // Of the step under way: the rotor obeys rotor_gain w' = rotor_drive - gear torque, the gear
+  // In the step under way the rotor obeys rotor_gain w' = rotor_drive - gear torque, and the gear
   // torque is mesh_torque + mesh_gain (w' - qd').
   double rotor_gain_ = 0, rotor_drive_ = 0, mesh_torque_ = 0, mesh_gain_ = 0;
   int flank_ = 0;  // that touches: 1, the rotor ahead; -1, behind; 0, none

@@ -33,7 +33,8 @@ struct SimSetup {
 /// Reads the configuration of an engine's process. Throws ConfigError.
 using SimReader = std::function<SimSetup(const ComponentContext&)>;
 
-/// Of the process of `engine`, which takes the scenario's `sim` and the field of the engine's name.
+/// Describes the process of `engine`: it takes the scenario's `sim` and the field of the engine's
+/// name.
 ComponentTraits SimTraits(const std::string& engine);
 /// Whatever the engine.
 std::vector<PortType> SimPorts();

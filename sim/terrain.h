@@ -29,7 +29,7 @@ class Terrain {
   /// The higher of ground and block at (x, y) at time `time` (s); in a field its block, be it
   /// below the ground.
   Surface At(double x, double y, double time) const;
-  /// Of the contact of one of a sole's `corners` with the ground or a single block.
+  /// What the contact of one of a sole's `corners` with the ground or a single block is like.
   ContactMaterial material(bool block, size_t corners) const;
   ContactMaterial material(const Surface& surface, size_t corners) const;
 
@@ -46,7 +46,7 @@ class Terrain {
 
  private:
   void ReadField(const BlockField& field, uint64_t seed);
-  /// Of the field's blocks the one at (x, y); −1: none.
+  /// Returns the index of the field's block at (x, y); −1: none.
   int FieldBlock(double x, double y) const;
 
   struct Wave {

@@ -60,7 +60,7 @@ class MujocoWorld : public World {
   Eigen::Vector3d contact_force(int index) const override;
   Eigen::Vector3d contact_moment(int index) const override;
 
-  /// Of the last step: Newton iterations, and solutions that Coulomb's law took.
+  /// The last step took that many Newton iterations, and Coulomb's law that many solutions.
   int solver_iterations() const { return iterations_; }
   int solutions() const { return solutions_; }
   /// Steps since construction in which that many were not enough: the last one was taken.

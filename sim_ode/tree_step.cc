@@ -203,7 +203,7 @@ void TreeStep::FindResponses(std::span<const Contact> contacts) {
   }
 }
 
-// Of the velocity of a by an impulse on b.
+// Returns how the velocity of a responds to an impulse on b.
 TreeStep::Matrix6d TreeStep::CrossResponse(size_t a, size_t b) const {
   Matrix6d to_a = Matrix6d::Identity(), to_b = Matrix6d::Identity();
   while (a != b) {  // parents have the lower index

@@ -24,7 +24,7 @@ LinearMoment OwnMoments(const Vector6d& resultant, const Eigen::Vector3d& right,
   return {-(right - left).cross(force), resultant.tail<3>() - left.cross(force)};
 }
 
-/// Of both feet: the edges of their soles, and M_z both ways.
+/// Both feet bound the ratio: by the edges of their soles, and by M_z both ways.
 class Bounds {
  public:
   void AddBelow(double a, double b, double c, const char* name) {

@@ -36,8 +36,8 @@ struct ComponentTraits {
   /// field the message is the configuration; of several, the configuration is a message with fields
   /// of the same names.
   std::vector<std::string> sections = {};
-  /// Of a simulated robot: its physics engine, as the scenario's `engine` calls it. Types with an
-  /// engine take each other's place in a graph.
+  /// A simulated robot's physics engine, as the scenario's `engine` calls it. Types with an engine
+  /// take each other's place in a graph.
   std::string engine = {};
   std::vector<RemovablePart> parts = {};
   /// Settings without what is imperfect about the robot: --ideal.
@@ -47,8 +47,8 @@ struct ComponentTraits {
   /// Settings of a run in lockstep beside one in real time, which take back what the latter was
   /// given.
   std::vector<std::string> lockstep = {};
-  /// Of an estimator, which reads robot_sensors_t and writes robot_state_t and estimator_status_t:
-  /// the settings that choose its methods, as estimator_status_t counts them.
+  /// An estimator reads robot_sensors_t and writes robot_state_t and estimator_status_t: these
+  /// settings choose its methods, as estimator_status_t counts them.
   std::vector<std::string> methods = {};
   std::vector<DriveLink> drive_links = {};
 };

@@ -33,7 +33,7 @@ class StateArchive {
   requires std::is_trivially_copyable_v<T> &&(!std::is_pointer_v<T>)void Show(T& value) {
     Bytes(&value, sizeof value);
   }
-  /// Of the same length when restored.
+  /// `values` has the same length when it is restored.
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void Show(std::vector<T>& values) {
@@ -59,7 +59,7 @@ class StateArchive {
   void Show(Eigen::Quaternion<Scalar, Options>& value) {
     Show(value.coeffs());
   }
-  /// Of the same length when restored.
+  /// `values` has the same length when it is restored.
   template <class T>
   requires(!std::is_trivially_copyable_v<T>) void Show(std::vector<T>& values) {
     if (!SameSize(values.size())) return;

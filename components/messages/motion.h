@@ -19,7 +19,7 @@ struct PointMotion {
   void Archive(StateArchive* archive) { archive->Show(position, velocity, acceleration); }
 };
 
-/// Of a frame, world axes.
+/// How a frame turns, world axes.
 struct RotationMotion {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< frame to world
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s

@@ -30,7 +30,7 @@ WrenchFeedback WithRobotLimits(WrenchFeedback config, const robot::RobotModel& m
 class InternalFeedback {
  public:
   InternalFeedback() = default;
-  /// Of a configuration with limits. Throws ConfigError "feedback.integral" ...: negative or not
+  /// Takes a configuration with limits. Throws ConfigError "feedback.integral" ...: negative or not
   /// finite.
   explicit InternalFeedback(const WrenchFeedback& config);
 

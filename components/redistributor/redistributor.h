@@ -83,14 +83,15 @@ class Redistributor : public Component, public Operated {
   SwingFriction swing_friction_;
   double feedback_pause_ = 0;  // s
   double feedback_edge_ = 0;   // m
-  // Of the last distribution, which a reading answers to; index −1: none.
+  // A reading answers to the last distribution, which these are of; index −1: none.
   int64_t last_index_ = -1;
   double last_time_ = 0;  // s
   double last_eta_ = 0;
   // s, when readings tell of the distribution again.
   double learn_from_ = -std::numeric_limits<double>::infinity();
   balance::SoleLimits double_support_, single_support_;
-  // Of double_support_'s edges, sole frames; empty for rectangles, which both feet have alike.
+  // double_support_'s edges make these, sole frames; empty for rectangles, which both feet have
+  // alike.
   std::array<balance::ConvexPolygon, 2> sole_;
   robot::RobotState state_;
   bool state_valid_ = false;

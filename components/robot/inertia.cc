@@ -7,7 +7,7 @@
 namespace poise::robot {
 namespace {
 
-// Of the largest principal moment: what three printed digits can be off.
+// Three printed digits can be off by this share of the largest principal moment.
 constexpr double kRoundingTolerance = 1e-3;
 constexpr double kDefiniteTolerance = 1e-9;
 // Beyond them a unit is mistaken, and products stop being finite.

@@ -9,7 +9,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of one joint in the linear (0..2) and angular (3..5) rows of a column-major 6×n matrix.
+// Sets one joint's linear (0..2) and angular (3..5) rows of a column-major 6×n matrix.
 inline void SetColumn(double* column, const Vector3d& linear, const Vector3d& angular) {
   column[0] = linear.x();
   column[1] = linear.y();

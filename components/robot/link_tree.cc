@@ -22,7 +22,7 @@ const char* TypeName(JointKind kind) {
   }
 }
 
-// Of the child link in the parent link.
+// Returns the child link's pose in the parent link.
 Eigen::Isometry3d JointPose(const SourceJoint& joint) {
   Eigen::Isometry3d pose = joint.origin;
   if (!joint.locked || joint.kind == JointKind::kFixed) return pose;

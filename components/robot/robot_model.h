@@ -162,7 +162,7 @@ struct RobotParts {
 /// components/robot_files makes it of a URDF and a Robot file.
 class RobotModel {
  public:
-  /// Of nothing, to be assigned to.
+  /// Makes a model of nothing, to be assigned to.
   RobotModel() = default;
   explicit RobotModel(RobotParts parts);
 

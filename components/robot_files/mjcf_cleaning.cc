@@ -94,7 +94,7 @@ class Cleaner {
                           : fmt::format(" {}='c{}'", name, known->second);
   }
 
-  // Of several <compiler> the last one's attributes hold.
+  // The last one's attributes hold where there are several <compiler>.
   void Merge(const std::string& attributes) {
     for (size_t at = 0; at < attributes.size();) {
       const size_t value = attributes.find('\'', at) + 1;
@@ -522,7 +522,7 @@ class Cleaner {
              Attribute(*e, "name"));
         continue;
       }
-      // Of whatever kind: gear and ranges are the same attributes of all.
+      // Every kind becomes a motor: gear and ranges are the same attributes of all.
       *xml += fmt::format("<motor name='a{}' joint='j{}'{}{}/>", result_.actuators.size(), joint,
                           ClassAttribute(*e, "class"), KeptAttributes(*e, "actuator"));
       result_.actuators.push_back({joint, kind == "motor"});

@@ -32,7 +32,7 @@ struct MjcfDocument {
   std::set<std::string> actuated;     ///< joints that an actuator moves
   std::set<std::string> from_shapes;  ///< links whose mass is that of their shapes
   std::string mesh_folder;            ///< as the file names it
-  /// Of the robot's root body in the world.
+  /// How the robot's root body stands in the world.
   Eigen::Quaterniond root_orientation = Eigen::Quaterniond::Identity();
 };
 

@@ -172,7 +172,7 @@ FootModel LoadFoot(const Foot& foot, const LinkTree& tree, const std::string& fi
   return result;
 }
 
-// Of the sole, in the base frame, all joints at zero.
+// Returns the sole's y in the base frame, all joints at zero.
 double LateralPlace(const FootModel& foot, const LinkTree& tree) {
   Eigen::Vector3d point = foot.sole.translation();
   for (int b = foot.body; b > 0; b = tree.bodies[static_cast<size_t>(b)].parent) {

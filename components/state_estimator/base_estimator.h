@@ -106,13 +106,13 @@ class BaseEstimator {
   double averaged_ = 0;  // s, of the accelerometer's readings
   Eigen::Quaterniond imu_orientation_ = Eigen::Quaterniond::Identity();  // IMU to world
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero();  // rad/s, without bias, IMU frame
-  // Of this step, in the base frame: IMU to base; rate of the base, rad/s; velocity of the IMU
+  // This step has in the base frame: IMU to base; rate of the base, rad/s; velocity of the IMU
   // relative to the base's origin, m/s; specific force, m/s².
   Eigen::Matrix3d imu_rotation_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d angular_velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d imu_velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
-  // Of the step before, in world axes.
+  // The step before had these, in world axes.
   Eigen::Vector3d last_imu_velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d last_acceleration_ = Eigen::Vector3d::Zero();
   std::array<Foot, 2> feet_;

@@ -18,7 +18,7 @@ struct FootWrenchSettings {
   int check_every = 4;  ///< ticks between observations while all sensors are good
 };
 
-/// Of one foot.
+/// What one foot's sensor says.
 struct FootReading {
   FootSensorCheck::State state = FootSensorCheck::State::kOk;  ///< as it says itself
   robot::Vector6d wrench = robot::Vector6d::Zero();            ///< robot on environment, sole frame
@@ -36,7 +36,7 @@ class FootWrenches {
   /// Robot on environment, sole frame, and its standard deviations.
   const robot::Vector6d& wrench(size_t foot) const { return wrench_[foot]; }
   const robot::Vector6d& deviation(size_t foot) const { return deviation_[foot]; }
-  /// Of the foot's sensor; else as observed.
+  /// Whether the foot's wrench is its sensor's; else it is observed.
   bool measured(size_t foot) const { return check_[foot].good(); }
   const FootSensorCheck& check(size_t foot) const { return check_[foot]; }
   const WrenchObserver& observer() const { return observer_; }

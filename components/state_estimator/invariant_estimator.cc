@@ -228,8 +228,8 @@ void InvariantEstimator::DefineWorld(const FootWeights& weights) {
     }
     return;
   }
-  // Of right and left sole, weighted: where they are, d̂ − d = ξ_d + ξ_R × d, of a sole that is not
-  // held as the joints show it; and how they are turned.
+  // Right and left sole, weighted, tell where they are, d̂ − d = ξ_d + ξ_R × d, a sole that is not
+  // held as the joints show it, and how they are turned.
   const auto moved = [&](int axis, double right, double left, double deviation) {
     Row h = Row::Zero();
     double variance = Square(deviation);
@@ -513,7 +513,7 @@ void InvariantEstimator::Publish() {
     base_covariance_.noalias() += step * step.transpose() / 3;
     base_covariance_.block<3, 3>(3, 3) += d * d * force_variance * Matrix3d::Identity();
   }
-  // Of what instant the readings are.
+  // The instant of the readings is uncertain.
   Eigen::Matrix<double, 9, 1> motion;
   motion << rate, acceleration, velocity;
   base_covariance_.noalias() += Square(config_.timing) * motion * motion.transpose();

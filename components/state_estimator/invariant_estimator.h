@@ -42,7 +42,7 @@ enum class FootContact : int8_t { kNone, kFirm, kSlipping };
 
 class InvariantEstimator {
  public:
-  /// Of (estimate − truth) of base orientation, linear velocity, position, world axes.
+  /// Rows are (estimate − truth) of base orientation, linear velocity, position, world axes.
   using BaseCovariance = Eigen::Matrix<double, 9, 9>;
 
   /// `period` s, nominal, > 0: steps are taken to last from a tenth of it to 1 s.

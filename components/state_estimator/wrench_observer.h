@@ -43,7 +43,7 @@ struct ObserverCorrection {
 
 class WrenchObserver {
  public:
-  /// Of both feet, [force; moment] each, right first.
+  /// Both feet have [force; moment] each, right first.
   using Wrenches = Eigen::Matrix<double, 12, 1>;
   using Covariance = Eigen::Matrix<double, 12, 12>;
 
@@ -70,9 +70,9 @@ class WrenchObserver {
   /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
   /// of freedom when nothing but the feet touches the robot.
   double push_excess() const { return push_excess_; }
-  /// Of the last Observe, in the base frame, without the load: specific force of the base's origin
-  /// (acceleration less gravity, m/s²), and the force and moment about the base's origin that the
-  /// model asks of the ground (N, N·m).
+  /// The last Observe found these, in the base frame, without the load: specific force of the
+  /// base's origin (acceleration less gravity, m/s²), and the force and moment about the base's
+  /// origin that the model asks of the ground (N, N·m).
   const Eigen::Vector3d& specific_force() const { return base_force_; }
   const Eigen::Vector3d& base_turn() const { return base_acceleration_; }  ///< rad/s²
   const robot::Vector6d& base_wrench() const { return base_wrench_; }

@@ -11,7 +11,7 @@ namespace poise {
 /// Feet in contact, right first.
 std::array<bool, 2> ContactsOf(Support support);
 
-/// Of phases by their index in the configuration. Immutable.
+/// Which phase follows which, by their index in the configuration. Immutable.
 class PhaseGraph {
  public:
   /// Throws ConfigError naming the field ("phase[1].next[0].to"): no phase, a name that no phase

@@ -19,39 +19,40 @@
 namespace poise {
 namespace {
 
-// Of a sole's inner radius: what friction of the ankles and errors of the model move the centre of
-// pressure by, and a reserve before the sole tips.
+// Friction of the ankles and errors of the model move the centre of pressure by this share of a
+// sole's inner radius, with a reserve before the sole tips.
 constexpr double kEdgeShare = 1.0 / 3;
-/// Of the smaller sole's inner radius: what the pendulum's offset is taken for at most. Chosen.
+/// The pendulum's offset is at most this share of the smaller sole's inner radius. Chosen.
 constexpr double kOffsetShare = 0.67;
-/// Of the clearance, by which a foot rises from where it stands though the other stands lower: the
-/// edges of tilted ground are higher than its middle. Chosen.
+/// A foot rises by this share of the clearance from where it stands though the other stands lower:
+/// the edges of tilted ground are higher than its middle. Chosen.
 constexpr double kRiseShare = 0.5;
-/// Of the swing, after which a foot is above its foothold where the ground is unknown: it comes
+/// After this share of the swing a foot is above its foothold where the ground is unknown: it comes
 /// down from above, not against a block's side. By then it has come down by a fifth of its height.
 /// Chosen.
 constexpr double kAcrossShare = 0.65;
-/// Of the swing, in which a foot only rises there: else its toe meets the side of the block ahead
-/// on its way up, which fells the robot. Chosen.
+/// In this share of the swing a foot only rises there: else its toe meets the side of the block
+/// ahead on its way up, which fells the robot. Chosen.
 constexpr double kWaitShare = 0.15;
 /// 1/s. Faster it would follow the capture point's noise, and a tick of 10 ms would not follow it.
 constexpr double kMostOffsetRate = 50;
 /// rad in a step. Beyond it a foot points back.
 constexpr double kMostTurn = 0.5 * M_PI;
-/// Of the smaller sole's inner radius, that unloading puts the soles' own centres of pressure off
-/// their middles: on soft ground a sole rolls by as much. Chosen.
+/// Unloading puts the soles' own centres of pressure off their middles by this share of the smaller
+/// sole's inner radius: on soft ground a sole rolls by as much. Chosen.
 constexpr double kLeadShare = 0.13;
-/// Of the standing height: a press that sinks on is not a spring's. Chosen.
+/// A press that sinks on beyond this share of the standing height is not a spring's. Chosen.
 constexpr double kMostSinking = 0.3;
-/// Of the standing height, by which the COM goes down before the sole does. Chosen: with 0.3 the
-/// robot crouched to 70 % of its height where a press on one corner had let expect three times as
-/// much.
+/// The COM goes down by this share of the standing height before the sole does. Chosen: with 0.3
+/// the robot crouched to 70 % of its height where a press on one corner had let expect three times
+/// as much.
 constexpr double kMostAhead = 0.08;
 /// m/s, that a sole sinks on average while it is loaded. At 10 kN/m the paper's robot loads as fast
 /// as on hard ground. Chosen.
 constexpr double kSinkSpeed = 0.04;
-/// Of the smaller sole's inner radius, that a sole sinks under the weight on ground which counts as
-/// soft: a stiffness of 18 kN/m under the paper's robot, which walks on 20 as on hard ground.
+/// Ground counts as soft where a sole sinks under the weight by this share of the smaller sole's
+/// inner radius: a stiffness of 18 kN/m under the paper's robot, which walks on 20 as on hard
+/// ground.
 constexpr double kSoftShare = 0.4;
 constexpr double kRounding = 1e-6;
 constexpr double kMostPress = 0.4;  // of the weight: more would lift the other foot off its middle
@@ -60,8 +61,9 @@ double LeastInnerRadius(const robot::RobotModel& model) {
   return std::min(robot::InnerRadius(model.feet()[0]), robot::InnerRadius(model.feet()[1]));
 }
 
-/// Of the robot whose walk the defaults are: the paper's. Another's is the same in units of g and
-/// of its COM's height, so that as much of the capture point's error grows in a step.
+/// The paper's robot, whose walk the defaults are, has its COM at this height. Another's walk is
+/// the same in units of g and of its COM's height, so that as much of the capture point's error
+/// grows in a step.
 constexpr double kDefaultHeight = 0.75;  // m
 
 enum class Unit { kTime, kLength, kSpeed, kRate, kTurnAcceleration };
@@ -124,8 +126,8 @@ WalkConfig WithRobotDefaults(WalkConfig config, double height) {
 
 namespace {
 
-/// Of WalkSpec: `ratio` of the damping that is critical for an ankle's rotor on the spring that a
-/// sole of half sizes a and b has in the ground, weight a²/sinking and weight b²/sinking.
+/// WalkSpec's damping is `ratio` of what is critical for an ankle's rotor on the spring that a sole
+/// of half sizes a and b has in the ground, weight a²/sinking and weight b²/sinking.
 Eigen::Vector2d SoftDamping(const robot::RobotModel& model, double ratio) {
   const double weight = robot::kGravity * model.total_mass();
   Eigen::Vector2d least = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());

@@ -247,7 +247,7 @@ bool TaskController::FindLimits() {
                                                  ? limits_->Stopping(j, position, velocity)
                                                  : limits_->Accelerations(j, position, velocity);
     const double most = limits_->range(j).acceleration, a = acceleration_[6 + j];
-    // Of a range that a limit narrows this side alone.
+    // Only the side of a range that a limit narrows counts.
     const bool above = range.upper < most && a > range.upper;
     const bool below = range.lower > -most && a < range.lower;
     if (!above && !below) continue;

@@ -30,7 +30,7 @@ class TaskController : public Component, public Operated {
  private:
   void AddSettings(double tick_period);
   void TakeActs(const Tick& tick);
-  /// Of the tasks, with what the ground takes off the COM's.
+  /// Gives the tasks their gains, less what the ground takes off the COM's.
   void SetGains();
   void Prepare();
   /// Fills the torque; STATUS_* of the message.

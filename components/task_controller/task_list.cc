@@ -36,7 +36,7 @@ TaskConfig::Reference DefaultReference(const TaskConfig& task) {
   return TaskConfig::START;
 }
 
-/// Of what moves.
+/// Returns the gains of what moves.
 balance::TaskGains GainsOf(const balance::TargetParts& needed, TaskConfig::Reference reference,
                            const std::string& type, const balance::StandingGains& gains) {
   if (needed.angular_momentum) return {0, gains.orientation.kd};

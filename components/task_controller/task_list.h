@@ -43,7 +43,7 @@ class TaskList {
   };
   Rows CountRows(const FeetInContact& in_contact) const;
 
-  /// Of tasks without their own, from now on.
+  /// Tasks without gains of their own have these from now on.
   void SetGains(const balance::StandingGains& gains);
   /// Tasks that follow no plan hold what they find at this state.
   void Hold(const balance::TaskState& state);

@@ -64,7 +64,7 @@ class Master {
 
   void set_outputs(size_t drive, const DriveOutputs& outputs) { outputs_[drive] = outputs; }
   const DriveOutputs& outputs(size_t drive) const { return outputs_[drive]; }
-  /// Of the last complete read.
+  /// The last complete read brought these.
   const DriveInputs& inputs(size_t drive) const { return inputs_[drive]; }
   /// Sends the frame of a cycle. False when the link refused it.
   bool Send(Exchange exchange = Exchange::kReadWrite);
@@ -72,8 +72,8 @@ class Master {
   /// of earlier cycles are counted and dropped.
   CycleResult Receive(int64_t deadline);
 
-  /// Of the slave's mailbox, at any time after PRE-OP; blocks. For start-up and diagnosis; not
-  /// while an attendant speaks with it.
+  /// Gives access to the slave's mailbox, at any time after PRE-OP; blocks. It is for start-up and
+  /// diagnosis, not while an attendant speaks with the slave.
   SlaveAccess& slave(size_t slave) { return slaves_[slave]; }
   /// A slave's place in the chain, 0 the first.
   int position(size_t slave) const { return positions_[slave]; }
@@ -115,7 +115,7 @@ class Master {
   std::vector<DriveOutputs> outputs_;
   std::vector<DriveInputs> inputs_;
 
-  // Of the cyclic frame.
+  // The cyclic frame is made and read with these.
   std::vector<uint8_t> image_bytes_;
   FrameBuilder builder_;
   std::array<uint8_t, kMaxFrame> received_{};

@@ -68,7 +68,8 @@ int BeforeOnCable(std::span<const SlavePorts> slaves, size_t swapped, int entry,
       longest = std::max(longest, Between(slave, from, port));
     return longest;
   };
-  // Of those whose frames are longer on their way, the one for which they are the least so.
+  // The slave to find is, of those whose frames are longer on their way, the one whose way is the
+  // least longer.
   const uint32_t own = round_trip(slaves[swapped], entry);
   int before = -1;
   uint32_t least = UINT32_MAX;

@@ -12,7 +12,7 @@ namespace poise::unitree {
 /// significant bit; neither reflected nor inverted.
 uint32_t Crc32(std::span<const uint32_t> words);
 
-/// Of all but `crc`, as the message lies in memory; what C fills up between fields counts as zero.
+/// Sums all but `crc`, as the message lies in memory; what C fills up between fields counts as 0.
 uint32_t CrcOf(const LowCmd& command);
 uint32_t CrcOf(const LowState& state);
 

@@ -68,7 +68,7 @@ class Writer : private Endpoint {
   bool Write(const T& sample) { return WriteSample(&sample); }
 };
 
-/// Of messages without strings and sequences, or with: those of `sample` are replaced.
+/// Reads messages without strings and sequences, or with: those of `sample` are replaced.
 template <class T>
 class Reader : private Endpoint {
  public:

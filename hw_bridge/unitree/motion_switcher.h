@@ -50,7 +50,7 @@ class MotionSwitcherServer {
 
   /// Answers what has been asked.
   void Serve();
-  /// Of the controller that is active; empty: none.
+  /// The name of the controller that is active; empty: none.
   const std::string& mode() const { return mode_; }
 
  private:

@@ -19,7 +19,7 @@ namespace poise::unitree {
 /// slot, a change of no joint.
 std::vector<size_t> MotorSlots(std::span<const std::string> joints, UnitreeBusConfig::Layout layout,
                                const google::protobuf::RepeatedPtrField<MotorSlot>& changes);
-/// Of a robot's joints.
+/// Returns the slots of a robot's joints.
 std::vector<size_t> MotorSlots(const robot::RobotModel& model, UnitreeBusConfig::Layout layout,
                                const google::protobuf::RepeatedPtrField<MotorSlot>& changes);
 

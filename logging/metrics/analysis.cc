@@ -122,7 +122,7 @@ std::optional<std::array<Eigen::Isometry3d, 2>> Soles(const RunRecord& run, int6
 
 using FootWrenches = std::array<std::optional<balance::Vector6d>, 2>;  // empty: out of contact
 
-/// Of wrenches on soles that stood so at `tick`; empty in the air.
+/// Returns the centre of pressure of wrenches on soles that stood so at `tick`; empty in the air.
 std::optional<Eigen::Vector2d> CopOf(const RunRecord& run, int64_t tick,
                                      const FootWrenches& wrenches) {
   const auto soles = Soles(run, tick);

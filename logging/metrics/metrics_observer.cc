@@ -25,7 +25,7 @@ struct Compared {
   Wrench observed, truth;
 };
 
-/// Of one foot; empty without observer.
+/// Returns one foot's wrenches; empty without observer.
 std::optional<Compared> WrenchesAt(const RunRecord& run, size_t foot, int64_t tick) {
   const estimator_status_t* status = run.estimator.at(tick);
   const ground_truth_t* truth = run.truth.at(tick);

@@ -10,7 +10,8 @@
 namespace poise::logging {
 namespace {
 
-// Of the robot's weight: a load whose centre of pressure stands out of a sensor noise of 1 N.
+// A load of this share of the robot's weight has a centre of pressure that stands out of a sensor
+// noise of 1 N.
 constexpr double kReadableShare = 0.01;
 // Figure 17 shows half a second after the switch; what moves before it is not its doing.
 constexpr double kBeforeSwitch = 0.05, kAfterSwitch = 0.5;  // s

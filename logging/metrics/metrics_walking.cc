@@ -71,7 +71,7 @@ Answer Way(const RunRecord& run) {
   return way;
 }
 
-/// Of the same ticks: what starting and stopping take is in neither.
+/// Work and way are of the same ticks: what starting and stopping take is in neither.
 Answer CostOfTransport(const RunRecord& run) {
   double work = 0, way = 0;
   for (const Stride& stride : Strides(run)) {

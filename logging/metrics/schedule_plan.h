@@ -29,9 +29,9 @@ struct SchedulePlan {
   double expected_within = 0;  ///< m, a contact further from its reference's end is early or late
 };
 
-/// Of the component that writes SUPPORT_PLAN. Empty when the run names no such configuration, when
-/// it does not fit this version's schema, or when the program does not link that schema: logging
-/// knows it by name only, since it includes no component's folder.
+/// Reads the schedule of the component that writes SUPPORT_PLAN. Empty when the run names no such
+/// configuration, when it does not fit this version's schema, or when the program does not link
+/// that schema: logging knows it by name only, since it includes no component's folder.
 std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run);
 
 }  // namespace poise::logging

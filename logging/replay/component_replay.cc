@@ -164,7 +164,7 @@ class ReplayedStages {
 
   using Connections = google::protobuf::RepeatedPtrField<Connection>;
 
-  /// Of the channel at the component's port; CheckWiring has found it.
+  /// Returns the name of the channel at the component's port; CheckWiring has found it.
   static std::string ChannelName(const Connections& connections, const std::string& port) {
     const auto found = std::ranges::find_if(
         connections, [&](const Connection& connection) { return connection.port() == port; });

@@ -97,7 +97,7 @@ TEST(ConvexHull, OfNearlyAlignedSolesCoversThemAndTurnsLeft) {
     worst_area = std::max(worst_area, std::abs(Area(hull) - 2 * half * 0.34) - 4 * noise);
     EXPECT_GT(SignedDistance(hull, {0, 0}), 0.04) << trial;
   }
-  // Of a side's corners two may be left out as on a line, 2 nm each; all are moved by half a grid.
+  // Two of a side's corners may be left out as on a line, 2 nm each; all are moved by half a grid.
   EXPECT_LT(worst_support, 2 * 2e-9 + 2 * 0.71e-9);
   EXPECT_LT(worst_area, 2e-9);
 }

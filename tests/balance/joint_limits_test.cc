@@ -85,8 +85,8 @@ TEST(JointLimits, KeepAReserveOfWhatTheUrdfGives) {
   }
 }
 
-// Of a leg that stands: a joint at rest beyond its range may stay there, may come back, and goes no
-// further.
+// A joint of a leg that stands, at rest beyond its range, may stay there, may come back, and goes
+// no further.
 TEST(JointLimits, AStandingLegsJointIsStoppedAndNotBroughtBack) {
   const auto model = Humanoid();
   const JointLimits limits(*model, 0.04);

@@ -156,7 +156,7 @@ TEST(PolygonSole, LargestRectangleOfDiamondAndHexagon) {
   EXPECT_NEAR(half.y(), 0.05, 1e-7);
   EXPECT_LT((largest(diamond, {0.15, 0}) - Vector2d(0.15, 0.025)).norm(), 1e-12);
   EXPECT_LT((largest(diamond, {0, 0.08}) - Vector2d(0.04, 0.08)).norm(), 1e-12);
-  // Of a regular hexagon it reaches from edge to edge and half of its corners' way out.
+  // In a regular hexagon it reaches from edge to edge and half of its corners' way out.
   const Vector2d hexagon = largest(Regular(6, 0.1), Vector2d::Zero());
   EXPECT_NEAR(hexagon.x(), 0.05, 1e-7);
   EXPECT_NEAR(hexagon.y(), 0.05 * std::sqrt(3), 1e-7);

@@ -50,7 +50,7 @@ TEST(WholeBody, ContactJacobianMapsVelocityToTheSoles) {
   Eigen::VectorXd velocity(model->num_velocities());
   velocity << state.base_linear_velocity, state.base_angular_velocity, state.joint_velocity;
   for (const auto& in_contact : {kDouble, kRight, kLeft}) {
-    // Of the right size, whatever it holds: joints that are no leg's have columns, too.
+    // It has the right size, whatever it holds: joints that are no leg's have columns, too.
     Eigen::MatrixXd jacobian = Eigen::MatrixXd::Constant(6 * (in_contact[0] + in_contact[1]),
                                                          model->num_velocities(), std::nan(""));
     body.ContactJacobian(in_contact, &jacobian);

@@ -220,7 +220,7 @@ TEST_P(MonitorCase, InAStepBodyOrComGiveWayAndNothingElse) {
 // The same for the hull of the soles, whatever the feet's heights and angles.
 TEST_P(MonitorCase, PutsTheCentreOfPressureOnTheNearestPointOfTheSolesHull) {
   constexpr double kMargin = 0.045;
-  // Of a sole that carries alone.
+  // A sole that carries alone has another one.
   const double side = GetParam().in_contact[0] && GetParam().in_contact[1] ? kMargin : 0.03;
   Harness<ContactWrenchMonitor> harness(&context_,
                                         "region: POLYGON sole_margin: 0.045 side_margin: 0.03");

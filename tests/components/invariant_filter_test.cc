@@ -185,7 +185,7 @@ InvariantState Propagated(const InvariantState& state, const ImuStep& imu, doubl
   return filter.state();
 }
 
-// Of the equations of motion with readings that are constant in the IMU's frame.
+// Integrates the equations of motion with readings that are constant in the IMU's frame.
 InvariantState Integrated(InvariantState state, const Vector3d& rate, const Vector3d& force,
                           double dt) {
   constexpr int kSteps = 4000;
@@ -440,7 +440,7 @@ TEST(InvariantFilter, ConvergesFromAWrongTiltAndVelocity) {
   const double tilt = deviation(0, 2), velocity = deviation(3, 3);
   EXPECT_LT(tilt, 5e-4);
   EXPECT_LT(velocity, 1.5e-3);
-  // Of a Gaussian error's length, five deviations are once in millions of draws.
+  // A Gaussian error is five deviations long once in millions of draws.
   EXPECT_LT(off.head<2>().norm(), 5 * tilt);
   EXPECT_LT(off.segment<3>(3).norm(), 5 * velocity);
 }

@@ -56,7 +56,7 @@ TEST(JointErrors, WhatIsLeftIsWhatTheVarianceSays) {
   // Friction that has turned over: the error has changed its sign.
   const Drawn turned = Draw(swing, {-2, 8, 10}, 1);
   EXPECT_GT(turned.variance, 0.8 * before);
-  // Of 500 squares of one normal number the mean lies within 20 % (three deviations).
+  // The mean of 500 squares of one normal number lies within 20 % (three deviations).
   EXPECT_LT(turned.squared, 1.2 * turned.variance);
   // A foot that stands, with torques ten times as large: hardly anything is known.
   const JointErrors::Torques stance = {2, 80, 60};

@@ -88,7 +88,7 @@ TEST_F(SoftGroundTest, AFootThatLeavesTheGroundForgets) {
   EXPECT_EQ(ground_.Limited(kGains).kp, kGains.kp);
 }
 
-// Of feet that have stood all the time nobody knows from where they sank.
+// Nobody knows from where feet sank that have stood all the time.
 TEST_F(SoftGroundTest, FeetThatStandFromTheStartAreTakenAsHard) {
   std::array<SoftGround::Foot, 2> feet;
   for (int tick = 0; tick < 500; ++tick) {

@@ -51,7 +51,7 @@ class JointWithFriction {
         motor_(model_.motors()[static_cast<size_t>(joint_)]),
         friction_(OnTheRightFoot(model_, share)) {}
 
-  /// Of the reference, after `time` s of one that moves with `speed` from `start` on.
+  /// Returns the reference's error after `time` s of one that moves with `speed` from `start` on.
   double Error(double start, double speed, double time) {
     Eigen::VectorXd velocity = Eigen::VectorXd::Zero(model_.num_joints());
     Eigen::VectorXd acceleration = velocity;

@@ -170,7 +170,7 @@ TEST_P(Takeover, AnotherRobotsStateIsRefused) {
   EXPECT_FALSE(restore.ok());
 }
 
-// Of the ticks two of three are skipped, and once 40 ms of them.
+// Two of three ticks are skipped, and once 40 ms of them.
 TEST_P(Takeover, SkippedTicksChangeNoScheduleAndNoReference) {
   const std::vector<robot_state_t> states = States(GetParam());
   Chain whole(GetParam()), skipping(GetParam());

@@ -298,7 +298,7 @@ TEST(TaskList, WithoutAListThereAreThePapersTasks) {
       "task { type: 'com' } task { type: 'orientation' reference: BODY }"
       "task { type: 'frame' foot: RIGHT } task { type: 'frame' foot: LEFT gains { kp: 100 kd: 15 } "
       "}";
-  // Of a robot of legs alone: other joints hold their posture without a list.
+  // The robot has legs alone: other joints hold their posture without a list.
   for (const Contacts& feet : {Contacts{true, true}, {true, false}, {false, true}}) {
     EXPECT_EQ(Torques(TestRobot::kDyros, TaskControllerText(), feet),
               Torques(TestRobot::kDyros, TaskControllerText() + list, feet));

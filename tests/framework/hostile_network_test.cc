@@ -87,7 +87,7 @@ class Attacker {
     text.append(data.begin(), data.end());
     return {text.begin(), text.end()};
   }
-  /// Of a message of 100 bytes in two fragments.
+  /// Makes a fragment of a message of 100 bytes in two.
   static Bytes Fragment(const std::string& channel, uint32_t offset) {
     std::string text("LC03\0\0\0\x09\0\0\0\x64", 12);
     for (int shift = 24; shift >= 0; shift -= 8) text.push_back(static_cast<char>(offset >> shift));

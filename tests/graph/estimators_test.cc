@@ -41,7 +41,7 @@ TEST(Estimators, BothAreInTheTableWhicheverRan) {
     SCOPED_TRACE(method);
     const std::string run = RunBy(folder / method, method);
     const auto checks = Checks(run);
-    // Of the robot as simulated: encoders of 0.02 mrad, gears that wind up by up to 0.6 mrad on
+    // The robot as simulated has encoders of 0.02 mrad, gears that wind up by up to 0.6 mrad on
     // legs of 0.8 m, an IMU with a bias.
     EXPECT_LT(checks.at("anchored_feet_position_rms").get<double>(), 2);
     EXPECT_LT(checks.at("invariant_ekf_position_rms").get<double>(), 0.2);

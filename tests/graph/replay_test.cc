@@ -79,7 +79,7 @@ TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
   EXPECT_HAS(result, "first torque[");
 }
 
-// Of FOOTSTEPS, which only a planner that steps writes.
+// The channel is FOOTSTEPS, which only a planner that steps writes.
 TEST_F(ReplayTest, ASettingMayBringOrTakeAChannel) {
   const std::string steps = folder_ / "steps", setting = "step_planner.walk.enabled=";
   Run({"--inline"});

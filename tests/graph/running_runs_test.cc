@@ -93,7 +93,7 @@ TEST_F(RunningRunsTest, TheOnlyOneIsMeantAndADeadOneForgotten) {
                    {"no run is going on; the latest has ended: poise log info " + Whole(run)});
   ExpectUsageError({"view"}, {"no run is going on; the latest has ended: poise report"});
   ExpectUsageError({"estop", "--reset"}, {"no run is going on"});
-  // Of an ended run nothing can be pushed.
+  // Nothing can be pushed in a run that has ended.
   ExpectUsageError({"push", "--force", "1,0,0"}, {"no run is going on; start one with poise run"});
 }
 

@@ -59,7 +59,7 @@ TEST_F(ScenarioPlaceTest, WhatLiesBesideTheFileComesFirst) {
   }
   fs::copy_file(kDeploy / "graphs/balance.pbtxt", "own/balance.pbtxt");
   ExpectGood("own/mine.pbtxt", Full("own/balance.pbtxt"));
-  // Of this folder, though there is none of that name installed.
+  // The name is of this folder's, though there is none of that name installed.
   const CurrentFolder own("own");
   ExpectGood("mine");
   ExpectGood("balance", "names, types and connections are good");

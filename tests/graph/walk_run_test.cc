@@ -169,7 +169,7 @@ TEST(WalkRun, UpAndDownStairsToAStandOnThem) {
   }
 }
 
-// Of which nothing is told. With its feet side by side, one across an edge, it fell in 12 of 12.
+// The stairs are not told of. With its feet side by side, one across an edge, it fell in 12 of 12.
 TEST(WalkRun, UpAndDownStairsItIsNotToldOfToAStandOnThem) {
   for (const std::string engine : {"mujoco", "ode"}) {
     for (const std::string variant : {"stairs", "stairs_down"}) {

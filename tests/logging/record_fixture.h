@@ -24,7 +24,7 @@ class RecordTest : public testing::Test {
 
   /// Through a log, so that the reading is part of the test.
   RunRecord Read();
-  /// Of a metric from `from` seconds on; a failure when it has none.
+  /// Returns a metric's value from `from` seconds on; it is a failure when it has none.
   double Measure(const std::string& name, double from = 0);
   /// True when the metric has no value.
   bool Unanswered(const std::string& name);

@@ -73,7 +73,7 @@ std::string SimpleBiped(const Biped& changes) {
 
 namespace {
 
-/// Of this process; goes with it.
+/// The folder is this process's and goes with it.
 class MakersTemporaryFolder {
  public:
   MakersTemporaryFolder()

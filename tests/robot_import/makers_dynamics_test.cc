@@ -20,8 +20,8 @@ using Real = long double;
 using MatrixL = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
 constexpr int kStates = 40;
-// Of the largest entry. Seen are 7e-15 and 6e-10: MuJoCo diagonalises what an MJCF file gives as
-// fullinertia to some 1e-9 by itself.
+// Entries differ by at most this share of the largest. Seen are 7e-15 and 6e-10: MuJoCo
+// diagonalises what an MJCF file gives as fullinertia to some 1e-9 by itself.
 constexpr double kDynamics = 1e-12, kDynamicsOfMjcf = 1e-7;
 // Inverses lose what the posture's condition costs. Seen are 3e-13 and 3e-9.
 constexpr double kContact = 1e-9, kContactOfMjcf = 1e-5;

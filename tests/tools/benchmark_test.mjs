@@ -10,7 +10,7 @@ import {test} from 'node:test';
 import {fileURLToPath} from 'node:url';
 
 const deploy = (...path) => readFileSync(new URL(`../../deploy/${path.join('/')}`, import.meta.url), 'utf8');
-// Of this build's bits, as deploy/bits/record.json is: recorded anew where a change moves those, and then the commit says why.
+// The record is of this build's bits, as deploy/bits/record.json is: recorded anew where a change moves those, and then the commit says why.
 const record = JSON.parse(readFileSync(new URL('benchmark_record.json', import.meta.url), 'utf8'));
 
 const folder = mkdtempSync(join(tmpdir(), 'poise-benchmark-'));

@@ -62,7 +62,7 @@ struct Outcome {
   bool crane_at_zero = false;
 };
 
-/// Of push_double_support without its push, as `poise run --realtime` would start it.
+/// Starts push_double_support without its push, as `poise run --realtime` would.
 Outcome Start(const Lost& lost, std::vector<std::string> set = {}, bool realtime = true) {
   RunChanges changes;
   changes.realtime = realtime;

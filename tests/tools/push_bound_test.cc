@@ -150,7 +150,7 @@ TEST(PushBound, AMovingRobotHasItsCapturePointInstead) {
   EXPECT_NEAR(moving->lip_impulse, rest->lip_impulse - rest->mass * 0.1, 1e-9);
 }
 
-// Of two pushes alike the one towards the nearer edge counts, and none that the run does not have.
+// The one of two pushes alike towards the nearer edge counts, and none that the run does not have.
 TEST(PushBound, OfSeveralTheNearestToItsBoundCounts) {
   const logging::RunRecord run = Standing(0, 0.05);
   Scenario two = PushScenario("direction_y: -1");
@@ -198,7 +198,7 @@ TEST(PushBound, ThereIsNoneForOtherPushes) {
   Scenario hand = PushScenario("direction_y: 1");
   hand.mutable_sim()->add_hand();
   EXPECT_FALSE(FindPushBound(hand, run));
-  // Of an oblique one the horizontal part counts.
+  // An oblique one's horizontal part counts.
   const auto oblique = FindPushBound(PushScenario("direction_x: 3 direction_z: 4"), run);
   EXPECT_NEAR(oblique->impulse, 100 * kDuration * 2 / pi * 0.6, 1e-12);
 }

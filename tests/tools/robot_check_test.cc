@@ -109,7 +109,7 @@ TEST(RobotCheck, TorqueOnBothFeetIsThatOfVirtualWork) {
 TEST(RobotCheck, SolesHaveTheirAreas) {
   EXPECT_NEAR(Paper().soles[0].area, 0.30 * 0.15, 1e-12);
   EXPECT_EQ(Paper().soles[0].corners.size(), 4u);
-  // Of the polygon in strips between its corners: trapezoids from heel to ball, and to the toe.
+  // The polygon has strips between its corners: trapezoids from heel to ball, and to the toe.
   const double area = 0.11 * (0.072 + 0.092) / 2 + 0.07 * 0.092 + 0.04 * (0.092 + 0.072) / 2;
   EXPECT_NEAR(Heron().soles[0].area, area, 1e-12);
   EXPECT_NEAR(Heron().soles[1].area, area, 1e-12);

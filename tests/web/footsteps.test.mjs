@@ -28,7 +28,7 @@ function walked(ticks, tick, keep = 1000) {
   });
 }
 
-// Of 98 N: the foot stands from tick 0, swings from 20, touches with a bounce from 100 on, and lies from 110 on.
+// The robot weighs 98 N: the foot stands from tick 0, swings from 20, touches with a bounce from 100 on, and lies from 110 on.
 const swing = (t) => {
   if (t < 20) return [1, 50, 0.1];
   if (t < 100) return [0, 3, 0.1 + 0.0025 * (t - 20)];

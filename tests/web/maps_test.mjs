@@ -15,7 +15,7 @@ const folder = mkdtempSync(join(tmpdir(), 'poise-maps-'));
 let browser;
 
 before(async () => {
-  // Of these pushes on a robot that does not balance the last knocks it over.
+  // The last of these pushes knocks a robot over that does not balance.
   const sweep = spawnSync(options.poise, ['sweep', 'push_double_support', '--set', 'duration=1.5', '--vary', 'sim.push[0].peak=20,60,2000',
     '--column', 'com_error_max_y', '--column', 'joint_torque_max', '--quiet', '--out', join(folder, 'sweep')], {encoding: 'utf8'});
   assert.equal(sweep.status, 0, sweep.stderr);

@@ -25,7 +25,7 @@ struct BenchmarkFigure {
   /// What `value` is to what was sought: empty: it, within the tolerance; "at least": all up to the
   /// cap was survived; "below": not even the smallest that was tried.
   std::string bound = {};
-  /// Of pushes: N·s, N·s per kg, and the share of both bounds (push_bound.h).
+  /// A push has N·s, N·s per kg, and its share of both bounds (push_bound.h).
   std::optional<double> impulse = {}, per_mass = {}, of_pendulum = {}, of_duration = {};
   const SweepRow* untold = nullptr;  ///< the run of the point does not tell, and counts for nothing
 };

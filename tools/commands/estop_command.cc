@@ -248,7 +248,7 @@ int Estop(const std::string& run, bool reset) {
   if (run.empty()) {
     lines = AllLines(&exit_code);
   } else {
-    // Of several that are called so, none is asked for: a stop must not wait for an answer.
+    // It asks for none of several that are called so: a stop must not wait for an answer.
     for (const std::filesystem::path& dir : RunsNamed(run)) lines.emplace_back(dir.string());
   }
   if (lines.empty()) return exit_code;

@@ -106,7 +106,7 @@ std::vector<Job> MakeJobs(const MatrixOptions& options) {
 void StartJob(const std::string& program, const fs::path& folder, Job* job) {
   const fs::path dir = folder / job->name;
   fs::create_directories(dir.parent_path());
-  // Of an earlier matrix: a run that cannot start would leave it.
+  // An earlier matrix wrote it, and a run that cannot start would leave it.
   if (fs::exists(dir / "summary.json")) fs::remove(dir / "summary.json");
   std::vector<std::string> command = {program};
   command.insert(command.end(), job->arguments.begin(), job->arguments.end());

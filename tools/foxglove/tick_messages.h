@@ -39,7 +39,7 @@ struct TickMessages {
 /// Gathers the messages of every `every`-th tick, from several channels that need not be in step.
 class TickGatherer {
  public:
-  /// Of several channels with one type the graph's first is taken.
+  /// The graph's first of several channels with one type is taken.
   TickGatherer(const RunSpec& spec, int64_t every);
 
   /// Passes over what is not wanted. The message must be well formed and of this run.

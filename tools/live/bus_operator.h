@@ -32,7 +32,7 @@ class BusOperator : public OperatorSink {
   /// Throws ConfigError when the run's graph has no channel that an operator writes; BusError.
   explicit BusOperator(const RunSpec& spec);
 
-  /// Of everything that LiveRun hands out.
+  /// Takes everything that LiveRun hands out.
   void Hear(const LiveMessage& message);
   /// Takes answers, and sends again what nobody has answered. To be called every few ms.
   void Update();

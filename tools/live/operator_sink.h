@@ -13,7 +13,7 @@ namespace poise {
 /// Carries acts to those who decide, and tells what these have answered. Used on one thread.
 class OperatorSink {
  public:
-  /// Of the one who receives an act, or of the way there.
+  /// What the one who receives an act answers, or what becomes of it on the way there.
   struct Answer {
     int64_t client = 0, id = 0;  ///< of the act
     bool accepted = false;

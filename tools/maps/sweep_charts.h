@@ -50,7 +50,7 @@ struct ChartScale {
   bool share = false;
   std::string Colour(const std::optional<double>& value) const;
 };
-/// Of the values that there are; what fell is off the scale.
+/// Makes the scale of the values that there are; what fell is off the scale.
 ChartScale ScaleOf(const std::vector<ChartCell>& cells, bool share);
 
 /// What fell stands in a strip above the plot.

@@ -27,7 +27,7 @@ std::string WordsOfField(const std::string& field) {
                      Words(field.substr(begin, last - begin)));
 }
 
-/// Of a field of the scenario, "sim.push[0].peak"; empty when its schema says none.
+/// Returns the unit of a scenario's field, "sim.push[0].peak"; empty when its schema says none.
 std::string UnitOfField(const std::string& field) {
   static const std::vector<FieldEntry> fields = FieldReference(Schema::kScenario);
   static const std::regex index("\\[[0-9]+\\]");

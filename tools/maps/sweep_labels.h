@@ -14,8 +14,8 @@ std::string PlainName(const Limit& limit);
 /// The variable is the run's seed, which has no order.
 bool IsSeed(const Variable& variable);
 
-/// Of the variable itself, else of the scenario's field that it sets; "°" of an angle; may be
-/// empty.
+/// The unit is the variable's own, else that of the scenario's field which it sets; "°" of an
+/// angle; it may be empty.
 std::string UnitOf(const Variable& variable);
 std::string UnitOf(const Limit& limit);
 

@@ -286,7 +286,7 @@ std::string Maps::Pair(size_t x, size_t y, const std::string& value) const {
   return PolarHeatMap(labels, columns.numbers, rows.texts, cells, scale);
 }
 
-/// Of a metric that all runs that stand agree on, or of which none knows it; else empty.
+/// Says of a metric that all runs that stand agree on it, or that none knows it; else empty.
 std::string Maps::ConstantSentence(const std::string& value) const {
   std::optional<double> first;
   for (const auto& [key, row] : rows_) {

@@ -6,7 +6,7 @@
 
 namespace poise {
 
-/// Of all that ran on the machine, this run included.
+/// How busy the machine was with all that ran on it, this run included.
 struct MachineLoad {
   int cpus = 0;          ///< that are online
   double load = 0;       ///< load average of a minute, at the end; lags behind a short run

@@ -8,7 +8,7 @@
 
 namespace poise {
 
-/// Of a vector over the ticks that both runs have.
+/// How a vector differs over the ticks that both runs have.
 struct VectorDifference {
   double rms = 0, largest = 0;  ///< norm of the difference
   double time = 0;              ///< s, of the largest, in the scenario's time
@@ -19,8 +19,8 @@ struct WrenchDifference {
   VectorDifference force, moment;  ///< N, N·m
 };
 
-/// Of robot_sensors_t::foot_wrench, each in its own sole's frame: right foot, left foot. The runs
-/// must be of one scenario.
+/// Compares robot_sensors_t::foot_wrench, each in its own sole's frame: right foot, left foot. The
+/// runs must be of one scenario.
 std::array<WrenchDifference, 2> CompareFootWrenches(const logging::RunRecord& first,
                                                     const logging::RunRecord& second);
 

@@ -30,7 +30,7 @@ struct MakerShapes {
   std::string mesh_folder;
 };
 
-/// Of a text of either format. Throws robot::RobotError.
+/// Reads the shapes of a text of either format. Throws robot::RobotError.
 MakerShapes ReadShapes(std::string_view maker_text);
 
 /// Whether a primitive's sizes are above 0 and finite, a mesh's scales not 0.

@@ -13,7 +13,7 @@
 
 namespace poise {
 
-/// Of a page, over all meshes: about a megabyte.
+/// A page holds that many over all meshes: about a megabyte.
 inline constexpr size_t kPageTriangles = 40'000;
 
 struct RobotDrawing {

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of a run's page, of which the robot is the smaller part.
+// A run's page holds at most so many triangles: the robot is the smaller part of it.
 constexpr size_t kRunTriangles = 20'000;
 
 Json Vector(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }

@@ -18,8 +18,8 @@ constexpr size_t kLeastJoints = 6;
 // rad: where the feet stand beside each other to within this, the base faces along its axis; a zero
 // posture need not be symmetric.
 constexpr double kSnap = 0.175;
-// Of the lower foot's depth below the hips, by which the other may be higher with all joints at
-// zero: a hand is.
+// A foot may be higher than the other by this share of the lower one's depth below the hips with
+// all joints at zero: a hand is higher.
 constexpr double kMostAbove = 0.3;
 
 std::vector<int> PathTo(const robot::LinkTree& tree, int body) {

@@ -29,8 +29,8 @@ using robot::SourceLink;
 constexpr double kPoint = 1e-6;
 constexpr double kDummyMass = 0.02;  // kg, of a link that moves and weighs nothing: a bracket
 constexpr double kMirror = 1e-3;     // share by which masses of both sides may differ
-// Of the robot's mass: what a finger weighs at most (a thumb of 150 g on a G1), and a limb at
-// least.
+// A finger weighs at most this share of the robot's mass (a thumb of 150 g on a G1), and a limb at
+// least this one.
 constexpr double kFingerShare = 0.0075, kLimbShare = 0.03;
 constexpr double kPelvisShare = 0.14;  // of a person's mass (Winter)
 constexpr double kTrunkShare = 0.25;   // of the robot's mass: what moves more is no arm
@@ -413,7 +413,7 @@ class Repairer {
     return fingers;
   }
 
-  /// Of all links in the root, with joints at zero.
+  /// Returns the poses of all links in the root, with joints at zero.
   std::map<std::string, Isometry3d> ZeroPoses() const {
     std::map<std::string, std::vector<const SourceJoint*>> children;
     for (const SourceJoint& joint : source_.joints) children[joint.parent].push_back(&joint);

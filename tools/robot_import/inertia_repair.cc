@@ -13,10 +13,10 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kDensity = 1000;  // kg/m³: machines are near that of water
-// Of the trace, that a repaired inertia keeps from the edge of what is possible: rounding to the
-// ten digits of a text must not cross it.
+// A repaired inertia keeps this share of its trace from the edge of what is possible: rounding to
+// the ten digits of a text must not cross it.
 constexpr double kInside = 1e-9;
-// Of the moment about the axis, that the products of inertia with the axis may be at most.
+// The products of inertia with the axis are at most this share of the moment about it.
 constexpr double kAcross = 0.2;
 
 /// Second moments ∫ x² dm about the principal axes: all are ≥ 0 where moments are physical.

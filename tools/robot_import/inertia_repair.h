@@ -15,7 +15,7 @@ std::optional<double> HiddenRotor(const Eigen::Matrix3d& inertia, const Eigen::V
 /// The physical inertia with the same principal axes whose moments are nearest (least squares).
 Eigen::Matrix3d NearestPhysical(const Eigen::Matrix3d& inertia);
 
-/// Of a solid sphere as dense as water.
+/// Returns the inertia of a solid sphere as dense as water.
 Eigen::Matrix3d SphereInertia(double mass);
 
 }  // namespace poise

@@ -28,7 +28,7 @@ constexpr double kRatedShare = 0.5;     // of it, likewise
 constexpr double kRatedReserve = 1.25;  // on what a joint bears while the robot stands on one foot
 constexpr double kCurrentSteps = 2000;  // in the peak current
 constexpr int kEncoderCounts = 16384;   // 14 bits
-// Of the paper's robot's harmonic drives, over their 150 N·m.
+// The paper's robot's harmonic drives have these, over their 150 N·m.
 constexpr double kStiffnessShare = 7e4 / 150, kDampingShare = 8.0 / 150;
 constexpr size_t kMostLegJoints = 14;   // of a robot without arms: its motors may be equal
 constexpr double kEffortPerMass = 2.5;  // N·m/kg: 2.7 (the paper's robot) to 4.2 (G1) at the knee

@@ -30,9 +30,9 @@ using robot::LinkTree;
 using robot::RobotError;
 
 constexpr double kSameTurn = 1e-4;  // rad: a frame that is off by less counts as upright
-// Of the leg from hip to sole, the length that a sole is taken to have where nothing shows it: G1
-// has 0.26, Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length: 0.35, 0.62,
-// 0.57, 0.5.
+// A sole is taken to have this share of the leg's length from hip to sole where nothing shows it:
+// G1 has 0.26, Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length is 0.35,
+// 0.62, 0.57, 0.5.
 constexpr double kSoleOfLeg = 0.28, kWidthOfSole = 0.45;
 // m, from hip to ankle: Atlas has 0.8, OP3 0.2.
 constexpr double kLongestLeg = 5, kShortestLeg = 0.03;
@@ -41,7 +41,7 @@ constexpr double kMostDensity = 5000;
 constexpr double kStraight = 0.01;   // rad: a joint that is nearer to zero is left there
 constexpr double kRectangle = 5e-4;  // m: a polygon that differs by less is one
 constexpr double kSameSole = 0.01;   // m: soles whose sizes differ by more are no mirror images
-// Of common sensors, where the file has none: those of the paper's robot.
+// Common sensors have these errors where the file has none: the paper's robot's.
 constexpr double kGyroNoise = 2e-4, kGyroBias = 7.5e-6;                   // rad/s
 constexpr double kAccelerometerNoise = 1.7e-2, kAccelerometerBias = 0.1;  // m/s²
 constexpr double kForceNoise = 1, kMomentNoise = 0.05;                    // N, N·m
@@ -228,7 +228,7 @@ class Import {
         anatomy_.forward_from, anatomy_.forward);
   }
 
-  /// Of the file's joints from the root to the links of a body: those that stand still, with why.
+  /// Names the file's joints from the root to the links of a body that stand still, with why.
   std::string LockedOnTheWay(const LinkTree& tree, const std::string& body) {
     std::map<std::string, const robot::SourceJoint*> above;  // by child link
     for (const robot::SourceJoint& joint : maker_.source.joints) above[joint.child] = &joint;

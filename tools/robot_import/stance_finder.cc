@@ -23,9 +23,10 @@ constexpr double kMostMargin = 0.15;    // rad, at most
 constexpr double kRounding = 1e4;       // steps in a metre that a text has
 constexpr double kJointRounding = 1e3;  // in a radian
 
-// Of its torque limit, that a leg's joint may bear on one foot: a step takes more than standing.
+// A leg's joint may bear this share of its torque limit on one foot: a step takes more than
+// standing.
 constexpr double kComfort = 0.9;
-// Of the nominal posture's spacing: by which the feet come nearer at a time, and how often.
+// The feet come nearer by this share of the nominal posture's spacing at a time, so often.
 constexpr double kNarrowing = 0.05;
 constexpr int kNarrowings = 7;
 constexpr double kLeastGap = 0.04;  // m between the soles

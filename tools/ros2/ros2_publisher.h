@@ -19,7 +19,7 @@ namespace poise {
 /// also where a simulation knows better. Stamps are the run's time.
 class Ros2Publisher {
  public:
-  /// Of a run's info, spec and robot; `run` must outlive it. `rate` in Hz, at most the ticks'.
+  /// Takes a run's info, spec and robot; `run` must outlive it. `rate` in Hz, at most the ticks'.
   /// Throws unitree::UnitreeError.
   Ros2Publisher(const unitree::DdsLink& link, const logging::RunRecord& run, double rate);
 

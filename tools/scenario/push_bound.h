@@ -22,16 +22,16 @@ struct PushBound {
   /// N·s, the bound of a push of this shape and duration T, whose force f(t) must satisfy
   /// integral of f e^(-wt) dt <= m w d.
   double lip_impulse_of_duration = 0;
-  /// Of a run with a recovery step, else 0: m from that edge to the farthest one that a step can
-  /// make (FarthestSupport), s from the push's begin to the first touch-down, and
-  /// N·s, m w (d + reach e^(-w time)): what one step catches of a push at once.
+  /// A run with a recovery step has m from that edge to the farthest one that a step can make
+  /// (FarthestSupport), s from the push's begin to the first touch-down, and N·s,
+  /// m w (d + reach e^(-w time)): what one step catches of a push at once. Others have 0.
   double reach = 0, step_time = 0, step_impulse = 0;
 
   /// Whether there is such a bound. Else impulse and mass alone are known.
   bool bounded() const { return lip_impulse > 0; }
 };
 
-/// Of several pushes the one that is nearest to its bound, or farthest beyond it: each has the
+/// Finds of several pushes the nearest to its bound, or the farthest beyond it: each has the
 /// robot as it stands when it begins, those to come after the run's end do not count; without any
 /// bound, the largest. Without feet that bear at a push's start, or with a capture point beyond
 /// them, it has no bound. Empty when the scenario has hands, no push or but vertical ones.

@@ -31,7 +31,7 @@ struct SweepRow {
   /// Names of what went wrong until the end (logging::Events), in order, each once, joined by +.
   std::string trouble;
   std::string reason;  ///< why it ended early
-  /// Of a run that was stopped, crashed or hung: in whose stage; empty: in none, or not known.
+  /// Whose stage a run was in when it was stopped, crashed or hung; empty: none's, or not known.
   std::string component, stage;
   std::map<std::string, double> metrics;
   std::optional<PushBound> push;

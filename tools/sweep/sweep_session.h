@@ -76,7 +76,7 @@ class SweepSession {
   /// What to say of the room that `runs` logs take, from the first point's; empty: little. Throws
   /// ConfigError where the disk cannot hold them, unless --force.
   std::string RoomForLogs(double runs) const;
-  /// Of a process that has ended: its answer, or that it crashed or hung.
+  /// Makes the row of a process that has ended: its answer, or that it crashed or hung.
   static SweepRow RowOf(const Request& request, const ForkedTasks::Result& result);
 
   const SweepDefinition& definition_;

@@ -58,7 +58,7 @@ std::string SweepCsv(const SweepHeader& header, const SweepRows& rows) {
   for (const auto& [key, row] : rows) {
     std::vector<std::string> cells = Place(points, row.run);
     if (limit) cells.push_back(Cell(row.limit));
-    // Of a run that does not tell it may not be known.
+    // When a run ended is not known where it does not tell.
     const bool ended = row.survived() || row.ended_at != 0;
     cells.insert(cells.end(),
                  {row.outcome, Cell(row.fell_at), ended ? fmt::format("{}", row.ended_at) : "",
@@ -150,7 +150,7 @@ std::string LimitCsv(const SweepHeader& header, const SweepRows& rows) {
     of_bound(&PushBound::distance);
     share(&PushBound::lip_impulse);
     share(&PushBound::lip_impulse_of_duration);
-    // Of the run at the limit: each has its own time.
+    // The run at the limit tells: each has its own time.
     const std::optional<PushBound> stepped =
         point.at_limit != nullptr && point.at_limit->push && point.at_limit->push->step_time > 0
             ? point.at_limit->push

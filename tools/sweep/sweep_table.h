@@ -25,7 +25,7 @@ struct LimitPoint {
   const SweepRow* any = nullptr;  ///< of some run
   int untold = 0;                 ///< runs that do not tell whether the robot stood
 };
-/// Of those points that have rows. Pointers are into `rows`.
+/// Returns the points that have rows. Pointers are into `rows`.
 std::vector<LimitPoint> LimitPoints(const SweepHeader& header, const SweepRows& rows);
 
 /// A row a point. After the variables: the limit under its name, fails_at, largest_survived,

@@ -3,8 +3,8 @@ import {Column} from './column.js';
 import {centerOfPressure, conjugate, rotate, transformWrench} from './spatial.js';
 
 const GRAVITY = 9.80665;   // m/s²
-// Of the robot's weight: least |F_z| of which a ratio says something. Of a sole's sensor as in logging/metrics/contact_history.h,
-// below which noise decides what it reads.
+// A ratio says something from the first share of the robot's weight |F_z| on; below the second, as in
+// logging/metrics/contact_history.h, noise decides what a sole's sensor reads.
 const LIGHT_SHARE = 0.01, NOISY_SHARE = 0.05;
 const BRIDGED = 0.1;       // s without a message for which a phase goes on as it was
 

@@ -55,7 +55,7 @@ struct ClosedLoopPoles {
       modes;  ///< slowest decay first; one of a conjugate pair; no pole nearer to 0 than 1e-3
   double spectral_radius = 0;  ///< below 1: it stands
   bool stable() const { return spectral_radius < 1; }
-  /// Of the modes below `frequency` Hz; 1 without one.
+  /// Returns the least damping ratio of the modes below `frequency` Hz; 1 without one.
   double LeastDamping(double frequency = 1e9) const;
 };
 

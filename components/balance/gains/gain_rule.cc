@@ -14,8 +14,8 @@ constexpr double kDamping = 0.7;        // of the COM and the body
 constexpr double kPhase = 1.0 / 3;      // rad at k_d that the loop's delay may cost
 constexpr double kHorizon = 3;          // of the loop's delay: with a third it would ring
 constexpr double kVelocityCutoff = 20;  // Hz
-// Of the lowest frequency at which a rotor rings on its gear: a second-order low-pass leaves a
-// sixteenth of it.
+// The cutoff is this share of the lowest frequency at which a rotor rings on its gear: a
+// second-order low-pass leaves a sixteenth of the ringing.
 constexpr double kGearShare = 0.25;
 
 }  // namespace

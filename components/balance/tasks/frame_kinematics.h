@@ -7,7 +7,7 @@
 
 namespace poise::balance {
 
-/// Of a frame's origin, world axes, linear over angular.
+/// How a frame's origin moves: world axes, linear over angular.
 struct FrameMotion {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();       ///< in the world
   robot::Vector6d velocity = robot::Vector6d::Zero();           ///< m/s, rad/s

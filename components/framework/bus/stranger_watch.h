@@ -29,7 +29,7 @@ struct Stranger {
 class StrangerWatch {
  public:
   enum class Ports { kProcesses, kMirror };
-  /// Of the ports that processes listen to, or of the public one. Throws BusError.
+  /// Watches the ports that processes listen to, or the public one. Throws BusError.
   StrangerWatch(const RunSpec& spec, Ports ports);
 
   /// Counts what has come. True when anything has.

@@ -22,7 +22,7 @@ struct StepInput {
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
   Eigen::Vector3d com_velocity = Eigen::Vector3d::Zero();
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  ///< about the COM per mass, m²/s
-  /// Of the body from where its orientation is to be, rad, and its angular velocity, rad/s.
+  /// The body is turned by `lean` (rad) from where it is to be, and turns with `turning` (rad/s).
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
                                         Eigen::Isometry3d::Identity()};

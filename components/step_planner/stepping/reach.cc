@@ -40,7 +40,7 @@ class Leg {
   }
 
   Vector3d sole() const { return data_.foot_pose[foot_].translation(); }
-  /// Of the COM, m, world.
+  /// Returns the COM's position, m, world.
   Vector3d Com() {
     Vector3d sum = Vector3d::Zero();
     for (size_t b = 0; b < model_.bodies().size(); ++b) {
@@ -108,7 +108,8 @@ class Leg {
   Eigen::Matrix3d level_;
 };
 
-/// Of `foot` from the COM, from the stance outwards; empty when the stance cannot be held.
+/// Returns where `foot` reaches from the COM, from the stance outwards; empty when the stance
+/// cannot be held.
 balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, int foot,
                                   double reserve) {
   robot::PostureGoal goal = robot::StandingGoal(model);

@@ -66,9 +66,9 @@ class StepChoice {
     if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
   }
 
-  /// Of both feet the step whose margin is the largest, counted up to `enough`, and of equals the
-  /// sooner; none when standing still does as well. A foot that is not in contact swings at once,
-  /// from where it is.
+  /// Chooses of both feet's steps the one whose margin is the largest, counted up to `enough`, and
+  /// of equals the sooner; none when standing still does as well. A foot that is not in contact
+  /// swings at once, from where it is.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.

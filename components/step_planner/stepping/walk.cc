@@ -22,15 +22,16 @@ constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge
 constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
 constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
 constexpr double kPressed = 0.8;        // share of the press' load that counts as such
-// Of the unloading's rate: however far the centre of pressure is, and to come up with it. Chosen: a
-// foot that carries nothing and is a contact of the model still was dragged off its place.
+// Unloading goes on at these shares of its rate: at least, however far the centre of pressure is,
+// and at most, to come up with it. Chosen: a foot that carries nothing and is a contact of the
+// model still was dragged off its place.
 constexpr double kSlowest = 0.1, kFastest = 3;
 constexpr double kWait = 0.1;  // s in which a capture point that must wait is stopped
-// Of the load: a sole that bears less has not shown yet how far it sinks.
+// A sole that bears less of the load has not shown yet how far it sinks.
 constexpr double kBears = 0.5, kBearsAll = 0.7;
-// Of a straight leg: how far it is stretched at most. Fitted: 0.9 and 0.94 fall as seldom, 0.97 and
-// 0.86 more often; with 0.97 the knee of a foot that is about to leave the ground came to be
-// straight.
+// A leg is stretched to this share of a straight one at most. Fitted: 0.9 and 0.94 fall as seldom,
+// 0.97 and 0.86 more often; with 0.97 the knee of a foot that is about to leave the ground came to
+// be straight.
 constexpr double kStretched = 0.92;
 constexpr int kMostClosing = 3;  // steps that bring the feet side by side, until it stands as it is
 constexpr double kBlend = 0.1;   // s in which the centre of pressure goes over to another stage's
@@ -348,7 +349,7 @@ double Walk::Progress(double time) const {
 void Walk::Unload(const StepState& state, double period) {
   const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
   const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
-  // Of the way, how far the centre of pressure still is from the sole that shall carry.
+  // The centre of pressure still has this share of the way to the sole that shall carry.
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
   const double share = spec_.lead < left * way.norm() ? spec_.lead / (left * way.norm()) : 1;
   const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
@@ -445,7 +446,7 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
 }
 
 Vector2d Walk::AgainstRolling(const StepInput& input) const {
-  // Of both, each by what it carries.
+  // Both soles count, each by what it carries.
   Vector2d cop = Vector2d::Zero();
   const double all = input.load[0] + input.load[1];
   for (size_t i = 0; i < 2; ++i) {

@@ -157,7 +157,7 @@ class Walk {
   double GroundAt(const StepInput& input, const Footstep& foothold) const;
   /// m, world: the highest COM from which the foot reaches down to the foothold that it is told of.
   double HighestForStep(const StepInput& input, const StepState& state) const;
-  /// Of the ramp that is under way, 0 to 1.
+  /// How far the ramp that is under way has come, 0 to 1.
   double Progress(double time) const;
   /// The unloading ramp, in a walk that rests, no sooner than the centre of pressure goes over.
   void Unload(const StepState& state, double period);
@@ -175,7 +175,7 @@ class Walk {
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
   double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
-  /// Of the plan, from the first piece that is not over; `stance`: the sole that carries.
+  /// Plans anew from the first piece that is not over; `stance` is the sole that carries.
   void PlanFrom(const StepState& state);
   /// The swing's foothold, moved by what the centre of pressure cannot correct.
   void Adjust(const StepInput& input, const StepState& state);

@@ -106,8 +106,8 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
   }
 }
 
-// Of a step under way whose foothold is fixed, from a corner the pendulum ends on the edge of the
-// new sole or beyond it, of one step the same sole's.
+// In a step under way whose foothold is fixed the pendulum ends, from a corner, on the edge of the
+// new sole or beyond it, and of one step on the same sole's.
 TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
   const StepChoice choice = Choice();
   const double frequency = 3.4, left = 0.2, yaw = -0.3;

@@ -150,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"phase { transition { kind: LOAD foot: LEFT_FOOT delay: -1 } }",
                 "phase[0].transition.delay"}));
 
-// Of one foot's way down: "down", "stand" behind it, and whatever follows.
+// One foot's way down is "down", "stand" behind it, and whatever follows.
 #define DOWN(more) \
   "phase { name: 'down' duration: 1 support: RIGHT " more " } phase { name: 'stand' } "
 

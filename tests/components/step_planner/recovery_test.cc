@@ -163,7 +163,7 @@ class World {
   Recovery& recovery() { return recovery_; }
   const robot::RobotModel& model() const { return model_; }
   double largest_jump() const { return largest_jump_; }
-  /// Of the load's ramps, in a tick.
+  /// The load's fastest ramp, in a tick.
   double fastest_ramp() const { return fastest_ramp_; }
   double touched() const { return touched_; }
   double decided() const { return decided_; }

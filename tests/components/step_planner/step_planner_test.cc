@@ -20,8 +20,8 @@ namespace {
 
 using robot::TestRobot;
 
-// Of a point in the hull of others, m, negative outside, by brute force: a pair of points with all
-// others on its left is an edge.
+// Returns how far a point lies in the hull of others, m, negative outside, by brute force: a pair
+// of points with all others on its left is an edge.
 double DistanceInside(const std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& point) {
   double inside = std::numeric_limits<double>::infinity(), outside = inside;
   for (const Eigen::Vector2d& a : points) {

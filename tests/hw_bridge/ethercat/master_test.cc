@@ -305,7 +305,7 @@ TEST(EthercatMaster, ADamagedOutputComesBackAsNoAnswer) {
     const CycleResult result = bench.Cycle();
     taken += result.returned ? 1 : 0;
   }
-  // Of 1 to 8 bytes changed at random, some hit inputs, address or time alone; most are caught.
+  // Some of 1 to 8 bytes changed at random hit inputs, address or time alone; most are caught.
   EXPECT_LT(taken, 1200);
 }
 

@@ -73,7 +73,7 @@ class Wire {
   }
   /// False: they are no state.
   bool Read(const std::vector<uint8_t>& bytes, LowState* state) const {
-    // Of that size and no byte more, so that a sanitizer sees who reads beyond them.
+    // The copy has that size and no byte more, so that a sanitizer sees who reads beyond it.
     const std::unique_ptr<uint8_t[]> exact(new uint8_t[bytes.size()]);
     std::copy(bytes.begin(), bytes.end(), exact.get());
     const ddsrt_iovec_t place = {exact.get(), bytes.size()};
