@@ -16,8 +16,8 @@ const pages = ['README.md', ...repositoryFiles('docs').filter((f) => f.endsWith(
 const MEASURED = /^Measured: (by the commit of this line, \d{4}-\d\d-\d\d|[0-9a-f]{7}(?: to [0-9a-f]{7})?, \d{4}-\d\d-\d\d)[,;.]/;
 const COMPARED = /Compared by the tests\.$/;
 
-/** Columns of what was chosen or is prescribed, not measured. */
-const GIVEN = new Set(['use', 'reason', 'points; `--quick`']);
+/** Columns of what was chosen or is prescribed, not measured: a field's values, too, are an interface's. */
+const GIVEN = new Set(['field', 'use', 'reason', 'points; `--quick`']);
 
 /** Whether most cells of a table, its first column aside, begin with a figure. */
 function isMeasured({rows}) {

@@ -90,7 +90,8 @@ function problemOfSpan(span, page) {
   }
   const message = /^([A-Z][A-Z_]+)\.([a-z_]+)/.exec(span);
   if (message && !isPlaceholder(message[1])) {
-    const section = facts.messages.split('\n## ').find((s) => new RegExp(`Channel .*\\b${message[1]}\\b`).test(s));
+    // The channels' names end at the point; a summary behind it may name others.
+    const section = facts.messages.split('\n## ').find((s) => new RegExp(`^Channel [^.]*\\b${message[1]}\\b`, 'm').test(s));
     if (section === undefined) return `there is no channel ${message[1]}`;
     return new RegExp(`\\b${message[2]}\\b`).test(section) ? null : `${message[1]} has no field ${message[2]}`;
   }
