@@ -125,6 +125,10 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   merge->add_flag("--force", merge_options->force, "replace what --out holds");
   merge->add_flag("--partial", merge_options->partial, "though points are missing");
   merge->add_flag("--png", merge_options->all_pictures, "every map as PNG, too");
+  merge->footer(
+      "The whole has what one sweep has.\nExit code: 0 when every run was made, fallen or not; 1 "
+      "when one could not be made; 2 wrong usage or configuration.\nExample: poise sweep merge "
+      "runs/first runs/second --out runs/whole");
   merge->callback(
       [merge_options, command] { *command = [merge_options] { return Merge(*merge_options); }; });
   sweep->callback([arguments, session, command, merge] {
