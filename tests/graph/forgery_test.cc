@@ -187,8 +187,9 @@ TEST_P(Forgery, ForgedMessagesOfEveryChannelChangeNothingAndAreNamed) {
   EXPECT_THAT(told, HasSubstr("packets from outside the run: "));
   EXPECT_THAT(result.output, HasSubstr("warning: refused "));
   std::map<std::string, int64_t> counts;
-  for (const nlohmann::json& each :
-       nlohmann::json::parse(ReadAll(run_ + "/recorder.json"))["strangers"]) {
+  // A name of its own: a temporary's part would outlive it in the loop.
+  const nlohmann::json recorder = nlohmann::json::parse(ReadAll(run_ + "/recorder.json"));
+  for (const nlohmann::json& each : recorder["strangers"]) {
     counts[each["channel"].get<std::string>()] += each["packets"].get<int64_t>();
   }
   EXPECT_GT(counts[kControlChannel], 0);
