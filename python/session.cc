@@ -12,7 +12,7 @@
 #include "components/framework/run.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
-#include "logging/metrics/bridge_words.h"
+#include "logging/events/bridge_words.h"
 #include "poise/bridge_status_t.hpp"
 #include "sim/push.h"
 #include "tools/cli/output_place.h"

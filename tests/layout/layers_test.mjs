@@ -38,13 +38,14 @@ const BELOW = {
   'logging': BUS,
   'logging/recording': [...BUS, 'logging'],
   'logging/metrics': [...BUS, 'logging'],
+  'logging/events': [...BUS, 'logging', 'logging/metrics'],
   'logging/export': [...BUS, 'logging'],
   'logging/replay': [...BUS, 'logging'],
-  'python': [...BUS, 'python', 'sim', 'logging', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/run'],
+  'python': [...BUS, 'python', 'sim', 'logging', 'logging/events', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/run'],
   'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
-const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'run', 'foxglove', 'ros2', 'live', 'sweep', 'maps', 'benchmark', 'commands'];
+const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'operator', 'run', 'foxglove', 'ros2', 'live', 'sweep', 'maps', 'benchmark', 'commands'];
 /** Folders that one file may name although it is not below them: where all processes are listed. */
 const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
 

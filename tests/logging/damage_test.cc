@@ -5,7 +5,7 @@
 #include <random>
 
 #include "components/robot/robot_model.h"
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/metrics/metrics.h"
 #include "logging/replay/compare.h"
 #include "logging/run_log_writer.h"

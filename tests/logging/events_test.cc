@@ -1,4 +1,4 @@
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 
 #include <gmock/gmock.h>
 
@@ -8,8 +8,8 @@
 
 #include "components/step_planner/step_planner.pb.h"
 #include "google/protobuf/text_format.h"
-#include "logging/metrics/bridge_words.h"
-#include "logging/metrics/operator_words.h"
+#include "logging/events/bridge_words.h"
+#include "logging/events/operator_words.h"
 #include "tests/logging/record_fixture.h"
 
 namespace poise::logging {
@@ -530,7 +530,7 @@ TEST(BridgeNames, EveryStateAndReasonHasItsOwn) {
   }
 }
 
-/// Of the component with this index, in the log of this run.
+/// Makes the answer of the component with this index, in the log of this run.
 operate::answer_t Answered(int64_t id, int64_t tick, int32_t component, int8_t verdict) {
   operate::answer_t answer{};
   SetHeader(tick, &answer);

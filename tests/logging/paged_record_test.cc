@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
+#include "logging/events/events.h"
 #include "logging/export/signal_table.h"
-#include "logging/metrics/events.h"
 #include "logging/metrics/metrics.h"
 #include "tests/logging/record_fixture.h"
 #include "tests/test_seed.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "logging/metrics/event_spans.h"
+#include "logging/events/event_spans.h"
 #include "tools/report/event_list.h"
 
 namespace poise {

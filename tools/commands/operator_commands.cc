@@ -1,17 +1,19 @@
 #include <charconv>
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "components/framework/bus/udp_bus.h"
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/terminal.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
+#include "tools/operator/operator_line.h"
 #include "tools/run/live_run.h"
-#include "tools/run/operator_line.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
 
@@ -69,7 +71,12 @@ ActedRun FindActedRun(const std::string& run, const std::string& command) {
   } else {
     dir = RunNamed(run, naming);
   }
-  return {dir, OperatorLine(ReadRunSpec(dir.string()))};
+  try {
+    return {dir, OperatorLine(ReadRunSpec(dir.string()))};
+  } catch (const BusError&) {
+    if (RunInProgress(dir)) throw;
+    throw std::runtime_error(fmt::format("{}: this run has ended", dir.string()));
+  }
 }
 
 /// Says what became of `what`; the exit code.

@@ -7,7 +7,7 @@ namespace poise {
 
 enum class EventLevel { kInfo, kWarning, kError };
 
-/// Of an event's name (logging/metrics/events.h).
+/// Returns the level of the events with this name (logging/events/events.h).
 EventLevel LevelOfEvent(std::string_view name);
 
 }  // namespace poise

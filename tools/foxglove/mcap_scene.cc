@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "fmt/format.h"
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/printable.h"
 #include "logging/run_record.h"
 #include "tools/foxglove/scene_topics.h"

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/run_record.h"
 #include "tools/foxglove/contact_scene.h"
 #include "tools/foxglove/ground_scene.h"
@@ -34,7 +34,7 @@ class SceneTopics {
  public:
   using Emit = std::function<void(size_t topic, uint64_t time, std::string message)>;
 
-  /// Of a run's info, spec and robot alone; `run` must outlive it. Meshes are read where the run
+  /// Takes a run's info, spec and robot alone; `run` must outlive it. Meshes are read where the run
   /// found them.
   SceneTopics(const logging::RunRecord& run, const Scenario& scenario, Emit emit);
 

@@ -12,8 +12,8 @@
 #include "components/framework/bus/run_socket.h"
 #include "poise/bridge_status_t.hpp"
 #include "tools/live/operator_sink.h"
+#include "tools/operator/operator_line.h"
 #include "tools/run/live_run.h"
-#include "tools/run/operator_line.h"
 
 namespace poise {
 

@@ -8,7 +8,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "logging/metrics/operator_words.h"
+#include "logging/events/operator_words.h"
 #include "poise/bridge_status_t.hpp"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/message_traits.hpp"

@@ -10,8 +10,8 @@
 
 #include "components/framework/runners/inline_runner.h"
 #include "tools/live/operator_sink.h"
-#include "tools/run/act_targets.h"
-#include "tools/run/operator_line.h"
+#include "tools/operator/act_targets.h"
+#include "tools/operator/operator_line.h"
 
 namespace poise {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "fmt/format.h"
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/run_record.h"
 #include "tools/report/html_report.h"
 #include "tools/report/report.h"

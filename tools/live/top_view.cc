@@ -5,7 +5,7 @@
 
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "logging/metrics/bridge_words.h"
+#include "logging/events/bridge_words.h"
 #include "logging/printable.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/report.h"

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "fmt/format.h"
-#include "logging/metrics/event_spans.h"
+#include "logging/events/event_spans.h"
 #include "tools/cli/text_table.h"
 #include "tools/report/fall_story.h"
 

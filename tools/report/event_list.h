@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 
 namespace poise {
 

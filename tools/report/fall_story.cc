@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "fmt/format.h"
+#include "logging/events/event_spans.h"
 #include "logging/metrics/contact_history.h"
-#include "logging/metrics/event_spans.h"
 #include "tools/cli/text_table.h"
 
 namespace poise {

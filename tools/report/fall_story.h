@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/run_record.h"
 
 namespace poise {

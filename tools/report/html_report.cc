@@ -18,9 +18,9 @@
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "lcmtypes/field_table.h"
+#include "logging/events/events.h"
 #include "logging/export/column_codec.h"
 #include "logging/export/signal_table.h"
-#include "logging/metrics/events.h"
 #include "logging/partial_file.h"
 #include "tools/report/ground_json.h"
 #include "tools/report/run_story.h"
@@ -182,7 +182,7 @@ Json ChannelsJson(const std::vector<logging::ChannelColumns>& channels, int64_t 
   return json;
 }
 
-/// Of a page whose rows hold several ticks.
+/// Writes the channels of a page whose rows hold several ticks.
 Json RowChannelsJson(const std::vector<logging::ChannelRows>& channels, int64_t num_ticks,
                      BlobWriter* blobs) {
   constexpr double kFew = 0.2;  // of the ticks, as in web/src/data.js

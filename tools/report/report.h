@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/metrics/metrics.h"
 #include "logging/run_record.h"
 #include "tools/cli/text_table.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "components/framework/graph.pb.h"
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/run_record.h"
 #include "tools/report/report.h"
 #include "tools/scenario/scenario.pb.h"

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/run_record.h"
 #include "tools/report/report.h"
 #include "tools/scenario/scenario.pb.h"

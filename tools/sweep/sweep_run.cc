@@ -13,7 +13,7 @@
 #include "components/framework/runners/inline_runner.h"
 #include "components/robot/robot_model.h"
 #include "fmt/format.h"
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 #include "logging/metrics/metrics.h"
 #include "logging/metrics/schedule_plan.h"
 #include "logging/recording/inline_record.h"

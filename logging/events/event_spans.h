@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 
 namespace poise::logging {
 

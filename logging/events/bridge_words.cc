@@ -1,4 +1,4 @@
-#include "logging/metrics/bridge_words.h"
+#include "logging/events/bridge_words.h"
 
 #include "fmt/format.h"
 

@@ -1,4 +1,4 @@
-#include "logging/metrics/operator_words.h"
+#include "logging/events/operator_words.h"
 
 #include "fmt/format.h"
 #include "operate/act_t.hpp"

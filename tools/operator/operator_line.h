@@ -13,7 +13,7 @@
 #include "components/framework/bus/run_socket.h"
 #include "components/framework/graph.pb.h"
 #include "operate/message_traits.hpp"
-#include "tools/run/act_targets.h"
+#include "tools/operator/act_targets.h"
 
 namespace poise {
 

@@ -1,4 +1,4 @@
-#include "logging/metrics/event_spans.h"
+#include "logging/events/event_spans.h"
 
 #include <algorithm>
 #include <array>

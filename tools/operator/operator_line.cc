@@ -1,4 +1,4 @@
-#include "tools/run/operator_line.h"
+#include "tools/operator/operator_line.h"
 
 #include <poll.h>
 
@@ -16,7 +16,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "logging/metrics/operator_words.h"
+#include "logging/events/operator_words.h"
 #include "tools/scenario/registry.h"
 
 namespace poise {

@@ -140,8 +140,8 @@ TEST_F(SweepFaultTest, AnInlineRunThatHangsEndsAndNamesTheStage) {
 // The one that does not answer is named, not the others, which wait for it.
 TEST_F(SweepFaultTest, AProcessThatStandsStillIsTheOneThatIsNamed) {
   unsetenv("POISE_PATH");
-  PoiseProgram program({"run", "base/stand", "--duration", "1000", "--out", Out("run")});
-  ASSERT_TRUE(WaitForLog(Out("run"), kUnderWay));
+  PoiseProgram program({"run", StandScenario(), "--duration", "1000", "--out", Out("run")});
+  ASSERT_TRUE(WaitForLog(Out("run"), kUnderWay)) << program.Wait().output;
   kill(ComponentProcess(Out("run"), "task_controller"), SIGSTOP);
   const ProgramResult result = program.Wait();
   EXPECT_EQ(result.exit_code, 1);

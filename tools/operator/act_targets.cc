@@ -1,4 +1,4 @@
-#include "tools/run/act_targets.h"
+#include "tools/operator/act_targets.h"
 
 #include <algorithm>
 

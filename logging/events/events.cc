@@ -1,4 +1,4 @@
-#include "logging/metrics/events.h"
+#include "logging/events/events.h"
 
 #include <algorithm>
 #include <array>
@@ -15,10 +15,10 @@
 #include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
 #include "fmt/format.h"
+#include "logging/events/bridge_words.h"
+#include "logging/events/operator_words.h"
 #include "logging/metrics/analysis.h"
-#include "logging/metrics/bridge_words.h"
 #include "logging/metrics/contact_history.h"
-#include "logging/metrics/operator_words.h"
 #include "logging/metrics/planner_steps.h"
 #include "logging/metrics/schedule_plan.h"
 #include "logging/metrics/true_contacts.h"
@@ -287,7 +287,7 @@ void AddCalibration(const RunRecord& run, EventList* events) {
 
 /// Why the centre of pressure is not within its limits.
 std::string NotAchievedText(const balance_torque_t& balance) {
-  // Of a wrench that does not press on the ground there is none, and the message has zeros.
+  // A wrench that does not press on the ground has none, and the message has zeros.
   const double pulls = balance.resultant_task.force[2];
   if (!(pulls < 0)) {
     return fmt::format("no CoP: the task torque would pull at the ground with {:.0f} N", pulls);
@@ -562,7 +562,8 @@ Answer PushForce(const RunRecord& run, int64_t tick) {
 /// difference between neighbouring samples, which a push does not touch.
 double PushThreshold(const RunRecord& run) {
   constexpr double kDeviations = 6;  // of a norm of three: beyond it once in 10^7 samples
-  // Of the norm of three normal variables of deviation 1, and of a difference of two.
+  // The norm of three normal variables of deviation 1 has this median; a difference of two, √2 of
+  // it.
   const double median_of_difference = 1.5382 * std::sqrt(2.0);
   std::vector<double> differences;
   for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
