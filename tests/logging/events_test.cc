@@ -4,12 +4,9 @@
 
 #include <cmath>
 #include <numbers>
-#include <set>
 
 #include "components/step_planner/step_planner.pb.h"
 #include "google/protobuf/text_format.h"
-#include "logging/events/bridge_words.h"
-#include "logging/events/operator_words.h"
 #include "tests/logging/record_fixture.h"
 
 namespace poise::logging {
@@ -516,20 +513,6 @@ TEST_F(EventsTest, AMissingMessageEndsNothing) {
   EXPECT_EQ(Named("balancing_on").size(), 1u);
 }
 
-TEST(BridgeNames, EveryStateAndReasonHasItsOwn) {
-  std::set<std::string> names;
-  for (int8_t state = bridge_status_t::STATE_INIT; state <= bridge_status_t::STATE_ESTOP; ++state) {
-    EXPECT_EQ(BridgeStateName(state).find("state "), std::string::npos) << int{state};
-    EXPECT_TRUE(names.insert(BridgeStateName(state)).second) << int{state};
-  }
-  EXPECT_EQ(BridgeReasonName(bridge_status_t::REASON_NONE), "");
-  for (int8_t reason = bridge_status_t::REASON_NO_COMMAND;
-       reason <= bridge_status_t::REASON_SHUTDOWN; ++reason) {
-    EXPECT_EQ(BridgeReasonName(reason).find("reason "), std::string::npos) << int{reason};
-    EXPECT_TRUE(names.insert(BridgeReasonName(reason)).second) << int{reason};
-  }
-}
-
 /// Makes the answer of the component with this index, in the log of this run.
 operate::answer_t Answered(int64_t id, int64_t tick, int32_t component, int8_t verdict) {
   operate::answer_t answer{};
@@ -581,21 +564,6 @@ TEST_F(EventsTest, AnAnswerThatIsNotOfThisRunOrTellsNoTickOfItIsNone) {
   answers_ = {other, Answered(2, -5, 0, answer_t::VERDICT_RANGE),
               Answered(3, int64_t{1} << 50, 0, answer_t::VERDICT_RANGE)};
   EXPECT_TRUE(Named("act_refused").empty());
-}
-
-TEST_F(EventsTest, EveryKindOfActAndRefusalHasAWord) {
-  using operate::act_t;
-  using operate::answer_t;
-  std::set<std::string> words;
-  for (int8_t kind = act_t::KIND_PUSH; kind <= act_t::KIND_NEXT_PHASE; ++kind) {
-    EXPECT_EQ(ActKindName(kind).find("of kind"), std::string::npos) << int{kind};
-    EXPECT_TRUE(words.insert(ActKindName(kind)).second) << int{kind};
-  }
-  for (int8_t verdict = answer_t::VERDICT_LATE; verdict <= answer_t::VERDICT_NOT_NOW; ++verdict) {
-    const std::string reason = RefusalReason(act_t::KIND_PUSH, verdict);
-    EXPECT_EQ(reason.find("refused ("), std::string::npos) << int{verdict};
-    EXPECT_TRUE(words.insert(reason).second) << int{verdict};
-  }
 }
 
 }  // namespace

@@ -1,0 +1,121 @@
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "fmt/format.h"
+#include "logging/events/bridge_words.h"
+#include "logging/events/event_groups.h"
+#include "logging/metrics/analysis.h"
+#include "logging/metrics/contact_history.h"
+
+namespace poise::logging {
+namespace {
+
+constexpr double kLimitGap = 0.1;  // s between two limits of a motor that are one
+
+/// A limit of the bridge that changed what a controller wanted of a joint.
+struct MotorLimit {
+  int bit;
+  const char *begins, *ends;
+};
+constexpr MotorLimit kMotorLimits[] = {
+    {bridge_status_t::LIMIT_TORQUE, "motor_limited", "motor_limited_ends"},
+    {bridge_status_t::LIMIT_THERMAL, "motor_hot", "motor_hot_ends"},
+    {bridge_status_t::LIMIT_IMPEDANCE, "impedance_cut", "impedance_cut_ends"},
+};
+
+/// N·m that the command wants of a joint, with its stiffness and damping at the estimated joint.
+Answer WantedTorque(const RunRecord& run, int64_t tick, size_t joint) {
+  const joint_command_t* const command = run.command.at(tick);
+  const robot_state_t* const state = run.state.at(tick);
+  if (command == nullptr || joint >= command->torque.size()) return {};
+  if (command->stiffness[joint] == 0 && command->damping[joint] == 0) return command->torque[joint];
+  if (state == nullptr) return {};
+  return command->torque[joint] +
+         command->stiffness[joint] * (command->position[joint] - state->joint_position[joint]) +
+         command->damping[joint] * (command->velocity[joint] - state->joint_velocity[joint]);
+}
+
+/// "left_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted", over the interval.
+std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& limit,
+                        const Interval& interval) {
+  const std::string& name = run.robot.joints()[joint].name;
+  if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) {
+    return fmt::format("{}: stiffness, damping, position or velocity cut to what the robot bears",
+                       name);
+  }
+  const auto applied = [&](int64_t tick) -> Answer {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr) return {};
+    return bridge->applied_torque[joint];
+  };
+  double from = applied(interval.begin - 1).value_or(*applied(interval.begin)), to = from;
+  Answer wanted;
+  for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr || (bridge->saturated[joint] & limit.bit) == 0) continue;
+    const double now = bridge->applied_torque[joint];
+    // A cold motor is held at its largest torque, a hot one to ever less.
+    const bool more = limit.bit == bridge_status_t::LIMIT_TORQUE
+                          ? std::abs(now) >= std::abs(to) || tick == interval.begin
+                          : std::abs(now) <= std::abs(to) || tick == interval.begin;
+    if (more) to = now;
+    const Answer want = WantedTorque(run, tick, joint);
+    if (want && (!wanted || std::abs(*want) > std::abs(*wanted))) wanted = want;
+  }
+  return fmt::format("{}: {:.1f} to {:.1f} N·m{}", name, Tenths(from), Tenths(to),
+                     wanted ? fmt::format(", of {:.1f} N·m wanted", Tenths(*wanted)) : "");
+}
+
+}  // namespace
+
+void AddMotorEvents(const RunRecord& run, EventList* events) {
+  const size_t joints = run.robot.joints().size();
+  const auto gap = static_cast<int64_t>(std::ceil(kLimitGap / run.spec.tick_period()));
+  std::array<std::vector<std::vector<Interval>>, std::size(kMotorLimits)> limited;
+  limited.fill(std::vector<std::vector<Interval>>(joints));
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr || bridge->state != bridge_status_t::STATE_RUNNING) continue;
+    for (size_t joint = 0; joint < joints; ++joint) {
+      if (bridge->saturated[joint] == 0) continue;
+      for (size_t i = 0; i < limited.size(); ++i) {
+        if ((bridge->saturated[joint] & kMotorLimits[i].bit) == 0) continue;
+        std::vector<Interval>& intervals = limited[i][joint];
+        if (intervals.empty() || tick - *intervals.back().end > gap)
+          intervals.push_back({tick, {}});
+        intervals.back().end = tick + 1;
+      }
+    }
+  }
+  for (size_t i = 0; i < limited.size(); ++i) {
+    const MotorLimit& limit = kMotorLimits[i];
+    for (size_t joint = 0; joint < joints; ++joint) {
+      for (Interval& interval : limited[i][joint]) {
+        if (*interval.end == run.num_ticks) interval.end.reset();
+        events->Add(interval.begin, limit.begins, LimitedText(run, joint, limit, interval));
+        events->AddEndOf(interval, limit.ends, run.robot.joints()[joint].name);
+      }
+    }
+  }
+}
+
+void AddBridgeEvents(const RunRecord& run, EventList* events) {
+  const ElementNames names(run.robot);
+  const bridge_status_t* before = nullptr;
+  for (int64_t tick = 0; tick < run.num_ticks; ++tick) {
+    const bridge_status_t* bridge = run.bridge.at(tick);
+    if (bridge == nullptr) continue;
+    if (before != nullptr && bridge->state != before->state) {
+      const std::string reason = BridgeReasonText(*bridge, names);
+      events->Add(tick, "bridge_state",
+                  fmt::format("{} to {}{}", BridgeStateName(before->state),
+                              BridgeStateName(bridge->state), reason.empty() ? "" : ": " + reason));
+    }
+    before = bridge;
+  }
+}
+
+}  // namespace poise::logging
