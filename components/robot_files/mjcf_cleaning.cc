@@ -10,18 +10,13 @@
 #include "components/robot/robot_model.h"
 #include "components/robot/xml_text.h"
 #include "components/robot_files/mjcf_attributes.h"
+#include "components/robot_files/mjcf_defaults.h"
 
 namespace poise::robot {
 namespace {
 
 constexpr size_t kMaxElements = 20000;
 constexpr size_t kFreeCoordinates = 7;  // position and quaternion
-
-// A class of defaults: what the reader itself must resolve.
-struct DefaultClass {
-  std::string parent;
-  std::map<std::string, std::string> joint, geom;
-};
 
 class Cleaner {
  public:
@@ -41,7 +36,7 @@ class Cleaner {
     std::string xml = "<mujoco><compiler autolimits='true'" + compiler_ +
                       " balanceinertia='true' boundmass='1e-9' boundinertia='1e-12'/>"
                       "<size njmax='1' nconmax='1'/>";
-    Sections(root, "default", [&](const tinyxml2::XMLElement& e) { Defaults(e, "", &xml); });
+    Sections(root, "default", [&](const tinyxml2::XMLElement& e) { defaults_.Read(e, "", &xml); });
     Sections(root, "asset", [&](const tinyxml2::XMLElement& e) { Assets(e); });
     const Place robot = RobotBody(root);
     xml += "<worldbody>";
@@ -81,17 +76,6 @@ class Cleaner {
          e = e->NextSiblingElement(name)) {
       read(*e);
     }
-  }
-
-  std::string ClassAttribute(const tinyxml2::XMLElement& element, const char* name) const {
-    const std::string value = Attribute(element, name);
-    if (value.empty()) return "";
-    const auto known = class_index_.find(value);
-    if (known == class_index_.end()) {
-      FailMjcf(element, "{} '{}' of <{}> is no class of <default>", name, value, Shown(element));
-    }
-    return value == main_ ? fmt::format(" {}='main'", name)
-                          : fmt::format(" {}='c{}'", name, known->second);
   }
 
   // The last one's attributes hold where there are several <compiler>.
@@ -145,76 +129,10 @@ class Cleaner {
       entry.mesh = file;
       if (mesh.Attribute("scale")) {
         entry.scale = MjcfNumbers<3>(mesh, "scale");
-      } else if (const auto* scale = Inherited(mesh_scale_, ClassOf(mesh, ""))) {
+      } else if (const auto* scale = defaults_.MeshScale(mesh)) {
         entry.scale = *scale;
       }
     });
-  }
-
-  void Defaults(const tinyxml2::XMLElement& element, const std::string& parent, std::string* xml) {
-    std::string name = Attribute(element, "class");
-    const bool is_main = parent.empty();
-    if (name.empty() && is_main) name = "main";
-    if (name.empty()) FailMjcf(element, "<default> within another has no class: add class=\"...\"");
-    if (is_main && main_.empty()) main_ = name;
-    if (is_main && name != main_)
-      FailMjcf(element, "<default> '{}' stands beside '{}'", name, main_);
-    const bool is_new = class_index_.emplace(name, class_index_.size()).second;
-    if (!is_new && !is_main) FailMjcf(element, "class '{}' of <default> stands twice", name);
-    DefaultClass& own = classes_[name];
-    own.parent = parent;
-    // The outermost class is MuJoCo's "main".
-    *xml += is_main ? std::string("<default>")
-                    : fmt::format("<default class='c{}'>", class_index_[name]);
-    for (const tinyxml2::XMLElement* e = element.FirstChildElement(); e;
-         e = e->NextSiblingElement()) {
-      const std::string kind = e->Value();
-      if (kind == "default") {
-        Defaults(*e, name, xml);
-      } else if (kind == "joint" || kind == "geom") {
-        auto& known = kind == "joint" ? own.joint : own.geom;
-        for (const tinyxml2::XMLAttribute* a = e->FirstAttribute(); a; a = a->Next()) {
-          known[a->Name()] = OneLine(a->Value());
-        }
-        if (e->Attribute("actuatorfrcrange"))
-          force_range_[name] = MjcfNumbers<2>(*e, "actuatorfrcrange");
-        *xml += fmt::format("<{}{}/>", kind, KeptAttributes(*e, kind));
-      } else if (kind == "mesh" && e->Attribute("scale")) {
-        mesh_scale_[name] = MjcfNumbers<3>(*e, "scale");
-      } else if (kind == "site" || IsActuator(kind)) {
-        *xml += kind == "site" ? fmt::format("<site{}/>", KeptAttributes(*e, "site"))
-                               : fmt::format("<motor{}/>", KeptAttributes(*e, "actuator"));
-      }
-    }
-    *xml += "</default>";
-  }
-
-  // The class whose defaults an element takes.
-  std::string ClassOf(const tinyxml2::XMLElement& element, const std::string& child_class) const {
-    const std::string own = Attribute(element, "class");
-    if (!own.empty()) return own;
-    return child_class.empty() ? main_ : child_class;
-  }
-
-  // What a class or the nearest above it has; null where none has.
-  template <typename T>
-  const T* Inherited(const std::map<std::string, T>& known, const std::string& name) const {
-    for (auto c = classes_.find(name); c != classes_.end(); c = classes_.find(c->second.parent)) {
-      if (const auto found = known.find(c->first); found != known.end()) return &found->second;
-    }
-    return nullptr;
-  }
-
-  std::string Resolved(const tinyxml2::XMLElement& element, const char* name,
-                       const std::string& child_class,
-                       std::map<std::string, std::string> DefaultClass::*kind) const {
-    if (element.Attribute(name)) return Attribute(element, name);
-    for (auto c = classes_.find(ClassOf(element, child_class)); c != classes_.end();
-         c = classes_.find(c->second.parent)) {
-      const auto& known = c->second.*kind;
-      if (const auto found = known.find(name); found != known.end()) return found->second;
-    }
-    return "";
   }
 
   /// Numbers in a keyframe of the joints with which a body of the world floats: a free one, or
@@ -224,7 +142,8 @@ class Cleaner {
     std::map<std::string, int> count;
     for (const tinyxml2::XMLElement* j = body.FirstChildElement("joint"); j;
          j = j->NextSiblingElement("joint")) {
-      const std::string type = Resolved(*j, "type", child_class, &DefaultClass::joint);
+      const std::string type =
+          defaults_.Resolved(*j, "type", child_class, MjcfDefaults::Kind::kJoint);
       ++count[type.empty() ? "hinge" : type];
     }
     using Count = std::map<std::string, int>;
@@ -325,7 +244,7 @@ class Cleaner {
     body.name = UniqueName(element, "body", static_cast<size_t>(index), &links_);
     body.parent = parent;
     if (!Attribute(element, "childclass").empty()) {
-      ClassAttribute(element, "childclass");
+      defaults_.ClassAttribute(element, "childclass");
       child_class = Attribute(element, "childclass");
     }
     *xml += BodyTag(fmt::format(" name='b{}'", index), element);
@@ -355,7 +274,7 @@ class Cleaner {
   }
 
   std::string BodyTag(const std::string& name, const tinyxml2::XMLElement& element) const {
-    return fmt::format("<body{}{}{}>", name, ClassAttribute(element, "childclass"),
+    return fmt::format("<body{}{}{}>", name, defaults_.ClassAttribute(element, "childclass"),
                        KeptAttributes(element, "body"));
   }
 
@@ -438,24 +357,26 @@ class Cleaner {
     owner.joint = static_cast<int>(index);
     if (element.Attribute("actuatorfrcrange")) {
       joint.force_range = MjcfNumbers<2>(element, "actuatorfrcrange");
-    } else {
-      if (const auto* range = Inherited(force_range_, ClassOf(element, child_class))) {
-        joint.force_range = *range;
-      }
+    } else if (const auto* range = defaults_.ForceRange(element, child_class)) {
+      joint.force_range = *range;
     }
-    if (const auto k = Resolved(element, "stiffness", child_class, &DefaultClass::joint);
+    if (const auto k =
+            defaults_.Resolved(element, "stiffness", child_class, MjcfDefaults::Kind::kJoint);
         !k.empty() && std::strtod(k.c_str(), nullptr) != 0) {
       Note(element, "the spring of joint '{}' is left out", joint.name);
     }
-    *xml += fmt::format("<joint name='j{}'{}{}/>", index, ClassAttribute(element, "class"),
-                        KeptAttributes(element, "joint"));
+    *xml +=
+        fmt::format("<joint name='j{}'{}{}/>", index, defaults_.ClassAttribute(element, "class"),
+                    KeptAttributes(element, "joint"));
   }
 
   void Geom(const tinyxml2::XMLElement& element, int body, const std::string& child_class,
             std::string* xml) {
     Count(element);
-    const std::string type = Resolved(element, "type", child_class, &DefaultClass::geom);
-    const std::string mesh = Resolved(element, "mesh", child_class, &DefaultClass::geom);
+    const std::string type =
+        defaults_.Resolved(element, "type", child_class, MjcfDefaults::Kind::kGeom);
+    const std::string mesh =
+        defaults_.Resolved(element, "mesh", child_class, MjcfDefaults::Kind::kGeom);
     CleanGeom geom;
     const bool is_mesh = !mesh.empty() || type == "mesh";
     if (is_mesh) {
@@ -480,7 +401,7 @@ class Cleaner {
       kept += " type='sphere' size='0.001' mass='0'";
     }
     *xml += fmt::format("<geom name='g{}'{}{}/>", result_.geoms.size(),
-                        ClassAttribute(element, "class"), kept);
+                        defaults_.ClassAttribute(element, "class"), kept);
     result_.geoms.push_back(geom);
   }
 
@@ -493,7 +414,7 @@ class Cleaner {
     site.body = body;
     // A body may have the same name: the site then takes another.
     if (!links_.insert(site.name).second) site.name = UniqueSite(site.name);
-    *xml += fmt::format("<site name='s{}'{}{}/>", index, ClassAttribute(element, "class"),
+    *xml += fmt::format("<site name='s{}'{}{}/>", index, defaults_.ClassAttribute(element, "class"),
                         KeptAttributes(element, "site"));
   }
 
@@ -524,7 +445,7 @@ class Cleaner {
       }
       // Every kind becomes a motor: gear and ranges are the same attributes of all.
       *xml += fmt::format("<motor name='a{}' joint='j{}'{}{}/>", result_.actuators.size(), joint,
-                          ClassAttribute(*e, "class"), KeptAttributes(*e, "actuator"));
+                          defaults_.ClassAttribute(*e, "class"), KeptAttributes(*e, "actuator"));
       result_.actuators.push_back({joint, kind == "motor"});
     }
   }
@@ -586,11 +507,7 @@ class Cleaner {
   std::vector<std::string>* warnings_;
   CleanMjcf& result_;
   std::string compiler_;  // attributes
-  std::string main_;
-  std::map<std::string, DefaultClass> classes_;
-  std::map<std::string, size_t> class_index_;
-  std::map<std::string, std::array<double, 2>> force_range_;  // by class
-  std::map<std::string, std::array<double, 3>> mesh_scale_;   // by class
+  MjcfDefaults defaults_;
   std::map<std::string, CleanGeom> meshes_;
   std::set<std::string> links_, joint_names_;
   size_t base_coordinates_ = 0;  // in a keyframe; 0: no joint floats the robot

@@ -11,12 +11,13 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/robot_files/robot_files.h"
 #include "fmt/format.h"
-#include "tools/robot/maker_shapes.h"
-#include "tools/robot/mesh_file.h"
 #include "tools/robot/standing_loads.h"
+#include "tools/robot_import/body_shapes.h"
+#include "tools/robot_import/feet_import.h"
 #include "tools/robot_import/file_defects.h"
 #include "tools/robot_import/maker_file.h"
 #include "tools/robot_import/motor_guess.h"
+#include "tools/robot_import/robot_fields.h"
 #include "tools/robot_import/sole_finder.h"
 #include "tools/robot_import/stance_finder.h"
 
@@ -30,58 +31,28 @@ using robot::LinkTree;
 using robot::RobotError;
 
 constexpr double kSameTurn = 1e-4;  // rad: a frame that is off by less counts as upright
-// A sole is taken to have this share of the leg's length from hip to sole where nothing shows it:
-// G1 has 0.26, Talos 0.26, TOCABI 0.35, the paper's robot 0.36. Its width over its length is 0.35,
-// 0.62, 0.57, 0.5.
-constexpr double kSoleOfLeg = 0.28, kWidthOfSole = 0.45;
 // m, from hip to ankle: Atlas has 0.8, OP3 0.2.
 constexpr double kLongestLeg = 5, kShortestLeg = 0.03;
 // kg/m³, a robot's mass over the cube of its leg's length: a person has 100, OP3 300.
 constexpr double kMostDensity = 5000;
-constexpr double kStraight = 0.01;   // rad: a joint that is nearer to zero is left there
-constexpr double kRectangle = 5e-4;  // m: a polygon that differs by less is one
-constexpr double kSameSole = 0.01;   // m: soles whose sizes differ by more are no mirror images
+constexpr double kStraight = 0.01;  // rad: a joint that is nearer to zero is left there
 // Common sensors have these errors where the file has none: the paper's robot's.
 constexpr double kGyroNoise = 2e-4, kGyroBias = 7.5e-6;                   // rad/s
 constexpr double kAccelerometerNoise = 1.7e-2, kAccelerometerBias = 0.1;  // m/s²
-constexpr double kForceNoise = 1, kMomentNoise = 0.05;                    // N, N·m
-
-std::string Lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
-bool Contains(const std::string& text, const char* word) {
-  return Lower(text).find(word) != std::string::npos;
-}
-
-double Clean(double value) { return std::round(value * 1e6) / 1e6 + 0.0; }
-
-void SetPose(const Isometry3d& pose, Pose* result) {
-  const Vector3d& p = pose.translation();
-  if (Clean(p.x()) != 0) result->set_x(Clean(p.x()));
-  if (Clean(p.y()) != 0) result->set_y(Clean(p.y()));
-  if (Clean(p.z()) != 0) result->set_z(Clean(p.z()));
-  const Matrix3d& r = pose.linear();
-  const double pitch = std::asin(std::clamp(-r(2, 0), -1.0, 1.0));
-  const double roll = std::atan2(r(2, 1), r(2, 2)), yaw = std::atan2(r(1, 0), r(0, 0));
-  const auto angle = [](double a) { return std::round(a * 1e10) / 1e10; };
-  if (std::abs(roll) > 1e-9) result->set_roll(angle(roll));
-  if (std::abs(pitch) > 1e-9) result->set_pitch(angle(pitch));
-  if (std::abs(yaw) > 1e-9) result->set_yaw(angle(yaw));
-}
 
 class Import {
  public:
   explicit Import(const ImportOptions& options)
-      : options_(options), maker_(ReadMakerFile(options.file, options.srdf)) {}
+      : options_(options),
+        maker_(ReadMakerFile(options.file, options.srdf)),
+        shapes_(options, maker_) {}
 
   RobotImport Run() {
     NameIt();
     for (const std::string& line : maker_.left_out) result_.defects.push_back({line, "left out"});
     RepairDefects(options_.lock, &maker_, &result_, &rotor_);
     FindLegs();
-    FindSoles();
+    FindFeet();
     FindImu();
     BodyLink();
     Motors();
@@ -139,38 +110,6 @@ class Import {
     return joints;
   }
 
-  /// Shapes of a body's links, in its frame.
-  std::vector<FootShape> ShapesOf(const LinkTree& tree, int body, bool collides) {
-    std::vector<FootShape> shapes;
-    for (const robot::SourceShape& source : maker_.shapes) {
-      const auto place = tree.links.find(source.link);
-      if (place == tree.links.end() || place->second.body != body || source.collides != collides) {
-        continue;
-      }
-      FootShape shape{source.kind, place->second.pose * source.pose, source.size, {}};
-      if (source.kind == robot::SourceShape::Kind::kMesh) {
-        const std::filesystem::path file =
-            FindMesh({options_.file, maker_.mesh_folder, options_.meshes}, source.mesh);
-        if (file.empty()) {
-          missing_[source.mesh] = "it is not there";
-          continue;
-        }
-        const auto [known, is_new] = meshes_.try_emplace(file.string());
-        Mesh& mesh = known->second;
-        if (is_new) mesh.points = MeshPoints(file, &mesh.problem);
-        if (!mesh.problem.empty()) {
-          missing_[source.mesh] = mesh.problem;
-          continue;
-        }
-        for (const Vector3d& p : mesh.points) {
-          shape.points.push_back(shape.pose * source.size.cwiseProduct(p));
-        }
-      }
-      shapes.push_back(std::move(shape));
-    }
-    return shapes;
-  }
-
   void FindLegs() {
     const LinkTree tree = Tree();
     if (tree.joints.size() > static_cast<size_t>(balance::kMaxJoints)) {
@@ -194,7 +133,7 @@ class Import {
       }
       const Vector3d down = poses[b].linear().transpose() * -up;
       for (const bool collides : {true, false}) {
-        for (const Vector3d& p : LowPoints(ShapesOf(tree, static_cast<int>(b), collides), down)) {
+        for (const Vector3d& p : LowPoints(shapes_.Of(tree, static_cast<int>(b), collides), down)) {
           reach(p);
         }
       }
@@ -285,224 +224,9 @@ class Import {
     if (rpy.has_yaw()) facing->set_yaw(rpy.yaw());
   }
 
-  void FindSoles() {
+  void FindFeet() {
     const LinkTree tree = Tree();  // its root faces forward now
-    const std::vector<Isometry3d> poses = BodyPoses(tree, Posture(tree));
-    std::array<FootSole, 2> soles = {SoleOf(tree, poses, 0), SoleOf(tree, poses, 1)};
-    Compare(poses, &soles);
-    for (size_t f = 0; f < 2; ++f) {
-      FootSole& sole = soles[f];
-      const Leg& leg = anatomy_.leg[f];
-      if (options_.sole) {
-        SetRectangle((*options_.sole)[0], (*options_.sole)[1], &sole.found);
-        sole.from = "as told";
-        sole.sureness = Sureness::kSure;
-      }
-      Foot* const foot = robot().add_foot();
-      foot->set_name(f == 0 ? "right" : "left");
-      WriteSole(tree, leg.body, options_.foot[f].empty() ? sole.link : options_.foot[f], sole.found,
-                foot);
-      Say(fmt::format("{} sole", foot->name()), SoleValue(*foot), sole.from, sole.sureness);
-      const auto [sensor, why] = ForceSensor(tree, leg);
-      foot->set_force_sensor(sensor);
-      Say(fmt::format("{} force sensor", foot->name()), sensor ? "yes" : "none", why,
-          sensor ? Sureness::kLikely : Sureness::kGuess);
-    }
-    robot().set_force_noise(kForceNoise);
-    robot().set_moment_noise(kMomentNoise);
-  }
-
-  struct FootSole {
-    FoundSole found;
-    std::string from, link;  ///< a link that is named for it, or none
-    Sureness sureness = Sureness::kSure;
-  };
-
-  FootSole SoleOf(const LinkTree& tree, const std::vector<Isometry3d>& poses, size_t f) {
-    const Leg& leg = anatomy_.leg[f];
-    const Matrix3d in_body = poses[static_cast<size_t>(leg.body)].linear().transpose();
-    const Vector3d down = in_body * -Vector3d::UnitZ(), forward = in_body * Vector3d::UnitX();
-    missing_.clear();
-    FootSole sole;
-    sole.found = FindSole(ShapesOf(tree, leg.body, true), down, forward);
-    sole.from = "collision shapes";
-    if (!sole.found.polygon.empty()) return sole;
-    sole.found = FindSole(ShapesOf(tree, leg.body, false), down, forward);
-    sole.from = "visual shapes";
-    sole.sureness = Sureness::kLikely;
-    if (!sole.found.polygon.empty()) return sole;
-    sole.link = SoleFrame(tree, leg.body);
-    sole.from = "share of the leg's length";
-    sole.sureness = Sureness::kGuess;
-    if (!missing_.empty()) TellMissing(*missing_.begin());
-    sole.found = GuessedSole(tree, poses, leg, sole.link, down, forward);
-    return sole;
-  }
-
-  /// Right and left soles are mirror images: where they are of two kinds, the better founded one
-  /// serves for both.
-  void Compare(const std::vector<Isometry3d>& poses, std::array<FootSole, 2>* soles) {
-    const auto size = [&](size_t f) -> Eigen::Vector2d {
-      Eigen::AlignedBox2d box;
-      for (const Eigen::Vector2d& p : (*soles)[f].found.polygon) box.extend(p);
-      return box.sizes();
-    };
-    const auto told = [&](size_t f) {
-      return fmt::format("{:.3g} x {:.3g} m of {}", size(f).x(), size(f).y(), (*soles)[f].from);
-    };
-    const bool alike = (*soles)[0].sureness == (*soles)[1].sureness;
-    if ((alike && (size(0) - size(1)).cwiseAbs().maxCoeff() < kSameSole) || options_.sole) return;
-    const std::string what = fmt::format("the soles differ: right {}, left {}", told(0), told(1));
-    if (alike) {
-      result_.defects.push_back({what, "kept; --sole LENGTH WIDTH says what both are"});
-      return;
-    }
-    const size_t good = (*soles)[0].sureness < (*soles)[1].sureness ? 0 : 1;
-    result_.defects.push_back(
-        {what, fmt::format("both that of the {} foot's {}, mirrored; --sole says better",
-                           good == 0 ? "right" : "left", (*soles)[good].from)});
-    // Across the sagittal plane, each about its foot's own frame.
-    const Isometry3d& from = poses[static_cast<size_t>(anatomy_.leg[good].body)];
-    const Isometry3d& to = poses[static_cast<size_t>(anatomy_.leg[1 - good].body)];
-    const Eigen::DiagonalMatrix<double, 3> mirror(1, -1, 1);
-    const Isometry3d sole = from * (*soles)[good].found.frame;
-    Isometry3d mirrored = Isometry3d::Identity();
-    mirrored.linear() = mirror * sole.linear() * mirror;
-    mirrored.translation() = to.translation() + mirror * (sole.translation() - from.translation());
-    FootSole& other = (*soles)[1 - good];
-    other = (*soles)[good];
-    other.link.clear();
-    other.found.frame = to.inverse() * mirrored;
-    std::ranges::reverse(other.found.polygon);
-    for (Eigen::Vector2d& p : other.found.polygon) p.y() = -p.y();
-    other.from += " of the other foot, mirrored";
-    other.sureness = Sureness::kLikely;
-  }
-
-  void TellMissing(const std::pair<std::string, std::string>& mesh) {
-    if (std::exchange(told_missing_, true) || options_.sole) return;
-    result_.defects.push_back(
-        {fmt::format("the soles are meshes, and '{}' cannot be read: {}", mesh.first, mesh.second),
-         "guess: a share of the leg's length; --meshes FOLDER or --sole LENGTH WIDTH say better"});
-  }
-
-  static void SetRectangle(double length, double width, FoundSole* sole) {
-    const double x = length / 2, y = width / 2;
-    sole->polygon = {{-x, -y}, {x, -y}, {x, y}, {-x, y}};
-  }
-
-  /// A link of the foot that is named for its sole.
-  static std::string SoleFrame(const LinkTree& tree, int body) {
-    for (const auto& [link, place] : tree.links) {
-      if (place.body == body && Contains(link, "sole")) return link;
-    }
-    return "";
-  }
-
-  FoundSole GuessedSole(const LinkTree& tree, const std::vector<Isometry3d>& poses, const Leg& leg,
-                        const std::string& frame, const Vector3d& down, const Vector3d& forward) {
-    FoundSole sole;
-    sole.frame.linear().col(0) = forward;
-    sole.frame.linear().col(1) = -down.cross(forward);
-    sole.frame.linear().col(2) = -down;
-    Vector3d place = Vector3d::Zero();
-    for (const auto& [link, at] : tree.links) {
-      if (at.body != leg.body) continue;
-      if (frame.empty() ? at.pose.translation().dot(down) > place.dot(down) : link == frame) {
-        place = at.pose.translation();
-      }
-    }
-    sole.frame.translation() = place;
-    const auto hip = static_cast<size_t>(tree.joints[static_cast<size_t>(leg.joints[0])].body);
-    const double length =
-        kSoleOfLeg *
-        (poses[static_cast<size_t>(leg.body)] * place - poses[hip].translation()).norm();
-    SetRectangle(std::round(length * 1e3) / 1e3, std::round(kWidthOfSole * length * 1e3) / 1e3,
-                 &sole);
-    return sole;
-  }
-
-  /// The link of the body that has most shapes, or its own.
-  std::string FootLink(const LinkTree& tree, int body) {
-    std::string best = tree.bodies[static_cast<size_t>(body)].name;
-    int most = 0;
-    for (const auto& [link, place] : tree.links) {
-      if (place.body != body) continue;
-      const auto count =
-          static_cast<int>(std::ranges::count_if(maker_.shapes, [&, &name = link](const auto& s) {
-            return s.link == name && s.collides;
-          }));
-      if (count > most) most = count, best = link;
-    }
-    return best;
-  }
-
-  void WriteSole(const LinkTree& tree, int body, const std::string& wanted, const FoundSole& sole,
-                 Foot* foot) {
-    const std::string link = wanted.empty() ? FootLink(tree, body) : wanted;
-    foot->set_link(link);
-    SetPose(tree.links.at(link).pose.inverse() * sole.frame, foot->mutable_sole());
-    Eigen::AlignedBox2d box;
-    for (const Eigen::Vector2d& p : sole.polygon) box.extend(p);
-    bool rectangle = true;
-    for (const Eigen::Vector2d& p : sole.polygon) {
-      rectangle = rectangle && (p.cwiseAbs() - box.sizes() / 2).cwiseAbs().maxCoeff() < kRectangle;
-    }
-    if (rectangle) {
-      foot->set_length(Clean(box.sizes().x()));
-      foot->set_width(Clean(box.sizes().y()));
-      return;
-    }
-    for (const Eigen::Vector2d& p : sole.polygon) {
-      SoleVertex* const vertex = foot->add_vertex();
-      vertex->set_x(Clean(p.x()));
-      vertex->set_y(Clean(p.y()));
-    }
-  }
-
-  static std::string SoleValue(const Foot& foot) {
-    if (foot.vertex().empty()) {
-      return fmt::format("{:.3g} x {:.3g} m, at {}", foot.length(), foot.width(), foot.link());
-    }
-    Eigen::AlignedBox2d box;
-    for (const SoleVertex& v : foot.vertex()) box.extend(Eigen::Vector2d(v.x(), v.y()));
-    return fmt::format("polygon of {} corners within {:.3g} x {:.3g} m, at {}", foot.vertex_size(),
-                       box.sizes().x(), box.sizes().y(), foot.link());
-  }
-
-  std::pair<bool, std::string> ForceSensor(const LinkTree& tree, const Leg& leg) {
-    const auto at_foot = [&](const std::string& place) {
-      if (const auto link = tree.links.find(place); link != tree.links.end()) {
-        return link->second.body == leg.body;
-      }
-      for (const robot::SourceJoint& joint : maker_.source.joints) {
-        const auto child = tree.links.find(joint.child);
-        if (joint.name == place && child != tree.links.end()) return child->second.body == leg.body;
-      }
-      return false;
-    };
-    std::vector<std::string> places;
-    std::string kind;
-    for (const robot::MjcfSensor& sensor : maker_.sensors) {
-      const bool force = Contains(sensor.kind, "force") || sensor.kind == "feedback";
-      const bool known = std::ranges::find(places, sensor.site) != places.end();
-      if (!force || known || !at_foot(sensor.site)) continue;
-      if (kind.empty()) kind = sensor.kind;
-      places.push_back(sensor.site);
-    }
-    if (places.size() == 1) return {true, fmt::format("sensor '{}' at {}", kind, places[0])};
-    if (places.size() > 1) {
-      return {true, fmt::format("the sum of {} sensors, at {}", places.size(),
-                                fmt::join(places, " and "))};
-    }
-    for (const auto& [link, place] : tree.links) {
-      if (place.body == leg.body && (Contains(link, "ft_sensor") || Contains(link, "force") ||
-                                     Contains(link, "_ft_") || Lower(link).ends_with("_ft"))) {
-        places.push_back(link);
-      }
-    }
-    if (places.empty()) return {false, "the file shows none"};
-    return {true, fmt::format("link {}", fmt::join(places, ", "))};
+    AddFeet(options_, maker_, tree, BodyPoses(tree, Posture(tree)), anatomy_, &shapes_, &result_);
   }
 
   void FindImu() {
@@ -670,16 +394,10 @@ class Import {
 
   const ImportOptions& options_;
   MakerFile maker_;
+  BodyShapes shapes_;
   RobotImport result_;
   std::map<std::string, double> rotor_;  // kg·m² by joint
   Anatomy anatomy_;
-  struct Mesh {
-    std::vector<Vector3d> points;  // in the file's unit
-    std::string problem;
-  };
-  std::map<std::string, Mesh> meshes_;          // by file
-  std::map<std::string, std::string> missing_;  // a foot's meshes that are not known, and why
-  bool told_missing_ = false;
 };
 
 }  // namespace
