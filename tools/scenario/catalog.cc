@@ -188,10 +188,14 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
     const std::vector<fs::path> candidates = Candidates(kind, name, beside);
     for (const fs::path& file : candidates) {
       std::error_code error;
-      const bool other = fs::is_regular_file(file, error) && IsOtherKind(kind, file);
-      const std::string place = other ? fmt::format("{} (which says that it is a {})",
-                                                    file.string(), MessageNamedIn(file))
-                                      : file.string();
+      const bool there = fs::is_regular_file(file, error);
+      const bool other = there && IsOtherKind(kind, file);
+      std::string place = file.string();
+      if (other) {
+        place += fmt::format(" (which says that it is a {})", MessageNamedIn(file));
+      } else if (there && bases == BaseFiles::kRefused && IsBase(name)) {
+        place += " (which others build on: name the file itself to run it)";
+      }
       if (std::ranges::find(searched, place) == searched.end()) searched.push_back(place);
     }
     // A file beside may be of any kind: it is named where its name is near alone.

@@ -178,7 +178,8 @@ TEST(ScenarioBase, FilesInBaseAreNotOfferedToRun) {
   EXPECT_NE(list.output.find("mine"), std::string::npos) << list.output;
   EXPECT_NE(list.output.find("derived from it (0.4 s)"), std::string::npos) << list.output;
   EXPECT_EQ(list.output.find("base/"), std::string::npos) << list.output;
-  ExpectUsageError({"run", "base/stand"}, {"no scenario named 'base/stand'", "mine"});
+  ExpectUsageError({"run", "base/stand"},
+                   {"no scenario named 'base/stand'", "mine", "which others build on"});
   EXPECT_EQ(RunPoise({"graph", "check", "mine"}).exit_code, 0);
 }
 
