@@ -29,11 +29,6 @@ constexpr int64_t kLongestOutage = 5000 * kMillisecondNs;  // between a process 
 
 using BoundStage = ProcessBus::BoundStage;
 
-Join JoinOf(Timing timing) {
-  if (timing == Timing::kOwner) return Join::kLate;
-  return timing == Timing::kFollower ? Join::kNewest : Join::kEvery;
-}
-
 }  // namespace
 
 class ProcessRunner::Impl {

@@ -42,6 +42,11 @@ Timing TimingOf(const RunSpec& spec, int component) {
   return instance.plant() ? Timing::kPlant : Timing::kFollower;
 }
 
+Join JoinOf(Timing timing) {
+  if (timing == Timing::kOwner) return Join::kLate;
+  return timing == Timing::kFollower ? Join::kNewest : Join::kEvery;
+}
+
 int8_t AskForRealtime(const RealtimeOptions& options, Timing timing, int below) {
   int granted = 0;
   if (timing == Timing::kLockstep) return 0;

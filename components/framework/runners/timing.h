@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "components/framework/bus/inbox.h"
 #include "components/framework/graph.pb.h"
 
 namespace poise {
@@ -17,6 +18,9 @@ enum class Timing {
 
 /// In lockstep, and in a run in real time whose graph has no owner of the clock: kLockstep for all.
 Timing TimingOf(const RunSpec& spec, int component);
+
+/// Which messages of its inputs a component of this timing takes.
+Join JoinOf(Timing timing);
 
 /// Locks memory, sets SCHED_FIFO and pins this process as the run's options ask; what the system
 /// refuses is done without. `below`: by how much its priority is less than the owner's. On one core
