@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-// s on both feet after which a robot has stopped walking.
+// s on both feet after which a robot has stopped walking, unless its planner walks on.
 constexpr double kStands = 1;
 
 /// From a foot's landing to its next: two steps.
@@ -33,10 +33,25 @@ double Heading(const ground_truth_t& truth) {
   return std::atan2(ahead.y(), ahead.x());
 }
 
+/// The planner walks in every tick of [begin, end) that it tells of, and in one at least.
+bool PlannerWalks(const RunRecord& run, int64_t begin, int64_t end) {
+  bool walks = false;
+  for (int64_t t = begin; t < end; ++t) {
+    const support_plan_t* plan = run.plan.at(t);
+    if (plan == nullptr) continue;
+    walks = plan->stepping != support_plan_t::STEPPING_NONE &&
+            plan->step_reason == support_plan_t::REASON_WALK;
+    if (!walks) return false;
+  }
+  return walks;
+}
+
 std::vector<Stride> Strides(const RunRecord& run) {
   const std::vector<TrueStep> steps = TrueSteps(run);
+  // A slow walk carries with both feet for longer than a robot that has stopped.
   const auto follows = [&](const TrueStep& before, const TrueStep& step) {
-    return step.foot != before.foot && run.duration(step.lifted - before.landed) <= kStands;
+    return step.foot != before.foot && (run.duration(step.lifted - before.landed) <= kStands ||
+                                        PlannerWalks(run, before.landed, step.lifted));
   };
   std::vector<Stride> strides;
   for (size_t i = 0; i + 2 < steps.size();) {

@@ -150,6 +150,20 @@ TEST_F(ForeignControllerTest, APlanThatNobodyFollowsChangesNoStep) {
   EXPECT_TRUE(Unanswered("walk_way"));
 }
 
+// Without a planner it stands between two walks of a step each.
+TEST_F(ForeignControllerTest, ASlowWalkIsOneWhereThePlannerWalksOn) {
+  Walk(0.5);
+  spec_.set_tick_period(0.3);  // 1.5 s on both feet between two swings
+  EXPECT_TRUE(Unanswered("walk_way"));
+  without_.erase("SUPPORT_PLAN");
+  EXPECT_TRUE(Unanswered("walk_way"));
+  for (support_plan_t& plan : plan_) {
+    plan.stepping = support_plan_t::STEPPING_UNLOADING;
+    plan.step_reason = support_plan_t::REASON_WALK;
+  }
+  EXPECT_NEAR(Measure("walk_way"), 0.6, 1e-9);
+}
+
 TEST_F(ForeignControllerTest, ARattlingFootMakesNoStep) {
   Walk(0);
   for (ground_truth_t& truth : truth_) {
