@@ -33,6 +33,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kPicture{33};
 constexpr milliseconds kLongestSlice{10};  // of ticks before the page is served again
+constexpr milliseconds kLeastServed{2};    // though the run is behind: it hears its page
 constexpr double kMostBehind = 0.1;  // s: a run that is slower than the wall catches up no more
 constexpr double kLeastSpeed = 0.1, kMostSpeed = 1;
 constexpr int kMostBranches = 8;  // kept beside the log; each may take 3 MB a second of its run
@@ -75,7 +76,7 @@ class InteractiveRun {
       AdvanceUntil(Due());
       const auto wait = std::min(next_picture, paused_ || runner_->ended() ? next_picture : Next());
       server_->RunFor(std::clamp(std::chrono::duration_cast<milliseconds>(wait - Clock::now()),
-                                 milliseconds(0), kPicture));
+                                 kLeastServed, kPicture));
     }
     const bool early = !runner_->ended();
     recorder_->Close(spec_, early ? logging::kEndedByHand : "");
