@@ -97,17 +97,19 @@ function sceneKey(run, overlay) {
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
     return element('li', {}, mark, text);
   };
-  return element('details', {class: 'scene-key', open: WIDE.matches}, element('summary', {}, 'Signs in the picture'),
+  const key = element('details', {class: 'scene-key', open: WIDE.matches}, element('summary', {}, 'Signs in the picture'),
     element('ul', {class: 'key'}, entry('computed', '○↑', 'computed CoP, ground force'),
       entry('measured', '●↑', 'measured'), entry('desired', '◇', 'O_d, while balancing'),
       entry('limit', '╌', 'acceptable region'), entry('support', '▭', 'soles, support polygon'),
       entry('capture', '●', `capture point; ─ last ${TRACE} s; ○ step needed`),
       entry('support', '▰', 'footprints, when they came down; ╌ planned'),
-      run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'at rest in 0, ╌ 1, 2 steps (roughly)') : '',
+      run.find(FOOTSTEPS, 'stance') ? entry('reach', '⬠', 'at rest in 0, ╌ 1, 2 steps (approximate)') : '',
       entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
-      run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'), 'blocks: light soft, dark stiff') : '',
+      run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'), 'blocks as nothing stands on them; light: soft') : '',
       run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ its pull') : '',
       overlay ? entry('desired', '▒', 'second run') : ''));
+  WIDE.addEventListener('change', () => { key.open = WIDE.matches; });
+  return key;
 }
 
 /** Whoever lets the run go on, or takes it back, sees it. */

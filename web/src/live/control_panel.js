@@ -200,7 +200,7 @@ export function controlPanel(control, shared) {
     const [paceAnswer, pushAnswer, walkAnswer, stopAnswer] = [['pause', 'go', 'tick', 'speed', 'back', 'restart'], ['push'],
       ['walk', 'stop_walking', 'step'], ['stop', 'reset']].map((kinds) => answer(control, kinds));
     const pushing = control.can('push') ? pushForm(control, run.robot) : undefined;
-    const lag = element('p', {class: 'answer refused', role: 'status'});
+    const lag = element('p', {class: 'answer lag', role: 'status'});
     const acts = element('ol', {class: 'acts', 'aria-live': 'polite'});
     const filter = element('input', {type: 'search', placeholder: 'setting', 'aria-label': 'Search settings', input: () => {
       const words = filter.value.toLowerCase();
