@@ -9,7 +9,7 @@ const QUIET = ['--no-first-run', '--disable-background-networking', '--disable-c
   '--disable-quic', '--enable-unsafe-swiftshader'];  // no look-ups at start; 3D without a graphics card
 
 /** ms: a busy machine without a graphics card draws slowly, which is no failure. */
-export const PATIENCE = 240000;
+export const PATIENCE = 90000;
 
 /** `web`: build/web, where deploy/setup installs playwright-core; `more`: of Chromium's switches. */
 export async function launchBrowser(web, more = []) {

@@ -4,15 +4,14 @@ import assert from 'node:assert/strict';
 import {mkdirSync, mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
-import {after, before, test} from 'node:test';
+import {after, afterEach, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {grab, launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {replays, replaysInPart, startInteractive, startStanding, startView} from './live_run.mjs';
+import {endTest, replays, replaysInPart, startInteractive, startStanding, startView} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-control-'));
 const path = (name) => join(folder, name);
-const programs = [];
 const pictures = process.env.POISE_PICTURES;
 let browser;
 
@@ -20,9 +19,9 @@ before(async () => {
   if (pictures) mkdirSync(pictures, {recursive: true});
   browser = await launchBrowser(options.web);
 });
+afterEach(() => endTest(browser));
 after(async () => {
   await browser?.close();
-  for (const program of programs) await program.stop();
   rmSync(folder, {recursive: true, force: true});
 });
 
@@ -77,9 +76,7 @@ async function change(page, name) {
 
 test('a page pushes, changes, takes back and stops a run of processes, and a replay repeats it', async () => {
   const run = startStanding(options.poise, path('bus'), '--realtime', '--duration', '600');
-  programs.push(run);
   const view = await startView(options.poise, run, path('bus'), '--control');
-  programs.push(view);
   const {page, problems} = await openPage(browser, view.url);
   await until(page, () => window.poise.control.standing?.settings.length > 0 && !document.getElementById('control').hidden);
   await drag(page, 'bus_drag');
@@ -101,7 +98,6 @@ test('a page pushes, changes, takes back and stops a run of processes, and a rep
 
 test('an interactive run waits, steps, slows, goes back, goes on changed, and its log replays', async () => {
   const run = await startInteractive(options.poise, path('stand'), '--duration', '600');
-  programs.push(run);
   const {page, problems} = await openPage(browser, run.url);
   await until(page, () => window.poise.control.standing?.settings.length > 0);
   await until(page, () => window.poise.run.firstTick + window.poise.run.numRows > 300);
@@ -176,7 +172,6 @@ test('an interactive run waits, steps, slows, goes back, goes on changed, and it
 
 test('after a fall the page starts the run again, and goes back to its first tick', async () => {
   const run = await startInteractive(options.poise, path('again'), '--duration', '600');
-  programs.push(run);
   const {page, problems} = await openPage(browser, run.url);
   const end = () => page.evaluate(() => window.poise.run.firstTick + window.poise.run.numRows);
   const height = (at) => page.evaluate((t) => {

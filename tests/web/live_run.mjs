@@ -11,6 +11,12 @@ const programs = [];
 // A test that fails leaves its programs behind, which would keep node.
 after(() => Promise.all(programs.map((program) => program.stop())));
 
+/** Ends what a test began, also where it failed: what it leaves takes the machine from those after it. */
+export async function endTest(browser) {
+  for (const context of browser.contexts()) await context.close();
+  await Promise.all(programs.splice(0).map((program) => program.stop()));
+}
+
 class Program {
   constructor(poise, parameters) {
     programs.push(this);

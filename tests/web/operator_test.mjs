@@ -4,20 +4,19 @@ import assert from 'node:assert/strict';
 import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
-import {after, before, test} from 'node:test';
+import {after, afterEach, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {grab, launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {replays, startInteractive} from './live_run.mjs';
+import {endTest, replays, startInteractive} from './live_run.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-operator-'));
-const programs = [];
 let browser;
 
 before(async () => { browser = await launchBrowser(options.web); });
+afterEach(() => endTest(browser));
 after(async () => {
   await browser?.close();
-  for (const program of programs) await program.stop();
   rmSync(folder, {recursive: true, force: true});
 });
 
@@ -25,7 +24,6 @@ const until = (page, condition, argument) => page.waitForFunction(condition, arg
 
 async function start(name, ...more) {
   const run = await startInteractive(options.poise, join(folder, name), '--duration', '600', ...more);
-  programs.push(run);
   const {page, problems} = await openPage(browser, run.url);
   await until(page, () => window.poise.control.standing?.settings.length > 0 && window.poise.run.numRows > 100);
   return {run, page, problems};

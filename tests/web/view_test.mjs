@@ -5,30 +5,27 @@ import {spawnSync} from 'node:child_process';
 import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
-import {after, before, test} from 'node:test';
+import {after, afterEach, before, test} from 'node:test';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage, PATIENCE} from './browser.mjs';
-import {startRun, startView} from './live_run.mjs';
+import {endTest, startRun, startView} from './live_run.mjs';
 import {ask, open, openStream, upgrade} from './raw_socket.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}}});
 const folder = mkdtempSync(join(tmpdir(), 'poise-view-'));
 const path = (name) => join(folder, name);
-const programs = [];
 let browser;
 
 before(async () => { browser = await launchBrowser(options.web); });
+afterEach(() => endTest(browser));
 after(async () => {
   await browser?.close();
-  for (const program of programs) await program.stop();
   rmSync(folder, {recursive: true, force: true});
 });
 
 async function start(name, parameters, viewParameters = []) {
   const run = startRun(options.poise, path(name), ...parameters);
-  programs.push(run);
   const view = await startView(options.poise, run, path(name), ...viewParameters);
-  programs.push(view);
   return {run, view};
 }
 
@@ -197,7 +194,6 @@ test('a page that loses its server goes on with the next one where it was', asyn
   await until(page, () => window.poise.feed.state === 'waiting');
   const [first, ticks] = await page.evaluate(() => [window.poise.run.firstTick, window.poise.run.numRows]);
   const next = await startView(options.poise, run, path('again'), '--port', String(view.port));
-  programs.push(next);
   await until(page, () => window.poise.feed.state === 'live');
   await more(page);
   // What came between the two is a gap, and what was there has stayed.
