@@ -80,7 +80,7 @@ test('its program describes itself', () => {
   assert.deepEqual(about.inputs, [{name: 'robot_state', type: 'robot_state_t', kind: 'same tick'}]);
   assert.deepEqual(about.outputs, [{name: 'foot_load', type: 'gait_lab.foot_load_t'}]);
   assert.deepEqual(about.settings, [{path: 'foot_load.time_constant', type: 'number', default: '0.05', unit: 's',
-                                     meaning: 'of the first-order low-pass'}]);
+                                     meaning: 's, of the first-order low-pass'}]);
 });
 
 let bits;
