@@ -14,7 +14,7 @@ import {readText, withText} from './png_text.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}, retake: {type: 'boolean'}}});
 const PICTURE = join(root, 'docs/report.png');
-const SIZE = {width: 1320, height: 1230};
+const SIZE = {width: 1320, height: 1280};
 const TIME = 0.42;  // s: while the push acts and balancing holds the centre of pressure
 
 /** The words that the viewport shows, from top to bottom. */
