@@ -29,7 +29,7 @@ class MjcfDefaults {
   /// N·m, actuatorfrcrange of a joint's class; null: none.
   const std::array<double, 2>* ForceRange(const tinyxml2::XMLElement& joint,
                                           const std::string& child_class) const;
-  /// Of a mesh's class; null: none.
+  /// The defaults of a mesh's class; null: it has none.
   const std::array<double, 3>* MeshScale(const tinyxml2::XMLElement& mesh) const;
 
  private:
