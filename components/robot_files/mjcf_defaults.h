@@ -29,7 +29,7 @@ class MjcfDefaults {
   /// N·m, actuatorfrcrange of a joint's class; null: none.
   const std::array<double, 2>* ForceRange(const tinyxml2::XMLElement& joint,
                                           const std::string& child_class) const;
-  /// The defaults of a mesh's class; null: it has none.
+  /// The scale that a mesh's class gives; null: it gives none.
   const std::array<double, 3>* MeshScale(const tinyxml2::XMLElement& mesh) const;
 
  private:
