@@ -3,12 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace poise::logging {
 namespace {
 
 constexpr double kUnloadedShare = 0.02;             // of the weight
 constexpr double kLeastSwing = 0.1, kTouch = 0.02;  // s
+constexpr double kHopSwing = 0.5, kHopWay = 0.05;   // s, m
 constexpr double kDownTilt = 1, kDownShare = 0.5;   // rad; of the COM's height at time 0
 constexpr double kLeastHeight = 0.05;               // m, of a COM whose height is known
 
@@ -27,6 +29,21 @@ const ground_truth_t* Start(const RunRecord& run) {
     if (const ground_truth_t* truth = run.truth.at(tick)) return truth;
   }
   return nullptr;
+}
+
+/// m, world, of a sole.
+std::optional<Eigen::Vector2d> Place(const RunRecord& run, size_t foot, int64_t tick) {
+  const ground_truth_t* const truth = run.truth.at(tick);
+  if (truth == nullptr || foot >= truth->foot_pose.size()) return {};
+  const double* const position = truth->foot_pose[foot].position;
+  return Eigen::Vector2d(position[0], position[1]);
+}
+
+/// A sole that comes off for a moment and down where it stood, as soft ground lets it.
+bool Hops(const RunRecord& run, const TrueStep& step) {
+  if (step.landed - step.lifted >= Ticks(run, kHopSwing)) return false;
+  const auto from = Place(run, step.foot, step.lifted), to = Place(run, step.foot, step.landed);
+  return from && to && (*to - *from).norm() < kHopWay;
 }
 
 /// What IsDown compares with, found once.
@@ -117,7 +134,12 @@ std::vector<TrueStep> TrueSteps(const RunRecord& run) {
     }
   }
   std::ranges::stable_sort(steps, {}, &TrueStep::landed);
-  return steps;
+  std::vector<TrueStep> made;
+  for (const TrueStep& step : steps) {
+    const bool again = !made.empty() && made.back().foot == step.foot;
+    if (!again || !Hops(run, step)) made.push_back(step);
+  }
+  return made;
 }
 
 std::vector<TrueSupport> TrueSupports(const RunRecord& run) {

@@ -176,6 +176,18 @@ TEST_F(ForeignControllerTest, ARattlingFootMakesNoStep) {
   EXPECT_EQ(Measure("steps"), 1) << "a sole that scrapes for 20 ms is on its way still";
 }
 
+// On soft ground a sole that has come down comes off once more while it is loaded.
+TEST_F(ForeignControllerTest, AHopOfTheFootThatSteppedIsNoStep) {
+  Walk(0.5);
+  spec_.set_tick_period(0.04);
+  const double way = Measure("walk_way");
+  for (size_t t = 22; t < 25; ++t) truth_[t].foot_wrench[1].force[2] = 0;  // 0.12 s
+  EXPECT_EQ(Measure("steps"), 5);
+  EXPECT_EQ(Measure("walk_way"), way);
+  for (size_t t = 25; t < kTicks; ++t) truth_[t].foot_pose[1].position[0] = 0.06;
+  EXPECT_EQ(Measure("steps"), 6) << "it comes down elsewhere";
+}
+
 TEST_F(ForeignControllerTest, ARobotThatLiesIsDownWhateverTheSimulatorCallsIt) {
   Walk(0);
   EXPECT_EQ(Measure("fallen"), 0);

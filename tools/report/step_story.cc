@@ -24,7 +24,10 @@ std::optional<double> Figure(const logging::RunRecord& run, const char* metric) 
   return logging::FindMetric(metric)->compute(run);
 }
 
-bool IsWalked(const PlannerStep& step) { return step.reason == support_plan_t::REASON_WALK; }
+bool IsOfWalk(const PlannerStep& step) { return step.reason == support_plan_t::REASON_WALK; }
+
+/// The last step of a walk in which the robot falls may not land.
+bool IsWalked(const PlannerStep& step) { return IsOfWalk(step) && step.landing; }
 
 /// "The left foot stepped 281 mm, decided at 0.442 s (why) and down at 0.746 s, 1 mm from its
 /// foothold."
@@ -80,7 +83,7 @@ std::string TellSteps(const logging::RunRecord& run) {
   if (walked > 0) sentences.push_back(TellWalk(run, walked));
   size_t told = 0;
   for (const PlannerStep& step : steps) {
-    if (IsWalked(step)) continue;
+    if (IsOfWalk(step)) continue;
     if (++told <= kStepsTold) sentences.push_back(TellStep(run, step));
   }
   if (told > kStepsTold) {
