@@ -96,7 +96,10 @@ TEST_F(EventsTest, MotorsAtTheirLimitsAreNamedWithTheirTorques) {
     command_[t].position[3] = -0.5;
     bridge_[t].applied_torque[3] = t < 20 ? -20 : -30;
     if (t >= 20 && t < 25 && t != 22) bridge_[t].saturated[3] = bridge_status_t::LIMIT_TORQUE;
+    if (t >= 50) bridge_[t].saturated[5] = bridge_status_t::LIMIT_IMPEDANCE;
   }
+  EXPECT_THAT(Named("impedance_cut"),
+              ElementsAre(Is(0.1, "impedance_cut", Read().robot.joints()[5].name + ": stiffness")));
   EXPECT_THAT(Named("motor_hot"),
               ElementsAre(Is(0.08, "motor_hot", ankle + ": 12.7 to 7.5 N·m, of 14.0 N·m wanted")));
   EXPECT_THAT(Named("motor_hot_ends"), testing::IsEmpty());
