@@ -21,7 +21,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kPause{1};
 constexpr int kShare = 9;  // times what a reading took: the pause after it
-constexpr uintmax_t kMostBytes = uintmax_t{256} << 20;  // of log; as much again in memory
+constexpr uintmax_t kMostBytes = uintmax_t{256} << 20;  // of a log that is read again and again
+constexpr uintmax_t kMostAtTheEnd = uintmax_t{1} << 30;  // of one that is read once, for some 15 s
 
 bool OnlyAtTheEnd(const CheckResult& check) {
   return check.name.starts_with("duration_reached") || check.name == "log_defects";
@@ -85,13 +86,14 @@ void RunStatus::Run() {
   while (true) {
     const auto start = Clock::now();
     std::error_code error;
-    const bool readable = std::filesystem::file_size(log_, error) <= kMostBytes;
+    const uintmax_t most = ended ? kMostAtTheEnd : kMostBytes;
+    const bool readable = std::filesystem::file_size(log_, error) <= most;
     if (readable || ended) {
       nlohmann::ordered_json status;
       try {
         if (!readable) {
           throw std::runtime_error(
-              fmt::format("{}: has more than {} MB, or cannot be read", log_, kMostBytes >> 20));
+              fmt::format("{}: has more than {} MB, or cannot be read", log_, most >> 20));
         }
         status = StatusJson(log_, scenario_, ended);
       } catch (const std::exception& problem) {
