@@ -18,11 +18,21 @@ export async function launchBrowser(web, more = []) {
   return chromium.launch({executablePath: CHROMIUM, args: [...QUIET, ...more]});
 }
 
-/** Opens a file from disk or an http address; `problems` gathers errors of its console and every request beyond the page itself. */
-export async function openPage(browser, file, options = {}) {
+/** Of a browser without WebGL: a test that looks elsewhere does without the picture, which takes most of the time without a graphics card. */
+function withoutPicture() {
+  const {getContext} = HTMLCanvasElement.prototype;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === 'webgl2' ? null : getContext.call(this, kind, ...more); };
+}
+
+/**
+ * Opens a file from disk or an http address; `problems` gathers errors of its console and every request beyond the page itself. `picture`:
+ * the robot is drawn in 3D. The other options are Playwright's.
+ */
+export async function openPage(browser, file, {picture = true, ...options} = {}) {
   const context = await browser.newContext({viewport: {width: 1100, height: 800}, deviceScaleFactor: 0.5,
     acceptDownloads: true, ...options});
   context.setDefaultTimeout(PATIENCE);
+  if (!picture) await context.addInitScript(withoutPicture);
   const page = await context.newPage();
   const problems = [];
   page.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });

@@ -22,9 +22,10 @@ after(async () => {
 
 const until = (page, condition, argument) => page.waitForFunction(condition, argument, {timeout: PATIENCE});
 
-async function start(name, ...more) {
+/** `picture`: the robot is drawn, and can be grabbed. */
+async function start(name, picture, ...more) {
   const run = await startInteractive(options.poise, join(folder, name), '--duration', '600', ...more);
-  const {page, problems} = await openPage(browser, run.url);
+  const {page, problems} = await openPage(browser, run.url, {picture});
   await until(page, () => window.poise.control.standing?.settings.length > 0 && window.poise.run.numRows > 100);
   return {run, page, problems};
 }
@@ -54,7 +55,7 @@ async function answered(page, what) {
 }
 
 test('buttons walk the robot, stop it, and make one step', async () => {
-  const {run, page, problems} = await start('walk', '--set', 'step_planner.walk.enabled=true');
+  const {run, page, problems} = await start('walk', false, '--set', 'step_planner.walk.enabled=true');
   await page.locator('input[aria-label^=forward]').evaluate((slider) => {
     slider.value = 0.1;
     slider.dispatchEvent(new Event('input'));
@@ -88,7 +89,7 @@ test('buttons walk the robot, stop it, and make one step', async () => {
 });
 
 test('a stop without a connection says so, and is sent once there is one', async () => {
-  const {run, page, problems} = await start('unsent');
+  const {run, page, problems} = await start('unsent', false);
   // The connection breaks, and in that moment the button is pressed.
   const told = await page.evaluate(() => {
     const {send} = WebSocket.prototype;
@@ -108,14 +109,14 @@ test('a stop without a connection says so, and is sent once there is one', async
 });
 
 test('a push ends when its browser dies', async () => {
-  const {run, page} = await start('dying');
+  const {run, page} = await start('dying', true);
   await page.locator('#scene').scrollIntoViewIfNeeded();
   const at = await grab(page);
   await page.mouse.move(at.x + 25, at.y, {steps: 4});
   await until(page, () => window.poise.control.standing.push);
   const crash = await page.context().newCDPSession(page);
   crash.send('Page.crash').catch(() => {});  // no page can say goodbye in that
-  const {page: other, problems} = await openPage(browser, run.url);
+  const {page: other, problems} = await openPage(browser, run.url, {picture: false});
   // Measured by the simulator: a force, and for 250 ticks none. (What stands now is told before the ticks until now have come.)
   const ended = await until(other, () => {
     const {run: r, control} = window.poise;

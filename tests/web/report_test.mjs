@@ -28,6 +28,7 @@ before(async () => {
     const run = poise(...push, ...more, '--out', path(out));
     assert.ok(run.status === 0 || run.status === 1, run.stderr);  // a check of the shorter run may fail
   }
+  poise('report', path('a'));
   browser = await launchBrowser(options.web);
 });
 
@@ -90,7 +91,6 @@ test('the command prints the table, writes the page where it is told to, and say
 });
 
 test('the page shows the run, plays it, and needs no network', async () => {
-  poise('report', path('a'));
   const summary = JSON.parse(readFileSync(path('a/summary.json'), 'utf8'));
   const {page, problems} = await openPage(browser, path('a/report.html'));
   assert.equal(await page.locator('[role=alert]').count(), 0);
@@ -296,8 +296,11 @@ test('the keys work after a click with the mouse, and a control reached by tab k
   await page.context().close();
 });
 
+/** A run's page without its picture, for tests that change none of what others look at. */
+const plain = () => plain.page ??= openPage(browser, path('a/report.html'), {picture: false});
+
 test('joints are found by name, and are named with units in the file', async () => {
-  const {page} = await openPage(browser, path('a/report.html'));
+  const {page} = await plain();
   await page.fill('#signal-search', 'right knee');
   const found = (await page.locator('.results .name').allInnerTexts());
   for (const name of ['JOINT_COMMAND.torque[right_knee_pitch]', 'ROBOT_STATE.joint_position[right_knee_pitch]',
@@ -311,12 +314,46 @@ test('joints are found by name, and are named with units in the file', async () 
   await panel.getByRole('button', {name: 'CSV'}).click();
   await (await download).saveAs(path('knee.csv'));
   assert.match(readFileSync(path('knee.csv'), 'utf8'), /^time \(s\),torque\[right_knee_pitch\] \(N·m\)\r\n/);
-  await page.context().close();
+});
+
+/** A run's page in a window of a width, opened once for the tests of its layout. */
+async function ofWidth(width, height = 800) {
+  if (!widths.has(width)) widths.set(width, await openPage(browser, path('a/report.html'), {viewport: {width, height}}));
+  await widths.get(width).page.setViewportSize({width, height});
+  return widths.get(width);
+}
+const widths = new Map();
+
+test('values and events are on the first screen, also of a phone', async () => {
+  for (const [width, height] of [[1400, 900], [400, 800]]) {
+    const {page} = await ofWidth(width, height);
+    const bar = await page.evaluate(() => document.getElementById('player').getBoundingClientRect().top);
+    for (const place of ['.now h2', '.now tr', '.events h2', '.events li']) {
+      const box = await page.locator(place).first().boundingBox();
+      assert.ok(box.y >= 0 && box.y + box.height <= bar, `${place} at ${width} px: ${JSON.stringify(box)}`);
+    }
+  }
+});
+
+test('the signs are beside the picture, and fold', async () => {
+  for (const width of [1400, 400]) {
+    const {page} = await ofWidth(width);
+    const key = page.locator('.scene-key');
+    if (width === 400) assert.equal(await key.locator('ul').isVisible(), false);
+    if (width === 400) await key.locator('summary').click();
+    assert.equal(await key.locator('ul').isVisible(), true);
+    const [signs, picture] = [await key.boundingBox(), await page.locator('#scene').boundingBox()];
+    assert.ok(signs.y >= picture.y + picture.height, `at ${width} px they lie over it`);
+    assert.ok(await page.evaluate(() => [...document.querySelectorAll('.scene-key li')].every((li) => li.innerText.length < 50)));
+    await key.locator('summary').click();
+    assert.equal(await key.locator('ul').isVisible(), false);
+    assert.doesNotMatch(await page.evaluate(() => document.body.innerText), /[\u23e9-\u23fa]/, 'a sign that fonts lack');
+  }
 });
 
 test('nothing covers the plots and tables, and a phone needs no second direction', async () => {
   for (const width of [1400, 1000, 400]) {
-    const {page, problems} = await openPage(browser, path('a/report.html'), {viewport: {width, height: 800}});
+    const {page, problems} = await ofWidth(width);
     await page.evaluate(() => window.poise.printer.drawAll());
     const wide = await page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]);
     assert.equal(wide[0], wide[1], `at ${width} px the page is ${wide[0]} wide`);
@@ -392,18 +429,16 @@ test('a browser without 3D has the rest of the page', async () => {
 });
 
 test('a page too small for every tick shows rows, shaded between their least and largest values', async () => {
-  poise('report', path('a'));
   poise('report', path('a'), '--html', path('rows.html'), '--page-size', '0.3');
   const names = ['ROBOT_SENSORS.foot_wrench[0].force[2]', 'GROUND_TRUTH.com_position[1]', 'EXTERNAL_PUSH.force[1]',
     'JOINT_COMMAND.eta', 'SUPPORT_PLAN.in_contact[1]'];
-  const full = await openPage(browser, path('a/report.html'));
+  const full = await plain();
   const values = await full.page.evaluate((list) => Promise.all(list.map(async (name) => {
     const s = window.poise.run.signals.get(name);
     await s.load();
     return [...s.values];
   })), names);
-  await full.page.context().close();
-  const {page, problems} = await openPage(browser, path('rows.html'));
+  const {page, problems} = await openPage(browser, path('rows.html'), {picture: false});
   const {ticks, rows} = await page.evaluate(async (list) => {
     const {run} = window.poise;
     return {ticks: [...Array(run.numRows + 1).keys()].map((row) => run.tickOf(row)), rows: await Promise.all(list.map(async (name) => {
@@ -451,7 +486,7 @@ test('a part of a run is told to be one', async () => {
   const cut = poise('log', 'cut', path('a'), '--from', '0.5', '--to', '1.1', '--out', path('part.lcm'));
   assert.equal(cut.status, 0, cut.stderr);
   poise('report', path('part.lcm'));
-  const {page, problems} = await openPage(browser, path('part.html'));
+  const {page, problems} = await openPage(browser, path('part.html'), {picture: false});
   assert.match(await page.locator('#header').innerText(), /part of a run: 0\.5 s to 1\.1/);
   const checks = await page.locator('#tables table').first().innerText();
   assert.match(checks, /simulated time at which this part of the run ends/);
@@ -468,7 +503,7 @@ test('a part of a run is told to be one', async () => {
 });
 
 test('the build and its commit tell the run apart', async () => {
-  const {page} = await openPage(browser, path('a/report.html'));
+  const {page} = await plain();
   const spec = readFileSync(path('a/run_spec.pbtxt'), 'utf8');
   const set = /instruction_set: "([^"]+)"/.exec(spec)[1];
   const commit = /poise_commit: "([^"]*)"/.exec(spec)?.[1] ?? '';
@@ -476,7 +511,6 @@ test('the build and its commit tell the run apart', async () => {
   assert.ok(header.includes(set) && header.includes(commit.slice(0, 12)), header);
   const tables = await page.locator('#tables').innerText();
   assert.ok(tables.includes(set) && tables.includes(commit));
-  await page.context().close();
 });
 
 test('a run that grows grows in the plots, the bar and the picture', async () => {
@@ -515,7 +549,7 @@ test('a second run says how it ended, and is told apart from the first', async (
   const fell = poise('run', 'push_double_support', '--inline', '--duration', '2', '--without', 'balancing', '--set', 'sim.push[0].peak=300', '--out', path('fell'));
   assert.equal(fell.status, 1, fell.stderr);
   poise('report', path('a'), path('fell'), '-o', path('fell.html'));
-  const {page, problems} = await openPage(browser, path('fell.html'));
+  const {page, problems} = await openPage(browser, path('fell.html'), {picture: false});
   const [first, second] = await page.locator('.run-head').allInnerTexts();
   const time = /fell at ([\d.]+) s/.exec(second)[1];
   for (const text of ['second run', 'without balancing', 'sim.push[0].peak=300', 'fell', `the robot fell at ${time} s`, 'FAILED']) assert.ok(second.includes(text), text);
@@ -548,41 +582,11 @@ test('a second run says how it ended, and is told apart from the first', async (
   await page.context().close();
 });
 
-test('the signs are beside the picture, and fold', async () => {
-  poise('report', path('a'));
-  for (const width of [1400, 400]) {
-    const {page} = await openPage(browser, path('a/report.html'), {viewport: {width, height: 800}});
-    const key = page.locator('.scene-key');
-    if (width === 400) assert.equal(await key.locator('ul').isVisible(), false);
-    if (width === 400) await key.locator('summary').click();
-    assert.equal(await key.locator('ul').isVisible(), true);
-    const [signs, picture] = [await key.boundingBox(), await page.locator('#scene').boundingBox()];
-    assert.ok(signs.y >= picture.y + picture.height, `at ${width} px they lie over it`);
-    assert.ok(await page.evaluate(() => [...document.querySelectorAll('.scene-key li')].every((li) => li.innerText.length < 50)));
-    await key.locator('summary').click();
-    assert.equal(await key.locator('ul').isVisible(), false);
-    assert.doesNotMatch(await page.evaluate(() => document.body.innerText), /[\u23e9-\u23fa]/, 'a sign that fonts lack');
-    await page.context().close();
-  }
-});
-
-test('values and events are on the first screen, also of a phone', async () => {
-  for (const [width, height] of [[1400, 900], [400, 800]]) {
-    const {page} = await openPage(browser, path('a/report.html'), {viewport: {width, height}});
-    const bar = await page.evaluate(() => document.getElementById('player').getBoundingClientRect().top);
-    for (const place of ['.now h2', '.now tr', '.events h2', '.events li']) {
-      const box = await page.locator(place).first().boundingBox();
-      assert.ok(box.y >= 0 && box.y + box.height <= bar, `${place} at ${width} px: ${JSON.stringify(box)}`);
-    }
-    await page.context().close();
-  }
-});
-
 test('what a robot has no sensor for is not told as zero', async () => {
   const run = poise('run', 'stand', '--robot', 'heron/heron', '--inline', '--duration', '0.5', '--out', path('heron'));
   assert.ok(run.status <= 1, run.stderr);
   poise('report', path('heron'));
-  const {page, problems} = await openPage(browser, path('heron/report.html'));
+  const {page, problems} = await openPage(browser, path('heron/report.html'), {picture: false});
   await page.evaluate(() => window.poise.player.seek(0.3));
   const value = (name) => page.locator('.readout tr', {hasText: name}).locator('td').innerText();
   for (const foot of ['right', 'left']) {
