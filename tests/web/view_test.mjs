@@ -52,15 +52,24 @@ test('a page follows a run in progress, looks back while it goes on, and has all
 
   // What is shown while it goes on is so: values, not dashes; the cursor inside its plot; nothing has ended or failed.
   await page.evaluate(() => Promise.all([...window.poise.grid.inSight].map((p) => p.building)));
+  await page.evaluate(() => {
+    window.dashes = () => {
+      const {grid, run: r, player} = window.poise;
+      return [...grid.inSight].filter((p) => p.plot).flatMap((p) => p.lines.filter((line, i) => line.signal && p.values[i].textContent === '–'
+        && !Number.isNaN(line.signal.values[r.rowAt(player.time)])).map((line) => line.signal.name));
+    };
+  });
   for (let k = 0; k < 8; ++k) {
     await more(page, 10);
+    // Values are renewed some ten times a second: a dash may still be of a tick that a busy machine skipped.
+    await until(page, () => window.dashes().length === 0);
     const seen = await page.evaluate(() => {
-      const {grid, run: r, player} = window.poise;
+      const {grid} = window.poise;
+      grid.updateValues();
       const plots = [...grid.inSight].filter((p) => p.plot);
       const box = (e) => e.getBoundingClientRect();
       return {
-        dashes: plots.flatMap((p) => p.lines.filter((line, i) => line.signal && p.values[i].textContent === '–'
-          && !Number.isNaN(line.signal.values[r.rowAt(player.time)])).map((line) => line.signal.name)),
+        dashes: window.dashes(),
         outside: plots.filter((p) => !p.cursor.hidden && (box(p.cursor).left > box(p.plot.over).right + 3 || box(p.cursor).left < box(p.plot.over).left - 3)).length,
         single: grid.shared.phases.support.filter((p) => p.value !== 'both feet').length,
         text: document.body.innerText};
