@@ -108,13 +108,19 @@ def push(run, axes=None):
 
 
 def torques(run, axes=None, joints=None):
-    """Commanded joint torques (N·m), of the joints named."""
-    command = run["JOINT_COMMAND"]
+    """Torques (N·m) of the joints named: the motors' true ones where the log has them, else as the bridge ordered them, else
+    the command's, which lack what stiffness and damping add."""
+    for channel, field, label in (("GROUND_TRUTH", "joint_torque", "torque, true (N·m)"),
+                                  ("BRIDGE_STATUS", "applied_torque", "torque, ordered (N·m)"),
+                                  ("JOINT_COMMAND", "torque", "torque, commanded (N·m)")):
+        if channel in run.channels:
+            break
+    told = run[channel]
     names = run.joint_names
     figure, axes = _axes(axes)
     for joint in names if joints is None else joints:
         if joint not in names:
             raise ValueError(f"the robot has no joint '{joint}'; it has {', '.join(names)}")
-        axes[0].plot(command.time, command.torque[:, names.index(joint)], label=joint)
-    axes[0].set_ylabel("torque (N·m)")
+        axes[0].plot(told.time, told[field][:, names.index(joint)], label=joint)
+    axes[0].set_ylabel(label)
     return _finish(figure, axes)

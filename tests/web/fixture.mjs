@@ -37,9 +37,9 @@ export const robot = {
   visuals: [], meshes: [], capsules: [0, 1, 2],
 };
 
-/** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. `more`: of its scenario. */
-export function makeRun(section, constants = {}, ticks = 4, live = undefined, more = {}) {
-  const channels = TYPES.map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
+/** `constants`: value by "type.field"; all others are 0. `live`: {keep} of a run in progress. `more`: of its scenario. `gone`: types it lacks. */
+export function makeRun(section, constants = {}, ticks = 4, live = undefined, more = {}, gone = []) {
+  const channels = TYPES.filter((type) => !gone.includes(type)).map((type) => ({name: type.replace(/_t$/, '').toUpperCase(), type, count: ticks,
     signals: paths(type, sourceOf(type)).map((field) => ({field, integer: false, value: constants[`${type}.${field}`] ?? 0}))}));
   const limits = {half_length: 0.12, half_width: 0.05, friction: 0.9, yaw_friction: 0.8};
   const run = new Run({

@@ -507,6 +507,18 @@ test('what is not measured is no number', async () => {
   assert.deepEqual(await valuesOf(live, 'ROBOT_SENSORS.foot_wrench[0].force[2]'), [-5, NaN]);
 });
 
+test('torques are the motors\' true ones, where the log has them', async () => {
+  const values = {'ground_truth_t.joint_torque[1]': 10, 'bridge_status_t.applied_torque[1]': 8, 'joint_command_t.torque[1]': 4};
+  const panelOfLeg = (run) => figuresFor(run).find(({title}) => title === 'Torques of the right leg, of their limits');
+  for (const [gone, share, words] of [[[], 50, /true torque/], [['ground_truth_t'], 40, /as the bridge ordered it/],
+    [['ground_truth_t', 'bridge_status_t'], 20, /commanded torque, without stiffness/]]) {
+    const run = makeRun('', values, 4, undefined, {}, gone);
+    assert.equal((await valuesOf(run, 'derived.torque_share_ankle_roll'))[0], share);
+    assert.match(panelOfLeg(run).note, words);
+    assert.match(run.signals.get('derived.torque_share_ankle_roll').text, words);
+  }
+});
+
 test('the search finds the field before its channel, and units before counts', () => {
   const signals = [...makeRun('').signals.values()];
   const first = (query) => searchSignals(signals, query)[0].name;

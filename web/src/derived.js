@@ -159,13 +159,22 @@ function estimatorSignals(run) {
   ];
 }
 
+/** Where a joint's torque is told, the nearest to the truth first: a command of stiffness and damping has none of its own. */
+const TORQUES = [
+  {type: 'ground_truth_t', field: 'joint_torque', text: 'true torque of the motor'},
+  {type: 'bridge_status_t', field: 'applied_torque', text: 'torque as the bridge ordered it, stiffness and damping included'},
+  {type: 'joint_command_t', field: 'torque', text: 'commanded torque, without stiffness and damping'},
+];
+export const torqueOf = (run) => TORQUES.find(({type, field}) => run.find(type, `${field}[0]`)) ?? TORQUES.at(-1);
+
 function otherSignals(run) {
+  const torque = torqueOf(run);
   return [
     {name: 'push_magnitude', unit: 'N', text: 'external push, measured', deps: vector('external_push_t', 'force'),
       compute: pointwise((f) => Math.hypot(...f))},
     ...run.robot.joints.map((joint, i) => ({
-      name: `torque_share_${joint.name}`, unit: '%', text: 'commanded torque, of the joint\'s limit',
-      deps: [['joint_command_t', `torque[${i}]`]], compute: pointwise(([x]) => 100 * x / joint.torque_limit)})),
+      name: `torque_share_${joint.name}`, unit: '%', text: `${torque.text}, of the joint's limit`,
+      deps: [[torque.type, `${torque.field}[${i}]`]], compute: pointwise(([x]) => 100 * x / joint.torque_limit)})),
   ];
 }
 

@@ -1,5 +1,5 @@
 // Which plots a run gets: the paper's figures of its section, then what every run is looked at for.
-import {CONDITIONS} from './derived.js';
+import {CONDITIONS, torqueOf} from './derived.js';
 import {LIMITS_SHOWN} from './units.js';
 
 const series = (label, role, type, field) => ({label, role, type, field});
@@ -131,7 +131,7 @@ function common(run, covered) {
     for (let b = foot.body; run.robot.bodies[b].joint >= 0; b = run.robot.bodies[b].parent) {
       joints.unshift(run.robot.bodies[b].joint);
     }
-    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100],
+    return {title: `Torques of the ${foot.name} leg, of their limits`, unit: '%', limits: [-100, 100], note: `Drawn: ${torqueOf(run).text}.`,
       series: joints.map((j, i) => derived(run.robot.joints[j].name, `hue-${i}`,
         `torque_share_${run.robot.joints[j].name}`)), key: `leg-${f}`};
   });
