@@ -60,8 +60,11 @@ def load_share(run, axes=None):
     """η: the right foot's share of the vertical force, as commanded, with its feasible interval, and as measured."""
     command, truth = run["JOINT_COMMAND"], run["GROUND_TRUTH"]
     figure, axes = _axes(axes)
-    axes[0].fill_between(command.time, command.eta_min, command.eta_max, alpha=0.2, label="feasible")
-    axes[0].plot(command.time, command.eta, label="commanded")
+    told = (command.eta_feasible != 0) | (command.eta_max != 0)
+    if told.any():  # a controller that distributes nothing leaves all of it zero
+        low, high, eta = (np.where(told, values, np.nan) for values in (command.eta_min, command.eta_max, command.eta))
+        axes[0].fill_between(command.time, low, high, alpha=0.2, label="feasible")
+        axes[0].plot(command.time, eta, label="commanded")
     force = truth["foot_wrench.force"][:, :, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         axes[0].plot(truth.time, force[:, 0] / force.sum(axis=1), label="true", linewidth=0.8)
@@ -75,8 +78,11 @@ def foot_forces(run, axes=None):
     command, truth = run["JOINT_COMMAND"], run["GROUND_TRUTH"]
     names = truth.names("foot_wrench.force") or ["right", "left"]
     figure, axes = _axes(axes, 2)
+    computed = -command["foot_wrench.force"][:, :, 2]
+    told = (command.conditions_met != 0).any(axis=1) | (computed != 0).any(axis=1)
     for f in (0, 1):
-        axes[f].plot(command.time, -command["foot_wrench.force"][:, f, 2], label="computed")
+        if told.any():  # a controller that computes no wrenches leaves all of them zero
+            axes[f].plot(command.time, np.where(told, computed[:, f], np.nan), label="computed")
         axes[f].plot(truth.time, -truth["foot_wrench.force"][:, f, 2], label="true", linewidth=0.8)
         axes[f].set_ylabel(f"{names[f]} (N)")
     return _finish(figure, axes)

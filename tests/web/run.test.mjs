@@ -507,6 +507,20 @@ test('what is not measured is no number', async () => {
   assert.deepEqual(await valuesOf(live, 'ROBOT_SENSORS.foot_wrench[0].force[2]'), [-5, NaN]);
 });
 
+test('what a controller that distributes nothing does not tell is no number', async () => {
+  const first = async (run, name) => (await valuesOf(run, name))[0];
+  const names = ['JOINT_COMMAND.eta', 'JOINT_COMMAND.eta_optimal', 'JOINT_COMMAND.eta_min', 'JOINT_COMMAND.eta_max',
+    'JOINT_COMMAND.foot_wrench[0].force[2]', 'derived.right_load_computed', 'derived.left_load_computed'];
+  const silent = makeRun('');
+  for (const name of names) assert.ok(Number.isNaN(await first(silent, name)), name);
+  // On the left foot alone, and where no ratio is feasible.
+  const left = makeRun('', {'joint_command_t.in_contact[1]': 1, 'joint_command_t.eta_feasible': 1, 'joint_command_t.foot_wrench[1].force[2]': -98});
+  for (const name of names.slice(0, 4)) assert.equal(await first(left, name), 0, name);
+  assert.equal(Math.abs(await first(left, 'derived.right_load_computed')), 0);
+  assert.equal(await first(left, 'derived.left_load_computed'), 98);
+  assert.equal(await first(makeRun('', {'joint_command_t.eta_max': 1}), 'JOINT_COMMAND.eta_max'), 1);
+});
+
 test('torques are the motors\' true ones, where the log has them', async () => {
   const values = {'ground_truth_t.joint_torque[1]': 10, 'bridge_status_t.applied_torque[1]': 8, 'joint_command_t.torque[1]': 4};
   const panelOfLeg = (run) => figuresFor(run).find(({title}) => title === 'Torques of the right leg, of their limits');

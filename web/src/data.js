@@ -31,22 +31,26 @@ export function describeField(messages, type, path, names = {}) {
 }
 
 /**
- * Fields that hold a zero where there is nothing to tell: [pattern of type.field, field of the message that tells ($1: a list's
- * index), whether its value says that there is something].
+ * Fields that hold a zero where there is nothing to tell: [pattern of type.field, fields of the message that tell ($1: a list's
+ * index), whether the value of one of them says that there is something].
  */
 const TOLD = [
-  [/^(?:robot_sensors_t|drive_feedback_t)\.foot_wrench\[(\d+)\]\..*/, 'foot_sensor[$1]', (sensor) => sensor === 0],
-  [/^joint_command_t\.margins\[(\d+)\]\..*/, 'in_contact[$1]', (contact) => contact > 0],
-  [/^estimator_status_t\.covariance\[\d+\]/, 'has_covariance', (has) => has > 0],
-  [/^support_plan_t\.step_(?:position\[\d\]|time)/, 'step_needed', (needed) => needed > 0],
-  [/^bus_status_t\.((?:temperature|voltage)\[\d+\])/, '$1', (reported) => reported !== 0],
+  [/^(?:robot_sensors_t|drive_feedback_t)\.foot_wrench\[(\d+)\]\..*/, ['foot_sensor[$1]'], (sensor) => sensor === 0],
+  [/^joint_command_t\.margins\[(\d+)\]\..*/, ['in_contact[$1]'], (contact) => contact > 0],
+  // A controller that distributes nothing between the feet tells of no foot, and its ratio has no bound.
+  [/^joint_command_t\.foot_wrench\[\d+\]\..*/, ['in_contact[0]', 'in_contact[1]', 'conditions_met[0]', 'conditions_met[1]'],
+    (foot) => foot > 0],
+  [/^joint_command_t\.eta(?:_optimal|_min|_max)?$/, ['eta_feasible', 'eta_max'], (told) => told > 0],
+  [/^estimator_status_t\.covariance\[\d+\]/, ['has_covariance'], (has) => has > 0],
+  [/^support_plan_t\.step_(?:position\[\d\]|time)/, ['step_needed'], (needed) => needed > 0],
+  [/^bus_status_t\.((?:temperature|voltage)\[\d+\])/, ['$1'], (reported) => reported !== 0],
 ];
 
-/** {name, says} of the signal that tells whether this one's value is one; undefined: it always is. */
+/** {names, says} of the signals that tell whether this one's value is one; undefined: it always is. */
 function tellerOf(channel, field) {
   const path = `${channel.type}.${field}`;
-  const [pattern, teller, says] = TOLD.find(([p]) => p.test(path)) ?? [];
-  return pattern && {name: `${channel.name}.${path.replace(pattern, teller)}`, says};
+  const [pattern, tellers, says] = TOLD.find(([p]) => p.test(path)) ?? [];
+  return pattern && {names: tellers.map((teller) => `${channel.name}.${path.replace(pattern, teller)}`), says};
 }
 
 /** One scalar by row; NaN where its channel has no message. `values` is there after load(). */
@@ -79,9 +83,9 @@ export class Signal {
     const {channel, spec} = this;
     const bounds = spec.least ? [spec.least, spec.largest].map((bound) => channel.read(bound, true)) : [];
     const [values, least, largest] = await Promise.all([channel.read(spec, this.integer), ...bounds]);
-    const teller = this.teller && channel.run.signals.get(this.teller.name);
-    if (teller && teller !== this) await teller.load();
-    const told = teller === this ? values.slice() : teller?.values;
+    const tellers = (this.teller?.names ?? []).map((name) => channel.run.signals.get(name)).filter(Boolean);
+    await Promise.all(tellers.filter((teller) => teller !== this).map((teller) => teller.load()));
+    const told = tellers.map((teller) => teller === this ? values.slice() : teller.values);
     for (const column of [values, least, largest].filter(Boolean)) this.#leaveOut(column, told);
     Object.assign(this, {least, largest});
     this.#column = new Column(values);
@@ -89,15 +93,15 @@ export class Signal {
 
   /** NaN for what is no value. */
   #leaveOut(values, told) {
-    for (let i = 0; told && i < values.length; ++i) if (!this.teller.says(told[i])) values[i] = NaN;
+    for (let i = 0; told.length > 0 && i < values.length; ++i) if (!told.some((by) => this.teller.says(by[i]))) values[i] = NaN;
   }
 
   /** This signal's column of `values` by name, which append and fill take. */
   columnOf(values) {
-    const own = values[this.name], told = this.teller && values[this.teller.name];
-    if (!own || !told) return own;
+    const own = values[this.name], told = (this.teller?.names ?? []).map((name) => values[name]).filter(Boolean);
+    if (!own || told.length === 0) return own;
     const known = own.slice();
-    this.#leaveOut(known, told.slice());
+    this.#leaveOut(known, told.map((by) => by.slice()));
     return known;
   }
 
