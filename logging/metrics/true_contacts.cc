@@ -109,8 +109,15 @@ std::array<std::vector<Interval>, 2> OffTheGround(const RunRecord& run) {
     for (Interval& interval : off[foot]) {
       if (interval.end && *interval.end >= down) interval.end.reset();
     }
-    std::erase_if(off[foot], [&](const Interval& i) {
+    // Moments that follow each other as closely as a rattle's are no time off the ground.
+    std::vector<Interval> whole = Intervals(run, unloaded);
+    std::erase_if(whole, [&](const Interval& i) {
       return i.end.value_or(down) - i.begin < Ticks(run, kLeastSwing);
+    });
+    std::erase_if(off[foot], [&](const Interval& i) {
+      return std::ranges::none_of(whole, [&](const Interval& one) {
+        return i.begin <= one.begin && one.begin < i.end.value_or(down);
+      });
     });
   }
   return off;

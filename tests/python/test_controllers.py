@@ -111,6 +111,20 @@ class Judged(unittest.TestCase):
                     self.assertAlmostEqual(run.metric("torque_step_max"), abs(np.diff(truth.joint_torque, axis=0)).max(), places=9)
                     self.assertGreater(checks["joint_torque_share"]["measured"], 5)
 
+    def test_chatter_makes_no_step(self):
+        def chatters(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs)
+            outputs.joint_command.torque += 60 * (-1) ** tick.index
+
+        run, checks, shown = self.run_it("stand", "torque", holder(False, step=chatters), {"duration": 2})
+        force = -run["GROUND_TRUTH"]["foot_wrench.force"][:, :, 2]
+        unloaded = force < 0.02 * run.robot.total_mass * 9.80665
+        self.assertTrue(unloaded.any())
+        longest = max(len(stretch) for foot in unloaded.T for stretch in "".join("01"[x] for x in foot).split("0"))
+        self.assertLess(longest, 50)
+        self.assertEqual(run.metric("steps"), 0)
+        self.assertNotIn("made", shown.stdout.split("\n\n")[0])
+
     def test_conditions_that_a_controller_tells_are_judged(self):
         def tells(met):
             def step(self, tick, inputs, outputs):

@@ -145,6 +145,16 @@ TEST_F(UnknownChecksTest, AWalkIsNoStandWhateverTheCommandSays) {
   EXPECT_THAT(text, HasSubstr("It walked 5 steps, a way of 0.6 m, at up to 0.5 m/s."));
 }
 
+// A rattle of 4 ms every 10 ms, as a chattering torque makes it.
+TEST_F(UnknownChecksTest, ARattlingRobotMakesNoStep) {
+  Stand();
+  for (size_t t = 0; t < kTicks; ++t) {
+    if (t % 5 < 2) truth_[t].foot_wrench[1].force[2] = 0;
+  }
+  EXPECT_THAT(Tell(), HasSubstr("The robot stood on both feet to the end"));
+  EXPECT_THAT(Tell(), Not(HasSubstr("step")));
+}
+
 TEST_F(UnknownChecksTest, ARobotThatLiesOrHangsWithoutMotorsDoesNotStand) {
   Stand();
   for (size_t t = 0; t < kTicks; ++t) {
