@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iterator>
 #include <string>
+#include <optional>
 #include <vector>
 
 #include "fmt/format.h"
@@ -13,7 +14,8 @@
 namespace poise::logging {
 namespace {
 
-constexpr double kLimitGap = 0.1;  // s between two limits of a motor that are one
+constexpr double kLimitGap = 0.1;   // s between two limits of a motor that are one
+constexpr double kLeastCut = 0.01;  // share of an impedance; less is rounding
 
 /// A limit of the bridge that changed what a controller wanted of a joint.
 struct MotorLimit {
@@ -38,15 +40,68 @@ Answer WantedTorque(const RunRecord& run, int64_t tick, size_t joint) {
          command->damping[joint] * (command->velocity[joint] - state->joint_velocity[joint]);
 }
 
-/// "left_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted", over the interval.
-std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& limit,
-                        const Interval& interval) {
+/// What the bridge changed most in the impedance that a command wants of a joint.
+struct ImpedanceCut {
+  double share = 0;  ///< of what was wanted; of a position, of a radian
+  double from = 0, to = 0;
+  const char *what = "", *unit = "";
+};
+
+/// Empty where the log does not say.
+std::optional<ImpedanceCut> CutAt(const RunRecord& run, int64_t tick, size_t joint) {
+  const joint_command_t* const command = run.command.at(tick);
+  const drive_command_t* const drive = run.drive.at(tick);
+  if (command == nullptr || drive == nullptr || joint >= command->stiffness.size() ||
+      joint >= drive->stiffness.size()) {
+    return {};
+  }
+  ImpedanceCut most;
+  const auto compare = [&](double from, double to, double of, const char* what, const char* unit) {
+    const double share = of > 0 ? std::abs(from - to) / of : 0;
+    if (share > most.share) most = {share, from, to, what, unit};
+  };
+  const auto own = [&](const auto& wanted, const auto& given, const char* what, const char* unit) {
+    compare(wanted[joint], given[joint], std::abs(wanted[joint]), what, unit);
+  };
+  own(command->stiffness, drive->stiffness, "stiffness", "N·m/rad");
+  own(command->damping, drive->damping, "damping", "N·m·s/rad");
+  own(command->velocity, drive->velocity, "velocity", "rad/s");
+  compare(command->position[joint], drive->position[joint], 1, "position", "rad");
+  return most;
+}
+
+/// A cut that nobody notices.
+bool IsRounding(const RunRecord& run, int64_t tick, size_t joint) {
+  const std::optional<ImpedanceCut> cut = CutAt(run, tick, joint);
+  return cut && cut->share < kLeastCut;
+}
+
+/// "left_knee_pitch: stiffness cut from 900 to 600 N·m/rad", of the interval's largest cut.
+std::string CutText(const RunRecord& run, size_t joint, const Interval& interval) {
   const std::string& name = run.robot.joints()[joint].name;
-  if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) {
+  std::optional<ImpedanceCut> most;
+  for (int64_t tick = interval.begin; tick < interval.end.value_or(run.num_ticks); ++tick) {
+    const bridge_status_t* const bridge = run.bridge.at(tick);
+    if (bridge == nullptr || (bridge->saturated[joint] & bridge_status_t::LIMIT_IMPEDANCE) == 0) {
+      continue;
+    }
+    const std::optional<ImpedanceCut> cut = CutAt(run, tick, joint);
+    if (cut && (!most || cut->share > most->share)) most = cut;
+  }
+  if (!most) {
     return fmt::format("{}: stiffness, damping, position or velocity cut to what the robot bears",
                        name);
   }
   const auto applied = [&](int64_t tick) -> Answer {
+  return fmt::format("{}: {} cut from {:.4g} to {:.4g} {}", name, most->what, most->from, most->to,
+                     most->unit);
+}
+
+/// "left_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted", over the interval.
+std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& limit,
+                        const Interval& interval) {
+  const std::string& name = run.robot.joints()[joint].name;
+  if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) return CutText(run, joint, interval);
     const bridge_status_t* const bridge = run.bridge.at(tick);
     if (bridge == nullptr) return {};
     return bridge->applied_torque[joint];
@@ -82,7 +137,9 @@ void AddMotorEvents(const RunRecord& run, EventList* events) {
     for (size_t joint = 0; joint < joints; ++joint) {
       if (bridge->saturated[joint] == 0) continue;
       for (size_t i = 0; i < limited.size(); ++i) {
-        if ((bridge->saturated[joint] & kMotorLimits[i].bit) == 0) continue;
+        const int bit = kMotorLimits[i].bit;
+        if ((bridge->saturated[joint] & bit) == 0) continue;
+        if (bit == bridge_status_t::LIMIT_IMPEDANCE && IsRounding(run, tick, joint)) continue;
         std::vector<Interval>& intervals = limited[i][joint];
         if (intervals.empty() || tick - *intervals.back().end > gap)
           intervals.push_back({tick, {}});

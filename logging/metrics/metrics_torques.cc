@@ -159,7 +159,9 @@ void AddTorques(MetricList* list) {
                      }
                      return count;
                    }});
-  list->push_back({"saturations", "", "joint-ticks in which the bridge limited the torque",
+  list->push_back({"saturations", "",
+                   "joint-ticks in which the bridge changed what a joint was to do: torque (largest, "
+                   "slew, heat, end of the range) or impedance",
                    [](const RunRecord& run) {
                      return Maximum(run, [&](int64_t t) -> Answer {
                        const bridge_status_t* bridge = run.bridge.at(t);

@@ -32,6 +32,7 @@ RecordTest::RecordTest() {
     task_.push_back(Sized<task_torque_t>(t));
     balance_.push_back(Sized<balance_torque_t>(t));
     command_.push_back(Sized<joint_command_t>(t));
+    drive_.push_back(Sized<drive_command_t>(t));
     bridge_.push_back(Sized<bridge_status_t>(t));
     push_.push_back(Sized<external_push_t>(t));
     truth_.push_back(Sized<ground_truth_t>(t));
@@ -63,6 +64,7 @@ RunRecord RecordTest::Read() {
     add("TASK_TORQUE", task_[t]);
     add("BALANCE_TORQUE", balance_[t]);
     add("JOINT_COMMAND", command_[t]);
+    if (with_drives_) add("DRIVE_COMMAND", drive_[t]);
     add("BRIDGE_STATUS", bridge_[t]);
     add("EXTERNAL_PUSH", push_[t]);
     add("GROUND_TRUTH", truth_[t]);

@@ -38,12 +38,14 @@ class RecordTest : public testing::Test {
   std::string path_ = folder_.path("run.lcm");
   RunSpec spec_ = MakeTestSpec();
   std::set<std::string> without_;  ///< channels that have no messages
+  bool with_drives_ = false;       ///< the log has DRIVE_COMMAND
   std::vector<robot_sensors_t> sensors_;
   std::vector<robot_state_t> state_;
   std::vector<support_plan_t> plan_;
   std::vector<task_torque_t> task_;
   std::vector<balance_torque_t> balance_;
   std::vector<joint_command_t> command_;
+  std::vector<drive_command_t> drive_;
   std::vector<bridge_status_t> bridge_;
   std::vector<external_push_t> push_;
   std::vector<ground_truth_t> truth_;

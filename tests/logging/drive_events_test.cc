@@ -1,0 +1,43 @@
+// What a run tells of impedances that its drives close, and of impacts.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "logging/events/events.h"
+#include "tests/logging/record_fixture.h"
+
+namespace poise::logging {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class DriveEventsTest : public RecordTest {
+ protected:
+  DriveEventsTest() { with_drives_ = true; }
+  std::vector<std::string> Details(const std::string& name) {
+    std::vector<std::string> found;
+    for (const Event& event : Events(Read())) {
+      if (event.name == name) found.push_back(event.detail);
+    }
+    return found;
+  }
+};
+
+TEST_F(DriveEventsTest, AnImpedanceThatIsCutIsToldWithItsSize) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    bridge_[t].state = bridge_status_t::STATE_RUNNING;
+    if (t < 20 || t >= 40) continue;
+    bridge_[t].saturated[3] = bridge_status_t::LIMIT_IMPEDANCE;
+    command_[t].stiffness[3] = 600.93;
+    drive_[t].stiffness[3] = 600;
+  }
+  EXPECT_THAT(Details("impedance_cut"), IsEmpty()) << "0.15 %";
+  for (size_t t = 30; t < 40; ++t) command_[t].stiffness[3] = t == 35 ? 900 : 700;
+  const std::string knee = Read().robot.joints()[3].name;
+  EXPECT_THAT(Details("impedance_cut"),
+              ElementsAre(knee + ": stiffness cut from 900 to 600 N·m/rad"));
+  EXPECT_THAT(Details("impedance_cut_ends"), ElementsAre(knee + ", after 0.020 s"));
+}
+
+}  // namespace
+}  // namespace poise::logging
