@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -89,9 +90,17 @@ void AddSoleEvents(const RunRecord& run, EventList* events) {
     std::erase_if(intervals, [&](const Interval& i) {
       return run.duration(i.end.value_or(run.num_ticks) - i.begin) < kLeastTipping;
     });
+    const auto lasts = static_cast<int64_t>(std::llround(kLeastTipping / run.spec.tick_period()));
     events->AddIntervals(intervals, "sole_on_edge", "sole_on_edge_ends", [&](int64_t tick) {
-      return fmt::format("{}, which carried {:.0f} N", FootName(run, foot),
-                         -run.truth.at(tick)->foot_wrench[foot].force[2]);
+      // The median: an impact of a tick or two carries nothing.
+      std::vector<double> loads;
+      for (int64_t t = tick; t < std::min(tick + lasts, run.num_ticks); ++t) {
+        const ground_truth_t* const truth = run.truth.at(t);
+        if (truth != nullptr) loads.push_back(-truth->foot_wrench[foot].force[2]);
+      }
+      const auto middle = loads.begin() + static_cast<std::ptrdiff_t>(loads.size() / 2);
+      std::ranges::nth_element(loads, middle);
+      return fmt::format("{}, which carried {:.0f} N", FootName(run, foot), *middle);
     });
   }
 }

@@ -126,7 +126,7 @@ void AddWalking(MetricList* list) {
                      }
                      return Scaled(square.Root(), kMilli);
                    }});
-  list->push_back({"walk_way", "m", "walking, way of the COM from step to step", Way});
+  list->push_back({"walk_way", "m", "walking, way of the COM between touch-downs", Way});
   list->push_back({"walk_cost_of_transport", "",
                    "walking, positive work of the joints over weight and way", CostOfTransport});
 }

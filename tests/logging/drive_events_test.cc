@@ -39,5 +39,17 @@ TEST_F(DriveEventsTest, AnImpedanceThatIsCutIsToldWithItsSize) {
   EXPECT_THAT(Details("impedance_cut_ends"), ElementsAre(knee + ", after 0.020 s"));
 }
 
+TEST_F(DriveEventsTest, ASoleThatTipsIsToldWithALoadThatLasts) {
+  const robot::RobotModel robot = Read().robot;
+  const double half = 0.5 * robot.feet()[1].length, weight = robot.total_mass() * robot::kGravity;
+  for (size_t t = 30; t < 70; ++t) {
+    const double load = t == 30 ? 30 * weight : weight;
+    truth_[t].foot_wrench[1].force[2] = -load;
+    truth_[t].foot_wrench[1].moment[1] = half * load;
+  }
+  EXPECT_THAT(Details("sole_on_edge"),
+              ElementsAre(fmt::format("left foot, which carried {:.0f} N", weight)));
+}
+
 }  // namespace
 }  // namespace poise::logging

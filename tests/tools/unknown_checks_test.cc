@@ -142,7 +142,18 @@ TEST_F(UnknownChecksTest, AWalkIsNoStandWhateverTheCommandSays) {
   const std::string text = Tell();
   EXPECT_THAT(text, Not(HasSubstr("on both feet to the end")));
   EXPECT_THAT(text, HasSubstr("changed its support 10 times"));
-  EXPECT_THAT(text, HasSubstr("It walked 5 steps, a way of 0.6 m, at up to 0.5 m/s."));
+  EXPECT_THAT(text, HasSubstr("and stood to the end"));
+  EXPECT_THAT(text, HasSubstr("It walked 5 steps, a way of 0.6 m between touch-downs, at up to 0.5 m/s."));
+}
+
+TEST_F(UnknownChecksTest, AWalkThatGoesOnAtTheEndIsNoStand) {
+  spec_.set_tick_period(0.02);
+  Stand();
+  for (size_t t = 10; t < 20; ++t) truth_[t].foot_wrench[0].force[2] = 0;
+  EXPECT_THAT(Tell(), HasSubstr("stood to the end"));
+  for (size_t t = 90; t < kTicks; ++t) truth_[t].foot_wrench[1].force[2] = 0;
+  EXPECT_THAT(Tell(), HasSubstr("and did not fall to the end"));
+  EXPECT_THAT(Tell(), Not(HasSubstr("stood")));
 }
 
 // A rattle of 4 ms every 10 ms, as a chattering torque makes it.

@@ -22,6 +22,7 @@ using logging::RunRecord;
 constexpr size_t kFigures = 3;            // in the second sentence
 constexpr size_t kSupports = 5;           // named one by one
 constexpr double kFalls = 1;              // s before a fall that belong to it
+constexpr double kStands = 0.3;           // s, on both feet after a step
 constexpr double kReferenceMoved = 5e-3;  // m, of a reference that is none to stand at
 
 struct Words {
@@ -221,6 +222,16 @@ std::string BridgeTrouble(const std::vector<Event>& events) {
   return "";
 }
 
+/// True when a step is on its way as the run ends, or the last has only just come down.
+bool WalksAtTheEnd(const RunRecord& run) {
+  const std::vector<logging::TrueStep> steps = logging::TrueSteps(run);
+  const std::vector<logging::TrueSupport> supports = logging::TrueSupports(run);
+  if (steps.empty() || supports.empty()) return false;
+  const std::array<bool, 2>& carries = supports.back().carries;
+  return !carries[0] || !carries[1] ||
+         run.duration(run.num_ticks - steps.back().landed) < kStands;
+}
+
 /// Figures beside the paper's; those of any run where the scenario has none.
 std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks) {
   std::vector<std::string> parts;
@@ -283,10 +294,10 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
   std::string first = pushes.empty() ? "the robot" : pushes + ", the robot";
   if (!support.moves.empty()) first += fmt::format(" {},", support.moves);
   const std::string and_ = support.moves.empty() ? "" : " and";
-  // Whether it fell nobody saw, or it is held up without its motors.
-  const char* const stood = run.truth.empty()     ? "ran"
-                            : !BridgeFollows(run) ? "did not fall"
-                                                  : "stood";
+  // Whether it fell nobody saw; or it is held up without its motors, or walks on.
+  const char* const stood = run.truth.empty()                            ? "ran"
+                            : !BridgeFollows(run) || WalksAtTheEnd(run) ? "did not fall"
+                                                                        : "stood";
   if (run.spec.has_cut()) {
     const double begin = run.time(run.spec.cut().first_tick());
     return Capital(fmt::format("{} {}. The log is a part of a run: {} to {} of {}.", first,

@@ -48,7 +48,7 @@ std::string TellWalk(const logging::RunRecord& run, std::ptrdiff_t steps) {
       fmt::format("It {} {} step{}", way ? "walked" : "made", steps, steps == 1 ? "" : "s");
   const std::optional<double> fastest = Figure(run, "walk_speed_max");
   const std::optional<double> error = Figure(run, "walk_velocity_error_rms");
-  if (way) text += fmt::format(", a way of {}", FormatNumber(*way, "m"));
+  if (way) text += fmt::format(", a way of {} between touch-downs", FormatNumber(*way, "m"));
   if (fastest) text += fmt::format(", at up to {}", FormatNumber(*fastest, "m/s"));
   if (error) {
     text += fmt::format(" and {} off the commanded velocity (of two steps each; RMS)",
