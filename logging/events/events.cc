@@ -14,6 +14,7 @@
 #include "logging/events/event_groups.h"
 #include "logging/events/operator_words.h"
 #include "logging/metrics/analysis.h"
+#include "logging/metrics/push_noise.h"
 #include "logging/metrics/true_contacts.h"
 
 namespace poise::logging {
@@ -29,26 +30,6 @@ Answer PushForce(const RunRecord& run, int64_t tick) {
   const external_push_t* push = run.push.at(tick);
   if (push == nullptr) return {};
   return GetVector3(push->force).norm();
-}
-
-/// N, below which a reading is noise: the sensor's deviation from the record itself, by the median
-/// difference between neighbouring samples, which a push does not touch.
-double PushThreshold(const RunRecord& run) {
-  constexpr double kDeviations = 6;  // of a norm of three: beyond it once in 10^7 samples
-  // The norm of three normal variables of deviation 1 has this median; a difference of two, √2 of
-  // it.
-  const double median_of_difference = 1.5382 * std::sqrt(2.0);
-  std::vector<double> differences;
-  for (int64_t tick = 1; tick < run.num_ticks; ++tick) {
-    const external_push_t* before = run.push.at(tick - 1);
-    const external_push_t* now = run.push.at(tick);
-    if (before == nullptr || now == nullptr) continue;
-    differences.push_back((GetVector3(now->force) - GetVector3(before->force)).norm());
-  }
-  if (differences.empty()) return 0;
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  return kDeviations * *middle / median_of_difference;
 }
 
 void AddPush(const RunRecord& run, bool ended, EventList* events) {

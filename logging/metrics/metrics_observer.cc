@@ -126,7 +126,8 @@ void AddCalibration(MetricList* list) {
   const auto mass = [](const RunRecord& run, int64_t tick) -> Answer {
     const robot_state_t* state = run.state.at(tick);
     const ground_truth_t* truth = run.truth.at(tick);
-    if (state == nullptr || truth == nullptr) return {};
+    // A controller that tells no task need not believe in the model's mass.
+    if (state == nullptr || truth == nullptr || run.task.empty()) return {};
     double force = 0;
     for (size_t f = 0; f < 2; ++f) {
       force +=

@@ -111,6 +111,25 @@ class Judged(unittest.TestCase):
                     self.assertAlmostEqual(run.metric("torque_step_max"), abs(np.diff(truth.joint_torque, axis=0)).max(), places=9)
                     self.assertGreater(checks["joint_torque_share"]["measured"], 5)
 
+    def test_what_nobody_told_is_not_shown(self):
+        run, checks, shown = self.run_it("stand", "impedance", holder(True), {"duration": 0.5})
+        true = abs(run["GROUND_TRUTH"].joint_torque).max()
+        for metric in ("push_peak", "push_impulse", "mass_error_end", "eta_lowest"):
+            self.assertIsNone(run.metric(metric), metric)
+        self.assertNotIn("ushed", shown.stdout)
+        self.assertIn("limited by a motor's torque or heat", shown.stdout)
+        try:
+            import matplotlib
+            matplotlib.use("Agg")
+        except ImportError:
+            return
+        torques = poise.plots.torques(run)
+        self.assertEqual(torques.axes[0].get_ylabel(), "torque, true (N·m)")
+        self.assertAlmostEqual(max(abs(line.get_ydata()).max() for line in torques.axes[0].lines), true)
+        for plot in (poise.plots.load_share, poise.plots.foot_forces):
+            for axes in plot(run).axes:
+                self.assertEqual([line.get_label() for line in axes.lines], ["true"])
+
     def test_chatter_makes_no_step(self):
         def chatters(self, tick, inputs, outputs):
             super(type(self), self).step(tick, inputs, outputs)

@@ -166,6 +166,20 @@ TEST_F(UnknownChecksTest, ARattlingRobotMakesNoStep) {
   EXPECT_THAT(Tell(), Not(HasSubstr("step")));
 }
 
+TEST_F(UnknownChecksTest, ReadingsOfNoPushAreNoPush) {
+  Stand();
+  push_[0].force[0] = -0.1;
+  logging::RunRecord run = Read();
+  run.num_ticks = 1;  // it ended at once
+  EXPECT_THAT(TellRun(run, {}, logging::Events(run), ""), Not(HasSubstr("ushed")));
+  for (size_t t = 0; t < kTicks; ++t) push_[t].force[t % 3] = t % 2 == 0 ? 0.3 : -0.3;
+  EXPECT_THAT(Tell(), Not(HasSubstr("ushed")));
+  for (const char* metric : {"push_peak", "push_impulse"}) EXPECT_TRUE(Unanswered(metric)) << metric;
+  push_[50].force[1] = 20;
+  EXPECT_NEAR(Measure("push_peak"), 20, 0.1);
+  EXPECT_THAT(Tell(), HasSubstr("Pushed from the right with up to 20.0 N"));
+}
+
 TEST_F(UnknownChecksTest, ARobotThatLiesOrHangsWithoutMotorsDoesNotStand) {
   Stand();
   for (size_t t = 0; t < kTicks; ++t) {

@@ -29,6 +29,10 @@ void Evaluate(const logging::Metric& metric, const logging::RunRecord& run, Chec
   result->unit = metric.unit;
   if (result->label.empty()) result->label = metric.description;
   result->measured = metric.compute(run);
+  const bool sensed = std::ranges::any_of(run.robot.feet(), &robot::FootModel::force_sensor);
+  if (metric.name.starts_with("cop_measured") && !sensed) {
+    result->label += " (observed: the feet have no sensors)";
+  }
   if (!result->measured) result->missing = logging::MissingFor(metric, run);
   if (metric.joint) result->joint = metric.joint(run);
   if (!result->limited() || !result->known()) return;
