@@ -34,7 +34,7 @@ std::string BridgeReasonName(int8_t reason) {
     case bridge_status_t::REASON_NO_COMMAND:
       return "no command";
     case bridge_status_t::REASON_COMMAND_NOT_FINITE:
-      return "command not finite";
+      return "command not finite, or with a negative stiffness or damping";
     case bridge_status_t::REASON_COMMAND_STALE:
       return "command stale";
     case bridge_status_t::REASON_COMMAND_SEQUENCE:

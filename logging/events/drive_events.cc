@@ -1,8 +1,9 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <string>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "fmt/format.h"
@@ -92,7 +93,6 @@ std::string CutText(const RunRecord& run, size_t joint, const Interval& interval
     return fmt::format("{}: stiffness, damping, position or velocity cut to what the robot bears",
                        name);
   }
-  const auto applied = [&](int64_t tick) -> Answer {
   return fmt::format("{}: {} cut from {:.4g} to {:.4g} {}", name, most->what, most->from, most->to,
                      most->unit);
 }
@@ -102,6 +102,7 @@ std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& li
                         const Interval& interval) {
   const std::string& name = run.robot.joints()[joint].name;
   if (limit.bit == bridge_status_t::LIMIT_IMPEDANCE) return CutText(run, joint, interval);
+  const auto applied = [&](int64_t tick) -> Answer {
     const bridge_status_t* const bridge = run.bridge.at(tick);
     if (bridge == nullptr) return {};
     return bridge->applied_torque[joint];
@@ -122,6 +123,26 @@ std::string LimitedText(const RunRecord& run, size_t joint, const MotorLimit& li
   }
   return fmt::format("{}: {:.1f} to {:.1f} N·m{}", name, Tenths(from), Tenths(to),
                      wanted ? fmt::format(", of {:.1f} N·m wanted", Tenths(*wanted)) : "");
+}
+
+/// " (stiffness of left_knee_pitch: -5 N·m/rad)", of what a drive cannot close, in the last command
+/// before a cycle.
+std::string NegativeGain(const RunRecord& run, int64_t tick) {
+  constexpr int64_t kLast = 100;  // ticks
+  for (int64_t t = tick; t >= std::max<int64_t>(0, tick - kLast); --t) {
+    const joint_command_t* const command = run.command.at(t);
+    if (command == nullptr) continue;
+    for (size_t joint = 0; joint < command->stiffness.size(); ++joint) {
+      for (const bool stiff : {true, false}) {
+        const double gain = stiff ? command->stiffness[joint] : command->damping[joint];
+        if (!(gain < 0)) continue;
+        return fmt::format(" ({} of {}: {:.4g} {})", stiff ? "stiffness" : "damping",
+                           run.robot.joints()[joint].name, gain,
+                           stiff ? "N·m/rad" : "N·m·s/rad");
+      }
+    }
+  }
+  return "";
 }
 
 }  // namespace
@@ -166,7 +187,10 @@ void AddBridgeEvents(const RunRecord& run, EventList* events) {
     const bridge_status_t* bridge = run.bridge.at(tick);
     if (bridge == nullptr) continue;
     if (before != nullptr && bridge->state != before->state) {
-      const std::string reason = BridgeReasonText(*bridge, names);
+      std::string reason = BridgeReasonText(*bridge, names);
+      if (bridge->reason == bridge_status_t::REASON_COMMAND_NOT_FINITE) {
+        reason += NegativeGain(run, tick);
+      }
       events->Add(tick, "bridge_state",
                   fmt::format("{} to {}{}", BridgeStateName(before->state),
                               BridgeStateName(bridge->state), reason.empty() ? "" : ": " + reason));

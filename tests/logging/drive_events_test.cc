@@ -39,6 +39,22 @@ TEST_F(DriveEventsTest, AnImpedanceThatIsCutIsToldWithItsSize) {
   EXPECT_THAT(Details("impedance_cut_ends"), ElementsAre(knee + ", after 0.020 s"));
 }
 
+TEST_F(DriveEventsTest, ANegativeStiffnessIsNamed) {
+  for (size_t t = 0; t < kTicks; ++t) {
+    const bool refused = t >= 50;
+    if (refused) command_[t].stiffness[3] = -5;
+    bridge_[t].state =
+        refused ? bridge_status_t::STATE_STOPPING : bridge_status_t::STATE_RUNNING;
+    bridge_[t].reason =
+        refused ? bridge_status_t::REASON_COMMAND_NOT_FINITE : bridge_status_t::REASON_NONE;
+    bridge_[t].reason_joint = -1;
+  }
+  EXPECT_THAT(Details("bridge_state"),
+              ElementsAre("running to stopping: command not finite, or with a negative stiffness "
+                          "or damping (stiffness of " +
+                          Read().robot.joints()[3].name + ": -5 N·m/rad)"));
+}
+
 TEST_F(DriveEventsTest, ASoleThatTipsIsToldWithALoadThatLasts) {
   const robot::RobotModel robot = Read().robot;
   const double half = 0.5 * robot.feet()[1].length, weight = robot.total_mass() * robot::kGravity;

@@ -144,6 +144,25 @@ class Judged(unittest.TestCase):
         self.assertEqual(run.metric("steps"), 0)
         self.assertNotIn("made", shown.stdout.split("\n\n")[0])
 
+    def test_the_component_whose_output_is_not_finite_is_named(self):
+        def breaks(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs)
+            if tick.index > 300:
+                outputs.joint_command.torque[0] = np.nan
+
+        run, checks, shown = self.run_it("stand", "torque", holder(False, step=breaks))
+        self.assertRegex(shown.stdout.replace("\n", " "), r": holder: output joint_command is not finite at tick 301\.")
+        self.assertNotIn(": holder: holder", shown.stdout)
+
+    def test_a_negative_stiffness_is_named(self):
+        def softens(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs)
+            if tick.index > 300:
+                outputs.joint_command.stiffness[3] = -5
+
+        run, checks, shown = self.run_it("stand", "impedance", holder(True, step=softens))
+        self.assertIn("(stiffness of %s: -5 N·m/rad)" % run.joint_names[3], " ".join(shown.stdout.split()))
+
     def test_conditions_that_a_controller_tells_are_judged(self):
         def tells(met):
             def step(self, tick, inputs, outputs):

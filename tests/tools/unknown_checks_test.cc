@@ -180,6 +180,21 @@ TEST_F(UnknownChecksTest, ReadingsOfNoPushAreNoPush) {
   EXPECT_THAT(Tell(), HasSubstr("Pushed from the right with up to 20.0 N"));
 }
 
+// As a run within one process leaves it: each component tells why the run ended.
+TEST_F(UnknownChecksTest, TheComponentThatEndedTheRunIsNamedAlone) {
+  spec_.set_num_ticks(2 * kTicks);
+  logging::RunRecord run = Read();
+  for (const char* name : {"alpha", "own_torque"}) {
+    run.spec.mutable_graph()->add_component()->set_name(name);
+    run.health[name].state = health_t::STATE_FAILED;
+    run.health[name].detail = "own_torque: output joint_command is not finite at tick 100";
+  }
+  EXPECT_EQ(EndReason(run), "own_torque: output joint_command is not finite at tick 100");
+  run.health["own_torque"].detail = "output joint_command is not finite at tick 100";
+  run.health.erase("alpha");
+  EXPECT_EQ(EndReason(run), "own_torque: output joint_command is not finite at tick 100");
+}
+
 TEST_F(UnknownChecksTest, ARobotThatLiesOrHangsWithoutMotorsDoesNotStand) {
   Stand();
   for (size_t t = 0; t < kTicks; ++t) {

@@ -271,10 +271,16 @@ std::string Figures(const RunRecord& run, const std::vector<CheckResult>& checks
 
 std::string EndReason(const RunRecord& run) {
   std::string reason;
+  // Within one process each component tells of the one that ended the run.
+  const auto named = [&](const std::string& detail) {
+    return std::ranges::any_of(run.spec.graph().component(), [&](const auto& component) {
+      return detail.starts_with(component.name() + ": ");
+    });
+  };
   for (const auto& [component, health] : run.health) {
     if (health.detail.empty() || health.state < health_t::STATE_FINISHED) continue;
     if (reason.empty() || health.state == health_t::STATE_FAILED) {
-      reason = health.detail == logging::kEndedByHand
+      reason = health.detail == logging::kEndedByHand || named(health.detail)
                    ? health.detail
                    : fmt::format("{}: {}", component, health.detail);
     }
