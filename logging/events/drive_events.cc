@@ -137,8 +137,7 @@ std::string NegativeGain(const RunRecord& run, int64_t tick) {
         const double gain = stiff ? command->stiffness[joint] : command->damping[joint];
         if (!(gain < 0)) continue;
         return fmt::format(" ({} of {}: {:.4g} {})", stiff ? "stiffness" : "damping",
-                           run.robot.joints()[joint].name, gain,
-                           stiff ? "N·m/rad" : "N·m·s/rad");
+                           run.robot.joints()[joint].name, gain, stiff ? "N·m/rad" : "N·m·s/rad");
       }
     }
   }

@@ -118,8 +118,7 @@ constexpr Needs kNeeds[] = {
     {"step_*", "SUPPORT_PLAN.stepping; EXTERNAL_PUSH.force"},
     {"push_*", "EXTERNAL_PUSH.force"},
     // estimates
-    {"mass_error_*",
-     "TASK_TORQUE; ROBOT_STATE.load_mass; GROUND_TRUTH.foot_pose, foot_wrench"},
+    {"mass_error_*", "TASK_TORQUE; ROBOT_STATE.load_mass; GROUND_TRUTH.foot_pose, foot_wrench"},
     {"com_estimate_error_*", "SUPPORT_PLAN.com_position; GROUND_TRUTH.com_position"},
     {"imu_tilt_*", "ESTIMATOR_STATUS.imu_tilt, calibration"},
     {"observer_*", "ESTIMATOR_STATUS.observed_wrench; GROUND_TRUTH.foot_wrench"},

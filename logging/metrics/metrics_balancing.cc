@@ -68,7 +68,8 @@ void AddCop(MetricList* list) {
         if (balance == nullptr) return {};
         return std::abs(balance->cop[axis]) - balance->cop_limit[axis];
       });
-  add("cop_measured_max", "largest CoP of the resultant as the feet's sensors read it, without them as observed",
+  add("cop_measured_max",
+      "largest CoP of the resultant as the feet's sensors read it, without them as observed",
       [size](const RunRecord& run, int64_t t, int axis) {
         return size(MeasuredCop(run, t), axis);
       });

@@ -42,8 +42,8 @@ Answer PushPeak(const RunRecord& run) {
 }
 
 void AddPush(MetricList* list) {
-  list->push_back({"push_peak", "N", "largest push, measured; none: all is the sensor's noise",
-                   PushPeak});
+  list->push_back(
+      {"push_peak", "N", "largest push, measured; none: all is the sensor's noise", PushPeak});
   list->push_back({"push_impulse", "N·s", "size of the sum of the measured push over time",
                    [](const RunRecord& run) -> Answer {
                      if (!PushPeak(run)) return {};

@@ -159,16 +159,17 @@ void AddTorques(MetricList* list) {
                      }
                      return count;
                    }});
-  list->push_back({"saturations", "",
-                   "joint-ticks in which the bridge changed what a joint was to do: torque (largest, "
-                   "slew, heat, end of the range) or impedance",
-                   [](const RunRecord& run) {
-                     return Maximum(run, [&](int64_t t) -> Answer {
-                       const bridge_status_t* bridge = run.bridge.at(t);
-                       if (bridge == nullptr) return {};
-                       return static_cast<double>(bridge->saturations);
-                     });
-                   }});
+  list->push_back(
+      {"saturations", "",
+       "joint-ticks in which the bridge changed what a joint was to do: torque (largest, "
+       "slew, heat, end of the range) or impedance",
+       [](const RunRecord& run) {
+         return Maximum(run, [&](int64_t t) -> Answer {
+           const bridge_status_t* bridge = run.bridge.at(t);
+           if (bridge == nullptr) return {};
+           return static_cast<double>(bridge->saturations);
+         });
+       }});
   list->push_back({"bridge_not_running_ticks", "",
                    "ticks in which the bridge was damping, stopping or stopped",
                    [](const RunRecord& run) {
