@@ -1,4 +1,5 @@
 """Controllers that are not Poise's, in graphs without any of its own: by torque and by impedance they are judged by the truth."""
+import csv
 import os
 import re
 import shutil
@@ -110,6 +111,17 @@ class Judged(unittest.TestCase):
                     self.assertAlmostEqual(run.metric("joint_torque_max"), torque.max(), places=9)
                     self.assertAlmostEqual(run.metric("torque_step_max"), abs(np.diff(truth.joint_torque, axis=0)).max(), places=9)
                     self.assertGreater(checks["joint_torque_share"]["measured"], 5)
+
+    def test_a_fall_in_a_sweep_is_a_fall(self):
+        out = os.path.join(tempfile.mkdtemp(dir=FOLDER), "sweep")
+        done = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "sweep", "push", "--set", "graph=torque",
+                               "--set", "sim.push[0].scaled_impulse=", "--vary", "sim.push[0].peak=50,900", "--jobs", "1", "--quiet",
+                               "--out", out], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        with open(os.path.join(out, "table.csv")) as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual([row["outcome"] for row in rows], ["stands", "fell"])
+        self.assertGreater(float(rows[1]["fell_at"]), 1)
 
     def test_what_nobody_told_is_not_shown(self):
         run, checks, shown = self.run_it("stand", "impedance", holder(True), {"duration": 0.5})

@@ -271,7 +271,8 @@ void Launcher::Watch() {
     const bool recorded =
         !log_ || control_.statuses().at(kRecorderName).health.state == health_t::STATE_FINISHED;
     if (ended_at > 0 && recorded) {
-      outcome_.completed = outcome_.ticks_done = !failed;
+      outcome_.completed = !failed;
+      outcome_.ticks_done = true;
       if (!reason.empty()) Fail(fault, reason);
       return;
     }
