@@ -92,7 +92,7 @@ void AddSoleEvents(const RunRecord& run, EventList* events) {
     });
     const auto lasts = static_cast<int64_t>(std::llround(kLeastTipping / run.spec.tick_period()));
     events->AddIntervals(intervals, "sole_on_edge", "sole_on_edge_ends", [&](int64_t tick) {
-      // The median: an impact of a tick or two carries nothing.
+      // The load told is the median: an impact of a tick or two carries nothing.
       std::vector<double> loads;
       for (int64_t t = tick; t < std::min(tick + lasts, run.num_ticks); ++t) {
         const ground_truth_t* const truth = run.truth.at(t);
