@@ -186,6 +186,9 @@ function(poise_proto_library name)
   add_library(${name} STATIC ${sources} ${CMAKE_CURRENT_BINARY_DIR}/${name}_schema.cc)
   target_include_directories(${name} SYSTEM PUBLIC ${PROJECT_BINARY_DIR})
   target_link_libraries(${name} PUBLIC protobuf::libprotobuf ${A_DEPS})
+  if(NOT name STREQUAL poise_rule_proto)
+    target_link_libraries(${name} PUBLIC poise_rule_proto)  # any schema may give its fields rules
+  endif()
   set_property(GLOBAL APPEND PROPERTY POISE_LIBRARIES ${name})
 endfunction()
 

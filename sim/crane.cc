@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "components/robot/dynamics.h"
-#include "sim/config_check.h"
-#include "sim/minimum_jerk.h"
+#include "components/balance/minimum_jerk.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 
@@ -32,19 +32,14 @@ CraneSpring::CraneSpring(const Crane& config, const robot::RobotModel& model,
     : release_time_(config.release_time()),
       tick_period_(tick_period),
       anchor_(com + config.height() * Vector3d::UnitZ()) {
-  RequireNotNegative(config.height(), "crane.height");
-  RequireNotNegative(config.follow_time(), "crane.follow_time");
   const double ticks = std::ceil(config.follow_time() / tick_period - 1e-9);
   follow_ticks_ = static_cast<int64_t>(std::min(ticks, 1e9));
-  RequirePositive(release_time_, "crane.release_time");
   const double mass = model.total_mass();
   stiffness_ = config.has_stiffness() ? config.stiffness() : mass * robot::kGravity / kSag;
-  RequirePositive(stiffness_, "crane.stiffness");
   const double felt = kFeltMass * model.bodies()[0].mass;
   damping_ = config.has_damping() ? config.damping()
                                   : std::min(2 * kDampingRatio * std::sqrt(mass * stiffness_),
                                              kStable * felt / step);
-  RequireNotNegative(damping_, "crane.damping");
   if (step * (damping_ + step * stiffness_) > felt) {
     throw ConfigError(
         config.has_damping() ? "crane.damping" : "crane.stiffness",
@@ -63,7 +58,7 @@ void CraneSpring::Follow(bool follows) {
   } else if (followed_ > follow_ticks_) {
     released_ = std::min(1.0, released_ + tick_period_ / release_time_);
   }
-  share_ = 1 - MinimumJerk(released_, 1).position;
+  share_ = 1 - balance::MinimumJerk(released_, 1).position;
 }
 
 Vector3d CraneSpring::Force(const Vector3d& position, const Vector3d& velocity) const {

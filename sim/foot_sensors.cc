@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "poise/drive_feedback_t.hpp"
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
 
 namespace poise {
 
@@ -29,12 +29,10 @@ FootSensors::FootSensors(const robot::RobotModel& model, const SimConfig& config
     }
     fault.start = in.start();
     fault.end = in.has_end() ? in.end() : std::numeric_limits<double>::infinity();
-    RequireFinite(fault.start, field + ".start");
-    if (!(fault.end > fault.start)) throw ConfigError(field + ".end", "must be after its start");
+      if (!(fault.end > fault.start)) throw ConfigError(field + ".end", "must be after its start");
     fault.kind = in.kind();
     fault.bias << in.force_x(), in.force_y(), in.force_z(), in.moment_x(), in.moment_y(),
         in.moment_z();
-    if (!fault.bias.allFinite()) throw ConfigError(field, "must have finite numbers only");
     faults_.push_back(fault);
   }
 }

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "sim/config_check.h"
-#include "sim/minimum_jerk.h"
+#include "components/balance/minimum_jerk.h"
+#include "components/framework/configuration/configuration.h"
 #include "sim/push.h"
 
 namespace poise {
@@ -31,18 +31,10 @@ HandSpring::HandSpring(const Hand& config, const robot::RobotModel& model, doubl
     throw ConfigError(field + ".move_duration", "missing; give it in s");
   }
   if (!config.has_release()) throw ConfigError(field + ".release", "missing; give it in s");
-  RequireNotNegative(start_, field + ".start");
-  RequirePositive(move_duration_, field + ".move_duration");
-  RequireFinite(release_, field + ".release");
   if (release_ < start_ + move_duration_ - kEarly) {
     throw ConfigError(field + ".release", fmt::format("{} s is before the move ends at {} s",
                                                       release_, start_ + move_duration_));
   }
-  RequirePositive(stiffness_, field + ".stiffness");
-  RequireNotNegative(damping_, field + ".damping");
-  RequirePositive(max_force_, field + ".max_force");
-  if (!offset_.allFinite()) throw ConfigError(field + ".x", "the offset must be finite");
-  if (!point_.allFinite()) throw ConfigError(field + ".point", "must be finite");
   if (config.has_link()) body_ = FindBody(model, config.link(), field + ".link");
   // The force is explicit in the step; a point of a link feels as little as a quarter of its mass.
   const double mass = model.bodies()[static_cast<size_t>(body_)].mass / 4;
@@ -62,7 +54,7 @@ void HandSpring::Grip(double time, const Vector3d& position) {
 
 Vector3d HandSpring::Force(double time, const Vector3d& position, const Vector3d& velocity) const {
   if (!gripped_ || time >= release_ - kEarly) return Vector3d::Zero();
-  const MinimumJerk move(time - start_, move_duration_);
+  const balance::MinimumJerk move(time - start_, move_duration_);
   const Vector3d force = stiffness_ * (origin_ + move.position * offset_ - position) +
                          damping_ * (move.speed * offset_ - velocity);
   const double size = force.norm();

@@ -47,9 +47,6 @@ void SimComponent::Configure(const ComponentContext& context, Wiring* wiring) {
     sensors_ = std::make_unique<Sensors>(*model, SimulatedNoise(*model, setup.sim), context.seed);
     foot_sensors_ = std::make_unique<FootSensors>(*model, setup.sim);
     command_loss_ = setup.sim.command_loss();
-    if (!(command_loss_ >= 0 && command_loss_ < 1)) {
-      throw ConfigError("command_loss", "must be in [0, 1)");
-    }
   } catch (const ConfigError& error) {
     if (error.field().empty()) throw;
     throw ConfigError("sim." + error.field(), error.problem());

@@ -4,7 +4,8 @@
 
 #include <string>
 
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "sim/push.h"
 
 namespace poise {
@@ -24,13 +25,13 @@ void CheckChange(const Motor& change, const std::string& field) {
   if (change.has_rated_current()) RefuseChange(field + ".rated_current");
   if (change.has_peak_current()) RefuseChange(field + ".peak_current");
   if (change.has_encoder_counts()) RefuseChange(field + ".encoder_counts");
-  RequireNotNegative(change.rotor_inertia(), field + ".rotor_inertia");
-  RequireNotNegative(change.coulomb_friction(), field + ".coulomb_friction");
-  RequireNotNegative(change.viscous_friction(), field + ".viscous_friction");
-  RequireNotNegative(change.static_friction(), field + ".static_friction");
-  RequirePositive(change.stribeck_velocity(), field + ".stribeck_velocity");
+  CheckNotNegative(change.rotor_inertia(), field + ".rotor_inertia");
+  CheckNotNegative(change.coulomb_friction(), field + ".coulomb_friction");
+  CheckNotNegative(change.viscous_friction(), field + ".viscous_friction");
+  CheckNotNegative(change.static_friction(), field + ".static_friction");
+  CheckPositive(change.stribeck_velocity(), field + ".stribeck_velocity");
   if (change.has_torque_constant()) {
-    RequirePositive(change.torque_constant(), field + ".torque_constant");
+    CheckPositive(change.torque_constant(), field + ".torque_constant");
   }
 }
 
@@ -60,8 +61,6 @@ void Apply(const Motor& change, const std::string& field, MotorModel* motor) {
 
 RobotModel WithModelErrors(const RobotModel& model, const SimConfig& config) {
   RobotModel result = model;
-  RequireFinite(config.imu_roll(), "imu_roll");
-  RequireFinite(config.imu_pitch(), "imu_pitch");
   if (config.imu_roll() != 0 || config.imu_pitch() != 0) {
     const Eigen::Matrix3d turn = (Eigen::AngleAxisd(config.imu_pitch(), Eigen::Vector3d::UnitY()) *
                                   Eigen::AngleAxisd(config.imu_roll(), Eigen::Vector3d::UnitX()))
@@ -104,7 +103,6 @@ std::vector<MotorModel> SimulatedMotors(const RobotModel& model, const SimConfig
       Apply(change, field, &motors[static_cast<size_t>(joint)]);
     }
   }
-  RequirePositive(config.rotor_inertia_scale(), "rotor_inertia_scale");
   for (MotorModel& motor : motors) motor.reflected_inertia *= config.rotor_inertia_scale();
   return motors;
 }
@@ -116,7 +114,6 @@ DriveTrain SimulatedDriveTrain(const RobotModel& model, const SimConfig& config)
     result.set_torque_lag(drive.torque_lag);
     result.set_current_resolution(drive.current_resolution);
     result.set_backlash(drive.backlash);
-    RequirePositive(config.gear_stiffness_scale(), "gear_stiffness_scale");
     result.set_gear_stiffness(config.gear_stiffness_scale() * drive.gear_stiffness);
     result.set_gear_damping(drive.gear_damping);
     result.set_link_encoder(drive.link_encoder);
@@ -131,7 +128,7 @@ SensorNoise SimulatedNoise(const RobotModel& model, const SimConfig& config) {
   if (change.has_link()) RefuseChange("imu_change.link");
   if (change.has_pose()) RefuseChange("imu_change.pose");
   const auto choose = [](bool given, double value, const char* field, double other) {
-    RequireNotNegative(value, field);
+    CheckNotNegative(value, field);
     return given ? value : other;
   };
   const robot::ImuModel& imu = model.imu();

@@ -8,7 +8,8 @@
 #include <string>
 
 #include "components/robot/sole.h"
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "sim/simulated_robot.h"
 #include "sim/start_posture.h"
 
@@ -34,8 +35,12 @@ int NumCorners(const RobotModel& model) {
   return static_cast<int>(count);
 }
 
+const SimConfig& Checked(const SimConfig& config) {
+  CheckFields(config);
+  return config;
+}
+
 int StepsPerTick(const SimConfig& config, double tick_period) {
-  RequirePositive(config.step(), "step");
   const double steps = tick_period / config.step();
   const double whole = std::round(steps);
   if (whole < 1 || std::abs(steps - whole) > 1e-6 * whole) {
@@ -49,12 +54,11 @@ int StepsPerTick(const SimConfig& config, double tick_period) {
 Drivetrain::Options DrivetrainOptions(const RobotModel& model,
                                       const std::vector<robot::MotorModel>& motors,
                                       const DriveTrain& drive, const SimConfig& config) {
-  RequirePositive(config.friction_stiffness(), "friction_stiffness");
-  RequireNotNegative(drive.torque_lag(), "drive_train.torque_lag");
-  RequireNotNegative(drive.current_resolution(), "drive_train.current_resolution");
-  RequireNotNegative(drive.backlash(), "drive_train.backlash");
-  RequireNotNegative(drive.gear_stiffness(), "drive_train.gear_stiffness");
-  RequireNotNegative(drive.gear_damping(), "drive_train.gear_damping");
+  CheckNotNegative(drive.torque_lag(), "drive_train.torque_lag");
+  CheckNotNegative(drive.current_resolution(), "drive_train.current_resolution");
+  CheckNotNegative(drive.backlash(), "drive_train.backlash");
+  CheckNotNegative(drive.gear_stiffness(), "drive_train.gear_stiffness");
+  CheckNotNegative(drive.gear_damping(), "drive_train.gear_damping");
   const Drivetrain::Options options{config.rotor_inertia(),      config.joint_friction(),
                                     config.friction_stiffness(), drive.backlash(),
                                     drive.gear_stiffness(),      drive.gear_damping()};
@@ -74,7 +78,7 @@ Drivetrain::Options DrivetrainOptions(const RobotModel& model,
 
 size_t DelaySteps(const DriveTrain& drive, double step) {
   const double delay = drive.sensor_delay();
-  RequireNotNegative(delay, "drive_train.sensor_delay");
+  CheckNotNegative(delay, "drive_train.sensor_delay");
   const double whole = std::round(delay / step);
   if (std::abs(delay / step - whole) > 1e-6 * std::max(whole, 1.0) || whole > 1e4) {
     throw ConfigError(
@@ -109,7 +113,7 @@ SimulationTruth::SimulationTruth(int num_joints)
 
 Simulation::Simulation(const RobotModel& model, const SimConfig& config, const WorldFactory& worlds,
                        double tick_period, uint64_t seed, int64_t lead_ticks)
-    : model_(WithModelErrors(model, config)),
+    : model_(WithModelErrors(model, Checked(config))),
       motors_(SimulatedMotors(model, config)),
       steps_per_tick_(StepsPerTick(config, tick_period)),
       step_(tick_period / steps_per_tick_),
@@ -132,8 +136,6 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       truth_(model_.num_joints()),
       measured_(truth_),
       delayed_(DelaySteps(drive_train_, step_), truth_) {
-  RequireNotNegative(fall_height_, "fall_height");
-  RequirePositive(fall_tilt_, "fall_tilt");
   const RobotState start = SolveStart(model_, config.start());
   const double scale = ImpulseScale(model_, start);
   for (int i = 0; i < config.push_size(); ++i) {

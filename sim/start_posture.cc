@@ -5,7 +5,8 @@
 #include <string>
 
 #include "components/robot/posture.h"
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 
 namespace poise {
 
@@ -34,7 +35,6 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
       for (const auto& known : model.joints()) names += (names.empty() ? "" : ", ") + known.name;
       throw ConfigError(field + ".joint", "no joint '" + entry.joint() + "'; use one of " + names);
     }
-    RequireFinite(entry.position(), field + ".position");
     goal.nominal[joint] = entry.position();
   }
 
@@ -61,11 +61,9 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
     evaluate(goal.nominal);
     com_height = data.com.z() - data.foot_pose[kRightFoot].translation().z();
   }
-  RequirePositive(spacing, "start.foot_spacing");
-  RequireNotNegative(config.left_foot_height(), "start.left_foot_height");
-  RequireFinite(config.com_x(), "start.com_x");
-  RequireFinite(config.com_y(), "start.com_y");
-  RequirePositive(com_height, "start.com_height");
+  // Both may follow from the robot.
+  CheckPositive(spacing, "start.foot_spacing");
+  CheckPositive(com_height, "start.com_height");
 
   goal.foot[kRightFoot] = Isometry3d(Translation3d(0, -spacing / 2, 0));
   goal.foot[kLeftFoot] = Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));

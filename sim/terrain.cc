@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "sim/config_check.h"
-#include "sim/minimum_jerk.h"
+#include "components/balance/minimum_jerk.h"
+#include "components/framework/configuration/configuration.h"
 #include "sim/random.h"
 
 namespace poise {
@@ -16,7 +16,6 @@ using std::numbers::pi;
 
 namespace {
 
-constexpr double kMaxTilt = 0.8;  // rad
 constexpr uint64_t kTerrainStream = 1, kFieldStream = 101;
 constexpr int kMostRows = 64;
 constexpr double kLaneMiddle = 0.1;  // m from y = 0, about where feet come down
@@ -32,30 +31,11 @@ Vector2d Slope(double roll, double pitch) {
 
 Terrain::Terrain(const SimConfig& config, uint64_t seed) {
   const Ground& ground = config.ground();
-  RequireNotNegative(ground.friction(), "ground.friction");
   ground_material_.friction = ground.friction();
   if (config.has_block_field()) ReadField(config.block_field(), seed);
   if (!config.has_block()) return;
 
   const SoftBlock& block = config.block();
-  RequireFinite(block.x(), "block.x");
-  RequireFinite(block.y(), "block.y");
-  RequirePositive(block.length(), "block.length");
-  RequirePositive(block.width(), "block.width");
-  RequirePositive(block.height(), "block.height");
-  RequirePositive(block.stiffness(), "block.stiffness");
-  RequireNotNegative(block.damping(), "block.damping");
-  RequireNotNegative(block.irregularity(), "block.irregularity");
-  RequirePositive(block.irregularity_wavelength(), "block.irregularity_wavelength");
-  RequireNotNegative(block.friction(), "block.friction");
-  RequireNotNegative(block.start(), "block.start");
-  RequireNotNegative(block.rise(), "block.rise");
-  if (!(std::abs(block.tilt_roll()) <= kMaxTilt)) {
-    throw ConfigError("block.tilt_roll", "must be within 0.8 rad of level");
-  }
-  if (!(std::abs(block.tilt_pitch()) <= kMaxTilt)) {
-    throw ConfigError("block.tilt_pitch", "must be within 0.8 rad of level");
-  }
   has_block_ = true;
   center_ = {block.x(), block.y()};
   half_size_ = {block.length() / 2, block.width() / 2};
@@ -76,21 +56,6 @@ Terrain::Terrain(const SimConfig& config, uint64_t seed) {
 }
 
 void Terrain::ReadField(const BlockField& field, uint64_t seed) {
-  RequireFinite(field.start(), "block_field.start");
-  RequirePositive(field.length(), "block_field.length");
-  RequireFinite(field.stagger(), "block_field.stagger");
-  RequireNotNegative(field.height(), "block_field.height");
-  RequirePositive(field.least_stiffness(), "block_field.least_stiffness");
-  RequirePositive(field.most_stiffness(), "block_field.most_stiffness");
-  RequireNotNegative(field.damping(), "block_field.damping");
-  RequireNotNegative(field.friction(), "block_field.friction");
-  RequireFinite(field.climb(), "block_field.climb");
-  if (field.rows() < 1 || field.rows() > kMostRows) {
-    throw ConfigError("block_field.rows", "must be 1 to 64");
-  }
-  if (!(field.tilt() >= 0 && field.tilt() <= kMaxTilt)) {
-    throw ConfigError("block_field.tilt", "must be 0 to 0.8 rad");
-  }
   if (field.most_stiffness() < field.least_stiffness()) {
     throw ConfigError("block_field.most_stiffness", "must be least_stiffness or more");
   }
@@ -161,7 +126,7 @@ Terrain::Surface Terrain::At(double x, double y, double time) const {
     }
   }
   // A rising block grows from the ground, its relief with it.
-  const MinimumJerk rise(std::max(0.0, time - start_), rise_);
+  const balance::MinimumJerk rise(std::max(0.0, time - start_), rise_);
   const double velocity = rise.speed * height;
   height *= rise.position;
   slope *= rise.position;

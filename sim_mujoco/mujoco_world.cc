@@ -9,7 +9,8 @@
 #include <memory>
 
 #include "components/framework/configuration/configuration.h"
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 
 namespace poise {
 namespace {
@@ -45,9 +46,7 @@ ContactLaw SpringDamperLaw(double k, double d, double depth, double h) {
 }
 
 WorldFactory MujocoWorlds(const MujocoConfig& config) {
-  RequirePositive(config.contact_time_constant(), "contact_time_constant");
-  RequirePositive(config.contact_softness(), "contact_softness");
-  RequirePositive(config.friction_softness(), "friction_softness");
+  CheckFields(config);
   return [config](const robot::RobotModel& model, int max_contacts, double step) {
     if (config.contact_time_constant() < step) {
       throw ConfigError(

@@ -12,7 +12,8 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/dynamics.h"
-#include "sim/config_check.h"
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 
 namespace poise {
 namespace {
@@ -99,10 +100,7 @@ Softness SpringDamper(double k, double d, double h) {
 }
 
 WorldFactory OdeWorlds(const OdeConfig& config) {
-  if (!(config.contact_erp() > 0 && config.contact_erp() <= 1)) {
-    throw ConfigError("contact_erp", "must be greater than 0 and at most 1");
-  }
-  RequirePositive(config.contact_cfm(), "contact_cfm");
+  CheckFields(config);
   return [config](const robot::RobotModel& model, int max_contacts, double step) {
     return std::make_unique<OdeWorld>(config, model, max_contacts, step);
   };

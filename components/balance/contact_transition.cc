@@ -1,12 +1,8 @@
 #include "components/balance/contact_transition.h"
 
-namespace poise::balance {
+#include "components/balance/minimum_jerk.h"
 
-double SmoothStep(double s) {
-  if (!(s > 0)) return 0;  // NaN too
-  if (s >= 1) return 1;
-  return s * s * s * (10 + s * (-15 + 6 * s));
-}
+namespace poise::balance {
 
 double TransitionRatio(double free_ratio, int foot, bool unloading, double progress) {
   const double unloaded = foot == 0 ? 0.0 : 1.0;

@@ -3,9 +3,6 @@
 
 namespace poise::balance {
 
-/// Smooth step with zero slope at both ends, 10 s³ − 15 s⁴ + 6 s⁵, s clamped to [0, 1].
-double SmoothStep(double s);
-
 /// η during a transition: from `free_ratio` (progress 0) to the ratio that leaves `foot` without
 /// load (progress 1) when unloading, the reverse when loading. `foot` 0: right, 1: left.
 double TransitionRatio(double free_ratio, int foot, bool unloading, double progress);

@@ -41,11 +41,6 @@ bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
   return balance::SignedDistance(region, cop) >= -kCopTolerance;
 }
 
-double ReadNotNegative(double value, const char* field, const char* must) {
-  if (!(value >= 0) || !std::isfinite(value)) throw ConfigError(field, must);
-  return value;
-}
-
 }  // namespace
 
 void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wiring) {
@@ -65,8 +60,7 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
     }
   }
   if (config.has_half_width_beyond_soles()) {
-    beyond_soles_ = ReadNotNegative(config.half_width_beyond_soles(), "half_width_beyond_soles",
-                                    "must be a number of m, 0 or more");
+    beyond_soles_ = config.half_width_beyond_soles();
     // Replaced in every tick.
     if (!double_support.has_half_width()) double_support.set_half_width(1);
   }
@@ -80,10 +74,8 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   const double side = config.has_side_margin() ? config.side_margin() : alone;
   CutSoles({alone, side}, &sole_);
   CutSoles(Eigen::Vector2d::Constant(given ? config.sole_margin() : margin), &shared_sole_);
-  const char* const must = "must be a number, 0 or more";
-  cop_feedback_ = ReadNotNegative(config.cop_feedback().share(), "cop_feedback.share", must);
-  cop_feedback_time_ =
-      ReadNotNegative(config.cop_feedback().time_constant(), "cop_feedback.time_constant", must);
+  cop_feedback_ = config.cop_feedback().share();
+  cop_feedback_time_ = config.cop_feedback().time_constant();
   whole_body_ = context.shared->Get<balance::WholeBody>(
       "estimated", [&] { return std::make_shared<balance::WholeBody>(model_); });
   const int num_joints = model_->num_joints();
@@ -99,7 +91,6 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   task_acceleration_ = acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
   other_torque_ = Eigen::VectorXd::Zero(num_joints);
   body_share_ = config.body_share();
-  if (!(body_share_ <= 1)) throw ConfigError("body_share", "must be at most 1");
   const int step_rows = std::min(kStepRows, num_joints);
   for (auto& motion : step_motion_) motion.emplace(num_joints, step_rows);
   step_jacobian_ = Eigen::MatrixXd::Zero(step_rows, model_->num_velocities());
@@ -397,7 +388,6 @@ void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,
                                     std::array<balance::ConvexPolygon, 2>* soles) const {
   constexpr std::array<const char*, 2> kField = {"sole_margin", "side_margin"};
   for (int axis = 0; axis < 2; ++axis) {
-    ReadNotNegative(margin[axis], kField[axis], "must be m, 0 or more");
     for (const robot::FootModel& foot : model_->feet()) {
       if (margin[axis] < robot::InnerRadius(foot)) continue;
       throw ConfigError(kField[axis],

@@ -13,6 +13,7 @@
 
 #include "components/framework/component_traits.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/ports.h"
 #include "components/framework/state_archive.h"
 
@@ -71,11 +72,13 @@ struct ComponentContext {
 
   /// Text of a resource. Throws ConfigError when the run has no such resource.
   const std::string& resource(const std::string& name) const;
-  /// The configuration as a `Config` message. Throws ConfigError with line and field.
+  /// The configuration as a `Config` message whose fields keep their rules. Throws ConfigError with
+  /// line and field.
   template <class Config>
   Config config() const {
     Config message;
     ParseTextProto(config_text, name, &message);
+    CheckFields(message);
     return message;
   }
 };

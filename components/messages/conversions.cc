@@ -6,17 +6,16 @@
 
 #include "components/balance/support_polygon.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
 
 namespace poise {
 namespace {
 
-double Positive(bool present, double value, const std::string& field) {
-  if (!present) throw ConfigError(field, "is missing; give a positive number");
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw ConfigError(field, "must be a positive number");
-  }
+double Given(bool present, double value, const std::string& field) {
+  if (!present) throw ConfigError(field, "is missing; give a number greater than 0");
+  CheckPositive(value, field);  // it may follow from soles and a margin
   return value;
 }
 
@@ -131,11 +130,10 @@ ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotMo
 
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field) {
   balance::ContactLimits limits;
-  limits.half_length =
-      Positive(config.has_half_length(), config.half_length(), field + ".half_length");
-  limits.half_width = Positive(config.has_half_width(), config.half_width(), field + ".half_width");
-  limits.friction = Positive(true, config.friction(), field + ".friction");
-  limits.yaw_friction = Positive(true, config.yaw_friction(), field + ".yaw_friction");
+  limits.half_length = Given(config.has_half_length(), config.half_length(), field + ".half_length");
+  limits.half_width = Given(config.has_half_width(), config.half_width(), field + ".half_width");
+  limits.friction = config.friction();
+  limits.yaw_friction = config.yaw_friction();
   return limits;
 }
 

@@ -2,31 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "components/balance/contact_conditions.h"
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/balance/distribution_ratio.h"
-#include "components/framework/configuration/configuration.h"
+#include "components/framework/tick_time.h"
 #include "components/messages/conversions.h"
 #include "components/robot/posture.h"
 
 namespace poise {
 namespace {
 
-constexpr double kMaxPeriod = 0.02;  // s, counted after a gap of the ticks
-
 double TwoDigits(double value) {
   if (!(value > 0)) return 0;
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
   return std::round(value / unit) * unit;
-}
-
-double ReadNotNegative(double value, const char* name) {
-  if (!(value >= 0) || !std::isfinite(value)) {
-    throw ConfigError(std::string("feedback.") + name, "must be a number, 0 or more");
-  }
-  return value;
 }
 
 balance::Matrix6d IntoO(const Eigen::Isometry3d& foot) {
@@ -74,16 +64,12 @@ Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
 
 InternalFeedback::InternalFeedback(const WrenchFeedback& config)
     : enabled_(config.enabled()),
-      proportional_(ReadNotNegative(config.proportional(), "proportional")),
-      rate_(ReadNotNegative(config.integral(), "integral")),
-      max_force_(ReadNotNegative(config.max_force(), "max_force")),
-      max_moment_(ReadNotNegative(config.max_moment(), "max_moment")),
-      release_time_(ReadNotNegative(config.release_time(), "release_time")),
-      full_load_(ReadNotNegative(config.full_load(), "full_load")) {
-  if (full_load_ > 0.5) {
-    throw ConfigError("feedback.full_load", "must be at most 0.5, the share of even standing");
-  }
-}
+      proportional_(config.proportional()),
+      rate_(config.integral()),
+      max_force_(config.max_force()),
+      max_moment_(config.max_moment()),
+      release_time_(config.release_time()),
+      full_load_(config.full_load()) {}
 
 InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
   const auto limit = [](auto part, double most) {
@@ -96,7 +82,7 @@ InternalWrench InternalFeedback::Limited(InternalWrench wrench) const {
 }
 
 void InternalFeedback::Release(double period) {
-  const double counted = std::clamp(period, 0.0, kMaxPeriod);
+  const double counted = TickPeriod(period);
   integral_ *= counted > 0 ? release_time_ / (release_time_ + counted) : 1.0;
 }
 
@@ -107,7 +93,7 @@ double InternalFeedback::LoadShare(double eta) const {
 
 InternalWrench InternalFeedback::Update(const InternalWrench& error, double period, double share) {
   if (!error.allFinite()) return Hold(share);
-  integral_ = Limited(integral_ + share * rate_ * std::clamp(period, 0.0, kMaxPeriod) * error);
+  integral_ = Limited(integral_ + share * rate_ * TickPeriod(period) * error);
   return share * Limited(integral_ + proportional_ * error);
 }
 

@@ -6,17 +6,15 @@
 #include <cmath>
 #include <string>
 
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/tick_time.h"
 
 namespace poise {
 namespace {
 
-constexpr double kTimeTolerance = 1e-9;  // s, rounding of start + duration
-
-void Check(bool given, bool holds, const std::string& field, const char* must) {
-  if (!given) throw ConfigError(field, fmt::format("is missing; {}", must));
-  if (!holds) throw ConfigError(field, must);
+void CheckGiven(bool given, const std::string& field, const char* give) {
+  if (!given) throw ConfigError(field, fmt::format("is missing; give {}", give));
 }
 
 }  // namespace
@@ -25,12 +23,9 @@ RatioMoves::RatioMoves(const RedistributorConfig& config) {
   for (int i = 0; i < config.ratio_move_size(); ++i) {
     const RatioMove& move = config.ratio_move(i);
     const std::string field = fmt::format("ratio_move[{}]", i);
-    Check(move.has_start(), std::isfinite(move.start()) && move.start() >= 0, field + ".start",
-          "must be a time in s from 0 up");
-    Check(move.has_duration(), std::isfinite(move.duration()) && move.duration() > 0,
-          field + ".duration", "must be a time in s above 0");
-    Check(move.has_position(), move.position() >= 0 && move.position() <= 1, field + ".position",
-          "must lie between 0 (lower end) and 1 (upper end)");
+    CheckGiven(move.has_start(), field + ".start", "a time in s");
+    CheckGiven(move.has_duration(), field + ".duration", "a time in s");
+    CheckGiven(move.has_position(), field + ".position", "0 (lower end) to 1 (upper end)");
     const double free_from = moves_.empty() ? 0 : moves_.back().start + moves_.back().duration;
     if (move.start() < free_from - kTimeTolerance) {
       throw ConfigError(field + ".start",

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/balance/redistribution.h"
 #include "components/messages/archive_message.h"
 #include "components/messages/conversions.h"
@@ -27,10 +28,6 @@ constexpr double kRatioRamp = 0.5;
 // 1/s: half of what shakes a foot on something soft (redistributor.proto).
 constexpr double kMostIntegral = 40;
 
-void CheckRatio(double value, const char* field) {
-  if (!(value >= 0 && value <= 1)) throw ConfigError(field, "must lie between 0 and 1");
-}
-
 bool AllFinite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); });
 }
@@ -48,24 +45,13 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   for (size_t i = 0; i < 2; ++i) sole_[i] = balance::CornersOf(double_support_[i].edges);
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
-  CheckRatio(eta_min_, "eta_min");
-  CheckRatio(eta_max_, "eta_max");
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
   landed_share_ = config.landed_share();
-  if (!(landed_share_ >= 0 && landed_share_ < 0.5)) {
-    throw ConfigError("landed_share", "must be at least 0 and less than 0.5");
-  }
   ratio_moves_ = RatioMoves(config);
   const WrenchFeedback feedback = WithRobotLimits(config.feedback(), *model_);
   feedback_ = InternalFeedback(feedback);
   feedback_pause_ = feedback.pause();
   feedback_edge_ = feedback.edge();
-  if (!(feedback_edge_ >= 0) || !std::isfinite(feedback_edge_)) {
-    throw ConfigError("feedback.edge", "must be m, 0 or more");
-  }
-  if (!(feedback_pause_ >= 0) || !std::isfinite(feedback_pause_)) {
-    throw ConfigError("feedback.pause", "must be a time in s, 0 or more");
-  }
   if (feedback_.enabled() && !redistribution_) {
     throw ConfigError("feedback.enabled", "needs redistribution: true");
   }

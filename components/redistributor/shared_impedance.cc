@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/framework/configuration/configuration.h"
-
 namespace poise {
 namespace {
 
@@ -12,25 +10,16 @@ namespace {
 constexpr double kRotorTime = 3e-3;     // s
 constexpr double kStiffnessTime = 0.1;  // s
 
-double Positive(bool given, double value, double otherwise, const char* field) {
-  if (!given) return otherwise;
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw ConfigError(field, "must be a finite number of s above 0");
-  }
-  return value;
-}
-
 }  // namespace
 
 PlannedImpedance::PlannedImpedance(const SharedImpedance& config, const robot::RobotModel& model,
                                    double period) {
   if (!config.enabled()) return;
-  horizon_ = Positive(config.has_horizon(), config.horizon(),
-                      model.drive_train().sensor_delay + period / 2, "impedance.horizon");
-  const double rotor_time =
-      Positive(config.has_rotor_time(), config.rotor_time(), kRotorTime, "impedance.rotor_time");
-  const double stiffness_time = Positive(config.has_stiffness_time(), config.stiffness_time(),
-                                         kStiffnessTime, "impedance.stiffness_time");
+  horizon_ = config.has_horizon() ? config.horizon()
+                                  : model.drive_train().sensor_delay + period / 2;
+  const double rotor_time = config.has_rotor_time() ? config.rotor_time() : kRotorTime;
+  const double stiffness_time =
+      config.has_stiffness_time() ? config.stiffness_time() : kStiffnessTime;
   for (const robot::MotorModel& motor : model.motors()) {
     damping_.push_back(motor.reflected_inertia / rotor_time);
     stiffness_.push_back(damping_.back() / stiffness_time);

@@ -3,18 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/balance/contact_transition.h"
-#include "components/framework/configuration/configuration.h"
+#include "components/balance/minimum_jerk.h"
 
 namespace poise {
-namespace {
-
-double Positive(double value, const char* field, const char* unit) {
-  if (value > 0 && std::isfinite(value)) return value;
-  throw ConfigError(field, std::string("must be a finite number of ") + unit + " above 0");
-}
-
-}  // namespace
 
 double FrictionTorque(const robot::MotorModel& motor, double velocity, double smoothing) {
   return motor.coulomb_friction * std::tanh(velocity / smoothing) +
@@ -25,19 +16,9 @@ SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::Ro
                              double period)
     : share_(config.share()),
       lead_(config.lead()),
-      smoothing_(Positive(config.smoothing_velocity(), "friction_compensation.smoothing_velocity",
-                          "rad/s")),
-      rate_(period / Positive(config.ramp(), "friction_compensation.ramp", "s")),
+      smoothing_(config.smoothing_velocity()),
+      rate_(period / config.ramp()),
       fade_load_(config.fade_load()) {
-  if (!(share_ >= 0 && share_ <= 1)) {
-    throw ConfigError("friction_compensation.share", "must lie between 0 and 1");
-  }
-  if (!(lead_ >= 0) || !std::isfinite(lead_)) {
-    throw ConfigError("friction_compensation.lead", "must be a time in s, 0 or more");
-  }
-  if (!(fade_load_ >= 0 && fade_load_ <= 1)) {
-    throw ConfigError("friction_compensation.fade_load", "must lie between 0 and 1");
-  }
   if (share_ == 0) return;
   for (int j = 0; j < model.num_joints(); ++j) {
     Joint joint{.index = j, .motor = model.motors()[static_cast<size_t>(j)]};

@@ -13,7 +13,8 @@ constexpr double kMaxLoad = 100;
 // Feet without load at first: beyond this difference of height, m, only the lower one stands.
 constexpr double kLevel = 0.01;
 
-double SmoothStep(double x) {
+/// 3 s² − 2 s³: of a weight, not of a motion, so that its slope alone has to vanish at the ends.
+double CubicStep(double x) {
   const double s = std::clamp(x, 0.0, 1.0);
   return s * s * (3 - 2 * s);
 }
@@ -65,7 +66,7 @@ FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, do
   double sum = 0, grip = 0;
   for (size_t i = 0; i < load.size(); ++i) {
     const double share = std::clamp(load[i] / robot_weight, 0.0, kMaxLoad);
-    weights.grip[i] = SmoothStep((share - light_load) / (full_load - light_load));
+    weights.grip[i] = CubicStep((share - light_load) / (full_load - light_load));
     pull[i] = weights.grip[i] * share;
     sum += pull[i];
     grip += weights.grip[i];

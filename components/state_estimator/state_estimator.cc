@@ -20,28 +20,14 @@ using Eigen::Vector3d;
 
 constexpr double kLongestDelay = 0.05;  // s
 
-void RequirePositive(double value, const char* field, const char* unit) {
-  if (!(value > 0) || !std::isfinite(value)) {
-    throw ConfigError(field, std::string("must be a finite number of ") + unit + " above 0");
-  }
-}
-
 BaseEstimatorConfig ReadAnchoredConfig(const StateEstimatorConfig& config) {
-  RequirePositive(config.joint_velocity_cutoff(), "joint_velocity_cutoff", "Hz");
-  RequirePositive(config.orientation_time_constant(), "orientation_time_constant", "s");
-  RequirePositive(config.gravity_time_constant(), "gravity_time_constant", "s");
-  RequirePositive(config.gyro_bias_time_constant(), "gyro_bias_time_constant", "s");
-  RequirePositive(config.anchor_time_constant(), "anchor_time_constant", "s");
-  RequirePositive(config.foot_rotation_tolerance(), "foot_rotation_tolerance", "rad");
   if (config.gyro_bias_time_constant() < 4 * config.orientation_time_constant()) {
     throw ConfigError("gyro_bias_time_constant",
                       "must be at least four times orientation_time_constant, or the estimate "
                       "oscillates");
   }
-  if (!(config.light_load() >= 0)) throw ConfigError("light_load", "must not be negative");
-  if (!(config.full_load() > config.light_load() && config.full_load() <= 0.5)) {
-    throw ConfigError("full_load",
-                      "must be above light_load and at most 0.5, a foot's share in even standing");
+  if (config.full_load() <= config.light_load()) {
+    throw ConfigError("full_load", "must be greater than light_load");
   }
   BaseEstimatorConfig result;
   result.joint_velocity_cutoff = config.joint_velocity_cutoff();
@@ -59,101 +45,77 @@ InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config,
                                              const robot::DriveTrainModel& drive) {
   const InvariantEkfConfig& in = config.invariant_ekf();
   InvariantEstimatorConfig out;
-  const auto read = [](const char* name, double value, double* field, bool zero = false) {
-    if (std::isfinite(value) && (zero ? value >= 0 : value > 0)) {
-      *field = value;
-      return;
-    }
-    throw ConfigError(
-        std::string("invariant_ekf.") + name,
-        zero ? "must be a finite number, not negative" : "must be a finite number above 0");
-  };
   out.joint_velocity_cutoff = config.joint_velocity_cutoff();
   out.light_load = config.light_load();
   out.full_load = config.full_load();
-  read("sensor_delay", in.has_sensor_delay() ? in.sensor_delay() : drive.sensor_delay,
-       &out.sensor_delay, true);
+  out.sensor_delay = in.has_sensor_delay() ? in.sensor_delay() : drive.sensor_delay;
   if (out.sensor_delay > kLongestDelay) {
     throw ConfigError("invariant_ekf.sensor_delay",
                       "must be at most 0.05 s: the motion is not known further ahead");
   }
-  read("timing", in.timing(), &out.timing, true);
+  out.timing = in.timing();
   const double stiffness = drive.link_encoder ? 0 : drive.gear_stiffness;  // the encoders see it
-  read("gear_stiffness", in.has_gear_stiffness() ? in.gear_stiffness() : stiffness,
-       &out.gear_stiffness, true);
-  read("gear_stiffness_error", in.gear_stiffness_error(), &out.gear_stiffness_error, true);
-  read("gyro_noise", in.gyro_noise(), &out.gyro_noise);
-  read("accelerometer_noise", in.accelerometer_noise(), &out.accelerometer_noise);
-  read("gyro_bias", in.gyro_bias(), &out.gyro_bias);
-  read("accelerometer_bias", in.accelerometer_bias(), &out.accelerometer_bias);
-  read("gyro_bias_walk", in.gyro_bias_walk(), &out.gyro_bias_walk, true);
-  read("accelerometer_bias_walk", in.accelerometer_bias_walk(), &out.accelerometer_bias_walk, true);
-  read("start_position", in.start_position(), &out.start_position);
-  read("start_tilt", in.start_tilt(), &out.start_tilt);
-  read("start_yaw", in.start_yaw(), &out.start_yaw);
-  read("start_torque", in.start_torque(), &out.start_torque, true);
-  read("contact_walk", in.contact_walk(), &out.contact_walk, true);
-  read("turn_walk", in.turn_walk(), &out.turn_walk, true);
-  read("slip_speed", in.slip_speed(), &out.slip_speed);
-  read("turn_speed", in.turn_speed(), &out.turn_speed);
-  read("cop_margin", in.cop_margin(), &out.cop_margin);
-  read("gate", in.gate(), &out.gate);
-  read("rest_time", in.rest_time(), &out.rest_time);
-  read("rest_distance", in.rest_distance(), &out.rest_distance);
-  read("rest_turn", in.rest_turn(), &out.rest_turn);
+  out.gear_stiffness = in.has_gear_stiffness() ? in.gear_stiffness() : stiffness;
+  out.gear_stiffness_error = in.gear_stiffness_error();
+  out.gyro_noise = in.gyro_noise();
+  out.accelerometer_noise = in.accelerometer_noise();
+  out.gyro_bias = in.gyro_bias();
+  out.accelerometer_bias = in.accelerometer_bias();
+  out.gyro_bias_walk = in.gyro_bias_walk();
+  out.accelerometer_bias_walk = in.accelerometer_bias_walk();
+  out.start_position = in.start_position();
+  out.start_tilt = in.start_tilt();
+  out.start_yaw = in.start_yaw();
+  out.start_torque = in.start_torque();
+  out.contact_walk = in.contact_walk();
+  out.turn_walk = in.turn_walk();
+  out.slip_speed = in.slip_speed();
+  out.turn_speed = in.turn_speed();
+  out.cop_margin = in.cop_margin();
+  out.gate = in.gate();
+  out.rest_time = in.rest_time();
+  out.rest_distance = in.rest_distance();
+  out.rest_turn = in.rest_turn();
   return out;
 }
 
 FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
-  const auto read = [](const char* group, const char* name, double value) {
-    if (std::isfinite(value) && value > 0) return value;
-    throw ConfigError(std::string(group) + "." + name, "must be a finite number above 0");
-  };
   const WrenchObserverConfig& in = config.wrench_observer();
   const FootSensorCheckConfig& check = config.foot_sensor_check();
-  const char* const observer = "wrench_observer";
   FootWrenchSettings out;
   out.observer = {
-      .cutoff = read(observer, "cutoff", in.cutoff()),
-      .friction_error = read(observer, "friction_error", in.friction_error()),
-      .friction_stiffness = read(observer, "friction_stiffness", in.friction_stiffness()),
-      .torque_error = read(observer, "torque_error", in.torque_error()),
-      .mass_error = read(observer, "mass_error", in.mass_error()),
-      .com_error = read(observer, "com_error", in.com_error()),
-      .acceleration_error = read(observer, "acceleration_error", in.acceleration_error()),
-      .push_gate = read(observer, "push_gate", in.push_gate()),
-      .latency = read(observer, "latency", in.latency())};
-  if (in.check_every() < 1) {
-    throw ConfigError("wrench_observer.check_every", "must be at least 1");
-  }
+      .cutoff = in.cutoff(),
+      .friction_error = in.friction_error(),
+      .friction_stiffness = in.friction_stiffness(),
+      .torque_error = in.torque_error(),
+      .mass_error = in.mass_error(),
+      .com_error = in.com_error(),
+      .acceleration_error = in.acceleration_error(),
+      .push_gate = in.push_gate(),
+      .latency = in.latency()};
   out.check_every = in.check_every();
-  const char* const group = "foot_sensor_check";
   out.check = {.enabled = check.enabled(),
-               .gate = read(group, "gate", check.gate()),
-               .frozen_gate = read(group, "frozen_gate", check.frozen_gate()),
-               .agree_gate = read(group, "agree_gate", check.agree_gate()),
-               .time = read(group, "time", check.time()),
-               .frozen_time = read(group, "frozen_time", check.frozen_time()),
-               .recover_time = read(group, "recover_time", check.recover_time())};
+               .gate = check.gate(),
+               .frozen_gate = check.frozen_gate(),
+               .agree_gate = check.agree_gate(),
+               .time = check.time(),
+               .frozen_time = check.frozen_time(),
+               .recover_time = check.recover_time()};
   return out;
 }
 
 CalibratorSettings ReadCalibratorSettings(const StateEstimatorConfig& config) {
   const CalibrationConfig& in = config.calibration();
-  const auto read = [](const char* name, double value) {
-    if (std::isfinite(value) && value > 0) return value;
-    throw ConfigError(std::string("calibration.") + name, "must be a finite number above 0");
-  };
   return {.enabled = in.enabled(),
-          .max_mass = read("max_mass", in.max_mass()),
-          .max_shift = read("max_shift", in.max_shift()),
-          .walk = read("walk", in.walk()),
-          .force_error = read("force_error", in.force_error()),
-          .moment_error = read("moment_error", in.moment_error()),
-          .still_rate = read("still_rate", in.still_rate()),
-          .still_acceleration = read("still_acceleration", in.still_acceleration()),
-          .gate = read("gate", in.gate()),
-          .apply_time = read("apply_time", in.apply_time()),
+          .max_mass = in.max_mass(),
+          .max_shift = in.max_shift(),
+          .walk = in.walk(),
+          .force_error = in.force_error(),
+          .moment_error = in.moment_error(),
+          .still_rate = in.still_rate(),
+          .still_acceleration = in.still_acceleration(),
+          .gate = in.gate(),
+          .apply_time = in.apply_time(),
           .cutoff = config.wrench_observer().cutoff()};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/tick_time.h"
 #include "components/robot/robot_model.h"
 #include "components/step_planner/stepping/footwork.h"
 
@@ -80,7 +81,7 @@ void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery
                             const Walk* walk, Report* out) {
   ReportPlanned(input, recovery, walk, out);
   const int stance = Stance(input, recovery, walk);
-  if (stance == stance_ && input.time < since_ + kRegionPeriod - stepping::kTimeTolerance) return;
+  if (stance == stance_ && input.time < since_ + kRegionPeriod - kTimeTolerance) return;
   since_ = input.time;
   stance_ = stance;
   out->stance = static_cast<int8_t>(stance);

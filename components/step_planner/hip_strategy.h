@@ -28,6 +28,9 @@ class HipStrategy {
  public:
   enum class State { kUpright, kTilting, kTilted, kReturning };
 
+  /// s in which a turn that ends early is stopped.
+  static constexpr double kBrakeTime = 0.12;
+
   explicit HipStrategy(const HipStrategyConfig& config) : config_(config) {}
 
   bool enabled() const { return config_.enabled(); }
@@ -46,11 +49,8 @@ class HipStrategy {
 
   HipStrategyConfig config_;
   State state_ = State::kUpright;
-  double since_ = 0;  // s, when the move under way began; while tilted: last time outside `inside`
+  double since_ = 0;  // s, when the move under way began; while tilted: last time not well inside
   QuinticMove tilt_;
 };
-
-/// Throws ConfigError "hip_strategy.tilt" ...: not finite, or beyond what can work.
-void CheckHipStrategyConfig(const HipStrategyConfig& config);
 
 }  // namespace poise

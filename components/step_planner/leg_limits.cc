@@ -43,23 +43,23 @@ bool Raises(const robot::RobotModel& model, double clearance) {
 
 double WidestStance(const stepping::Reach& reach) {
   return Largest(kFarthest, [&](double width) {
-    return reach.LowerShare({Vector2d(0, -0.5 * width), Vector2d(0, 0.5 * width)}) <= 1;
+    return reach.LoweringShare({Vector2d(0, -0.5 * width), Vector2d(0, 0.5 * width)}) <= 1;
   });
 }
 
 double WidestSpacing(const stepping::Reach& reach) {
   const Vector2d here = Vector2d::Zero();
   return Largest(kFarthest, [&](double width) {
-    return reach.LowerShare({here, Vector2d(0, width)}) <= 1 &&
-           reach.LowerShare({Vector2d(0, -width), here}) <= 1;
+    return reach.LoweringShare({here, Vector2d(0, width)}) <= 1 &&
+           reach.LoweringShare({Vector2d(0, -width), here}) <= 1;
   });
 }
 
 double LongestStride(const stepping::Reach& reach, double spacing) {
   return Largest(kFarthest, [&](double length) {
     const Vector2d half(0.5 * length, 0.5 * spacing);
-    return reach.LowerShare({Vector2d(-half), half}) <= 1 &&
-           reach.LowerShare({Vector2d(half.x(), -half.y()), Vector2d(-half.x(), half.y())}) <= 1;
+    return reach.LoweringShare({Vector2d(-half), half}) <= 1 &&
+           reach.LoweringShare({Vector2d(half.x(), -half.y()), Vector2d(-half.x(), half.y())}) <= 1;
   });
 }
 

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 
+#include "components/framework/tick_time.h"
+
 namespace poise {
 namespace {
-
-// Ticks are whole microseconds: far below any, far above rounding.
-constexpr double kTimeTolerance = 1e-9;
 
 int Other(int foot) { return 1 - foot; }
 

@@ -11,6 +11,7 @@
 
 #include "components/balance/tasks/centroidal_momentum.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/robot/dynamics.h"
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
@@ -21,6 +22,21 @@ namespace {
 
 // Share of the way between the hips that two legs take: beside each other they are clear.
 constexpr double kLegShare = 0.6;
+// m that the centre of pressure asked for keeps off a sole's edge: what it is off by in a step.
+constexpr double kSoleMargin = 0.02;
+// m beyond the capture point that the sole's centre comes down: what is left for errors of the
+// prediction. Fitted, as the numbers below, to pushes of the paper's robot (docs/stepping.md).
+constexpr double kOvershoot = 0.04;
+// m of the capture point inside the new support, beyond which a foothold is no better.
+constexpr double kAmpleMargin = 0.04;
+// Share of the hip joints' effort that swings the leg: the rest is for what the leg has to hold.
+constexpr double kSwingEffort = 0.35;
+// m/s downward at which the sole meets the ground: sooner down is a larger push, harder a bounce.
+constexpr double kTouchSpeed = 0.25;
+// s before touch-down in which the foothold stays: a move within less would jerk the leg.
+constexpr double kFreeze = 0.05;
+// rad off the joints' limits at footholds: as far as a leg's joint overshoots.
+constexpr double kJointReserve = 0.1;
 // Share of the weight that an observed load must be above to be a landing: a leg that brakes its
 // swing was seen to be misjudged by 0.05, by more than three standard deviations.
 constexpr double kObservedLoad = 0.15;
@@ -92,123 +108,78 @@ double TurningInertia(const robot::RobotModel& model) {
   return least;
 }
 
+StepMotion RecoveryMotion(const RecoveryConfig& config) {
+  auto motion = GroupDefault<StepMotion, RecoveryConfig>("motion");
+  motion.MergeFrom(config.motion());
+  return motion;
+}
+
 }  // namespace
 
 void CheckRecoveryConfig(const RecoveryConfig& config) {
-  const auto check = [](bool holds, const char* name, const char* must) {
-    if (!holds) throw ConfigError(std::string("recovery.") + name, must);
-  };
-  const auto not_negative = [&](double value, const char* name) {
-    check(value >= 0 && std::isfinite(value), name, "must be a number, 0 or more");
-  };
-  const auto positive = [&](double value, const char* name) {
-    check(value > 0 && std::isfinite(value), name, "must be a number above 0");
-  };
-  not_negative(config.sure(), "sure");
-  not_negative(config.reserve(), "reserve");
-  not_negative(config.beyond(), "beyond");
-  not_negative(config.again_after(), "again_after");
-  check(config.max_steps() >= 1, "max_steps", "must be 1 or more");
-  positive(config.unload(), "unload");
-  not_negative(config.momentum(), "momentum");
-  positive(config.load(), "load");
-  not_negative(config.edge(), "edge");
-  not_negative(config.overshoot(), "overshoot");
-  not_negative(config.enough(), "enough");
-  positive(config.clearance(), "clearance");
-  positive(config.touch_speed(), "touch_speed");
-  positive(config.freeze(), "freeze");
-  positive(config.least_swing(), "least_swing");
-  check(config.swing_effort() > 0 && config.swing_effort() <= 1, "swing_effort",
-        "must be a share above 0, at most 1");
-  not_negative(config.touch_duration(), "touch_duration");
-  not_negative(config.settle(), "settle");
-  positive(config.lower(), "lower");
-  not_negative(config.joint_reserve(), "joint_reserve");
-  not_negative(config.gap(), "gap");
-  not_negative(config.leg_distance(), "leg_distance");
-  positive(config.gain(), "gain");
-  not_negative(config.lean_rate(), "lean_rate");
-  not_negative(config.swing_budget(), "swing_budget");
-  not_negative(config.catch_budget(), "catch_budget");
-  positive(config.far(), "far");
-  positive(config.height_rate(), "height_rate");
-  positive(config.rest_distance(), "rest_distance");
-  positive(config.rest_speed(), "rest_speed");
-  positive(config.rest_time(), "rest_time");
-  not_negative(config.together_after(), "together_after");
-  positive(config.together_shift(), "together_shift");
-  positive(config.together_swing(), "together_swing");
-  not_negative(config.lingering(), "lingering");
-  not_negative(config.lingering_time(), "lingering_time");
+  // Between two heights a share of the way is taken.
+  if (config.motion().has_com_lowering()) {
+    CheckPositive(config.motion().com_lowering(), "recovery.motion.com_lowering");
+  }
 }
 
 stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model) {
+  const StepMotion motion = RecoveryMotion(config);
   for (const robot::FootModel& foot : model.feet()) {
-    if (config.edge() < robot::InnerRadius(foot)) continue;
-    throw ConfigError("recovery.edge",
-                      fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
-                                  config.edge(), foot.name, foot.length, foot.width));
+    if (kSoleMargin < robot::InnerRadius(foot)) continue;
+    throw ConfigError("recovery", fmt::format("keeps the centre of pressure {} m off a sole's edge, "
+                                              "which leaves nothing of the {} foot's, {} x {} m",
+                                              kSoleMargin, foot.name, foot.length, foot.width));
   }
-  const stepping::Reach reach(model, robot::StandingHeight(model), config.lower(),
-                              config.joint_reserve(), config.gap());
+  const stepping::Reach reach(model, robot::StandingHeight(model), motion.com_lowering(),
+                              kJointReserve, motion.gap());
   if (reach.empty()) {
-    throw ConfigError("recovery.lower",
-                      fmt::format("is {} m; robot '{}' cannot stand {} m lower than {} m with "
-                                  "joint_reserve {} rad: change one of them",
-                                  config.lower(), model.name(), config.lower(),
-                                  robot::StandingHeight(model), config.joint_reserve()));
+    throw ConfigError("recovery.motion.com_lowering",
+                      fmt::format("is {} m; robot '{}' cannot stand so much lower than {} m with "
+                                  "its joints {} rad off their limits: give less",
+                                  motion.com_lowering(), model.name(),
+                                  robot::StandingHeight(model), kJointReserve));
   }
-  if (config.has_gap()) CheckGap("recovery", config.gap(), model, reach);
-  if (config.has_clearance()) CheckClearance("recovery", config.clearance(), model);
+  if (config.motion().has_gap()) CheckGap("recovery.motion", motion.gap(), model, reach);
+  if (config.motion().has_clearance()) {
+    CheckClearance("recovery.motion", motion.clearance(), model);
+  }
   stepping::StepLimits limits;
-  limits.edge = config.edge();
-  limits.acceleration = SwingAcceleration(model, config.swing_effort());
-  limits.least_swing = config.least_swing();
-  limits.unload = config.unload();
-  limits.beyond = config.overshoot();
-  limits.enough = config.enough();
+  limits.sole_margin = kSoleMargin;
+  limits.acceleration = SwingAcceleration(model, kSwingEffort);
+  limits.least_swing = motion.swing();
+  limits.unload = motion.unload();
+  limits.overshoot = kOvershoot;
+  limits.ample_margin = kAmpleMargin;
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
-  limits.leg_distance = config.has_leg_distance()
-                            ? config.leg_distance()
-                            : std::max(std::max(model.feet()[0].width, model.feet()[1].width),
-                                       kLegShare * stepping::Legs(model).hip_spacing());
+  limits.leg_distance = std::max(std::max(model.feet()[0].width, model.feet()[1].width),
+                                 kLegShare * stepping::Legs(model).hip_spacing());
   return {model, reach, limits};
 }
 
-stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model, double watch) {
+stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
+                                        const ContactConfirmation& contact,
+                                        const robot::RobotModel& model, double watched_margin) {
+  const StepMotion motion = RecoveryMotion(config);
   stepping::RecoverySpec spec;
-  spec.sure = config.sure();
-  spec.reserve = config.reserve();
-  spec.beyond = config.beyond();
-  spec.again_after = config.again_after();
-  spec.lingering = config.lingering();
-  spec.lingering_time = config.lingering_time();
-  spec.max_steps = config.max_steps();
-  spec.momentum = config.momentum();
-  spec.load = config.load();
-  spec.swing = {config.clearance(), config.touch_speed(), config.freeze()};
+  spec.margin_to_sole_edge = config.margin_to_sole_edge();
+  spec.load = motion.load();
+  spec.swing = {motion.clearance(), kTouchSpeed, kFreeze};
   spec.touch_load = contact.touch_load();
-  spec.touch_duration = config.touch_duration();
   spec.observed_load = kObservedLoad * model.total_mass() * robot::kGravity;
-  spec.settle = config.settle();
+  spec.settle = motion.settle();
   spec.search_depth = contact.search_depth();
-  spec.gain = config.gain();
+  spec.gain = motion.gain();
   spec.turn_share = TurningInertia(model) / (model.total_mass() * robot::kGravity);
-  spec.lean_rate = config.lean_rate();
-  spec.swing_budget = config.swing_budget();
-  spec.catch_budget = config.catch_budget();
-  spec.far = config.far();
-  spec.height_rate = config.height_rate();
-  spec.rest_distance = config.rest_distance();
-  spec.rest_speed = config.rest_speed();
-  spec.rest_time = config.rest_time();
-  spec.watch = watch;
+  spec.height_rate = motion.height_rate();
+  spec.watched_margin = watched_margin;
   spec.together_after = config.together_after();
-  spec.together_shift = config.together_shift();
-  spec.together_swing = config.together_swing();
-  return {MakeStepChoice(config, model), spec};
+  return spec;
+}
+
+stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
+                                const robot::RobotModel& model, double watched_margin) {
+  return {MakeStepChoice(config, model), MakeRecoverySpec(config, contact, model, watched_margin)};
 }
 
 }  // namespace poise

@@ -7,16 +7,20 @@
 
 namespace poise {
 
-/// Throws ConfigError "recovery.sure" ...: not finite, or beyond what can work.
+/// Throws ConfigError where numbers that keep their rules do not fit together.
 void CheckRecoveryConfig(const RecoveryConfig& config);
 
 /// Reach and limits of this robot's steps, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or not what is configured, or its soles are smaller than
-/// the edge.
+/// ConfigError when its legs reach nothing or not what is configured, or its soles are too small.
 stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::RobotModel& model);
 
-/// `watch`: RecoverySpec::watch. Thresholds for this robot besides. Throws as MakeStepChoice.
+/// The numbers of this robot's recovery. `watched_margin`: RecoverySpec's.
+stepping::RecoverySpec MakeRecoverySpec(const RecoveryConfig& config,
+                                        const ContactConfirmation& contact,
+                                        const robot::RobotModel& model, double watched_margin);
+
+/// Both. Throws as MakeStepChoice.
 stepping::Recovery MakeRecovery(const RecoveryConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model, double watch);
+                                const robot::RobotModel& model, double watched_margin);
 
 }  // namespace poise

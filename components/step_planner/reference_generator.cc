@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/tick_time.h"
 #include "components/step_planner/phase_graph.h"
 
 namespace poise {
@@ -231,7 +232,7 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
   const double speed = on_time.velocity.norm();
   const double lag = speed > 0 ? (on_time.position - com).dot(on_time.velocity) / speed : 0;
   const double rate = std::clamp(2 * (1 - lag / com_lag_), 0.0, 1.0);
-  references_.com = com_.Slow(time, std::clamp(time - time_, 0.0, kMaxPeriod), rate);
+  references_.com = com_.Slow(time, TickPeriod(time - time_), rate);
   time_ = time;
   for (size_t i = 0; i < 2; ++i) {
     if (!foot_free_[i]) continue;

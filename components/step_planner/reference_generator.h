@@ -11,9 +11,6 @@
 
 namespace poise {
 
-/// s, counted at most for a tick after a gap of the ticks.
-inline constexpr double kMaxPeriod = 0.02;
-
 /// Quintic in time from a given motion to rest at a target; from rest it is the minimum-jerk line.
 /// Holds before and after.
 class QuinticMove {

@@ -108,7 +108,6 @@ class StepPlanner : public Component, public Operated {
   std::optional<ReferenceGenerator> generator_;
   StanceFollower stance_follower_{0};
   std::optional<HipStrategy> hip_strategy_;
-  double joint_reserve_ = 0, brake_time_ = 0;  // rad, s, of the hip strategy
   ContactConfirmation contact_;
   std::vector<Landing> landing_;           // by foot
   std::vector<ContactLoss> contact_loss_;  // by foot
@@ -129,8 +128,6 @@ class StepPlanner : public Component, public Operated {
   bool stands_otherwise_ = false;  // on both feet after steps, where the phase is on one
   // A foot that a phase put down may stand on ground that gives way: its sole is not followed.
   bool was_free_ = false;
-  double step_reach_ = 0;          // m
-  bool angular_momentum_ = false;  // counts in the capture point that asks for a step
   References references_;
   Eigen::Matrix3d untilted_ =
       Eigen::Matrix3d::Identity();  // the body's reference less the hip strategy's tilt

@@ -103,7 +103,6 @@ void ReportWalking(const stepping::Walk& walk, double time,
   const double ground = sole[1 - foot].translation().z();
   const Eigen::Vector2d foothold =
       landed ? Eigen::Vector2d(sole[foot].translation().head<2>()) : walk.foothold().position;
-  if (walk.retreating()) plan->foot_state[foot] = support_plan_t::FOOT_RETRACTED;
   plan->step_reason = support_plan_t::REASON_WALK;
   plan->step_foot = static_cast<int8_t>(foot);
   SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);

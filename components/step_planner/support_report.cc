@@ -7,6 +7,9 @@
 namespace poise {
 namespace {
 
+// m from the soles' edge that a foot can be put down at the most, of the step that is announced.
+constexpr double kStepReach = 0.4;
+
 int8_t TransitionCode(TransitionKind kind) {
   switch (kind) {
     case TransitionKind::kUnloading:
@@ -138,25 +141,18 @@ void StepPlanner::ReportReferences() {
 void StepPlanner::ReportCapture(double time, const Capture& capture) {
   if (!capture.known) return;
   support_plan_t& out = *support_plan_;
-  const robot::RobotData& data = whole_body_->data();
   const Eigen::Isometry3d& frame_o = capture.frame_o;
   const balance::ConvexPolygon soles = Soles(frame_o, sole_);
   if (soles.num_corners == 0) return;
-  balance::CapturePoint counts = capture.pendulum;
-  if (angular_momentum_) {
-    const Eigen::Vector3d turning = whole_body_->AngularMomentum() / whole_body_->data().total_mass;
-    balance::ComputeCapturePoint(frame_o, data.com, data.com_velocity, turning, robot::kGravity,
-                                 &counts);
-  }
   const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
     return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
   };
   SetVector3(world(capture.pendulum.position), out.capture_point);
-  out.capture_margin = balance::SignedDistance(soles, counts.position);
+  out.capture_margin = balance::SignedDistance(soles, capture.pendulum.position);
   out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
   balance::Step step;
   if (out.step_needed != 0 && out.capture_margin < 0) {
-    step = balance::LatestStep(soles, counts, step_reach_);
+    step = balance::LatestStep(soles, capture.pendulum, kStepReach);
     SetVector3(world(step.position), out.step_position);
   } else if (out.step_needed == 0) {
     SetVector3(Eigen::Vector3d::Zero(), out.step_position);

@@ -10,17 +10,21 @@
 
 namespace poise {
 
-/// Throws ConfigError "walk.unload" ...: not finite, beyond what can work, commands out of
-/// order or before the run.
+/// Throws ConfigError "walk.command[1].time" ...: commands or told edges are out of order. Each
+/// number has been held to its rule already (CheckFields).
 void CheckWalkConfig(const WalkConfig& config);
 
-/// What nobody gave is that of the paper's robot in units of g and `height`, m, of the standing
-/// COM.
-WalkConfig WithRobotDefaults(WalkConfig config, double height);
+/// Reach and spacing of this robot's walk, whose COM stands at its standing height. Throws
+/// ConfigError when its legs reach nothing or not what is configured.
+stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model);
 
-/// Reach, spacing and thresholds for this robot, whose COM stands at its standing height. Throws
-/// ConfigError when its legs reach nothing or not what is configured, or its soles are smaller than
-/// the edge.
+/// The numbers of this robot's walk. What nobody gave is that of the paper's robot in units of g and
+/// of the standing COM's height. `choice`: MakeWalkChoice's.
+stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmation& contact,
+                                const robot::RobotModel& model,
+                                const stepping::StepChoice& choice);
+
+/// Both. Throws as MakeWalkChoice.
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,
                         const robot::RobotModel& model);
 

@@ -91,23 +91,19 @@ void SetRotation(const RotationMotion& motion, balance::TaskTarget* target) {
 }  // namespace
 
 balance::TaskGains ReadGains(const Gains& gains, const std::string& field, bool has_position) {
-  const auto check = [&](bool has, double value, const char* name) {
-    const std::string path = fmt::format("{}.{}", field, name);
-    if (!has) {
-      throw ConfigError(path, fmt::format("is not set, but {0} is: set all of its gains, or none, "
-                                          "which then follow from the robot",
-                                          field));
-    }
-    if (!(value > 0) || !std::isfinite(value)) {
-      throw ConfigError(path, "must be a positive number");
-    }
+  const auto check = [&](bool has, const char* name) {
+    if (has) return;
+    throw ConfigError(fmt::format("{}.{}", field, name),
+                      fmt::format("is not set, but {0} is: set all of its gains, or none, which "
+                                  "then follow from the robot",
+                                  field));
   };
   if (has_position) {
-    check(gains.has_kp(), gains.kp(), "kp");
+    check(gains.has_kp(), "kp");
   } else if (gains.has_kp()) {
     throw ConfigError(field + ".kp", "must be left out; this task has no position");
   }
-  check(gains.has_kd(), gains.kd(), "kd");
+  check(gains.has_kd(), "kd");
   return {gains.kp(), gains.kd()};
 }
 
@@ -120,9 +116,6 @@ balance::StandingGains ReadStandingGains(const TaskControllerConfig& config,
   if (config.has_posture()) gains.posture = ReadGains(config.posture(), "posture");
   if (config.has_base_velocity_cutoff()) {
     gains.base_velocity_cutoff = config.base_velocity_cutoff();
-    if (!(gains.base_velocity_cutoff >= 0) || !std::isfinite(gains.base_velocity_cutoff)) {
-      throw ConfigError("base_velocity_cutoff", "must be Hz, 0 or more");
-    }
   } else if (config.has_com()) {
     gains.base_velocity_cutoff = 0;
   }
@@ -160,7 +153,6 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   for (const int axis : task.axis()) spec.axes[static_cast<size_t>(axis)] = true;
 
   Entry entry;
-  if (task.level() < 0) throw ConfigError(field + ".level", "must be 0 or more");
   entry.level = task.level();
   entry.reference = task.has_reference() ? task.reference() : DefaultReference(task);
   try {

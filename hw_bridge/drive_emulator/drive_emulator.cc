@@ -44,15 +44,6 @@ size_t FindJoint(const robot::RobotModel& model, const std::string& name,
                                        Suggest(name, names)));
 }
 
-void CheckShares(const FrameFaults& frames, const std::string& field) {
-  for (const double share : {frames.lost_out(), frames.lost_back(), frames.corrupted(),
-                             frames.truncated(), frames.late()}) {
-    if (!(share >= 0 && share <= 1)) {
-      throw ConfigError(field, "must have shares between 0 and 1");
-    }
-  }
-}
-
 /// What the robot's file says of a motor, where the configuration does not.
 void CompleteDrive(const robot::MotorModel& motor, ethercat::EmulatedDriveConfig* drive) {
   if (!drive->has_rated_current()) {
@@ -136,7 +127,6 @@ void DriveEmulator::Configure(const ComponentContext& context, Wiring* wiring) {
   }
   for (int i = 0; i < config.trouble_size(); ++i) {
     const DriveTrouble& trouble = config.trouble(i);
-    CheckShares(trouble.frames(), fmt::format("trouble[{}].frames", i));
     Trouble& entry = troubles_.emplace_back();
     entry.config = trouble;
     if (trouble.kind() == DriveTrouble::FRAMES) continue;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
 #include "hw_bridge/unitree/remote.h"
@@ -13,8 +14,6 @@
 
 namespace poise::unitree {
 namespace {
-
-constexpr uint32_t kMostDelay = 100;  // cycles
 
 bool AllFinite(const MotorCmd& motor) {
   return std::isfinite(motor.q + motor.dq + motor.tau + motor.kp + motor.kd);
@@ -28,26 +27,11 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
       motors_(model.motors()),
       slots_(MotorSlots(model, config.layout(), config.slot())),
       watchdog_cycles_(0) {
-  if (config.state_delay() > kMostDelay) throw ConfigError("state_delay", "must be at most 100");
-  if (config.command_delay() > kMostDelay) {
-    throw ConfigError("command_delay", "must be at most 100");
-  }
-  if (!(config.watchdog() >= 0 && config.watchdog() < 10)) {
-    throw ConfigError("watchdog", "must be between 0 and 10 s");
-  }
+  CheckFields(config);
   watchdog_cycles_ = std::llround(config.watchdog() / period);
-  if (!(std::abs(config.temperature()) <= 300)) {
-    throw ConfigError("temperature", "must be a number of °C, at most 300");
-  }
-  if (!(config.watchdog_damping() >= 0) || !std::isfinite(config.watchdog_damping())) {
-    throw ConfigError("watchdog_damping", "must be a finite number of N·m·s/rad, not negative");
-  }
   for (int i = 0; i < config.trouble_size(); ++i) {
     Trouble& trouble = troubles_.emplace_back();
     trouble.config = config.trouble(i);
-    if (!(std::abs(trouble.config.value()) <= 10000)) {
-      throw ConfigError(fmt::format("trouble[{}].value", i), "must be a number, at most 10000");
-    }
     trouble.buttons = ButtonsOf({trouble.config.button().begin(), trouble.config.button().end()});
     const auto kind = trouble.config.kind();
     if (kind != UnitreeTrouble::HOT_MOTOR && kind != UnitreeTrouble::MOTOR_ERROR) continue;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "tests/test_seed.h"
 
 namespace poise::balance {

@@ -67,6 +67,7 @@ std::string FieldsAsText(const std::vector<FieldEntry>& fields, size_t width) {
   std::string text;
   for (const FieldEntry& field : fields) {
     text += fmt::format("{}: {}", field.path, field.type);
+    if (!field.range.empty()) text += fmt::format(", {}", field.range);
     if (!field.default_value.empty()) {
       text += fmt::format(", default {}", field.default_value);
     } else if (!field.group && !TellsDefault(field.meaning)) {
@@ -96,7 +97,8 @@ std::string FieldsAsMarkdown(const std::vector<FieldEntry>& fields) {
         meaning += fmt::format("<br>`{}`{}{}", name, value.empty() ? "" : ": ", value);
       }
       rows +=
-          fmt::format("| `{}` | {} | {} | {} | {} |\n", field.path, field.type,
+          fmt::format("| `{}` | {}{} | {} | {} | {} |\n", field.path, field.type,
+                      field.range.empty() ? "" : ", " + field.range,
                       field.default_value.empty() ? "" : fmt::format("`{}`", field.default_value),
                       Cell(field.unit), Cell(meaning));
     }

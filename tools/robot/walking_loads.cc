@@ -41,12 +41,12 @@ class Step {
   Step(const robot::RobotModel& model, const RobotState& stance)
       : model_(model),
         height_(robot::StandingHeight(model)),
-        config_(WithRobotDefaults({}, height_)),
+        spec_(MakeWalkSpec({}, {}, model, MakeWalkChoice({}, model))),
         spacing_(robot::StandingSpacing(model)),
         nominal_(stance.joint_position) {}
 
-  double single() const { return config_.swing() + config_.settle(); }
-  double both() const { return config_.unload() + config_.load(); }
+  double single() const { return spec_.single(); }
+  double both() const { return spec_.unload + spec_.load; }
 
   /// The robot on the sole of `stance`, whose frame lies at the origin, at each sample, with its
   /// velocities. Nothing where it is out of reach.
@@ -59,9 +59,9 @@ class Step {
     PointMotion from;
     from.position = across - ahead;
     swing.Begin(from, Eigen::Matrix3d::Identity(), across + ahead,
-                Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, config_.swing(),
-                {config_.clearance(), config_.touch_speed(), config_.freeze()});
-    const double com_height = height_ - config_.lower();
+                Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(), 0, spec_.swing,
+                spec_.foot);
+    const double com_height = height_ - spec_.com_lowering;
     const double omega = std::sqrt(robot::kGravity / com_height);
     const Orbit sagittal(omega, single(), both(), 0.5 * length, false);
     const Orbit lateral(omega, single(), both(), 0.5 * spacing_, true);
@@ -69,7 +69,7 @@ class Step {
     robot::PostureGoal goal;
     goal.nominal = nominal_;
     for (int i = 0; i <= kSamples; ++i) {
-      const double time = std::min(i * interval(), config_.swing());
+      const double time = std::min(i * interval(), spec_.swing);
       const double middle = i * interval() - 0.5 * single();
       Eigen::Isometry3d& foot = goal.foot[1 - stance];
       foot.translation() = swing.At(time).position;
@@ -123,7 +123,7 @@ class Step {
  private:
   const robot::RobotModel& model_;
   double height_;
-  WalkConfig config_;
+  stepping::WalkSpec spec_;
   double spacing_;
   VectorXd nominal_;
 };
@@ -138,8 +138,7 @@ VectorXd Velocity(const RobotState& state) {
 
 std::optional<StepLoads> LoadsOfAStep(const robot::RobotModel& model, const RobotState& stance,
                                       const VectorXd& standing) {
-  MakeWalk({}, {}, model);  // refuses what the run would
-  const Step step(model, stance);
+  const Step step(model, stance);  // refuses what the run would
   const VectorXd none = VectorXd::Zero(model.num_joints());
   StepLoads loads{standing, none, none};
   VectorXd square = none;  // mean over the time on one foot, of both feet's steps

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 
@@ -120,8 +121,12 @@ void Append(const Descriptor& type, const std::string& prefix, std::vector<Field
         comment += comment.ends_with('.') ? " " : ". ";
       }
       comment += of_type;
+      if (const std::string text = GroupDefaultText(field); !text.empty()) {
+        comment += fmt::format(" Default: {}.", text);
+      }
     }
     entry.unit = UnitOf(comment);
+    entry.range = RangeOf(field);
     entry.meaning = comment;
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_ENUM) {
       const auto& values = *field.enum_type();

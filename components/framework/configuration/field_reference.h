@@ -14,6 +14,7 @@ struct FieldEntry {
   std::string type;           ///< "number", "text", "list of groups", ...
   std::string default_value;  ///< as a file has it; empty: none
   std::string unit;           ///< empty: none
+  std::string range;          ///< what its rule allows, "0 or more"; empty: any
   std::string meaning;        ///< one line, the comment as it stands: it begins with the unit
   std::vector<std::pair<std::string, std::string>> values;  ///< of an enum: name, meaning
   bool group = false;  ///< holds fields, which follow, and cannot be set itself

@@ -2,30 +2,39 @@
 #pragma once
 
 #include "components/framework/state_archive.h"
+#include "components/framework/tick_time.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 
-/// Lost once a foot that is to carry has measured less than release_load for lost_duration; no
+/// Lost once a foot that is to carry has measured less than release_load for kLostDuration; no
 /// longer with the first measurement above, or when it is not to carry any more.
 class ContactLoss {
  public:
-  explicit ContactLoss(const ContactConfirmation& config)
-      : release_load_(config.release_load()), duration_(config.lost_duration()) {}
+  /// s; longer than the rattle of a foot that a push rocks.
+  static constexpr double kLostDuration = 0.1;
+
+  explicit ContactLoss(const ContactConfirmation& config) : release_load_(config.release_load()) {}
 
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   /// `deviation`: N, of an observed load, which must be below that instead where it is more; 0 of a
   /// measured one.
   void Update(double time, double load, bool carries, double deviation = 0);
   /// From here on anew: another phase, another plan.
-  void Reset() { below_ = lost_ = false; }
+  void Reset() {
+    empty_.Reset();
+    lost_ = false;
+  }
   bool lost() const { return lost_; }
-  void Archive(StateArchive* archive) { archive->Show(below_, lost_, since_); }
+  void Archive(StateArchive* archive) {
+    empty_.Archive(archive);
+    archive->Show(lost_);
+  }
 
  private:
-  double release_load_, duration_;  // N, s
-  bool below_ = false, lost_ = false;
-  double since_ = 0;  // s, when the load fell below
+  double release_load_;     // N
+  LastingCondition empty_;  // it is to carry and does not
+  bool lost_ = false;
 };
 
 }  // namespace poise

@@ -5,7 +5,6 @@
 namespace poise {
 namespace {
 
-constexpr double kTouchTolerance = 1e-9;  // s, far below a tick, far above rounding
 // Time constant, s, of the reference's velocity: a search begins and a lowering ends without a
 // step.
 constexpr double kVelocityTime = 0.05;
@@ -14,6 +13,11 @@ constexpr double kTouchDeviations = 3, kReleaseDeviations = 1.2;
 // Time constant, s, with which a touching sole's reference comes to where the sole stands: a
 // fraction of settle_duration's default.
 constexpr double kRelaxTime = 0.1;
+// m/s at which a foot without contact at its reference's end goes on downward: slow enough that the
+// load stops it before it tips the robot.
+constexpr double kSearchSpeed = 0.03;
+// m that a foot rises which found no surface: clear of what it may have touched with its edge.
+constexpr double kRetractHeight = 0.05;
 
 }  // namespace
 
@@ -26,20 +30,12 @@ LoadLevels::LoadLevels(const ContactConfirmation& config, double deviation)
 
 void TouchDetector::Reset(bool touching) {
   touching_ = touching;
-  changing_ = false;
+  contradicts_.Reset();
 }
 
 bool TouchDetector::Update(double time, double load, const LoadLevels& levels) {
   const bool contradicts = touching_ ? load < levels.release : load > levels.touch;
-  if (!contradicts) {
-    changing_ = false;
-    return touching_;
-  }
-  if (!changing_) {
-    changing_ = true;
-    since_ = time;
-  }
-  if (time - since_ >= config_.touch_duration() - kTouchTolerance) Reset(!touching_);
+  if (contradicts_.Update(time, contradicts, duration_)) Reset(!touching_);
   return touching_;
 }
 
@@ -72,7 +68,7 @@ void Landing::Release() {
 }
 
 void Landing::Measure(double time, double load, double deviation) {
-  period_ = std::clamp(time - time_, 0.0, kMaxPeriod);
+  period_ = TickPeriod(time - time_);
   time_ = time;
   load_ = load;
   levels_ = LoadLevels(config_, deviation);
@@ -84,12 +80,12 @@ bool Landing::confirmed() const {
   if (!touch_.touching()) return false;
   if (state_ == State::kSwing) return !left_;
   return state_ == State::kTouching &&
-         time_ - touched_ >= config_.settle_duration() - kTouchTolerance;
+         time_ - touched_ >= config_.settle_duration() - kTimeTolerance;
 }
 
 bool Landing::SearchBegins(bool before_touch_down, bool due) const {
   if (!config_.required() || !before_touch_down) return false;
-  return due || (lowered_ && time_ >= move_end_ - kTouchTolerance);
+  return due || (lowered_ && time_ >= move_end_ - kTimeTolerance);
 }
 
 void Landing::Enter(State state, const PointMotion& reference, const Eigen::Matrix3d& rotation) {
@@ -122,9 +118,9 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
       } else if (sole.translation().z() <= end_height_ - depth ||
                  reference_.position.z() <= end_height_ - 2 * depth) {
         state_ = State::kRetracted;
-        const double height = config_.retract_height();
-        retreat_.Begin(reference_, reference_.position + height * Eigen::Vector3d::UnitZ(), time_,
-                       height / config_.search_speed());
+        retreat_.Begin(reference_,
+                       reference_.position + kRetractHeight * Eigen::Vector3d::UnitZ(), time_,
+                       kRetractHeight / kSearchSpeed);
       }
       break;
     }
@@ -138,7 +134,7 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
 
 void Landing::Search() {
   const double missing = std::max(1 - load_ / levels_.press, 0.0);
-  const Eigen::Vector3d velocity(0, 0, -config_.search_speed() * missing);
+  const Eigen::Vector3d velocity(0, 0, -kSearchSpeed * missing);
   reference_.velocity += Share(kVelocityTime) * (velocity - reference_.velocity);
   reference_.position += period_ * reference_.velocity;
 }
@@ -149,7 +145,7 @@ void Landing::Touch(const Eigen::Isometry3d& sole) {
   Eigen::Vector3d share = Eigen::Vector3d::Constant(Share(kRelaxTime));
   share.z() *= loaded;
   reference_.position += share.cwiseProduct(sole.translation() - reference_.position);
-  reference_.position.z() -= period_ * config_.search_speed() * (1 - loaded);
+  reference_.position.z() -= period_ * kSearchSpeed * (1 - loaded);
   // Not that of the reference's coming back, which would lift the foot.
   reference_.velocity -= Share(kVelocityTime) * reference_.velocity;
   rotation_ = Eigen::Quaterniond(rotation_)

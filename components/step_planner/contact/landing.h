@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
 #include "components/step_planner/reference_generator.h"
 #include "components/step_planner/step_planner.pb.h"
@@ -21,28 +22,33 @@ struct LoadLevels {
 };
 
 /// Contact from a measured load, with hysteresis: it is made when the load has stayed above
-/// touch_load for touch_duration, and lost when it has stayed below release_load as long.
+/// touch_load for a duration, and lost when it has stayed below release_load as long.
 class TouchDetector {
  public:
-  explicit TouchDetector(const ContactConfirmation& config) : config_(config) {}
+  /// s that either must last: ten periods of 500 Hz, longer than the sensor's noise.
+  static constexpr double kTouchDuration = 0.02;
+
+  explicit TouchDetector(double duration = kTouchDuration) : duration_(duration) {}
 
   /// `touching`: what holds until the load says otherwise.
   void Reset(bool touching);
   /// `time` in s, not decreasing; `load` in N, positive when the sole is pressed.
   bool Update(double time, double load, const LoadLevels& levels);
   bool touching() const { return touching_; }
-  void Archive(StateArchive* archive) { archive->Show(touching_, changing_, since_); }
+  void Archive(StateArchive* archive) {
+    archive->Show(touching_);
+    contradicts_.Archive(archive);
+  }
 
  private:
-  ContactConfirmation config_;
+  double duration_;  // s
   bool touching_ = false;
-  bool changing_ = false;
-  double since_ = 0;  // s, when the load began to contradict `touching_`
+  LastingCondition contradicts_;  // the load, `touching_`
 };
 
 /// One foot from lift-off to double support. Pure function of its calls.
 ///
-/// Searching: the reference goes on downward at search_speed · (1 − load / press_load), which
+/// Searching: the reference goes on downward at kSearchSpeed · (1 − load / press_load), which
 /// presses until contact counts in spite of joint friction, and never much harder.
 /// Touching: the foot is let go. Its reference comes to where the sole stands, so that the task
 /// asks for no acceleration and is a damper only: the sole settles flat, yields to a surface that
@@ -54,7 +60,7 @@ class Landing {
   enum class State { kSwing, kSearching, kTouching, kRetracted };
 
   explicit Landing(const ContactConfirmation& config)
-      : config_(config), touch_(config), levels_(config, 0) {}
+      : config_(config), levels_(config, 0) {}
 
   /// The foot is free from here on, its reference at rest at height `z`, m. It counts as touching
   /// the ground that it leaves until its load says that it has left.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "components/framework/state_archive.h"
+#include "components/framework/tick_time.h"
 
 namespace poise {
 
@@ -9,19 +10,21 @@ namespace poise {
 class StepDetector {
  public:
   StepDetector() = default;
-  /// Needed once the margin has been below −`beyond` (m) for `persistence` (s), and no longer once
+  /// Needed once the margin has been below −`excess` (m) for `persistence` (s), and no longer once
   /// it has been above for as long.
-  StepDetector(double beyond, double persistence) : beyond_(beyond), persistence_(persistence) {}
+  StepDetector(double excess, double persistence) : excess_(excess), persistence_(persistence) {}
 
   /// `time` in s, not decreasing; `margin` in m, positive inside.
   bool Update(double time, double margin);
-  void Archive(StateArchive* archive) { archive->Show(needed_, changing_, since_); }
+  void Archive(StateArchive* archive) {
+    archive->Show(needed_);
+    contradicts_.Archive(archive);
+  }
 
  private:
-  double beyond_ = 0, persistence_ = 0;
+  double excess_ = 0, persistence_ = 0;
   bool needed_ = false;
-  bool changing_ = false;
-  double since_ = 0;  // s, when the margin began to contradict `needed_`
+  LastingCondition contradicts_;  // the margin, `needed_`
 };
 
 }  // namespace poise

@@ -38,7 +38,7 @@ RegionFinder::RegionFinder(const StepChoice& choice) {
   std::array<balance::ConvexPolygon, 2> sole;
   for (int foot = 0; foot < 2; ++foot) {
     const auto i = static_cast<size_t>(foot);
-    sole[i] = balance::SolePolygon(choice.foot(foot), limits.edge);
+    sole[i] = balance::SolePolygon(choice.foot(foot), limits.sole_margin);
     footholds_[i] = choice.reach().Footholds(foot, Vector2d::Zero());
   }
   stands_ = sole[0].num_corners > 0 && sole[1].num_corners > 0;

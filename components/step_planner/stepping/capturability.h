@@ -33,7 +33,7 @@ struct CaptureRegions {
 };
 
 /// The regions of Koolen et al. 2012 (d_N = r + (l − r + d_{N−1}) e^{−ωT}) with polygons for r and
-/// l: in each direction u, by the farthest points s of the stance sole less `edge`, f of the
+/// l: in each direction u, by the farthest points s of the stance sole less `sole_margin`, f of the
 /// footholds in reach and d_{N−1} of the region of N − 1 steps about the other foot,
 ///
 ///     d_N = (1 − e^{−ωT}) s + e^{−ωT} (f + d_{N−1}),    d_0 = s

@@ -65,15 +65,6 @@ PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, doub
   return com;
 }
 
-bool TouchTimer::Update(double time, double load, double least) {
-  if (!(load > std::max(load_, least))) {
-    since_ = -1;
-    return false;
-  }
-  if (since_ < 0) since_ = time;
-  return time >= since_ + duration_ - kTimeTolerance;
-}
-
 void LetGo(const Eigen::Isometry3d& sole, double share, double pulled, double down, double lowest,
            StepOutput* output) {
   PointMotion& swing = output->swing;

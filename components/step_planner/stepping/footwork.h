@@ -7,14 +7,12 @@
 #include <array>
 
 #include "components/framework/state_archive.h"
+#include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
-
-/// Times are compared to this, s: far below a tick, far above rounding.
-inline constexpr double kTimeTolerance = 1e-9;
 
 /// The robot in one tick; world axes, feet right first.
 struct StepInput {
@@ -26,8 +24,6 @@ struct StepInput {
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
                                         Eigen::Isometry3d::Identity()};
-  /// rad/s, of the soles, world.
-  std::array<Eigen::Vector3d, 2> sole_turning{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   std::array<double, 2> load{0, 0};  ///< N
   /// N that a load must be above to be one: of what is observed only; 0 of a measured one.
   std::array<double, 2> least_load{0, 0};
@@ -83,20 +79,6 @@ class HeightLead {
 /// (g + z̈)/(z − ground) (c − p).
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
                       const Eigen::Vector2d& cop);
-
-/// A load that lasts.
-class TouchTimer {
- public:
-  explicit TouchTimer(double load = 0, double duration = 0) : load_(load), duration_(duration) {}
-  void Reset() { since_ = -1; }
-  /// `least`: N, in place of the load that is one, where that is less.
-  bool Update(double time, double load, double least = 0);
-  void Archive(StateArchive* archive) { archive->Show(since_); }
-
- private:
-  double load_, duration_;  // N, s
-  double since_ = -1;       // s; negative: no load
-};
 
 /// A foot that has touched is let go: its reference comes by `share` to where the sole stands, in
 /// height by `pulled` of that, and goes `down`, m, on towards `lowest`, m, where it carries too

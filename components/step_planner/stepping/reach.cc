@@ -163,13 +163,13 @@ balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::Co
   return balance::ConvexHull({points.data(), count});
 }
 
-Reach::Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
+Reach::Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
              double gap)
-    : lower_(lower) {
+    : lowering_(lowering) {
   for (int foot = 0; foot < 2; ++foot) {
     auto& leg = leg_[static_cast<size_t>(foot)];
     leg[0] = LegPolygon(model, height, foot, joint_reserve);
-    leg[1] = LegPolygon(model, height - lower, foot, joint_reserve);
+    leg[1] = LegPolygon(model, height - lowering, foot, joint_reserve);
   }
   least_spacing_ = 0.5 * (model.feet()[0].width + model.feet()[1].width) + gap;
   double front = 0, rear = 0;
@@ -196,7 +196,7 @@ balance::ConvexPolygon Reach::Leg(int foot, double share) const {
   return between;
 }
 
-double Reach::LowerShare(const std::array<Vector2d, 2>& offset) const {
+double Reach::LoweringShare(const std::array<Vector2d, 2>& offset) const {
   double share = 0;
   for (size_t i = 0; i < 2; ++i) {
     const double high = balance::SignedDistance(leg_[i][0], offset[i]);

@@ -23,10 +23,10 @@ class Reach {
  public:
   /// Nothing is reached.
   Reach() = default;
-  /// At two heights of the COM above the soles: standing, and `lower` m below. A leg's joints keep
+  /// At two heights of the COM above the soles: standing, and `lowering` m below. A leg's joints keep
   /// `joint_reserve`, rad, off their limits, and a straight knee as far off. `gap`, m: between the
   /// soles, sideways. Never throws; a robot that cannot stand there has no reach.
-  Reach(const robot::RobotModel& model, double height, double lower, double joint_reserve,
+  Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
         double gap);
 
   bool empty() const {
@@ -35,11 +35,11 @@ class Reach {
     }
     return false;
   }
-  /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lower`, 0 to 1.
+  /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lowering`, 0 to 1.
   balance::ConvexPolygon Leg(int foot, double share) const;
-  /// Least share of `lower` with which the soles stand at `offset` from the COM by foot; above 1,
+  /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above 1,
   /// and by how many m, when even the lowest does not do.
-  double LowerShare(const std::array<Eigen::Vector2d, 2>& offset) const;
+  double LoweringShare(const std::array<Eigen::Vector2d, 2>& offset) const;
   /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
   /// all the way, in that leg's reach or `roll` beyond it.
   Eigen::Vector2d ComAbove(int stance, const Eigen::Vector2d& com) const;
@@ -51,7 +51,7 @@ class Reach {
                                    Place place = Place::kBeside) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
   double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
-  double lower() const { return lower_; }                  ///< m
+  double lowering() const { return lowering_; }            ///< m
   /// m, of the longer sole: a stance foot that rolls over its edge lets the COM go no farther than
   /// that beyond its leg's reach.
   double roll() const { return roll_; }
@@ -59,7 +59,7 @@ class Reach {
  private:
   // By foot, by height: standing, lowered.
   std::array<std::array<balance::ConvexPolygon, 2>, 2> leg_;
-  double least_spacing_ = 0, least_ahead_ = 0, lower_ = 0, roll_ = 0;
+  double least_spacing_ = 0, least_ahead_ = 0, lowering_ = 0, roll_ = 0;
 };
 
 }  // namespace poise::stepping

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 
 namespace poise::stepping {
 namespace {
@@ -11,51 +11,71 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kMaxPeriod = 0.02;  // s, counted at most for a tick after a gap
+// m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
+// back. Fitted to what stands from both feet (docs/stepping.md).
+constexpr double kHopelessExcess = 0.015;
+// A capture point this far beyond the soles, m, steps as soon as the best step would leave it less
+// than kLateMargin, m, inside the new ones: noise makes no step, and waiting none that comes late.
+constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
+constexpr double kAgainAfter = 0.03;     // s beyond the soles of a step: longer than its touch
+constexpr double kNearEdgeTime = 0.1;    // s near the soles' edge: a push that stands is out sooner
+constexpr int kMostSteps = 5;            // in a row: what five do not catch, the sixth does not
+// Share of the angular momentum about the COM that counts in the capture point: what the swinging
+// leg and the turning body give to the COM and take from it then moves no foothold.
+constexpr double kMomentumShare = 0.5;
+// 1/s, critically damped: the return of a turned body to upright, for which the COM's reference
+// leaves room within the soles, m of centre of pressure at most, while a foot swings and on both.
+constexpr double kLeanRate = 6;
+constexpr double kSwingBudget = 0.02, kCatchBudget = 0.1;
+// The robot rests once the capture point is within so many m of the soles' middle and the COM slower
+// than so many m/s for so many s: a swing of the COM is longer.
+constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
+// s that the COM rests beside the middle until that is rest: the joints' friction holds it there.
+constexpr double kStillBesideTime = 1;
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
-constexpr double kGently = 0.2;     // s of the load's ramps where no fall is to be caught
-constexpr double kGentleGain = 1;   // as `gain`: the joints' friction leaves less of an error
-constexpr double kStill = 1;        // s that the COM rests beside the middle until that is rest
-constexpr double kTogether = 0.03;  // m from side by side that is side by side
+// Feet are put side by side as no fall is to be caught: s in which the COM goes above the foot that
+// stays, and times that after which this is given up; s of the load's ramps; s in the air; the gain,
+// since the joints' friction leaves less of an error with it.
+constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
+constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
+constexpr double kTogetherGain = 1;
+constexpr double kTogetherDistance = 0.03;  // m from side by side that is side by side
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
-constexpr double kMostShifts = 2.5;  // times its time after which a shift is given up
 
 }  // namespace
 
-balance::ConvexPolygon Recovery::Soles(const StepState& state, double edge) const {
+balance::ConvexPolygon Recovery::Soles(const StepState& state, double margin) const {
   balance::ConvexPolygon soles;
   for (int i = 0; i < 2; ++i) {
     const auto foot = static_cast<size_t>(i);
     if (!state.in_contact[foot]) continue;
-    soles = HullOf(soles, SoleAt(choice_.foot(i), edge, state.sole[foot], state.sole_yaw[foot]));
+    soles = HullOf(soles, SoleAt(choice_.foot(i), margin, state.sole[foot], state.sole_yaw[foot]));
   }
   return soles;
 }
 
-double Recovery::Beyond(const StepState& state) const {
+double Recovery::Excess(const StepState& state) const {
   return -balance::SignedDistance(Soles(state, 0), state.pendulum.capture_point());
+}
+
+void Recovery::Watch(double time, double excess) {
+  stays_outside_ = outside_.Update(time, excess > 0, kAgainAfter);
+  const bool was_near = near_edge_.holds();
+  const bool near = !active() && excess > -spec_.margin_to_sole_edge;
+  stays_near_edge_ = near_edge_.Update(time, near, kNearEdgeTime);
+  if (near && !was_near) excess_at_edge_ = excess;
 }
 
 bool Recovery::Update(const StepInput& input) {
   const double time = input.time;
-  StepState state = Observe(input, active() ? in_contact_ : input.in_contact, spec_.momentum);
-  const double beyond = Beyond(state);
-  if (!(beyond > 0)) {
-    beyond_since_ = -1;
-  } else if (beyond_since_ < 0) {
-    beyond_since_ = time;
-  }
-  if (active() || !(beyond > -spec_.lingering)) {
-    lingers_since_ = -1;
-  } else if (lingers_since_ < 0) {
-    lingers_since_ = time;
-    lingered_from_ = beyond;
-  }
+  StepState state = Observe(input, active() ? in_contact_ : input.in_contact, kMomentumShare);
+  const double excess = Excess(state);
+  Watch(time, excess);
   switch (stage_) {
     case Stage::kIdle: {
-      const StepReason need = NeedOfFirstStep(input, state, beyond);
+      const StepReason need = NeedOfFirstStep(input, state, excess);
       if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
         together_asked_ = false;
         together_at_ = -1;
@@ -69,21 +89,21 @@ bool Recovery::Update(const StepInput& input) {
         since_ = time;
         stage_ = Stage::kShifting;
       }
-      step_helps_ = !(spec_.watch >= 0 && stage_ == Stage::kIdle && beyond > -spec_.watch &&
-                      choice_.Choose(state).foot < 0);
+      step_helps_ = !(spec_.watched_margin >= 0 && stage_ == Stage::kIdle &&
+                      excess > -spec_.watched_margin && choice_.Choose(state).foot < 0);
       if (need == StepReason::kNone) break;
       const size_t stance = state.in_contact[0] ? 0 : 1;
       standing_height_ = input.com_height - input.sole[stance].translation().z();
       height_.Begin(input.com_height);
       steps_now_ = 0;
       in_contact_ = input.in_contact;
-      output_.cop = balance::NearestPoint(Soles(state, choice_.limits().edge),
+      output_.cop = balance::NearestPoint(Soles(state, choice_.limits().sole_margin),
                                           state.pendulum.capture_point());
       BeginStep(input, choice_.Choose(state), need);
       break;
     }
     case Stage::kShifting:
-      Shift(input, state, beyond);
+      Shift(input, state, excess);
       break;
     case Stage::kUnloading:
       if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
@@ -98,12 +118,8 @@ bool Recovery::Update(const StepInput& input) {
       }
       break;
     case Stage::kCatching:
-      if (beyond_since_ >= 0 && time >= beyond_since_ + spec_.again_after - kTimeTolerance &&
-          steps_now_ < spec_.max_steps) {
+      if (stays_outside_ && steps_now_ < kMostSteps) {
         BeginStep(input, choice_.Choose(state), StepReason::kAgain);
-      } else if (const int foot = FootToBring(state); foot >= 0 && steps_now_ < spec_.max_steps) {
-        BeginStep(input, choice_.Beside(state, foot, kGently + spec_.together_swing),
-                  StepReason::kTogether);
       } else if (AtRest(input, state)) {
         stage_ = Stage::kIdle;
         const bool caught = reason_ != StepReason::kTogether;
@@ -128,28 +144,27 @@ bool Recovery::Update(const StepInput& input) {
 }
 
 StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& state,
-                                     double beyond) {
-  if (!input.allowed || spec_.max_steps < 1) return StepReason::kNone;
-  if (spec_.lingering > 0 && lingers_since_ >= 0 && beyond > lingered_from_ &&
-      input.time >= lingers_since_ + spec_.lingering_time - kTimeTolerance) {
+                                     double excess) {
+  if (!input.allowed) return StepReason::kNone;
+  if (spec_.margin_to_sole_edge > 0 && stays_near_edge_ && excess > excess_at_edge_) {
     const StepPlan plan = choice_.Choose(state);
     if (plan.foot >= 0 && plan.margin >= 0) return StepReason::kLingering;
   }
-  if (!(beyond > 0)) return StepReason::kNone;
+  if (!(excess > 0)) return StepReason::kNone;
   if (input.step_needed) return StepReason::kPersistent;
-  if (beyond > spec_.sure) return StepReason::kSure;
-  if (beyond < spec_.beyond) return StepReason::kNone;
+  if (excess > kHopelessExcess) return StepReason::kSure;
+  if (excess < kLeastExcess) return StepReason::kNone;
   const StepPlan plan = choice_.Choose(state);
-  return plan.foot >= 0 && plan.margin >= 0 && plan.margin < spec_.reserve ? StepReason::kDeadline
-                                                                           : StepReason::kNone;
+  return plan.foot >= 0 && plan.margin >= 0 && plan.margin < kLateMargin ? StepReason::kDeadline
+                                                                         : StepReason::kNone;
 }
 
 double Recovery::UnloadTime() const {
-  return reason_ == StepReason::kTogether ? kGently : choice_.limits().unload;
+  return reason_ == StepReason::kTogether ? kTogetherRamp : choice_.limits().unload;
 }
 
 double Recovery::LoadTime() const {
-  return reason_ == StepReason::kTogether ? kGently : spec_.load;
+  return reason_ == StepReason::kTogether ? kTogetherRamp : spec_.load;
 }
 
 bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan) {
@@ -161,9 +176,9 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
     return false;
   }
   for (int foot = 0; foot < 2; ++foot) {
-    const StepPlan beside = choice_.Beside(state, foot, kGently + spec_.together_swing);
+    const StepPlan beside = choice_.Beside(state, foot, kTogetherRamp + kTogetherSwing);
     const double way = (beside.foothold - state.sole[static_cast<size_t>(foot)]).norm();
-    if (way < kTogether) {
+    if (way < kTogetherDistance) {
       together_asked_ = false;
       together_at_ = -1;
       return false;
@@ -174,22 +189,22 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
   return plan->foot >= 0;
 }
 
-void Recovery::Shift(const StepInput& input, const StepState& state, double beyond) {
+void Recovery::Shift(const StepInput& input, const StepState& state, double excess) {
   const int stance = 1 - plan_.foot;
   const auto s = static_cast<size_t>(stance);
   const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
+      SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
   const double over = input.time - since_;
-  const bool above = over >= spec_.together_shift - kTimeTolerance &&
+  const bool above = over >= kTogetherShift - kTimeTolerance &&
                      balance::Contains(sole, state.pendulum.com) &&
                      balance::Contains(sole, state.pendulum.capture_point());
-  if (beyond > 0 || (!above && over > kMostShifts * spec_.together_shift)) {
+  if (excess > 0 || (!above && over > kMostShifts * kTogetherShift)) {
     // Pushed meanwhile, or it does not get there.
     stage_ = Stage::kCatching;
     since_ = moving_since_ = input.time;
     cop_from_ = output_.cop;
   } else if (above) {
-    BeginStep(input, choice_.Beside(state, plan_.foot, kGently + spec_.together_swing),
+    BeginStep(input, choice_.Beside(state, plan_.foot, kTogetherRamp + kTogetherSwing),
               StepReason::kTogether);
   }
 }
@@ -213,7 +228,6 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
                  touch_down_, spec_.swing);
     stage_ = Stage::kSwinging;
     if (plan.around) swing_.GoAround(plan.corner);
-    touch_.Reset();
   }
 }
 
@@ -230,7 +244,6 @@ void Recovery::LiftOff(const StepInput& input) {
   stage_ = Stage::kSwinging;
   since_ = input.time;
   cop_from_ = output_.cop;
-  touch_.Reset();
   touched_since_ = -1;
 }
 
@@ -240,13 +253,10 @@ double Recovery::TouchLoad(const StepInput& input) const {
 }
 
 bool Recovery::Touches(const StepInput& input) {
-  if (swing_.Progress(input.time) < kLeastProgress) {
-    touch_.Reset();
-    return false;
-  }
+  if (swing_.Progress(input.time) < kLeastProgress) return false;
   if (touched_since_ < 0) {
-    const double load = input.load[static_cast<size_t>(plan_.foot)];
-    if (!touch_.Update(input.time, load, TouchLoad(input))) return false;
+    // At once: the foot bounces, and six milliseconds of steady load came 0.12 s late.
+    if (!(input.load[static_cast<size_t>(plan_.foot)] > TouchLoad(input))) return false;
     touched_since_ = input.time;
   }
   return input.time >= touched_since_ + spec_.settle - kTimeTolerance;
@@ -254,7 +264,7 @@ bool Recovery::Touches(const StepInput& input) {
 
 void Recovery::Settle(const StepInput& input) {
   const auto foot = static_cast<size_t>(plan_.foot);
-  const double period = std::clamp(input.time - time_, 0.0, kMaxPeriod);
+  const double period = TickPeriod(input.time - time_);
   const double share = period / (kLetGo * spec_.settle + period);
   const double loaded = std::clamp(input.load[foot] / TouchLoad(input), 0.0, 1.0);
   LetGo(input.sole[foot], share, loaded, period * (1 - loaded) * spec_.swing.touch_speed,
@@ -277,7 +287,7 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
   }
   // A push takes over a foot that is under way to the other's side.
   if (reason_ == StepReason::kTogether) {
-    if (!(Beyond(state) > spec_.beyond)) {
+    if (!(Excess(state) > kLeastExcess)) {
       if (stage_ == Stage::kSwinging) {
         FollowSwing(swing_, spec_.swing, spec_.search_depth, input.time, &output_);
       }
@@ -318,7 +328,7 @@ Vector2d Recovery::Goal(const StepState& state) const {
 Vector2d Recovery::ForBody(const StepInput& input, double budget) const {
   // L̇ = −J (λ² lean + 2 λ turning) about the COM takes a centre of pressure (−L̇_y, L̇_x)/(m g) off.
   const Vector3d moment =
-      spec_.turn_share * spec_.lean_rate * (spec_.lean_rate * input.lean + 2 * input.turning);
+      spec_.turn_share * kLeanRate * (kLeanRate * input.lean + 2 * input.turning);
   const Vector2d offset(moment.y(), -moment.x());
   const double length = offset.norm();
   return length > budget ? Vector2d(budget / length * offset) : offset;
@@ -331,7 +341,7 @@ Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
   const Vector2d body = ForBody(input, budget);
   const Vector2d lead = velocity / state.pendulum.frequency;
   const bool gently = stage_ == Stage::kShifting || reason_ == StepReason::kTogether;
-  const double gain = gently ? std::max(spec_.gain, kGentleGain) : spec_.gain;
+  const double gain = gently ? std::max(spec_.gain, kTogetherGain) : spec_.gain;
   return balance::NearestPoint(support, point - lead + gain * (point - goal) + body) - body;
 }
 
@@ -341,12 +351,12 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
   if (reason_ == StepReason::kTogether) {
     return PointFor(
         input, state,
-        SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]),
-        state.sole[s], Vector2d::Zero(), spec_.swing_budget);
+        SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]),
+        state.sole[s], Vector2d::Zero(), kSwingBudget);
   }
-  const Vector2d body = ForBody(input, spec_.swing_budget);
+  const Vector2d body = ForBody(input, kSwingBudget);
   const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance), choice_.limits().edge, state.sole[s], state.sole_yaw[s]);
+      SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
   return balance::NearestPoint(sole, state.pendulum.capture_point() + body) - body;
 }
 
@@ -354,36 +364,22 @@ Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state)
   Vector2d goal = Goal(state), velocity = Vector2d::Zero();
   if (stage_ == Stage::kShifting) {
     const Vector2d way = state.sole[static_cast<size_t>(1 - plan_.foot)] - shift_from_;
-    const double s = std::clamp((input.time - since_) / spec_.together_shift, 0.0, 1.0);
-    goal = shift_from_ + balance::SmoothStep(s) * way;
-    velocity = 30 * s * s * (1 - s) * (1 - s) / spec_.together_shift * way;
+    const balance::MinimumJerk shift(input.time - since_, kTogetherShift);
+    goal = shift_from_ + shift.position * way;
+    velocity = shift.speed * way;
   }
-  return PointFor(input, state, Soles(state, choice_.limits().edge), goal, velocity,
-                  spec_.catch_budget);
-}
-
-int Recovery::FootToBring(const StepState& state) const {
-  const Vector2d point = state.pendulum.capture_point();
-  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
-  const std::array<Vector2d, 2> offset{turn * (state.sole[0] - point),
-                                       turn * (state.sole[1] - point)};
-  if (choice_.reach().LowerShare(offset) < spec_.far) return -1;
-  const int far = offset[0].norm() > offset[1].norm() ? 0 : 1;
-  const auto near = static_cast<size_t>(1 - far);
-  const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(1 - far), choice_.limits().edge, state.sole[near], state.sole_yaw[near]);
-  return balance::Contains(sole, point) ? far : -1;
+  return PointFor(input, state, Soles(state, choice_.limits().sole_margin), goal, velocity,
+                  kCatchBudget);
 }
 
 bool Recovery::AtRest(const StepInput& input, const StepState& state) {
-  const bool slow = input.com_velocity.norm() < spec_.rest_speed;
-  const bool near = (state.pendulum.capture_point() - Goal(state)).norm() < spec_.rest_distance;
-  if (!slow || !(near || Beyond(state) < -spec_.rest_distance)) moving_since_ = input.time;
-  // The joints' friction holds the COM some cm beside the middle.
-  return input.time >= moving_since_ + (near ? spec_.rest_time : kStill) - kTimeTolerance;
+  const bool slow = input.com_velocity.norm() < kStillSpeed;
+  const bool near = (state.pendulum.capture_point() - Goal(state)).norm() < kStillDistance;
+  if (!slow || !(near || Excess(state) < -kStillDistance)) moving_since_ = input.time;
+  return input.time >= moving_since_ + (near ? kStillTime : kStillBesideTime) - kTimeTolerance;
 }
 
-double Recovery::LowerShare(const StepState& state) const {
+double Recovery::LoweringShare(const StepState& state) const {
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
   std::array<Vector2d, 2> offset;
   const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
@@ -393,18 +389,18 @@ double Recovery::LowerShare(const StepState& state) const {
     const bool swings = steps && static_cast<int>(i) == plan_.foot;
     offset[i] = turn * ((swings ? plan_.foothold : state.sole[i]) - com);
   }
-  return std::min(choice_.reach().LowerShare(offset), 1.0);
+  return std::min(choice_.reach().LoweringShare(offset), 1.0);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {
-  const double period = std::clamp(input.time - time_, 0.0, kMaxPeriod);
+  const double period = TickPeriod(input.time - time_);
   // The height, critically damped.
   const size_t stance =
       stage_ == Stage::kShifting || stage_ == Stage::kUnloading || stage_ == Stage::kSwinging
           ? static_cast<size_t>(1 - plan_.foot)
           : static_cast<size_t>(plan_.foot);
   const double ground = input.sole[stance].translation().z();
-  const double wanted = ground + standing_height_ - LowerShare(state) * choice_.reach().lower();
+  const double wanted = ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
   height_.Follow(wanted, period);
 
   double share = 1;
@@ -437,10 +433,11 @@ void Recovery::Archive(StateArchive* archive) {
   archive->Show(plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop, plan_.capture_point,
                 plan_.com, plan_.margin, plan_.place, plan_.around, plan_.corner);
   swing_.Archive(archive);
-  touch_.Archive(archive);
   height_.Archive(archive);
-  archive->Show(time_, since_, ramp_from_, touched_since_, touch_down_, beyond_since_,
-                lingers_since_, lingered_from_, moving_since_, cop_from_, standing_height_,
+  outside_.Archive(archive);
+  near_edge_.Archive(archive);
+  archive->Show(time_, since_, ramp_from_, touched_since_, touch_down_, stays_outside_,
+                stays_near_edge_, excess_at_edge_, moving_since_, cop_from_, standing_height_,
                 together_asked_, together_at_, shift_from_, step_helps_);
   output_.Archive(archive);
 }

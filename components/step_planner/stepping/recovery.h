@@ -12,34 +12,24 @@
 
 namespace poise::stepping {
 
-/// Numbers of the configuration, in m, s, N.
+/// Numbers that a robot or a scenario sets, in m, s, N.
 struct RecoverySpec {
-  double sure = 0;         ///< m beyond the soles from which no other strategy helps
-  double reserve = 0;      ///< m of margin below which a step may not wait any longer
-  double beyond = 0;       ///< m beyond the soles from which it may not wait below `reserve`
-  double again_after = 0;  ///< s beyond the soles of a step until the next one begins
-  int max_steps = 0;
-  double momentum = 1;  ///< share of the angular momentum that counts in the capture point
-  double load = 0;      ///< s of the ramp that loads a landed foot
+  double load = 0;  ///< s of the ramp that loads a landed foot
   SwingSpec swing;
-  double touch_load = 0, touch_duration = 0;  ///< N, s
+  double touch_load = 0;     ///< N
   double observed_load = 0;  ///< N, in place of `touch_load` where loads are observed
   double settle = 0;         ///< s from a touch until the foot is a contact of the model
   double search_depth = 0;   ///< m below the foothold
   double gain = 0;           ///< of the capture point's error in the centre of pressure, > 0
   /// m·s²: the inertia with which the body turns, soles and COM at rest, over the robot's weight.
   double turn_share = 0;
-  double lean_rate = 0;     ///< 1/s, critically damped, of the body's return to upright
-  double swing_budget = 0;  ///< m of centre of pressure that this may take while a foot swings
-  double catch_budget = 0;  ///< m, on both feet
-  double far = 1;           ///< share of `lower` from which the feet are too far apart to rest
-  double height_rate = 0;   ///< 1/s, with which the COM's height follows what the legs ask for
-  double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
-  double lingering = 0, lingering_time = 0;                 ///< m inside the soles, 0: none; s
-  double watch = -1;  ///< m inside the soles from which is known whether a step helps; < 0: never
+  double height_rate = 0;  ///< 1/s, with which the COM's height follows what the legs ask for
+  /// m inside the soles: a capture point that is nearer to their edge for a while and comes out
+  /// needs a step; 0: no such rule.
+  double margin_to_sole_edge = 0;
+  /// m inside the soles, within which is known whether a step helps; < 0: nowhere.
+  double watched_margin = -1;
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
-  double together_shift = 1;  ///< s in which the COM goes above the foot that stays for it
-  double together_swing = 1;  ///< s of the other in the air
 };
 
 enum class Stage { kIdle, kShifting, kUnloading, kSwinging, kLoading, kCatching };
@@ -62,7 +52,6 @@ class Recovery {
   Recovery(const StepChoice& choice, const RecoverySpec& spec)
       : choice_(choice),
         spec_(spec),
-        touch_(spec.touch_load, spec.touch_duration),
         height_(spec.height_rate) {}
 
   /// Once a tick. False: idle, `output` is not to be used.
@@ -71,8 +60,8 @@ class Recovery {
   void BringTogether() { together_asked_ = true; }
   const StepOutput& output() const { return output_; }
   bool active() const { return stage_ != Stage::kIdle; }
-  /// A step is under way, or one would help: false only within `watch` of the soles' edge, or
-  /// beyond it, where none does and another strategy may have the centre of pressure.
+  /// A step is under way, or one would help: false only within `watched_margin` of the soles' edge,
+  /// or beyond it, where none does and another strategy may have the centre of pressure.
   bool would_step() const { return active() || step_helps_; }
   Stage stage() const { return stage_; }
   StepReason reason() const { return reason_; }
@@ -83,11 +72,13 @@ class Recovery {
   void Archive(StateArchive* archive);
 
  private:
-  /// Hull of the soles in contact, `edge` m off their edges.
-  balance::ConvexPolygon Soles(const StepState& state, double edge) const;
+  /// Hull of the soles in contact, `margin` m off their edges.
+  balance::ConvexPolygon Soles(const StepState& state, double margin) const;
   /// m that the capture point is beyond the soles in contact; negative inside.
-  double Beyond(const StepState& state) const;
-  StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double beyond);
+  double Excess(const StepState& state) const;
+  /// Keeps the times of what has to last. `excess`: m.
+  void Watch(double time, double excess);
+  StepReason NeedOfFirstStep(const StepInput& input, const StepState& state, double excess);
   /// No effect without a foot.
   void BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason);
   void LiftOff(const StepInput& input);
@@ -106,14 +97,11 @@ class Recovery {
   /// Where the COM's share of the centre of pressure shall be on the stance sole, and on both.
   Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
-  /// The foot that is to be brought beside the other one, which holds the capture point, since the
-  /// COM cannot rest there with the feet so far apart; −1: none.
-  int FootToBring(const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
   /// It is time for the feet to be put side by side, and `plan` does it.
   bool TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan);
   /// The COM on its way above the foot that stays; then the other one leaves the ground.
-  void Shift(const StepInput& input, const StepState& state, double beyond);
+  void Shift(const StepInput& input, const StepState& state, double excess);
   /// The centre of pressure on `support` that leads the capture point along `goal`, m, m/s.
   Eigen::Vector2d PointFor(const StepInput& input, const StepState& state,
                            const balance::ConvexPolygon& support, const Eigen::Vector2d& goal,
@@ -124,7 +112,7 @@ class Recovery {
   /// being unloaded goes on from the load that it has, faster, and comes down as soon as it can.
   void Hurry(const StepState& state, double time);
   void LeadCom(const StepInput& input, const StepState& state);
-  double LowerShare(const StepState& state) const;
+  double LoweringShare(const StepState& state) const;
 
   StepChoice choice_;
   RecoverySpec spec_;
@@ -137,11 +125,11 @@ class Recovery {
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double ramp_from_ = 0;         // share of the unloading ramp where `cop_from_` was asked for
   double touch_down_ = 0;        // s
-  TouchTimer touch_;
   double touched_since_ = -1;  // s; negative: not yet, in this swing
-  // s and m beyond, when it came near the edge; negative s: it is not.
-  double lingers_since_ = -1, lingered_from_ = 0;
-  double beyond_since_ = -1;                            // s; negative: inside
+  // The capture point is beyond the soles, and near their edge or beyond.
+  LastingCondition outside_, near_edge_;
+  bool stays_outside_ = false, stays_near_edge_ = false;  // for as long as a step asks for
+  double excess_at_edge_ = 0;                             // m, when it came near the edge
   double moving_since_ = 0;                             // s, last time not at rest
   Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
   bool step_helps_ = true;                              // of the last idle tick

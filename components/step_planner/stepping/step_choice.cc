@@ -16,7 +16,7 @@ using Eigen::Vector2d;
 constexpr double kQuinticAcceleration = 5.7735026918962577;
 // The step's time and the foothold, each of which follows from the other, after so many rounds.
 constexpr int kRounds = 4;
-constexpr double kTimeTolerance = 2e-3;  // s: a tick
+constexpr double kFixedPoint = 2e-3;  // s, a tick: the step's time is found to that
 constexpr double kLater = 0.06;          // s, after which a place out of reach is tried again
 // m of margin for which a step may take a second longer.
 constexpr double kMarginOfTime = 0.05;
@@ -51,12 +51,12 @@ double SwingTime(double distance, double acceleration) {
 
 Vector2d StepChoice::BrakingPoint(const StepState& state, int stance) const {
   const auto i = static_cast<size_t>(stance);
-  return balance::NearestPoint(SoleAt(feet_[i], limits_.edge, state.sole[i], state.sole_yaw[i]),
+  return balance::NearestPoint(SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]),
                                state.pendulum.capture_point());
 }
 
 double StepChoice::DistanceOfLegs(int foot, const Vector2d& foothold, const Vector2d& com) const {
-  const double height = legs_.height() - reach_.lower();
+  const double height = legs_.height() - reach_.lowering();
   const auto from_com = [&](const Vector2d& sole) -> Eigen::Vector3d {
     return {sole.x() - com.x(), sole.y() - com.y(), -height};
   };
@@ -122,7 +122,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
   const Vector2d away = caught - cop;
   const double distance = away.norm();
   Vector2d wanted = caught;
-  if (distance > 0) wanted += limits_.beyond / distance * away;
+  if (distance > 0) wanted += limits_.overshoot / distance * away;
   const double side = foot == robot::kLeftFoot ? 1 : -1;
   plan.place = place;
   if (place == Place::kBeside) {
@@ -134,7 +134,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
   } else {
     // As far on its own side as holds the capture point well.
     const double room =
-        std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width - limits_.edge - limits_.enough);
+        std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width - limits_.sole_margin - limits_.ample_margin);
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
   const Vector2d com = local(plan.com);
@@ -154,8 +154,8 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
   }
   plan.foothold = state.sole[s] + turn * foothold;
   const balance::ConvexPolygon soles =
-      HullOf(SoleAt(feet_[s], limits_.edge, state.sole[s], state.sole_yaw[s]),
-             SoleAt(feet_[static_cast<size_t>(foot)], limits_.edge, plan.foothold, plan.yaw));
+      HullOf(SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
+             SoleAt(feet_[static_cast<size_t>(foot)], limits_.sole_margin, plan.foothold, plan.yaw));
   plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   plan.margin = std::min(plan.margin, plan.margin + plan.follows);
@@ -177,7 +177,7 @@ StepPlan StepChoice::Plan(const StepState& state, int foot, Place place) const {
     double needed = unload + std::max(limits_.least_swing, swing);
     // Later the COM is nearer to where the foot has to go.
     if (!std::isfinite(plan.margin)) needed = time + kLater;
-    if (needed <= time + kTimeTolerance) break;
+    if (needed <= time + kFixedPoint) break;
     time = needed;
     if (state.pendulum.frequency * time > kLongest) {
       plan.margin = -std::numeric_limits<double>::infinity();
@@ -201,7 +201,7 @@ StepPlan StepChoice::Beside(const StepState& state, int foot, double time) const
   const Vector2d from = turn.transpose() * (state.sole[static_cast<size_t>(foot)] - state.sole[s]);
   const bool possible = WayAround(side, from, foothold, &plan);
   plan.corner = state.sole[s] + turn * plan.corner;
-  plan.margin = possible ? limits_.enough : -std::numeric_limits<double>::infinity();
+  plan.margin = possible ? limits_.ample_margin : -std::numeric_limits<double>::infinity();
   return plan;
 }
 
@@ -212,7 +212,7 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   balance::ConvexPolygon soles;
   for (size_t i = 0; i < 2; ++i) {
     if (!state.in_contact[i]) continue;
-    soles = HullOf(soles, SoleAt(feet_[i], limits_.edge, state.sole[i], state.sole_yaw[i]));
+    soles = HullOf(soles, SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]));
   }
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d stays = CapturePointAfter(now, balance::NearestPoint(soles, now),
@@ -228,14 +228,14 @@ StepPlan StepChoice::Choose(const StepState& state) const {
     if (!state.in_contact[static_cast<size_t>(1 - foot)]) continue;
     const auto consider = [&](const StepPlan& plan) {
       if (!std::isfinite(plan.margin) || !Helps(state, plan)) return;
-      const double score = std::min(plan.margin, limits_.enough) - kMarginOfTime * plan.time;
+      const double score = std::min(plan.margin, limits_.ample_margin) - kMarginOfTime * plan.time;
       if (best.foot >= 0 && score <= best_score) return;
       best = plan;
       best_score = score;
     };
     const StepPlan beside = Plan(state, foot);
     consider(beside);
-    if (!(limits_.leg_distance > 0) || beside.margin >= limits_.enough) continue;
+    if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) continue;
     const Vector2d away =
         state.pendulum.capture_point() - state.sole[static_cast<size_t>(1 - foot)];
     const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();

@@ -13,12 +13,12 @@
 namespace poise::stepping {
 
 struct StepLimits {
-  double edge = 0;          ///< m, that a centre of pressure keeps off a sole's edge
+  double sole_margin = 0;   ///< m that a centre of pressure keeps off a sole's edge
   double acceleration = 1;  ///< m/s², of a swing foot, greatest
   double least_swing = 0;   ///< s
   double unload = 0;        ///< s, from the decision until a loaded foot leaves the ground
-  double beyond = 0;        ///< m beyond the capture point that a sole's centre comes down
-  double enough = 0;        ///< m, of the capture point inside the new support, that is enough
+  double overshoot = 0;     ///< m beyond the capture point that a sole's centre comes down
+  double ample_margin = 0;  ///< m of the capture point inside the new support; more is no better
   double spacing = 0;       ///< m, sideways between the soles' centres, when nothing asks for more
   /// m between the legs' lines at a foothold ahead of the stance sole or behind it; 0: there is
   /// none
@@ -43,7 +43,7 @@ struct StepPlan {
   Eigen::Vector2d cop = Eigen::Vector2d::Zero();            ///< centre of pressure until then
   Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
   Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
-  /// m, of the capture point at touch-down inside the soles less `edge`; negative: outside, another
+  /// m, of the capture point at touch-down inside the soles less `sole_margin`; negative: outside, another
   /// step must follow; −∞: no foot can get there.
   double margin = 0;
   /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
@@ -66,8 +66,8 @@ class StepChoice {
     if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
   }
 
-  /// Chooses of both feet's steps the one whose margin is the largest, counted up to `enough`, and
-  /// of equals the sooner; none when standing still does as well. A foot that is not in contact
+  /// Chooses of both feet's steps the one whose margin is the largest, counted up to `ample_margin`,
+  /// and of equals the sooner; none when standing still does as well. A foot that is not in contact
   /// swings at once, from where it is.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
@@ -83,7 +83,7 @@ class StepChoice {
   /// The step catches the capture point, or comes nearer to it than the soles where they are while
   /// the stance leg follows the COM.
   bool Helps(const StepState& state, const StepPlan& plan) const;
-  /// The stance sole's point nearest to the capture point, less `edge`.
+  /// The stance sole's point nearest to the capture point, less `sole_margin`.
   Eigen::Vector2d BrakingPoint(const StepState& state, int stance) const;
   const StepLimits& limits() const { return limits_; }
   const Reach& reach() const { return reach_; }

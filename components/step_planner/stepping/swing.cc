@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/balance/minimum_jerk.h"
+
 namespace poise::stepping {
 namespace {
 
@@ -184,19 +186,15 @@ PointMotion Swing::At(double time) const {
 
 RotationMotion Swing::RotationAt(double time) const {
   // About one axis by minimum jerk: level in two thirds of the way.
-  const double duration = 2.0 / 3 * (end_ - start_);
-  const double s = std::clamp((time - start_) / duration, 0.0, 1.0);
-  const double share = s * s * s * (10 + s * (-15 + 6 * s));
-  const double rate = 30 * s * s * (1 - s) * (1 - s) / duration;
-  const double rise = 60 * s * (1 - s) * (1 - 2 * s) / (duration * duration);
+  const balance::MinimumJerk turned(time - start_, 2.0 / 3 * (end_ - start_));
   const double angle = turn_.norm();
   RotationMotion motion;
   motion.rotation = from_rotation_;
   if (angle > 0) {
-    motion.rotation = Eigen::AngleAxisd(share * angle, turn_ / angle) * from_rotation_;
+    motion.rotation = Eigen::AngleAxisd(turned.position * angle, turn_ / angle) * from_rotation_;
   }
-  motion.angular_velocity = rate * turn_;
-  motion.angular_acceleration = rise * turn_;
+  motion.angular_velocity = turned.speed * turn_;
+  motion.angular_acceleration = turned.acceleration * turn_;
   return motion;
 }
 

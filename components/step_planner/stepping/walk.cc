@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 
 namespace poise::stepping {
 namespace {
@@ -11,25 +11,23 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kLongestTick = 0.02;  // s, counted at most for a tick after a gap
-constexpr double kRiseOver = 0.5;      // share of a swing before which no load is a landing
-constexpr double kTogether = 0.03;     // m, rad: the feet stand side by side
-// Time constant, as a share of the settling, with which a foot that touches is let go.
-constexpr double kLetGo = 0.25;
-constexpr int kHalvings = 40;           // of [0, 1]
-constexpr double kLongestLetGo = 0.06;  // s of settling that this counts of
-constexpr double kEdgeAhead = 0.03;     // m that told ground is higher: an edge to be risen over
-constexpr double kEdgeWait = 0.25;      // of the swing, in which the foot only rises then. Chosen.
-constexpr double kNothing = 0.3;        // s at the end of the search until a place is left
-constexpr double kPressed = 0.8;        // share of the press' load that counts as such
-// Unloading goes on at these shares of its rate: at least, however far the centre of pressure is,
-// and at most, to come up with it. Chosen: a foot that carries nothing and is a contact of the
-// model still was dragged off its place.
-constexpr double kSlowest = 0.1, kFastest = 3;
-constexpr double kWait = 0.1;  // s in which a capture point that must wait is stopped
-// A sole that bears less of the load has not shown yet how far it sinks.
-constexpr double kBears = 0.5, kBearsAll = 0.7;
-// A leg is stretched to this share of a straight one at most. Fitted: 0.9 and 0.94 fall as seldom,
+constexpr double kRiseOver = 0.5;   // share of a swing before which no load is a landing
+constexpr double kTogether = 0.03;  // m, rad: the feet stand side by side
+// Time constant, as a share of the settling, with which a foot that touches is let go; of at most so
+// many s of it.
+constexpr double kLetGo = 0.25, kLongestLetGo = 0.06;
+constexpr int kHalvings = 40;  // of [0, 1]
+// m that told ground is higher to be an edge that the foot rises over, and the share of the swing in
+// which it only rises then: on unknown ground 0.15 is enough, told ground is an edge for certain.
+constexpr double kEdgeHeight = 0.03, kEdgeWait = 0.25;
+// Share of the press' load that counts as pressed: a sole that lies down rocks between loads.
+constexpr double kPressed = 0.8;
+// Times the unloading's rate, at least and at most: the ramp goes on however far the centre of
+// pressure is, and comes up with it. A foot that carries nothing and is a contact of the model still
+// was dragged off its place.
+constexpr double kSlowestUnload = 0.1, kFastestUnload = 3;
+constexpr double kStopTime = 0.1;  // s in which a capture point that must wait is stopped
+// Share of a straight leg, to which it is stretched at most. Fitted: 0.9 and 0.94 fall as seldom,
 // 0.97 and 0.86 more often; with 0.97 the knee of a foot that is about to leave the ground came to
 // be straight.
 constexpr double kStretched = 0.92;
@@ -48,7 +46,6 @@ WalkSpec Pressing(WalkSpec spec) {
 Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
     : choice_(choice),
       spec_(Pressing(spec)),
-      touch_(spec.touch_load, spec.touch_duration),
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
       pressed_(spec.height_rate),
@@ -79,17 +76,17 @@ Footstep Walk::Next(const Footstep& stance, int foot) const {
   return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
 }
 
-Footstep Walk::NextOnWay(const Footstep& stance, int foot) const {
+Footstep Walk::NextOnCourse(const Footstep& stance, int foot) const {
   // At the end the feet come side by side, wherever that is.
-  const double most = closing_ ? 0 : spec_.line;
-  return Towards(Next(stance, foot), Next(way_, foot), most, stance, foot, spec_.step);
+  const double most = closing_ ? 0 : spec_.most_return;
+  return Towards(Next(stance, foot), Next(course_, foot), most, stance, foot, spec_.step);
 }
 
 bool Walk::LiftsOff(const StepState& state, double time) const {
   if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
-  if (spec_.rests && unloaded_ < 1) return false;
+  if (spec_.quasi_static && unloaded_ < 1) return false;
   const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
-  return !spec_.rests || off.norm() < spec_.off_center;
+  return !spec_.quasi_static || off.norm() < spec_.lift_off_distance;
 }
 
 bool Walk::FeetTogether(const StepState& state) const {
@@ -100,15 +97,15 @@ bool Walk::FeetTogether(const StepState& state) const {
 }
 
 bool Walk::OnSoftGround() const {
-  return spec_.rests && std::max(sinks_[0], sinks_[1]) > spec_.soft;
+  return spec_.quasi_static && std::max(sinks_[0], sinks_[1]) > spec_.soft;
 }
 
 bool Walk::AtRest(const StepInput& input, const StepState& state) {
   const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
-  const bool rests = (state.pendulum.capture_point() - middle).norm() < spec_.rest_distance &&
-                     input.com_velocity.norm() < spec_.rest_speed;
+  const bool rests = (state.pendulum.capture_point() - middle).norm() < spec_.still_distance &&
+                     input.com_velocity.norm() < spec_.still_speed;
   if (!rests) moving_since_ = input.time;
-  return input.time >= moving_since_ + spec_.rest_time - kTimeTolerance;
+  return input.time >= moving_since_ + spec_.still_time - kTimeTolerance;
 }
 
 bool Walk::Update(const StepInput& input, const WalkCommand& command) {
@@ -126,26 +123,20 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
       if (time >= since_ + spec_.start - kTimeTolerance) Enter(WalkStage::kUnloading, time);
       break;
     case WalkStage::kUnloading:
-      Unload(state, std::clamp(time - time_, 0.0, kLongestTick));
+      Unload(state, TickPeriod(time - time_));
       if (LiftsOff(state, time)) BeginSwing(input);
       break;
     case WalkStage::kSwinging:
       if (swing_.Progress(time) < kRiseOver) {
         touch_.Reset();
-      } else if (touch_.Update(time, input.load[static_cast<size_t>(1 - stance_)])) {
-        settled_since_ = time;
+      } else if (touch_.Update(time, LoadOfSwing(input) > spec_.touch_load, spec_.touch_duration)) {
+        pressed_since_ = time;
         sole_[static_cast<size_t>(1 - stance_)].Touch(input.sole[static_cast<size_t>(1 - stance_)]);
         Enter(WalkStage::kTouching, time);
-      } else if (Leaves(input, false)) {
-        Retreat(input, state);
       }
       break;
     case WalkStage::kTouching:
-      if (const bool settled = Settled(input); Leaves(input, settled)) {
-        Retreat(input, state);
-      } else if (settled) {
-        Land(input, state, command);
-      }
+      if (Settled(input)) Land(input, state, command);
       break;
     case WalkStage::kLoading:
       if (time < since_ + slower_ * spec_.load - kTimeTolerance) break;
@@ -160,7 +151,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
   }
   state.in_contact = in_contact_;
   PlanFrom(state);
-  if (stage_ == WalkStage::kSwinging && !spec_.rests) Adjust(input, state);
+  if (stage_ == WalkStage::kSwinging && !spec_.quasi_static) Adjust(input, state);
   Lead(input, state);
   time_ = time;
   return true;
@@ -186,8 +177,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   height_.Begin(input.com_height);
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
-  way_ = Standing(state, stance_);
-  foothold_ = Next(way_, 1 - stance_);
+  course_ = Standing(state, stance_);
+  foothold_ = Next(course_, 1 - stance_);
   left_over_.setZero();
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
@@ -196,7 +187,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
   const Vector2d above = state.sole[static_cast<size_t>(stance_)];
-  const CapturePlan::Point lift_off = spec_.rests ? CapturePlan::Point{above, above} : plan_.At(0);
+  const CapturePlan::Point lift_off = spec_.quasi_static ? CapturePlan::Point{above, above} : plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {
@@ -212,13 +203,10 @@ void Walk::BeginSwing(const StepInput& input) {
   touch_down_ = input.time + SwingTime();
   search_depth_ = spec_.search_depth + Sunk(input);
   pressed_.Begin(0);
-  attempt_ = 0;
-  first_ = foothold_;
-  home_ = {input.sole[foot].translation().head<2>(), Yaw(input.sole[foot])};
   const double ground = GroundAt(input, foothold_);
   SwingSpec way = spec_.foot;
   // Up before an edge that it is told of, not against it.
-  if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeAhead) {
+  if (!spec_.ground.empty() && ground > input.sole[foot].translation().z() + kEdgeHeight) {
     way.wait = std::max(way.wait, kEdgeWait);
   }
   swing_.Begin({.position = input.sole[foot].translation()}, input.sole[foot].linear(),
@@ -231,7 +219,7 @@ void Walk::BeginSwing(const StepInput& input) {
 
 double Walk::Sunk(const StepInput& input) const {
   const auto s = static_cast<size_t>(stance_);
-  return spec_.rests && spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
+  return spec_.quasi_static && spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
 }
 
 double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
@@ -242,71 +230,40 @@ double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
          spec_.ground.At(stance_, stance.x());
 }
 
-bool Walk::Leaves(const StepInput& input, bool settled) const {
-  // Only while the capture point stays above the other sole, and but for the last place, which has
-  // carried before.
-  if (!spec_.rests || attempt_ > spec_.places || spec_.places == 0) return false;
-  if (stage_ == WalkStage::kSwinging) {
-    const double end = swing_.end() + search_depth_ / spec_.foot.touch_speed;
-    return input.time >= end + kNothing - kTimeTolerance;
-  }
-  if (!settled) return input.time >= since_ + spec_.patience - kTimeTolerance;
-  return input.sole[static_cast<size_t>(1 - stance_)].linear()(2, 2) < std::cos(spec_.most_tilt);
-}
-
-void Walk::Retreat(const StepInput& input, const StepState& state) {
-  ++attempt_;
-  ++num_left_;
-  const Footstep stance = Standing(state, stance_);
-  if (attempt_ > spec_.places) {
-    foothold_ = home_;
-  } else {
-    const Eigen::Rotation2Dd turn(stance.yaw);
-    const Vector2d com = turn.inverse() * (input.com.head<2>() - stance.position);
-    foothold_ = AnotherPlace(first_, attempt_, spec_.place_shift, stance, 1 - stance_,
-                             choice_.reach().Footholds(1 - stance_, com));
-  }
-  touch_down_ = input.time + spec_.swing;
-  swing_.Begin(output_.swing, output_.swing_rotation.rotation,
-               {foothold_.position.x(), foothold_.position.y(), GroundAt(input, foothold_)},
-               Eigen::AngleAxisd(foothold_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
-               touch_down_, spec_.foot);
-  touch_.Reset();
-  Enter(WalkStage::kSwinging, input.time);
+double Walk::LoadOfSwing(const StepInput& input) const {
+  return input.load[static_cast<size_t>(1 - stance_)];
 }
 
 double Walk::Loaded(const StepInput& input) const {
-  return std::clamp(input.load[static_cast<size_t>(1 - stance_)] / spec_.press_load, 0.0, 1.0);
+  return std::clamp(LoadOfSwing(input) / spec_.press_load, 0.0, 1.0);
 }
 
 double Walk::Missing(const StepInput& input) const {
-  const double load = input.load[static_cast<size_t>(1 - stance_)];
-  return std::clamp(1 - load / spec_.press_load, -1.0, 1.0);
+  return std::clamp(1 - LoadOfSwing(input) / spec_.press_load, -1.0, 1.0);
 }
 
 bool Walk::Settled(const StepInput& input) {
-  if (spec_.rests) {
+  if (spec_.quasi_static) {
     // The sole has lain under its load for as long.
-    if (Loaded(input) < kPressed) settled_since_ = input.time;
-    return input.time >= settled_since_ + spec_.settle - kTimeTolerance;
+    if (Loaded(input) < kPressed) pressed_since_ = input.time;
+    return input.time >= pressed_since_ + spec_.settle - kTimeTolerance;
   }
   // Not before the capture point is where both feet are to take it over.
   const double since = std::max(since_, touch_down_);
   return input.time >= since + spec_.settle - kTimeTolerance &&
-         input.load[static_cast<size_t>(1 - stance_)] >= spec_.release_load;
+         LoadOfSwing(input) >= spec_.release_load;
 }
 
 void Walk::LetGo(const StepInput& input) {
   const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(1 - stance_)];
-  const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  const double period = TickPeriod(input.time - time_);
   const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
   double pulled = 0, missing = Missing(input);
   if (!(spec_.press_share > 0)) {
     // Comes to rest between the two loads, on a leg of any mass: there it counts as a contact.
-    const double load = input.load[static_cast<size_t>(1 - stance_)];
     pulled =
-        std::clamp((load - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0, 1.0);
+        std::clamp((LoadOfSwing(input) - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0, 1.0);
     missing = 1 - pulled;
   }
   stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
@@ -322,8 +279,8 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
       std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
                spec_.most_sinking);
   const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
-  slower_ = spec_.rests && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
-  way_ = Next(way_, 1 - stance_);
+  slower_ = spec_.quasi_static && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
+  course_ = Next(course_, 1 - stance_);
   stance_ = 1 - stance_;
   double_since_ = input.time;
   Enter(WalkStage::kLoading, input.time);
@@ -332,7 +289,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   closing_ = !command_.stepping;
-  foothold_ = NextOnWay(Standing(state, stance_), 1 - stance_);
+  foothold_ = NextOnCourse(Standing(state, stance_), 1 - stance_);
   // The feet come to stand as they are, one on a tread, one on the next.
   if (closing_ && (spec_.stand_apart || AcrossEdge(foothold_))) final_ = true;
 }
@@ -340,7 +297,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
 double Walk::Progress(double time) const {
   const double past = time - since_;
   if (stage_ == WalkStage::kUnloading) {
-    return spec_.rests ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
+    return spec_.quasi_static ? unloaded_ : std::clamp(past / spec_.unload, 0.0, 1.0);
   }
   // From what the press carries.
   return std::clamp(ramp_start_ + (1 - ramp_start_) * past / (slower_ * spec_.load), 0.0, 1.0);
@@ -351,14 +308,14 @@ void Walk::Unload(const StepState& state, double period) {
   const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
   // The centre of pressure still has this share of the way to the sole that shall carry.
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
-  const double share = spec_.lead < left * way.norm() ? spec_.lead / (left * way.norm()) : 1;
+  const double share = spec_.load_lead < left * way.norm() ? spec_.load_lead / (left * way.norm()) : 1;
   const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
   unloaded_ =
-      std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowest * step, kFastest * step));
+      std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowestUnload * step, kFastestUnload * step));
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
-  const double edge = choice_.limits().edge;
+  const double edge = choice_.limits().sole_margin;
   const auto s = static_cast<size_t>(stance_), o = 1 - s;
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), edge, state.sole[s], state.sole_yaw[s]);
@@ -382,7 +339,7 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
   return balance::ConvexHull({mixed.data(), corners});
 }
 
-CapturePlan::Point Walk::Resting(const StepState& state, double time) const {
+CapturePlan::Point Walk::QuasiStatic(const StepState& state, double time) const {
   const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
   const Vector2d& other = state.sole[static_cast<size_t>(1 - stance_)];
   const double w = state.pendulum.frequency;
@@ -393,11 +350,9 @@ CapturePlan::Point Walk::Resting(const StepState& state, double time) const {
   }
   const Vector2d way = (final_ ? Vector2d(0.5 * (stance + other)) : stance) - other;
   // Minimum jerk, p = ξ − ξ̇/ω: towards the outer edge at first, never beyond the next middle.
-  const double s = std::clamp((time - double_since_) / Transfer(), 0.0, 1.0);
-  const double gone = s * s * s * (10 + s * (-15 + 6 * s));
-  const double going = 30 * s * s * (1 - s) * (1 - s) / Transfer();
-  const double share = pressed + (1 - pressed) * gone;
-  const double rate = pressing * (1 - gone) + (1 - pressed) * going;
+  const balance::MinimumJerk gone(time - double_since_, Transfer());
+  const double share = pressed + (1 - pressed) * gone.position;
+  const double rate = pressing * (1 - gone.position) + (1 - pressed) * gone.speed;
   const Vector2d point = other + share * way;
   return {point, point - rate / w * way};
 }
@@ -419,18 +374,18 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
       [[fallthrough]];
     case WalkStage::kLoading:
     case WalkStage::kStopping:
-      wanted_ = spec_.rests ? Resting(state, time) : plan_.At(time - double_since_);
+      wanted_ = spec_.quasi_static ? QuasiStatic(state, time) : plan_.At(time - double_since_);
       break;
     case WalkStage::kSwinging:
     case WalkStage::kTouching:
-      if (spec_.rests) {
-        wanted_ = Resting(state, time);
+      if (spec_.quasi_static) {
+        wanted_ = QuasiStatic(state, time);
         break;
       }
       wanted_ = plan_.At(spec_.single() - std::max(due - time, 0.0));
       // Later than planned the capture point waits where it is, as far as the sole lets it.
       wanted_.cop +=
-          balance::SmoothStep((time - due) / kWait) * (wanted_.capture_point - wanted_.cop);
+          balance::SmoothStep((time - due) / kStopTime) * (wanted_.capture_point - wanted_.cop);
       break;
     case WalkStage::kStanding:
       break;
@@ -438,49 +393,26 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
   const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
   const balance::ConvexPolygon carrying = Carrying(input, state);
   const Vector2d asked = balance::NearestPoint(
-      carrying, wanted_.cop + (1 + spec_.gain) * error + AgainstRolling(input));
+      carrying, wanted_.cop + (1 + spec_.gain) * error);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
   return balance::NearestPoint(carrying, asked + left * left_over_);
 }
 
-Vector2d Walk::AgainstRolling(const StepInput& input) const {
-  // Both soles count, each by what it carries.
-  Vector2d cop = Vector2d::Zero();
-  const double all = input.load[0] + input.load[1];
-  for (size_t i = 0; i < 2; ++i) {
-    if (!in_contact_[i] || !(all > spec_.touch_load)) continue;
-    const double share = std::clamp(input.load[i] / all, 0.0, 1.0);
-    const Vector3d& turning = input.sole_turning[i];
-    cop += share * spec_.roll_damping * Vector2d(-turning.y(), turning.x()) +
-           AgainstSoftRolling(input, i, share);
-  }
-  return cop;
-}
-
-Vector2d Walk::AgainstSoftRolling(const StepInput& input, size_t foot, double share) const {
-  if (!spec_.rests || !(sinks_[foot] > spec_.soft) || !(share > kBears)) return Vector2d::Zero();
-  const double bears = balance::SmoothStep((share - kBears) / (kBearsAll - kBears));
-  const Eigen::Rotation2Dd turn(Yaw(input.sole[foot]));
-  const Vector2d turning = turn.inverse() * Vector2d(input.sole_turning[foot].head<2>());
-  const Vector2d damping = spec_.soft_damping / std::sqrt(sinks_[foot]);
-  return bears * share * (turn * Vector2d(-damping.y() * turning.y(), damping.x() * turning.x()));
-}
-
 double Walk::SwingTime() const {
   const double sinks = sinks_[static_cast<size_t>(stance_)];
-  if (!spec_.rests || !(sinks > spec_.soft)) return spec_.swing;
+  if (!spec_.quasi_static || !(sinks > spec_.soft)) return spec_.swing;
   return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), spec_.slowest_swing);
 }
 
 bool Walk::Lost(const StepInput& input) const {
-  if (!OnOneFoot() || !spec_.rests) return false;
+  if (!OnOneFoot() || !spec_.quasi_static) return false;
   const StepState state = Observe(input, in_contact_);
   const auto s = static_cast<size_t>(stance_);
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), 0, state.sole[s], state.sole_yaw[s]);
-  return -balance::SignedDistance(sole, state.pendulum.capture_point()) > spec_.give_up;
+  return -balance::SignedDistance(sole, state.pendulum.capture_point()) > 0;
 }
 
 Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double period) {
@@ -510,15 +442,15 @@ double Walk::StillSinks(const StepInput& input) {
 
 double Walk::Height(const StepInput& input, const StepState& state) {
   const auto s = static_cast<size_t>(stance_), o = 1 - s;
-  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.lower;
+  const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.com_lowering;
   const double stance = input.sole[s].translation().z(), other = input.sole[o].translation().z();
   // Before it sinks: its leg would be stretched.
-  const double low = spec_.rests ? stance - StillSinks(input) : stance;
+  const double low = spec_.quasi_static ? stance - StillSinks(input) : stance;
   const bool feels = stage_ != WalkStage::kSwinging || output_.searching;
   // Above the lower foot: a straight leg reaches no farther down.
   const double height = (feels ? std::min(low, other) : low) + standing_height_ - lower;
   const bool shifts = stage_ == WalkStage::kLoading || stage_ == WalkStage::kUnloading;
-  if (!spec_.rests || !shifts || !(sinks_[s] > spec_.soft)) return height;
+  if (!spec_.quasi_static || !shifts || !(sinks_[s] > spec_.soft)) return height;
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
   double highest = std::max(stance, other) + standing_height_ - lower;
@@ -531,7 +463,7 @@ double Walk::Height(const StepInput& input, const StepState& state) {
 }
 
 void Walk::Lead(const StepInput& input, const StepState& state) {
-  const double period = std::clamp(input.time - time_, 0.0, kLongestTick);
+  const double period = TickPeriod(input.time - time_);
   // A foot that is pressed carries: the sole of the other one shall do so by its middle still.
   const bool presses = stage_ == WalkStage::kTouching;
   const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
@@ -573,10 +505,9 @@ void Walk::Archive(StateArchive* archive) {
   for (PressedSole& sole : sole_) sole.Archive(archive);
   archive->Show(sinks_, slower_, search_depth_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
-                start_yaw_, starting_, closing_, final_, closings_, settled_since_, way_.position,
-                way_.yaw);
-  archive->Show(unloaded_, lowered_, attempt_, num_left_, first_.position, first_.yaw,
-                home_.position, home_.yaw);
+                start_yaw_, starting_, closing_, final_, closings_, pressed_since_, course_.position,
+                course_.yaw);
+  archive->Show(unloaded_, lowered_);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);
   for (Quintic& quintic : start_) quintic.Archive(archive);

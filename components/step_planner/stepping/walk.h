@@ -5,17 +5,17 @@
 #include <array>
 
 #include "components/framework/state_archive.h"
-#include "components/step_planner/stepping/another_place.h"
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/footwork.h"
+#include "components/step_planner/stepping/known_ground.h"
 #include "components/step_planner/stepping/pressed_sole.h"
 #include "components/step_planner/stepping/step_choice.h"
 #include "components/step_planner/stepping/swing.h"
 
 namespace poise::stepping {
 
-/// Numbers of the configuration, in m, s, N.
+/// Numbers that a robot or a scenario sets, in m, s, N.
 struct WalkSpec {
   double start = 0;   ///< s in which the COM leaves the middle for the first stance foot
   double unload = 0;  ///< s of the ramp that unloads a foot
@@ -31,37 +31,28 @@ struct WalkSpec {
   double gain = 0;                            ///< of the capture point's error, > 0
   double offset_rate = 0;                     ///< 1/s, of the pendulum's observed offset; 0: none
   double most_offset = 0;                     ///< m
-  double adjust_from = 0;  ///< m of error at touch-down below which the foothold stays
-  double lower = 0;        ///< m below standing at which it walks
+  double adjust_from = 0;   ///< m of error at touch-down below which the foothold stays
+  double com_lowering = 0;  ///< m below standing at which it walks
   double height_rate = 0, yaw_rate = 0;  ///< 1/s, with which height and heading of the body follow
-  double rest_distance = 0, rest_speed = 0, rest_time = 0;  ///< m, m/s, s
-  bool rests = false;  ///< the capture point, above the sole that carries, until both do
-  double press_load =
-      0;  ///< N with which a foot that has touched is pressed down; at least touch_load
-  double press_share = 0;  ///< of the weight that this is; 0: it only has to touch
-  double off_center = 0;   ///< m of the capture point beside the sole's middle at lift-off, at most
-  double line = 0;         ///< m, rad by which a foothold comes back to the commanded way
-  bool stand_apart = false;  ///< at a stop; else the feet come side by side
-  int places = 0;            ///< others that are tried for a step; 0: a foot waits where it is
-  double place_shift = 0;    ///< m between them
-  double patience = 0;       ///< s of a press until a place is left that does not take it
-  double most_tilt = 0;      ///< rad of a sole that is stood on
+  /// The robot is still: m from the soles' middle to the capture point, m/s of the COM, s of both.
+  double still_distance = 0, still_speed = 0, still_time = 0;
+  bool quasi_static = false;  ///< the capture point waits above the stance sole until both carry
+  /// N with which a foot that has touched is pressed down; at least touch_load.
+  double press_load = 0;
+  double press_share = 0;        ///< of the weight that this is; 0: it only has to touch
+  double lift_off_distance = 0;  ///< m from the stance sole's middle to the capture point, at most
+  double most_return = 0;        ///< m, rad by which a foothold comes back to the course at most
+  bool stand_apart = false;      ///< at a stop; else the feet come side by side
   KnownGround ground;
-  /// m of the centre of pressure for each rad/s with which the sole that carries turns.
-  double roll_damping = 0;
-  /// m by which the load of a foot that rests may leave it sooner than the centre of pressure does:
-  /// what each sole's own is off its middle then.
-  double lead = 0;
-  double weight = 1;        ///< N, of the robot
-  double most_sinking = 0;  ///< m, that a sole where it rests is expected to sink at most
-  double most_ahead = 0;    ///< m, by which the COM goes down at most before its sole does
-  double soft = 0;  ///< m of sinking under the weight, above which a sole stands on soft ground
+  /// m by which the load of a quasi-static foot may leave it sooner than the centre of pressure
+  /// does: what each sole's own is off its middle then.
+  double load_lead = 0;
+  double weight = 1;         ///< N, of the robot
+  double most_sinking = 0;   ///< m that a quasi-static sole is expected to sink at most
+  double most_ahead = 0;     ///< m by which the COM goes down at most before the stance sole does
+  double soft = 0;           ///< m of sinking under the weight, above which ground counts as soft
   double slowest_swing = 1;  ///< ratio: a swing above soft ground to one above firm ground, at most
-  /// m s/rad: of the centre of pressure for each rad/s of a soft sole's turning about its length
-  /// and its width, at a sinking of 1 m; it goes with the root of the stiffness.
-  Eigen::Vector2d soft_damping = Eigen::Vector2d::Zero();
-  double sink_speed = 1;  ///< m/s of its sinking, on average over the ramps: above 0
-  double give_up = 0;     ///< m beyond the sole that carries, from which another planner may step
+  double sink_speed = 1;     ///< m/s of a sole's sinking, on average over the ramps: above 0
 
   /// s from touch-down to touch-down.
   double period() const { return unload + swing + settle + load; }
@@ -101,11 +92,8 @@ class Walk {
     return num_steps_ + (under_way ? 1 : 0);
   }
   int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
-  /// The foot in the air has left a place that does not carry, for another one.
-  bool retreating() const { return stage_ == WalkStage::kSwinging && attempt_ > 0; }
-  int num_left() const { return num_left_; }  ///< places left so, since the start
-  /// On one foot that rests, the capture point is so far beyond its sole that the walk does not
-  /// bring it back.
+  /// On one foot of a quasi-static walk, the capture point is beyond the stance sole: the walk does
+  /// not bring it back.
   bool Lost(const StepInput& input) const;
   /// Another planner moves the feet in this tick.
   void Stop(double time) {
@@ -141,16 +129,14 @@ class Walk {
   /// The foot is let go: its reference comes to where the sole stands, so that its task asks for
   /// nothing when it becomes a contact, and the torque goes on without a step.
   void LetGo(const StepInput& input);
+  /// N on the foot that swings.
+  double LoadOfSwing(const StepInput& input) const;
   /// Share of the touch's load on the foot that comes down, at most 1.
   double Loaded(const StepInput& input) const;
   /// What is missing of the press' load, as a share of it, −1 to 1.
   double Missing(const StepInput& input) const;
   bool Settled(const StepInput& input);
-  /// The place cannot be stood on, as far as the foot has felt it, and another one may be tried.
-  bool Leaves(const StepInput& input, bool settled) const;
-  /// Up from there, to another place; the last one is where the foot stood before the step.
-  void Retreat(const StepInput& input, const StepState& state);
-  /// m, by which the stance sole has sunk into ground that it did not know, in a walk that rests.
+  /// m, by which the stance sole has sunk into unknown ground, in a quasi-static walk.
   double Sunk(const StepInput& input) const;
   /// m, world: what is told of the ground, or where the stance sole met it, from where the other
   /// sole stands.
@@ -159,7 +145,7 @@ class Walk {
   double HighestForStep(const StepInput& input, const StepState& state) const;
   /// How far the ramp that is under way has come, 0 to 1.
   double Progress(double time) const;
-  /// The unloading ramp, in a walk that rests, no sooner than the centre of pressure goes over.
+  /// The unloading ramp, in a quasi-static walk no sooner than the centre of pressure goes over.
   void Unload(const StepState& state, double period);
   void Land(const StepInput& input, const StepState& state, const WalkCommand& command);
   bool OnOneFoot() const {
@@ -168,10 +154,10 @@ class Walk {
   bool AtRest(const StepInput& input, const StepState& state);
   Footstep Standing(const StepState& state, int foot) const;
   Footstep Next(const Footstep& stance, int foot) const;
-  /// The same, brought back to the commanded way.
-  Footstep NextOnWay(const Footstep& stance, int foot) const;
-  /// The plan of a walk that rests: from above one sole to above the other while both carry.
-  CapturePlan::Point Resting(const StepState& state, double time) const;
+  /// Next, brought back to the commanded course.
+  Footstep NextOnCourse(const Footstep& stance, int foot) const;
+  /// The plan of a quasi-static walk: from above one sole to above the other while both carry.
+  CapturePlan::Point QuasiStatic(const StepState& state, double time) const;
   /// The foot may leave the ground.
   bool LiftsOff(const StepState& state, double time) const;
   double Transfer() const { return slower_ * (spec_.load + spec_.unload); }  ///< s
@@ -182,11 +168,6 @@ class Walk {
   /// What to ask for so that the capture point moves as of `cop`, m: what legs that swing and a
   /// body that turns add to the pendulum is observed, ξ̇ = ω (ξ − asked − offset), and taken off.
   Eigen::Vector2d WithoutOffset(const StepState& state, const Eigen::Vector2d& cop, double period);
-  /// What brakes the sole that carries, m: on soft ground it rolls on a spring, with the ankle's
-  /// rotor as its mass, and gravity makes that spring softer yet.
-  Eigen::Vector2d AgainstRolling(const StepInput& input) const;
-  /// The same of one that has sunk into soft ground and bears more than half of the load.
-  Eigen::Vector2d AgainstSoftRolling(const StepInput& input, size_t foot, double share) const;
   /// s: slower where the sole that stands has sunk, as the root of it. The leg's reaction then goes
   /// down as the centre of pressure does that the sole takes without rolling to the ankle's limit.
   double SwingTime() const;
@@ -212,17 +193,17 @@ class Walk {
   int stance_ = 0, num_steps_ = 0;
   std::array<bool, 2> in_contact_{true, true};
   Swing swing_;
-  TouchTimer touch_;
+  LastingCondition touch_;
   HeightLead height_, body_yaw_;
   HeightLead pressed_;                              // share that the press carries
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
-  double settled_since_ = 0;                        // s: pressed down
+  double pressed_since_ = 0;                        // s: pressed down
   std::array<PressedSole, 2> sole_;
   std::array<double, 2> sinks_{0, 0};  // m, expected of each sole under the weight
   double search_depth_ = 0;            // m, below the foothold: as deep as the stance sole's ground
   double slower_ = 1;                  // ratio: the ramps, where the sole sinks
-  double unloaded_ = 0;                // of the unloading ramp, where it rests
+  double unloaded_ = 0;                // of the unloading ramp, where it is quasi-static
   double ramp_start_ = 0;              // of the loading ramp: what the press carries
   double standing_height_ = 0;         // m
   bool lowered_ = false;               // stopped while it walked: it has not stood up since
@@ -231,10 +212,8 @@ class Walk {
   bool closing_ = false;            // the step under way comes beside the other foot, the last one
   bool final_ = false;              // it has
   int closings_ = 0;                // last ones so far: on soft ground soles turn as they land
-  int attempt_ = 0, num_left_ = 0;  // places left: of this step, of all
   Footstep foothold_;
-  Footstep first_, home_;  // foothold of the step's first attempt; where the foot stood before
-  Footstep way_;  ///< where the stance sole would stand if every step came down as commanded
+  Footstep course_;  // where the stance sole would stand if every step came down as commanded
   Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down
   std::array<Quintic, 2> start_;                        // of the capture point while starting
   CapturePlan plan_;                                    // made anew in every tick

@@ -49,8 +49,8 @@ double Walk::HighestForStep(const StepInput& input, const StepState& state) cons
   const auto s = static_cast<size_t>(stance_);
   std::array<Vector2d, 2> offset{Vector2d::Zero(), Vector2d::Zero()};
   offset[1 - s] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
-  const double share = std::min(choice_.reach().LowerShare(offset), 1.0);
-  return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lower();
+  const double share = std::min(choice_.reach().LoweringShare(offset), 1.0);
+  return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lowering();
 }
 
 bool Walk::AcrossEdge(const Footstep& foothold) const {
@@ -106,14 +106,14 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   const Vector2d& stance = state.sole[s];
   // The plan for the foothold that the command asks for.
   const Vector2d moved = foothold_.position;
-  foothold_.position = NextOnWay(Standing(state, stance_), 1 - stance_).position;
+  foothold_.position = NextOnCourse(Standing(state, stance_), 1 - stance_).position;
   PlanFrom(state);
   const Vector2d planned = plan_.At(spec_.single()).capture_point;
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d error = now - plan_.At(spec_.single() - left).capture_point;
   const double size = error.norm();
   const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance_), choice_.limits().edge, stance, state.sole_yaw[s]);
+      SoleAt(choice_.foot(stance_), choice_.limits().sole_margin, stance, state.sole_yaw[s]);
   // What the centre of pressure at the sole's edge leaves of the error at touch-down.
   const Vector2d cop = balance::NearestPoint(sole, stance + (1 + spec_.gain) * error);
   const Vector2d caught = CapturePointAfter(now, cop, w, left);

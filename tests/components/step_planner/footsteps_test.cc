@@ -10,7 +10,7 @@
 #include <numbers>
 #include <vector>
 
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/step_planner/stepping/capture_plan.h"
 #include "components/step_planner/stepping/pressed_sole.h"
 #include "components/step_planner/stepping/walk.h"

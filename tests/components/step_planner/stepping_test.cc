@@ -212,7 +212,7 @@ TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
       continue;
     }
     ++tried;
-    EXPECT_LE(reach.LowerShare({right, left}), share + 1e-9);
+    EXPECT_LE(reach.LoweringShare({right, left}), share + 1e-9);
     robot::PostureGoal goal;
     goal.foot[0] = Eigen::Translation3d(right.x(), right.y(), 0) * Eigen::Isometry3d::Identity();
     goal.foot[1] = Eigen::Translation3d(left.x(), left.y(), 0) * Eigen::Isometry3d::Identity();

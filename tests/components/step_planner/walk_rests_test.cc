@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "components/balance/contact_transition.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/step_planner/stepping/walk.h"
 #include "tests/components/step_planner/walk_world.h"
 

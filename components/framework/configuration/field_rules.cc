@@ -1,0 +1,148 @@
+#include "components/framework/configuration/field_rules.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/rule.pb.h"
+
+namespace poise {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+bool Allows(const FieldRule& rule, double value) {
+  return std::isfinite(value) && !(rule.has_min() && value < rule.min()) &&
+         !(rule.has_max() && value > rule.max()) && !(rule.has_above() && value <= rule.above()) &&
+         !(rule.has_below() && value >= rule.below());
+}
+
+std::string Range(const FieldRule& rule) {
+  if (rule.has_min() && rule.has_max()) return fmt::format("{} to {}", rule.min(), rule.max());
+  if (rule.has_min() && !rule.has_below()) return fmt::format("{} or more", rule.min());
+  if (rule.has_max() && !rule.has_above()) return fmt::format("at most {}", rule.max());
+  std::string low;
+  if (rule.has_min()) low = fmt::format("at least {}", rule.min());
+  if (rule.has_above()) low = fmt::format("greater than {}", rule.above());
+  std::string high;
+  if (rule.has_max()) high = fmt::format("at most {}", rule.max());
+  if (rule.has_below()) high = fmt::format("less than {}", rule.below());
+  return low + (low.empty() || high.empty() ? "" : " and ") + high;
+}
+
+const FieldRule& RuleOf(const FieldDescriptor& field) {
+  return field.options().GetExtension(rule);
+}
+
+/// `text`: the value as it is written.
+void Check(const FieldRule& rule, double value, const std::string& text, const std::string& path) {
+  if (Allows(rule, value)) return;
+  const std::string range = Range(rule);
+  throw ConfigError(path,
+                    fmt::format("is {}; must be {}", text, range.empty() ? "finite" : range));
+}
+
+template <class Value>
+void Check(const FieldDescriptor& field, Value value, const std::string& path) {
+  Check(RuleOf(field), static_cast<double>(value), fmt::format("{}", value), path);
+}
+
+/// Checks the element `i` of a list, or a single value where `i` is −1.
+void CheckValue(const Message& message, const FieldDescriptor& field, int i,
+                const std::string& path) {
+  const Reflection& values = *message.GetReflection();
+  const bool one = i < 0;
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return Check(field,
+                   one ? values.GetDouble(message, &field)
+                       : values.GetRepeatedDouble(message, &field, i),
+                   path);
+    case FieldDescriptor::CPPTYPE_FLOAT:
+      return Check(
+          field,
+          one ? values.GetFloat(message, &field) : values.GetRepeatedFloat(message, &field, i),
+          path);
+    case FieldDescriptor::CPPTYPE_INT32:
+      return Check(
+          field,
+          one ? values.GetInt32(message, &field) : values.GetRepeatedInt32(message, &field, i),
+          path);
+    case FieldDescriptor::CPPTYPE_INT64:
+      return Check(
+          field,
+          one ? values.GetInt64(message, &field) : values.GetRepeatedInt64(message, &field, i),
+          path);
+    case FieldDescriptor::CPPTYPE_UINT32:
+      return Check(
+          field,
+          one ? values.GetUInt32(message, &field) : values.GetRepeatedUInt32(message, &field, i),
+          path);
+    case FieldDescriptor::CPPTYPE_UINT64:
+      return Check(
+          field,
+          one ? values.GetUInt64(message, &field) : values.GetRepeatedUInt64(message, &field, i),
+          path);
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      return CheckFields(one ? values.GetMessage(message, &field)
+                             : values.GetRepeatedMessage(message, &field, i),
+                         path + ".");
+    case FieldDescriptor::CPPTYPE_BOOL:
+    case FieldDescriptor::CPPTYPE_ENUM:
+    case FieldDescriptor::CPPTYPE_STRING:
+      break;
+  }
+}
+
+}  // namespace
+
+void CheckFields(const Message& config, const std::string& prefix) {
+  std::vector<const FieldDescriptor*> fields;
+  config.GetReflection()->ListFields(config, &fields);
+  for (const FieldDescriptor* field : fields) {
+    const std::string path = prefix + field->name();
+    if (!field->is_repeated()) {
+      CheckValue(config, *field, -1, path);
+      continue;
+    }
+    for (int i = 0; i < config.GetReflection()->FieldSize(config, field); ++i) {
+      CheckValue(config, *field, i, fmt::format("{}[{}]", path, i));
+    }
+  }
+}
+
+void CheckPositive(double value, const std::string& field) {
+  FieldRule positive;
+  positive.set_above(0);
+  Check(positive, value, fmt::format("{}", value), field);
+}
+
+void CheckNotNegative(double value, const std::string& field) {
+  FieldRule not_negative;
+  not_negative.set_min(0);
+  Check(not_negative, value, fmt::format("{}", value), field);
+}
+
+std::string RangeOf(const FieldDescriptor& field) { return Range(RuleOf(field)); }
+
+std::string GroupDefaultText(const FieldDescriptor& group) {
+  return group.options().GetExtension(group_default);
+}
+
+void ReadGroupDefault(const google::protobuf::Descriptor& parent, const std::string& name,
+                      Message* group) {
+  const FieldDescriptor* const field = parent.FindFieldByName(name);
+  const bool good =
+      field != nullptr && field->message_type() == group->GetDescriptor() &&
+      google::protobuf::TextFormat::ParseFromString(GroupDefaultText(*field), group);
+  if (!good) throw std::logic_error(parent.full_name() + "." + name + " has no group_default");
+}
+
+}  // namespace poise
