@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/robot/dynamics.h"
 #include "components/balance/minimum_jerk.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/robot/dynamics.h"
 
 namespace poise {
 

@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "poise/drive_feedback_t.hpp"
 #include "components/framework/configuration/configuration.h"
+#include "poise/drive_feedback_t.hpp"
 
 namespace poise {
 
@@ -29,7 +29,7 @@ FootSensors::FootSensors(const robot::RobotModel& model, const SimConfig& config
     }
     fault.start = in.start();
     fault.end = in.has_end() ? in.end() : std::numeric_limits<double>::infinity();
-      if (!(fault.end > fault.start)) throw ConfigError(field + ".end", "must be after its start");
+    if (!(fault.end > fault.start)) throw ConfigError(field + ".end", "must be after its start");
     fault.kind = in.kind();
     fault.bias << in.force_x(), in.force_y(), in.force_z(), in.moment_x(), in.moment_y(),
         in.moment_z();

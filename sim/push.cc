@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "components/robot/dynamics.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/robot/dynamics.h"
 
 namespace poise {
 
@@ -50,7 +50,7 @@ PushProfile::PushProfile(const Push& config, const robot::RobotModel& model, dou
                                            : "missing; give it in N, or scaled_impulse");
   }
   if (config.has_scaled_impulse()) {
-      peak_ = config.scaled_impulse() * impulse_scale / (MeanOfPeak(profile_) * duration_);
+    peak_ = config.scaled_impulse() * impulse_scale / (MeanOfPeak(profile_) * duration_);
   }
   if (direction_.norm() < 1e-12) {
     throw ConfigError(field + ".direction_x", "no direction; set direction_x, _y or _z");

@@ -7,9 +7,9 @@
 #include <limits>
 #include <string>
 
-#include "components/robot/sole.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
+#include "components/robot/sole.h"
 #include "sim/simulated_robot.h"
 #include "sim/start_posture.h"
 

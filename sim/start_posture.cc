@@ -4,9 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "components/robot/posture.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
+#include "components/robot/posture.h"
 
 namespace poise {
 

@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
 
 namespace poise {

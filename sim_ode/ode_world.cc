@@ -11,9 +11,8 @@
 #include <stdexcept>
 
 #include "components/framework/configuration/configuration.h"
-#include "components/robot/dynamics.h"
-#include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
+#include "components/robot/dynamics.h"
 
 namespace poise {
 namespace {

@@ -130,7 +130,8 @@ ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotMo
 
 balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::string& field) {
   balance::ContactLimits limits;
-  limits.half_length = Given(config.has_half_length(), config.half_length(), field + ".half_length");
+  limits.half_length =
+      Given(config.has_half_length(), config.half_length(), field + ".half_length");
   limits.half_width = Given(config.has_half_width(), config.half_width(), field + ".half_width");
   limits.friction = config.friction();
   limits.yaw_friction = config.yaw_friction();

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "components/balance/contact_conditions.h"
-#include "components/balance/minimum_jerk.h"
 #include "components/balance/distribution_ratio.h"
+#include "components/balance/minimum_jerk.h"
 #include "components/framework/tick_time.h"
 #include "components/messages/conversions.h"
 #include "components/robot/posture.h"

@@ -15,8 +15,8 @@ constexpr double kStiffnessTime = 0.1;  // s
 PlannedImpedance::PlannedImpedance(const SharedImpedance& config, const robot::RobotModel& model,
                                    double period) {
   if (!config.enabled()) return;
-  horizon_ = config.has_horizon() ? config.horizon()
-                                  : model.drive_train().sensor_delay + period / 2;
+  horizon_ =
+      config.has_horizon() ? config.horizon() : model.drive_train().sensor_delay + period / 2;
   const double rotor_time = config.has_rotor_time() ? config.rotor_time() : kRotorTime;
   const double stiffness_time =
       config.has_stiffness_time() ? config.stiffness_time() : kStiffnessTime;

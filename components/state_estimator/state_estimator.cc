@@ -83,16 +83,15 @@ FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
   const WrenchObserverConfig& in = config.wrench_observer();
   const FootSensorCheckConfig& check = config.foot_sensor_check();
   FootWrenchSettings out;
-  out.observer = {
-      .cutoff = in.cutoff(),
-      .friction_error = in.friction_error(),
-      .friction_stiffness = in.friction_stiffness(),
-      .torque_error = in.torque_error(),
-      .mass_error = in.mass_error(),
-      .com_error = in.com_error(),
-      .acceleration_error = in.acceleration_error(),
-      .push_gate = in.push_gate(),
-      .latency = in.latency()};
+  out.observer = {.cutoff = in.cutoff(),
+                  .friction_error = in.friction_error(),
+                  .friction_stiffness = in.friction_stiffness(),
+                  .torque_error = in.torque_error(),
+                  .mass_error = in.mass_error(),
+                  .com_error = in.com_error(),
+                  .acceleration_error = in.acceleration_error(),
+                  .push_gate = in.push_gate(),
+                  .latency = in.latency()};
   out.check_every = in.check_every();
   out.check = {.enabled = check.enabled(),
                .gate = check.gate(),

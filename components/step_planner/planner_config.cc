@@ -171,7 +171,8 @@ constexpr double kLengthReserve = 0.03, kWidthReserve = 0.025;
 double ReadStanceHalf(bool given, double value, double sole, double reserve, const char* field) {
   if (!given) return std::max(0.5 * sole - reserve, 0.25 * sole);
   if (value > 0.5 * sole) {
-    throw ConfigError(field, fmt::format("is {}; must be at most the sole's {} m", value, 0.5 * sole));
+    throw ConfigError(field,
+                      fmt::format("is {}; must be at most the sole's {} m", value, 0.5 * sole));
   }
   return value;
 }

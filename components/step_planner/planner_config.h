@@ -7,8 +7,8 @@
 
 namespace poise {
 
-/// Throws ConfigError naming the field ("phase[2].duration", "contact.release_load") of a plan whose
-/// numbers keep their rules (CheckFields) and do not fit together.
+/// Throws ConfigError naming the field ("phase[2].duration", "contact.release_load") of a plan
+/// whose numbers keep their rules (CheckFields) and do not fit together.
 void CheckStepPlannerConfig(const StepPlannerConfig& config);
 
 /// m, sole frame: where on a foot the robot balances before the other one leaves the ground. Throws

@@ -127,9 +127,10 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
   const StepMotion motion = RecoveryMotion(config);
   for (const robot::FootModel& foot : model.feet()) {
     if (kSoleMargin < robot::InnerRadius(foot)) continue;
-    throw ConfigError("recovery", fmt::format("keeps the centre of pressure {} m off a sole's edge, "
-                                              "which leaves nothing of the {} foot's, {} x {} m",
-                                              kSoleMargin, foot.name, foot.length, foot.width));
+    throw ConfigError("recovery",
+                      fmt::format("keeps the centre of pressure {} m off a sole's edge, "
+                                  "which leaves nothing of the {} foot's, {} x {} m",
+                                  kSoleMargin, foot.name, foot.length, foot.width));
   }
   const stepping::Reach reach(model, robot::StandingHeight(model), motion.com_lowering(),
                               kJointReserve, motion.gap());
@@ -137,8 +138,8 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
     throw ConfigError("recovery.motion.com_lowering",
                       fmt::format("is {} m; robot '{}' cannot stand so much lower than {} m with "
                                   "its joints {} rad off their limits: give less",
-                                  motion.com_lowering(), model.name(),
-                                  robot::StandingHeight(model), kJointReserve));
+                                  motion.com_lowering(), model.name(), robot::StandingHeight(model),
+                                  kJointReserve));
   }
   if (config.motion().has_gap()) CheckGap("recovery.motion", motion.gap(), model, reach);
   if (config.motion().has_clearance()) {

@@ -18,8 +18,9 @@
 namespace poise {
 namespace {
 
-// Shares of the smaller sole's inner radius. The centre of pressure keeps a third off a sole's edge:
-// friction of the ankles and errors of the model move it by as much, and the sole tips beyond.
+// Shares of the smaller sole's inner radius. The centre of pressure keeps a third off a sole's
+// edge: friction of the ankles and errors of the model move it by as much, and the sole tips
+// beyond.
 constexpr double kSoleMarginShare = 1.0 / 3;
 // The pendulum's offset is taken for two thirds at most, so that it stays on the sole.
 constexpr double kOffsetShare = 0.67;
@@ -45,27 +46,27 @@ constexpr double kMostSinking = 0.3;
 // where a press on one corner had let expect three times as much.
 constexpr double kMostAhead = 0.08;
 
-// m/s that a sole sinks on average while it is loaded: the paper's robot loads as fast on 10 kN/m as
-// on hard ground.
+// m/s that a sole sinks on average while it is loaded: the paper's robot loads as fast on 10 kN/m
+// as on hard ground.
 constexpr double kSinkSpeed = 0.04;
 
-// The numbers of the gait of the paper's robot, whose COM stands 0.75 m high. Another robot's is the
-// same in units of g and of its own height, so that as much of the capture point's error grows in a
-// step (RobotScale).
+// The numbers of the gait of the paper's robot, whose COM stands 0.75 m high. Another robot's is
+// the same in units of g and of its own height, so that as much of the capture point's error grows
+// in a step (RobotScale).
 constexpr double kDefaultHeight = 0.75;  // m
-constexpr double kStart = 0.8;             // s in which the COM leaves the middle for the stance foot
-constexpr double kFreeze = 0.1;            // s before touch-down: a foothold that moves then jerks
-constexpr double kStillTime = 0.3;         // s of rest until it stands: a swing of the COM is longer
-constexpr double kAdjustFrom = 0.01;       // m of error that the sole corrects without a foothold
-constexpr double kMostReturn = 0.03;       // m a step back to the course: more would be a lurch
-constexpr double kReachLowering = 0.06;    // m below standing: footholds in reach leave knees bent
-constexpr double kStillDistance = 0.02;    // m from the soles' middle: as the estimate is known to
-constexpr double kTouchSpeed = 0.1;        // m/s downward: a foot that meets the ground harder bounces
-constexpr double kStillSpeed = 0.04;       // m/s of the COM, as kStillDistance in an ω
-constexpr double kYawRate = 5;             // 1/s with which the body's heading follows the feet's
+constexpr double kStart = 0.8;           // s in which the COM leaves the middle for the stance foot
+constexpr double kFreeze = 0.1;          // s before touch-down: a foothold that moves then jerks
+constexpr double kStillTime = 0.3;       // s of rest until it stands: a swing of the COM is longer
+constexpr double kAdjustFrom = 0.01;     // m of error that the sole corrects without a foothold
+constexpr double kMostReturn = 0.03;     // m a step back to the course: more would be a lurch
+constexpr double kReachLowering = 0.06;  // m below standing: footholds in reach leave knees bent
+constexpr double kStillDistance = 0.02;  // m from the soles' middle: as the estimate is known to
+constexpr double kTouchSpeed = 0.1;   // m/s downward: a foot that meets the ground harder bounces
+constexpr double kStillSpeed = 0.04;  // m/s of the COM, as kStillDistance in an ω
+constexpr double kYawRate = 5;        // 1/s with which the body's heading follows the feet's
 constexpr double kTurnAcceleration = 0.2;  // rad/s² with which the turn rate is approached
-// Not scaled: the acceleration is one of g, joints keep off their limits by an angle, and a hard sole
-// bounces as long on any robot.
+// Not scaled: the acceleration is one of g, joints keep off their limits by an angle, and a hard
+// sole bounces as long on any robot.
 constexpr double kAcceleration = 0.1;     // m/s² with which the commanded velocity is approached
 constexpr double kJointReserve = 0.1;     // rad off the joints' limits at footholds
 constexpr double kTouchDuration = 0.002;  // s of contact.touch_load that are a landing
@@ -127,12 +128,12 @@ void CheckLegs(const WalkConfig& given, const StepMotion& motion, const robot::R
       (motion.com_lowering() >= height ||
        stepping::Reach(model, height, motion.com_lowering(), kJointReserve, motion.gap())
            .empty())) {
-    throw ConfigError("walk.motion.com_lowering",
-                      fmt::format("is {} m; robot '{}', whose COM stands {:.3f} m high, cannot "
-                                  "stand so much lower with its joints {} rad off their limits: "
-                                  "give less; it can {:.3f} m",
-                                  motion.com_lowering(), model.name(), height, kJointReserve,
-                                  reach.lowering()));
+    throw ConfigError(
+        "walk.motion.com_lowering",
+        fmt::format("is {} m; robot '{}', whose COM stands {:.3f} m high, cannot "
+                    "stand so much lower with its joints {} rad off their limits: "
+                    "give less; it can {:.3f} m",
+                    motion.com_lowering(), model.name(), height, kJointReserve, reach.lowering()));
   }
   if (given.motion().has_gap()) CheckGap("walk.motion", motion.gap(), model, reach);
   if (given.motion().has_clearance()) CheckClearance("walk.motion", motion.clearance(), model);
@@ -306,8 +307,8 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
       const char* steps;
       double time;  // s
     } parts[] = {{"vx", command.vx(), fastest, "m", "longest", size.longest, "a step", period},
-                 {"vy", command.vy(), size.widest / (2 * period), "m", "widest",
-                  size.widest, "two steps", 2 * period},
+                 {"vy", command.vy(), size.widest / (2 * period), "m", "widest", size.widest,
+                  "two steps", 2 * period},
                  {"wz", command.wz(), config.most_turn() / (2 * period), "rad", "most_turn",
                   config.most_turn(), "two steps", 2 * period}};
     for (const auto& part : parts) {

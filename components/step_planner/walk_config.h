@@ -18,11 +18,10 @@ void CheckWalkConfig(const WalkConfig& config);
 /// ConfigError when its legs reach nothing or not what is configured.
 stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::RobotModel& model);
 
-/// The numbers of this robot's walk. What nobody gave is that of the paper's robot in units of g and
-/// of the standing COM's height. `choice`: MakeWalkChoice's.
+/// The numbers of this robot's walk. What nobody gave is that of the paper's robot in units of g
+/// and of the standing COM's height. `choice`: MakeWalkChoice's.
 stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmation& contact,
-                                const robot::RobotModel& model,
-                                const stepping::StepChoice& choice);
+                                const robot::RobotModel& model, const stepping::StepChoice& choice);
 
 /// Both. Throws as MakeWalkChoice.
 stepping::Walk MakeWalk(const WalkConfig& config, const ContactConfirmation& contact,

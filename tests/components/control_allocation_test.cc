@@ -117,7 +117,7 @@ TEST(ControlAllocation, NoneOfAPlannerThatWalks) {
     const robot::RobotModel model = robot::LoadTestRobot(robot);
     ControlContext context(robot);
     Harness<StepPlanner> harness(&context,
-                                 "phase { support: DOUBLE } walk { enabled: true start: 0.2 "
+                                 "phase { support: DOUBLE } walk { enabled: true "
                                  "command { time: 0 vx: 0.1 wz: 0.1 } }");
     robot_state_t state = StateMessage(model, StandingState(model));
     harness.Bind("robot_state", &state);

@@ -25,7 +25,7 @@ std::string Phases(robot::TestRobot robot) {
           : "";
   return std::string(R"(
   contact { settle_duration: 0.03 }
-  hip_strategy { enabled: true start: 0.02 tilt: 0.05 tilt_time: 0.1 hold_time: 0.05 return_time: 0.1 inside: 0.001 }
+  hip_strategy { enabled: true start: 0.02 tilt: 0.05 tilt_time: 0.1 }
   phase { duration: 0.25 com { target: SHIFT x: 0.01 duration: 0.2 } )") +
          unload + R"( }
   phase { duration: 0.15 support: RIGHT foot { foot: LEFT_FOOT z: 0.04 duration: 0.1 } }

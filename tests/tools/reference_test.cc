@@ -7,6 +7,7 @@
 #include <regex>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/framework/graph.pb.h"
 #include "components/robot_files/robot.pb.h"
 #include "poise/message_traits.hpp"
@@ -146,6 +147,80 @@ TEST(FieldReference, DefaultsAreThoseOfTheCompiledClasses) {
       }
     }
   }
+}
+
+/// Checks that each default of a type, and of the groups in it, keeps its field's rule.
+void ExpectDefaultsKeepTheirRules(const google::protobuf::Descriptor& type) {
+  const std::unique_ptr<Message> message(
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&type)->New());
+  const auto* reflection = message->GetReflection();
+  for (int i = 0; i < type.field_count(); ++i) {
+    const FieldDescriptor* field = type.field(i);
+    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      if (field->message_type()->file()->package() != "poise") continue;
+      if (const std::string text = GroupDefaultText(*field); !text.empty()) {
+        std::unique_ptr<Message> group(reflection->GetMessage(*message, field).New());
+        ASSERT_NO_THROW(ReadGroupDefault(type, field->name(), group.get())) << field->full_name();
+        // A group that has a default has one of each of its fields.
+        for (int k = 0; k < group->GetDescriptor()->field_count(); ++k) {
+          const FieldDescriptor* part = group->GetDescriptor()->field(k);
+          EXPECT_TRUE(group->GetReflection()->HasField(*group, part)) << part->full_name();
+        }
+        EXPECT_NO_THROW(CheckFields(*group)) << field->full_name();
+      }
+      ExpectDefaultsKeepTheirRules(*field->message_type());
+    } else if (field->has_default_value() && !field->is_repeated()) {
+      if (field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE) {
+        reflection->SetDouble(message.get(), field, field->default_value_double());
+      } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_INT32) {
+        reflection->SetInt32(message.get(), field, field->default_value_int32());
+      }
+    }
+  }
+  EXPECT_NO_THROW(CheckFields(*message)) << type.full_name();
+}
+
+TEST(FieldRules, EveryDefaultKeepsThem) {
+  ExpectDefaultsKeepTheirRules(*StepPlannerConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*SimConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*StateEstimatorConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*TaskControllerConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*ContactWrenchMonitorConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*RedistributorConfig::descriptor());
+  ExpectDefaultsKeepTheirRules(*HwBridgeConfig::descriptor());
+}
+
+TEST(FieldRules, AnErrorNamesPathValueAndRange) {
+  const auto problem_of = [](const std::string& path, const std::string& value) -> std::string {
+    Scenario scenario;
+    if (path.starts_with("sim.push[1]")) SetField(&scenario, "sim.push[0].start", "1");
+    SetField(&scenario, path, value);
+    try {
+      CheckFields(scenario);
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(problem_of("sim.push[1].duration", "0"),
+            "sim.push[1].duration: is 0; must be greater than 0");
+  EXPECT_EQ(problem_of("sim.push[1].duration", "0.1"), "accepted");
+  EXPECT_EQ(problem_of("sim.push[0].peak", "nan"), "sim.push[0].peak: is nan; must be finite");
+  EXPECT_EQ(problem_of("redistributor.eta_min", "1.5"),
+            "redistributor.eta_min: is 1.5; must be 0 to 1");
+  EXPECT_EQ(problem_of("redistributor.landed_share", "0.5"),
+            "redistributor.landed_share: is 0.5; must be at least 0 and less than 0.5");
+  EXPECT_EQ(problem_of("hw_bridge.enable_cycles", "0"),
+            "hw_bridge.enable_cycles: is 0; must be 1 or more");
+  EXPECT_EQ(problem_of("step_planner.walk.motion.swing", "-1"),
+            "step_planner.walk.motion.swing: is -1; must be greater than 0");
+}
+
+TEST(FieldRules, TheReferenceTellsThem) {
+  const auto fields = SelectFields(FieldReference(Schema::kScenario), "redistributor.eta_min");
+  ASSERT_EQ(fields.size(), 1);
+  EXPECT_EQ(fields[0].range, "0 to 1");
+  EXPECT_THAT(FieldsAsText(fields, 80), HasSubstr("number, 0 to 1, default 0.02"));
 }
 
 TEST(FieldReference, SetTakesEveryPathThatIsPrinted) {

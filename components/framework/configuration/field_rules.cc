@@ -37,16 +37,13 @@ std::string Range(const FieldRule& rule) {
   return low + (low.empty() || high.empty() ? "" : " and ") + high;
 }
 
-const FieldRule& RuleOf(const FieldDescriptor& field) {
-  return field.options().GetExtension(rule);
-}
+const FieldRule& RuleOf(const FieldDescriptor& field) { return field.options().GetExtension(rule); }
 
 /// `text`: the value as it is written.
 void Check(const FieldRule& rule, double value, const std::string& text, const std::string& path) {
   if (Allows(rule, value)) return;
   const std::string range = Range(rule);
-  throw ConfigError(path,
-                    fmt::format("is {}; must be {}", text, range.empty() ? "finite" : range));
+  throw ConfigError(path, fmt::format("is {}; must be {}", text, range.empty() ? "finite" : range));
 }
 
 template <class Value>
@@ -61,10 +58,10 @@ void CheckValue(const Message& message, const FieldDescriptor& field, int i,
   const bool one = i < 0;
   switch (field.cpp_type()) {
     case FieldDescriptor::CPPTYPE_DOUBLE:
-      return Check(field,
-                   one ? values.GetDouble(message, &field)
-                       : values.GetRepeatedDouble(message, &field, i),
-                   path);
+      return Check(
+          field,
+          one ? values.GetDouble(message, &field) : values.GetRepeatedDouble(message, &field, i),
+          path);
     case FieldDescriptor::CPPTYPE_FLOAT:
       return Check(
           field,
@@ -91,9 +88,9 @@ void CheckValue(const Message& message, const FieldDescriptor& field, int i,
           one ? values.GetUInt64(message, &field) : values.GetRepeatedUInt64(message, &field, i),
           path);
     case FieldDescriptor::CPPTYPE_MESSAGE:
-      return CheckFields(one ? values.GetMessage(message, &field)
-                             : values.GetRepeatedMessage(message, &field, i),
-                         path + ".");
+      return CheckFields(
+          one ? values.GetMessage(message, &field) : values.GetRepeatedMessage(message, &field, i),
+          path + ".");
     case FieldDescriptor::CPPTYPE_BOOL:
     case FieldDescriptor::CPPTYPE_ENUM:
     case FieldDescriptor::CPPTYPE_STRING:
@@ -139,9 +136,8 @@ std::string GroupDefaultText(const FieldDescriptor& group) {
 void ReadGroupDefault(const google::protobuf::Descriptor& parent, const std::string& name,
                       Message* group) {
   const FieldDescriptor* const field = parent.FindFieldByName(name);
-  const bool good =
-      field != nullptr && field->message_type() == group->GetDescriptor() &&
-      google::protobuf::TextFormat::ParseFromString(GroupDefaultText(*field), group);
+  const bool good = field != nullptr && field->message_type() == group->GetDescriptor() &&
+                    google::protobuf::TextFormat::ParseFromString(GroupDefaultText(*field), group);
   if (!good) throw std::logic_error(parent.full_name() + "." + name + " has no group_default");
 }
 

@@ -118,9 +118,8 @@ void Landing::AdvanceState(bool before_touch_down, bool due, const Eigen::Isomet
       } else if (sole.translation().z() <= end_height_ - depth ||
                  reference_.position.z() <= end_height_ - 2 * depth) {
         state_ = State::kRetracted;
-        retreat_.Begin(reference_,
-                       reference_.position + kRetractHeight * Eigen::Vector3d::UnitZ(), time_,
-                       kRetractHeight / kSearchSpeed);
+        retreat_.Begin(reference_, reference_.position + kRetractHeight * Eigen::Vector3d::UnitZ(),
+                       time_, kRetractHeight / kSearchSpeed);
       }
       break;
     }

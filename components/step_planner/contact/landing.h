@@ -59,8 +59,7 @@ class Landing {
  public:
   enum class State { kSwing, kSearching, kTouching, kRetracted };
 
-  explicit Landing(const ContactConfirmation& config)
-      : config_(config), levels_(config, 0) {}
+  explicit Landing(const ContactConfirmation& config) : config_(config), levels_(config, 0) {}
 
   /// The foot is free from here on, its reference at rest at height `z`, m. It counts as touching
   /// the ground that it leaves until its load says that it has left.

@@ -23,9 +23,9 @@ class Reach {
  public:
   /// Nothing is reached.
   Reach() = default;
-  /// At two heights of the COM above the soles: standing, and `lowering` m below. A leg's joints keep
-  /// `joint_reserve`, rad, off their limits, and a straight knee as far off. `gap`, m: between the
-  /// soles, sideways. Never throws; a robot that cannot stand there has no reach.
+  /// At two heights of the COM above the soles: standing, and `lowering` m below. A leg's joints
+  /// keep `joint_reserve`, rad, off their limits, and a straight knee as far off. `gap`, m: between
+  /// the soles, sideways. Never throws; a robot that cannot stand there has no reach.
   Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
         double gap);
 
@@ -37,8 +37,8 @@ class Reach {
   }
   /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lowering`, 0 to 1.
   balance::ConvexPolygon Leg(int foot, double share) const;
-  /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above 1,
-  /// and by how many m, when even the lowest does not do.
+  /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above
+  /// 1, and by how many m, when even the lowest does not do.
   double LoweringShare(const std::array<Eigen::Vector2d, 2>& offset) const;
   /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
   /// all the way, in that leg's reach or `roll` beyond it.

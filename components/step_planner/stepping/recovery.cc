@@ -17,9 +17,9 @@ constexpr double kHopelessExcess = 0.015;
 // A capture point this far beyond the soles, m, steps as soon as the best step would leave it less
 // than kLateMargin, m, inside the new ones: noise makes no step, and waiting none that comes late.
 constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
-constexpr double kAgainAfter = 0.03;     // s beyond the soles of a step: longer than its touch
-constexpr double kNearEdgeTime = 0.1;    // s near the soles' edge: a push that stands is out sooner
-constexpr int kMostSteps = 5;            // in a row: what five do not catch, the sixth does not
+constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
+constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
+constexpr int kMostSteps = 5;          // in a row: what five do not catch, the sixth does not
 // Share of the angular momentum about the COM that counts in the capture point: what the swinging
 // leg and the turning body give to the COM and take from it then moves no foothold.
 constexpr double kMomentumShare = 0.5;
@@ -27,16 +27,16 @@ constexpr double kMomentumShare = 0.5;
 // leaves room within the soles, m of centre of pressure at most, while a foot swings and on both.
 constexpr double kLeanRate = 6;
 constexpr double kSwingBudget = 0.02, kCatchBudget = 0.1;
-// The robot rests once the capture point is within so many m of the soles' middle and the COM slower
-// than so many m/s for so many s: a swing of the COM is longer.
+// The robot rests once the capture point is within so many m of the soles' middle and the COM
+// slower than so many m/s for so many s: a swing of the COM is longer.
 constexpr double kStillDistance = 0.03, kStillSpeed = 0.06, kStillTime = 0.3;
 // s that the COM rests beside the middle until that is rest: the joints' friction holds it there.
 constexpr double kStillBesideTime = 1;
 // Share of a swing before which a load is the ground that the foot leaves, or a tap on the way up.
 constexpr double kLeastProgress = 0.5;
 // Feet are put side by side as no fall is to be caught: s in which the COM goes above the foot that
-// stays, and times that after which this is given up; s of the load's ramps; s in the air; the gain,
-// since the joints' friction leaves less of an error with it.
+// stays, and times that after which this is given up; s of the load's ramps; s in the air; the
+// gain, since the joints' friction leaves less of an error with it.
 constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
 constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
 constexpr double kTogetherGain = 1;
@@ -349,10 +349,10 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
   const int stance = 1 - plan_.foot;
   const auto s = static_cast<size_t>(stance);
   if (reason_ == StepReason::kTogether) {
-    return PointFor(
-        input, state,
-        SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]),
-        state.sole[s], Vector2d::Zero(), kSwingBudget);
+    return PointFor(input, state,
+                    SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s],
+                           state.sole_yaw[s]),
+                    state.sole[s], Vector2d::Zero(), kSwingBudget);
   }
   const Vector2d body = ForBody(input, kSwingBudget);
   const balance::ConvexPolygon sole =
@@ -400,7 +400,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
           ? static_cast<size_t>(1 - plan_.foot)
           : static_cast<size_t>(plan_.foot);
   const double ground = input.sole[stance].translation().z();
-  const double wanted = ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
+  const double wanted =
+      ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
   height_.Follow(wanted, period);
 
   double share = 1;

@@ -50,9 +50,7 @@ class Recovery {
  public:
   Recovery() = default;
   Recovery(const StepChoice& choice, const RecoverySpec& spec)
-      : choice_(choice),
-        spec_(spec),
-        height_(spec.height_rate) {}
+      : choice_(choice), spec_(spec), height_(spec.height_rate) {}
 
   /// Once a tick. False: idle, `output` is not to be used.
   bool Update(const StepInput& input);
@@ -125,14 +123,14 @@ class Recovery {
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began
   double ramp_from_ = 0;         // share of the unloading ramp where `cop_from_` was asked for
   double touch_down_ = 0;        // s
-  double touched_since_ = -1;  // s; negative: not yet, in this swing
+  double touched_since_ = -1;    // s; negative: not yet, in this swing
   // The capture point is beyond the soles, and near their edge or beyond.
   LastingCondition outside_, near_edge_;
   bool stays_outside_ = false, stays_near_edge_ = false;  // for as long as a step asks for
   double excess_at_edge_ = 0;                             // m, when it came near the edge
-  double moving_since_ = 0;                             // s, last time not at rest
-  Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();  // m, when the stage began
-  bool step_helps_ = true;                              // of the last idle tick
+  double moving_since_ = 0;                               // s, last time not at rest
+  Eigen::Vector2d cop_from_ = Eigen::Vector2d::Zero();    // m, when the stage began
+  bool step_helps_ = true;                                // of the last idle tick
   bool together_asked_ = false;
   double together_at_ = -1;                               // s; negative: when asked
   Eigen::Vector2d shift_from_ = Eigen::Vector2d::Zero();  // m, the capture point before it shifts

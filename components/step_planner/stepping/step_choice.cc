@@ -17,7 +17,7 @@ constexpr double kQuinticAcceleration = 5.7735026918962577;
 // The step's time and the foothold, each of which follows from the other, after so many rounds.
 constexpr int kRounds = 4;
 constexpr double kFixedPoint = 2e-3;  // s, a tick: the step's time is found to that
-constexpr double kLater = 0.06;          // s, after which a place out of reach is tried again
+constexpr double kLater = 0.06;       // s, after which a place out of reach is tried again
 // m of margin for which a step may take a second longer.
 constexpr double kMarginOfTime = 0.05;
 // m by which a step that does not catch the capture point must still come nearer than standing.
@@ -51,8 +51,9 @@ double SwingTime(double distance, double acceleration) {
 
 Vector2d StepChoice::BrakingPoint(const StepState& state, int stance) const {
   const auto i = static_cast<size_t>(stance);
-  return balance::NearestPoint(SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]),
-                               state.pendulum.capture_point());
+  return balance::NearestPoint(
+      SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]),
+      state.pendulum.capture_point());
 }
 
 double StepChoice::DistanceOfLegs(int foot, const Vector2d& foothold, const Vector2d& com) const {
@@ -133,8 +134,8 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
     wanted.y() = side * std::max(side * wanted.y(), std::min(limits_.spacing, narrow));
   } else {
     // As far on its own side as holds the capture point well.
-    const double room =
-        std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width - limits_.sole_margin - limits_.ample_margin);
+    const double room = std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width -
+                                          limits_.sole_margin - limits_.ample_margin);
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
   const Vector2d com = local(plan.com);
@@ -153,9 +154,9 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
     plan.corner = state.sole[s] + turn * plan.corner;
   }
   plan.foothold = state.sole[s] + turn * foothold;
-  const balance::ConvexPolygon soles =
-      HullOf(SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
-             SoleAt(feet_[static_cast<size_t>(foot)], limits_.sole_margin, plan.foothold, plan.yaw));
+  const balance::ConvexPolygon soles = HullOf(
+      SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
+      SoleAt(feet_[static_cast<size_t>(foot)], limits_.sole_margin, plan.foothold, plan.yaw));
   plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   plan.margin = std::min(plan.margin, plan.margin + plan.follows);

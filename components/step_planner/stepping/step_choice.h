@@ -43,8 +43,8 @@ struct StepPlan {
   Eigen::Vector2d cop = Eigen::Vector2d::Zero();            ///< centre of pressure until then
   Eigen::Vector2d capture_point = Eigen::Vector2d::Zero();  ///< at touch-down
   Eigen::Vector2d com = Eigen::Vector2d::Zero();            ///< at touch-down
-  /// m, of the capture point at touch-down inside the soles less `sole_margin`; negative: outside, another
-  /// step must follow; −∞: no foot can get there.
+  /// m, of the capture point at touch-down inside the soles less `sole_margin`; negative: outside,
+  /// another step must follow; −∞: no foot can get there.
   double margin = 0;
   /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
   double follows = 0;
@@ -66,9 +66,9 @@ class StepChoice {
     if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
   }
 
-  /// Chooses of both feet's steps the one whose margin is the largest, counted up to `ample_margin`,
-  /// and of equals the sooner; none when standing still does as well. A foot that is not in contact
-  /// swings at once, from where it is.
+  /// Chooses of both feet's steps the one whose margin is the largest, counted up to
+  /// `ample_margin`, and of equals the sooner; none when standing still does as well. A foot that
+  /// is not in contact swings at once, from where it is.
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.

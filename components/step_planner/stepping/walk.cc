@@ -13,18 +13,19 @@ using Eigen::Vector3d;
 
 constexpr double kRiseOver = 0.5;   // share of a swing before which no load is a landing
 constexpr double kTogether = 0.03;  // m, rad: the feet stand side by side
-// Time constant, as a share of the settling, with which a foot that touches is let go; of at most so
-// many s of it.
+// Time constant, as a share of the settling, with which a foot that touches is let go; of at most
+// so many s of it.
 constexpr double kLetGo = 0.25, kLongestLetGo = 0.06;
 constexpr int kHalvings = 40;  // of [0, 1]
-// m that told ground is higher to be an edge that the foot rises over, and the share of the swing in
-// which it only rises then: on unknown ground 0.15 is enough, told ground is an edge for certain.
+// m that told ground is higher to be an edge that the foot rises over, and the share of the swing
+// in which it only rises then: on unknown ground 0.15 is enough, told ground is an edge for
+// certain.
 constexpr double kEdgeHeight = 0.03, kEdgeWait = 0.25;
 // Share of the press' load that counts as pressed: a sole that lies down rocks between loads.
 constexpr double kPressed = 0.8;
 // Times the unloading's rate, at least and at most: the ramp goes on however far the centre of
-// pressure is, and comes up with it. A foot that carries nothing and is a contact of the model still
-// was dragged off its place.
+// pressure is, and comes up with it. A foot that carries nothing and is a contact of the model
+// still was dragged off its place.
 constexpr double kSlowestUnload = 0.1, kFastestUnload = 3;
 constexpr double kStopTime = 0.1;  // s in which a capture point that must wait is stopped
 // Share of a straight leg, to which it is stretched at most. Fitted: 0.9 and 0.94 fall as seldom,
@@ -187,7 +188,8 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
   const Vector2d above = state.sole[static_cast<size_t>(stance_)];
-  const CapturePlan::Point lift_off = spec_.quasi_static ? CapturePlan::Point{above, above} : plan_.At(0);
+  const CapturePlan::Point lift_off =
+      spec_.quasi_static ? CapturePlan::Point{above, above} : plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
   const Vector2d speed = state.pendulum.frequency * (lift_off.capture_point - lift_off.cop);
   for (int i = 0; i < 2; ++i) {
@@ -262,8 +264,9 @@ void Walk::LetGo(const StepInput& input) {
   double pulled = 0, missing = Missing(input);
   if (!(spec_.press_share > 0)) {
     // Comes to rest between the two loads, on a leg of any mass: there it counts as a contact.
-    pulled =
-        std::clamp((LoadOfSwing(input) - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0, 1.0);
+    pulled = std::clamp(
+        (LoadOfSwing(input) - spec_.release_load) / (spec_.touch_load - spec_.release_load), 0.0,
+        1.0);
     missing = 1 - pulled;
   }
   stepping::LetGo(sole, share, pulled, period * missing * spec_.foot.touch_speed,
@@ -308,10 +311,11 @@ void Walk::Unload(const StepState& state, double period) {
   const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
   // The centre of pressure still has this share of the way to the sole that shall carry.
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
-  const double share = spec_.load_lead < left * way.norm() ? spec_.load_lead / (left * way.norm()) : 1;
+  const double share =
+      spec_.load_lead < left * way.norm() ? spec_.load_lead / (left * way.norm()) : 1;
   const double step = period / (slower_ * spec_.unload), most = share < 1 ? RampStart(share) : 1;
-  unloaded_ =
-      std::min(1.0, unloaded_ + std::clamp(most - unloaded_, kSlowestUnload * step, kFastestUnload * step));
+  unloaded_ = std::min(
+      1.0, unloaded_ + std::clamp(most - unloaded_, kSlowestUnload * step, kFastestUnload * step));
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
@@ -392,8 +396,7 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
   }
   const Vector2d error = state.pendulum.capture_point() - wanted_.capture_point;
   const balance::ConvexPolygon carrying = Carrying(input, state);
-  const Vector2d asked = balance::NearestPoint(
-      carrying, wanted_.cop + (1 + spec_.gain) * error);
+  const Vector2d asked = balance::NearestPoint(carrying, wanted_.cop + (1 + spec_.gain) * error);
   // A foot that lands at another time than planned makes no step of it.
   if (since_ == time && stage_ != WalkStage::kStarting) left_over_ = output_.cop - asked;
   const double left = 1 - balance::SmoothStep((time - since_) / kBlend);
@@ -505,8 +508,8 @@ void Walk::Archive(StateArchive* archive) {
   for (PressedSole& sole : sole_) sole.Archive(archive);
   archive->Show(sinks_, slower_, search_depth_);
   archive->Show(time_, since_, moving_since_, double_since_, touch_down_, standing_height_,
-                start_yaw_, starting_, closing_, final_, closings_, pressed_since_, course_.position,
-                course_.yaw);
+                start_yaw_, starting_, closing_, final_, closings_, pressed_since_,
+                course_.position, course_.yaw);
   archive->Show(unloaded_, lowered_);
   archive->Show(foothold_.position, foothold_.yaw, from_cop_, wanted_.capture_point, wanted_.cop,
                 left_over_, reckoned_, offset_);

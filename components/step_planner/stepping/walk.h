@@ -209,9 +209,9 @@ class Walk {
   bool lowered_ = false;               // stopped while it walked: it has not stood up since
   double start_yaw_ = 0;               // rad
   bool starting_ = false;              // no foot has left the ground yet
-  bool closing_ = false;            // the step under way comes beside the other foot, the last one
-  bool final_ = false;              // it has
-  int closings_ = 0;                // last ones so far: on soft ground soles turn as they land
+  bool closing_ = false;  // the step under way comes beside the other foot, the last one
+  bool final_ = false;    // it has
+  int closings_ = 0;      // last ones so far: on soft ground soles turn as they land
   Footstep foothold_;
   Footstep course_;  // where the stance sole would stand if every step came down as commanded
   Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down

@@ -171,12 +171,12 @@ double Between(const robot::FootModel& a, const Vector2d& at_a, const robot::Foo
 // On the right foot, pushed anywhere: no foothold and no way to it upon the standing sole or leg.
 TEST_P(AroundCase, NoSoleOrLegMeetsTheOther) {
   const Reach reach(model_, height_, 0.03, 0.1, gap_);
-  StepLimits limits{.edge = 0.01,
+  StepLimits limits{.sole_margin = 0.01,
                     .acceleration = 60,
                     .least_swing = 0.2,
                     .unload = 0.04,
-                    .beyond = 0.04,
-                    .enough = 0.04,
+                    .overshoot = 0.04,
+                    .ample_margin = 0.04,
                     .spacing = std::max(spacing_, reach.least_spacing()),
                     .leg_distance = 0.12};
   const StepChoice choice(model_, reach, limits);

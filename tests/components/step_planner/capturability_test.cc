@@ -27,7 +27,7 @@ StepChoice Choice() {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   const Reach reach(model, robot::StandingHeight(model), 0.05, 0.1, 0.02);
   StepLimits limits;
-  limits.edge = kEdge;
+  limits.sole_margin = kEdge;
   limits.acceleration = 20;
   limits.least_swing = 0.2;
   limits.unload = 0.05;

@@ -17,7 +17,7 @@ constexpr double kTick = 0.002;
 
 TEST(TouchDetector, CountsALoadThatLasts) {
   const ContactConfirmation config;
-  TouchDetector touch(config);
+  TouchDetector touch;
   int tick = 0;
   const auto hold = [&](double load, int ticks) {
     bool touching = false;
@@ -39,14 +39,12 @@ TEST(TouchDetector, CountsALoadThatLasts) {
 }
 
 TEST(TouchDetector, TimeIsThatOfTheTicks) {
-  ContactConfirmation config;
-  config.set_touch_duration(0.1);
-  TouchDetector touch(config);
+  const ContactConfirmation config;
+  TouchDetector touch(0.1);
   EXPECT_FALSE(touch.Update(7.00, 20, LoadLevels(config, 0)));
   EXPECT_FALSE(touch.Update(7.09, 20, LoadLevels(config, 0)));
   EXPECT_TRUE(touch.Update(7.10, 20, LoadLevels(config, 0)));
-  config.set_touch_duration(0);
-  TouchDetector at_once(config);
+  TouchDetector at_once(0);
   EXPECT_TRUE(at_once.Update(3, 10.1, LoadLevels(config, 0)));
 }
 
@@ -167,7 +165,7 @@ TEST_P(LandingFriction, ALowerSurfaceIsSearchedFor) {
     step = std::max(step, std::abs(foot.reference.velocity.z() - last));
     last = foot.reference.velocity.z();
   }
-  // The way at search_speed, then as far again below the surface as a load of 10 N and friction
+  // The way at kSearchSpeed, then as far again below the surface as a load of 10 N and friction
   // ask for.
   const double press = (10 + friction) / (Foot::kMass * Foot::kKp);
   const double at_least = (0.085 - surface) / 0.03;

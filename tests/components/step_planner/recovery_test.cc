@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "components/robot/posture.h"
+#include "components/step_planner/recovery_config.h"
 #include "components/step_planner/stepping/pendulum.h"
 #include "tests/robot/robot_test_support.h"
 
@@ -21,62 +22,29 @@ using robot::TestRobot;
 
 constexpr double kPeriod = 0.002;  // s
 
-StepLimits Limits(const robot::RobotModel& model, const Reach& reach) {
-  StepLimits limits;
-  limits.edge = 0.01;
-  limits.acceleration = 25;
-  limits.least_swing = 0.2;
-  limits.unload = 0.04;
-  limits.beyond = 0.04;
-  limits.enough = 0.04;
-  limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
-  limits.leg_distance = 0.12;
-  return limits;
+/// The shipped numbers of the robot's recovery.
+RecoverySpec Shipped(TestRobot robot) {
+  return MakeRecoverySpec(RecoveryConfig(), ContactConfirmation(), robot::LoadTestRobot(robot), -1);
 }
 
-/// `far`: 2: feet far apart are left where they are.
-RecoverySpec Spec(double far = 2) {
-  RecoverySpec spec;
-  spec.sure = 0.03;
-  spec.reserve = 0.03;
-  spec.beyond = 0.02;
-  spec.again_after = 0.03;
-  spec.max_steps = 5;
-  spec.load = 0.06;
-  spec.swing = {0.05, 0.25, 0.05};
-  spec.touch_load = 10;
-  spec.touch_duration = 0.006;
-  spec.search_depth = 0.06;
-  spec.gain = 1;
-  spec.height_rate = 8;
-  spec.rest_distance = 0.03;
-  spec.rest_speed = 0.06;
-  spec.rest_time = 0.3;
-  spec.far = far;
-  spec.together_shift = 1.5;
-  spec.together_swing = 0.7;
-  return spec;
-}
+constexpr double kLingers = 0.1;  // s near the edge that make a step
 
-constexpr double kLingers = 0.1;  // s
-
-RecoverySpec Lingering(double inside) {
-  RecoverySpec spec = Spec();
-  spec.lingering = inside;
-  spec.lingering_time = kLingers;
+RecoverySpec Lingering(TestRobot robot, double inside) {
+  RecoverySpec spec = Shipped(robot);
+  spec.margin_to_sole_edge = inside;
   return spec;
 }
 
 class World {
  public:
-  explicit World(TestRobot robot, double ground_there = 0, const RecoverySpec& spec = Spec())
+  explicit World(TestRobot robot, double ground_there = 0)
+      : World(robot, ground_there, Shipped(robot)) {}
+  World(TestRobot robot, double ground_there, const RecoverySpec& spec)
       : model_(robot::LoadTestRobot(robot)),
         height_(robot::StandingHeight(model_)),
         spacing_(robot::StandingSpacing(model_)),
-        reach_(model_, height_, 0.08 * height_, 0.1, 0.02),
         ground_there_(ground_there) {
-    StepChoice choice(model_, reach_, Limits(model_, reach_));
-    recovery_ = Recovery(choice, spec);
+    recovery_ = Recovery(MakeStepChoice(RecoveryConfig(), model_), spec);
     com_ = {0, 0, height_};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, i == 0 ? -0.5 * spacing_ : 0.5 * spacing_, 0) *
@@ -216,7 +184,6 @@ class World {
 
   robot::RobotModel model_;
   double height_, spacing_;
-  Reach reach_;
   double ground_there_;
   Recovery recovery_;
   double time_ = 0;
@@ -256,7 +223,7 @@ TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
     const Vector2d direction = Direction(degrees);
     std::array<double, 2> decided{};
     for (const bool lingers : {false, true}) {
-      World world(GetParam(), 0, lingers ? Lingering(kNear) : Spec());
+      World world(GetParam(), 0, lingers ? Lingering(GetParam(), kNear) : Shipped(GetParam()));
       const double edge = EdgeDistance(world, direction, 0);
       world.Push(world.mass() * world.Frequency() *
                  (EdgeDistance(world, direction, 0.01) + 0.0005) * direction);
@@ -279,8 +246,8 @@ TEST_P(RecoveryCase, WhatLingersAtTheEdgeAndComesOutGetsAStepSooner) {
 TEST_P(RecoveryCase, WhereNoStepHelpsAnotherStrategyHasTheCentreOfPressure) {
   for (const double watch : {-1.0, 0.01}) {
     for (const double side : {1.0, -1.0}) {
-      RecoverySpec spec = Spec();
-      spec.watch = watch;
+      RecoverySpec spec = Shipped(GetParam());
+      spec.watched_margin = watch;
       World world(GetParam(), 0, spec);
       world.LiftLeft(0.05);
       const double out = 0.5 * world.model().feet()[0].width - 0.004;
@@ -323,7 +290,7 @@ TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
 TEST_P(RecoveryCase, AFootThatSettlesIsAContactLater) {
   std::array<double, 2> landed{};
   for (size_t i = 0; i < 2; ++i) {
-    RecoverySpec spec = Spec();
+    RecoverySpec spec = Shipped(GetParam());
     spec.settle = i == 0 ? 0 : 0.04;
     World world(GetParam(), 0, spec);
     world.Push({1.1 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
@@ -336,7 +303,7 @@ TEST_P(RecoveryCase, AFootThatSettlesIsAContactLater) {
 
 TEST_P(RecoveryCase, WhatTheSolesCanStopGetsNoStep) {
   for (double degrees = 0; degrees < 360; degrees += 30) {
-    World world(GetParam(), 0, degrees < 180 ? Spec() : Lingering(0.006));
+    World world(GetParam(), 0, degrees < 180 ? Shipped(GetParam()) : Lingering(GetParam(), 0.006));
     const Vector2d direction = Direction(degrees);
     world.Push(0.97 * world.mass() * world.Frequency() * EdgeDistance(world, direction, 0.01) *
                direction);
@@ -489,29 +456,6 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
   }
   EXPECT_GE(hurried, 40);
   EXPECT_GE(stood, 10);  // none, with a foot that took its time
-}
-
-// The feet are too far apart to rest: the one behind comes beside the other one, no faster than the
-// hips can swing it.
-TEST_P(RecoveryCase, AFootFarBehindIsBroughtAsFastAsTheHipsCan) {
-  World world(GetParam(), 0, Spec(0.5));
-  world.Push({1.25 * world.mass() * world.Frequency() * EdgeDistance(world, {1, 0}, 0), 0});
-  double largest = 0;
-  int swings = 0;
-  for (int tick = 0; tick < 4000; ++tick) {
-    world.Tick();
-    const Recovery& recovery = world.recovery();
-    if (recovery.stage() != Stage::kSwinging || recovery.reason() != StepReason::kTogether)
-      continue;
-    ++swings;
-    largest = std::max(largest, recovery.output().swing.acceleration.head<2>().norm());
-  }
-  EXPECT_GT(swings, 0);
-  EXPECT_LT(largest, 1.05 * world.recovery().choice().limits().acceleration);
-  EXPECT_TRUE(world.Rests());
-  const Vector3d apart = world.soles()[1].translation() - world.soles()[0].translation();
-  EXPECT_NEAR(apart.x(), 0, 0.03);
-  EXPECT_GT(world.nearest(), 0.01);
 }
 
 // The ground is 3 cm higher or 4 cm lower than the stance sole: the load says where it is.

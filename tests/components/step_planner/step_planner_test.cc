@@ -412,7 +412,7 @@ TEST(StepPlanner, ARecoveryThatTakesAWalkOverKeepsItsHeading) {
   ControlContext context(TestRobot::kDyros);
   Harness<StepPlanner> harness(&context,
                                "phase { support: DOUBLE } recovery { enabled: true } "
-                               "walk { enabled: true rests: true start: 0.5 command { vx: 0 } }");
+                               "walk { enabled: true quasi_static: true command { vx: 0 } }");
   robot_state_t message{};
   harness.Bind("robot_state", &message);
   const auto& plan = harness.output<support_plan_t>();

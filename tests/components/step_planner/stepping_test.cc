@@ -245,12 +245,12 @@ TEST_P(ReachCase, FootholdsAreBesideTheOtherSole) {
 TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
   const double spacing = robot::StandingSpacing(model_);
   const Reach reach(model_, height_, lower_, 0.1, 0.02);
-  StepLimits limits{.edge = 0.01,
+  StepLimits limits{.sole_margin = 0.01,
                     .acceleration = 25,
                     .least_swing = 0.2,
                     .unload = 0.04,
-                    .beyond = 0.04,
-                    .enough = 0.03,
+                    .overshoot = 0.04,
+                    .ample_margin = 0.03,
                     .spacing = spacing};
   const StepChoice choice(model_, reach, limits);
   std::mt19937 random{TestSeed(164)};
@@ -274,15 +274,15 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
         for (double y = -1; y < 1; y += 0.02) {
           if (balance::SignedDistance(footholds, {x, y}) < 0) continue;
           const balance::ConvexPolygon soles =
-              HullOf(SoleAt(model_.feet()[stance], limits.edge, state.sole[stance], 0),
-                     SoleAt(model_.feet()[static_cast<size_t>(foot)], limits.edge,
+              HullOf(SoleAt(model_.feet()[stance], limits.sole_margin, state.sole[stance], 0),
+                     SoleAt(model_.feet()[static_cast<size_t>(foot)], limits.sole_margin,
                             state.sole[stance] + Vector2d(x, y), 0));
           best = std::max(best, balance::SignedDistance(soles, plan.capture_point));
         }
       }
       // A step that the stance leg cannot follow counts as worse, wherever the foot goes.
       const Vector2d behind = state.sole[stance] - plan.com;
-      if (best < limits.enough || !balance::Contains(reach.Leg(1 - foot, 1), behind)) continue;
+      if (best < limits.ample_margin || !balance::Contains(reach.Leg(1 - foot, 1), behind)) continue;
       ++possible;
       EXPECT_GE(plan.margin, -0.02) << "foot " << foot << ", velocity "
                                     << state.pendulum.velocity.transpose() << ", best " << best;
@@ -312,12 +312,12 @@ double BeyondSpan(const Reach& reach, int foot, const Vector2d& foothold) {
 // However fast the robot falls: the prediction runs away as e^ωT, the foothold does not.
 TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
   const Reach reach(model_, height_, lower_, 0.1, 0.02);
-  const StepLimits limits{.edge = 0.01,
+  const StepLimits limits{.sole_margin = 0.01,
                           .acceleration = 25,
                           .least_swing = 0.2,
                           .unload = 0.04,
-                          .beyond = 0.04,
-                          .enough = 0.03,
+                          .overshoot = 0.04,
+                          .ample_margin = 0.03,
                           .spacing = robot::StandingSpacing(model_),
                           .leg_distance = 0.12};
   const StepChoice choice(model_, reach, limits);

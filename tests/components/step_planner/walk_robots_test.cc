@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 #include "components/robot/posture.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/walk_config.h"
@@ -87,7 +88,7 @@ WalkConfig Enabled() {
 
 TEST(WalkDefaults, AreThePapersRobots) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
-  const WalkConfig defaults;
+  const auto defaults = GroupDefault<StepMotion, WalkConfig>("motion");
   const Walk walk = MakeWalk(Enabled(), ContactConfirmation(), model);
   // To the bit.
   EXPECT_EQ(walk.period(),
@@ -110,10 +111,10 @@ TEST(WalkDefaults, AreOneWalkInUnitsOfGravityAndHeight) {
               std::sqrt(ratio) * first.walk().command().velocity.x(), 1e-12);
 
   WalkConfig given = Enabled();
-  given.set_swing(0.5);
+  given.mutable_motion()->set_swing(0.5);
   const Walk walk = MakeWalk(given, ContactConfirmation(), other);
   EXPECT_NEAR(walk.period() - 0.5,
-              std::sqrt(ratio) * (first.walk().period() - WalkConfig().swing()), 1e-12);
+              std::sqrt(ratio) * (first.walk().period() - GroupDefault<StepMotion, WalkConfig>("motion").swing()), 1e-12);
 }
 
 // A leg presses with its mass at the foot times k_p of the foot's task: 6 kg and 625 1/s^2 of a
@@ -133,13 +134,9 @@ TEST(WalkLanding, AFootThatIsLetGoCarriesUntilItCountsOnALegOfAnyMass) {
   }
 }
 
-void Set(const char* field, double value, google::protobuf::Message* config) {
-  config->GetReflection()->SetDouble(config, config->GetDescriptor()->FindFieldByName(field),
-                                     value);
-}
-
 std::string RefusedField(const WalkConfig& config, const robot::RobotModel& model) {
   try {
+    CheckFields(config, "walk.");
     CheckWalkConfig(config);
     MakeWalk(config, ContactConfirmation(), model);
   } catch (const ConfigError& error) {
@@ -154,20 +151,21 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
     const char* field;
     double possible, impossible;
   };
-  for (const Case& c : {Case{"lower", 0.08, 0.8}, Case{"gap", 0.1, 0.5}, Case{"clearance", 0.14, 3},
-                        Case{"longest", 0.3, 9}, Case{"widest", 0.2, 4}}) {
+  for (const Case& c : {Case{"motion.com_lowering", 0.08, 0.8}, Case{"motion.gap", 0.1, 0.5},
+                        Case{"motion.clearance", 0.14, 3}, Case{"longest", 0.3, 9},
+                        Case{"widest", 0.2, 4}}) {
     WalkConfig config = Enabled();
-    Set(c.field, c.possible, &config);
+    SetField(&config, c.field, std::to_string(c.possible));
     EXPECT_EQ(RefusedField(config, model), "accepted") << c.field;
-    Set(c.field, c.impossible, &config);
+    SetField(&config, c.field, std::to_string(c.impossible));
     EXPECT_EQ(RefusedField(config, model), std::string("walk.") + c.field);
   }
   RecoveryConfig recovery;
-  recovery.set_clearance(3);
+  recovery.mutable_motion()->set_clearance(3);
   EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
-  recovery.set_clearance(0.05);
+  recovery.mutable_motion()->set_clearance(0.05);
   EXPECT_NO_THROW(MakeStepChoice(recovery, model));
-  recovery.set_gap(0.5);
+  recovery.mutable_motion()->set_gap(0.5);
   EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
 }
 
@@ -210,11 +208,11 @@ TEST(WalkCommands, WhatNoOneCanWalkIsRefused) {
   for (const auto& [field, value] :
        {std::pair{"vx", nan}, {"vy", nan}, {"wz", nan}, {"time", nan}, {"time", -1.0}}) {
     WalkConfig config = Enabled();
-    Set(field, value, config.add_command());
+    SetField(config.add_command(), field, std::to_string(value));
     EXPECT_EQ(RefusedField(config, model), std::string("walk.command[0].") + field);
   }
   WalkConfig config = Enabled();
-  Set("most_turn", 1.6, &config);  // a foot that points back
+  config.set_most_turn(1.6);  // a foot that points back
   EXPECT_EQ(RefusedField(config, model), "walk.most_turn");
 }
 
@@ -227,20 +225,20 @@ TEST(WalkLimits, AVelocityThatNoStepReachesAndWhatHasNoEffectAreTold) {
   ASSERT_EQ(WalkWarnings(config, model).size(), 1);
   EXPECT_NE(WalkWarnings(config, model)[0].find("walked at -0.248 m/s"), std::string::npos);
   config.mutable_command(0)->set_vx(0.1);
-  config.set_places(2);
   config.set_slowest_swing(2);
-  EXPECT_EQ(WalkWarnings(config, model).size(), 2);
-  config.set_rests(true);
+  EXPECT_EQ(WalkWarnings(config, model).size(), 1);
+  config.set_quasi_static(true);
   EXPECT_TRUE(WalkWarnings(config, model).empty());
 }
 
 TEST(WalkLimits, AsideAndInATurnOnlyEverySecondStepGoesOut) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   WalkConfig config = Enabled();
-  config.set_unload(0.2);
-  config.set_swing(0.5);
-  config.set_settle(0.1);
-  config.set_load(0.2);  // 1 s a step
+  StepMotion* motion = config.mutable_motion();
+  motion->set_unload(0.2);
+  motion->set_swing(0.5);
+  motion->set_settle(0.1);
+  motion->set_load(0.2);  // 1 s a step
   config.set_widest(0.2);
   config.set_most_turn(0.3);
   WalkCommandConfig* command = config.add_command();

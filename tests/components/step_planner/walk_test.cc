@@ -55,7 +55,7 @@ TEST(Walk, GoesAsHighAfterARecoveryAsBefore) {
   world.Run(6, command);
   ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
   const double before = world.com().z();
-  EXPECT_NEAR(standing - before, 0.02, 0.002);  // WalkSpec::lower
+  EXPECT_NEAR(standing - before, 0.02, 0.002);  // com_lowering
   world.Recover(0.5);
   world.Run(6, command);
   ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
@@ -63,7 +63,9 @@ TEST(Walk, GoesAsHighAfterARecoveryAsBefore) {
 }
 
 TEST(Walk, StandsApartWhereItIsToldTo) {
-  World world(TestRobot::kDyros, 0, 0, false, 0, 1, true);
+  WalkConfig config;
+  config.set_stand_apart(true);
+  World world(TestRobot::kDyros, 0, 0, config);
   const WalkCommand command{{0.1, 0}, 0, true};
   world.Run(8, command);
   ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));

@@ -11,6 +11,7 @@
 
 #include "components/robot/posture.h"
 #include "components/step_planner/stepping/walk.h"
+#include "components/step_planner/walk_config.h"
 #include "tests/robot/robot_test_support.h"
 
 namespace poise::stepping {
@@ -20,84 +21,35 @@ using robot::TestRobot;
 
 inline const WalkCommand kStand{};
 inline constexpr double kPeriod = 0.002;      // s
-inline constexpr double kSearchDepth = 0.06;  // m
-inline constexpr double kLower = 0.02;        // m
 
-inline WalkSpec Spec(const Reach& reach, double spacing) {
-  WalkSpec spec;
-  spec.start = 0.8;
-  spec.unload = spec.load = 0.2;
-  spec.swing = 0.55;
-  spec.settle = 0.05;
-  spec.step = {spacing, reach.least_spacing(), 0.25, 0.12, 0.35};
-  spec.acceleration = 0.1;
-  spec.turn_acceleration = 0.2;
-  spec.foot = {0.04, 0.1, 0.1};
-  spec.touch_load = 10;
-  spec.touch_duration = 0.006;
-  spec.search_depth = kSearchDepth;
-  spec.gain = 1;
-  spec.adjust_from = 0.01;
-  spec.lower = kLower;
-  spec.height_rate = 6;
-  spec.yaw_rate = 5;
-  spec.rest_distance = 0.02;
-  spec.rest_speed = 0.04;
-  spec.rest_time = 0.3;
-  return spec;
+// What the world has in place of the paper's robot and the ground.
+inline constexpr double kWeight = 500;    // N
+inline constexpr double kDownLoad = 200;  // N of a foot that is down
+
+/// A walk that waits above the stance sole and presses the other one down.
+inline WalkConfig QuasiStatic() {
+  WalkConfig config;
+  config.set_quasi_static(true);
+  config.set_press(0.1);
+  return config;
 }
-
-inline constexpr double kEdge = 0.02;          // m
-inline constexpr double kRollDamping = 0.007;  // m/(rad/s)
-inline constexpr double kSoft = 0.02;          // m
-inline constexpr double kSoftDamping = 0.001;  // m^1.5/(rad/s)
-inline constexpr double kLead = 0.01;          // m
-inline constexpr double kWeight = 500;         // N
-inline constexpr double kDownLoad = 200;       // N of a foot that is down
-inline constexpr double kTouchLoad = 20;       // N of one that touches what does not carry
-inline constexpr double kMostTilt = 0.4;       // rad
-inline constexpr double kPatience = 1;         // s
-inline constexpr double kSinkSpeed = 0.02;     // m/s
 
 class World {
  public:
-  /// `rough`: m, by how much the ground is lower under every third foothold.
-  /// `patient`: s more for each ramp of the load.
-  /// `rests`: the capture point, above the sole that carries.
-  /// `places`: of WalkSpec.
-  /// `slowest_swing`: of WalkSpec, with soft_damping; 1: neither.
-  /// `stand_apart`: of WalkSpec.
-  explicit World(TestRobot robot, double rough = 0, double patient = 0, bool rests = false,
-                 int places = 0, double slowest_swing = 1, bool stand_apart = false)
+  /// The shipped walk, but for what is given. `rough`: m, by how much the ground is lower under
+  /// every third foothold. `patient`: s more for each ramp of the load.
+  explicit World(TestRobot robot, double rough = 0, double patient = 0, const WalkConfig& config = {})
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
-    const Reach reach(model_, height, 0.08 * height, 0.1, 0.02);
-    StepLimits limits;
-    limits.edge = kEdge;
-    limits.spacing = std::max(robot::StandingSpacing(model_), reach.least_spacing());
-    WalkSpec spec = Spec(reach, limits.spacing);
-    spec.load += patient;
-    spec.unload += patient;
-    spec.rests = rests;
-    spec.off_center = 0.02;
-    spec.line = 0.03;
-    spec.stand_apart = stand_apart;
-    spec.places = places;
-    spec.place_shift = 0.15;
-    spec.patience = kPatience;
-    spec.most_tilt = kMostTilt;
-    spec.roll_damping = kRollDamping;
-    spec.lead = kLead;
-    spec.press_share = rests ? 0.1 : 0;
-    spec.press_load = rests ? kDownLoad : 0;
-    spec.weight = kWeight;
-    spec.most_sinking = 0.2;
-    spec.most_ahead = 0.05;
-    spec.sink_speed = kSinkSpeed;
-    spec.soft = kSoft;
-    spec.slowest_swing = slowest_swing;
-    if (slowest_swing > 1) spec.soft_damping = {kSoftDamping, 2 * kSoftDamping};
-    walk_ = Walk(StepChoice(model_, reach, limits), spec);
+    const StepChoice choice = MakeWalkChoice(config, model_);
+    spec_ = MakeWalkSpec(config, ContactConfirmation(), model_, choice);
+    spec_.load += patient;
+    spec_.unload += patient;
+    spec_.weight = kWeight;
+    if (config.press() > 0) spec_.press_load = kDownLoad;
+    walk_ = Walk(choice, spec_);
+    const StepLimits& limits = choice.limits();
+    sole_margin_ = limits.sole_margin;
     com_ = {0, 0, height};
     for (size_t i = 0; i < 2; ++i) {
       sole_[i] = Eigen::Translation3d(0, (i == 0 ? -0.5 : 0.5) * limits.spacing, 0) *
@@ -109,23 +61,8 @@ class World {
   void Soften(double depth) { soft_ = depth; }
   /// No ground under a sole whose centre is from `from` to `to`, m, along x.
   void Dig(double from, double to) { hole_ = {from, to}; }
-  /// Ground on which a pressed sole there lies tilted by so much, rad.
-  void Slant(double from, double to, double tilt) {
-    slanted_ = {from, to};
-    tilt_ = tilt;
-  }
   /// Ground that turns each foot outwards by so much, rad, as it comes down.
   void Twist(double yaw) { twist_ = yaw; }
-  /// Ground that a sole there touches, and that does not take the press.
-  void Weaken(double from, double to) { weak_ = {from, to}; }
-  /// The centre of pressure asked for in the next tick if the soles turned like this.
-  Vector2d AskedFor(const Vector3d& turning, const WalkCommand& command) const {
-    StepInput input = See();
-    input.sole_turning = {turning, turning};
-    Walk walk = walk_;
-    walk.Update(input, command);
-    return walk.output().cop;
-  }
   bool Lost(const Vector2d& push) const {
     StepInput input = See();
     input.com_velocity.head<2>() += push;
@@ -156,6 +93,7 @@ class World {
   }
 
   Walk& walk() { return walk_; }
+  const WalkSpec& spec() const { return spec_; }
   const std::array<Eigen::Isometry3d, 2>& sole() const { return sole_; }
   Vector2d middle() const {
     return 0.5 * (sole_[0].translation() + sole_[1].translation()).head<2>();
@@ -186,7 +124,7 @@ class World {
     input.com_height = com_.z();
     for (size_t i = 0; i < 2; ++i) {
       const bool down = in_contact_[i] || sole_[i].translation().z() <= Ground(sole_[i]);
-      input.load[i] = !down ? 0 : IsAt(weak_, sole_[i]) && !in_contact_[i] ? kTouchLoad : kDownLoad;
+      input.load[i] = down ? kDownLoad : 0;
     }
     return input;
   }
@@ -234,15 +172,12 @@ class World {
       const double ground = Ground(sole_[i]) - (pressed ? soft_ : 0);
       if (pressed || output.swing.velocity.z() < 0) z = std::max(z, ground);
       if (pressed && soft_ > 0) z = ground;
-      if (pressed && IsAt(slanted_, sole_[i])) {
-        sole_[i].linear() = Eigen::AngleAxisd(tilt_, Vector3d::UnitX()).toRotationMatrix();
-      }
       if (pressed && twist_ != 0) {
         sole_[i].linear() =
             Eigen::AngleAxisd(i == 0 ? -twist_ : twist_, Vector3d::UnitZ()).toRotationMatrix();
       }
     }
-    EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * kEdge) << time_;
+    EXPECT_GE(balance::SignedDistance(soles, output.cop), 0.5 * sole_margin_) << time_;
     const Vector3d& acceleration = output.com.acceleration;
     for (int i = 0; i < 2; ++i) {
       com_[i] += kPeriod * velocity_[i] + 0.5 * kPeriod * kPeriod * acceleration[i];
@@ -254,8 +189,9 @@ class World {
 
   robot::RobotModel model_;
   double rough_, soft_ = 0;
-  std::array<double, 2> hole_{0, 0}, slanted_{0, 0}, weak_{0, 0};
-  double tilt_ = 0, twist_ = 0;
+  std::array<double, 2> hole_{0, 0};
+  double twist_ = 0, sole_margin_ = 0;
+  WalkSpec spec_;
   Walk walk_;
   std::optional<Walk> fresh_;
   double time_ = 0;
