@@ -198,28 +198,6 @@ TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
   EXPECT_EQ(ExpectedSinking(0.01, 0, weight), 0);
 }
 
-TEST(AnotherPlace, LiesAroundTheFirstOneWhereTheFootReaches) {
-  const double yaw = 0.4, shift = 0.15;
-  const Footstep stance{{1, 2}, yaw};
-  const Eigen::Rotation2Dd turn(yaw);
-  const Footstep first{stance.position + turn * Vector2d(0.1, 0.2), yaw + 0.1};
-  const std::array<Vector2d, 4> expected{Vector2d(0.25, 0.2), Vector2d(-0.05, 0.2),
-                                         Vector2d(0.1, 0.35), Vector2d(0.1, 0.05)};
-  for (int i = 1; i <= kMostPlaces; ++i) {
-    const Footstep place = AnotherPlace(first, i, shift, stance, robot::kLeftFoot, {});
-    const Vector2d seen = turn.inverse() * (place.position - stance.position);
-    EXPECT_LT((seen - expected[static_cast<size_t>(i - 1)]).norm(), 1e-12) << i;
-    EXPECT_EQ(place.yaw, first.yaw);
-  }
-  // A reach of 0.15 m ahead and 0.1 to 0.3 m aside.
-  const std::array<Vector2d, 4> corners{Vector2d(-0.2, 0.1), Vector2d(0.15, 0.1),
-                                        Vector2d(0.15, 0.3), Vector2d(-0.2, 0.3)};
-  const balance::ConvexPolygon reach = balance::ConvexHull(corners);
-  const Footstep near = AnotherPlace(first, 1, shift, stance, robot::kLeftFoot, reach);
-  EXPECT_LT((turn.inverse() * (near.position - stance.position) - Vector2d(0.15, 0.2)).norm(),
-            1e-12);
-}
-
 TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
   KnownGround ground;
   EXPECT_TRUE(ground.empty());
