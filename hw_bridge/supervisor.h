@@ -37,13 +37,12 @@ struct SupervisorConfig {
   double start_velocity = std::numeric_limits<double>::infinity();  ///< rad/s, greatest at start
 
   /// Cycles that a drive may take to report itself enabled after it has been told to.
-  int enable_cycles = 2;
-  int first_command_ramp = 0;  ///< cycles in which torque is faded in after the start; 0: at once
-  int damping_after_cycles =
-      3;                      ///< age of the last accepted command beyond which it is not followed
-  int stop_after_cycles = 9;  ///< cycles of damping before the bridge stops
-  std::vector<double> damping;  ///< N·m·s/rad, by joint
-  double stop_ramp = 0.1;       ///< s
+  int enable_cycles = 0;
+  int first_command_ramp = 0;    ///< cycles in which torque is faded in after the start; 0: at once
+  int damping_after_cycles = 0;  ///< age of the last command beyond which it is not followed
+  int stop_after_cycles = 0;     ///< cycles of damping before the bridge stops
+  std::vector<double> damping;   ///< N·m·s/rad, by joint
+  double stop_ramp = 0;          ///< s
   /// Cycles of holding between the last command's end and damping; 0: none.
   int hold_cycles = 0;
   bool hold_before_command = false;    ///< hold from the start until the first command, without end

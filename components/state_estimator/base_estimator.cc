@@ -46,12 +46,12 @@ Vector3d RotationError(const Matrix3d& to, const Matrix3d& from) {
 }  // namespace
 
 BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
-                             const BaseEstimatorConfig& config, double period)
+                             const StateEstimatorConfig& config, double period)
     : model_(std::move(model)),
       config_(config),
       period_(period),
       weight_(model_->total_mass() * robot::kGravity),
-      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff),
+      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff()),
       kinematics_(model_),
       state_(model_->num_joints()),
       joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
@@ -117,7 +117,7 @@ void BaseEstimator::UpdateJoints(const BaseSensors& sensors, double dt) {
 
 void BaseEstimator::UpdateWeights(const BaseSensors& sensors) {
   const FootWeights weights =
-      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+      WeighFeet(sensors.foot_load, weight_, config_.light_load(), config_.full_load());
   grip_ = weights.standing;
   for (size_t i = 0; i < feet_.size(); ++i) {
     feet_[i].grip = weights.grip[i];
@@ -128,7 +128,8 @@ void BaseEstimator::UpdateWeights(const BaseSensors& sensors) {
 
 void BaseEstimator::Place(const BaseSensors& sensors) {
   const Placement placement = PlaceOnGround(
-      kinematics_, WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load));
+      kinematics_,
+      WeighFeet(sensors.foot_load, weight_, config_.light_load(), config_.full_load()));
   orientation_ = placement.orientation;
   state_.base_orientation = Quaterniond(orientation_).normalized();
   state_.base_position = placement.position;
@@ -196,16 +197,16 @@ void BaseEstimator::UpdateOrientation(const BaseSensors& sensors, double dt) {
   Vector3d error = Vector3d::Zero();  // of the feet, world axes
   UpdateTrust();
   for (const Foot& foot : feet_) error += grip_ * foot.weight * foot.trust * foot.turn;
-  Vector3d correction = Approach(dt, config_.orientation_time_constant) * error;
+  Vector3d correction = Approach(dt, config_.orientation_time_constant()) * error;
   const Vector3d up = orientation_ * imu_acceleration_;
   const double size = up.norm() / robot::kGravity;
   if (size > 0.5 && size < 1.5) {  // otherwise it is not gravity
     correction +=
-        Approach(dt, config_.gravity_time_constant) * up.cross(Vector3d::UnitZ()) / up.norm();
+        Approach(dt, config_.gravity_time_constant()) * up.cross(Vector3d::UnitZ()) / up.norm();
   }
   // A proportional-integral observer: with this gain its slow pole lies near 1 /
   // gyro_bias_time_constant.
-  gyro_bias_ -= predicted_rotation.transpose() * correction / config_.gyro_bias_time_constant;
+  gyro_bias_ -= predicted_rotation.transpose() * correction / config_.gyro_bias_time_constant();
   gyro_bias_ = Clamp(gyro_bias_, kMaxGyroBias);
 
   imu_orientation_ = (Exp(correction) * predicted).normalized();
@@ -223,7 +224,7 @@ void BaseEstimator::UpdateTrust() {
   const bool both = feet_[0].weight > 0 && feet_[1].weight > 0;
   const double gap = both ? (feet_[0].turn - feet_[1].turn).squaredNorm()
                           : std::numeric_limits<double>::infinity();
-  const double tolerance = config_.foot_rotation_tolerance * config_.foot_rotation_tolerance;
+  const double tolerance = config_.foot_rotation_tolerance() * config_.foot_rotation_tolerance();
   for (Foot& foot : feet_) {
     foot.trust = tolerance / (tolerance + std::min(foot.turn.squaredNorm(), gap));
   }
@@ -252,7 +253,7 @@ void BaseEstimator::UpdatePosition(double dt) {
 }
 
 void BaseEstimator::UpdateAnchors(double dt) {
-  const double share = Approach(dt, config_.anchor_time_constant);
+  const double share = Approach(dt, config_.anchor_time_constant());
   // How far each foot stands from its anchor, and the weighted mean, which is the base's error.
   std::array<Vector3d, 2> shift;
   Vector3d mean_shift = Vector3d::Zero();

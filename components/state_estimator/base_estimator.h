@@ -24,25 +24,14 @@
 #include "components/state_estimator/base_sensors.h"
 #include "components/state_estimator/low_pass.h"
 #include "components/state_estimator/sole_kinematics.h"
+#include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
-
-/// See state_estimator.proto for what each means.
-struct BaseEstimatorConfig {
-  double joint_velocity_cutoff = 20;     ///< Hz
-  double orientation_time_constant = 2;  ///< s, as those below
-  double gravity_time_constant = 50;
-  double gyro_bias_time_constant = 10;
-  double anchor_time_constant = 0.5;
-  double foot_rotation_tolerance = 0.003;  ///< rad
-  double light_load = 0.05;                ///< share of the weight
-  double full_load = 0.2;
-};
 
 class BaseEstimator {
  public:
   /// `period` s, nominal, > 0: steps are taken to last from a tenth of it to 1 s.
-  BaseEstimator(std::shared_ptr<const robot::RobotModel> model, const BaseEstimatorConfig& config,
+  BaseEstimator(std::shared_ptr<const robot::RobotModel> model, const StateEstimatorConfig& config,
                 double period);
 
   /// Takes the next readings, `dt` s after the last. The first call places the robot: loaded feet
@@ -93,7 +82,7 @@ class BaseEstimator {
   void AverageAccelerometer(const BaseSensors& sensors, double dt);
 
   std::shared_ptr<const robot::RobotModel> model_;
-  BaseEstimatorConfig config_;
+  StateEstimatorConfig config_;
   double period_;
   double weight_;  // N, of the robot
   LowPass velocity_filter_;

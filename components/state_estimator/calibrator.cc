@@ -20,12 +20,12 @@ double Square(double x) { return x * x; }
 }  // namespace
 
 Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model,
-                       const CalibratorSettings& settings, double period)
+                       const CalibrationConfig& config, double cutoff, double period)
     : model_(std::move(model)),
-      settings_(settings),
-      filter_(12, settings.cutoff),
+      config_(config),
+      filter_(12, cutoff),
       input_(Eigen::VectorXd::Zero(12)),
-      correlated_(std::max(1.0, 1 / (2 * settings.cutoff * period))) {
+      correlated_(std::max(1.0, 1 / (2 * cutoff * period))) {
   const double mass = model_->total_mass();
   covariance_.diagonal() << Square(kStartMass * mass),
       Vector3d::Constant(Square(kStartShift * mass));
@@ -42,17 +42,17 @@ void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt) 
   since_ += dt;
   const double mass = model_->total_mass();
   Load wanted = estimate_;
-  wanted[0] = std::clamp(wanted[0], -settings_.max_mass * mass, settings_.max_mass * mass);
-  const double reach = settings_.max_shift * mass;
+  wanted[0] = std::clamp(wanted[0], -config_.max_mass() * mass, config_.max_mass() * mass);
+  const double reach = config_.max_shift() * mass;
   for (int i = 1; i < 4; ++i) wanted[i] = std::clamp(wanted[i], -reach, reach);
-  applied_ += std::min(dt / settings_.apply_time, 1.0) * (wanted - applied_);
+  applied_ += std::min(dt / config_.apply_time(), 1.0) * (wanted - applied_);
 }
 
 void Calibrator::Update(const WrenchObserver& observer, bool usable) {
   const Vector3d& s = observer.specific_force();
   const Vector3d& w = observer.data().body_angular_velocity[0];
-  running_ = usable && w.norm() < settings_.still_rate &&
-             std::abs(s.norm() - robot::kGravity) < settings_.still_acceleration;
+  running_ = usable && w.norm() < config_.still_rate() &&
+             std::abs(s.norm() - robot::kGravity) < config_.still_acceleration();
   if (!running_) return;
   // Environment on robot, base axes, about the base's origin.
   robot::Vector6d ground = robot::Vector6d::Zero();
@@ -75,18 +75,18 @@ void Calibrator::Correct(const Eigen::Matrix<double, 6, 4>& regressor,
   const double mass = model_->total_mass();
   const double dt = std::max(since_, 0.0);
   since_ = 0;
-  covariance_.diagonal().head<3>().array() += Square(settings_.walk * mass) * dt;
+  covariance_.diagonal().head<3>().array() += Square(config_.walk() * mass) * dt;
   const robot::Vector6d gap = measured - regressor * estimate_;
   Eigen::Matrix<double, 6, 1> noise;
-  noise.head<3>().setConstant(correlated_ * Square(settings_.force_error));
-  noise.tail<3>().setConstant(correlated_ * Square(settings_.moment_error));
+  noise.head<3>().setConstant(correlated_ * Square(config_.force_error()));
+  noise.tail<3>().setConstant(correlated_ * Square(config_.moment_error()));
   const Eigen::Matrix<double, 4, 6> cross = covariance_ * regressor.transpose();
   Eigen::Matrix<double, 6, 6> total = regressor * cross;
   total.diagonal() += noise;
   const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factors(total);
   const double difference = gap.dot(factors.solve(gap));
   // Something else pushes the robot, or a reading is wrong.
-  if (!(difference < settings_.gate)) {
+  if (!(difference < config_.gate())) {
     running_ = false;
     return;
   }

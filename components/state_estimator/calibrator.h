@@ -14,29 +14,20 @@
 
 #include "components/framework/state_archive.h"
 #include "components/state_estimator/low_pass.h"
+#include "components/state_estimator/state_estimator.pb.h"
 #include "components/state_estimator/wrench_observer.h"
 
 namespace poise {
-
-/// See CalibrationConfig in state_estimator.proto for what each means.
-struct CalibratorSettings {
-  bool enabled = false;
-  double max_mass = 0.2, max_shift = 0.1;
-  double walk = 0.002, force_error = 2, moment_error = 0.3;
-  double still_rate = 0.3, still_acceleration = 0.5;
-  double gate = 40, apply_time = 0.2;
-  double cutoff = 40;  ///< Hz, the observer's: readings and model pass the same filter
-};
 
 class Calibrator {
  public:
   /// (mass, kg; moment x, y, z, kg·m).
   using Load = Eigen::Vector4d;
 
-  Calibrator(std::shared_ptr<const robot::RobotModel> model, const CalibratorSettings& settings,
-             double period);
+  Calibrator(std::shared_ptr<const robot::RobotModel> model, const CalibrationConfig& config,
+             double cutoff, double period);
 
-  bool enabled() const { return settings_.enabled; }
+  bool enabled() const { return config_.enabled(); }
   /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
   void Track(const std::array<robot::Vector6d, 2>& wrench, double dt);
   /// With what the observer has found in this tick without any load; `usable`: both wrenches are
@@ -55,7 +46,7 @@ class Calibrator {
   void Correct(const Eigen::Matrix<double, 6, 4>& regressor, const robot::Vector6d& measured);
 
   std::shared_ptr<const robot::RobotModel> model_;
-  CalibratorSettings settings_;
+  CalibrationConfig config_;
   LowPass filter_;
   Eigen::VectorXd input_;
   double correlated_;  // samples that the filter makes one of

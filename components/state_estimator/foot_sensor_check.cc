@@ -22,7 +22,7 @@ void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
 
 void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covariance,
                               const Wrench& noise, double least_force, double dt) {
-  if (said_ != State::kOk || !settings_.enabled) return;
+  if (said_ != State::kOk || !config_.enabled()) return;
   Covariance total = covariance;
   total.diagonal() += noise.cwiseAbs2();
   const Wrench gap = measured_ - observed;
@@ -31,16 +31,16 @@ void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covarian
   if (!(difference >= 0)) return;  // not a covariance
   difference_ = difference;
   // What does not change by a bit has no noise: a little disagreement is then enough.
-  const bool same = same_time_ >= settings_.frozen_time;
+  const bool same = same_time_ >= config_.frozen_time();
   const bool stuck = same_time_ >= kStuckTime && noise.minCoeff() > 0 && !measured_.isZero(0);
-  const bool wrong = stuck || difference > (same ? settings_.frozen_gate : settings_.gate);
+  const bool wrong = stuck || difference > (same ? config_.frozen_gate() : config_.gate());
   wrong_time_ = wrong ? wrong_time_ + dt : 0;
-  right_time_ = !same && difference < settings_.agree_gate ? right_time_ + dt : 0;
+  right_time_ = !same && difference < config_.agree_gate() ? right_time_ + dt : 0;
   if (state_ == State::kOk) {
-    if (wrong_time_ < (same ? settings_.frozen_time : settings_.time)) return;
+    if (wrong_time_ < (same ? config_.frozen_time() : config_.time())) return;
     state_ = !same ? State::kBiased : measured_.isZero(0) ? State::kDead : State::kFrozen;
     right_time_ = 0;
-  } else if (right_time_ >= settings_.recover_time) {
+  } else if (right_time_ >= config_.recover_time()) {
     state_ = State::kOk;
     wrong_time_ = 0;
   }

@@ -6,15 +6,9 @@
 #include <cstdint>
 
 #include "components/framework/state_archive.h"
+#include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
-
-/// See FootSensorCheckConfig in state_estimator.proto for what each means.
-struct FootSensorCheckSettings {
-  bool enabled = true;
-  double gate = 60, frozen_gate = 20, agree_gate = 20;
-  double time = 0.05, frozen_time = 0.02, recover_time = 1;
-};
 
 class FootSensorCheck {
  public:
@@ -22,7 +16,7 @@ class FootSensorCheck {
   using Covariance = Eigen::Matrix<double, 6, 6>;
   enum class State : int8_t { kOk, kAbsent, kInvalid, kDead, kFrozen, kBiased };
 
-  explicit FootSensorCheck(const FootSensorCheckSettings& settings) : settings_(settings) {}
+  explicit FootSensorCheck(const FootSensorCheckConfig& config) : config_(config) {}
 
   /// Once a tick, `dt` s after the last: what the sensor says of itself (kOk, kAbsent or kInvalid)
   /// and what it reads.
@@ -41,7 +35,7 @@ class FootSensorCheck {
   }
 
  private:
-  FootSensorCheckSettings settings_;
+  FootSensorCheckConfig config_;
   State state_ = State::kOk, said_ = State::kOk;
   Wrench measured_ = Wrench::Zero();
   double same_time_ = 0;                    // s, for which not a bit has changed

@@ -10,12 +10,13 @@ constexpr double kLeastShare = 0.15;
 }  // namespace
 
 FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
-                           const FootWrenchSettings& settings)
-    : observer_(model, settings.observer),
-      check_every_(settings.check_every),
-      push_gate_(settings.observer.push_gate),
+                           const StateEstimatorConfig& config)
+    : observer_(model, config.wrench_observer()),
+      check_every_(config.wrench_observer().check_every()),
+      push_gate_(config.wrench_observer().push_gate()),
       least_force_(kLeastShare * model->total_mass() * robot::kGravity),
-      check_{FootSensorCheck(settings.check), FootSensorCheck(settings.check)} {
+      check_{FootSensorCheck(config.foot_sensor_check()),
+             FootSensorCheck(config.foot_sensor_check())} {
   noise_.head<3>().setConstant(model->force_noise());
   noise_.tail<3>().setConstant(model->moment_noise());
   wrench_.fill(robot::Vector6d::Zero());

@@ -12,12 +12,6 @@
 
 namespace poise {
 
-struct FootWrenchSettings {
-  WrenchObserverSettings observer;
-  FootSensorCheckSettings check;
-  int check_every = 4;  ///< ticks between observations while all sensors are good
-};
-
 /// What one foot's sensor says.
 struct FootReading {
   FootSensorCheck::State state = FootSensorCheck::State::kOk;  ///< as it says itself
@@ -26,7 +20,7 @@ struct FootReading {
 
 class FootWrenches {
  public:
-  FootWrenches(std::shared_ptr<const robot::RobotModel> model, const FootWrenchSettings& settings);
+  FootWrenches(std::shared_ptr<const robot::RobotModel> model, const StateEstimatorConfig& config);
 
   /// Once a tick, `dt` s after the last. `correction`: what is known before this tick. Allocates
   /// nothing. Any finite input gives finite wrenches.

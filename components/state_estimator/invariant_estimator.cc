@@ -47,29 +47,41 @@ constexpr double kRecoverTilt = 0.1, kRecoverSpeed = 1, kRecoverPosition = 1;
 
 double Square(double x) { return x * x; }
 
+/// What nobody gave is the robot's, and the IMU's noise is its own at least.
+InvariantEkfConfig WithRobot(InvariantEkfConfig config, const robot::RobotModel& model) {
+  const robot::DriveTrainModel& drive = model.drive_train();
+  if (!config.has_sensor_delay()) config.set_sensor_delay(drive.sensor_delay);
+  if (!config.has_gear_stiffness()) {
+    config.set_gear_stiffness(drive.link_encoder ? 0
+                                                 : drive.gear_stiffness);  // the encoders see it
+  }
+  const robot::ImuModel& imu = model.imu();
+  config.set_gyro_noise(std::max(config.gyro_noise(), imu.gyro_noise));
+  config.set_accelerometer_noise(std::max(config.accelerometer_noise(), imu.accelerometer_noise));
+  config.set_gyro_bias(std::max(config.gyro_bias(), imu.gyro_bias));
+  config.set_accelerometer_bias(std::max(config.accelerometer_bias(), imu.accelerometer_bias));
+  return config;
+}
+
 }  // namespace
 
 InvariantEstimator::InvariantEstimator(std::shared_ptr<const robot::RobotModel> model,
-                                       const InvariantEstimatorConfig& config, double period)
+                                       const StateEstimatorConfig& config, double period)
     : model_(std::move(model)),
-      config_(config),
+      loads_(config),
+      config_(WithRobot(config.invariant_ekf(), *model_)),
       period_(period),
       weight_(model_->total_mass() * robot::kGravity),
       encoder_noise_(model_->num_joints()),
       torque_(Eigen::VectorXd::Zero(model_->num_joints())),
       unrest_(Eigen::VectorXd::Zero(model_->num_joints())),
-      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff),
+      velocity_filter_(model_->num_joints(), config.joint_velocity_cutoff()),
       kinematics_(model_),
       filter_(robot::kGravity),
       joint_position_(Eigen::VectorXd::Zero(model_->num_joints())),
       link_position_(Eigen::VectorXd::Zero(model_->num_joints())),
       joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
       state_(model_->num_joints()) {
-  const robot::ImuModel& imu = model_->imu();
-  config_.gyro_noise = std::max(config.gyro_noise, imu.gyro_noise);
-  config_.accelerometer_noise = std::max(config.accelerometer_noise, imu.accelerometer_noise);
-  config_.gyro_bias = std::max(config.gyro_bias, imu.gyro_bias);
-  config_.accelerometer_bias = std::max(config.accelerometer_bias, imu.accelerometer_bias);
   for (int j = 0; j < model_->num_joints(); ++j) {
     const robot::MotorModel& motor = model_->motors()[static_cast<size_t>(j)];
     const double counts = motor.gear_ratio * motor.encoder_counts;
@@ -107,7 +119,7 @@ void InvariantEstimator::ReadJoints(const BaseSensors& sensors, double dt) {
   }
   joint_position_ = sensors.joint_position;
   link_position_ = sensors.joint_position;
-  if (!(config_.gear_stiffness > 0) || sensors.joint_torque.size() != torque_.size()) return;
+  if (!(config_.gear_stiffness() > 0) || sensors.joint_torque.size() != torque_.size()) return;
   const double compliance =
       std::clamp(1 + filter_.state().compliance, kLeastCompliance, kMostCompliance);
   // What has just changed of the torque first moves the rotor, and then rings.
@@ -116,7 +128,7 @@ void InvariantEstimator::ReadJoints(const BaseSensors& sensors, double dt) {
     const double torque = std::clamp(sensors.joint_torque[j], -kMaxTorque, kMaxTorque);
     if (placed_) unrest_[j] = std::max(unrest_[j], std::abs(torque - torque_[j]));
     torque_[j] = torque;
-    link_position_[j] -= compliance * torque / config_.gear_stiffness;
+    link_position_[j] -= compliance * torque / config_.gear_stiffness();
   }
 }
 
@@ -157,11 +169,11 @@ void InvariantEstimator::ReadSoles() {
       const robot::Vector6d column = kinematics_.RelativeColumn(f, j);
       const Vector3d shift = base * column.head<3>(), turn = base * column.tail<3>();
       double variance = Square(encoder_noise_[j]);
-      if (config_.gear_stiffness > 0) {
+      if (config_.gear_stiffness() > 0) {
         // The same error for kRinging, of which white noise must be so much larger to tell as
         // little.
-        variance += kRinging / period_ * Square(unrest_[j] / config_.gear_stiffness);
-        const double windup = torque_[j] / config_.gear_stiffness;
+        variance += kRinging / period_ * Square(unrest_[j] / config_.gear_stiffness());
+        const double windup = torque_[j] / config_.gear_stiffness();
         lag -= windup * shift;
         lean -= windup * turn;
       }
@@ -169,7 +181,7 @@ void InvariantEstimator::ReadSoles() {
       speed += velocity_filter_.value()[j] * shift;
       rate += velocity_filter_.value()[j] * turn;
     }
-    add_noise(Square(config_.timing), speed, rate);
+    add_noise(Square(config_.timing()), speed, rate);
     reading.noise << linear, mixed.transpose(), mixed, angular;
     reading.compliance = filter_.state().compliance;
     reading.by_compliance << lag, lean;
@@ -182,15 +194,16 @@ void InvariantEstimator::Begin(const InvariantState& state, double turn, double 
   deviation.segment<3>(InvariantFilter::kRotation).setConstant(turn);
   deviation.segment<3>(InvariantFilter::kVelocity).setConstant(speed);
   deviation.segment<3>(InvariantFilter::kPosition).setConstant(position);
-  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias);
-  deviation.segment<3>(InvariantFilter::kAccelerometerBias).setConstant(config_.accelerometer_bias);
-  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error;
+  deviation.segment<3>(InvariantFilter::kGyroBias).setConstant(config_.gyro_bias());
+  deviation.segment<3>(InvariantFilter::kAccelerometerBias)
+      .setConstant(config_.accelerometer_bias());
+  deviation[InvariantFilter::kCompliance] = config_.gear_stiffness_error();
   filter_.Set(state, deviation.cwiseAbs2().asDiagonal());
 }
 
 void InvariantEstimator::Place(const BaseSensors& sensors) {
   const FootWeights weights =
-      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+      WeighFeet(sensors.foot_load, weight_, loads_.light_load(), loads_.full_load());
   const Placement placement = PlaceOnGround(kinematics_, weights);
   InvariantState state;
   state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
@@ -198,7 +211,7 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   Begin(state, kUnplacedTurn, kStartSpeed, kUnplaced);
   for (size_t f = 0; f < 2; ++f) {
     if (!(weights.grip[f] > 0)) continue;  // a leg that hangs carries little
-    for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque;
+    for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque();
   }
   UpdateContacts(sensors);
   for (size_t f = 0; f < 2; ++f) {
@@ -223,8 +236,8 @@ void InvariantEstimator::DefineWorld(const FootWeights& weights) {
   if (!(sum > 0)) {  // on a hoist
     for (int axis = 0; axis < 3; ++axis) {
       filter_.Know(row(InvariantFilter::kRotation, axis),
-                   axis < 2 ? config_.start_tilt : config_.start_yaw);
-      filter_.Know(row(InvariantFilter::kPosition, axis), config_.start_position);
+                   axis < 2 ? config_.start_tilt() : config_.start_yaw());
+      filter_.Know(row(InvariantFilter::kPosition, axis), config_.start_position());
     }
     return;
   }
@@ -256,16 +269,16 @@ void InvariantEstimator::DefineWorld(const FootWeights& weights) {
   };
   const double right = share[0] / sum, left = share[1] / sum;
   for (int axis = 0; axis < 2; ++axis) {
-    turned(axis, right, left, config_.start_tilt);
-    moved(axis, 0.5, 0.5, config_.start_position);
+    turned(axis, right, left, config_.start_tilt());
+    moved(axis, 0.5, 0.5, config_.start_position());
   }
-  moved(2, right, left, config_.start_position);
+  moved(2, right, left, config_.start_position());
   const double apart =
       filter_.SeenPosition(feet_[1].reading).y() - filter_.SeenPosition(feet_[0].reading).y();
   if (apart > kLeastStance) {
-    moved(0, -1 / apart, 1 / apart, config_.start_yaw);
+    moved(0, -1 / apart, 1 / apart, config_.start_yaw());
   } else {
-    turned(2, right, left, config_.start_yaw);
+    turned(2, right, left, config_.start_yaw());
   }
 }
 
@@ -276,15 +289,15 @@ void InvariantEstimator::Propagate(double dt) {
   imu.acceleration = 0.5 * (last_force_ + force_);
   // A step at an unknown instant between two readings: uniform over their difference.
   imu.angular_velocity_noise =
-      Square(config_.gyro_noise) * Matrix3d::Identity() + turn * turn.transpose() / 12;
+      Square(config_.gyro_noise()) * Matrix3d::Identity() + turn * turn.transpose() / 12;
   imu.acceleration_noise =
-      Square(config_.accelerometer_noise) * Matrix3d::Identity() + push * push.transpose() / 12;
+      Square(config_.accelerometer_noise()) * Matrix3d::Identity() + push * push.transpose() / 12;
   if (!imu_good_ || !last_imu_good_) {
     imu.angular_velocity_noise += Square(kGyroFault) * Matrix3d::Identity();
     imu.acceleration_noise += Square(kAccelerometerFault) * Matrix3d::Identity();
   }
-  imu.gyro_bias_walk = config_.gyro_bias_walk;
-  imu.accelerometer_bias_walk = config_.accelerometer_bias_walk;
+  imu.gyro_bias_walk = config_.gyro_bias_walk();
+  imu.accelerometer_bias_walk = config_.accelerometer_bias_walk();
   filter_.Propagate(imu, dt);
 
   const InvariantFilter::Covariance& c = filter_.covariance();
@@ -300,8 +313,9 @@ void InvariantEstimator::Propagate(double dt) {
     const Foot& foot = feet_[f];
     filter_.Loosen(
         static_cast<int>(f),
-        foot.slip_left > 0 ? Square(config_.slip_speed * dt) : Square(config_.contact_walk) * dt,
-        foot.turn_left > 0 ? Square(config_.turn_speed * dt) : Square(config_.turn_walk) * dt);
+        foot.slip_left > 0 ? Square(config_.slip_speed() * dt)
+                           : Square(config_.contact_walk()) * dt,
+        foot.turn_left > 0 ? Square(config_.turn_speed() * dt) : Square(config_.turn_walk()) * dt);
   }
 }
 
@@ -315,7 +329,7 @@ void InvariantEstimator::Recover(bool finite) {
 
 void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
   const FootWeights weights =
-      WeighFeet(sensors.foot_load, weight_, config_.light_load, config_.full_load);
+      WeighFeet(sensors.foot_load, weight_, loads_.light_load(), loads_.full_load());
   ReadSoles();
   for (size_t f = 0; f < 2; ++f) {
     Foot& foot = feet_[f];
@@ -336,8 +350,8 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
     }
     const double inside = robot::DistanceInside(model_->feet()[f], sensors.foot_cop[f]);
     if (filter_.holds_rotation(i)) {
-      if (!(inside > 0.5 * config_.cop_margin)) filter_.ReleaseRotation(i);
-    } else if (inside > config_.cop_margin) {
+      if (!(inside > 0.5 * config_.cop_margin())) filter_.ReleaseRotation(i);
+    } else if (inside > config_.cop_margin()) {
       filter_.HoldRotation(i, foot.reading);
       LetTurn(f);
     }
@@ -345,7 +359,7 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
 }
 
 void InvariantEstimator::LetSlip(size_t foot) {
-  feet_[foot].slip_left = config_.rest_time;
+  feet_[foot].slip_left = config_.rest_time();
   feet_[foot].slip_time = 0;
   BeginRest(foot);
 }
@@ -360,7 +374,7 @@ Eigen::Vector3d InvariantEstimator::Apart(size_t foot) const {
 }
 
 void InvariantEstimator::LetTurn(size_t foot) {
-  feet_[foot].turn_left = config_.rest_time;
+  feet_[foot].turn_left = config_.rest_time();
   feet_[foot].turn_start = filter_.SeenRotation(feet_[foot].reading);
 }
 
@@ -375,8 +389,8 @@ void InvariantEstimator::Correct(double dt) {
     foot.reading.noise *= scale;
     const InvariantFilter::Innovation test = filter_.Test(static_cast<int>(f), foot.reading);
     foot.innovation = test.position;
-    moved[f] = (foot.slip_left <= 0 && test.position > config_.gate) ||
-               (foot.turn_left <= 0 && test.rotation > config_.gate);
+    moved[f] = (foot.slip_left <= 0 && test.position > config_.gate()) ||
+               (foot.turn_left <= 0 && test.rotation > config_.gate());
     firm += foot.slip_left <= 0 ? 1 : 0;
     if (!moved[f]) {
       const double shown = scale * std::max(test.position, test.rotation) / 3;  // 3: its mean
@@ -391,13 +405,13 @@ void InvariantEstimator::Correct(double dt) {
       if (!foot.loaded || moved[f] != after) continue;
       if (moved[f]) {
         const InvariantFilter::Innovation test = filter_.Test(i, foot.reading);
-        if (foot.slip_left <= 0 && test.position > config_.gate) {
+        if (foot.slip_left <= 0 && test.position > config_.gate()) {
           LetSlip(f);
-          filter_.Loosen(i, Square(config_.slip_speed * dt), 0);
+          filter_.Loosen(i, Square(config_.slip_speed() * dt), 0);
         }
-        if (foot.turn_left <= 0 && test.rotation > config_.gate) {
+        if (foot.turn_left <= 0 && test.rotation > config_.gate()) {
           LetTurn(f);
-          filter_.Loosen(i, 0, Square(config_.turn_speed * dt));
+          filter_.Loosen(i, 0, Square(config_.turn_speed() * dt));
         }
       }
       filter_.Correct(i, foot.reading);
@@ -420,12 +434,12 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
       const double speed =
           std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
       const bool together = feet_[1 - f].loaded &&
-                            (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time;
+                            (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time();
       if (!other_stands && (together || foot.slip_time > kLongestSlip)) {
         // Then it is the world, and the base's velocity is what is wrong.
-        filter_.Doubt(0, Square(way / config_.rest_time), 0);
-      } else if (way > config_.rest_distance + 3 * speed * config_.rest_time) {
-        foot.slip_left = config_.rest_time;
+        filter_.Doubt(0, Square(way / config_.rest_time()), 0);
+      } else if (way > config_.rest_distance() + 3 * speed * config_.rest_time()) {
+        foot.slip_left = config_.rest_time();
         BeginRest(f);
       }
     }
@@ -434,13 +448,13 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
     foot.turn_left -= dt;
     const double turn =
         RotationLog(filter_.SeenRotation(feet_[f].reading) * foot.turn_start.transpose()).norm();
-    if (foot.turn_left <= 0 && turn > config_.rest_turn) LetTurn(f);
+    if (foot.turn_left <= 0 && turn > config_.rest_turn()) LetTurn(f);
   }
 }
 
 void InvariantEstimator::Publish() {
   const InvariantState& s = filter_.state();
-  const double d = config_.sensor_delay;
+  const double d = config_.sensor_delay();
   const Matrix3d to_base = kinematics_.imu_rotation();
   const Matrix3d base = s.rotation * to_base.transpose();
   const Vector3d rate =
@@ -500,9 +514,9 @@ void InvariantEstimator::Publish() {
   // the last two readings at an unknown instant of it.
   const Vector3d turn = r * (gyro_ - last_gyro_), push = r * (force_ - last_force_);
   const bool fault = !imu_good_;
-  const double gyro_variance = Square(config_.gyro_noise) + (fault ? Square(kGyroFault) : 0);
+  const double gyro_variance = Square(config_.gyro_noise()) + (fault ? Square(kGyroFault) : 0);
   const double force_variance =
-      Square(config_.accelerometer_noise) + (fault ? Square(kAccelerometerFault) : 0);
+      Square(config_.accelerometer_noise()) + (fault ? Square(kAccelerometerFault) : 0);
   Eigen::Matrix<double, 9, 3> spread = Eigen::Matrix<double, 9, 3>::Zero();
   spread.middleRows<3>(0) = d * Matrix3d::Identity();
   spread.middleRows<3>(3) = Skew(lever);
@@ -516,7 +530,7 @@ void InvariantEstimator::Publish() {
   // The instant of the readings is uncertain.
   Eigen::Matrix<double, 9, 1> motion;
   motion << rate, acceleration, velocity;
-  base_covariance_.noalias() += Square(config_.timing) * motion * motion.transpose();
+  base_covariance_.noalias() += Square(config_.timing()) * motion * motion.transpose();
 }
 
 FootContact InvariantEstimator::contact(int foot) const {

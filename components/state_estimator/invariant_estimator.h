@@ -20,23 +20,9 @@
 #include "components/state_estimator/invariant_filter.h"
 #include "components/state_estimator/low_pass.h"
 #include "components/state_estimator/sole_kinematics.h"
+#include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
-
-/// See InvariantEkfConfig in state_estimator.proto for what each means.
-struct InvariantEstimatorConfig {
-  double joint_velocity_cutoff = 20;
-  double light_load = 0.05, full_load = 0.2;
-  double sensor_delay = 0, timing = 0.0005, gear_stiffness = 0, gear_stiffness_error = 0.2;
-  double gyro_noise = 1e-4, accelerometer_noise = 1e-2;
-  double gyro_bias = 1e-3, accelerometer_bias = 0.1;
-  double gyro_bias_walk = 1e-6, accelerometer_bias_walk = 1e-4;
-  double start_position = 5e-5, start_tilt = 5e-4, start_yaw = 5e-5, start_torque = 30;
-  double contact_walk = 2e-5, turn_walk = 4e-5;
-  double slip_speed = 0.3, turn_speed = 1;
-  double cop_margin = 0.02;
-  double gate = 25, rest_time = 0.05, rest_distance = 1e-4, rest_turn = 2e-4;
-};
 
 enum class FootContact : int8_t { kNone, kFirm, kSlipping };
 
@@ -47,7 +33,7 @@ class InvariantEstimator {
 
   /// `period` s, nominal, > 0: steps are taken to last from a tenth of it to 1 s.
   InvariantEstimator(std::shared_ptr<const robot::RobotModel> model,
-                     const InvariantEstimatorConfig& config, double period);
+                     const StateEstimatorConfig& config, double period);
 
   /// Takes the next readings, `dt` s after the last. The first call places the robot as
   /// PlaceOnGround says, at rest. Any finite input gives a finite state. Allocates nothing.
@@ -103,7 +89,8 @@ class InvariantEstimator {
   void Publish();
 
   std::shared_ptr<const robot::RobotModel> model_;
-  InvariantEstimatorConfig config_;
+  StateEstimatorConfig loads_;  // whose light_load and full_load weigh feet
+  InvariantEkfConfig config_;
   double period_;
   double weight_;                    // N, of the robot
   Eigen::VectorXd encoder_noise_;    // rad, standard deviation by joint

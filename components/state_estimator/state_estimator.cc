@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 constexpr double kLongestDelay = 0.05;  // s
 
-BaseEstimatorConfig ReadAnchoredConfig(const StateEstimatorConfig& config) {
+void CheckConfig(const StateEstimatorConfig& config, const robot::RobotModel& model) {
   if (config.gyro_bias_time_constant() < 4 * config.orientation_time_constant()) {
     throw ConfigError("gyro_bias_time_constant",
                       "must be at least four times orientation_time_constant, or the estimate "
@@ -29,93 +29,12 @@ BaseEstimatorConfig ReadAnchoredConfig(const StateEstimatorConfig& config) {
   if (config.full_load() <= config.light_load()) {
     throw ConfigError("full_load", "must be greater than light_load");
   }
-  BaseEstimatorConfig result;
-  result.joint_velocity_cutoff = config.joint_velocity_cutoff();
-  result.orientation_time_constant = config.orientation_time_constant();
-  result.gravity_time_constant = config.gravity_time_constant();
-  result.gyro_bias_time_constant = config.gyro_bias_time_constant();
-  result.anchor_time_constant = config.anchor_time_constant();
-  result.foot_rotation_tolerance = config.foot_rotation_tolerance();
-  result.light_load = config.light_load();
-  result.full_load = config.full_load();
-  return result;
-}
-
-InvariantEstimatorConfig ReadInvariantConfig(const StateEstimatorConfig& config,
-                                             const robot::DriveTrainModel& drive) {
-  const InvariantEkfConfig& in = config.invariant_ekf();
-  InvariantEstimatorConfig out;
-  out.joint_velocity_cutoff = config.joint_velocity_cutoff();
-  out.light_load = config.light_load();
-  out.full_load = config.full_load();
-  out.sensor_delay = in.has_sensor_delay() ? in.sensor_delay() : drive.sensor_delay;
-  if (out.sensor_delay > kLongestDelay) {
+  if (!config.invariant_ekf().has_sensor_delay() &&
+      model.drive_train().sensor_delay > kLongestDelay) {
     throw ConfigError("invariant_ekf.sensor_delay",
-                      "must be at most 0.05 s: the motion is not known further ahead");
+                      "must be at most 0.05 s, and the robot file's is longer: the motion is not "
+                      "known further ahead");
   }
-  out.timing = in.timing();
-  const double stiffness = drive.link_encoder ? 0 : drive.gear_stiffness;  // the encoders see it
-  out.gear_stiffness = in.has_gear_stiffness() ? in.gear_stiffness() : stiffness;
-  out.gear_stiffness_error = in.gear_stiffness_error();
-  out.gyro_noise = in.gyro_noise();
-  out.accelerometer_noise = in.accelerometer_noise();
-  out.gyro_bias = in.gyro_bias();
-  out.accelerometer_bias = in.accelerometer_bias();
-  out.gyro_bias_walk = in.gyro_bias_walk();
-  out.accelerometer_bias_walk = in.accelerometer_bias_walk();
-  out.start_position = in.start_position();
-  out.start_tilt = in.start_tilt();
-  out.start_yaw = in.start_yaw();
-  out.start_torque = in.start_torque();
-  out.contact_walk = in.contact_walk();
-  out.turn_walk = in.turn_walk();
-  out.slip_speed = in.slip_speed();
-  out.turn_speed = in.turn_speed();
-  out.cop_margin = in.cop_margin();
-  out.gate = in.gate();
-  out.rest_time = in.rest_time();
-  out.rest_distance = in.rest_distance();
-  out.rest_turn = in.rest_turn();
-  return out;
-}
-
-FootWrenchSettings ReadFootWrenchSettings(const StateEstimatorConfig& config) {
-  const WrenchObserverConfig& in = config.wrench_observer();
-  const FootSensorCheckConfig& check = config.foot_sensor_check();
-  FootWrenchSettings out;
-  out.observer = {.cutoff = in.cutoff(),
-                  .friction_error = in.friction_error(),
-                  .friction_stiffness = in.friction_stiffness(),
-                  .torque_error = in.torque_error(),
-                  .mass_error = in.mass_error(),
-                  .com_error = in.com_error(),
-                  .acceleration_error = in.acceleration_error(),
-                  .push_gate = in.push_gate(),
-                  .latency = in.latency()};
-  out.check_every = in.check_every();
-  out.check = {.enabled = check.enabled(),
-               .gate = check.gate(),
-               .frozen_gate = check.frozen_gate(),
-               .agree_gate = check.agree_gate(),
-               .time = check.time(),
-               .frozen_time = check.frozen_time(),
-               .recover_time = check.recover_time()};
-  return out;
-}
-
-CalibratorSettings ReadCalibratorSettings(const StateEstimatorConfig& config) {
-  const CalibrationConfig& in = config.calibration();
-  return {.enabled = in.enabled(),
-          .max_mass = in.max_mass(),
-          .max_shift = in.max_shift(),
-          .walk = in.walk(),
-          .force_error = in.force_error(),
-          .moment_error = in.moment_error(),
-          .still_rate = in.still_rate(),
-          .still_acceleration = in.still_acceleration(),
-          .gate = in.gate(),
-          .apply_time = in.apply_time(),
-          .cutoff = config.wrench_observer().cutoff()};
 }
 
 FootReading ReadFoot(const robot_sensors_t& sensors, size_t foot) {
@@ -145,11 +64,10 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   if (!config.has_joint_velocity_cutoff()) {
     config.set_joint_velocity_cutoff(balance::VelocityCutoff(*model));
   }
-  const BaseEstimatorConfig anchored = ReadAnchoredConfig(config);
-  const InvariantEstimatorConfig invariant = ReadInvariantConfig(config, model->drive_train());
-  wrenches_ = std::make_unique<FootWrenches>(model, ReadFootWrenchSettings(config));
-  calibrator_ =
-      std::make_unique<Calibrator>(model, ReadCalibratorSettings(config), context.tick_period);
+  CheckConfig(config, *model);
+  wrenches_ = std::make_unique<FootWrenches>(model, config);
+  calibrator_ = std::make_unique<Calibrator>(
+      model, config.calibration(), config.wrench_observer().cutoff(), context.tick_period);
   const MessageCounts counts = JointAndFootCounts(*model);
   wiring->AddInput(&robot_sensors_, "robot_sensors", counts);
   wiring->AddOutput(&robot_state_, "robot_state", counts);
@@ -158,11 +76,11 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
                    [this](const Tick& tick) { Estimate(tick); });
   last_time_ = MakeTick(0, context.tick_period, context.lead_ticks).time;
   if (config.method() == StateEstimatorConfig::INVARIANT_EKF) {
-    invariant_ = std::make_unique<InvariantEstimator>(model, invariant, context.tick_period);
+    invariant_ = std::make_unique<InvariantEstimator>(model, config, context.tick_period);
     estimator_status_->method = estimator_status_t::METHOD_INVARIANT_EKF;
     estimator_status_->has_covariance = 1;
   } else {
-    anchored_ = std::make_unique<BaseEstimator>(model, anchored, context.tick_period);
+    anchored_ = std::make_unique<BaseEstimator>(model, config, context.tick_period);
     estimator_status_->method = estimator_status_t::METHOD_ANCHORED_FEET;
   }
 }

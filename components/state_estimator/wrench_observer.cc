@@ -35,10 +35,10 @@ double Square(double x) { return x * x; }
 }  // namespace
 
 WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
-                               const WrenchObserverSettings& settings)
+                               const WrenchObserverConfig& config)
     : model_(std::move(model)),
-      settings_(settings),
-      filter_(2 * model_->num_joints() + 6, settings.cutoff),
+      config_(config),
+      filter_(2 * model_->num_joints() + 6, config.cutoff()),
       input_(Eigen::VectorXd::Zero(2 * model_->num_joints() + 6)),
       state_(model_->num_joints()),
       data_(*model_),
@@ -60,7 +60,7 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     supports_.push_back(supports);
   }
   errors_ = JointErrors(leg_joints_.size(),
-                        {settings_.friction_error, settings_.torque_error, settings_.mass_error});
+                        {config_.friction_error(), config_.torque_error(), config_.mass_error()});
   torques_.assign(leg_joints_.size(), {});
   residual_ = variance_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(leg_joints_.size()));
   noise_ = bristle_ = bristle_error_ =
@@ -72,7 +72,7 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
     // White noise passes to the low-pass's second derivative with ω², times 0.8 to 1.
     const double count = 2 * std::numbers::pi / (motor.gear_ratio * motor.encoder_counts);
     const double acceleration =
-        Square(2 * std::numbers::pi * settings.cutoff) * count / std::sqrt(12.0);
+        Square(2 * std::numbers::pi * config.cutoff()) * count / std::sqrt(12.0);
     noise_[i] = kLeastVariance;
     if (std::isfinite(acceleration)) noise_[i] += Square(motor.reflected_inertia * acceleration);
   }
@@ -114,9 +114,9 @@ void WrenchObserver::TrackFriction(double dt) {
     if (!(limit > 0)) continue;
     const double way = dt * filter_.rate().head(n)[leg_joints_[k]];
     const double end = std::copysign(limit, way);
-    const double keep = std::exp(-settings_.friction_stiffness * std::abs(way) / limit);
+    const double keep = std::exp(-config_.friction_stiffness() * std::abs(way) / limit);
     bristle_[i] = end + keep * (bristle_[i] - end);
-    const double error = settings_.friction_error * limit;
+    const double error = config_.friction_error() * limit;
     bristle_error_[i] = error + keep * (bristle_error_[i] - error);
   }
 }
@@ -224,9 +224,9 @@ void WrenchObserver::AddJointRows() {
     const double held = bristle_[static_cast<Eigen::Index>(k)];
     const double friction = held + motor.viscous_friction * speed;
     double variance = Square(bristle_error_[static_cast<Eigen::Index>(k)]) +
-                      Square(settings_.friction_error * motor.viscous_friction * speed) +
-                      Square(settings_.torque_error * torque) +
-                      Square(settings_.mass_error * joint_torque_[joint]) +
+                      Square(config_.friction_error() * motor.viscous_friction * speed) +
+                      Square(config_.torque_error() * torque) +
+                      Square(config_.mass_error() * joint_torque_[joint]) +
                       noise_[static_cast<Eigen::Index>(k)];
     double known = torque - friction - joint_torque_[joint];
     torques_[k] = {held, torque, joint_torque_[joint]};
@@ -274,9 +274,9 @@ bool WrenchObserver::AddBaseRows() {
   const double size = base_force_.norm();
   robot::Vector6d noise;
   for (int i = 0; i < 3; ++i) {
-    noise[i] = Square(mass * settings_.mass_error * base_force_[i]) +
-               Square(mass * settings_.acceleration_error);
-    noise[3 + i] = Square(mass * settings_.com_error * size);
+    noise[i] = Square(mass * config_.mass_error() * base_force_[i]) +
+               Square(mass * config_.acceleration_error());
+    noise[3 + i] = Square(mass * config_.com_error() * size);
   }
   const robot::Vector6d gap = base - sum * estimate_;
   const Eigen::Matrix<double, 12, 6> cross = spread_ * sum.transpose();
@@ -286,9 +286,9 @@ bool WrenchObserver::AddBaseRows() {
   Eigen::LLT<Matrix6> factors(total);
   push_excess_ = torque_known_ ? gap.dot(factors.solve(gap)) : 0;
   if (!std::isfinite(push_excess_)) return false;
-  if (push_excess_ > settings_.push_gate) {
+  if (push_excess_ > config_.push_gate()) {
     // Something else pushes: what the base says is worth less, the more they disagree.
-    total.diagonal() += (Square(push_excess_ / settings_.push_gate) - 1) * noise;
+    total.diagonal() += (Square(push_excess_ / config_.push_gate()) - 1) * noise;
     factors.compute(total);
   }
   const Eigen::Matrix<double, 6, 12> gain = factors.solve(cross.transpose());
@@ -361,7 +361,7 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   for (Eigen::Index f = 0; f < 2; ++f) {
     settled_covariance_.block<6, 6>(6 * f, 6 * f) *= fit_[static_cast<size_t>(f)];
   }
-  const Wrenches late = settings_.latency * rate_;
+  const Wrenches late = config_.latency() * rate_;
   covariance_.noalias() += late * late.transpose();
   return true;
 }

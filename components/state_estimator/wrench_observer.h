@@ -21,17 +21,9 @@
 #include "components/state_estimator/base_sensors.h"
 #include "components/state_estimator/joint_errors.h"
 #include "components/state_estimator/low_pass.h"
+#include "components/state_estimator/state_estimator.pb.h"
 
 namespace poise {
-
-/// See WrenchObserverConfig in state_estimator.proto for what each means.
-struct WrenchObserverSettings {
-  double cutoff = 40;
-  double friction_error = 0.5, friction_stiffness = 1e4, torque_error = 0.02;
-  double mass_error = 0.02, com_error = 0.006, acceleration_error = 0.03;
-  double push_gate = 25;
-  double latency = 0.01;
-};
 
 /// What else the readings are known to hold, and the robot to carry.
 struct ObserverCorrection {
@@ -48,7 +40,7 @@ class WrenchObserver {
   using Covariance = Eigen::Matrix<double, 12, 12>;
 
   WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
-                 const WrenchObserverSettings& settings);
+                 const WrenchObserverConfig& config);
 
   /// Takes the readings of a tick, `dt` s after the last. The first are taken to be those of a
   /// robot at rest. Allocates nothing, as Observe.
@@ -92,7 +84,7 @@ class WrenchObserver {
   void Learn(double dt);
 
   std::shared_ptr<const robot::RobotModel> model_;
-  WrenchObserverSettings settings_;
+  WrenchObserverConfig config_;
   std::vector<int> leg_joints_;
   std::vector<std::array<bool, 2>> supports_;  // by leg joint: of which feet
   LowPass filter_;                             // positions, gyro, accelerometer, torques

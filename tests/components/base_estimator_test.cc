@@ -30,7 +30,7 @@ struct Errors {
 
 class Follow {
  public:
-  Follow(BaseMotion* motion, const BaseEstimatorConfig& config = {})
+  Follow(BaseMotion* motion, const StateEstimatorConfig& config = {})
       : motion_(*motion), estimator_(motion->model(), config, kPeriod) {}
 
   void Step() {

@@ -42,8 +42,16 @@ Eigen::Matrix<double, 9, 1> BaseError(const robot::RobotState& estimate,
 
 class FollowMotion {
  public:
-  explicit FollowMotion(BaseMotion* motion, const InvariantEstimatorConfig& config = {})
-      : motion_(*motion), estimator_(motion->model(), config, kTick) {}
+  explicit FollowMotion(BaseMotion* motion, const StateEstimatorConfig& config = {})
+      : motion_(*motion), estimator_(motion->model(), AsTheMotion(config), kTick) {}
+
+  /// What the motion's sensors are where nothing else is given: in time, on rigid gears.
+  static StateEstimatorConfig AsTheMotion(StateEstimatorConfig config) {
+    InvariantEkfConfig* ekf = config.mutable_invariant_ekf();
+    if (!ekf->has_sensor_delay()) ekf->set_sensor_delay(0);
+    if (!ekf->has_gear_stiffness()) ekf->set_gear_stiffness(0);
+    return config;
+  }
 
   void Step() {
     motion_.Next();
@@ -101,9 +109,9 @@ TEST_P(AnyInvariantRobot, FollowsNoisyReadings) {
   errors.accelerometer_noise = 1.7e-2;
   errors.accelerometer_bias = 0.1 * Vector3d(1, -1, 1) / std::sqrt(3.0);
   errors.load_noise = 1;
-  InvariantEstimatorConfig config;
-  config.gyro_noise = 2e-4;
-  config.accelerometer_noise = 1.7e-2;
+  StateEstimatorConfig config;
+  config.mutable_invariant_ekf()->set_gyro_noise(2e-4);
+  config.mutable_invariant_ekf()->set_accelerometer_noise(1.7e-2);
   FollowMotion follow(&motion, config);
   const bool waist = GetParam() == MantisPath();
   while (motion.time() < 20) {
@@ -239,9 +247,9 @@ TEST(InvariantEstimator, WindupOfTheGearsIsTakenOut) {
   for (const bool known : {false, true}) {
     BaseMotion motion(DyrosPath());
     const int n = motion.model()->num_joints();
-    InvariantEstimatorConfig config;
-    config.gear_stiffness = known ? kStiffness : 0;
-    InvariantEstimator estimator(motion.model(), config, kTick);
+    StateEstimatorConfig config;
+    config.mutable_invariant_ekf()->set_gear_stiffness(known ? kStiffness : 0);
+    InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
     Eigen::VectorXd torque(n), reading(n);
     for (int j = 0; j < n; ++j) torque[j] = 40 * std::sin(1 + j);
     motion.Next();
@@ -267,10 +275,10 @@ TEST(InvariantEstimator, TorquesThatCannotBeTrustedAtFirstDoNotTiltTheWorld) {
     BaseMotion motion(DyrosPath());
     motion.errors() = TypicalErrors(*motion.model());
     const int n = motion.model()->num_joints();
-    InvariantEstimatorConfig config;
-    config.gear_stiffness = kStiffness;
-    if (trusted) config.start_torque = 0;
-    InvariantEstimator estimator(motion.model(), config, kTick);
+    StateEstimatorConfig config;
+    config.mutable_invariant_ekf()->set_gear_stiffness(kStiffness);
+    if (trusted) config.mutable_invariant_ekf()->set_start_torque(0);
+    InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
     Eigen::VectorXd torque(n), reading(n), shown(n);
     for (int j = 0; j < n; ++j) torque[j] = 25 * std::sin(1 + j);
     int inside = 0, ticks = 0;
@@ -310,10 +318,10 @@ TEST(InvariantEstimator, AnUncertainStiffnessIsFound) {
     Sway(&motion, 0.02);
     motion.errors() = TypicalErrors(*motion.model());
     const int n = motion.model()->num_joints();
-    InvariantEstimatorConfig config;
-    config.gear_stiffness = 1.5 * kStiffness;
-    config.gear_stiffness_error = certain ? 0 : 0.4;
-    InvariantEstimator estimator(motion.model(), config, kTick);
+    StateEstimatorConfig config;
+    config.mutable_invariant_ekf()->set_gear_stiffness(1.5 * kStiffness);
+    config.mutable_invariant_ekf()->set_gear_stiffness_error(certain ? 0 : 0.4);
+    InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
     Eigen::VectorXd torque(n), reading(n);
     int inside = 0, ticks = 0;
     while (motion.time() < 10) {
@@ -346,7 +354,7 @@ TEST(InvariantEstimator, ReadingsWorseThanTheirNoiseCountLess) {
   motion.script().load = {[](double) { return 1.0; }, [](double) { return 0.0; }};
   motion.errors() = TypicalErrors(*motion.model());
   const int n = motion.model()->num_joints();
-  InvariantEstimator estimator(motion.model(), {}, kTick);
+  InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion({}), kTick);
   Eigen::VectorXd reading(n);
   int slips = 0;
   while (motion.time() < 4) {
@@ -382,9 +390,9 @@ TEST(InvariantEstimator, TheDelayOfTheReadingsIsPredicted) {
     Sway(&motion, 0.03);
     BaseMotion late(DyrosPath());
     Sway(&late, 0.03);
-    InvariantEstimatorConfig config;
-    config.sensor_delay = known ? kDelay * kTick : 0;
-    InvariantEstimator estimator(motion.model(), config, kTick);
+    StateEstimatorConfig config;
+    config.mutable_invariant_ekf()->set_sensor_delay(known ? kDelay * kTick : 0);
+    InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
     double worst_position = 0, worst_turn = 0;
     for (int i = 0; i < 2000; ++i) {
       motion.Next();
@@ -442,11 +450,11 @@ TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
   const int n = motion.model()->num_joints();
   std::mt19937_64 random(TestSeed(3));
   const auto garbage = [&] { return AnyFinite(&random); };
-  InvariantEstimatorConfig config;
-  config.gear_stiffness = 7e4;
-  config.sensor_delay = 0.002;
+  StateEstimatorConfig config;
+  config.mutable_invariant_ekf()->set_gear_stiffness(7e4);
+  config.mutable_invariant_ekf()->set_sensor_delay(0.002);
   for (int run = 0; run < 60; ++run) {
-    InvariantEstimator estimator(motion.model(), config, kTick);
+    InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
     Eigen::VectorXd q(n), torque(n);
     for (int i = 0; i < 200; ++i) {
       for (int j = 0; j < n; ++j) {
@@ -478,7 +486,7 @@ TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
 TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
   BaseMotion motion(DyrosPath());
   Sway(&motion, 0.01);
-  InvariantEstimator estimator(motion.model(), {}, kTick);
+  InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion({}), kTick);
   double worst_after = 0;
   for (int i = 0; i < 3000; ++i) {
     motion.Next();
@@ -500,8 +508,8 @@ TEST(InvariantEstimator, ABurstOfImpossibleReadingsIsRiddenOut) {
 TEST(InvariantEstimator, SolesThatMoveAlikeStand) {
   constexpr double kBlow = 50, kSeconds = 2 * kTick;  // m/s² too much, for so long
   BaseMotion motion(DyrosPath());
-  const InvariantEstimatorConfig config;
-  InvariantEstimator estimator(motion.model(), config, kTick);
+  const StateEstimatorConfig config;
+  InvariantEstimator estimator(motion.model(), FollowMotion::AsTheMotion(config), kTick);
   bool both_slipped = false;
   for (int i = 0; i < 1000; ++i) {
     motion.Next();
@@ -510,7 +518,7 @@ TEST(InvariantEstimator, SolesThatMoveAlikeStand) {
     estimator.Update(sensors, kTick);
     both_slipped = both_slipped || (estimator.contact(0) == FootContact::kSlipping &&
                                     estimator.contact(1) == FootContact::kSlipping);
-    if (i < 502 + 1.2 * config.rest_time / kTick) continue;
+    if (i < 502 + 1.2 * config.invariant_ekf().rest_time() / kTick) continue;
     EXPECT_EQ(estimator.contact(0), FootContact::kFirm) << i;
     EXPECT_EQ(estimator.contact(1), FootContact::kFirm) << i;
     ASSERT_LT(estimator.state().base_linear_velocity.norm(), 0.01) << i;
@@ -518,7 +526,7 @@ TEST(InvariantEstimator, SolesThatMoveAlikeStand) {
   EXPECT_TRUE(both_slipped);
   const double way =
       (estimator.state().base_position - motion.truth().base_position).head<2>().norm();
-  EXPECT_LT(way, kBlow * kSeconds * 1.2 * config.rest_time);
+  EXPECT_LT(way, kBlow * kSeconds * 1.2 * config.invariant_ekf().rest_time());
 }
 
 // On a hoist for a minute, then put down: it begins again and finds its velocity.

@@ -141,7 +141,7 @@ class Motion {
     if (!(limit > 0)) return 0;
     constexpr int kSteps = 100;
     const double sign = way < 0 ? -1 : 1;
-    const double stiffness = WrenchObserverSettings().friction_stiffness;
+    const double stiffness = WrenchObserverConfig().friction_stiffness();
     for (int i = 0; i < kSteps; ++i) held += stiffness * (1 - sign * held / limit) * way / kSteps;
     return held;
   }

@@ -31,6 +31,7 @@ inline SupervisorConfig ThreeJoints() {
     config.torque_limit.push_back(limit[j]);
   }
   config.monitor.period = 0.002;
+  config.enable_cycles = 2;
   config.damping_after_cycles = 3;
   config.stop_after_cycles = 13;
   config.damping.assign(config.motors.size(), 20);

@@ -282,7 +282,8 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
       }
       // A step that the stance leg cannot follow counts as worse, wherever the foot goes.
       const Vector2d behind = state.sole[stance] - plan.com;
-      if (best < limits.ample_margin || !balance::Contains(reach.Leg(1 - foot, 1), behind)) continue;
+      if (best < limits.ample_margin || !balance::Contains(reach.Leg(1 - foot, 1), behind))
+        continue;
       ++possible;
       EXPECT_GE(plan.margin, -0.02) << "foot " << foot << ", velocity "
                                     << state.pendulum.velocity.transpose() << ", best " << best;

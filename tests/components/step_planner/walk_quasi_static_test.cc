@@ -94,7 +94,10 @@ TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
         world.sole()[static_cast<size_t>(foot)].translation().head<2>() - world.com().head<2>();
     const double leg = walk.choice().legs().Highest(foot, sole, 0.92);
     const double ahead = std::min(0.6 * whole, world.spec().most_ahead);
-    const double up = whole > world.spec().soft ? std::max(std::min(leg, stands) - stands + world.spec().com_lowering, 0.0) : 0;
+    const double up =
+        whole > world.spec().soft
+            ? std::max(std::min(leg, stands) - stands + world.spec().com_lowering, 0.0)
+            : 0;
     EXPECT_NEAR(height - world.com().z(), depth + ahead - up, 0.005) << depth;
   }
 }
@@ -117,7 +120,8 @@ TEST(Walk, LooksForTheGroundWhereTheSunkSoleMetIt) {
       EXPECT_NEAR(world.time(), due, 0.02);
     } else {
       world.Run(3, command);
-      EXPECT_NEAR(world.walk().output().swing.position.z(), -kSunk - world.spec().search_depth, 1e-3);
+      EXPECT_NEAR(world.walk().output().swing.position.z(), -kSunk - world.spec().search_depth,
+                  1e-3);
     }
   }
 }
@@ -178,8 +182,8 @@ TEST(Walk, AFootThatFindsNothingWaitsWhereItIs) {
   EXPECT_EQ(world.walk().num_steps(), 0);
 }
 
-// Soles that sink by 2.5 and 4.5 times what counts as soft: the swing takes the root of it longer, at
-// most twice.
+// Soles that sink by 2.5 and 4.5 times what counts as soft: the swing takes the root of it longer,
+// at most twice.
 TEST(Walk, SwingsSlowlyAboveASoleThatHasSunk) {
   const WalkCommand command{{0, 0}, 0, true};
   WalkConfig config = QuasiStatic();

@@ -114,7 +114,9 @@ TEST(WalkDefaults, AreOneWalkInUnitsOfGravityAndHeight) {
   given.mutable_motion()->set_swing(0.5);
   const Walk walk = MakeWalk(given, ContactConfirmation(), other);
   EXPECT_NEAR(walk.period() - 0.5,
-              std::sqrt(ratio) * (first.walk().period() - GroupDefault<StepMotion, WalkConfig>("motion").swing()), 1e-12);
+              std::sqrt(ratio) *
+                  (first.walk().period() - GroupDefault<StepMotion, WalkConfig>("motion").swing()),
+              1e-12);
 }
 
 // A leg presses with its mass at the foot times k_p of the foot's task: 6 kg and 625 1/s^2 of a
@@ -151,9 +153,9 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
     const char* field;
     double possible, impossible;
   };
-  for (const Case& c : {Case{"motion.com_lowering", 0.08, 0.8}, Case{"motion.gap", 0.1, 0.5},
-                        Case{"motion.clearance", 0.14, 3}, Case{"longest", 0.3, 9},
-                        Case{"widest", 0.2, 4}}) {
+  for (const Case& c :
+       {Case{"motion.com_lowering", 0.08, 0.8}, Case{"motion.gap", 0.1, 0.5},
+        Case{"motion.clearance", 0.14, 3}, Case{"longest", 0.3, 9}, Case{"widest", 0.2, 4}}) {
     WalkConfig config = Enabled();
     SetField(&config, c.field, std::to_string(c.possible));
     EXPECT_EQ(RefusedField(config, model), "accepted") << c.field;

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using robot::TestRobot;
 
 inline const WalkCommand kStand{};
-inline constexpr double kPeriod = 0.002;      // s
+inline constexpr double kPeriod = 0.002;  // s
 
 // What the world has in place of the paper's robot and the ground.
 inline constexpr double kWeight = 500;    // N
@@ -38,7 +38,8 @@ class World {
  public:
   /// The shipped walk, but for what is given. `rough`: m, by how much the ground is lower under
   /// every third foothold. `patient`: s more for each ramp of the load.
-  explicit World(TestRobot robot, double rough = 0, double patient = 0, const WalkConfig& config = {})
+  explicit World(TestRobot robot, double rough = 0, double patient = 0,
+                 const WalkConfig& config = {})
       : model_(robot::LoadTestRobot(robot)), rough_(rough) {
     const double height = robot::StandingHeight(model_);
     const StepChoice choice = MakeWalkChoice(config, model_);
