@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "components/framework/tick_time.h"
 #include "components/robot/robot_model.h"
@@ -10,6 +11,8 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+using robot::Other;
 using stepping::Stage;
 using stepping::Walk;
 using stepping::WalkStage;
@@ -27,17 +30,20 @@ bool UnderWay(const stepping::Recovery& recovery) {
   return recovery.stage() == Stage::kUnloading || recovery.stage() == Stage::kSwinging;
 }
 
-/// The foot that carries, or is to while the other steps; −1: both do.
-int Stance(const FootstepInput& input, const stepping::Recovery* recovery, const Walk* walk) {
+/// The foot that carries, or is to while the other steps; none: both do.
+std::optional<Foot> Stance(const FootstepInput& input, const stepping::Recovery* recovery,
+                           const Walk* walk) {
   if (walk != nullptr && walk->active()) {
-    return walk->stage() == WalkStage::kStopping ? -1 : 1 - walk->stepping_foot();
+    if (walk->stage() == WalkStage::kStopping) return {};
+    return Other(walk->stepping_foot());
   }
-  if (recovery != nullptr && UnderWay(*recovery)) return 1 - recovery->plan().foot;
-  if (input.in_contact[0] == input.in_contact[1]) return -1;
-  return input.in_contact[0] ? robot::kRightFoot : robot::kLeftFoot;
+  if (recovery != nullptr && UnderWay(*recovery)) return Other(recovery->plan().foot);
+  const bool right = input.in_contact[Foot::kRight];
+  if (right == input.in_contact[Foot::kLeft]) return {};
+  return right ? Foot::kRight : Foot::kLeft;
 }
 
-void Put(int i, int foot, const Eigen::Vector2d& at, double yaw, double ground, double left,
+void Put(int i, Foot foot, const Eigen::Vector2d& at, double yaw, double ground, double left,
          Report* out) {
   out->foot[i] = static_cast<int8_t>(foot);
   out->x[i] = at.x();
@@ -53,8 +59,7 @@ void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recover
   if (walk != nullptr && walk->active()) {
     std::array<Walk::PlannedStep, Walk::kPlannedSteps> planned;
     const int all = walk->Planned(&planned);
-    const double ground =
-        input.sole[static_cast<size_t>(1 - walk->stepping_foot())].translation().z();
+    const double ground = input.sole[Other(walk->stepping_foot())].translation().z();
     for (const Walk::PlannedStep& step : planned) {
       if (count == all) break;
       Put(count++, step.foot, step.at.position, step.at.yaw, ground, step.touch_down - input.time,
@@ -62,12 +67,12 @@ void ReportPlanned(const FootstepInput& input, const stepping::Recovery* recover
     }
   } else if (recovery != nullptr && UnderWay(*recovery)) {
     const stepping::StepPlan& plan = recovery->plan();
-    const double ground = input.sole[plan.foot == robot::kRightFoot ? 1 : 0].translation().z();
+    const double ground = input.sole[Other(plan.foot)].translation().z();
     Put(count++, plan.foot, plan.foothold, plan.yaw, ground, recovery->touch_down() - input.time,
         out);
   }
   out->planned = static_cast<int8_t>(count);
-  for (int i = count; i < Walk::kPlannedSteps; ++i) Put(i, 0, {0, 0}, 0, 0, 0, out);
+  for (int i = count; i < Walk::kPlannedSteps; ++i) Put(i, Foot::kRight, {0, 0}, 0, 0, 0, out);
 }
 
 }  // namespace
@@ -80,20 +85,20 @@ FootstepReport::FootstepReport(const stepping::Recovery* recovery, const Walk* w
 void FootstepReport::Update(const FootstepInput& input, const stepping::Recovery* recovery,
                             const Walk* walk, Report* out) {
   ReportPlanned(input, recovery, walk, out);
-  const int stance = Stance(input, recovery, walk);
+  const std::optional<Foot> stance = Stance(input, recovery, walk);
   if (stance == stance_ && input.time < since_ + kRegionPeriod - kTimeTolerance) return;
   since_ = input.time;
   stance_ = stance;
-  out->stance = static_cast<int8_t>(stance);
+  out->stance = stance ? static_cast<int8_t>(*stance) : int8_t{-1};
   std::fill(std::begin(out->corners), std::end(out->corners), int8_t{0});
   std::fill(std::begin(out->region_x), std::end(out->region_x), 0.0);
   std::fill(std::begin(out->region_y), std::end(out->region_y), 0.0);
   out->frequency = out->step_time[0] = out->step_time[1] = out->height = 0;
-  if (stance < 0) return;
+  if (!stance) return;
   const bool walks = walk != nullptr && (walk->active() || recovery == nullptr);
-  const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(stance)];
+  const Eigen::Isometry3d& sole = input.sole[*stance];
   const double height = std::max(input.com_height - sole.translation().z(), kLeastHeight);
-  stepping::RegionInput seen{.stance = stance,
+  stepping::RegionInput seen{.stance = *stance,
                              .sole = sole.translation().head<2>(),
                              .yaw = stepping::Yaw(sole),
                              .frequency = std::sqrt(robot::kGravity / height),

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
+#include <optional>
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/stepping/capturability.h"
@@ -16,9 +16,9 @@ namespace poise {
 struct FootstepInput {
   double time = 0;        ///< s
   double com_height = 0;  ///< m, world
-  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
-                                        Eigen::Isometry3d::Identity()};  ///< world, right first
-  std::array<bool, 2> in_contact{true, true};
+  robot::FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(),
+                                           Eigen::Isometry3d::Identity()};  ///< world
+  robot::FootArray<bool> in_contact{true, true};
 };
 
 /// Regions are made anew when the foot that carries changes, and every 20 ms. Never allocates.
@@ -34,7 +34,7 @@ class FootstepReport {
 
  private:
   double since_ = -1e9;  // s, last time that regions were made
-  int stance_ = -1;
+  std::optional<robot::Foot> stance_;
   stepping::RegionFinder recovery_regions_, walk_regions_;
 };
 

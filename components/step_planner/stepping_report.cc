@@ -55,7 +55,7 @@ void ReportStepping(const stepping::Recovery& recovery, double time,
   const bool under_way = recovery.stage() == stepping::Stage::kUnloading ||
                          recovery.stage() == stepping::Stage::kSwinging;
   const stepping::StepPlan& step = recovery.plan();
-  const double ground = sole[step.foot == robot::kRightFoot ? 1 : 0].translation().z();
+  const double ground = sole[robot::Index(Other(step.foot))].translation().z();
   const Eigen::Vector2d& cop = recovery.output().cop;
   plan->step_reason = ReasonCode(recovery.reason());
   plan->step_foot = static_cast<int8_t>(step.foot);
@@ -99,10 +99,11 @@ void ReportWalking(const stepping::Walk& walk, double time,
   const bool swings = walk.stage() == stepping::WalkStage::kSwinging;
   const bool landed = walk.stage() == stepping::WalkStage::kLoading ||
                       walk.stage() == stepping::WalkStage::kStopping;
-  const auto foot = static_cast<size_t>(landed ? 1 - walk.stepping_foot() : walk.stepping_foot());
-  const double ground = sole[1 - foot].translation().z();
+  const robot::Foot foot = landed ? Other(walk.stepping_foot()) : walk.stepping_foot();
+  const double ground = sole[robot::Index(Other(foot))].translation().z();
   const Eigen::Vector2d foothold =
-      landed ? Eigen::Vector2d(sole[foot].translation().head<2>()) : walk.foothold().position;
+      landed ? Eigen::Vector2d(sole[robot::Index(foot)].translation().head<2>())
+             : walk.foothold().position;
   plan->step_reason = support_plan_t::REASON_WALK;
   plan->step_foot = static_cast<int8_t>(foot);
   SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);

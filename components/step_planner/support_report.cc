@@ -96,7 +96,7 @@ void StepPlanner::ReportPhase(double time) {
   out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
                    : kind > 0 ? support_plan_t::TRANSITION_LOADING
                               : support_plan_t::TRANSITION_NONE;
-  out.transition_foot = static_cast<int8_t>(kind == 0 ? -1 : steps->foot);
+  out.transition_foot = kind == 0 ? int8_t{-1} : static_cast<int8_t>(steps->foot);
   out.transition_progress = kind == 0 ? 0 : steps->progress;
 }
 

@@ -271,7 +271,8 @@ stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmat
   spec.soft = kSoftShare * radius;
   spec.slowest_swing = config.slowest_swing();
   for (const KnownGroundConfig& edge : config.ground()) {
-    spec.ground.Add(edge.foot(), edge.from(), edge.height());
+    spec.ground.Add(edge.foot() == LEFT_FOOT ? robot::Foot::kLeft : robot::Foot::kRight,
+                    edge.from(), edge.height());
   }
   return spec;
 }

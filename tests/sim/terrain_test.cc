@@ -7,6 +7,7 @@
 #include <set>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/field_rules.h"
 
 namespace poise {
 namespace {

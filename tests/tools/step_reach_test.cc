@@ -48,8 +48,8 @@ TEST(FarthestSupport, IsTheFarthestOfFootholdsDrawnAtRandom) {
     const Vector2d first = corner(), second = corner();
     return Vector2d(first + std::clamp(2 * share(random) - 0.5, 0.0, 1.0) * (second - first));
   };
-  for (const int stance : {robot::kRightFoot, robot::kLeftFoot}) {
-    const int foot = 1 - stance;
+  for (const robot::Foot stance : robot::kFeet) {
+    const robot::Foot foot = Other(stance);
     const double yaw = 0.4;
     const Vector2d sole(0.3, -0.2);
     const auto standing = stepping::SoleAt(choice.foot(stance), 0, sole, yaw);
@@ -74,14 +74,15 @@ TEST(FarthestSupport, IsTheFarthestOfFootholdsDrawnAtRandom) {
       const auto farthest =
           FarthestSupport(choice, stance, sole, yaw, sole, {std::cos(angle), std::sin(angle)});
       ASSERT_TRUE(farthest);
-      EXPECT_GE(*farthest, drawn[i] - 1e-5) << "foot " << foot << ", direction " << i;
-      EXPECT_LE(*farthest, drawn[i] + 0.03) << "foot " << foot << ", direction " << i;
+      EXPECT_GE(*farthest, drawn[i] - 1e-5) << "foot " << robot::Index(foot) << ", direction " << i;
+      EXPECT_LE(*farthest, drawn[i] + 0.03) << "foot " << robot::Index(foot) << ", direction " << i;
     }
   }
 }
 
 TEST(FarthestSupport, WithoutReachThereIsNone) {
-  EXPECT_FALSE(FarthestSupport(stepping::StepChoice(), 0, {0, 0}, 0, {0, 0}, {1, 0}));
+  EXPECT_FALSE(
+      FarthestSupport(stepping::StepChoice(), robot::Foot::kRight, {0, 0}, 0, {0, 0}, {1, 0}));
 }
 
 TEST(DistanceToEdge, OfASquareAndOfARayThatMissesIt) {

@@ -95,9 +95,9 @@ std::optional<PushBound> BoundOf(const Push& push, const Scenario& scenario,
   if (step_time) {
     const stepping::StepChoice choice =
         MakeStepChoice(scenario.step_planner().recovery(), run.robot);
-    for (int foot = 0; foot < 2; ++foot) {
-      if (truth->foot_contact_points[static_cast<size_t>(foot)] == 0) continue;
-      const Eigen::Isometry3d sole = GetPose(truth->foot_pose[static_cast<size_t>(foot)]);
+    for (const robot::Foot foot : robot::kFeet) {
+      if (truth->foot_contact_points[robot::Index(foot)] == 0) continue;
+      const Eigen::Isometry3d sole = GetPose(truth->foot_pose[robot::Index(foot)]);
       const Eigen::Vector3d ahead = sole.linear().col(0);
       const std::optional<double> farthest =
           FarthestSupport(choice, foot, sole.translation().head<2>(),

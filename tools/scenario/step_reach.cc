@@ -62,19 +62,19 @@ std::optional<double> DistanceToEdge(std::span<const Vector2d> points, const Vec
   return furthest;
 }
 
-std::optional<double> FarthestSupport(const stepping::StepChoice& choice, int stance,
+std::optional<double> FarthestSupport(const stepping::StepChoice& choice, robot::Foot stance,
                                       const Vector2d& sole, double yaw, const Vector2d& from,
                                       const Vector2d& along) {
   const stepping::Reach& reach = choice.reach();
   if (reach.empty()) return {};
-  const int foot = 1 - stance;
+  const robot::Foot foot = Other(stance);
   const balance::ConvexPolygon stands = reach.Leg(stance, 1), swings = reach.Leg(foot, 1);
   // Seen from the stance sole: with the COM where the stance leg lets it be, the other leg's.
   std::vector<Vector2d> reached;
   for (const Vector2d& a : stands.corners()) {
     for (const Vector2d& b : swings.corners()) reached.push_back(b - a);
   }
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  const double side = robot::Side(foot);
   const balance::HalfPlane places[] = {{{0, -side}, -reach.least_spacing()},
                                        {{-1, 0}, -reach.least_ahead()},
                                        {{1, 0}, -reach.least_ahead()}};

@@ -16,7 +16,7 @@ namespace poise {
 /// reaches farther. `stance`: the foot that stands, its sole's centre at `sole`, m, turned by
 /// `yaw`, rad; `from` in the same axes. Empty when the ray misses all of it, or the robot has no
 /// reach.
-std::optional<double> FarthestSupport(const stepping::StepChoice& choice, int stance,
+std::optional<double> FarthestSupport(const stepping::StepChoice& choice, robot::Foot stance,
                                       const Eigen::Vector2d& sole, double yaw,
                                       const Eigen::Vector2d& from, const Eigen::Vector2d& along);
 

@@ -35,16 +35,15 @@ Vector2d Direction(size_t k) {
 
 RegionFinder::RegionFinder(const StepChoice& choice) {
   const StepLimits& limits = choice.limits();
-  std::array<balance::ConvexPolygon, 2> sole;
-  for (int foot = 0; foot < 2; ++foot) {
-    const auto i = static_cast<size_t>(foot);
-    sole[i] = balance::SolePolygon(choice.foot(foot), limits.sole_margin);
-    footholds_[i] = choice.reach().Footholds(foot, Vector2d::Zero());
+  FootArray<balance::ConvexPolygon> sole;
+  for (const Foot foot : kFeet) {
+    sole[foot] = balance::SolePolygon(choice.foot(foot), limits.sole_margin);
+    footholds_[foot] = choice.reach().Footholds(foot, Vector2d::Zero());
   }
   stands_ = sole[0].num_corners > 0 && sole[1].num_corners > 0;
   reaches_ = footholds_[0].num_corners > 0 && footholds_[1].num_corners > 0;
-  for (size_t i = 0; i < 2; ++i) {
-    const double side = i == robot::kLeftFoot ? 1 : -1;
+  for (const Foot i : kFeet) {
+    const double side = Side(i);
     for (size_t k = 0; k < kRegionDirections; ++k) {
       edge_[i][k] = Farthest(sole[i], Direction(k));
       foothold_[i][k] = Farthest(footholds_[i], Direction(k));
@@ -59,9 +58,9 @@ CaptureRegions RegionFinder::About(const RegionInput& input) const {
   CaptureRegions result;
   if (!stands_) return result;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(input.yaw).toRotationMatrix();
-  const auto own = static_cast<size_t>(input.stance);
+  const Foot own = input.stance;
   const Vector2d planned = turn.transpose() * (input.foothold - input.sole);
-  balance::ConvexPolygon around = footholds_[1 - own];  // and where the step under way goes
+  balance::ConvexPolygon around = footholds_[Other(own)];  // and where the step under way goes
   if (input.under_way) {
     around = HullOf(around, balance::ConvexHull({&planned, 1}));
     result.first = result.longest = input.left;
@@ -72,29 +71,31 @@ CaptureRegions RegionFinder::About(const RegionInput& input) const {
     const auto farther = [&](const Vector2d& a, const Vector2d& b) {
       return a.dot(direction) > b.dot(direction) ? a : b;
     };
-    const std::array<Vector2d, 2> edge{edge_[0][k], edge_[1][k]};
-    std::array<double, 2> decay{};  // by the foot that stands
-    for (size_t s = 0; s < 2 && reaches_; ++s) {
-      const double time = input.step_time > 0 ? input.step_time : time_[1 - s][k];
+    const FootArray<Vector2d> edge{edge_[Foot::kRight][k], edge_[Foot::kLeft][k]};
+    FootArray<double> decay;  // by the foot that stands
+    for (const Foot s : kFeet) {
+      if (!reaches_) break;
+      const double time = input.step_time > 0 ? input.step_time : time_[Other(s)][k];
       result.longest = std::max(result.longest, time);
       if (!input.under_way) result.first = std::max(result.first, s == own ? time : 0.0);
       decay[s] = std::exp(-input.frequency * time);
     }
-    std::array<Vector2d, 2> before = edge;  // about each foot, of the number of steps before
+    FootArray<Vector2d> before = edge;  // about each foot, of the number of steps before
     Vector2d region = edge[own];
     corner[0][k] = region;
     for (size_t n = 1; n < corner.size(); ++n) {
-      std::array<Vector2d, 2> now = before;
-      for (size_t s = 0; s < 2 && reaches_; ++s) {
-        const Vector2d& foothold = foothold_[1 - s][k];
+      FootArray<Vector2d> now = before;
+      for (const Foot s : kFeet) {
+        if (!reaches_) break;
+        const Vector2d& foothold = foothold_[Other(s)][k];
         now[s] =
-            farther((1 - decay[s]) * edge[s] + decay[s] * (foothold + before[1 - s]), before[s]);
+            farther((1 - decay[s]) * edge[s] + decay[s] * (foothold + before[Other(s)]), before[s]);
       }
       if (input.under_way) {
         const Vector2d foothold =
             balance::NearestPoint(around, planned + input.movable * direction);
         const double left = std::exp(-input.frequency * input.left);
-        region = farther((1 - left) * edge[own] + left * (foothold + before[1 - own]), region);
+        region = farther((1 - left) * edge[own] + left * (foothold + before[Other(own)]), region);
       } else {
         region = now[own];
       }

@@ -14,7 +14,7 @@ inline constexpr int kRegionDirections = 16;
 
 /// The robot from above as regions see it; world axes.
 struct RegionInput {
-  int stance = 0;                                  ///< the foot that carries
+  Foot stance = Foot::kRight;                      ///< the foot that carries
   Eigen::Vector2d sole = Eigen::Vector2d::Zero();  ///< m, its sole's centre
   double yaw = 0;                                  ///< rad, of that sole
   double frequency = 1;                            ///< 1/s, of the pendulum
@@ -58,9 +58,9 @@ class RegionFinder {
   bool stands_ = false, reaches_ = false;
   // By foot, in axes of the heading: its sole's from its centre; its footholds' with the other
   // sole's centre at the origin, and the s that its swing there takes.
-  std::array<Points, 2> edge_, foothold_;
-  std::array<std::array<double, kRegionDirections>, 2> time_{};
-  std::array<balance::ConvexPolygon, 2> footholds_;
+  FootArray<Points> edge_, foothold_;
+  FootArray<std::array<double, kRegionDirections>> time_{};
+  FootArray<balance::ConvexPolygon> footholds_;
 };
 
 }  // namespace poise::stepping

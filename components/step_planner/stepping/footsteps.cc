@@ -15,9 +15,9 @@ Vector2d Turned(double yaw, const Vector2d& point) { return Eigen::Rotation2Dd(y
 
 }  // namespace
 
-Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& command, double period,
+Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits) {
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  const double side = Side(foot);
   // Out by two steps, then none.
   const auto outwards = [&](double rate) { return rate * side > 0 ? 2 * rate * period : 0.0; };
   const Vector2d half(0, 0.5 * side * limits.spacing);
@@ -34,8 +34,8 @@ Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& comma
 }
 
 Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
-                 int foot, const FootstepLimits& limits) {
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+                 Foot foot, const FootstepLimits& limits) {
+  const double side = Side(foot);
   Vector2d way = wanted.position - step.position;
   const double size = way.norm();
   if (size > most) way *= most / size;

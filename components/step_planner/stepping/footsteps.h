@@ -3,7 +3,15 @@
 
 #include <Eigen/Core>
 
+#include "components/robot/foot.h"
+
 namespace poise::stepping {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+using robot::Other;
+using robot::Side;
 
 /// What is walked: in axes of the heading.
 struct WalkCommand {
@@ -31,13 +39,13 @@ struct FootstepLimits {
 /// Where `foot` comes down when the other stands at `stance`, for a step every `period` s. Ahead
 /// each step goes half a stride. To the side, and in a turn, the foot of that side goes out by what
 /// two steps ask for and the other comes beside it: so no foot crosses or turns towards the other.
-Footstep NextFootstep(const Footstep& stance, int foot, const WalkCommand& command, double period,
+Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits);
 
 /// `step`, beside `stance`, moved towards `wanted` by at most `most`, m and rad; the soles do not
 /// touch.
 Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
-                 int foot, const FootstepLimits& limits);
+                 Foot foot, const FootstepLimits& limits);
 
 /// `command` approached from `from` by at most `speed`, m/s, and `turn`, rad/s.
 WalkCommand Approach(const WalkCommand& from, const WalkCommand& command, double speed,

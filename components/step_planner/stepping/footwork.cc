@@ -24,12 +24,12 @@ double Yaw(const Eigen::Isometry3d& pose) {
   return std::atan2(pose.linear()(1, 0), pose.linear()(0, 0));
 }
 
-StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact, double momentum) {
+StepState Observe(const StepInput& input, const FootArray<bool>& in_contact, double momentum) {
   StepState state;
   state.in_contact = in_contact;
   double ground = 0, feet = 0;
   Eigen::Vector2d heading = Eigen::Vector2d::Zero();
-  for (size_t i = 0; i < 2; ++i) {
+  for (const Foot i : kFeet) {
     state.sole[i] = input.sole[i].translation().head<2>();
     state.sole_yaw[i] = Yaw(input.sole[i]);
     if (!in_contact[i]) continue;

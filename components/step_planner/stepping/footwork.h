@@ -22,13 +22,12 @@ struct StepInput {
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();  ///< about the COM per mass, m²/s
   /// The body is turned by `lean` (rad) from where it is to be, and turns with `turning` (rad/s).
   Eigen::Vector3d lean = Eigen::Vector3d::Zero(), turning = Eigen::Vector3d::Zero();
-  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
-                                        Eigen::Isometry3d::Identity()};
-  std::array<double, 2> load{0, 0};  ///< N
+  FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};
+  FootArray<double> load{0, 0};  ///< N
   /// N that a load must be above to be one: of what is observed only; 0 of a measured one.
-  std::array<double, 2> least_load{0, 0};
-  std::array<bool, 2> in_contact{true, true};  ///< of the plan; while no step is under way
-  PointMotion free_foot;                       ///< reference of a foot in the air; likewise
+  FootArray<double> least_load{0, 0};
+  FootArray<bool> in_contact{true, true};  ///< of the plan; while no step is under way
+  PointMotion free_foot;                   ///< reference of a foot in the air; likewise
   Eigen::Matrix3d free_rotation = Eigen::Matrix3d::Identity();
   double com_height = 0;     ///< m, world, of the COM's reference; likewise
   bool step_needed = false;  ///< the capture point has stayed beyond the soles
@@ -37,10 +36,10 @@ struct StepInput {
 
 /// What the plan takes over while steps are made.
 struct StepOutput {
-  std::array<bool, 2> in_contact{true, true};
+  FootArray<bool> in_contact{true, true};
   int transition = 0;  ///< −1: `foot` is unloaded, 1: loaded, 0: neither
   double progress = 0;
-  int foot = -1;  ///< that steps, or last did
+  Foot foot = Foot::kRight;  ///< that steps, or last did
   PointMotion com;
   PointMotion swing;
   RotationMotion swing_rotation;
@@ -56,8 +55,7 @@ double Yaw(const Eigen::Isometry3d& pose);
 /// The pendulum above the soles in contact. `momentum`: share of the angular momentum that counts
 /// as the COM's own. All of it: what leg and body give each other and the COM changes nothing,
 /// since the momentum about the centre of pressure is gravity's alone.
-StepState Observe(const StepInput& input, const std::array<bool, 2>& in_contact,
-                  double momentum = 0);
+StepState Observe(const StepInput& input, const FootArray<bool>& in_contact, double momentum = 0);
 
 /// The COM's height, led without haste to where the legs want it.
 class HeightLead {

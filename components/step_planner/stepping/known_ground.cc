@@ -4,7 +4,7 @@
 
 namespace poise::stepping {
 
-double KnownGround::At(int foot, double x) const {
+double KnownGround::At(Foot foot, double x) const {
   double height = 0;
   for (const Edge& edge : edge_) {
     if (edge.foot == foot && x >= edge.from) height = edge.height;
@@ -12,7 +12,7 @@ double KnownGround::At(int foot, double x) const {
   return height;
 }
 
-bool KnownGround::EdgeWithin(int foot, double rear, double front) const {
+bool KnownGround::EdgeWithin(Foot foot, double rear, double front) const {
   return std::any_of(edge_.begin(), edge_.end(), [&](const Edge& edge) {
     return edge.foot == foot && edge.from > rear && edge.from < front;
   });

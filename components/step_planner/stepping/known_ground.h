@@ -3,22 +3,30 @@
 
 #include <vector>
 
+#include "components/robot/foot.h"
+
 namespace poise::stepping {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+using robot::Other;
+using robot::Side;
 
 /// What the robot is told of the ground: steps across the way, for a lane each. Empty: nothing.
 class KnownGround {
  public:
   /// From `from`, m, world x, on the ground under `foot` is `height`, m, world; in order of `from`.
-  void Add(int foot, double from, double height) { edge_.push_back({foot, from, height}); }
+  void Add(Foot foot, double from, double height) { edge_.push_back({foot, from, height}); }
   bool empty() const { return edge_.empty(); }
   /// m, under the middle of `foot` at x, m; 0 before the first edge.
-  double At(int foot, double x) const;
+  double At(Foot foot, double x) const;
   /// Between x = `rear` and `front`, m, an edge lies under `foot`.
-  bool EdgeWithin(int foot, double rear, double front) const;
+  bool EdgeWithin(Foot foot, double rear, double front) const;
 
  private:
   struct Edge {
-    int foot;
+    Foot foot;
     double from, height;
   };
   std::vector<Edge> edge_;

@@ -46,8 +46,8 @@ Legs::Legs(const robot::RobotModel& model) : height_(robot::StandingHeight(model
   }
 }
 
-LegLine Legs::At(int foot, const Vector3d& sole) const {
-  const Leg& leg = leg_[static_cast<size_t>(foot)];
+LegLine Legs::At(Foot foot, const Vector3d& sole) const {
+  const Leg& leg = leg_[foot];
   LegLine line{leg.hip, leg.hip, sole + leg.ankle};
   const Vector3d whole = line.ankle - line.hip;
   // Stretched, where the body is lower or higher than it can be.
@@ -63,8 +63,8 @@ LegLine Legs::At(int foot, const Vector3d& sole) const {
   return line;
 }
 
-double Legs::Highest(int foot, const Eigen::Vector2d& sole, double stretch) const {
-  const Leg& leg = leg_[static_cast<size_t>(foot)];
+double Legs::Highest(Foot foot, const Eigen::Vector2d& sole, double stretch) const {
+  const Leg& leg = leg_[foot];
   const double length = stretch * (leg.thigh + leg.shank);
   const double away = (sole + leg.ankle.head<2>() - leg.hip.head<2>()).norm();
   return leg.ankle.z() - leg.hip.z() + std::sqrt(std::max(0.0, length * length - away * away));

@@ -4,9 +4,16 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "components/robot/foot.h"
 #include "components/robot/robot_model.h"
 
 namespace poise::stepping {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+using robot::Other;
+using robot::Side;
 
 /// One leg's joints, m.
 struct LegLine {
@@ -25,10 +32,10 @@ class Legs {
   explicit Legs(const robot::RobotModel& model);
 
   /// `sole`: its centre from the COM.
-  LegLine At(int foot, const Eigen::Vector3d& sole) const;
+  LegLine At(Foot foot, const Eigen::Vector3d& sole) const;
   /// m of the COM above a level sole, its centre at `sole` from the COM, where the leg is `stretch`
   /// of a straight one; as if below the hip where it reaches no farther.
-  double Highest(int foot, const Eigen::Vector2d& sole, double stretch) const;
+  double Highest(Foot foot, const Eigen::Vector2d& sole, double stretch) const;
   /// m from COM to soles in the stance.
   double height() const { return height_; }
   /// m sideways between the hips.
@@ -40,7 +47,7 @@ class Legs {
     Eigen::Vector3d ankle = Eigen::Vector3d::Zero();  // from the sole's centre
     double thigh = 0, shank = 0, bent = 1;            // bent: 1 ahead, −1 behind
   };
-  std::array<Leg, 2> leg_;
+  FootArray<Leg> leg_;
   double height_ = 0;
 };
 

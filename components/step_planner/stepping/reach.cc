@@ -30,8 +30,8 @@ constexpr double kMaxTurn = 0.3;  // rad, of a joint in one iteration
 /// One leg by Newton's method; body and other leg stay.
 class Leg {
  public:
-  Leg(const robot::RobotModel& model, const robot::RobotState& standing, int foot, double reserve)
-      : model_(model), data_(model), state_(standing), foot_(static_cast<size_t>(foot)) {
+  Leg(const robot::RobotModel& model, const robot::RobotState& standing, Foot foot, double reserve)
+      : model_(model), data_(model), state_(standing), foot_(robot::Index(foot)) {
     const auto joints = model.supporting_joints(model.feet()[foot_].body);
     joints_.assign(joints.begin(), joints.end());
     reserve_ = reserve;
@@ -110,7 +110,7 @@ class Leg {
 
 /// Returns where `foot` reaches from the COM, from the stance outwards; empty when the stance
 /// cannot be held.
-balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, int foot,
+balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, Foot foot,
                                   double reserve) {
   robot::PostureGoal goal = robot::StandingGoal(model);
   goal.com_height = height;
@@ -166,8 +166,8 @@ balance::ConvexPolygon HullOf(const balance::ConvexPolygon& a, const balance::Co
 Reach::Reach(const robot::RobotModel& model, double height, double lowering, double joint_reserve,
              double gap)
     : lowering_(lowering) {
-  for (int foot = 0; foot < 2; ++foot) {
-    auto& leg = leg_[static_cast<size_t>(foot)];
+  for (const Foot foot : kFeet) {
+    auto& leg = leg_[foot];
     leg[0] = LegPolygon(model, height, foot, joint_reserve);
     leg[1] = LegPolygon(model, height - lowering, foot, joint_reserve);
   }
@@ -184,8 +184,8 @@ Reach::Reach(const robot::RobotModel& model, double height, double lowering, dou
   least_ahead_ = front + rear + gap;
 }
 
-balance::ConvexPolygon Reach::Leg(int foot, double share) const {
-  const auto& leg = leg_[static_cast<size_t>(foot)];
+balance::ConvexPolygon Reach::Leg(Foot foot, double share) const {
+  const auto& leg = leg_[foot];
   share = std::clamp(share, 0.0, 1.0);
   // Between two convex sets that are cut along the same directions.
   if (leg[0].num_corners != leg[1].num_corners) return leg[share < 1 ? 0 : 1];
@@ -196,9 +196,9 @@ balance::ConvexPolygon Reach::Leg(int foot, double share) const {
   return between;
 }
 
-double Reach::LoweringShare(const std::array<Vector2d, 2>& offset) const {
+double Reach::LoweringShare(const FootArray<Vector2d>& offset) const {
   double share = 0;
-  for (size_t i = 0; i < 2; ++i) {
+  for (const Foot i : kFeet) {
     const double high = balance::SignedDistance(leg_[i][0], offset[i]);
     if (high >= 0) continue;
     const double low = balance::SignedDistance(leg_[i][1], offset[i]);
@@ -207,21 +207,21 @@ double Reach::LoweringShare(const std::array<Vector2d, 2>& offset) const {
   return share;
 }
 
-Vector2d Reach::ComAbove(int stance, const Vector2d& com) const {
-  const balance::ConvexPolygon& leg = leg_[static_cast<size_t>(stance)][1];
+Vector2d Reach::ComAbove(Foot stance, const Vector2d& com) const {
+  const balance::ConvexPolygon& leg = leg_[stance][1];
   if (leg.num_corners == 0) return com;
   const Vector2d nearest = -balance::NearestPoint(leg, -com);
   const double beyond = (com - nearest).norm();
   return beyond > roll_ ? Vector2d(nearest + roll_ / beyond * (com - nearest)) : com;
 }
 
-balance::ConvexPolygon Reach::Footholds(int foot, const Vector2d& com, Place place) const {
-  const Vector2d above = ComAbove(1 - foot, com);
-  balance::ConvexPolygon reached = leg_[static_cast<size_t>(foot)][1];
+balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Place place) const {
+  const Vector2d above = ComAbove(Other(foot), com);
+  balance::ConvexPolygon reached = leg_[foot][1];
   for (Vector2d& corner : reached.mutable_corners()) corner += above;
   if (place == Place::kAhead) return balance::Clip(reached, {{-1, 0}, -least_ahead_});
   if (place == Place::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  const double side = Side(foot);
   return balance::Clip(reached, {{0, -side}, -least_spacing_});
 }
 

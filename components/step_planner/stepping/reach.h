@@ -5,9 +5,16 @@
 #include <array>
 
 #include "components/balance/convex_polygon.h"
+#include "components/robot/foot.h"
 #include "components/robot/robot_model.h"
 
 namespace poise::stepping {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+using robot::Other;
+using robot::Side;
 
 /// A foot's sole, `margin` (m) off its edges, its frame at `centre`, turned by `yaw`, rad.
 balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,
@@ -36,18 +43,18 @@ class Reach {
     return false;
   }
   /// Sole centre of `foot` from the COM, with the COM lowered by `share` of `lowering`, 0 to 1.
-  balance::ConvexPolygon Leg(int foot, double share) const;
+  balance::ConvexPolygon Leg(Foot foot, double share) const;
   /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above
   /// 1, and by how many m, when even the lowest does not do.
-  double LoweringShare(const std::array<Eigen::Vector2d, 2>& offset) const;
+  double LoweringShare(const FootArray<Eigen::Vector2d>& offset) const;
   /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
   /// all the way, in that leg's reach or `roll` beyond it.
-  Eigen::Vector2d ComAbove(int stance, const Eigen::Vector2d& com) const;
+  Eigen::Vector2d ComAbove(Foot stance, const Eigen::Vector2d& com) const;
   /// Sole centre of `foot`, the other's at the origin and the COM above `ComAbove` of `com`,
   /// lowered all the way: the leg's reach, and beside the other sole, ahead of it or behind it,
   /// `gap` between them. So the legs span what is between the soles, wherever `com` is. Beside, the
   /// legs do not cross; of the other two that is not said.
-  balance::ConvexPolygon Footholds(int foot, const Eigen::Vector2d& com,
+  balance::ConvexPolygon Footholds(Foot foot, const Eigen::Vector2d& com,
                                    Place place = Place::kBeside) const;
   double least_spacing() const { return least_spacing_; }  ///< m between the soles' centres
   double least_ahead() const { return least_ahead_; }      ///< the same, one ahead of the other
@@ -58,7 +65,7 @@ class Reach {
 
  private:
   // By foot, by height: standing, lowered.
-  std::array<std::array<balance::ConvexPolygon, 2>, 2> leg_;
+  FootArray<std::array<balance::ConvexPolygon, 2>> leg_;
   double least_spacing_ = 0, least_ahead_ = 0, lowering_ = 0, roll_ = 0;
 };
 

@@ -48,10 +48,10 @@ constexpr double kLetGo = 0.25;
 
 balance::ConvexPolygon Recovery::Soles(const StepState& state, double margin) const {
   balance::ConvexPolygon soles;
-  for (int i = 0; i < 2; ++i) {
-    const auto foot = static_cast<size_t>(i);
+  for (const Foot foot : kFeet) {
     if (!state.in_contact[foot]) continue;
-    soles = HullOf(soles, SoleAt(choice_.foot(i), margin, state.sole[foot], state.sole_yaw[foot]));
+    soles =
+        HullOf(soles, SoleAt(choice_.foot(foot), margin, state.sole[foot], state.sole_yaw[foot]));
   }
   return soles;
 }
@@ -90,9 +90,9 @@ bool Recovery::Update(const StepInput& input) {
         stage_ = Stage::kShifting;
       }
       step_helps_ = !(spec_.watched_margin >= 0 && stage_ == Stage::kIdle &&
-                      excess > -spec_.watched_margin && choice_.Choose(state).foot < 0);
+                      excess > -spec_.watched_margin && !choice_.Choose(state).possible);
       if (need == StepReason::kNone) break;
-      const size_t stance = state.in_contact[0] ? 0 : 1;
+      const Foot stance = state.in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft;
       standing_height_ = input.com_height - input.sole[stance].translation().z();
       height_.Begin(input.com_height);
       steps_now_ = 0;
@@ -148,15 +148,15 @@ StepReason Recovery::NeedOfFirstStep(const StepInput& input, const StepState& st
   if (!input.allowed) return StepReason::kNone;
   if (spec_.margin_to_sole_edge > 0 && stays_near_edge_ && excess > excess_at_edge_) {
     const StepPlan plan = choice_.Choose(state);
-    if (plan.foot >= 0 && plan.margin >= 0) return StepReason::kLingering;
+    if (plan.possible && plan.margin >= 0) return StepReason::kLingering;
   }
   if (!(excess > 0)) return StepReason::kNone;
   if (input.step_needed) return StepReason::kPersistent;
   if (excess > kHopelessExcess) return StepReason::kSure;
   if (excess < kLeastExcess) return StepReason::kNone;
   const StepPlan plan = choice_.Choose(state);
-  return plan.foot >= 0 && plan.margin >= 0 && plan.margin < kLateMargin ? StepReason::kDeadline
-                                                                         : StepReason::kNone;
+  return plan.possible && plan.margin >= 0 && plan.margin < kLateMargin ? StepReason::kDeadline
+                                                                        : StepReason::kNone;
 }
 
 double Recovery::UnloadTime() const {
@@ -175,23 +175,23 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
   if (!input.allowed || !input.in_contact[0] || !input.in_contact[1] || !AtRest(input, state)) {
     return false;
   }
-  for (int foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     const StepPlan beside = choice_.Beside(state, foot, kTogetherRamp + kTogetherSwing);
-    const double way = (beside.foothold - state.sole[static_cast<size_t>(foot)]).norm();
+    const double way = (beside.foothold - state.sole[foot]).norm();
     if (way < kTogetherDistance) {
       together_asked_ = false;
       together_at_ = -1;
       return false;
     }
     // Straight rather than around the other leg.
-    if (std::isfinite(beside.margin) && (plan->foot < 0 || !beside.around)) *plan = beside;
+    if (std::isfinite(beside.margin) && (!plan->possible || !beside.around)) *plan = beside;
   }
-  return plan->foot >= 0;
+  return plan->possible;
 }
 
 void Recovery::Shift(const StepInput& input, const StepState& state, double excess) {
-  const int stance = 1 - plan_.foot;
-  const auto s = static_cast<size_t>(stance);
+  const Foot stance = Other(plan_.foot);
+  const Foot s = stance;
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
   const double over = input.time - since_;
@@ -210,7 +210,7 @@ void Recovery::Shift(const StepInput& input, const StepState& state, double exce
 }
 
 void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReason reason) {
-  if (plan.foot < 0 || !std::isfinite(plan.margin)) return;
+  if (!plan.possible || !std::isfinite(plan.margin)) return;
   plan_ = plan;
   reason_ = reason;
   ++num_steps_;
@@ -220,9 +220,9 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
   cop_from_ = output_.cop;
   ramp_from_ = 0;
   stage_ = Stage::kUnloading;
-  if (!in_contact_[static_cast<size_t>(plan.foot)]) {
+  if (!in_contact_[plan.foot]) {
     const Vector2d sole = plan.foothold;
-    const double ground = input.sole[static_cast<size_t>(1 - plan.foot)].translation().z();
+    const double ground = input.sole[Other(plan.foot)].translation().z();
     swing_.Begin(input.free_foot, input.free_rotation, {sole.x(), sole.y(), ground},
                  Eigen::AngleAxisd(plan.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
                  touch_down_, spec_.swing);
@@ -232,10 +232,10 @@ void Recovery::BeginStep(const StepInput& input, const StepPlan& plan, StepReaso
 }
 
 void Recovery::LiftOff(const StepInput& input) {
-  const auto foot = static_cast<size_t>(plan_.foot);
+  const Foot foot = plan_.foot;
   in_contact_[foot] = false;
   const Eigen::Isometry3d& sole = input.sole[foot];
-  const double ground = input.sole[1 - foot].translation().z();
+  const double ground = input.sole[Other(foot)].translation().z();
   swing_.Begin({.position = sole.translation()}, sole.linear(),
                {plan_.foothold.x(), plan_.foothold.y(), ground},
                Eigen::AngleAxisd(plan_.yaw, Vector3d::UnitZ()).toRotationMatrix(), input.time,
@@ -248,7 +248,7 @@ void Recovery::LiftOff(const StepInput& input) {
 }
 
 double Recovery::TouchLoad(const StepInput& input) const {
-  const double least = input.least_load[static_cast<size_t>(plan_.foot)];
+  const double least = input.least_load[plan_.foot];
   return std::max(spec_.touch_load, least > 0 ? std::max(least, spec_.observed_load) : 0);
 }
 
@@ -256,14 +256,14 @@ bool Recovery::Touches(const StepInput& input) {
   if (swing_.Progress(input.time) < kLeastProgress) return false;
   if (touched_since_ < 0) {
     // At once: the foot bounces, and six milliseconds of steady load came 0.12 s late.
-    if (!(input.load[static_cast<size_t>(plan_.foot)] > TouchLoad(input))) return false;
+    if (!(input.load[plan_.foot] > TouchLoad(input))) return false;
     touched_since_ = input.time;
   }
   return input.time >= touched_since_ + spec_.settle - kTimeTolerance;
 }
 
 void Recovery::Settle(const StepInput& input) {
-  const auto foot = static_cast<size_t>(plan_.foot);
+  const Foot foot = plan_.foot;
   const double period = TickPeriod(input.time - time_);
   const double share = period / (kLetGo * spec_.settle + period);
   const double loaded = std::clamp(input.load[foot] / TouchLoad(input), 0.0, 1.0);
@@ -272,7 +272,7 @@ void Recovery::Settle(const StepInput& input) {
 }
 
 void Recovery::Land(const StepInput& input) {
-  in_contact_[static_cast<size_t>(plan_.foot)] = true;
+  in_contact_[plan_.foot] = true;
   stage_ = Stage::kLoading;
   since_ = input.time;
   cop_from_ = output_.cop;
@@ -346,8 +346,8 @@ Vector2d Recovery::PointFor(const StepInput& input, const StepState& state,
 }
 
 Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) const {
-  const int stance = 1 - plan_.foot;
-  const auto s = static_cast<size_t>(stance);
+  const Foot stance = Other(plan_.foot);
+  const Foot s = stance;
   if (reason_ == StepReason::kTogether) {
     return PointFor(input, state,
                     SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s],
@@ -363,7 +363,7 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
 Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
   Vector2d goal = Goal(state), velocity = Vector2d::Zero();
   if (stage_ == Stage::kShifting) {
-    const Vector2d way = state.sole[static_cast<size_t>(1 - plan_.foot)] - shift_from_;
+    const Vector2d way = state.sole[Other(plan_.foot)] - shift_from_;
     const balance::MinimumJerk shift(input.time - since_, kTogetherShift);
     goal = shift_from_ + shift.position * way;
     velocity = shift.speed * way;
@@ -381,13 +381,13 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 
 double Recovery::LoweringShare(const StepState& state) const {
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
-  std::array<Vector2d, 2> offset;
+  FootArray<Vector2d> offset;
   const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
   // Where both soles and the COM will be.
   const Vector2d com = steps ? plan_.com : state.pendulum.com;
-  for (size_t i = 0; i < 2; ++i) {
-    const bool swings = steps && static_cast<int>(i) == plan_.foot;
-    offset[i] = turn * ((swings ? plan_.foothold : state.sole[i]) - com);
+  for (const Foot foot : kFeet) {
+    const bool swings = steps && foot == plan_.foot;
+    offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
   }
   return std::min(choice_.reach().LoweringShare(offset), 1.0);
 }
@@ -395,10 +395,10 @@ double Recovery::LoweringShare(const StepState& state) const {
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   const double period = TickPeriod(input.time - time_);
   // The height, critically damped.
-  const size_t stance =
+  const Foot stance =
       stage_ == Stage::kShifting || stage_ == Stage::kUnloading || stage_ == Stage::kSwinging
-          ? static_cast<size_t>(1 - plan_.foot)
-          : static_cast<size_t>(plan_.foot);
+          ? Other(plan_.foot)
+          : plan_.foot;
   const double ground = input.sole[stance].translation().z();
   const double wanted =
       ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
@@ -431,8 +431,9 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 
 void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
-  archive->Show(plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop, plan_.capture_point,
-                plan_.com, plan_.margin, plan_.place, plan_.around, plan_.corner);
+  archive->Show(plan_.possible, plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop,
+                plan_.capture_point, plan_.com, plan_.margin, plan_.place, plan_.around,
+                plan_.corner);
   swing_.Archive(archive);
   height_.Archive(archive);
   outside_.Archive(archive);

@@ -117,7 +117,7 @@ class Recovery {
   Stage stage_ = Stage::kIdle;
   StepReason reason_ = StepReason::kNone;
   int num_steps_ = 0, steps_now_ = 0;
-  std::array<bool, 2> in_contact_{true, true};
+  FootArray<bool> in_contact_{true, true};
   StepPlan plan_;
   Swing swing_;
   double time_ = 0, since_ = 0;  // s, last tick; when the stage began

@@ -49,28 +49,28 @@ double SwingTime(double distance, double acceleration) {
   return std::sqrt(kQuinticAcceleration * distance / acceleration);
 }
 
-Vector2d StepChoice::BrakingPoint(const StepState& state, int stance) const {
-  const auto i = static_cast<size_t>(stance);
+Vector2d StepChoice::BrakingPoint(const StepState& state, Foot stance) const {
+  const Foot i = stance;
   return balance::NearestPoint(
       SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]),
       state.pendulum.capture_point());
 }
 
-double StepChoice::DistanceOfLegs(int foot, const Vector2d& foothold, const Vector2d& com) const {
+double StepChoice::DistanceOfLegs(Foot foot, const Vector2d& foothold, const Vector2d& com) const {
   const double height = legs_.height() - reach_.lowering();
   const auto from_com = [&](const Vector2d& sole) -> Eigen::Vector3d {
     return {sole.x() - com.x(), sole.y() - com.y(), -height};
   };
   return LegDistance(legs_.At(foot, from_com(foothold)),
-                     legs_.At(1 - foot, from_com(Vector2d::Zero())));
+                     legs_.At(Other(foot), from_com(Vector2d::Zero())));
 }
 
-bool StepChoice::ClearOfLeg(int foot, const Vector2d& com, Vector2d* foothold) const {
+bool StepChoice::ClearOfLeg(Foot foot, const Vector2d& com, Vector2d* foothold) const {
   const auto clear = [&](const Vector2d& at) {
     return DistanceOfLegs(foot, at, com) >= limits_.leg_distance;
   };
   if (clear(*foothold)) return true;
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  const double side = Side(foot);
   Vector2d in = {foothold->x(), side * reach_.least_spacing()}, out = *foothold;
   if (!clear(in)) return false;
   for (int i = 0; i < kHalvings; ++i) {
@@ -102,11 +102,12 @@ bool StepChoice::WayAround(double side, const Vector2d& from, const Vector2d& to
   return false;
 }
 
-StepPlan StepChoice::At(const StepState& state, int foot, double time, Place place) const {
-  const int stance = 1 - foot;
-  const auto s = static_cast<size_t>(stance);
+StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place place) const {
+  const Foot stance = Other(foot);
+  const Foot s = stance;
   const double w = state.pendulum.frequency;
   StepPlan plan;
+  plan.possible = true;
   plan.foot = foot;
   plan.time = time;
   plan.yaw = state.yaw;
@@ -124,7 +125,7 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
   const double distance = away.norm();
   Vector2d wanted = caught;
   if (distance > 0) wanted += limits_.overshoot / distance * away;
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+  const double side = Side(foot);
   plan.place = place;
   if (place == Place::kBeside) {
     // Side by side as when standing, and nearer where the capture point is on the stance foot's
@@ -134,43 +135,42 @@ StepPlan StepChoice::At(const StepState& state, int foot, double time, Place pla
     wanted.y() = side * std::max(side * wanted.y(), std::min(limits_.spacing, narrow));
   } else {
     // As far on its own side as holds the capture point well.
-    const double room = std::max(0.0, 0.5 * feet_[static_cast<size_t>(foot)].width -
-                                          limits_.sole_margin - limits_.ample_margin);
+    const double room =
+        std::max(0.0, 0.5 * feet_[foot].width - limits_.sole_margin - limits_.ample_margin);
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
   const Vector2d com = local(plan.com);
   plan.follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
   const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, place);
   Vector2d foothold(0, side * limits_.spacing);
-  bool possible = footholds.num_corners > 0;
-  if (possible) foothold = balance::NearestPoint(footholds, wanted);
-  if (place != Place::kBeside && possible) {
-    possible = ClearOfLeg(foot, reach_.ComAbove(stance, com), &foothold) &&
-               balance::SignedDistance(footholds, foothold) >= -kOffReach;
+  bool reached = footholds.num_corners > 0;
+  if (reached) foothold = balance::NearestPoint(footholds, wanted);
+  if (place != Place::kBeside && reached) {
+    reached = ClearOfLeg(foot, reach_.ComAbove(stance, com), &foothold) &&
+              balance::SignedDistance(footholds, foothold) >= -kOffReach;
   }
   if (limits_.leg_distance > 0) {
-    possible =
-        WayAround(side, local(state.sole[static_cast<size_t>(foot)]), foothold, &plan) && possible;
+    reached = WayAround(side, local(state.sole[foot]), foothold, &plan) && reached;
     plan.corner = state.sole[s] + turn * plan.corner;
   }
   plan.foothold = state.sole[s] + turn * foothold;
-  const balance::ConvexPolygon soles = HullOf(
-      SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
-      SoleAt(feet_[static_cast<size_t>(foot)], limits_.sole_margin, plan.foothold, plan.yaw));
+  const balance::ConvexPolygon soles =
+      HullOf(SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
+             SoleAt(feet_[foot], limits_.sole_margin, plan.foothold, plan.yaw));
   plan.margin = balance::SignedDistance(soles, plan.capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
   plan.margin = std::min(plan.margin, plan.margin + plan.follows);
-  if (!possible) plan.margin = -std::numeric_limits<double>::infinity();
+  if (!reached) plan.margin = -std::numeric_limits<double>::infinity();
   return plan;
 }
 
-StepPlan StepChoice::Plan(const StepState& state, int foot, Place place) const {
-  const double unload = state.in_contact[static_cast<size_t>(foot)] ? limits_.unload : 0;
+StepPlan StepChoice::Plan(const StepState& state, Foot foot, Place place) const {
+  const double unload = state.in_contact[foot] ? limits_.unload : 0;
   double time = unload + limits_.least_swing;
   StepPlan plan;
   for (int i = 0; i < kRounds; ++i) {
     plan = At(state, foot, time, place);
-    const Vector2d& from = state.sole[static_cast<size_t>(foot)];
+    const Vector2d& from = state.sole[foot];
     const double swing =
         plan.around
             ? std::sqrt(CornerAcceleration(from, plan.corner, plan.foothold) / limits_.acceleration)
@@ -188,10 +188,11 @@ StepPlan StepChoice::Plan(const StepState& state, int foot, Place place) const {
   return plan;
 }
 
-StepPlan StepChoice::Beside(const StepState& state, int foot, double time) const {
-  const auto s = static_cast<size_t>(1 - foot);
-  const double side = foot == robot::kLeftFoot ? 1 : -1;
+StepPlan StepChoice::Beside(const StepState& state, Foot foot, double time) const {
+  const Foot s = Other(foot);
+  const double side = Side(foot);
   StepPlan plan;
+  plan.possible = true;
   plan.foot = foot;
   plan.time = time;
   plan.yaw = state.sole_yaw[s];
@@ -199,10 +200,10 @@ StepPlan StepChoice::Beside(const StepState& state, int foot, double time) const
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(plan.yaw).toRotationMatrix();
   const Vector2d foothold(0, side * limits_.spacing);
   plan.foothold = state.sole[s] + turn * foothold;
-  const Vector2d from = turn.transpose() * (state.sole[static_cast<size_t>(foot)] - state.sole[s]);
-  const bool possible = WayAround(side, from, foothold, &plan);
+  const Vector2d from = turn.transpose() * (state.sole[foot] - state.sole[s]);
+  const bool reached = WayAround(side, from, foothold, &plan);
   plan.corner = state.sole[s] + turn * plan.corner;
-  plan.margin = possible ? limits_.ample_margin : -std::numeric_limits<double>::infinity();
+  plan.margin = reached ? limits_.ample_margin : -std::numeric_limits<double>::infinity();
   return plan;
 }
 
@@ -211,7 +212,7 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   // The stance sole would leave the ground before the foot comes down.
   if (plan.follows < 0) return false;
   balance::ConvexPolygon soles;
-  for (size_t i = 0; i < 2; ++i) {
+  for (const Foot i : kFeet) {
     if (!state.in_contact[i]) continue;
     soles = HullOf(soles, SoleAt(feet_[i], limits_.sole_margin, state.sole[i], state.sole_yaw[i]));
   }
@@ -224,21 +225,20 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
 StepPlan StepChoice::Choose(const StepState& state) const {
   StepPlan best;
   double best_score = 0;
-  for (int foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     // The stance foot must be there to stand on.
-    if (!state.in_contact[static_cast<size_t>(1 - foot)]) continue;
+    if (!state.in_contact[Other(foot)]) continue;
     const auto consider = [&](const StepPlan& plan) {
       if (!std::isfinite(plan.margin) || !Helps(state, plan)) return;
       const double score = std::min(plan.margin, limits_.ample_margin) - kMarginOfTime * plan.time;
-      if (best.foot >= 0 && score <= best_score) return;
+      if (best.possible && score <= best_score) return;
       best = plan;
       best_score = score;
     };
     const StepPlan beside = Plan(state, foot);
     consider(beside);
     if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) continue;
-    const Vector2d away =
-        state.pendulum.capture_point() - state.sole[static_cast<size_t>(1 - foot)];
+    const Vector2d away = state.pendulum.capture_point() - state.sole[Other(foot)];
     const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
     consider(Plan(state, foot, ahead < 0 ? Place::kBehind : Place::kAhead));
   }

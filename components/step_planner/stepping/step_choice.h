@@ -28,15 +28,16 @@ struct StepLimits {
 /// The robot as a step sees it: in any horizontal axes, heading of the body along `yaw`.
 struct StepState {
   Pendulum pendulum;
-  std::array<Eigen::Vector2d, 2> sole{Eigen::Vector2d::Zero(),
-                                      Eigen::Vector2d::Zero()};  ///< centres, m, right first
-  std::array<double, 2> sole_yaw{0, 0};                          ///< rad
-  std::array<bool, 2> in_contact{true, true};
+  FootArray<Eigen::Vector2d> sole{Eigen::Vector2d::Zero(),
+                                  Eigen::Vector2d::Zero()};  ///< centres, m
+  FootArray<double> sole_yaw{0, 0};                          ///< rad
+  FootArray<bool> in_contact{true, true};
   double yaw = 0;  ///< rad
 };
 
 struct StepPlan {
-  int foot = -1;                                            ///< that swings; −1: none can
+  bool possible = false;                                    ///< false: no foot can step
+  Foot foot = Foot::kRight;                                 ///< that swings
   double time = 0;                                          ///< s from now until it touches down
   Eigen::Vector2d foothold = Eigen::Vector2d::Zero();       ///< sole centre
   double yaw = 0;                                           ///< rad, of the sole
@@ -72,38 +73,38 @@ class StepChoice {
   StepPlan Choose(const StepState& state) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
-  StepPlan Plan(const StepState& state, int foot, Place place = Place::kBeside) const;
+  StepPlan Plan(const StepState& state, Foot foot, Place place = Place::kBeside) const;
   /// The foothold of `foot` for a touch-down `time` s from now, the centre of pressure at the
   /// stance sole's point nearest to the capture point. Within what both legs span, also
   /// where the COM has left it.
-  StepPlan At(const StepState& state, int foot, double time, Place place = Place::kBeside) const;
+  StepPlan At(const StepState& state, Foot foot, double time, Place place = Place::kBeside) const;
   /// The step of `foot` that puts it beside the other one, as when standing, with the COM above
   /// that.
-  StepPlan Beside(const StepState& state, int foot, double time) const;
+  StepPlan Beside(const StepState& state, Foot foot, double time) const;
   /// The step catches the capture point, or comes nearer to it than the soles where they are while
   /// the stance leg follows the COM.
   bool Helps(const StepState& state, const StepPlan& plan) const;
   /// The stance sole's point nearest to the capture point, less `sole_margin`.
-  Eigen::Vector2d BrakingPoint(const StepState& state, int stance) const;
+  Eigen::Vector2d BrakingPoint(const StepState& state, Foot stance) const;
   const StepLimits& limits() const { return limits_; }
   const Reach& reach() const { return reach_; }
   const Legs& legs() const { return legs_; }  ///< of a robot that has a reach
-  const robot::FootModel& foot(int index) const { return feet_[static_cast<size_t>(index)]; }
+  const robot::FootModel& foot(Foot foot) const { return feet_[foot]; }
 
  private:
   /// m between the legs' lines, `foot` at `foothold`, the other at the origin, the COM at `com`, in
   /// axes of the heading.
-  double DistanceOfLegs(int foot, const Eigen::Vector2d& foothold,
+  double DistanceOfLegs(Foot foot, const Eigen::Vector2d& foothold,
                         const Eigen::Vector2d& com) const;
   /// Draws `foothold` to its own side until the legs' lines are `leg_distance` apart; false: they
   /// are not there either.
-  bool ClearOfLeg(int foot, const Eigen::Vector2d& com, Eigen::Vector2d* foothold) const;
+  bool ClearOfLeg(Foot foot, const Eigen::Vector2d& com, Eigen::Vector2d* foothold) const;
   /// By which corner of the stance sole, `gap` off, a foot goes from `from` to the plan's foothold;
   /// in axes of the heading from the stance sole. False: there is no way.
   bool WayAround(double side, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                  StepPlan* plan) const;
 
-  std::array<robot::FootModel, 2> feet_;
+  FootArray<robot::FootModel> feet_;
   Reach reach_;
   Legs legs_;
   StepLimits limits_;

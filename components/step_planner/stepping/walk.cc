@@ -50,7 +50,7 @@ Walk::Walk(const StepChoice& choice, const WalkSpec& spec)
       height_(spec.height_rate),
       body_yaw_(spec.yaw_rate),
       pressed_(spec.height_rate),
-      sole_{PressedSole(choice.foot(0)), PressedSole(choice.foot(1))},
+      sole_{PressedSole(choice.foot(Foot::kRight)), PressedSole(choice.foot(Foot::kLeft))},
       ramp_start_(RampStart(spec.press_share)) {}
 
 double RampStart(double share) {
@@ -68,16 +68,15 @@ void Walk::Enter(WalkStage stage, double time) {
   since_ = time;
 }
 
-Footstep Walk::Standing(const StepState& state, int foot) const {
-  const auto i = static_cast<size_t>(foot);
-  return {state.sole[i], state.sole_yaw[i]};
+Footstep Walk::Standing(const StepState& state, Foot foot) const {
+  return {state.sole[foot], state.sole_yaw[foot]};
 }
 
-Footstep Walk::Next(const Footstep& stance, int foot) const {
+Footstep Walk::Next(const Footstep& stance, Foot foot) const {
   return NextFootstep(stance, foot, command_, spec_.period(), spec_.step);
 }
 
-Footstep Walk::NextOnCourse(const Footstep& stance, int foot) const {
+Footstep Walk::NextOnCourse(const Footstep& stance, Foot foot) const {
   // At the end the feet come side by side, wherever that is.
   const double most = closing_ ? 0 : spec_.most_return;
   return Towards(Next(stance, foot), Next(course_, foot), most, stance, foot, spec_.step);
@@ -86,12 +85,12 @@ Footstep Walk::NextOnCourse(const Footstep& stance, int foot) const {
 bool Walk::LiftsOff(const StepState& state, double time) const {
   if (time < since_ + slower_ * spec_.unload - kTimeTolerance) return false;
   if (spec_.quasi_static && unloaded_ < 1) return false;
-  const Vector2d off = state.pendulum.capture_point() - state.sole[static_cast<size_t>(stance_)];
+  const Vector2d off = state.pendulum.capture_point() - state.sole[stance_];
   return !spec_.quasi_static || off.norm() < spec_.lift_off_distance;
 }
 
 bool Walk::FeetTogether(const StepState& state) const {
-  const double yaw = state.sole_yaw[static_cast<size_t>(stance_)];
+  const double yaw = state.sole_yaw[stance_];
   const Vector2d between = Eigen::Rotation2Dd(-yaw) * (state.sole[1] - state.sole[0]);
   return std::abs(between.x()) < kTogether &&
          std::abs(Difference(state.sole_yaw[1], state.sole_yaw[0])) < kTogether;
@@ -132,7 +131,7 @@ bool Walk::Update(const StepInput& input, const WalkCommand& command) {
         touch_.Reset();
       } else if (touch_.Update(time, LoadOfSwing(input) > spec_.touch_load, spec_.touch_duration)) {
         pressed_since_ = time;
-        sole_[static_cast<size_t>(1 - stance_)].Touch(input.sole[static_cast<size_t>(1 - stance_)]);
+        sole_[Other(stance_)].Touch(input.sole[Other(stance_)]);
         Enter(WalkStage::kTouching, time);
       }
       break;
@@ -166,10 +165,10 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   closings_ = 0;
   // The foot on the side that it goes or turns to steps first.
   const double side = command.velocity.y() != 0 ? command.velocity.y() : command.turn_rate;
-  stance_ = side > 0 ? robot::kRightFoot : robot::kLeftFoot;
+  stance_ = side > 0 ? Foot::kRight : Foot::kLeft;
   in_contact_ = {true, true};
   sinks_ = {0, 0};
-  for (size_t i = 0; i < 2; ++i) sole_[i].Touch(input.sole[i]);
+  for (const Foot foot : kFeet) sole_[foot].Touch(input.sole[foot]);
   slower_ = 1;
   double ground = input.sole[0].translation().z();
   if (!spec_.ground.empty()) ground = std::min(ground, input.sole[1].translation().z());
@@ -179,7 +178,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   start_yaw_ = state.yaw;
   body_yaw_.Begin(0);
   course_ = Standing(state, stance_);
-  foothold_ = Next(course_, 1 - stance_);
+  foothold_ = Next(course_, Other(stance_));
   left_over_.setZero();
   offset_.setZero();
   reckoned_ = state.pendulum.capture_point();
@@ -187,7 +186,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
   // From rest to the capture point and its velocity at lift-off; the centre of pressure is
   // ξ − ξ̇/ω, above the stance foot then.
   PlanFrom(state);
-  const Vector2d above = state.sole[static_cast<size_t>(stance_)];
+  const Vector2d above = state.sole[stance_];
   const CapturePlan::Point lift_off =
       spec_.quasi_static ? CapturePlan::Point{above, above} : plan_.At(0);
   const Vector2d now = state.pendulum.capture_point();
@@ -199,7 +198,7 @@ void Walk::Start(const StepInput& input, const StepState& state, const WalkComma
 }
 
 void Walk::BeginSwing(const StepInput& input) {
-  const auto foot = static_cast<size_t>(1 - stance_);
+  const Foot foot = Other(stance_);
   in_contact_[foot] = false;
   starting_ = false;
   touch_down_ = input.time + SwingTime();
@@ -220,21 +219,19 @@ void Walk::BeginSwing(const StepInput& input) {
 }
 
 double Walk::Sunk(const StepInput& input) const {
-  const auto s = static_cast<size_t>(stance_);
+  const Foot s = stance_;
   return spec_.quasi_static && spec_.ground.empty() ? sole_[s].Sunk(input.sole[s]) : 0;
 }
 
 double Walk::GroundAt(const StepInput& input, const Footstep& foothold) const {
-  const Vector3d stance = input.sole[static_cast<size_t>(stance_)].translation();
+  const Vector3d stance = input.sole[stance_].translation();
   if (spec_.ground.empty()) return stance.z() + Sunk(input);
   // From sole to sole: what the estimator's height drifts by does not count.
-  return stance.z() + spec_.ground.At(1 - stance_, foothold.position.x()) -
+  return stance.z() + spec_.ground.At(Other(stance_), foothold.position.x()) -
          spec_.ground.At(stance_, stance.x());
 }
 
-double Walk::LoadOfSwing(const StepInput& input) const {
-  return input.load[static_cast<size_t>(1 - stance_)];
-}
+double Walk::LoadOfSwing(const StepInput& input) const { return input.load[Other(stance_)]; }
 
 double Walk::Loaded(const StepInput& input) const {
   return std::clamp(LoadOfSwing(input) / spec_.press_load, 0.0, 1.0);
@@ -257,7 +254,7 @@ bool Walk::Settled(const StepInput& input) {
 }
 
 void Walk::LetGo(const StepInput& input) {
-  const Eigen::Isometry3d& sole = input.sole[static_cast<size_t>(1 - stance_)];
+  const Eigen::Isometry3d& sole = input.sole[Other(stance_)];
   const double period = TickPeriod(input.time - time_);
   const double share = period / (kLetGo * std::min(spec_.settle, kLongestLetGo) + period);
   // It goes on downward as far as it carries nothing: a tilted sole, or one that bounced.
@@ -277,14 +274,14 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   ++num_steps_;
   in_contact_ = {true, true};
   from_cop_ = wanted_.cop;
-  const auto foot = static_cast<size_t>(1 - stance_);
+  const Foot foot = Other(stance_);
   sinks_[foot] =
       std::min(ExpectedSinking(sole_[foot].Sunk(input.sole[foot]), input.load[foot], spec_.weight),
                spec_.most_sinking);
   const double haste = spec_.sink_speed * (spec_.load + spec_.unload);
   slower_ = spec_.quasi_static && sinks_[foot] > haste ? sinks_[foot] / haste : 1;
-  course_ = Next(course_, 1 - stance_);
-  stance_ = 1 - stance_;
+  course_ = Next(course_, Other(stance_));
+  stance_ = Other(stance_);
   double_since_ = input.time;
   Enter(WalkStage::kLoading, input.time);
   closings_ = closing_ ? closings_ + 1 : 0;
@@ -292,7 +289,7 @@ void Walk::Land(const StepInput& input, const StepState& state, const WalkComman
   command_ = Approach(command_, command, spec_.acceleration * spec_.period(),
                       spec_.turn_acceleration * spec_.period());
   closing_ = !command_.stepping;
-  foothold_ = NextOnCourse(Standing(state, stance_), 1 - stance_);
+  foothold_ = NextOnCourse(Standing(state, stance_), Other(stance_));
   // The feet come to stand as they are, one on a tread, one on the next.
   if (closing_ && (spec_.stand_apart || AcrossEdge(foothold_))) final_ = true;
 }
@@ -307,8 +304,8 @@ double Walk::Progress(double time) const {
 }
 
 void Walk::Unload(const StepState& state, double period) {
-  const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
-  const Vector2d way = state.sole[static_cast<size_t>(1 - stance_)] - stance;
+  const Vector2d& stance = state.sole[stance_];
+  const Vector2d way = state.sole[Other(stance_)] - stance;
   // The centre of pressure still has this share of the way to the sole that shall carry.
   const double left = std::max(0.0, (output_.cop - stance).dot(way) / way.squaredNorm());
   const double share =
@@ -320,12 +317,12 @@ void Walk::Unload(const StepState& state, double period) {
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
   const double edge = choice_.limits().sole_margin;
-  const auto s = static_cast<size_t>(stance_), o = 1 - s;
+  const Foot s = stance_, o = Other(s);
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), edge, state.sole[s], state.sole_yaw[s]);
   if (OnOneFoot()) return sole;
   const balance::ConvexPolygon other =
-      SoleAt(choice_.foot(1 - stance_), edge, state.sole[o], state.sole_yaw[o]);
+      SoleAt(choice_.foot(Other(stance_)), edge, state.sole[o], state.sole_yaw[o]);
   if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
   // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
   const Vector2d way = state.sole[s] - state.sole[o];
@@ -344,8 +341,8 @@ balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& s
 }
 
 CapturePlan::Point Walk::QuasiStatic(const StepState& state, double time) const {
-  const Vector2d& stance = state.sole[static_cast<size_t>(stance_)];
-  const Vector2d& other = state.sole[static_cast<size_t>(1 - stance_)];
+  const Vector2d& stance = state.sole[stance_];
+  const Vector2d& other = state.sole[Other(stance_)];
   const double w = state.pendulum.frequency;
   const double pressed = pressed_.point().position, pressing = pressed_.point().velocity;
   if (OnOneFoot()) {
@@ -404,7 +401,7 @@ Vector2d Walk::DesiredCop(const StepInput& input, const StepState& state) {
 }
 
 double Walk::SwingTime() const {
-  const double sinks = sinks_[static_cast<size_t>(stance_)];
+  const double sinks = sinks_[stance_];
   if (!spec_.quasi_static || !(sinks > spec_.soft)) return spec_.swing;
   return spec_.swing * std::min(std::sqrt(sinks / spec_.soft), spec_.slowest_swing);
 }
@@ -412,7 +409,7 @@ double Walk::SwingTime() const {
 bool Walk::Lost(const StepInput& input) const {
   if (!OnOneFoot() || !spec_.quasi_static) return false;
   const StepState state = Observe(input, in_contact_);
-  const auto s = static_cast<size_t>(stance_);
+  const Foot s = stance_;
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance_), 0, state.sole[s], state.sole_yaw[s]);
   return -balance::SignedDistance(sole, state.pendulum.capture_point()) > 0;
@@ -432,7 +429,7 @@ Vector2d Walk::WithoutOffset(const StepState& state, const Vector2d& cop, double
 }
 
 double Walk::StillSinks(const StepInput& input) {
-  const auto s = static_cast<size_t>(stance_);
+  const Foot s = stance_;
   // A sole that stands on one corner sinks farther than one that lies, under the same load: each
   // tick's is an upper bound.
   const double sunk = sole_[s].Sunk(input.sole[s]), load = input.load[s];
@@ -444,7 +441,7 @@ double Walk::StillSinks(const StepInput& input) {
 }
 
 double Walk::Height(const StepInput& input, const StepState& state) {
-  const auto s = static_cast<size_t>(stance_), o = 1 - s;
+  const Foot s = stance_, o = Other(s);
   const double lower = stage_ == WalkStage::kStopping ? 0 : spec_.com_lowering;
   const double stance = input.sole[s].translation().z(), other = input.sole[o].translation().z();
   // Before it sinks: its leg would be stretched.
@@ -457,9 +454,9 @@ double Walk::Height(const StepInput& input, const StepState& state) {
   // While a foot sinks, above the higher one as far as the lower one's leg reaches: the ankle of a
   // leg that is bent above its sole comes to its limit first.
   double highest = std::max(stance, other) + standing_height_ - lower;
-  for (size_t i = 0; i < 2; ++i) {
+  for (const Foot i : kFeet) {
     const Vector2d offset = Eigen::Rotation2Dd(-state.yaw) * (state.sole[i] - input.com.head<2>());
-    const double leg = choice_.legs().Highest(static_cast<int>(i), offset, kStretched);
+    const double leg = choice_.legs().Highest(i, offset, kStretched);
     highest = std::min(highest, (i == s ? low : other) + std::min(leg, standing_height_));
   }
   return std::max(height, highest);
@@ -471,13 +468,13 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   const bool presses = stage_ == WalkStage::kTouching;
   const double share = stage_ == WalkStage::kSwinging ? 0 : presses ? Loaded(input) : 1;
   pressed_.Follow(share * spec_.press_share, period);
-  const auto s = static_cast<size_t>(stance_);
+  const Foot s = stance_;
   double height = Height(input, state);
   if (!spec_.ground.empty()) height = std::min(height, HighestForStep(input, state));
   height_.Follow(height, period);
   // The body heads between the feet: where they stand, and where the one in the air will.
   const bool swings = OnOneFoot();
-  const double other = swings ? foothold_.yaw : state.sole_yaw[1 - s];
+  const double other = swings ? foothold_.yaw : state.sole_yaw[Other(s)];
   const double heading = state.sole_yaw[s] + 0.5 * Difference(other, state.sole_yaw[s]);
   const double yaw = body_yaw_.point().position;
   body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
@@ -493,7 +490,7 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
     LetGo(input);
   }
   output_.transition = stage_ == WalkStage::kUnloading ? -1 : stage_ == WalkStage::kLoading ? 1 : 0;
-  output_.foot = stage_ == WalkStage::kLoading ? stance_ : 1 - stance_;
+  output_.foot = stage_ == WalkStage::kLoading ? stance_ : Other(stance_);
   output_.progress = output_.transition == 0 ? 0 : Progress(input.time);
 }
 

@@ -91,7 +91,7 @@ class Walk {
         active() && stage_ != WalkStage::kLoading && stage_ != WalkStage::kStopping;
     return num_steps_ + (under_way ? 1 : 0);
   }
-  int stepping_foot() const { return 1 - stance_; }  ///< that is in the air, or the next to be
+  Foot stepping_foot() const { return Other(stance_); }  ///< that is in the air, or the next to be
   /// On one foot of a quasi-static walk, the capture point is beyond the stance sole: the walk does
   /// not bring it back.
   bool Lost(const StepInput& input) const;
@@ -105,7 +105,7 @@ class Walk {
   const Footstep& foothold() const { return foothold_; }  ///< of the step under way
   struct PlannedStep {
     Footstep at;
-    int foot = 0;
+    Foot foot = Foot::kRight;
     double touch_down = 0;  ///< s, planned
   };
   static constexpr int kPlannedSteps = 3;
@@ -152,10 +152,10 @@ class Walk {
     return stage_ == WalkStage::kSwinging || stage_ == WalkStage::kTouching;
   }
   bool AtRest(const StepInput& input, const StepState& state);
-  Footstep Standing(const StepState& state, int foot) const;
-  Footstep Next(const Footstep& stance, int foot) const;
+  Footstep Standing(const StepState& state, Foot foot) const;
+  Footstep Next(const Footstep& stance, Foot foot) const;
   /// Next, brought back to the commanded course.
-  Footstep NextOnCourse(const Footstep& stance, int foot) const;
+  Footstep NextOnCourse(const Footstep& stance, Foot foot) const;
   /// The plan of a quasi-static walk: from above one sole to above the other while both carry.
   CapturePlan::Point QuasiStatic(const StepState& state, double time) const;
   /// The foot may leave the ground.
@@ -190,8 +190,9 @@ class Walk {
   WalkSpec spec_;
   WalkStage stage_ = WalkStage::kStanding;
   WalkCommand command_;
-  int stance_ = 0, num_steps_ = 0;
-  std::array<bool, 2> in_contact_{true, true};
+  Foot stance_ = Foot::kRight;
+  int num_steps_ = 0;
+  FootArray<bool> in_contact_{true, true};
   Swing swing_;
   LastingCondition touch_;
   HeightLead height_, body_yaw_;
@@ -199,19 +200,19 @@ class Walk {
   double time_ = 0, since_ = 0, moving_since_ = 0;  // s: last tick; stage; not at rest
   double double_since_ = 0, touch_down_ = 0;        // s: both feet down; a touch, planned
   double pressed_since_ = 0;                        // s: pressed down
-  std::array<PressedSole, 2> sole_;
-  std::array<double, 2> sinks_{0, 0};  // m, expected of each sole under the weight
-  double search_depth_ = 0;            // m, below the foothold: as deep as the stance sole's ground
-  double slower_ = 1;                  // ratio: the ramps, where the sole sinks
-  double unloaded_ = 0;                // of the unloading ramp, where it is quasi-static
-  double ramp_start_ = 0;              // of the loading ramp: what the press carries
-  double standing_height_ = 0;         // m
-  bool lowered_ = false;               // stopped while it walked: it has not stood up since
-  double start_yaw_ = 0;               // rad
-  bool starting_ = false;              // no foot has left the ground yet
-  bool closing_ = false;  // the step under way comes beside the other foot, the last one
-  bool final_ = false;    // it has
-  int closings_ = 0;      // last ones so far: on soft ground soles turn as they land
+  FootArray<PressedSole> sole_;
+  FootArray<double> sinks_{0, 0};  // m, expected of each sole under the weight
+  double search_depth_ = 0;        // m, below the foothold: as deep as the stance sole's ground
+  double slower_ = 1;              // ratio: the ramps, where the sole sinks
+  double unloaded_ = 0;            // of the unloading ramp, where it is quasi-static
+  double ramp_start_ = 0;          // of the loading ramp: what the press carries
+  double standing_height_ = 0;     // m
+  bool lowered_ = false;           // stopped while it walked: it has not stood up since
+  double start_yaw_ = 0;           // rad
+  bool starting_ = false;          // no foot has left the ground yet
+  bool closing_ = false;           // the step under way comes beside the other foot, the last one
+  bool final_ = false;             // it has
+  int closings_ = 0;               // last ones so far: on soft ground soles turn as they land
   Footstep foothold_;
   Footstep course_;  // where the stance sole would stand if every step came down as commanded
   Eigen::Vector2d from_cop_ = Eigen::Vector2d::Zero();  // m, when both feet were down

@@ -32,12 +32,13 @@ int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
       break;
   }
   Footstep next = foothold_;
-  int foot = stepping_foot(), count = 0;
+  Foot foot = stepping_foot();
+  int count = 0;
   for (PlannedStep& step : *steps) {
     step = {next, foot, due + count * spec_.period()};
     ++count;
     if (closing_) break;
-    foot = 1 - foot;
+    foot = Other(foot);
     next = Next(next, foot);
   }
   return count;
@@ -46,16 +47,16 @@ int Walk::Planned(std::array<PlannedStep, kPlannedSteps>* steps) const {
 double Walk::HighestForStep(const StepInput& input, const StepState& state) const {
   const bool steps = stage_ == WalkStage::kUnloading || OnOneFoot();
   if (!steps) return std::numeric_limits<double>::infinity();
-  const auto s = static_cast<size_t>(stance_);
-  std::array<Vector2d, 2> offset{Vector2d::Zero(), Vector2d::Zero()};
-  offset[1 - s] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
+  const Foot s = stance_;
+  FootArray<Vector2d> offset{Vector2d::Zero(), Vector2d::Zero()};
+  offset[Other(s)] = Eigen::Rotation2Dd(-state.yaw) * (foothold_.position - state.sole[s]);
   const double share = std::min(choice_.reach().LoweringShare(offset), 1.0);
   return GroundAt(input, foothold_) + standing_height_ - share * choice_.reach().lowering();
 }
 
 bool Walk::AcrossEdge(const Footstep& foothold) const {
   if (spec_.ground.empty()) return false;
-  const int foot = 1 - stance_;
+  const Foot foot = Other(stance_);
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(foot), 0, foothold.position, foothold.yaw);
   double rear = foothold.position.x(), front = rear;
@@ -86,13 +87,13 @@ void Walk::PlanFrom(const StepState& state) {
     plan_.Finish(w, middle);
     return;
   }
-  int foot = stance_;
+  Foot foot = stance_;
   for (int i = 0; i < kAhead; ++i) {
     plan_.Append(stance.position, next.position, between);
     plan_.Append(next.position, next.position, spec_.single());
     stance = next;
     next = Next(stance, foot);
-    foot = 1 - foot;
+    foot = Other(foot);
   }
   plan_.Finish(w, stance.position);
 }
@@ -101,12 +102,12 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   // Until the foot carries.
   const double left = touch_down_ + spec_.settle - input.time;
   if (swing_.frozen(input.time)) return;
-  const auto s = static_cast<size_t>(stance_);
+  const Foot s = stance_;
   const double w = state.pendulum.frequency;
   const Vector2d& stance = state.sole[s];
   // The plan for the foothold that the command asks for.
   const Vector2d moved = foothold_.position;
-  foothold_.position = NextOnCourse(Standing(state, stance_), 1 - stance_).position;
+  foothold_.position = NextOnCourse(Standing(state, stance_), Other(stance_)).position;
   PlanFrom(state);
   const Vector2d planned = plan_.At(spec_.single()).capture_point;
   const Vector2d now = state.pendulum.capture_point();
@@ -134,7 +135,7 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const Vector2d com = After(state.pendulum, cop, left).com;
   const balance::ConvexPolygon footholds =
-      choice_.reach().Footholds(1 - stance_, turn.transpose() * (com - stance));
+      choice_.reach().Footholds(Other(stance_), turn.transpose() * (com - stance));
   if (footholds.num_corners == 0) return;
   const Vector2d offset = turn.transpose() * (foothold - stance);
   foothold = stance + turn * balance::NearestPoint(footholds, offset);

@@ -50,8 +50,8 @@ TEST(Legs, AtTheHighestALegIsStretchedAsAsked) {
   const robot::RobotModel model = robot::LoadTestRobot(TestRobot::kDyros);
   const Legs legs(model);
   for (const double x : {-0.2, 0.0, 0.3}) {
-    for (int foot = 0; foot < 2; ++foot) {
-      const Eigen::Vector2d sole(x, foot == 0 ? -0.1 : 0.1);
+    for (const Foot foot : kFeet) {
+      const Eigen::Vector2d sole(x, 0.1 * Side(foot));
       const LegLine line =
           legs.At(foot, Vector3d(sole.x(), sole.y(), -legs.Highest(foot, sole, 0.9)));
       const double straight = (line.knee - line.hip).norm() + (line.ankle - line.knee).norm();
@@ -72,9 +72,9 @@ TEST(Legs, KneesAreWhereTheRobotHasThem) {
     goal.nominal = model.stance().joint_position;
     robot::RobotData data(model);
     robot::ComputeKinematics(model, robot::SolvePosture(model, goal), &data);
-    for (int foot = 0; foot < 2; ++foot) {
+    for (const Foot foot : kFeet) {
       const auto joint = [&](const char* name) -> Vector3d {
-        const std::string whole = std::string(foot == 0 ? "right_" : "left_") + name;
+        const std::string whole = std::string(foot == Foot::kRight ? "right_" : "left_") + name;
         for (size_t j = 0; j < model.joints().size(); ++j) {
           if (model.joints()[j].name == whole) return data.body_position[j + 1];
         }
@@ -89,7 +89,8 @@ TEST(Legs, KneesAreWhereTheRobotHasThem) {
           Vector3d(0, 0, -legs.height()) + (ankle - hip) - (line.ankle - line.hip);
       line = legs.At(foot, sole);
       EXPECT_LT((line.ankle - line.hip - (ankle - hip)).norm(), 1e-6);
-      EXPECT_LT((line.knee - line.hip - (knee - hip)).norm(), 0.02) << x << ' ' << foot;
+      EXPECT_LT((line.knee - line.hip - (knee - hip)).norm(), 0.02)
+          << x << ' ' << robot::Index(foot);
     }
   }
 }
@@ -192,8 +193,8 @@ TEST_P(AroundCase, NoSoleOrLegMeetsTheOther) {
     state.sole = {Vector2d::Zero(), Vector2d(0, limits.spacing)};
     state.in_contact = {true, false};
     const StepPlan plan = choice.Choose(state);
-    if (plan.foot < 0) continue;
-    ASSERT_EQ(plan.foot, robot::kLeftFoot);
+    if (!plan.possible) continue;
+    ASSERT_EQ(plan.foot, Foot::kLeft);
     EXPECT_GE(Between(model_.feet()[0], state.sole[0], model_.feet()[1], plan.foothold),
               gap_ - 1e-9);
     Swing swing;
@@ -212,7 +213,8 @@ TEST_P(AroundCase, NoSoleOrLegMeetsTheOther) {
       const Vector2d com = After(state.pendulum, plan.cop, time).com;
       const Vector3d middle(com.x(), com.y(), height_ - 0.03);
       // Twice the radius of a leg of 5 cm.
-      EXPECT_GT(LegDistance(legs.At(1, sole - middle), legs.At(0, -middle)), 0.1)
+      EXPECT_GT(LegDistance(legs.At(Foot::kLeft, sole - middle), legs.At(Foot::kRight, -middle)),
+                0.1)
           << plan.foothold.transpose() << " at " << time << " of " << plan.time;
     }
   }

@@ -47,20 +47,20 @@ TEST(CaptureRegions, AreTheClosedFormAheadAndBack) {
   const StepChoice choice = Choice();
   const double yaw = 0.4, frequency = 3.5, time = 0.4;
   const Vector2d sole(0.3, -0.2);
-  for (int stance = 0; stance < 2; ++stance) {
+  for (const Foot stance : kFeet) {
     const CaptureRegions regions = RegionFinder(choice).About({stance, sole, yaw, frequency, time});
     EXPECT_EQ(regions.first, time);
     EXPECT_EQ(regions.longest, time);
     for (const double sign : {1.0, -1.0}) {
       const Vector2d along(sign, 0), direction = Eigen::Rotation2Dd(yaw) * along;
       const double rest = 0.5 * choice.foot(stance).length - kEdge;
-      const double reach = Farthest(choice.reach().Footholds(1 - stance, {0, 0}), along);
+      const double reach = Farthest(choice.reach().Footholds(Other(stance), {0, 0}), along);
       ASSERT_NEAR(reach, Farthest(choice.reach().Footholds(stance, {0, 0}), along), 5e-3);
       for (int steps = 0; steps <= kMostRegionSteps; ++steps) {
         const double region =
             Farthest(regions.region[static_cast<size_t>(steps)], direction) - sole.dot(direction);
         EXPECT_NEAR(region, CaptureRegion(frequency, rest, reach, time, steps), 5e-3)
-            << stance << sign << steps;
+            << robot::Index(stance) << sign << steps;
       }
     }
   }
@@ -75,7 +75,7 @@ TEST(CaptureRegions, TheirCornersAreJustCaught) {
   std::uniform_real_distribution<double> any(0, 1);
   for (int trial = 0; trial < 20; ++trial) {
     const double frequency = 2.5 + 2 * any(random), time = 0.25 + 0.4 * any(random);
-    const int stance = trial % 2, other = 1 - stance;
+    const Foot stance = kFeet[static_cast<size_t>(trial % 2)], other = Other(stance);
     const CaptureRegions about = RegionFinder(choice).About({stance, {0, 0}, 0, frequency, time});
     const CaptureRegions next = RegionFinder(choice).About({other, {0, 0}, 0, frequency, time});
     const ConvexPolygon sole = about.region[0];
@@ -112,13 +112,13 @@ TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
   const StepChoice choice = Choice();
   const double frequency = 3.4, left = 0.2, yaw = -0.3;
   const Vector2d sole(1, 2), foothold = sole + Eigen::Rotation2Dd(yaw) * Vector2d(0.15, 0.25);
-  RegionInput input{robot::kRightFoot, sole, yaw, frequency, 0.5};
+  RegionInput input{Foot::kRight, sole, yaw, frequency, 0.5};
   input.under_way = true;
   input.foothold = foothold;
   input.left = left;
   const CaptureRegions regions = RegionFinder(choice).About(input);
   EXPECT_EQ(regions.first, left);
-  const double half = 0.5 * choice.foot(robot::kLeftFoot).length - kEdge;
+  const double half = 0.5 * choice.foot(Foot::kLeft).length - kEdge;
   const Vector2d ahead = Eigen::Rotation2Dd(yaw) * Vector2d(1, 0);
   const double edge = Farthest(regions.region[1], ahead);
   const Vector2d cop = sole + half * ahead;
@@ -133,11 +133,11 @@ TEST(CaptureRegions, OfAStepUnderWayAreAboutItsFoothold) {
 
 TEST(CaptureRegions, GrowWithTheStepsAndStepsTakeWhatTheSwingTakes) {
   const StepChoice choice = Choice();
-  const CaptureRegions regions = RegionFinder(choice).About({robot::kLeftFoot, {0, 0}, 0, 3.6, 0});
+  const CaptureRegions regions = RegionFinder(choice).About({Foot::kLeft, {0, 0}, 0, 3.6, 0});
   EXPECT_GE(regions.first, choice.limits().unload + choice.limits().least_swing - 1e-12);
   EXPECT_GE(regions.longest, regions.first);
   // Quicker steps catch more.
-  const CaptureRegions slow = RegionFinder(choice).About({robot::kLeftFoot, {0, 0}, 0, 3.6, 0.8});
+  const CaptureRegions slow = RegionFinder(choice).About({Foot::kLeft, {0, 0}, 0, 3.6, 0.8});
   EXPECT_GT(slow.first, regions.longest);
   for (int k = 0; k < kRegionDirections; ++k) {
     const double angle = 2 * std::numbers::pi * k / kRegionDirections;

@@ -71,8 +71,7 @@ TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
     Footstep stance{{0, -0.105}, 0};  // the right foot
     const Footstep first = stance;
     for (int i = 0; i < 32; ++i) {
-      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot, command, 1,
-                            Limits());
+      stance = NextFootstep(stance, i % 2 == 0 ? Foot::kLeft : Foot::kRight, command, 1, Limits());
     }
     EXPECT_NEAR(stance.yaw - first.yaw, sign * 2 * std::numbers::pi, 1e-9);
     EXPECT_LT((stance.position - first.position).norm(), 1e-9);
@@ -84,8 +83,8 @@ TEST(Footsteps, GoesAsFastAsCommanded) {
        {Vector2d(0.2, 0), Vector2d(-0.1, 0), Vector2d(0, 0.05), Vector2d(0.1, -0.05)}) {
     Footstep stance{{0, -0.105}, 0};
     for (int i = 0; i < 20; ++i) {
-      stance = NextFootstep(stance, i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot,
-                            {velocity, 0, true}, 0.8, Limits());
+      stance = NextFootstep(stance, i % 2 == 0 ? Foot::kLeft : Foot::kRight, {velocity, 0, true},
+                            0.8, Limits());
     }
     EXPECT_LT((stance.position - Vector2d(0, -0.105) - 16 * velocity).norm(), 1e-9)
         << velocity.transpose();
@@ -98,8 +97,8 @@ TEST(Footsteps, FeetNeverCrossOrTurnTowardsEachOther) {
       for (const double wz : {-1.0, 0.0, 1.0}) {
         Footstep stance{{0, 0.105}, 0.3};  // the left foot
         for (int i = 0; i < 12; ++i) {
-          const int foot = i % 2 == 0 ? robot::kRightFoot : robot::kLeftFoot;
-          const double side = foot == robot::kLeftFoot ? 1 : -1;
+          const Foot foot = i % 2 == 0 ? Foot::kRight : Foot::kLeft;
+          const double side = Side(foot);
           const Footstep next = NextFootstep(stance, foot, {{vx, vy}, wz, true}, 1, Limits());
           const Vector2d apart =
               Eigen::Rotation2Dd(-stance.yaw) * (next.position - stance.position);
@@ -120,7 +119,7 @@ TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
   const Vector2d error(0.004, 0.01);
   Footstep way{{0, -0.105}, 0}, stance = way, adrift = way;
   for (int i = 0; i < 40; ++i) {
-    const int foot = i % 2 == 0 ? robot::kLeftFoot : robot::kRightFoot;
+    const Foot foot = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
     const auto next = [&](const Footstep& from) {
       return NextFootstep(from, foot, command, 1, Limits());
     };
@@ -139,7 +138,7 @@ TEST(Footsteps, WhatALandingWasOffIsNotCarriedOn) {
 
 TEST(Footsteps, AWayThatIsFarIsComeBackToByStepsThatDoNotCross) {
   const Footstep stance{{0, 0.105}, 0}, step{{0.1, -0.085}, 0}, far{{0.1, 0.5}, 1};
-  const Footstep moved = Towards(step, far, 0.03, stance, robot::kRightFoot, Limits());
+  const Footstep moved = Towards(step, far, 0.03, stance, Foot::kRight, Limits());
   EXPECT_NEAR(moved.position.y(), 0.105 - Limits().least_spacing, 1e-12);
   EXPECT_NEAR(moved.yaw, 0.03, 1e-12);
 }
@@ -201,17 +200,17 @@ TEST(PressedSole, SinksByItsSpringAndNotByLyingDown) {
 TEST(KnownGround, IsTheLastEdgeThatWasPassedInThisFootsLane) {
   KnownGround ground;
   EXPECT_TRUE(ground.empty());
-  ground.Add(robot::kLeftFoot, 0.6, 0.1);
-  ground.Add(robot::kRightFoot, 0.8, 0.2);
-  ground.Add(robot::kLeftFoot, 1.0, 0.3);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.5), 0);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 0.6), 0.1);
-  EXPECT_EQ(ground.At(robot::kRightFoot, 0.7), 0);
-  EXPECT_EQ(ground.At(robot::kRightFoot, 5), 0.2);
-  EXPECT_EQ(ground.At(robot::kLeftFoot, 1.2), 0.3);
-  EXPECT_TRUE(ground.EdgeWithin(robot::kLeftFoot, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(robot::kRightFoot, 0.5, 0.7));
-  EXPECT_FALSE(ground.EdgeWithin(robot::kLeftFoot, 0.6, 1.0));
+  ground.Add(Foot::kLeft, 0.6, 0.1);
+  ground.Add(Foot::kRight, 0.8, 0.2);
+  ground.Add(Foot::kLeft, 1.0, 0.3);
+  EXPECT_EQ(ground.At(Foot::kLeft, 0.5), 0);
+  EXPECT_EQ(ground.At(Foot::kLeft, 0.6), 0.1);
+  EXPECT_EQ(ground.At(Foot::kRight, 0.7), 0);
+  EXPECT_EQ(ground.At(Foot::kRight, 5), 0.2);
+  EXPECT_EQ(ground.At(Foot::kLeft, 1.2), 0.3);
+  EXPECT_TRUE(ground.EdgeWithin(Foot::kLeft, 0.5, 0.7));
+  EXPECT_FALSE(ground.EdgeWithin(Foot::kRight, 0.5, 0.7));
+  EXPECT_FALSE(ground.EdgeWithin(Foot::kLeft, 0.6, 1.0));
 }
 
 }  // namespace

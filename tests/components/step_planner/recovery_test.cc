@@ -160,7 +160,7 @@ class World {
       const robot::FootModel& foot = model_.feet()[0];
       nearest_ = std::min(nearest_, std::max(apart.x() - foot.length, apart.y() - foot.width));
       // On the stance sole.
-      const auto stance = static_cast<size_t>(1 - output.foot);
+      const auto stance = robot::Index(Other(output.foot));
       EXPECT_TRUE(output.in_contact[stance]);
       EXPECT_GE(balance::SignedDistance(
                     SoleAt(model_.feet()[stance], 0, sole_[stance].translation().head<2>(), 0),
@@ -275,7 +275,7 @@ TEST_P(RecoveryCase, NoFootIsSentFartherThanLegsReachHoweverHardThePush) {
         if (recovery.stage() != Stage::kUnloading && recovery.stage() != Stage::kSwinging) continue;
         const StepPlan& plan = recovery.plan();
         const Vector2d stance =
-            world.soles()[static_cast<size_t>(1 - plan.foot)].translation().head<2>();
+            world.soles()[robot::Index(Other(plan.foot))].translation().head<2>();
         ASSERT_TRUE(plan.foothold.allFinite()) << i << ' ' << share;
         ASSERT_LT((plan.foothold - stance).norm(), farthest) << i << ' ' << share;
         ASSERT_LT(recovery.touch_down() - world.time(), 4 / world.Frequency()) << i << ' ' << share;

@@ -207,8 +207,8 @@ TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
     const double share = 0.5 + 0.5 * any(random);
     const Vector2d right(0.6 * any(random), -0.3 + 0.3 * any(random));
     const Vector2d left(-right.x(), -right.y());
-    if (balance::SignedDistance(reach.Leg(0, share), right) < 0.01 ||
-        balance::SignedDistance(reach.Leg(1, share), left) < 0.01) {
+    if (balance::SignedDistance(reach.Leg(Foot::kRight, share), right) < 0.01 ||
+        balance::SignedDistance(reach.Leg(Foot::kLeft, share), left) < 0.01) {
       continue;
     }
     ++tried;
@@ -231,11 +231,11 @@ TEST_P(ReachCase, APostureExistsWhereverTheyReach) {
 
 TEST_P(ReachCase, FootholdsAreBesideTheOtherSole) {
   const Reach reach(model_, height_, lower_, 0.1, 0.02);
-  for (const int foot : {0, 1}) {
+  for (const Foot foot : kFeet) {
     const balance::ConvexPolygon footholds = reach.Footholds(foot, {0.05, 0});
     ASSERT_GE(footholds.num_corners, 3);
     for (const Vector2d& corner : footholds.corners()) {
-      EXPECT_GE((foot == 0 ? -1 : 1) * corner.y(), reach.least_spacing() - 1e-12);
+      EXPECT_GE(Side(foot) * corner.y(), reach.least_spacing() - 1e-12);
     }
   }
 }
@@ -262,11 +262,11 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
     const double angle = M_PI * any(random), speed = 0.75 + 0.5 * any(random);
     state.pendulum.velocity = speed * Vector2d(std::cos(angle), std::sin(angle));
     state.sole = {Vector2d(0, -0.5 * spacing), Vector2d(0, 0.5 * spacing)};
-    for (const int foot : {0, 1}) {
+    for (const Foot foot : kFeet) {
       const StepPlan plan = choice.Plan(state, foot);
       ASSERT_EQ(plan.foot, foot);
       EXPECT_GE(plan.time, limits.unload + limits.least_swing - 1e-12);
-      const auto stance = static_cast<size_t>(1 - foot);
+      const auto stance = robot::Index(Other(foot));
       const balance::ConvexPolygon footholds = reach.Footholds(foot, plan.com - state.sole[stance]);
       if (footholds.num_corners < 3) continue;
       double best = -1;
@@ -275,17 +275,17 @@ TEST_P(ReachCase, NoFootholdIsMuchBetterThanTheChosen) {
           if (balance::SignedDistance(footholds, {x, y}) < 0) continue;
           const balance::ConvexPolygon soles =
               HullOf(SoleAt(model_.feet()[stance], limits.sole_margin, state.sole[stance], 0),
-                     SoleAt(model_.feet()[static_cast<size_t>(foot)], limits.sole_margin,
+                     SoleAt(model_.feet()[robot::Index(foot)], limits.sole_margin,
                             state.sole[stance] + Vector2d(x, y), 0));
           best = std::max(best, balance::SignedDistance(soles, plan.capture_point));
         }
       }
       // A step that the stance leg cannot follow counts as worse, wherever the foot goes.
       const Vector2d behind = state.sole[stance] - plan.com;
-      if (best < limits.ample_margin || !balance::Contains(reach.Leg(1 - foot, 1), behind))
+      if (best < limits.ample_margin || !balance::Contains(reach.Leg(Other(foot), 1), behind))
         continue;
       ++possible;
-      EXPECT_GE(plan.margin, -0.02) << "foot " << foot << ", velocity "
+      EXPECT_GE(plan.margin, -0.02) << "foot " << robot::Index(foot) << ", velocity "
                                     << state.pendulum.velocity.transpose() << ", best " << best;
     }
   }
@@ -300,12 +300,12 @@ double Support(const balance::ConvexPolygon& polygon, const Vector2d& direction)
 
 // m that `foothold`, from the stance sole, is beyond what both legs span, wherever the COM is:
 // outside some half-plane of the sum of one leg's polygon and the other's turned round.
-double BeyondSpan(const Reach& reach, int foot, const Vector2d& foothold) {
+double BeyondSpan(const Reach& reach, Foot foot, const Vector2d& foothold) {
   double beyond = -1e9;
   for (int i = 0; i < 360; ++i) {
     const Vector2d direction(std::cos(i * M_PI / 180), std::sin(i * M_PI / 180));
     beyond = std::max(beyond, foothold.dot(direction) - Support(reach.Leg(foot, 1), direction) -
-                                  Support(reach.Leg(1 - foot, 1), -direction));
+                                  Support(reach.Leg(Other(foot), 1), -direction));
   }
   return beyond;
 }
@@ -340,9 +340,9 @@ TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
     state.sole_yaw = {state.yaw, state.yaw + 0.2 * any(random)};
     if (trial % 4 > 1) state.in_contact[static_cast<size_t>(trial % 2)] = false;
     const auto from_stance = [&](const StepPlan& plan) -> Vector2d {
-      return turn.transpose() * (plan.foothold - state.sole[static_cast<size_t>(1 - plan.foot)]);
+      return turn.transpose() * (plan.foothold - state.sole[robot::Index(Other(plan.foot))]);
     };
-    for (const int foot : {0, 1}) {
+    for (const Foot foot : kFeet) {
       for (const Place place : {Place::kBeside, Place::kAhead, Place::kBehind}) {
         const StepPlan plan = choice.At(state, foot, 1 + any(random), place);
         ASSERT_TRUE(plan.foothold.allFinite());
@@ -351,16 +351,15 @@ TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
       }
     }
     const StepPlan plan = choice.Choose(state);
-    (plan.foot < 0 ? none : chosen)++;
-    if (plan.foot < 0) continue;
+    (plan.possible ? chosen : none)++;
+    if (!plan.possible) continue;
     ASSERT_TRUE(std::isfinite(plan.margin) && plan.foothold.allFinite());
     ASSERT_LT(BeyondSpan(reach, plan.foot, from_stance(plan)), far) << trial;
     ASSERT_LE(plan.time, 4 / frequency) << trial;
     // Both legs reach what does not catch the capture point, with level soles.
     if (plan.margin >= 0) continue;
-    const Vector2d com =
-        turn.transpose() * (plan.com - state.sole[static_cast<size_t>(1 - plan.foot)]);
-    ASSERT_GE(balance::SignedDistance(reach.Leg(1 - plan.foot, 1), -com), 0) << trial;
+    const Vector2d com = turn.transpose() * (plan.com - state.sole[robot::Index(Other(plan.foot))]);
+    ASSERT_GE(balance::SignedDistance(reach.Leg(Other(plan.foot), 1), -com), 0) << trial;
     ASSERT_GE(balance::SignedDistance(reach.Leg(plan.foot, 1), from_stance(plan) - com), -1e-6);
   }
   EXPECT_GT(chosen, 100);

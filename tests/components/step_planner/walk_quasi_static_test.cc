@@ -21,7 +21,7 @@ TEST(Walk, RestsAboveTheSoleThatCarriesHoweverLateTheOtherComesDown) {
     world.Run(kPeriod, command);
     const Walk& walk = world.walk();
     if (walk.stage() != WalkStage::kTouching) continue;
-    const auto stance = static_cast<size_t>(1 - walk.stepping_foot());
+    const auto stance = robot::Index(Other(walk.stepping_foot()));
     const Vector2d off = world.capture_point() - world.sole()[stance].translation().head<2>();
     EXPECT_LT(off.norm(), 0.02) << i;
     rested = true;
@@ -41,7 +41,7 @@ TEST(Walk, LoadLeavesAFootNoSoonerThanTheCentreOfPressure) {
     world.Run(kPeriod, command);
     const Walk& walk = world.walk();
     if (walk.stage() != WalkStage::kUnloading || walk.num_steps() == 0) continue;
-    const auto leaves = static_cast<size_t>(walk.stepping_foot());
+    const auto leaves = robot::Index(walk.stepping_foot());
     const Vector2d other = world.sole()[1 - leaves].translation().head<2>();
     const Vector2d way = world.sole()[leaves].translation().head<2>() - other;
     // As much as lies below the centre of pressure, were each sole's own in its middle.
@@ -63,7 +63,7 @@ TEST(Walk, StandsInTheMiddlesOfBothSolesWhilePressing) {
   // The stance keeps nine tenths of the weight, the other sole takes one.
   ASSERT_TRUE(world.RunTo(WalkStage::kLoading, command));
   world.Run(0.1, command);
-  const auto landed = static_cast<size_t>(1 - world.walk().stepping_foot());
+  const auto landed = robot::Index(Other(world.walk().stepping_foot()));
   const Vector2d stance = world.sole()[1 - landed].translation().head<2>();
   const Vector2d way = world.sole()[landed].translation().head<2>() - stance;
   const double share = (world.walk().wanted().capture_point - stance).dot(way) / way.squaredNorm();
@@ -88,10 +88,10 @@ TEST(Walk, GoesDownAndWaitsAsThePressLetsExpect) {
     // most_ahead counts. Above a sole that sinks the COM comes up as its leg reaches, 0.92 of a
     // straight one, as high as it stands at most.
     const Walk& walk = world.walk();
-    const int foot = 1 - walk.stepping_foot();
+    const Foot foot = Other(walk.stepping_foot());
     const double stands = walk.choice().legs().height();
     const Vector2d sole =
-        world.sole()[static_cast<size_t>(foot)].translation().head<2>() - world.com().head<2>();
+        world.sole()[robot::Index(foot)].translation().head<2>() - world.com().head<2>();
     const double leg = walk.choice().legs().Highest(foot, sole, 0.92);
     const double ahead = std::min(0.6 * whole, world.spec().most_ahead);
     const double up =
@@ -173,7 +173,7 @@ TEST(Walk, AFootThatFindsNothingWaitsWhereItIs) {
   world.Dig(0.02, 1);
   const WalkCommand command{{0.05, 0}, 0, true};
   ASSERT_TRUE(world.RunTo(WalkStage::kSwinging, command));
-  const auto stance = static_cast<size_t>(1 - world.walk().stepping_foot());
+  const auto stance = robot::Index(Other(world.walk().stepping_foot()));
   for (int i = 0; i < 5000; ++i) {
     world.Run(kPeriod, command);
     const Vector2d off = world.capture_point() - world.sole()[stance].translation().head<2>();

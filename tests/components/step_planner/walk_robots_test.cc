@@ -129,10 +129,10 @@ TEST(WalkLanding, AFootThatIsLetGoCarriesUntilItCountsOnALegOfAnyMass) {
   for (const double stiffness : {600.0, 3750.0, 30e3}) {
     StillWorld world(model, Enabled(), stiffness);
     ASSERT_LT(world.Until(WalkStage::kTouching, kAhead), 3) << stiffness;
-    const int foot = world.walk().stepping_foot();
+    const robot::Foot foot = world.walk().stepping_foot();
     EXPECT_LT(world.Until(WalkStage::kLoading, kAhead), 0.5) << stiffness;
     EXPECT_EQ(world.walk().num_steps(), 1) << stiffness;
-    EXPECT_EQ(world.walk().stepping_foot(), 1 - foot) << stiffness;
+    EXPECT_EQ(world.walk().stepping_foot(), Other(foot)) << stiffness;
   }
 }
 

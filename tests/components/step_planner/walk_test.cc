@@ -125,7 +125,8 @@ TEST(Walk, APushIsCaughtByTheNextFoothold) {
     World world(TestRobot::kDyros);
     const WalkCommand command{{0, 0}, 0, true};
     world.Run(3, command);
-    while (world.walk().stage() != WalkStage::kSwinging || world.walk().stepping_foot() != 1) {
+    while (world.walk().stage() != WalkStage::kSwinging ||
+           world.walk().stepping_foot() != Foot::kLeft) {
       world.Run(kPeriod, command);
     }
     world.Run(0.1, command);
