@@ -211,8 +211,8 @@ Vector2d Reach::ComAbove(Foot stance, const Vector2d& com) const {
   const balance::ConvexPolygon& leg = leg_[stance][1];
   if (leg.num_corners == 0) return com;
   const Vector2d nearest = -balance::NearestPoint(leg, -com);
-  const double beyond = (com - nearest).norm();
-  return beyond > roll_ ? Vector2d(nearest + roll_ / beyond * (com - nearest)) : com;
+  const double excess = (com - nearest).norm();
+  return excess > roll_ ? Vector2d(nearest + roll_ / excess * (com - nearest)) : com;
 }
 
 balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Place place) const {

@@ -102,9 +102,9 @@ bool Walk::OnSoftGround() const {
 
 bool Walk::AtRest(const StepInput& input, const StepState& state) {
   const Vector2d middle = 0.5 * (state.sole[0] + state.sole[1]);
-  const bool rests = (state.pendulum.capture_point() - middle).norm() < spec_.still_distance &&
+  const bool still = (state.pendulum.capture_point() - middle).norm() < spec_.still_distance &&
                      input.com_velocity.norm() < spec_.still_speed;
-  if (!rests) moving_since_ = input.time;
+  if (!still) moving_since_ = input.time;
   return input.time >= moving_since_ + spec_.still_time - kTimeTolerance;
 }
 
@@ -316,13 +316,13 @@ void Walk::Unload(const StepState& state, double period) {
 }
 
 balance::ConvexPolygon Walk::Carrying(const StepInput& input, const StepState& state) const {
-  const double edge = choice_.limits().sole_margin;
+  const double margin = choice_.limits().sole_margin;
   const Foot s = stance_, o = Other(s);
   const balance::ConvexPolygon sole =
-      SoleAt(choice_.foot(stance_), edge, state.sole[s], state.sole_yaw[s]);
+      SoleAt(choice_.foot(stance_), margin, state.sole[s], state.sole_yaw[s]);
   if (OnOneFoot()) return sole;
   const balance::ConvexPolygon other =
-      SoleAt(choice_.foot(Other(stance_)), edge, state.sole[o], state.sole_yaw[o]);
+      SoleAt(choice_.foot(Other(stance_)), margin, state.sole[o], state.sole_yaw[o]);
   if (stage_ == WalkStage::kStarting || stage_ == WalkStage::kStopping) return HullOf(sole, other);
   // Free of the ramp the load goes to the feet as the centre of pressure lies between them.
   const Vector2d way = state.sole[s] - state.sole[o];

@@ -118,9 +118,9 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   // What the centre of pressure at the sole's edge leaves of the error at touch-down.
   const Vector2d cop = balance::NearestPoint(sole, stance + (1 + spec_.gain) * error);
   const Vector2d caught = CapturePointAfter(now, cop, w, left);
-  double beyond = 0;
-  if (size > 0) beyond = (caught - planned).dot(error) / size - spec_.adjust_from;
-  if (!(beyond > 0)) {
+  double missing = 0;  // m of the error that the foothold has to take
+  if (size > 0) missing = (caught - planned).dot(error) / size - spec_.adjust_from;
+  if (!(missing > 0)) {
     // Back to what is commanded, once the error is small enough.
     if (!moved.isApprox(foothold_.position, 1e-12)) {
       swing_.Move(foothold_.position, input.time, touch_down_);
@@ -130,8 +130,8 @@ void Walk::Adjust(const StepInput& input, const StepState& state) {
   // A foothold farther by d takes the plan's capture point at touch-down d (1 − e^{−ωB})/(ωB)
   // farther, for the centre of pressure needs B to get there.
   const double between = w * (spec_.load + spec_.unload);
-  beyond *= between / (1 - std::exp(-between));
-  Vector2d foothold = foothold_.position + beyond / size * error;
+  missing *= between / (1 - std::exp(-between));
+  Vector2d foothold = foothold_.position + missing / size * error;
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const Vector2d com = After(state.pendulum, cop, left).com;
   const balance::ConvexPolygon footholds =
