@@ -369,7 +369,7 @@ TEST(TaskList, RefusesByTheNameOfTheField) {
   EXPECT_EQ(legs("type: 'orientation' joint: 'right_knee_pitch'"), "task[1].joint");
   EXPECT_EQ(legs("type: 'frame' foot: LEFT link: 'right_foot'"), "task[1].link");
   EXPECT_EQ(legs("type: 'frame' foot: LEFT reference: BODY"), "task[1].reference");
-  EXPECT_EQ(legs("type: 'frame' point { x: inf } gains { kp: 1 kd: 1 }"), "task[1].point");
+  EXPECT_EQ(legs("type: 'frame' point { x: inf } gains { kp: 1 kd: 1 }"), "task[1].point.x");
   EXPECT_EQ(legs("type: 'angular_momentum' gains { kp: 1 kd: 1 }"), "task[1].gains.kp");
   EXPECT_EQ(legs("type: 'angular_momentum' gains { kd: 1 } foot: LEFT"), "task[1].foot");
   EXPECT_EQ(legs("type: 'joint_posture' gains { kp: 1 kd: 1 } joint: 'tail'"), "task[1].joint");

@@ -289,7 +289,7 @@ TEST(DriveEmulator, RefusesAConfigurationByField) {
   EXPECT_EQ(field("link { udp {} } wiring { joint: \"tail\" }"), "wiring[0].joint");
   EXPECT_EQ(field("link { udp {} } change { joint: \"tail\" }"), "change[0].joint");
   EXPECT_EQ(field("link { udp {} } trouble { kind: STO joint: \"tail\" }"), "trouble[0].joint");
-  EXPECT_EQ(field("link { udp {} } trouble { frames { late: 2 } }"), "trouble[0].frames");
+  EXPECT_EQ(field("link { udp {} } trouble { frames { late: 2 } }"), "trouble[0].frames.late");
 }
 
 }  // namespace

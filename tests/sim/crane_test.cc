@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "components/framework/configuration/field_rules.h"
 #include "tests/sim/engine.h"
 #include "tests/sim/simulation_fixture.h"
 
@@ -21,6 +22,7 @@ constexpr int64_t kLead = 1000;  // ticks
 CraneSpring MakeCrane(const std::string& text) {
   Crane config;
   ParseTextProto(text, "test", &config);
+  CheckFields(config, "crane.");
   return CraneSpring(config, PaperRobot(), Isometry3d::Identity(), Vector3d(0.02, 0, 0.7), kStep,
                      kTick);
 }

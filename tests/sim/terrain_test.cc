@@ -15,6 +15,7 @@ namespace {
 Terrain Make(const std::string& text, uint64_t seed = 1) {
   SimConfig config;
   ParseTextProto(text, "test", &config);
+  CheckFields(config);
   return Terrain(config, seed);
 }
 
