@@ -24,6 +24,7 @@ class Calibrator {
   /// (mass, kg; moment x, y, z, kg·m).
   using Load = Eigen::Vector4d;
 
+  /// `cutoff`: Hz, of the observer's low-pass, which readings and model pass alike. `period`: s.
   Calibrator(std::shared_ptr<const robot::RobotModel> model, const CalibrationConfig& config,
              double cutoff, double period);
 

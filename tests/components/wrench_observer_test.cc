@@ -186,7 +186,9 @@ TEST(WrenchObserver, AtRestItGivesTheStaticWrenchesToRounding) {
 TEST(WrenchObserver, InMotionItFollowsTheEquationsOfMotion) {
   for (const TestRobot robot : {TestRobot::kDyros, TestRobot::kMantis}) {
     Motion motion(robot, 0.1);
-    WrenchObserver observer(motion.model(), {.cutoff = 100});
+    WrenchObserverConfig config;
+    config.set_cutoff(100);
+    WrenchObserver observer(motion.model(), config);
     double worst = 0;
     for (int tick = 0; tick < 1500; ++tick) {
       const double t = kPeriod * tick;
@@ -308,6 +310,12 @@ TEST(WrenchObserver, TheCovarianceIsThatOfTheErrors) {
   EXPECT_GE(inside, static_cast<int>(0.93 * kTrials));
 }
 
+CalibrationConfig Enabled() {
+  CalibrationConfig config;
+  config.set_enabled(true);
+  return config;
+}
+
 TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
   Motion motion(TestRobot::kDyros, 0.02);
   // The robot carries less than its model says, so that the model's mass is an error to find.
@@ -319,7 +327,7 @@ TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
   Calibrator::Load expected;
   expected << was.mass - is.mass, was.mass * was.com - is.mass * is.com;
   WrenchObserver observer(believed, {});
-  Calibrator calibrator(believed, {.enabled = true}, kPeriod);
+  Calibrator calibrator(believed, Enabled(), WrenchObserverConfig().cutoff(), kPeriod);
   for (int tick = 0; tick < 1000; ++tick) {
     motion.At(kPeriod * tick, 0.5);
     observer.Track(motion.sensors(), kPeriod);
@@ -342,7 +350,7 @@ TEST(Calibrator, FindsALoadAndTheComInTwoSeconds) {
 TEST(Calibrator, StandingStillTheHeightIsNotSeen) {
   Motion motion(TestRobot::kDyros, 0);
   WrenchObserver observer(motion.model(), {});
-  Calibrator calibrator(motion.model(), {.enabled = true}, kPeriod);
+  Calibrator calibrator(motion.model(), Enabled(), WrenchObserverConfig().cutoff(), kPeriod);
   const double before = calibrator.covariance()(3, 3);
   motion.At(0, 0.5);
   const WrenchObserver::Wrenches w = motion.wrenches();
