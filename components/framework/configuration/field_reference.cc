@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 #include <stdexcept>
 
 #include "components/framework/configuration/configuration.h"
@@ -105,7 +106,18 @@ std::string DefaultOf(const FieldDescriptor& field) {
   return {};
 }
 
-void Append(const Descriptor& type, const std::string& prefix, std::vector<FieldEntry>* entries) {
+/// The value of a field in the text of a group's default, "unload: 0.2 load: 0.2"; empty: none.
+std::string ValueIn(const std::string& text, const std::string& name) {
+  std::istringstream words(text);
+  for (std::string word, value; words >> word;) {
+    if (word == name + ":" && words >> value) return value;
+  }
+  return {};
+}
+
+/// `defaults`: the text of the default of the group whose type this is.
+void Append(const Descriptor& type, const std::string& prefix, const std::string& defaults,
+            std::vector<FieldEntry>* entries) {
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor& field = *type.field(i);
     if (field.full_name() == "poise.Scenario.applied") continue;
@@ -121,13 +133,13 @@ void Append(const Descriptor& type, const std::string& prefix, std::vector<Field
         comment += comment.ends_with('.') ? " " : ". ";
       }
       comment += of_type;
-      if (const std::string text = GroupDefaultText(field); !text.empty()) {
-        comment += fmt::format(" Default: {}.", text);
-      }
     }
     entry.unit = UnitOf(comment);
     entry.range = RangeOf(field);
     entry.meaning = comment;
+    if (const std::string value = ValueIn(defaults, field.name()); !value.empty()) {
+      entry.meaning += fmt::format("{} Default: {}.", comment.ends_with('.') ? "" : ".", value);
+    }
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_ENUM) {
       const auto& values = *field.enum_type();
       if (entry.meaning.empty()) entry.meaning = Comment(values);
@@ -137,7 +149,8 @@ void Append(const Descriptor& type, const std::string& prefix, std::vector<Field
     }
     const std::string path = entry.path;
     entries->push_back(std::move(entry));
-    if (entries->back().group) Append(*field.message_type(), path + ".", entries);
+    if (entries->back().group)
+      Append(*field.message_type(), path + ".", GroupDefaultText(field), entries);
   }
 }
 
@@ -192,7 +205,7 @@ void AddSchema(std::string_view descriptor_set) {
 
 std::vector<FieldEntry> FieldsOfType(const std::string& type, const std::string& prefix) {
   std::vector<FieldEntry> entries;
-  Append(TypeNamed(type), prefix, &entries);
+  Append(TypeNamed(type), prefix, {}, &entries);
   return entries;
 }
 
@@ -203,7 +216,7 @@ std::vector<FieldEntry> FieldsOfGroup(const std::string& type, const std::string
   group.meaning = Comment(TypeNamed(type));
   group.group = true;
   std::vector<FieldEntry> entries = {group};
-  Append(TypeNamed(type), path + ".", &entries);
+  Append(TypeNamed(type), path + ".", {}, &entries);
   return entries;
 }
 
