@@ -48,10 +48,14 @@ add_library(poise_options INTERFACE)
 target_include_directories(poise_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
 target_link_libraries(poise_options INTERFACE Eigen3::Eigen fmt::fmt)
 target_compile_options(poise_options INTERFACE -Wall -Wextra -Wconversion)
-if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # GCC 12 raises them falsely: in its own AVX-512 headers wherever Eigen meets them (bug 105593), the last ones in fmt and std::string (bug 105651).
-  target_compile_options(poise_options INTERFACE -Wno-uninitialized -Wno-maybe-uninitialized -Wno-array-bounds
-                         -Wno-stringop-overflow -Wno-restrict)
+# A precompiled header fits only where macros are equal, and tinyxml2's package of Debian 13 brings this one to its users alone.
+target_compile_definitions(poise_options INTERFACE _FILE_OFFSET_BITS=64)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(poise_options INTERFACE -Wno-array-bounds)  # GCC 12 to 14 raise it falsely in Eigen
+  if(CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+    # GCC 12 raises them falsely: in its own AVX-512 headers wherever Eigen meets them (bug 105593), the last ones in fmt and std::string (bug 105651).
+    target_compile_options(poise_options INTERFACE -Wno-uninitialized -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-restrict)
+  endif()
 endif()
 if(POISE_WERROR)
   target_compile_options(poise_options INTERFACE -Werror)
