@@ -109,10 +109,8 @@ ordered_json PartJson(const BenchmarkResult& result) {
 
 /// What `poise run` is to be told in the benchmark's folder, beside the sweep's own changes.
 std::string RunOf(const BenchmarkSet& set, const BenchmarkPart& part) {
-  std::string what =
-      fmt::format("set/{}_scenario.pbtxt --robot {}", part.name(), ShellWord(set.subject().robot));
-  if (!set.subject().drives.empty()) what += " --drives " + set.subject().drives;
-  return what;
+  return fmt::format("set/{}_scenario.pbtxt --robot {}", part.name(),
+                     ShellWord(set.subject().robot));
 }
 
 }  // namespace

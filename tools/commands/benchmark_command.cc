@@ -197,7 +197,7 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
   benchmark
       ->add_option("--drives", subject->drives,
                    "emulated drives between bridge and robot, as of poise run; runs as processes")
-      ->check(CLI::IsMember({"ethercat", "unitree"}))
+      ->check(CLI::IsMember(EmulatedDrives()))
       ->excludes(graph);
   list("--part", &arguments->parts, "only this part of the set, repeatable", "PART");
   benchmark->add_flag("--quick", arguments->quick,

@@ -129,7 +129,7 @@ void AddRunCommand(CLI::App* app, Command* command) {
              "what moves the simulated robot's motors; ethercat: an emulated chain of "
              "servo drives, through real EtherCAT frames; unitree: an emulated G1 or H1-2, "
              "over DDS")
-          ->check(CLI::IsMember({"ethercat", "unitree"}))
+          ->check(CLI::IsMember(EmulatedDrives()))
           ->excludes(in_process)
           ->excludes(interactive);
   run->add_option("--link", options->changes.link,

@@ -109,6 +109,7 @@ std::string Maps::CommandOf(const Sweep& sweep, const std::string& what) {
   if (sweep.has_variant()) command += " --variant " + ShellWord(sweep.variant());
   for (const std::string& part : sweep.without()) command += " --without " + ShellWord(part);
   if (sweep.ideal()) command += " --ideal";
+  if (sweep.has_drives()) command += " --drives " + ShellWord(sweep.drives());
   for (const std::string& set : sweep.set()) command += " --set " + ShellWord(set);
   return command;
 }

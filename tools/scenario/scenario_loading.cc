@@ -459,6 +459,8 @@ void FailField(const LoadedScenario& loaded, std::string_view field, std::string
   throw ConfigError(fmt::format("{}:{}: {}: {}", place.file, place.line, place.field, problem));
 }
 
+std::vector<std::string> EmulatedDrives() { return {"ethercat", "unitree"}; }
+
 LoadedScenario LoadScenario(const std::string& name, const RunChanges& changes) {
   const fs::path overlay =
       changes.drives.empty() ? fs::path() : FindFile("drives", changes.drives, fs::current_path());

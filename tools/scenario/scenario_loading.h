@@ -14,6 +14,9 @@
 
 namespace poise {
 
+/// What --drives takes.
+std::vector<std::string> EmulatedDrives();
+
 /// What the command line changes, in this order: ablations, the variant, single fields.
 struct RunChanges {
   std::vector<std::string> without;  ///< of RemovableParts()
@@ -32,7 +35,7 @@ struct RunChanges {
   /// Components that share a process, "PROCESS=A,B,C".
   std::vector<std::string> host;
   bool hosted = false;  ///< those that the graph marks restart: true share the process "controller"
-  std::string drives;   ///< "ethercat"; empty: the simulated robot's own
+  std::string drives;   ///< of EmulatedDrives(); empty: the simulated robot's own
   std::string link;  ///< of EtherCAT: "udp", or "raw:MASTER,DRIVES" with two interfaces; empty: udp
   std::string capture;  ///< file for all EtherCAT frames; empty: none
   bool operator==(const RunChanges&) const = default;

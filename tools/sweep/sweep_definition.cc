@@ -241,6 +241,7 @@ SweepDefinition::Source::Source(SweepArguments given, bool limit) : arguments(st
   if (!changes.variant.empty()) sweep.set_variant(changes.variant);
   for (const std::string& part : changes.without) sweep.add_without(part);
   if (changes.ideal) sweep.set_ideal(true);
+  if (!changes.drives.empty()) sweep.set_drives(changes.drives);
   if (!changes.world.empty()) {
     CheckEngine(changes.world);
     sweep.add_set("engine=" + changes.world);
@@ -304,11 +305,17 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
   const Source source(arguments, limit);
   Sweep sweep = source.sweep;
   if (auto problem = CheckVariables(sweep, limit)) source.Fail(*problem);
+  const std::vector<std::string> drives = EmulatedDrives();
+  if (sweep.has_drives() && std::ranges::find(drives, sweep.drives()) == drives.end()) {
+    source.Fail({"drives", fmt::format("is '{}'; it is {}, or left out", sweep.drives(),
+                                       fmt::join(drives, " or "))});
+  }
   points_ = SweepPoints(sweep);
   scenario_ = sweep.scenario();
   changes_.reference = false;
   changes_.variant = sweep.variant();
   changes_.ideal = sweep.ideal();
+  changes_.drives = sweep.drives();
   changes_.without.assign(sweep.without().begin(), sweep.without().end());
   changes_.set.assign(sweep.set().begin(), sweep.set().end());
   changes_.duration.reset();  // is among `set`

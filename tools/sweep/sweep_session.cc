@@ -123,6 +123,9 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
                 "a robot without joint friction, sensor noise, drive train and model error");
   app->add_option("--world", changes->world,
                   "engine of the simulated robot: ode or mujoco; default: the scenario's");
+  app->add_option("--drives", changes->drives,
+                  "emulated drives between bridge and robot, as of poise run; runs as processes")
+      ->check(CLI::IsMember(EmulatedDrives()));
   list("--set", &changes->set, "change a field of the scenario in every run (poise list fields)",
        "FIELD=VALUE");
   app->add_option("--duration", changes->duration, "simulated time of a run, s")

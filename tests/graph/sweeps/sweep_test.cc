@@ -281,6 +281,8 @@ TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1 }\nmap { x: \"sed\" }\n",
          {"wrong.pbtxt:3: map[0].x", "seed"});
   expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1.5 }\n", {"wrong.pbtxt:2", "whole"});
+  expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1 }\ndrives: \"ethercut\"\n",
+         {"wrong.pbtxt:3: drives", "ethercat"});
   const auto flags = [&](std::vector<std::string> arguments,
                          const std::vector<std::string>& parts) {
     arguments.insert(arguments.begin(), {"sweep"});
@@ -297,6 +299,7 @@ TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   flags({"tiny", "--range", "5:9"}, {"--range 5:9"});
   flags({"tiny", "--part", "0/4"}, {"--part 0/4"});
   flags({"tiny", "--jobs", "0"}, {"--jobs"});
+  flags({"tiny", "--drives", "ethercut"}, {"--drives", "ethercat"});
   flags({"tiny", "--random", "4"}, {"tiny.pbtxt:2: vary[0].steps"});
   ExpectUsageError({"sweep", "tiny", "--resume"}, {"--out"});
   ExpectUsageError({"sweep", "merge", Out("none"), "--out", out}, {"no results"});

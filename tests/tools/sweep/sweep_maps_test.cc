@@ -205,6 +205,9 @@ TEST_F(SweepMapsTest, AMarkTellsTheCommandThatMakesItsRunAgain) {
                                "&#39;sim.push[0].peak=100&#39;"));
   EXPECT_THAT(MapCharts(header, rows, "set/a.pbtxt --robot g1").survival.at(0),
               HasSubstr("poise run set/a.pbtxt --robot g1 --ideal"));
+  header.sweep.set_drives("ethercat");
+  EXPECT_THAT(MapCharts(header, rows).survival.at(0),
+              HasSubstr("poise run my/push.pbtxt --ideal --drives ethercat --set"));
 }
 
 TEST_F(SweepMapsTest, WhereRandomRunsFall) {
