@@ -156,6 +156,13 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     Replace(options, &registry_);
     CheckGraph(spec_.graph(), registry_);
   }
+  const std::string program = OwnProgramOf(spec_);
+  if (!program.empty()) {
+    throw ConfigError(
+        program +
+        ", which this process cannot hold; give an object in its place, components={name: "
+        "object}, or run it with poise run");
+  }
   runner_ = std::make_unique<InlineRunner>(spec_, registry_);
   FillPlan(runner_->plan(), spec_.mutable_graph());
   names_ = logging::ElementNames::OfSpec(spec_);

@@ -127,9 +127,8 @@ class Elsewhere : public ForeignFunctions {
   explicit Elsewhere(std::string name) : name_(std::move(name)) {}
   void Configure(const ComponentContext&, std::span<const ForeignPort>) override {}
   void Step(const Tick&, std::span<ForeignPort>) override {
-    throw ConfigError(fmt::format(
-        "{} is a program of its own, which one process does not hold; run without --inline",
-        name_));
+    throw ConfigError(
+        fmt::format("{} is a program of its own, which no other process holds", name_));
   }
 
  private:

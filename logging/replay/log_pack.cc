@@ -130,6 +130,9 @@ class RemadeLog {
         lane.here = false;
       }
     }
+    if (tick_ < run_.ticks && runner.failed()) {
+      throw LogError(fmt::format("{}: cannot be made again: {}", path_, runner.end_detail()));
+    }
     PutKept();
     sums_.Close();
     CheckBlocks();

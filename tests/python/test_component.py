@@ -214,8 +214,6 @@ class AsProcess(unittest.TestCase):
         listed = self.poise("list", "components")
         self.assertIn("springs", listed.stdout)
         self.assertIn("Springs at the joints, and gravity compensation.", listed.stdout)
-        inline = self.poise("run", "sprung", "--inline", "--set", "duration=0.1", "--out", "inline")
-        self.assertIn("springs is a program of its own", inline.stdout + inline.stderr)
         for text in ("", "[]", '{"name": "other", "inputs": []}', '{"name": "springs"}',
                      self.told.replace("same tick", "sometimes"), self.told.replace('"task_torque_t"', "3")):
             self.describe(text)
@@ -228,6 +226,22 @@ class AsProcess(unittest.TestCase):
             self.assertIn("springs.json: is no description of a component", listed.stderr)
         self.describe(self.told.replace("task_torque_t", "health_t"))
         self.assertEqual(self.poise("run", "sprung").returncode, 2)
+
+    def test_a_program_is_no_part_of_another_process(self):
+        with open(os.path.join(self.folder, "share/poise/graphs/springs.pbtxt")) as file:
+            graph = file.read()
+        with open(os.path.join(self.folder, "share/poise/graphs/fresh.pbtxt"), "w") as file:
+            file.write(graph.replace('type: "springs"', 'type: "springs"\n  restart: true'))
+        program = "component 'task_controller' is springs, a program of its own"
+        for flags, what_to_do in ((["--inline"], "without --inline"), (["--interactive"], "without --inline and --interactive"),
+                                  (["--set", "graph=fresh", "--hosted"], "without --hosted"),
+                                  (["--set", "graph=fresh", "--host", "one=step_planner,task_controller"], "leave it out of --host")):
+            refused = self.poise("run", "sprung", "--set", "duration=0.1", "--out", "refused", *flags)
+            self.assertEqual(refused.returncode, 2, refused.stdout + refused.stderr)
+            self.assertEqual(refused.stderr.count("\n"), 1, refused.stderr)
+            self.assertIn(program, refused.stderr)
+            self.assertIn(what_to_do, refused.stderr)
+            self.assertFalse(os.path.exists(os.path.join(self.folder, "refused")))
 
     def test_the_description_says_what_the_class_says(self):
         scope = {}

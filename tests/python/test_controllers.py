@@ -166,6 +166,10 @@ class Judged(unittest.TestCase):
         self.assertRegex(shown.stdout.replace("\n", " "), r": holder: output joint_command is not finite at tick 301\.")
         self.assertNotIn(": holder: holder", shown.stdout)
 
+    def test_a_program_is_not_stepped_here(self):
+        with self.assertRaisesRegex(poise.ConfigError, "'holder' is torque, a program of its own.*components="):
+            poise.Environment("stand", {"graph": "torque"})
+
     def test_a_negative_stiffness_is_named(self):
         def softens(self, tick, inputs, outputs):
             super(type(self), self).step(tick, inputs, outputs)

@@ -98,6 +98,13 @@ ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunCha
     for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   }
   CheckRun(part.loaded, &part.spec);
+  const std::string program = in_process ? OwnProgramOf(part.spec) : "";
+  if (!program.empty()) {
+    throw ConfigError(fmt::format(
+        "{}, which a run inside one process cannot hold; {}", program,
+        warn ? "poise run without --inline and --interactive makes each component a process"
+             : "the reference variant is run so: leave it out with --no-reference"));
+  }
   return part;
 }
 

@@ -26,7 +26,6 @@
 #include "tools/run/estimates.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
-#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -43,10 +42,7 @@ struct Prepared {
 
 /// Whether one process cannot hold the run.
 bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
-  if (!changes.drives.empty()) return true;
-  const auto& components = spec.graph().component();
-  return std::any_of(components.begin(), components.end(),
-                     [](const ComponentInstance& each) { return IsDescribed(TypeOf(each)); });
+  return !changes.drives.empty() || !OwnProgramOf(spec).empty();
 }
 
 /// Runs as processes and reads the log; empty where not all ticks until the run's end were done:
