@@ -151,9 +151,9 @@ class AsProcess(unittest.TestCase):
         with open(os.path.join(self.folder, "lib/poise/components/springs.json"), "w") as file:
             file.write(text)
 
-    def poise(self, *arguments):
-        return subprocess.run([POISE, *arguments], cwd=self.folder, env=self.environment, capture_output=True, text=True,
-                              timeout=120)
+    def poise(self, *arguments, environment=None):
+        return subprocess.run([POISE, *arguments], cwd=self.folder, env=environment or self.environment, capture_output=True,
+                              text=True, timeout=120)
 
     def test_a_run_of_processes_in_lockstep(self):
         done = self.poise("run", "sprung", "--set", "duration=0.4", "--out", "run")
@@ -169,6 +169,23 @@ class AsProcess(unittest.TestCase):
                 if path != "run_id":
                     np.testing.assert_array_equal(processes[name][path], inline[name][path], f"{name} {path}")
         self.assertEqual(processes.metric("fallen"), 0)
+
+    def test_a_replay_judges_what_it_replayed_and_names_what_not(self):
+        self.poise("run", "sprung", "--set", "duration=0.4", "--out", "run")
+        poise.run("stand", duration=0.4, components={"task_controller": Player(poise.run("stand", duration=0.4))},
+                  out=os.path.join(self.folder, "object"))
+        elsewhere = {**self.environment, "POISE_PATH": ""}
+        for run, environment, why in (("run", self.environment, "springs is a program of its own"),
+                                      ("run", elsewhere, "does not know its type springs"),
+                                      ("object", self.environment, "an object of Python's")):
+            done = self.poise("replay", run, environment=environment)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertRegex(done.stdout, f"task_controller: not replayed: .*{why}")
+            self.assertIn("JOINT_COMMAND: 200 messages, the same bits", done.stdout)
+            self.assertNotIn("DIFFERENT", done.stdout)
+            alone = self.poise("replay", run, "--component", "task_controller", environment=environment)
+            self.assertEqual(alone.returncode, 1)
+            self.assertIn("nothing was replayed", alone.stdout)
 
     def sweep(self, end, out, *more):
         """A sweep of two runs, whose program does `end` when it has been told to stop."""

@@ -17,6 +17,7 @@
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/run/run_dir.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -94,23 +95,43 @@ void Print(const logging::ReplayedComponent& component, const logging::LogMessag
   }
 }
 
+/// Why the component cannot be replayed; empty: it can.
+std::string WhyNot(const RunSpec& spec, int component) {
+  const std::string& type = TypeOf(spec.graph().component(component));
+  if (IsDescribed(type)) {
+    return fmt::format("{} is a program of its own, which no other process holds", type);
+  }
+  if (Components().Find(type) == nullptr) {
+    return fmt::format(
+        "this program does not know its type {}: an object of Python's in the place of a "
+        "component, or of a module or program whose folder is not on POISE_PATH",
+        ForTerminal(type));
+  }
+  if (SpeaksToDrives(spec, component)) {
+    return "the log does not hold what passes between bridge and drives";
+  }
+  return "";
+}
+
 int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogReplay replay(log);
   RunSpec spec = replay.spec();
   ChangeConfigurations(options.set, &spec);
   const logging::LogMessages messages(log);
-  bool equal = true;
+  bool equal = true, replayed = false;
   for (const int index : Wanted(spec, options.components)) {
-    if (SpeaksToDrives(spec, index)) {
-      fmt::print("{}: left out: the log does not hold what passes between bridge and drives\n",
-                 spec.graph().component(index).name());
+    if (const std::string why = WhyNot(spec, index); !why.empty()) {
+      fmt::print("{}: not replayed: {}\n", ForTerminal(spec.graph().component(index).name()), why);
       continue;
     }
+    replayed = true;
     const logging::ReplayedComponent component = replay.Replay(spec, index, Components());
     Print(component, messages);
     equal = equal && component.equal();
   }
-  return equal ? kExitOk : kExitFailed;
+  // Of nothing it would say that all is equal.
+  if (!replayed) fmt::print("nothing was replayed\n");
+  return equal && replayed ? kExitOk : kExitFailed;
 }
 
 int Play(const ReplayOptions& options, const std::string& log) {
@@ -142,7 +163,8 @@ void AddReplayCommand(CLI::App* app, Command* command) {
       "logged, bit for bit (exit code 1 when it differs)");
   replay->footer(
       "Configurations, robot and seed are those of the log. The components are those of this "
-      "program, so that a changed build shows where it differs.\nExample: poise replay runs/latest "
+      "program, so that a changed build shows where it differs. What cannot be replayed (a program "
+      "of its own, an object of Python's, an end of the drives) is named and not judged.\nExample: poise replay runs/latest "
       "--component task_controller --set task_controller.com.kp=200");
   replay->add_option("run", options->run, "folder of a run or a log; default: the latest run");
   CLI::Option* component =
