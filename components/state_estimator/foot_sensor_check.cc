@@ -1,6 +1,7 @@
 #include "components/state_estimator/foot_sensor_check.h"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 
 namespace poise {
 namespace {
@@ -8,6 +9,9 @@ namespace {
 // s: no sensor with noise reads the same six numbers for so long, whatever they are. Zero is what a
 // good one without noise reads in the air.
 constexpr double kStuckTime = 0.1;
+// s, in which what a reading swings by is forgotten to 1/e: longer than the slowest rattle that the
+// observer's low-pass does not follow.
+constexpr double kSwingTime = 0.1;
 
 }  // namespace
 
@@ -15,9 +19,25 @@ void FootSensorCheck::Read(State said, const Wrench& measured, double dt) {
   said_ = said;
   same_time_ = measured == measured_ ? same_time_ + dt : 0;
   measured_ = measured;
-  if (said == State::kOk) return;
-  state_ = said;
-  wrong_time_ = right_time_ = same_time_ = 0;
+  if (said != State::kOk) {
+    state_ = said;
+    wrong_time_ = right_time_ = same_time_ = 0;
+    reads_ = false;
+    return;
+  }
+  input_ = measured;
+  if (reads_) {
+    filter_.Step(input_, dt);
+  } else {
+    filter_.Reset(input_);
+    above_.setZero();
+    below_.setZero();
+  }
+  reads_ = true;
+  const Wrench fast = measured - filter_.value();
+  const double keep = std::exp(-dt / kSwingTime);
+  above_ = (keep * above_).cwiseMax(fast);
+  below_ = (keep * below_).cwiseMax(-fast);
 }
 
 void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covariance,
@@ -25,7 +45,11 @@ void FootSensorCheck::Compare(const Wrench& observed, const Covariance& covarian
   if (said_ != State::kOk || !config_.enabled()) return;
   Covariance total = covariance;
   total.diagonal() += noise.cwiseAbs2();
-  const Wrench gap = measured_ - observed;
+  // Samples of what swings to both sides faster than the low-pass follows do not tell its mean: the
+  // ground strikes between them. A fault steps to one side. A sensor that is not believed has to
+  // agree by more than such a doubt.
+  if (state_ == State::kOk) total.diagonal() += above_.cwiseMin(below_).cwiseAbs2();
+  const Wrench gap = filter_.value() - observed;
   const double difference =
       gap.head<3>().norm() < least_force ? 0 : gap.dot(total.llt().solve(gap));
   if (!(difference >= 0)) return;  // not a covariance

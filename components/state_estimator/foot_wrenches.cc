@@ -15,8 +15,8 @@ FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
       check_every_(config.wrench_observer().check_every()),
       push_gate_(config.wrench_observer().push_gate()),
       least_force_(kLeastShare * model->total_mass() * robot::kGravity),
-      check_{FootSensorCheck(config.foot_sensor_check()),
-             FootSensorCheck(config.foot_sensor_check())} {
+      check_{FootSensorCheck(config.foot_sensor_check(), config.wrench_observer().cutoff()),
+             FootSensorCheck(config.foot_sensor_check(), config.wrench_observer().cutoff())} {
   noise_.head<3>().setConstant(model->force_noise());
   noise_.tail<3>().setConstant(model->moment_noise());
   wrench_.fill(robot::Vector6d::Zero());

@@ -401,6 +401,47 @@ TEST_P(FootSensorFault, IsNoticedNamedAndForgiven) {
   EXPECT_TRUE(wrenches.measured(1)) << "well again for 2 s";
 }
 
+// A sole that comes off the ground and strikes it again, up to 125 times a second: a good sensor
+// reads every blow, the observer's low-pass a mean. A bias is noticed as before once it rests.
+TEST(FootSensorCheck, ASoleThatRattlesIsNoFault) {
+  Motion motion(TestRobot::kDyros, 0);
+  const std::array<std::pair<int, int>, 4> rattles = {{{4, 2}, {8, 2}, {16, 4}, {30, 10}}};
+  for (const auto& [period, contact] : rattles) {  // ticks
+    FootWrenches wrenches(motion.model(), {});
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    const auto update = [&](int tick, bool rattles, double bias) {
+      motion.At(0, 0.5);
+      const WrenchObserver::Wrenches truth = motion.wrenches();
+      const bool strikes = tick % period < contact;
+      std::array<FootReading, 2> reading;
+      for (size_t f = 0; f < 2; ++f) {
+        reading[f].wrench = truth.segment<6>(static_cast<Eigen::Index>(6 * f));
+        if (rattles) reading[f].wrench *= strikes ? static_cast<double>(period) / contact : 0;
+        for (int i = 0; i < 6; ++i) reading[f].wrench[i] += (i < 3 ? 1.0 : 0.05) * normal(random);
+      }
+      reading[1].wrench[2] += bias;
+      wrenches.Update(tick, kPeriod, motion.sensors(), reading, {});
+    };
+    int tick = 0;
+    for (; tick < 1000; ++tick) {
+      update(tick, tick >= 100, 0);
+      ASSERT_TRUE(wrenches.measured(0) && wrenches.measured(1)) << period << " " << tick;
+    }
+    for (; tick < 1500; ++tick) {
+      update(tick, false, 0);
+      ASSERT_TRUE(wrenches.measured(0) && wrenches.measured(1)) << period << " " << tick;
+    }
+    for (; tick < 1550; ++tick) update(tick, false, 150);
+    EXPECT_EQ(wrenches.check(1).state(), FootSensorCheck::State::kBiased) << period;
+    // What rattles does not agree: the bias is still there.
+    for (; tick < 3000; ++tick) {
+      update(tick, true, 150);
+      ASSERT_FALSE(wrenches.measured(1)) << period << " " << tick;
+    }
+  }
+}
+
 // Standing still a reading that stays what it was agrees with everything, but no noise repeats.
 TEST(FootSensorCheck, AReadingThatDoesNotChangeIsFrozenThoughItAgrees) {
   Motion motion(TestRobot::kDyros, 0);

@@ -156,6 +156,18 @@ class Judged(unittest.TestCase):
         self.assertEqual(run.metric("steps"), 0)
         self.assertNotIn("made", shown.stdout.split("\n\n")[0])
 
+    def test_chatter_is_no_fault_of_a_sensor(self):
+        def rattles(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs)
+            legs = np.array([any(part in name for part in ("knee", "hip_pitch", "ankle_pitch")) for name in self.robot.joint_names])
+            outputs.joint_command.torque = 80 * legs * (-1) ** (tick.index // 2)
+
+        run, checks, shown = self.run_it("stand", "impedance", holder(True, step=rattles), {"duration": 1})
+        force = -run["GROUND_TRUTH"]["foot_wrench.force"][:, :, 2]
+        self.assertTrue((force < 10).any() and force.max() > run.robot.total_mass * 9.80665)
+        self.assertFalse(run["ESTIMATOR_STATUS"].foot_sensor.any())
+        self.assertNotIn("sensor", shown.stdout.split("\n\n")[0])
+
     def test_the_component_whose_output_is_not_finite_is_named(self):
         def breaks(self, tick, inputs, outputs):
             super(type(self), self).step(tick, inputs, outputs)
