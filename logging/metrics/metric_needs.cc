@@ -8,6 +8,7 @@
 
 #include "fmt/format.h"
 #include "logging/metrics/schedule_plan.h"
+#include "logging/metrics/walk_course.h"
 
 namespace poise::logging {
 namespace {
@@ -110,6 +111,11 @@ constexpr Needs kNeeds[] = {
     {"steps", "GROUND_TRUTH.foot_wrench, com_position"},
     {"walk_velocity_error_rms",
      "GROUND_TRUTH.foot_wrench, com_position; SUPPORT_PLAN.walk_velocity, step_reason"},
+    {"landing_height_max", "GROUND_TRUTH.foot_wrench, com_position, foot_pose"},
+    {"walk_course_share",
+     "a way that step_planner.walk commands; GROUND_TRUTH.com_position, base_orientation"},
+    {"walk_turn_share",
+     "a turn that step_planner.walk commands; GROUND_TRUTH.com_position, base_orientation"},
     {"walk_cost_of_transport",
      "GROUND_TRUTH.foot_wrench, com_position, joint_torque, joint_velocity"},
     {"walk_*", "GROUND_TRUTH.foot_wrench, com_position"},
@@ -184,6 +190,11 @@ bool ObservesFeet(const RunRecord& run) {
 /// Whether the run has what "CHANNEL.field, field" names.
 bool Has(const RunRecord& run, std::string_view what) {
   if (what == "the phases of step_planner") return ReadSchedulePlan(run).has_value();
+  if (what == "a way that step_planner.walk commands")
+    return CommandedCourse(run).commanded_way > 0;
+  if (what == "a turn that step_planner.walk commands") {
+    return CommandedCourse(run).commanded_turn > 0;
+  }
   const size_t dot = std::min(what.find('.'), what.size());
   const std::string_view channel = what.substr(0, dot);
   const std::string_view field = what.substr(std::min(dot + 1, what.size()));

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "components/messages/conversions.h"
@@ -59,6 +60,19 @@ void AddStepping(MetricList* list) {
                      const std::vector<TrueStep> steps = TrueSteps(run);
                      return static_cast<double>(std::ranges::count_if(
                          steps, [&](const TrueStep& s) { return s.lifted >= run.first_tick; }));
+                   }});
+  list->push_back({"landing_height_max", "mm",
+                   "true height above or below the other sole at which a foot came down, largest",
+                   [](const RunRecord& run) -> Answer {
+                     Answer largest;
+                     for (const TrueStep& step : TrueSteps(run)) {
+                       const ground_truth_t* const truth = run.truth.at(step.landed);
+                       if (step.lifted < run.first_tick || truth == nullptr) continue;
+                       const double height = truth->foot_pose[step.foot].position[2] -
+                                             truth->foot_pose[1 - step.foot].position[2];
+                       largest = std::max(largest.value_or(0), kMilli * std::abs(height));
+                     }
+                     return largest;
                    }});
   list->push_back({"step_decision", "s", "from the push's begin to the decision for a step",
                    [](const RunRecord& run) -> Answer {

@@ -8,6 +8,7 @@
 #include "components/robot/robot_model.h"
 #include "logging/metrics/metric_groups.h"
 #include "logging/metrics/true_contacts.h"
+#include "logging/metrics/walk_course.h"
 
 namespace poise::logging {
 namespace {
@@ -25,13 +26,6 @@ struct Stride {
   bool planned = false;                   ///< the planner walks, too: `commanded` is known
   double duration = 0;                    ///< s
 };
-
-double Heading(const ground_truth_t& truth) {
-  const double* q = truth.base_orientation;
-  const Eigen::Vector3d ahead =
-      Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Eigen::Vector3d::UnitX();
-  return std::atan2(ahead.y(), ahead.x());
-}
 
 /// The planner walks in every tick of [begin, end) that it tells of, and in one at least.
 bool PlannerWalks(const RunRecord& run, int64_t begin, int64_t end) {
@@ -127,6 +121,20 @@ void AddWalking(MetricList* list) {
                      return Scaled(square.Root(), kMilli);
                    }});
   list->push_back({"walk_way", "m", "walking, way of the COM between touch-downs", Way});
+  list->push_back({"walk_course_share", "%",
+                   "walking, way of the COM along the scenario's commands, of what they ask for",
+                   [](const RunRecord& run) -> Answer {
+                     const WalkCourse course = FollowedCourse(run);
+                     if (run.truth.empty() || !(course.commanded_way > 0)) return {};
+                     return 100 * course.way / course.commanded_way;
+                   }});
+  list->push_back({"walk_turn_share", "%",
+                   "walking, turn in the sense of the scenario's commands, of what they ask for",
+                   [](const RunRecord& run) -> Answer {
+                     const WalkCourse course = FollowedCourse(run);
+                     if (run.truth.empty() || !(course.commanded_turn > 0)) return {};
+                     return 100 * course.turn / course.commanded_turn;
+                   }});
   list->push_back({"walk_cost_of_transport", "",
                    "walking, positive work of the joints over weight and way", CostOfTransport});
 }

@@ -14,6 +14,7 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
 constexpr const char* kSchema = "poise.StepPlannerConfig";
+constexpr const char* kScenario = "poise.Scenario";
 
 /// A field of a message by name; its schema is the only place that knows defaults.
 class Reader {
@@ -25,6 +26,12 @@ class Reader {
   }
   double Real(const char* name) const {
     return message_.GetReflection()->GetDouble(message_, &Field(name));
+  }
+  int Whole(const char* name) const {
+    return message_.GetReflection()->GetInt32(message_, &Field(name));
+  }
+  bool Flag(const char* name) const {
+    return message_.GetReflection()->GetBool(message_, &Field(name));
   }
   int Enum(const char* name) const {
     return message_.GetReflection()->GetEnumValue(message_, &Field(name));
@@ -100,32 +107,69 @@ void LinkPhases(const Reader& config, SchedulePlan* plan) {
   }
 }
 
+/// `text` as a message of `schema`; nullptr: the program does not link it, or the text is of
+/// another version.
+std::unique_ptr<Message> ReadAs(const char* schema, const std::string& text,
+                                const std::string& source) {
+  const auto* type =
+      google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(schema);
+  if (type == nullptr) return nullptr;
+  std::unique_ptr<Message> message(
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(type)->New());
+  try {
+    ParseTextProto(text, source, message.get());
+  } catch (const ConfigError&) {
+    return nullptr;
+  }
+  return message;
+}
+
+/// The configuration of who writes SUPPORT_PLAN; nullptr: there is none, or none that can be read.
+std::unique_ptr<Message> PlannerConfig(const RunRecord& run) {
+  const std::string component = WriterOf(run.spec.graph(), "support_plan_t");
+  if (component.empty()) return nullptr;
+  for (const ComponentConfig& config : run.spec.config()) {
+    if (config.component() == component) return ReadAs(kSchema, config.text(), component);
+  }
+  return nullptr;
+}
+
+std::vector<WalkOrder> OrdersOf(const Reader& walk) {
+  std::vector<WalkOrder> orders;
+  if (!walk.Flag("enabled")) return orders;
+  for (int i = 0; i < walk.Size("command"); ++i) {
+    const Reader command = walk.Element("command", i);
+    WalkOrder& order = orders.emplace_back();
+    order.time = command.Real("time");
+    order.after_steps = command.Whole("after_steps");
+    if (command.Flag("stop")) continue;
+    order.velocity = {command.Real("vx"), command.Real("vy"), command.Real("wz")};
+  }
+  return orders;
+}
+
 }  // namespace
 
 std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run) {
-  const auto* schema =
-      google::protobuf::DescriptorPool::generated_pool()->FindMessageTypeByName(kSchema);
-  const std::string component = WriterOf(run.spec.graph(), "support_plan_t");
-  if (schema == nullptr || component.empty()) return {};
-  for (const ComponentConfig& config : run.spec.config()) {
-    if (config.component() != component) continue;
-    const std::unique_ptr<Message> message(
-        google::protobuf::MessageFactory::generated_factory()->GetPrototype(schema)->New());
-    try {
-      ParseTextProto(config.text(), component, message.get());
-    } catch (const ConfigError&) {
-      return {};  // a log of another version: its figures stand without the plan
-    }
-    const Reader reader(*message);
-    SchedulePlan plan;
-    plan.expected_within = reader.Part("contact").Real("expected_within");
-    for (int i = 0; i < reader.Size("phase"); ++i) {
-      plan.phases.push_back(ReadPhase(reader.Element("phase", i)));
-    }
-    LinkPhases(reader, &plan);
-    return plan;
+  const std::unique_ptr<Message> message = PlannerConfig(run);
+  if (message == nullptr) return {};  // the figures of such a log stand without the plan
+  const Reader reader(*message);
+  SchedulePlan plan;
+  plan.expected_within = reader.Part("contact").Real("expected_within");
+  for (int i = 0; i < reader.Size("phase"); ++i) {
+    plan.phases.push_back(ReadPhase(reader.Element("phase", i)));
   }
-  return {};
+  LinkPhases(reader, &plan);
+  return plan;
+}
+
+std::vector<WalkOrder> ReadWalkOrders(const RunRecord& run) {
+  if (const auto scenario = ReadAs(kScenario, run.info.scenario, "the run's scenario")) {
+    const Reader reader(*scenario);
+    if (reader.Has("step_planner")) return OrdersOf(reader.Part("step_planner").Part("walk"));
+  }
+  const std::unique_ptr<Message> planner = PlannerConfig(run);
+  return planner == nullptr ? std::vector<WalkOrder>() : OrdersOf(Reader(*planner).Part("walk"));
 }
 
 }  // namespace poise::logging

@@ -1,6 +1,7 @@
 // What the scenario planned, read from the run's own configuration.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,5 +34,17 @@ struct SchedulePlan {
 /// configuration, when it does not fit this version's schema, or when the program does not link
 /// that schema: logging knows it by name only, since it includes no component's folder.
 std::optional<SchedulePlan> ReadSchedulePlan(const RunRecord& run);
+
+/// A velocity that is to be walked from a time on, and once so many steps have begun.
+struct WalkOrder {
+  double time = 0;                                     ///< s
+  int after_steps = 0;                                 ///< since the run's start
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< m/s ahead and to the left, rad/s
+};
+
+/// What the run's scenario commands its robot to walk, in order, whoever is to walk it: a graph
+/// need not have Poise's planner. Without a scenario that this program can read, what the component
+/// that writes SUPPORT_PLAN was configured with. Empty: nothing.
+std::vector<WalkOrder> ReadWalkOrders(const RunRecord& run);
 
 }  // namespace poise::logging

@@ -45,6 +45,7 @@ TEST(WalkRun, TenStepsAndAStopInEachEngine) {
     std::replace(words.begin(), words.end(), '\n', ' ');
     EXPECT_NE(words.find(told), std::string::npos) << result.output;
     EXPECT_EQ(words.find("strayed"), std::string::npos) << result.output;
+    EXPECT_GT(Measured(summary, "walk_course_share"), 70) << engine;
     // Eight of the strides' steps at least, 0.1 m each.
     EXPECT_GT(Measured(summary, "walk_way"), 0.6) << engine;
     if (engine == "ode") continue;
@@ -108,6 +109,7 @@ void ExpectWalks(const std::string& robot, const std::string& engine) {
   }
   EXPECT_GE(Measured(summary, "steps"), 9) << robot << ", " << engine;
   EXPECT_GT(Measured(summary, "walk_way"), 0.6) << robot << ", " << engine;
+  EXPECT_GT(Measured(summary, "walk_course_share"), 70) << robot << ", " << engine;
 }
 
 // No sensors in its feet, soft gears, arms.

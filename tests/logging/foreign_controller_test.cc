@@ -9,6 +9,8 @@
 #include "logging/metrics/metric_needs.h"
 #include "logging/metrics/metrics.h"
 #include "logging/metrics/true_contacts.h"
+#include "logging/metrics/walk_course.h"
+#include "operate/act_t.hpp"
 #include "tests/logging/record_fixture.h"
 
 namespace poise::logging {
@@ -186,6 +188,70 @@ TEST_F(ForeignControllerTest, AHopOfTheFootThatSteppedIsNoStep) {
   EXPECT_EQ(Measure("walk_way"), way);
   for (size_t t = 25; t < kTicks; ++t) truth_[t].foot_pose[1].position[0] = 0.06;
   EXPECT_EQ(Measure("steps"), 6) << "it comes down elsewhere";
+}
+
+// Ahead from 0.4 s on, a turn from 1.2 s on, and a stop once the fifth step has begun, at 1.4 s.
+TEST_F(ForeignControllerTest, AWalkIsHeldAgainstItsCommandedCourse) {
+  EXPECT_THAT(Missing("walk_course_share"), ElementsAre("a way that step_planner.walk commands"));
+  ComponentConfig* const planner = spec_.add_config();
+  planner->set_component("step_planner");
+  planner->set_text(
+      "walk { enabled: true command { time: 0.4 vx: 0.5 } command { time: 1.2 wz: 0.5 }\n"
+      "  command { after_steps: 5 stop: true } }");
+  const auto turn = [&](double rate) {
+    for (size_t t = 0; t < kTicks; ++t) {
+      const double angle = rate * std::max(0.0, 0.02 * static_cast<double>(t) - 1.2);
+      truth_[t].base_orientation[0] = std::cos(angle / 2);
+      truth_[t].base_orientation[3] = std::sin(angle / 2);
+    }
+  };
+  Walk(0.5);
+  turn(0.5);
+  const WalkCourse commanded = CommandedCourse(Read());
+  EXPECT_NEAR(commanded.commanded_way, 0.4, 0.011);
+  EXPECT_NEAR(commanded.commanded_turn, 0.1, 0.011);
+  EXPECT_NEAR(Measure("walk_course_share"), 100, 5);
+  EXPECT_NEAR(Measure("walk_turn_share"), 100, 12);
+  // Half of it; against it; a robot that stands.
+  Walk(0.25);
+  turn(-0.5);
+  EXPECT_NEAR(Measure("walk_course_share"), 50, 5);
+  EXPECT_NEAR(Measure("walk_turn_share"), -100, 12);
+  Walk(0);
+  turn(0);
+  EXPECT_EQ(Measure("walk_course_share"), 0);
+  EXPECT_EQ(Measure("walk_turn_share"), 0);
+  // It walks along its own axes: aside where it was to walk ahead.
+  Walk(0.5);
+  for (ground_truth_t& truth : truth_) {
+    truth.base_orientation[0] = truth.base_orientation[3] = std::sqrt(0.5);
+  }
+  EXPECT_NEAR(Measure("walk_course_share"), 0, 1e-9);
+  // What it slides while it lies is no way.
+  Walk(0.5);
+  turn(0.5);
+  for (size_t t = 40; t < kTicks; ++t) truth_[t].fallen = 1;
+  EXPECT_NEAR(Measure("walk_course_share"), 50, 5);
+  // From an operator's command on it is not the scenario's course.
+  answers_.resize(1);
+  SetHeader(30, &answers_[0]);
+  answers_[0].kind = operate::act_t::KIND_WALK;
+  answers_[0].verdict = operate::answer_t::VERDICT_DONE;
+  EXPECT_NEAR(CommandedCourse(Read()).commanded_way, 0.1, 0.011);
+  EXPECT_EQ(CommandedCourse(Read()).commanded_turn, 0);
+}
+
+TEST_F(ForeignControllerTest, HowHighAFootCameDownIsTheTruths) {
+  Walk(0.5);
+  EXPECT_EQ(Measure("landing_height_max"), 0);
+  for (size_t t = 15; t < kTicks; ++t) truth_[t].foot_pose[1].position[2] = -0.03;  // steps first
+  for (size_t t = 60; t < kTicks; ++t) truth_[t].foot_pose[1].position[2] = 0.01;   // and third
+  EXPECT_NEAR(Measure("landing_height_max"), 30, 1e-9);
+  for (size_t t = 0; t < kTicks; ++t) {
+    for (wrench_t& wrench : truth_[t].foot_wrench) wrench.force[2] = -kWeight;
+  }
+  EXPECT_TRUE(Unanswered("landing_height_max")) << "no foot came down";
+  EXPECT_THAT(Missing("landing_height_max"), IsEmpty());
 }
 
 TEST_F(ForeignControllerTest, ARobotThatLiesIsDownWhateverTheSimulatorCallsIt) {

@@ -112,6 +112,20 @@ class Judged(unittest.TestCase):
                     self.assertAlmostEqual(run.metric("torque_step_max"), abs(np.diff(truth.joint_torque, axis=0)).max(), places=9)
                     self.assertGreater(checks["joint_torque_share"]["measured"], 5)
 
+    def test_who_stands_has_not_walked(self):
+        for scenario, duration, asked in (("walk", 6, ("steps", "walk_course_share")),
+                                          ("walk_blocks", 3, ("steps", "walk_way", "landing_height_max"))):
+            run, checks, shown = self.run_it(scenario, "impedance", holder(True), {"duration": duration})
+            self.assertEqual(checks["fallen"]["measured"], 0)
+            self.assertFalse(run.passed, scenario)
+            self.assertEqual(shown.returncode, 1)
+            for metric in asked:
+                self.assertFalse(checks[metric]["passed"], metric)
+                self.assertEqual(checks[metric]["missing"], [])
+            self.assertIn("(%s) measured " % asked[0], shown.stdout)
+        self.assertAlmostEqual(poise.run("walk", {"graph": "impedance", "duration": 6}, components={"holder": holder(True)})
+                               .metric("walk_course_share"), 0, delta=2)
+
     def test_a_fall_in_a_sweep_is_a_fall(self):
         out = os.path.join(tempfile.mkdtemp(dir=FOLDER), "sweep")
         done = subprocess.run([os.path.join(os.environ["POISE_BIN"], "poise"), "sweep", "push", "--set", "graph=torque",
