@@ -105,6 +105,17 @@ TEST_F(BenchmarkTableTest, BoundsAreSaidWhereTheyAre) {
   EXPECT_FALSE(Figure("mean").value) << "more than one and less than the other";
 }
 
+TEST_F(BenchmarkTableTest, ARunThatMissesWhatIsAskedOfItDoesNotCountAsOneThatStands) {
+  result_.header.sweep.clear_limit();
+  Add(0, 0, kStands);
+  SweepRow& missed = Add(1, 0, kMissed);
+  missed.reason = "sole above the other: 0 mm, must be ≥ 10 mm";
+  EXPECT_EQ(Figure("stand, of 2").value, 1);
+  EXPECT_THAT(FormatBenchmark({result_}),
+              HasSubstr("1 run stood and did not do what is asked:\n  run 1"));
+  EXPECT_THAT(FormatBenchmark({result_}), HasSubstr("0 mm, must be ≥ 10 mm"));
+}
+
 TEST_F(BenchmarkTableTest, AShareIsOfTheRunsThatTell) {
   result_.header.sweep.clear_limit();
   for (const char* outcome : {kStands, kFell}) Add(outcome == kFell, 0, outcome);

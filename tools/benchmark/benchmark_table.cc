@@ -184,8 +184,10 @@ std::string FormatBenchmark(const std::vector<BenchmarkResult>& results) {
                           Percent(f.of_pendulum), Percent(f.of_duration)});
     }
     text += FormatColumns(rows);
-    const std::string untold = FormatUntold(result.header, result.rows);
-    if (!untold.empty()) text += "\n" + untold;
+    for (const std::string& runs :
+         {FormatMissed(result.header, result.rows), FormatUntold(result.header, result.rows)}) {
+      if (!runs.empty()) text += "\n" + runs;
+    }
   }
   return text;
 }

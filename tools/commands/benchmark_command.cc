@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct BenchmarkArguments {
-  std::string set = "balance_3";
+  std::string set = "balance_4";
   BenchmarkSubject subject;
   std::vector<std::string> parts;  // empty: all
   SessionOptions session;

@@ -146,7 +146,7 @@ std::string Maps::Tip(const SweepRow& row, const std::string& value) const {
   for (size_t i = 0; i < point.size(); ++i) {
     tip += fmt::format("\n{}: {}", Label(i), ValueText(i, point[i]));
   }
-  tip += "\n" + (row.survived() ? row.outcome : row.Ending());
+  tip += "\n" + (row.stands() || row.fell() ? row.outcome : row.Ending());
   if (row.fell_at) tip += fmt::format(" at {} s", FormatNumber(*row.fell_at));
   if (!row.phase.empty()) tip += fmt::format(", phase {}", row.phase);
   if (!row.trouble.empty()) tip += ", " + row.trouble;

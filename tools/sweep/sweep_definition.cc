@@ -329,6 +329,7 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
   CheckRun(loaded, &spec);
 
   SetColumns(source, loaded.scenario);
+  CheckRequired(source, loaded.scenario);
   CheckMaps(source);
 
   Sweep definition = sweep;
@@ -404,6 +405,21 @@ void SweepDefinition::SetColumns(const Source& source, const Scenario& scenario)
   }
   if (sweep().column_size() == 0) {
     for (const Check& check : scenario.check()) add(check.metric());
+  }
+}
+
+void SweepDefinition::CheckRequired(const Source& source, const Scenario& scenario) const {
+  std::vector<std::string> limited;
+  for (const Check& check : scenario.check()) {
+    if (check.has_at_most() || check.has_at_least()) limited.push_back(check.metric());
+  }
+  for (int i = 0; i < sweep().require_size(); ++i) {
+    const std::string& name = sweep().require(i);
+    if (std::ranges::find(limited, name) != limited.end()) continue;
+    source.Fail(
+        {fmt::format("require[{}]", i),
+         fmt::format("the scenario checks no limit of '{}'; {}", name,
+                     limited.empty() ? "it has no check with a limit" : Suggest(name, limited))});
   }
 }
 

@@ -38,6 +38,10 @@ class SweepDefinition {
   const std::string& scenario() const { return scenario_; }  ///< name or file, for LoadScenario
   /// Metrics of the table, by name.
   const std::vector<std::string>& columns() const { return columns_; }
+  /// Metrics whose limits a run that stands must keep (Sweep.require).
+  std::vector<std::string> required() const {
+    return {sweep().require().begin(), sweep().require().end()};
+  }
   /// What one run changes. Throws ConfigError.
   RunChanges ChangesOf(int64_t run, const std::optional<double>& limit) const;
   /// A digest of all that a run's figures depend on but the program: the same for the same sweep of
@@ -50,6 +54,7 @@ class SweepDefinition {
   void CheckFields(const Source& source, Scenario scenario,
                    const std::optional<double>& limit) const;
   void SetColumns(const Source& source, const Scenario& scenario);
+  void CheckRequired(const Source& source, const Scenario& scenario) const;
   void CheckMaps(const Source& source) const;
 
   SweepPoints points_;

@@ -134,11 +134,22 @@ void ReadEvents(const logging::RunRecord& run, SweepRow* row) {
   row->trouble = Joined(troubles, "+");
 }
 
+/// Whether a run that stands did what it was to do: the limits of the required checks.
+void Judge(const Scenario& scenario, const std::vector<std::string>& required,
+           const logging::RunRecord& run, SweepRow* row) {
+  for (const CheckResult& check : EvaluateChecks(scenario, run)) {
+    if (check.passed || std::ranges::find(required, check.name) == required.end()) continue;
+    row->outcome = kMissed;
+    row->reason += fmt::format("{}{}: {}, must be {}", row->reason.empty() ? "" : "; ", check.label,
+                               FormatMeasured(check), FormatLimit(check));
+  }
+}
+
 }  // namespace
 
 SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
-                  const std::vector<std::string>& metrics, const std::string& log_dir, SweepRow row,
-                  TaskStatus* status) {
+                  const std::vector<std::string>& metrics, const std::vector<std::string>& required,
+                  const std::string& log_dir, SweepRow row, TaskStatus* status) {
   std::optional<Prepared> prepared;
   try {
     LoadedScenario loaded = LoadScenario(scenario, changes);
@@ -184,6 +195,7 @@ SweepRow RunPoint(const std::string& scenario, const RunChanges& changes,
     if (value && std::isfinite(*value)) row.metrics[metric->name] = *value;
   }
   status->Step();
+  if (row.stands() && !required.empty()) Judge(merged, required, run, &row);
   row.push = FindPushBound(merged, run);
   return row;
 }

@@ -371,7 +371,7 @@ bool SweepSession::Run(const std::function<std::optional<Request>()>& next,
         row.run = request->run;
         row.limit = request->limit;
         row = RunPoint(definition_.scenario(), definition_.ChangesOf(request->run, request->limit),
-                       definition_.columns(), logs, std::move(row), shown);
+                       definition_.columns(), definition_.required(), logs, std::move(row), shown);
         return SweepRow::RowText(row);
       });
     }

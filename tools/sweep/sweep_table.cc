@@ -222,11 +222,11 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     if (row.outcome == kFell) ++ways[{row.phase, row.trouble}];
   }
   std::string text = fmt::format("{} runs", rows.size());
-  const int told = outcomes[kStands] + outcomes[kFell];
-  for (const char* outcome : {kStands, kFell, kStopped, kInvalid, kCrashed, kHung}) {
+  const int told = outcomes[kStands] + outcomes[kFell] + outcomes[kMissed];
+  for (const char* outcome : {kStands, kFell, kMissed, kStopped, kInvalid, kCrashed, kHung}) {
     if (outcomes[outcome] == 0) continue;
     text += fmt::format(", {} {}", outcome, outcomes[outcome]);
-    if (outcome == kStands || outcome == kFell) {
+    if (outcome == kStands || outcome == kFell || outcome == kMissed) {
       text += fmt::format(" ({:.1f} %)", 100.0 * outcomes[outcome] / told);
     }
   }
@@ -235,6 +235,7 @@ std::string FormatOutcomes(const SweepHeader& header, const SweepRows& rows) {
     return std::ranges::find(header.columns, column) != header.columns.end();
   };
   if (has("step_needed_time") && has("step_warning_time")) text += FormatWarnings(rows);
+  text += FormatMissed(header, rows);
   text += FormatUntold(header, rows);
   if (ways.empty()) return text;
   std::vector<std::pair<std::pair<std::string, std::string>, int>> sorted(ways.begin(), ways.end());
@@ -316,20 +317,43 @@ std::string PlaceText(const SweepPoints& points, const SweepRow& row) {
   return text;
 }
 
-std::string FormatUntold(const SweepHeader& header, const SweepRows& rows) {
+namespace {
+
+struct RunLines {
+  int count = 0;
+  std::string text;
+};
+
+/// A line each for the runs for which `told` holds, the first of them.
+template <class Told>
+RunLines LinesOf(const SweepHeader& header, const SweepRows& rows, const Told& told) {
   constexpr int kMost = 20;
   const SweepPoints points(header.sweep);
-  std::string text;
-  int count = 0;
+  RunLines lines;
   for (const auto& [key, row] : rows) {
-    if (row.survived() || ++count > kMost) continue;
-    text += fmt::format("  run {}, {}: {}\n", row.run, PlaceText(points, row),
-                        logging::LinesForTerminal(row.Ending()));
+    if (!told(row) || ++lines.count > kMost) continue;
+    lines.text += fmt::format("  run {}, {}: {}\n", row.run, PlaceText(points, row),
+                              logging::LinesForTerminal(row.Ending()));
   }
-  if (count == 0) return "";
-  if (count > kMost) text += fmt::format("  and {} more\n", count - kMost);
+  if (lines.count > kMost) lines.text += fmt::format("  and {} more\n", lines.count - kMost);
+  return lines;
+}
+
+}  // namespace
+
+std::string FormatUntold(const SweepHeader& header, const SweepRows& rows) {
+  const RunLines lines = LinesOf(header, rows, [](const SweepRow& row) { return !row.survived(); });
+  if (lines.count == 0) return "";
   return fmt::format("{} run{} not tell whether the robot stood, and count{} for nothing:\n{}",
-                     count, count == 1 ? " does" : "s do", count == 1 ? "s" : "", text);
+                     lines.count, lines.count == 1 ? " does" : "s do", lines.count == 1 ? "s" : "",
+                     lines.text);
+}
+
+std::string FormatMissed(const SweepHeader& header, const SweepRows& rows) {
+  const RunLines lines = LinesOf(header, rows, [](const SweepRow& row) { return row.missed(); });
+  if (lines.count == 0) return "";
+  return fmt::format("{} run{} stood and did not do what is asked:\n{}", lines.count,
+                     lines.count == 1 ? "" : "s", lines.text);
 }
 
 }  // namespace poise

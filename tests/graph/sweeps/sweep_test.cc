@@ -258,6 +258,33 @@ TEST_F(SweepTest, RunsThatCannotBeMadeAreNamedAndTheOthersGoOn) {
   EXPECT_NE(rows[1].at("reason").find("friction"), std::string::npos);
 }
 
+// Who stands and makes no step has not done what is asked.
+TEST_F(SweepTest, WhatARunIsToDoIsAskedOfIt) {
+  deploy_.Scenario("stepping",
+                   "base: \"pushed\" name: \"stepping\"\n"
+                   "check { metric: \"steps\" label: \"steps landed\" at_least: 1 }\n"
+                   "check { metric: \"fallen\" at_most: 0 }\n");
+  const auto outcome = [&](const std::string& required, CsvRow* row) {
+    const std::string out = Out("sweep_" + required);
+    const ProgramResult result =
+        RunPoise({"sweep",
+                  Sweep("asked_" + required, "scenario: \"stepping\" require: \"" + required +
+                                                 "\" vary { field: \"seed\" value: 1 }\n"),
+                  "--out", out});
+    EXPECT_EQ(result.exit_code, 0) << result.output;
+    *row = ReadCsv(out + "/table.csv").at(0);
+    return result.output;
+  };
+  CsvRow row;
+  const std::string missed = outcome("steps", &row);
+  EXPECT_EQ(row.at("outcome"), "missed");
+  EXPECT_NE(row.at("reason").find("steps landed: 0, must be ≥ 1"), std::string::npos);
+  EXPECT_NE(missed.find("missed 1 (100.0 %)"), std::string::npos) << missed;
+  EXPECT_NE(missed.find("stood and did not do what is asked"), std::string::npos) << missed;
+  outcome("fallen", &row);
+  EXPECT_EQ(row.at("outcome"), "stands");
+}
+
 TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   const std::string out = Out("sweep");
   const auto expect = [&](const std::string& text, const std::vector<std::string>& parts) {
@@ -281,6 +308,8 @@ TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1 }\nmap { x: \"sed\" }\n",
          {"wrong.pbtxt:3: map[0].x", "seed"});
   expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1.5 }\n", {"wrong.pbtxt:2", "whole"});
+  expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1 }\nrequire: \"com_error_max_x\"\n",
+         {"wrong.pbtxt:3: require[0]", "checks no limit of 'com_error_max_x'"});
   expect("scenario: \"pushed\"\nvary { field: \"seed\" value: 1 }\ndrives: \"ethercut\"\n",
          {"wrong.pbtxt:3: drives", "ethercat"});
   const auto flags = [&](std::vector<std::string> arguments,
