@@ -20,6 +20,7 @@
 #include "poise/robot_state_t.hpp"
 #include "tests/framework/toy_components.h"
 #include "tests/logging/log_test_support.h"
+#include "tools/run/stall_watch.h"
 
 namespace poise {
 namespace {
@@ -158,6 +159,70 @@ TEST_P(Takeover, ASuccessorGoesOnWithTheStateOfTheOneThatDied) {
 INSTANTIATE_TEST_SUITE_P(ComponentProcess, Takeover, testing::Bool(), [](const auto& shared) {
   return shared.param ? "OfSeveralInOneProcess" : "OfOne";
 });
+
+/// Questions every 20 ms for `time`, ns; each adds what `use` makes of the processor's time.
+template <class Use>
+int64_t Ask(SilenceWatch* watch, int64_t pid, int64_t time, int64_t* now, ProcessorTime* processor,
+            const Use& use) {
+  constexpr int64_t kLook = 20'000'000;
+  int64_t silent = 0;
+  for (int64_t asked = 0; asked < time; asked += kLook) {
+    *now += kLook;
+    use(processor, kLook);
+    silent = watch->Silent(pid, /*heard=*/1, *processor, *now);
+  }
+  return silent;
+}
+
+TEST(SilenceWatch, CountsTheTimeInWhichAProcessCouldHaveSpoken) {
+  SilenceWatch watch;
+  int64_t now = kSecond;
+  ProcessorTime processor;
+  const auto sleeps = [](ProcessorTime*, int64_t) {};
+  const auto computes = [](ProcessorTime* time, int64_t look) {
+    time->ready = true;
+    time->used += look;
+  };
+  // As among thirty: it has its turn now and then, and the system tells of a wait when it is over.
+  int turn = 0;
+  const auto waits = [&](ProcessorTime* time, int64_t look) {
+    time->ready = true;
+    if (++turn % 15 != 0) return;
+    time->used += look / 10;
+    time->waited += 15 * look;
+  };
+  EXPECT_NEAR(static_cast<double>(Ask(&watch, 1, 3 * kSecond, &now, &processor, sleeps)), 3e9, 1e8);
+  EXPECT_NEAR(static_cast<double>(Ask(&watch, 1, 3 * kSecond, &now, &processor, computes)), 6e9,
+              1e8);
+  EXPECT_NEAR(static_cast<double>(Ask(&watch, 1, 60 * kSecond, &now, &processor, waits)), 6e9, 1e8);
+  // A successor is not silent for what the one before it was.
+  EXPECT_EQ(watch.Silent(2, 1, {}, now), 0);
+  // Who asks was halted.
+  now += 100 * kSecond;
+  EXPECT_LT(watch.Silent(2, 1, {}, now), kSecond);
+  EXPECT_EQ(watch.Silent(2, now, {}, now), 0) << "it has spoken";
+}
+
+TEST(ChildProcess, TellsWhatItHadOfTheProcessors) {
+  logging::TemporaryFolder folder;
+  ChildProcess busy("busy", {"/bin/sh", "-c", "while :; do :; done"}, folder.path("busy.log"));
+  ChildProcess idle("idle", {"/bin/sleep", "600"}, folder.path("idle.log"));
+  const int64_t deadline = NowNanoseconds() + 60 * kSecond;
+  const auto until = [&](const auto& holds) {
+    while (!holds() && NowNanoseconds() < deadline) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return holds();
+  };
+  EXPECT_TRUE(until([&] { return busy.processor_time().used > kSecond / 10; }));
+  EXPECT_TRUE(busy.processor_time().ready);
+  EXPECT_TRUE(until([&] { return !idle.processor_time().ready; }));
+  busy.Signal(SIGSTOP);
+  EXPECT_TRUE(until([&] { return !busy.processor_time().ready; })) << "it stands still by itself";
+  busy.Signal(SIGKILL);
+  EXPECT_TRUE(until([&] { return busy.ended(); }));
+  EXPECT_EQ(busy.processor_time().used, 0);
+}
 
 TEST(ComponentProcess, OneThatDiesAgainAndAgainHasEnded) {
   logging::TemporaryFolder folder;

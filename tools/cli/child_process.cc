@@ -79,12 +79,17 @@ std::string ChildProcess::HowItEnded() const {
   return fmt::format("exited with code {}", WEXITSTATUS(status_));
 }
 
-int64_t ChildProcess::WaitedForProcessor() const {
-  int64_t on_processor = 0;
-  int64_t waited = 0;
-  std::ifstream in(fmt::format("/proc/{}/schedstat", pid_));
-  in >> on_processor >> waited;
-  return in ? waited : 0;
+ProcessorTime ChildProcess::processor_time() const {
+  ProcessorTime time;
+  std::ifstream times(fmt::format("/proc/{}/schedstat", pid_));
+  if (!(times >> time.used >> time.waited)) return {};
+  std::string stat;
+  std::ifstream in(fmt::format("/proc/{}/stat", pid_));
+  std::getline(in, stat);
+  // "PID (NAME) STATE ...": the name may hold anything.
+  const size_t end = stat.rfind(") ");
+  time.ready = end != std::string::npos && end + 2 < stat.size() && stat[end + 2] == 'R';
+  return time;
 }
 
 void ChildProcess::Signal(int signal) {

@@ -9,6 +9,14 @@
 
 namespace poise {
 
+/// What a process's first thread had of the processors; zero where the system does not tell, or it
+/// has ended.
+struct ProcessorTime {
+  int64_t used = 0;    ///< ns
+  int64_t waited = 0;  ///< ns that it was ready to run and had to wait, the present wait aside
+  bool ready = false;  ///< it runs, or waits for a processor
+};
+
 /// Starts on construction, in a process group of its own; ends with this process (SIGTERM) and with
 /// this object (SIGKILL). Not thread-safe: the thread that starts it must outlive it.
 class ChildProcess {
@@ -31,9 +39,7 @@ class ChildProcess {
   bool succeeded() const;
   /// "exited with code 3", "was killed by signal 9 (Killed)". Precondition: ended().
   std::string HowItEnded() const;
-  /// ns that its first thread was ready to run and had to wait for a processor; 0 where the system
-  /// does not tell, or it has ended.
-  int64_t WaitedForProcessor() const;
+  ProcessorTime processor_time() const;
   /// To the whole process group; nothing when it has ended.
   void Signal(int signal);
 

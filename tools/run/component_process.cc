@@ -77,7 +77,9 @@ bool ComponentProcess::Alive(int64_t now) {
     waiting_since_ = now;
     if (!NoteDeath(now)) return false;
   }
-  if (store_->standby() != spare_->pid()) return now - waiting_since_ < kSuccessorPatience;
+  if (store_->standby() != spare_->pid()) {
+    return now - waiting_since_ < kSuccessorPatience + spare_->processor_time().waited;
+  }
   spare_->Signal(SIGUSR2);
   process_ = std::move(spare_);
   ++takeovers_;

@@ -28,7 +28,7 @@ class ComponentProcess {
 
   /// Looks after it: lets the successor take over when the process has died. False when it has
   /// ended for good: it is not to be restarted, it and its successors died more than 5 times within
-  /// 2 s, or none became ready within 5 s. `now`: ns.
+  /// 2 s, or none became ready within 5 s, what it waited for a processor aside. `now`: ns.
   bool Alive(int64_t now);
   /// The successor can take over at once; true without one.
   bool StandbyReady() const;

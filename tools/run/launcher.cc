@@ -12,7 +12,6 @@
 #include "components/framework/runners/timing.h"
 #include "fmt/format.h"
 #include "tools/cli/signals.h"
-#include "tools/run/stall_watch.h"
 
 namespace poise {
 namespace {
@@ -24,7 +23,8 @@ constexpr int64_t kRecordTimeout = 30 * kSecond;
 constexpr int64_t kStopPatience = 2 * kSecond;  // before SIGTERM, and again before SIGKILL
 constexpr int64_t kSettled = 10 * kSecond;      // memory is measured from here on
 constexpr int64_t kSilence = 2 * kSecond;       // of a process that can be replaced
-constexpr int kSpin = 20;                       // ms
+constexpr int64_t kQuiet = kSecond / 5;  // before it is looked at: it speaks ten times a second
+constexpr int kSpin = 20;                // ms
 constexpr size_t kDetailLines = 5;
 constexpr std::string_view kWarning = "warning: ";  // begins a line that a user should see
 
@@ -181,7 +181,7 @@ bool Launcher::WaitUntilReady() {
     if (!Healthy()) return false;
     int64_t kept = 0;
     for (const auto& process : processes_) {
-      kept = std::max(kept, process->process().WaitedForProcessor());
+      kept = std::max(kept, process->process().processor_time().waited);
     }
     if (NowNanoseconds() > start + kReadyTimeout + kept) {
       std::string names;
@@ -339,7 +339,11 @@ void Launcher::EndSilent(int64_t now) {
     if (!process->restarts()) continue;
     // All components of a process speak or are silent together.
     const ControlClient::Status& status = control_.statuses().at(process->components().front());
-    if (status.seen && now - status.last_seen > kSilence) process->process().Signal(SIGKILL);
+    if (!status.seen || now - status.last_seen < kQuiet) continue;
+    ChildProcess& child = process->process();
+    const int64_t silent =
+        silence_[process.get()].Silent(child.pid(), status.last_seen, child.processor_time(), now);
+    if (silent > kSilence) child.Signal(SIGKILL);
   }
 }
 

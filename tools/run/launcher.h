@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "tools/run/component_process.h"
 #include "tools/run/crane_watch.h"
 #include "tools/run/kill_schedule.h"
+#include "tools/run/stall_watch.h"
 
 namespace poise {
 
@@ -73,7 +75,8 @@ class Launcher {
   void ReportProcesses();
   /// Waits for health, the end of a process or what the kill schedule listens to.
   void Wait(int timeout_ms);
-  /// A process that can be replaced and has been silent for long is ended, so that it is.
+  /// A process that can be replaced and has been silent for long, though the machine let it run, is
+  /// ended, so that it is.
   void EndSilent(int64_t now);
 
   std::unique_ptr<KillSchedule> kills_;
@@ -81,6 +84,7 @@ class Launcher {
   MachineLoadSampler machine_;
   bool log_;
   std::vector<std::unique_ptr<ComponentProcess>> processes_;  // the recorder's is the first, if any
+  std::map<const ComponentProcess*, SilenceWatch> silence_;   // of those that can be replaced
   int64_t next_measure_ = 0;                                  // ns, of memory
   RunOutcome outcome_;
 };

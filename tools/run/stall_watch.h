@@ -4,11 +4,16 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "tools/cli/child_process.h"
+
 namespace poise {
 
 /// Wall time without a tick after which a run hangs, ns. A tick takes some 0.1 ms: a machine that
 /// is busy with much else does not come near.
 inline constexpr int64_t kStallPatience = 20'000'000'000;
+
+/// The most that counts between two questions of those who watch, ns.
+inline constexpr int64_t kLongestLook = 500'000'000;
 
 /// Asked again and again. Between two questions at most kLongestLook counts, so that a debugger's
 /// halt, Ctrl-Z or a frozen container, which stop the one who asks as well, do not.
@@ -26,11 +31,37 @@ class StallWatch {
   }
 
  private:
-  static constexpr int64_t kLongestLook = 500'000'000;  // ns
-
   int64_t progress_ = 0;
   int64_t last_look_ = 0;  // ns; 0: none yet
   int64_t stood_ = 0;      // ns
+};
+
+/// For how long a process has said nothing though it could have. Asked again and again; of the time
+/// between two questions neither what the process waited for a processor counts, nor more than
+/// kLongestLook (StallWatch).
+class SilenceWatch {
+ public:
+  /// Of process `pid`, whose last word was heard at `heard`; a successor has said nothing yet and
+  /// begins anew. `now`: ns. Returns ns.
+  int64_t Silent(int64_t pid, int64_t heard, const ProcessorTime& time, int64_t now) {
+    if (pid != pid_ || heard != heard_) {
+      silent_ = 0;
+    } else {
+      const int64_t gap = std::min(now - last_look_, kLongestLook);
+      const bool waits = time.ready && time.used == last_.used;
+      silent_ += waits ? 0 : gap - std::clamp<int64_t>(time.waited - last_.waited, 0, gap);
+    }
+    pid_ = pid;
+    heard_ = heard;
+    last_ = time;
+    last_look_ = now;
+    return silent_;
+  }
+
+ private:
+  int64_t pid_ = 0, heard_ = 0;  // ns
+  ProcessorTime last_;
+  int64_t last_look_ = 0, silent_ = 0;  // ns
 };
 
 }  // namespace poise
