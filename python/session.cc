@@ -197,6 +197,15 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     if (plan.channels[c].type == "joint_command_t" && command_channel_ < 0) {
       command_channel_ = static_cast<int>(c);
     }
+    if (plan.channels[c].type == "bridge_status_t" && status_channel_ < 0) {
+      status_channel_ = static_cast<int>(c);
+    }
+  }
+  for (size_t c = 0; status_channel_ >= 0 && c < plan.channels.size(); ++c) {
+    const int bridge = plan.channels[static_cast<size_t>(status_channel_)].writer.component;
+    if (plan.channels[c].type == "drive_command_t" && plan.channels[c].writer.component == bridge) {
+      drive_channel_ = static_cast<int>(c);
+    }
   }
   const run_info_t info = logging::MakeRunInfo(spec_, scenario_);
   if (keep_ == SessionOptions::Keep::kFolder) {
@@ -215,6 +224,9 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     written_[static_cast<size_t>(channel)] = true;
     if (channel == command_channel_) {
       Override(const_cast<joint_command_t*>(static_cast<const joint_command_t*>(output.message())));
+    }
+    if (channel == status_channel_) {
+      NoteCuts(*static_cast<const bridge_status_t*>(output.message()), tick.time);
     }
     if (recorder_) recorder_->Add(channel, output, tick);
     if (store_) store_->Add(channel, tick.index, output);
@@ -333,6 +345,21 @@ void Session::Override(joint_command_t* command) {
   }
 }
 
+void Session::NoteCuts(const bridge_status_t& status, double time) {
+  if (command_channel_ < 0 || drive_channel_ < 0) return;
+  const OutputPort *const command = Writer(command_channel_), *const drive = Writer(drive_channel_);
+  if (command == nullptr || drive == nullptr) return;
+  for (size_t joint = 0; joint < status.saturated.size(); ++joint) {
+    if ((status.saturated[joint] & bridge_status_t::LIMIT_IMPEDANCE) == 0) continue;
+    const logging::ImpedanceCut cut =
+        logging::CutOf(*static_cast<const joint_command_t*>(command->message()),
+                       *static_cast<const drive_command_t*>(drive->message()), joint);
+    if (!cut.counts()) continue;
+    Cut& noted = cuts_.try_emplace(joint, Cut{time, {}}).first->second;
+    if (cut.share > noted.largest.share) noted.largest = cut;
+  }
+}
+
 void Session::Inject(const std::string& channel, const std::vector<uint8_t>& bytes) {
   const Lock lock(this);
   if (!runner_->Inject(channel, bytes)) {
@@ -442,6 +469,18 @@ bool Session::ended() {
 bool Session::failed() {
   const Lock lock(this);
   return runner_->failed();
+}
+
+std::vector<std::string> Session::warnings() {
+  const Lock lock(this);
+  std::vector<std::string> warnings = warnings_;
+  for (const auto& [joint, cut] : cuts_) {
+    warnings.push_back(
+        fmt::format("hw_bridge cuts what is commanded of {}: {}, from {:.3f} s on; command what "
+                    "the robot bears",
+                    model_->joints()[joint].name, cut.largest.Text(), cut.since));
+  }
+  return warnings;
 }
 
 std::string Session::detail() {

@@ -14,7 +14,9 @@
 
 #include "components/framework/runners/inline_runner.h"
 #include "components/messages/foreign_component.h"
+#include "logging/events/bridge_words.h"
 #include "logging/recording/inline_recorder.h"
+#include "poise/bridge_status_t.hpp"
 #include "poise/joint_command_t.hpp"
 #include "python/run_store.h"
 #include "sim/sim_component.h"
@@ -85,7 +87,8 @@ class Session {
   bool failed();
   std::string detail();
   const RunSpec& spec() const { return spec_; }
-  const std::vector<std::string>& warnings() const { return warnings_; }
+  /// What is odd about the scenario, and each joint whose commanded impedance the bridge has cut.
+  std::vector<std::string> warnings();
   const logging::ElementNames& names() const { return names_; }
   std::string scenario_text() const { return scenario_; }
 
@@ -94,6 +97,8 @@ class Session {
   void Replace(const SessionOptions& options, ComponentRegistry* registry);
   int FindChannel(const std::string& name) const;
   const OutputPort* Writer(int channel);
+  /// Notes what the bridge has cut of the command, whoever gave it.
+  void NoteCuts(const bridge_status_t& status, double time);
   /// Puts what is commanded from outside into the controller's message, which nobody has read yet.
   void Override(joint_command_t* command);
 
@@ -112,7 +117,12 @@ class Session {
   std::vector<double> override_;  // by joint; NaN: none
   bool overrides_ = false;
   std::optional<joint_command_t> command_;
-  int command_channel_ = -1;
+  int command_channel_ = -1, status_channel_ = -1, drive_channel_ = -1;  // -1: there is none
+  struct Cut {
+    double since = 0;  // s
+    logging::ImpedanceCut largest;
+  };
+  std::map<size_t, Cut> cuts_;  // by joint
   std::vector<bool> written_;   // by channel: a message is there
   std::vector<bool> replaced_;  // by component
 

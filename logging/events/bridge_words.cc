@@ -1,5 +1,7 @@
 #include "logging/events/bridge_words.h"
 
+#include <cmath>
+
 #include "fmt/format.h"
 
 namespace poise::logging {
@@ -96,6 +98,29 @@ std::string BridgeReasonText(const bridge_status_t& bridge, const ElementNames& 
   const std::string reason = BridgeReasonName(bridge.reason);
   if (reason.empty() || bridge.reason_joint < 0) return reason;
   return fmt::format("{} ({})", reason, names.Joint(bridge.reason_joint));
+}
+
+std::string ImpedanceCut::Text() const {
+  return fmt::format("{} cut from {:.4g} to {:.4g} {}", what, from, to, unit);
+}
+
+ImpedanceCut CutOf(const joint_command_t& wanted, const drive_command_t& given, size_t joint) {
+  ImpedanceCut most;
+  const auto compare = [&](double from, double to, double of, const char* what, const char* unit) {
+    const double share = of > 0 ? std::abs(from - to) / of : 0;
+    if (share > most.share) most = {share, from, to, what, unit};
+  };
+  const auto own = [&](const auto& from, const auto& to, const char* what, const char* unit) {
+    if (joint >= from.size() || joint >= to.size()) return;
+    compare(from[joint], to[joint], std::abs(from[joint]), what, unit);
+  };
+  own(wanted.stiffness, given.stiffness, "stiffness", "N·m/rad");
+  own(wanted.damping, given.damping, "damping", "N·m·s/rad");
+  own(wanted.velocity, given.velocity, "velocity", "rad/s");
+  if (joint < wanted.position.size() && joint < given.position.size()) {
+    compare(wanted.position[joint], given.position[joint], 1, "position", "rad");
+  }
+  return most;
 }
 
 }  // namespace poise::logging

@@ -15,8 +15,7 @@
 namespace poise::logging {
 namespace {
 
-constexpr double kLimitGap = 0.1;   // s between two limits of a motor that are one
-constexpr double kLeastCut = 0.01;  // share of an impedance; less is rounding
+constexpr double kLimitGap = 0.1;  // s between two limits of a motor that are one
 
 /// A limit of the bridge that changed what a controller wanted of a joint.
 struct MotorLimit {
@@ -41,13 +40,6 @@ Answer WantedTorque(const RunRecord& run, int64_t tick, size_t joint) {
          command->damping[joint] * (command->velocity[joint] - state->joint_velocity[joint]);
 }
 
-/// What the bridge changed most in the impedance that a command wants of a joint.
-struct ImpedanceCut {
-  double share = 0;  ///< of what was wanted; of a position, of a radian
-  double from = 0, to = 0;
-  const char *what = "", *unit = "";
-};
-
 /// Empty where the log does not say.
 std::optional<ImpedanceCut> CutAt(const RunRecord& run, int64_t tick, size_t joint) {
   const joint_command_t* const command = run.command.at(tick);
@@ -56,25 +48,13 @@ std::optional<ImpedanceCut> CutAt(const RunRecord& run, int64_t tick, size_t joi
       joint >= drive->stiffness.size()) {
     return {};
   }
-  ImpedanceCut most;
-  const auto compare = [&](double from, double to, double of, const char* what, const char* unit) {
-    const double share = of > 0 ? std::abs(from - to) / of : 0;
-    if (share > most.share) most = {share, from, to, what, unit};
-  };
-  const auto own = [&](const auto& wanted, const auto& given, const char* what, const char* unit) {
-    compare(wanted[joint], given[joint], std::abs(wanted[joint]), what, unit);
-  };
-  own(command->stiffness, drive->stiffness, "stiffness", "N·m/rad");
-  own(command->damping, drive->damping, "damping", "N·m·s/rad");
-  own(command->velocity, drive->velocity, "velocity", "rad/s");
-  compare(command->position[joint], drive->position[joint], 1, "position", "rad");
-  return most;
+  return CutOf(*command, *drive, joint);
 }
 
 /// A cut that nobody notices.
 bool IsRounding(const RunRecord& run, int64_t tick, size_t joint) {
   const std::optional<ImpedanceCut> cut = CutAt(run, tick, joint);
-  return cut && cut->share < kLeastCut;
+  return cut && !cut->counts();
 }
 
 /// "left_knee_pitch: stiffness cut from 900 to 600 N·m/rad", of the interval's largest cut.
@@ -93,8 +73,7 @@ std::string CutText(const RunRecord& run, size_t joint, const Interval& interval
     return fmt::format("{}: stiffness, damping, position or velocity cut to what the robot bears",
                        name);
   }
-  return fmt::format("{}: {} cut from {:.4g} to {:.4g} {}", name, most->what, most->from, most->to,
-                     most->unit);
+  return fmt::format("{}: {}", name, most->Text());
 }
 
 /// "left_ankle_pitch: 12.7 to 7.5 N·m, of 14.1 N·m wanted", over the interval.

@@ -172,7 +172,8 @@ void BindSession(py::module_* module) {
       .def_property_readonly("tick_period", [](const Session& s) { return s.spec().tick_period(); })
       .def_property_readonly("num_ticks", [](const Session& s) { return s.spec().num_ticks(); })
       .def_property_readonly("scenario", [](const Session& s) { return s.spec().scenario(); })
-      .def_property_readonly("warnings", [](const Session& s) { return s.warnings(); })
+      .def_property_readonly("warnings",
+                             [](Session& s) { return Unlocked([&] { return s.warnings(); }); })
       .def("robot_texts", [](const Session& s) {
         std::pair<std::string, std::string> texts;
         for (const Resource& resource : s.spec().resource()) {

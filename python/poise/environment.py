@@ -189,6 +189,8 @@ class Environment:
 
     @property
     def warnings(self):
+        """What is odd about the scenario; and each joint of whose commanded stiffness, damping, position or velocity the bridge has
+        cut something, with the largest cut so far."""
         return self._session.warnings
 
     def __repr__(self):

@@ -196,6 +196,26 @@ class Judged(unittest.TestCase):
         with self.assertRaisesRegex(poise.ConfigError, "'holder' is torque, a program of its own.*components="):
             poise.Environment("stand", {"graph": "torque"})
 
+    def test_a_cut_impedance_is_warned_of(self):
+        def stiff(self, tick, inputs, outputs):
+            super(type(self), self).step(tick, inputs, outputs)
+            outputs.joint_command.stiffness = 600
+            if tick.index >= 100:
+                outputs.joint_command.stiffness[3] = 1e7
+
+        env = poise.Environment("stand", {"graph": "impedance"}, components={"holder": holder(True, step=stiff)})
+        env.step(100)
+        self.assertEqual(env.warnings, [])
+        env.step(10)
+        self.assertEqual(len(env.warnings), 1)
+        self.assertRegex(env.warnings[0], r"%s: stiffness cut from 1e\+07 to \S+ N·m/rad, from 0\.200 s on" % env.joint_names[3])
+        env.command(position=env["ROBOT_SENSORS"].joint_position, damping=[1e6] + [0] * (len(env.joint_names) - 1))
+        env.step(10)
+        self.assertEqual(len(env.warnings), 2)
+        self.assertRegex(env.warnings[0], r"%s: damping cut from 1e\+06 to " % env.joint_names[0])
+        env.reset()
+        self.assertEqual(env.warnings, [])
+
     def test_a_negative_stiffness_is_named(self):
         def softens(self, tick, inputs, outputs):
             super(type(self), self).step(tick, inputs, outputs)
