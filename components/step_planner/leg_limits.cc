@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <functional>
+#include <span>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/robot/posture.h"
@@ -24,6 +26,19 @@ double Largest(double most, const std::function<bool(double)>& holds) {
     (holds(middle) ? low : high) = middle;
   }
   return low;
+}
+
+/// How far a polygon goes to a side, `sign` along y, at x = 0.
+double Sideways(const balance::ConvexPolygon& polygon, double sign) {
+  const std::span<const Vector2d> corners = polygon.corners();
+  double farthest = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const Vector2d &a = corners[i], &b = corners[(i + 1) % corners.size()];
+    if (a.x() == b.x() || (a.x() > 0) == (b.x() > 0)) continue;
+    const double y = a.y() - a.x() * (b.y() - a.y()) / (b.x() - a.x());
+    farthest = std::max(farthest, sign * y);
+  }
+  return farthest;
 }
 
 bool Raises(const robot::RobotModel& model, double clearance) {
@@ -48,11 +63,15 @@ double WidestStance(const stepping::Reach& reach) {
 }
 
 double WidestSpacing(const stepping::Reach& reach) {
-  const Vector2d here = Vector2d::Zero();
-  return Largest(kFarthest, [&](double width) {
-    return reach.LoweringShare({here, Vector2d(0, width)}) <= 1 &&
-           reach.LoweringShare({Vector2d(0, -width), here}) <= 1;
-  });
+  double widest = kFarthest;
+  for (const robot::Foot foot : robot::kFeet) {
+    double reached = 0;
+    for (const double share : {0.0, 1.0}) {
+      reached = std::max(reached, Sideways(reach.Leg(foot, share), robot::Side(foot)));
+    }
+    widest = std::min(widest, reached);
+  }
+  return widest;
 }
 
 double LongestStride(const stepping::Reach& reach, double spacing) {
@@ -69,16 +88,37 @@ void CheckGap(const std::string& part, double gap, const robot::RobotModel& mode
   if (reach.least_spacing() <= widest) return;
   const double most = widest - (reach.least_spacing() - gap);
   if (most <= 0) {
-    throw ConfigError(part + ".gap",
-                      fmt::format("is {} m; robot '{}' stands on one foot with the other {:.3f} m "
-                                  "beside it at most, and its soles are {:.3f} m wide: give less "
-                                  "joint_reserve, or less reach_lower",
-                                  gap, model.name(), widest, reach.least_spacing() - gap));
+    throw ConfigError(
+        part + ".gap",
+        fmt::format("is {} m; robot '{}' brings a foot down {:.3f} m beside its COM at "
+                    "most, and its soles are {:.3f} m wide: there is no gap that its "
+                    "legs allow; look at their joints' limits in its file",
+                    gap, model.name(), widest, reach.least_spacing() - gap));
   }
   throw ConfigError(part + ".gap",
-                    fmt::format("is {} m; robot '{}' cannot stand on one foot with the other "
-                                "so far beside it: give 0 to {:.3f} m",
+                    fmt::format("is {} m; robot '{}', standing on one foot, cannot bring the other "
+                                "down so far beside it: give 0 to {:.3f} m",
                                 gap, model.name(), most));
+}
+
+void CheckStanceLegs(double distance, const robot::RobotModel& model, const stepping::Reach& reach,
+                     double height, double reserve) {
+  double beside = 0;
+  for (const robot::Foot foot : robot::kFeet) beside = std::max(beside, reach.BesideCom(foot));
+  if (beside <= distance) return;
+  std::string joints;
+  for (const stepping::JointAt& at : stepping::JointsBelowCom(model, height, reserve)) {
+    const robot::Joint& joint = model.joints()[static_cast<size_t>(at.joint)];
+    joints +=
+        fmt::format("{}{} would be at {:.3f} of {:.3f} to {:.3f} rad", joints.empty() ? "" : ", ",
+                    joint.name, at.position, joint.lower, joint.upper);
+  }
+  throw ConfigError(
+      "walk.quasi_static",
+      fmt::format("is true: the robot stands on one foot with its COM above the middle of that "
+                  "sole. Robot '{}' comes within {:.3f} m of that, and {:.3f} m would do{}{}, and "
+                  "{} rad are kept off each limit. Give false",
+                  model.name(), beside, distance, joints.empty() ? "" : ": ", joints, reserve));
 }
 
 void CheckClearance(const std::string& part, double clearance, const robot::RobotModel& model) {

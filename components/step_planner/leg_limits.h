@@ -10,7 +10,7 @@ namespace poise {
 
 /// m sideways between the soles' centres with which the robot still stands, its COM in the middle.
 double WidestStance(const stepping::Reach& reach);
-/// The same with the COM above either sole, as when the other foot is in the air.
+/// m beside the COM at which either foot can come down, as when the other one stands below the COM.
 double WidestSpacing(const stepping::Reach& reach);
 /// m that a sole can come down ahead of the other one, `spacing` (m) beside it, the COM in the
 /// middle.
@@ -20,6 +20,11 @@ double LongestStride(const stepping::Reach& reach, double spacing);
 /// `reach`: with that gap.
 void CheckGap(const std::string& part, double gap, const robot::RobotModel& model,
               const stepping::Reach& reach);
+/// Throws ConfigError "walk.quasi_static" with the joints that keep either sole from standing
+/// within `distance` m of right below the COM. `reach`: at `height` m, `reserve` rad off the
+/// joints' limits.
+void CheckStanceLegs(double distance, const robot::RobotModel& model, const stepping::Reach& reach,
+                     double height, double reserve);
 /// `clearance`: m by which either foot is raised, the COM as high as standing.
 void CheckClearance(const std::string& part, double clearance, const robot::RobotModel& model);
 

@@ -115,6 +115,12 @@ StepMotion WalkMotion(const WalkConfig& config, const RobotScale& scale) {
   return motion;
 }
 
+/// m of the capture point from the middle of the sole that carries, at which the other foot leaves
+/// the ground.
+double LiftOffDistance(const robot::RobotModel& model, const stepping::StepLimits& limits) {
+  return 0.5 * (LeastInnerRadius(model) - limits.sole_margin);
+}
+
 double Period(const StepMotion& motion) {
   return motion.unload() + motion.swing() + motion.settle() + motion.load();
 }
@@ -214,6 +220,9 @@ stepping::StepChoice MakeWalkChoice(const WalkConfig& config, const robot::Robot
   limits.sole_margin = kSoleMarginShare * LeastInnerRadius(model);
   limits.spacing = std::max(robot::StandingSpacing(model), reach.least_spacing());
   CheckLegs(config, motion, model, reach, limits.spacing);
+  if (config.quasi_static()) {
+    CheckStanceLegs(LiftOffDistance(model, limits), model, reach, height, kJointReserve);
+  }
   return {model, reach, limits};
 }
 
@@ -260,7 +269,7 @@ stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmat
   spec.press_share = config.press();
   spec.press_load =
       std::max(config.press() * robot::kGravity * model.total_mass(), spec.touch_load);
-  spec.lift_off_distance = 0.5 * (radius - choice.limits().sole_margin);
+  spec.lift_off_distance = LiftOffDistance(model, choice.limits());
   spec.most_return = scale.Length(kMostReturn);
   spec.stand_apart = config.stand_apart();
   spec.load_lead = kLoadLeadShare * radius;

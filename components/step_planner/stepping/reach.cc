@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "components/balance/support_polygon.h"
@@ -50,6 +51,16 @@ class Leg {
     }
     return sum / model_.total_mass();
   }
+  /// Where the sole stands level at `target`, m, world, whatever the joints' limits: the joints
+  /// that are too near to them. Empty, too, where no position of the joints brings it there.
+  std::vector<JointAt> NearLimits(const Vector3d& target) {
+    std::vector<JointAt> near;
+    if (!Solve(target)) return near;
+    for (const int j : joints_) {
+      if (!Within(j)) near.push_back({j, state_.joint_position[j]});
+    }
+    return near;
+  }
   /// False, and the leg as it was, when the sole cannot stand level at `target`, m, world.
   bool Reach(const Vector3d& target) {
     const Eigen::VectorXd before = state_.joint_position;
@@ -90,13 +101,13 @@ class Leg {
     }
     return false;
   }
+  bool Within(int j) const {
+    const robot::Joint& joint = model_.joints()[static_cast<size_t>(j)];
+    const double q = state_.joint_position[j];
+    return q >= joint.lower + reserve_ && q <= joint.upper - reserve_;
+  }
   bool WithinLimits() const {
-    for (const int j : joints_) {
-      const robot::Joint& joint = model_.joints()[static_cast<size_t>(j)];
-      const double q = state_.joint_position[j];
-      if (q < joint.lower + reserve_ || q > joint.upper - reserve_) return false;
-    }
-    return true;
+    return std::ranges::all_of(joints_, [&](int j) { return Within(j); });
   }
 
   const robot::RobotModel& model_;
@@ -108,23 +119,28 @@ class Leg {
   Eigen::Matrix3d level_;
 };
 
+/// The stance with its COM `height` m high; empty: the robot does not stand so.
+std::optional<robot::RobotState> Standing(const robot::RobotModel& model, double height) {
+  robot::PostureGoal goal = robot::StandingGoal(model);
+  goal.com_height = height;
+  try {
+    return robot::SolvePosture(model, goal);
+  } catch (const robot::RobotError&) {
+    return {};
+  }
+}
+
 /// Returns where `foot` reaches from the COM, from the stance outwards; empty when the stance
 /// cannot be held.
 balance::ConvexPolygon LegPolygon(const robot::RobotModel& model, double height, Foot foot,
                                   double reserve) {
-  robot::PostureGoal goal = robot::StandingGoal(model);
-  goal.com_height = height;
-  robot::RobotState standing;
-  try {
-    standing = robot::SolvePosture(model, goal);
-  } catch (const robot::RobotError&) {
-    return {};
-  }
+  const std::optional<robot::RobotState> standing = Standing(model, height);
+  if (!standing) return {};
   std::array<Vector2d, kDirections> edge;
   for (int i = 0; i < kDirections; ++i) {
     const double angle = 2 * std::numbers::pi * i / kDirections;
     const Vector3d direction(std::cos(angle), std::sin(angle), 0);
-    Leg leg(model, standing, foot, reserve);
+    Leg leg(model, *standing, foot, reserve);
     const Vector3d start = leg.sole();
     double reached = 0, stride = kStride;
     while (stride > kFinest && reached < kFarthest) {
@@ -207,6 +223,16 @@ double Reach::LoweringShare(const FootArray<Vector2d>& offset) const {
   return share;
 }
 
+double Reach::BesideCom(Foot stance) const {
+  double inside = -kFarthest;
+  for (const balance::ConvexPolygon& leg : leg_[stance]) {
+    if (leg.num_corners >= 3) {
+      inside = std::max(inside, balance::SignedDistance(leg, Vector2d::Zero()));
+    }
+  }
+  return std::max(0.0, -inside);
+}
+
 Vector2d Reach::ComAbove(Foot stance, const Vector2d& com) const {
   const balance::ConvexPolygon& leg = leg_[stance][1];
   if (leg.num_corners == 0) return com;
@@ -223,6 +249,19 @@ balance::ConvexPolygon Reach::Footholds(Foot foot, const Vector2d& com, Place pl
   if (place == Place::kBehind) return balance::Clip(reached, {{1, 0}, -least_ahead_});
   const double side = Side(foot);
   return balance::Clip(reached, {{0, -side}, -least_spacing_});
+}
+
+std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height, double reserve) {
+  std::vector<JointAt> joints;
+  const std::optional<robot::RobotState> standing = Standing(model, height);
+  if (!standing) return joints;
+  for (const Foot foot : kFeet) {
+    Leg leg(model, *standing, foot, reserve);
+    const Vector3d com = leg.Com();
+    const std::vector<JointAt> near = leg.NearLimits({com.x(), com.y(), leg.sole().z()});
+    joints.insert(joints.end(), near.begin(), near.end());
+  }
+  return joints;
 }
 
 }  // namespace poise::stepping

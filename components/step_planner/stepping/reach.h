@@ -47,6 +47,9 @@ class Reach {
   /// Least share of `lowering` with which the soles stand at `offset` from the COM by foot; above
   /// 1, and by how many m, when even the lowest does not do.
   double LoweringShare(const FootArray<Eigen::Vector2d>& offset) const;
+  /// m by which the COM stays beside the middle of the sole of `stance`, at the least, at either
+  /// height: 0 where the leg stands right below it.
+  double BesideCom(Foot stance) const;
   /// `com`, or the nearest place where it can be with the sole of `stance` at the origin: lowered
   /// all the way, in that leg's reach or `roll` beyond it.
   Eigen::Vector2d ComAbove(Foot stance, const Eigen::Vector2d& com) const;
@@ -68,5 +71,15 @@ class Reach {
   FootArray<std::array<balance::ConvexPolygon, 2>> leg_;
   double least_spacing_ = 0, least_ahead_ = 0, lowering_ = 0, roll_ = 0;
 };
+
+/// A joint's position.
+struct JointAt {
+  int joint = 0;
+  double position = 0;  ///< rad
+};
+/// The joints of the legs that come nearer than `reserve`, rad, to a limit, or beyond it, where a
+/// leg stands with its level sole right below the COM, `height` m above it, the body as it stands.
+/// Empty as well where the robot does not stand so high.
+std::vector<JointAt> JointsBelowCom(const robot::RobotModel& model, double height, double reserve);
 
 }  // namespace poise::stepping

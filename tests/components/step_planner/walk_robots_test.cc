@@ -11,6 +11,7 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
 #include "components/robot/posture.h"
+#include "components/robot_files/robot_files.h"
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/walk_config.h"
 #include "tests/robot/robot_test_support.h"
@@ -169,6 +170,47 @@ TEST(WalkLimits, WhatTheLegsCannotDoIsRefused) {
   EXPECT_NO_THROW(MakeStepChoice(recovery, model));
   recovery.mutable_motion()->set_gap(0.5);
   EXPECT_THROW(MakeStepChoice(recovery, model), ConfigError);
+}
+
+/// The paper's robot with soles 60 mm wide and ankles that roll by up to `limit`, rad.
+robot::RobotModel WithAnkles(double limit) {
+  const auto replace = [](std::string* text, const std::string& before, const std::string& after,
+                          size_t from) {
+    text->replace(text->find(before, from), before.size(), after);
+  };
+  std::string urdf = robot::ReadWhole(robot::UrdfPath(TestRobot::kDyros));
+  std::string text = robot::ReadWhole(robot::RobotPath(TestRobot::kDyros));
+  for (const std::string joint : {"right_ankle_roll", "left_ankle_roll"}) {
+    const std::string bound = std::to_string(limit);
+    replace(&urdf, "lower=\"-0.6\" upper=\"0.6\"",
+            "lower=\"-" + bound + "\" upper=\"" + bound + "\"",
+            urdf.find("<joint name=\"" + joint));
+    replace(&text, "width: 0.15", "width: 0.06", 0);
+  }
+  return robot::RobotModel(robot::LoadRobotTexts(text, urdf));
+}
+
+// Its ankles roll by 0.14 rad where a sole stands right below the COM, and 0.1 rad are kept off a
+// limit.
+TEST(WalkLimits, AStanceLegThatDoesNotComeBelowTheComIsNoFaultOfTheGap) {
+  const robot::RobotModel model = WithAnkles(0.17);
+  WalkConfig config = Enabled();
+  config.mutable_motion()->set_gap(0.01);
+  EXPECT_EQ(RefusedField(config, model), "accepted");
+  config.set_quasi_static(true);
+  EXPECT_EQ(RefusedField(config, WithAnkles(0.3)), "accepted");
+  try {
+    MakeWalk(config, ContactConfirmation(), model);
+    ADD_FAILURE() << "accepted";
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), "walk.quasi_static");
+    const std::string text = error.what();
+    for (const char* part : {"right_ankle_roll would be at ", "left_ankle_roll would be at ",
+                             " of -0.170 to 0.170 rad", "0.1 rad are kept off", "Give false"}) {
+      EXPECT_NE(text.find(part), std::string::npos) << text;
+    }
+    EXPECT_EQ(text.find("hip"), std::string::npos) << text;
+  }
 }
 
 TEST(WalkCommands, HoldFromATimeAndANumberOfStepsOn) {
