@@ -86,6 +86,9 @@ class Component:
             def step(self, tick, inputs, outputs):
                 outputs.task_torque.torque = -2 * inputs.robot_state.joint_velocity
 
+    step is given a tick, a named tuple (index, utime, time), and messages by port: inputs (None: none has come yet) and outputs,
+    which keep what was filled in from tick to tick.
+
     In the place of one of the graph's (Environment(components={...})) it has that one's ports. As a program of its own
     (poise.main) it says them: inputs and outputs, {port: message type}; an input may be (type, "tick before") or
     (type, "latest").

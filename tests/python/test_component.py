@@ -70,6 +70,7 @@ class InProcess(unittest.TestCase):
                 seen.update(name=context.name, period=context.tick_period, joints=context.robot.num_joints)
 
             def step(self, tick, inputs, outputs):
+                assert isinstance(tick, tuple) and tuple(tick) == (tick.index, tick.utime, tick.time)
                 seen.setdefault("ticks", []).append((tick.index, tick.utime, round(tick.time, 9)))
                 super().step(tick, inputs, outputs)
 
