@@ -94,15 +94,15 @@ TEST(Ethercat, ASweepIsOfTheRunsThatPoiseRunMakes) {
   const RunFolder folder;
   const std::string run = folder / "run", sweep = folder / "sweep";
   ASSERT_EQ(RunPoise(Arguments(run, {})).exit_code, 0);
-  const ProgramResult result =
-      RunPoise({"sweep", StandScenario(), "--drives", "ethercat", "--vary", "seed=1", "--column",
-                "bus_frames_sent", "--logs", "--out", sweep});
+  const ProgramResult result = RunPoise({"sweep", StandScenario(), "--drives", "ethercat", "--vary",
+                                         "sim.push[0].peak=20,60", "--column", "bus_frames_sent",
+                                         "--column", "push_peak", "--logs", "--out", sweep});
   ASSERT_EQ(result.exit_code, 0) << result.output;
   const std::vector<CsvRow> rows = ReadCsv(sweep + "/table.csv");
-  ASSERT_EQ(rows.size(), 1u);
-  EXPECT_EQ(rows[0].at("outcome"), "stands");
-  EXPECT_GT(std::stod(rows[0].at("bus_frames_sent")), 0);
-  EXPECT_TRUE(logging::CompareLogs(run + "/run.lcm", sweep + "/logs/0/run.lcm").equal());
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[1].at("outcome"), "stands");
+  EXPECT_GT(std::stod(rows[1].at("bus_frames_sent")), 0);
+  EXPECT_TRUE(logging::CompareLogs(run + "/run.lcm", sweep + "/logs/1/run.lcm").equal());
   EXPECT_NE(ReadAll(sweep + "/maps.html").find("--drives ethercat"), std::string::npos);
 }
 
