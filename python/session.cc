@@ -16,6 +16,7 @@
 #include "poise/bridge_status_t.hpp"
 #include "sim/push.h"
 #include "tools/cli/output_place.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -156,7 +157,7 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     Replace(options, &registry_);
     CheckGraph(spec_.graph(), registry_);
   }
-  const std::string program = OwnProgramOf(spec_);
+  const std::string program = OwnProgramOf(spec_.graph());
   if (!program.empty()) {
     throw ConfigError(
         program +

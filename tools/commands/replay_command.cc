@@ -164,7 +164,8 @@ void AddReplayCommand(CLI::App* app, Command* command) {
   replay->footer(
       "Configurations, robot and seed are those of the log. The components are those of this "
       "program, so that a changed build shows where it differs. What cannot be replayed (a program "
-      "of its own, an object of Python's, an end of the drives) is named and not judged.\nExample: poise replay runs/latest "
+      "of its own, an object of Python's, an end of the drives) is named and not judged.\nExample: "
+      "poise replay runs/latest "
       "--component task_controller --set task_controller.com.kp=200");
   replay->add_option("run", options->run, "folder of a run or a log; default: the latest run");
   CLI::Option* component =

@@ -22,6 +22,7 @@
 #include "tools/run/launcher.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
@@ -98,7 +99,7 @@ ScenarioRun::Part ScenarioRun::Prepare(const std::string& scenario, const RunCha
     for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
   }
   CheckRun(part.loaded, &part.spec);
-  const std::string program = in_process ? OwnProgramOf(part.spec) : "";
+  const std::string program = in_process ? OwnProgramOf(part.spec.graph()) : "";
   if (!program.empty()) {
     throw ConfigError(fmt::format(
         "{}, which a run inside one process cannot hold; {}", program,

@@ -6,6 +6,7 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
+#include "components/framework/run.h"
 #include "components/framework/say_error.h"
 #include "components/messages/foreign_component.h"
 #include "fmt/format.h"
@@ -27,6 +28,12 @@ InputKind KindOf(const std::string& kind) {
   if (kind == "latest") return InputKind::kLatest;
   throw ConfigError(
       fmt::format("kind '{}' of an input is none of: same tick, tick before, latest", kind));
+}
+
+/// How an error names one.
+std::string OwnProgram(const ComponentInstance& instance) {
+  return fmt::format("component '{}' is {}, a program of its own", instance.name(),
+                     TypeOf(instance));
 }
 
 }  // namespace
@@ -91,5 +98,26 @@ void LoadDescriptions() {
 }
 
 bool IsDescribed(const std::string& type) { return Described().contains(type); }
+
+std::string OwnProgramOf(const Graph& graph) {
+  for (const ComponentInstance& instance : graph.component()) {
+    if (IsDescribed(TypeOf(instance))) return OwnProgram(instance);
+  }
+  return "";
+}
+
+void CheckSharedProcesses(const Graph& graph) {
+  for (const std::string& process : ProcessNames(graph)) {
+    const std::vector<int> components = ComponentsOf(graph, process);
+    if (components.size() < 2) continue;
+    for (const int i : components) {
+      if (!IsDescribed(TypeOf(graph.component(i)))) continue;
+      throw ConfigError(fmt::format(
+          "{}, which cannot share the process {} with others; leave it out of --host and of the "
+          "graph's process: and run without --hosted",
+          OwnProgram(graph.component(i)), process));
+    }
+  }
+}
 
 }  // namespace poise

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "components/framework/component_type.h"
+#include "components/framework/graph.pb.h"
 
 namespace poise {
 
@@ -15,6 +16,12 @@ void LoadDescriptions();
 
 /// Whether the type is one of them: it cannot run in another's process.
 bool IsDescribed(const std::string& type);
+
+/// The graph's first component that is one, as an error names it: "component 'task_controller' is
+/// springs, a program of its own"; empty: there is none.
+std::string OwnProgramOf(const Graph& graph);
+/// Throws ConfigError for one that is to share its process with others.
+void CheckSharedProcesses(const Graph& graph);
 
 /// One of them. Throws ConfigError.
 ComponentType ReadDescription(const std::filesystem::path& file);

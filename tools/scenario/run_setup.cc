@@ -220,27 +220,6 @@ void CheckEngineOf(const std::vector<std::string>& changes, const Graph& graph) 
   }
 }
 
-/// How an error names a component that is a program of its own.
-std::string OwnProgram(const ComponentInstance& instance) {
-  return fmt::format("component '{}' is {}, a program of its own", instance.name(),
-                     TypeOf(instance));
-}
-
-/// Refuses a program of its own in a process of several.
-void CheckShared(const Graph& graph) {
-  for (const std::string& process : ProcessNames(graph)) {
-    const std::vector<int> components = ComponentsOf(graph, process);
-    if (components.size() < 2) continue;
-    for (const int i : components) {
-      if (!IsDescribed(TypeOf(graph.component(i)))) continue;
-      throw ConfigError(fmt::format(
-          "{}, which cannot share the process {} with others; leave it out of --host and of the "
-          "graph's process: and run without --hosted",
-          OwnProgram(graph.component(i)), process));
-    }
-  }
-}
-
 /// Puts components of `graph` into the process of that name.
 void PutInto(const std::string& process, const std::vector<std::string>& components,
              const std::string& flag, Graph* graph) {
@@ -417,7 +396,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
 }
 
 void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
-  CheckShared(spec->graph());
+  CheckSharedProcesses(spec->graph());
   try {
     CheckGraph(spec->graph(), Components());
     const BoundGraph bound(*spec, Components());
@@ -442,7 +421,7 @@ void CheckRun(const LoadedScenario& loaded, RunSpec* spec) {
 
 void CheckGraphFile(const std::string& path) {
   const Graph graph = GraphFiles(path).Merged();
-  CheckShared(graph);
+  CheckSharedProcesses(graph);
   try {
     CheckGraph(graph, Components());
   } catch (const GraphError& error) {
@@ -579,13 +558,6 @@ bool SpeaksToDrives(const RunSpec& spec, int component) {
   const std::vector<DriveLink>& ends = Components().TraitsOf(TypeOf(instance)).drive_links;
   return std::any_of(ends.begin(), ends.end(),
                      [&](const DriveLink& end) { return HasField(own, end.group); });
-}
-
-std::string OwnProgramOf(const RunSpec& spec) {
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    if (IsDescribed(TypeOf(instance))) return OwnProgram(instance);
-  }
-  return "";
 }
 
 RunSource ChoosePorts(RunSpec* spec) {

@@ -42,10 +42,6 @@ void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec
 /// log holds.
 bool SpeaksToDrives(const RunSpec& spec, int component);
 
-/// The first component that is a program of its own, which no other process holds, as an error
-/// names it: "component 'task_controller' is springs, a program of its own"; empty: there is none.
-std::string OwnProgramOf(const RunSpec& spec);
-
 /// A block of free UDP ports for the run's channels, and its source port taken. Throws ConfigError
 /// when none is found; BusError when multicast is not routed.
 RunSource ChoosePorts(RunSpec* spec);

@@ -26,6 +26,7 @@
 #include "tools/run/estimates.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
+#include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
@@ -42,7 +43,7 @@ struct Prepared {
 
 /// Whether one process cannot hold the run.
 bool NeedsProcesses(const RunSpec& spec, const RunChanges& changes) {
-  return !changes.drives.empty() || !OwnProgramOf(spec).empty();
+  return !changes.drives.empty() || !OwnProgramOf(spec.graph()).empty();
 }
 
 /// Runs as processes and reads the log; empty where not all ticks until the run's end were done:
