@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "sim_ode/box_lcp.h"
+#include "components/balance/box_lcp.h"
 
 namespace poise {
 
@@ -108,7 +108,7 @@ class TreeStep {
   Eigen::MatrixXd system_, normal_system_;
   Eigen::VectorXd wanted_, lower_, upper_, impulses_, normal_wanted_, normal_impulses_, zero_,
       infinite_;
-  BoxLcp normals_, all_;
+  balance::BoxLcp normals_, all_;
   std::vector<Eigen::Vector3d> forces_;
 };
 

@@ -34,8 +34,13 @@ constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>
 // Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must
 // remain.
 constexpr int kMostKept = 3;
-// The COM's three, the heading and the six of a foot in the air.
-constexpr int kStepRows = 10;
+// The COM's height and the six of a foot in the air: what a step holds, and how much more a change
+// of it counts than another motion of the same energy. With 1000 a swing that the stance sole cannot
+// bear turned the body; with 10 it is a little later.
+constexpr int kStepRows = 7;
+constexpr double kHeldWeight = 10;
+// Share of the weight that a sole keeps in a step, at least: alone, and with the other one.
+constexpr double kLeastAlone = 0.2, kLeastShared = 0.02;
 
 bool Inside(const Eigen::Vector2d& cop, const balance::ConvexPolygon& region) {
   return balance::SignedDistance(region, cop) >= -kCopTolerance;
@@ -90,13 +95,14 @@ void ContactWrenchMonitor::Configure(const ComponentContext& context, Wiring* wi
   protected_bias_ = Eigen::VectorXd::Zero(most_rows);
   task_acceleration_ = acceleration_ = Eigen::VectorXd::Zero(model_->num_velocities());
   other_torque_ = Eigen::VectorXd::Zero(num_joints);
-  body_share_ = config.body_share();
-  const int step_rows = std::min(kStepRows, num_joints);
-  for (auto& motion : step_motion_) motion.emplace(num_joints, step_rows);
-  step_jacobian_ = Eigen::MatrixXd::Zero(step_rows, model_->num_velocities());
-  step_bias_ = Eigen::VectorXd::Zero(step_rows);
-  body_jacobian_ = robot::Matrix6X::Zero(6, model_->num_velocities());
-  balance_control_.emplace(num_joints, std::max(most_rows, step_rows));
+  step_balance_.emplace(num_joints, kStepRows);
+  step_jacobian_ = Eigen::MatrixXd::Zero(kStepRows, model_->num_velocities());
+  step_weight_ = Eigen::VectorXd::Constant(kStepRows, kHeldWeight);
+  effort_ = Eigen::VectorXd::Zero(num_joints);
+  for (int j = 0; j < num_joints; ++j) {
+    effort_[j] = model_->joints()[static_cast<size_t>(j)].effort;
+  }
+  balance_control_.emplace(num_joints, most_rows);
   state_ = robot::RobotState(num_joints);
   height_jacobian_ = Eigen::MatrixXd::Zero(1, model_->num_velocities());
   height_bias_ = Eigen::VectorXd::Zero(1);
@@ -131,7 +137,6 @@ void ContactWrenchMonitor::AddSettings(double tick_period) {
     add("single_support.half_width", &single_support_.half_width);
   }
   settings.Add("cop_feedback.share", &cop_feedback_, 0, 1, kRegionRamp);
-  if (body_share_ >= 0) settings.Add("body_share", &body_share_, 0, 1, kRegionRamp);
 }
 
 void ContactWrenchMonitor::TakeActs(const Tick& tick) {
@@ -204,12 +209,13 @@ int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contac
     for (Eigen::Vector2d& corner : region.mutable_corners()) corner -= cop_feedback_ * cop_error_;
   }
   if (region.num_corners == 0) return balance_torque_t::STATUS_SINGULAR;
-  steps_ = body_share_ >= 0 && support_plan_->stepping != support_plan_t::STEPPING_NONE &&
-           ProtectSteps(in_contact);
+  const bool steps = balancing_ && support_plan_->stepping != support_plan_t::STEPPING_NONE;
   balance::BalanceResult result;
-  const balance::BalanceStatus status = polygon_ || cop_feedback_ > 0
-                                            ? Move(geometry, region, &result)
-                                            : Move(geometry, limits, &result);
+  balance::BalanceStatus status = balance::BalanceStatus::kOk;
+  if (!steps || !MoveForStep(geometry, region, &result)) {
+    status = polygon_ || cop_feedback_ > 0 ? Move(geometry, region, &result)
+                                           : Move(geometry, limits, &result);
+  }
   if (status == balance::BalanceStatus::kSingular || !torque_.allFinite()) {
     return balance_torque_t::STATUS_SINGULAR;
   }
@@ -225,9 +231,6 @@ template <class Bounds>
 balance::BalanceStatus ContactWrenchMonitor::Move(const balance::ContactGeometry& geometry,
                                                   const Bounds& bounds,
                                                   balance::BalanceResult* result) {
-  if (steps_ && balancing_ && MoveForStep(geometry, bounds, result)) {
-    return balance::BalanceStatus::kOk;
-  }
   const balance::BalanceStatus status =
       balance_control_->Compute(whole_body_->contact(), *com_height_, geometry, bounds, balancing_,
                                 torque_, result, balance::Movers::kLegs);
@@ -307,55 +310,45 @@ bool ContactWrenchMonitor::KeepLimits(const balance::ContactGeometry& geometry,
   return true;
 }
 
-bool ContactWrenchMonitor::ProtectSteps(const std::array<bool, 2>& in_contact) {
-  const robot::RobotData& data = whole_body_->data();
-  robot::ComputePointJacobian(*model_, data, model_->body_task_body(), Eigen::Vector3d::Zero(),
-                              body_jacobian_);
-  step_jacobian_.row(2) = data.com_jacobian.row(2);
-  step_jacobian_.row(3) = body_jacobian_.row(5);
-  Eigen::Index rows = 4;
-  for (size_t i = 0; i < 2; ++i) {
-    if (in_contact[i]) continue;
-    if (rows + 6 > step_jacobian_.rows()) return false;
-    step_jacobian_.middleRows<6>(rows) = data.foot_jacobian[i];
-    rows += 6;
-  }
-  for (size_t way = 0; way < step_motion_.size(); ++way) {
-    if (way == 0) {
-      step_jacobian_.topRows<2>() = data.com_jacobian.topRows<2>();
-    } else {
-      step_jacobian_.topRows<2>() = body_jacobian_.middleRows<2>(3);
-    }
-    // The null space has no use for the bias.
-    if (!step_motion_[way]->Compute(whole_body_->contact(), step_jacobian_.topRows(rows),
-                                    step_bias_.head(rows))) {
-      return false;
-    }
-  }
-  return true;
-}
-
-template <class Bounds>
 bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
-                                       const Bounds& bounds, balance::BalanceResult* result) {
-  const std::array<double, 2> share{body_share_, 1 - body_share_};
-  std::array<balance::BalanceResult, 2> moved;
-  acceleration_.head(torque_.size()).setZero();
-  for (size_t way = 0; way < step_motion_.size(); ++way) {
-    if (share[way] == 0) continue;
-    other_torque_ = torque_;
-    if (balance_control_->Compute(whole_body_->contact(), *step_motion_[way], geometry, bounds,
-                                  true, other_torque_, &moved[way],
-                                  balance::Movers::kLegs) != balance::BalanceStatus::kOk) {
-      return false;
-    }
-    acceleration_.head(torque_.size()) += share[way] * other_torque_;
+                                       const balance::ConvexPolygon& region,
+                                       balance::BalanceResult* result) {
+  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  balance::StepBounds& bounds = step_bounds_;
+  if (!balance::FrameO(geometry.sole, geometry.in_contact, &bounds.frame_o)) return false;
+  bounds.in_contact = geometry.in_contact;
+  bounds.sole = geometry.sole;
+  bounds.region = region;
+  const double weight = model_->total_mass() * robot::kGravity;
+  for (size_t f = 0; f < 2; ++f) {
+    bounds.foot[f] = {both ? shared_sole_[f] : sole_[f],
+                      (both ? double_support_ : single_support_).friction,
+                      (both ? kLeastShared : kLeastAlone) * weight};
   }
-  torque_ = acceleration_.head(torque_.size());
-  // Each brings the centre of pressure to the bound, and so does a mixture of them.
-  *result = moved[body_share_ > 0 ? 0 : 1];
-  result->resultant = share[0] * moved[0].resultant + share[1] * moved[1].resultant;
-  result->cop = balance::CenterOfPressure(result->resultant);
+  step_jacobian_.row(0) = height_jacobian_.row(0);
+  if (!both) {
+    step_jacobian_.bottomRows<6>() = whole_body_->data().foot_jacobian[geometry.in_contact[0]];
+  }
+  const Eigen::Index held = both ? 1 : kStepRows;
+  balance::StepBalance::Result step;
+  if (!step_balance_->Compute(whole_body_->contact(), bounds,
+                              {step_jacobian_.topRows(held), step_weight_.head(held)}, effort_,
+                              all_joints_ ? balance::Movers::kAllJoints : balance::Movers::kLegs,
+                              torque_, &step)) {
+    return false;
+  }
+  result->frame_o = bounds.frame_o;
+  result->resultant_task.setZero();
+  result->resultant.setZero();
+  for (size_t f = 0; f < 2; ++f) {
+    if (!geometry.in_contact[f]) continue;
+    const balance::Matrix6d transfer = balance::WrenchTransform(bounds.frame_o, geometry.sole[f]);
+    result->resultant_task += transfer * step.task[f];
+    result->resultant += transfer * step.wrench[f];
+  }
+  result->cop_task = balance::CenterOfPressure(result->resultant_task);
+  result->cop = result->cop_desired = balance::CenterOfPressure(result->resultant);
+  result->active_x = result->active_y = step.changed;
   return true;
 }
 

@@ -9,6 +9,7 @@
 #include "components/balance/balance_control.h"
 #include "components/balance/convex_polygon.h"
 #include "components/balance/joint_limits.h"
+#include "components/balance/step_balance.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"
@@ -39,8 +40,8 @@ class ContactWrenchMonitor : public Component, public Operated {
   /// Dynamics and protected task for these contacts; STATUS_*.
   int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
   int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
-  /// BalanceControl by the configured movers, within the joints' limits; in a step MoveForStep,
-  /// which does not keep them. torque_ on entry the task torque.
+  /// BalanceControl by the configured movers, within the joints' limits. torque_ on entry the task
+  /// torque.
   template <class Bounds>
   balance::BalanceStatus Move(const balance::ContactGeometry& geometry, const Bounds& bounds,
                               balance::BalanceResult* result);
@@ -54,13 +55,9 @@ class ContactWrenchMonitor : public Component, public Operated {
   template <class Bounds>
   bool KeepLimits(const balance::ContactGeometry& geometry, const Bounds& bounds,
                   balance::BalanceResult* result);
-  /// What a step needs: the COM's height, the heading and the feet in the air, with the rest of the
-  /// COM, so that the body gives way, and with the rest of the body, so that the COM does. False
-  /// when their dynamics do not exist.
-  bool ProtectSteps(const std::array<bool, 2>& in_contact);
-  /// Both of these mixed; false when one cannot bring the centre of pressure to its bound.
-  template <class Bounds>
-  bool MoveForStep(const balance::ContactGeometry& geometry, const Bounds& bounds,
+  /// While the planner makes steps: StepBalance, which holds the COM's height and the feet in the
+  /// air. False, and torque_ as it was, where it finds nothing.
+  bool MoveForStep(const balance::ContactGeometry& geometry, const balance::ConvexPolygon& region,
                    balance::BalanceResult* result);
   balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
   /// Both soles less `margin`, m: x at toe and heel, y at the sides. ConfigError: nothing is left.
@@ -90,13 +87,11 @@ class ContactWrenchMonitor : public Component, public Operated {
   std::optional<balance::TaskDynamics> protected_;  // the COM's height and joints at their limits
   Eigen::MatrixXd protected_jacobian_;
   Eigen::VectorXd protected_bias_, task_acceleration_, acceleration_, other_torque_;
-  double body_share_ = 0;  // of what gives way in steps
-  bool steps_ = false;     // in this tick
-  // By what gives way: the body, the COM.
-  std::array<std::optional<balance::TaskDynamics>, 2> step_motion_;
-  Eigen::MatrixXd step_jacobian_;
-  Eigen::VectorXd step_bias_;
-  robot::Matrix6X body_jacobian_;
+  std::optional<balance::StepBalance> step_balance_;
+  balance::StepBounds step_bounds_;
+  Eigen::MatrixXd step_jacobian_;  // of what a step holds
+  Eigen::VectorXd step_weight_;
+  Eigen::VectorXd effort_;  // N·m, by joint
   balance::ContactLimits double_support_, single_support_;
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull

@@ -4,6 +4,7 @@
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/redistribution.h"
+#include "components/balance/step_balance.h"
 #include "components/balance/task_hierarchy.h"
 #include "components/balance/tasks/task.h"
 #include "tests/allocation_counter.h"
@@ -68,6 +69,33 @@ void CountOn(const std::shared_ptr<const robot::RobotModel>& model,
 TEST(Allocation, TheTickPathAllocatesNothing) {
   for (const auto& model : {Biped(), Humanoid()}) {
     for (const auto& in_contact : {kDouble, kRight, kLeft}) CountOn(model, in_contact);
+  }
+}
+
+TEST(Allocation, BalancingInAStepAllocatesNothing) {
+  for (const auto& model : {Biped(), Humanoid()}) {
+    for (const auto& in_contact : {kDouble, kRight, kLeft}) {
+      StateSampler sampler(model, 43);
+      WholeBody body(model);
+      ASSERT_TRUE(body.Update(sampler.Draw(), in_contact));
+      StepBounds bounds;
+      bounds.in_contact = in_contact;
+      bounds.sole = body.geometry().sole;
+      ASSERT_TRUE(FrameO(bounds.sole, in_contact, &bounds.frame_o));
+      bounds.region = Rectangle({0.05, 0.05});
+      for (SoleBounds& foot : bounds.foot) foot = {Rectangle({0.08, 0.04}), 0.8, 30};
+      const Eigen::MatrixXd rows = body.data().com_jacobian;
+      const Eigen::VectorXd weight = Eigen::VectorXd::Constant(3, 10);
+      const Eigen::VectorXd effort = Eigen::VectorXd::Constant(model->num_joints(), 200);
+      Eigen::VectorXd torque = sampler.Vector(model->num_joints(), 100);
+      StepBalance balance(model->num_joints(), 3);
+      StepBalance::Result result;
+      const long before = allocations;
+      const bool found = balance.Compute(body.contact(), bounds, {rows, weight}, effort,
+                                         Movers::kAllJoints, torque, &result);
+      EXPECT_EQ(allocations - before, 0);
+      EXPECT_TRUE(found && result.changed);
+    }
   }
 }
 

@@ -1,4 +1,4 @@
-#include "sim_ode/box_lcp.h"
+#include "components/balance/box_lcp.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace poise {
+namespace poise::balance {
 namespace {
 
 using Eigen::MatrixXd;
@@ -130,4 +130,4 @@ TEST(BoxLcp, RefusesWhatIsNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace poise
+}  // namespace poise::balance

@@ -1,9 +1,9 @@
-#include "sim_ode/box_lcp.h"
+#include "components/balance/box_lcp.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace poise {
+namespace poise::balance {
 namespace {
 
 using Eigen::Index;
@@ -200,4 +200,4 @@ bool BoxLcp::Descend(const Matrix& a, const Vector& q, const Vector& lower, cons
   return false;
 }
 
-}  // namespace poise
+}  // namespace poise::balance

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace poise {
+namespace poise::balance {
 
 /// Finds x with lower <= x <= upper and w = A x - q, where w[i] = 0 if x[i] lies between its
 /// bounds, w[i] >= 0 on the lower one and w[i] <= 0 on the upper one. A is symmetric and positive
@@ -48,4 +48,4 @@ class BoxLcp {
   Eigen::VectorXd point_;  // within the bounds, of the descent
 };
 
-}  // namespace poise
+}  // namespace poise::balance
