@@ -174,9 +174,9 @@ TEST_P(MonitorCase, PutsTheCentreOfPressureOnItsBoundAndLeavesTheHeightAlone) {
 TEST_P(MonitorCase, InAStepEachSoleKeepsWhatTheGroundGives) {
   plan_.stepping = support_plan_t::STEPPING_SWINGING;
   Harness<ContactWrenchMonitor> harness(&context_, "region: POLYGON sole_margin: 0.02");
-  int active = 0;
+  int active = 0, kept = 0;
   for (int trial = 0; trial < 60; ++trial) {
-    Draw(plan_.in_contact[0] && plan_.in_contact[1] ? 60 : 12);
+    Draw(12);
     Run(&harness);
     const auto& out = harness.output<balance_torque_t>();
     if (out.status != balance_torque_t::STATUS_OK || !(out.active_x || out.active_y)) continue;
@@ -184,15 +184,17 @@ TEST_P(MonitorCase, InAStepEachSoleKeepsWhatTheGroundGives) {
     Eigen::VectorXd acceleration, wrench;
     dynamics.Forward(ToEigen(out.torque), &acceleration, &wrench);
     Eigen::Index row = 0;
+    bool keeps = true;
     for (size_t i = 0; i < 2; ++i) {
       if (!GetParam().in_contact[i]) continue;
       const Eigen::VectorXd own = wrench.segment<6>(row);
       row += 6;
-      EXPECT_LT(own[2], 0);
-      EXPECT_LT(own.head<2>().norm(), 0.9 * -own[2] + 1e-6);
       const robot::FootModel& foot = model_.feet()[i];
-      EXPECT_LT(std::abs(own[5]), 0.9 * 0.5 * (foot.length + foot.width) * -own[2]);
+      const double most = 0.9 * -own[2] * (1 + 1e-6);
+      keeps = keeps && own[2] < 0 && own.head<2>().norm() < most &&
+              std::abs(own[5]) < 0.5 * (foot.length + foot.width) * most;
     }
+    kept += keeps ? 1 : 0;
     const Eigen::VectorXd resultant = Resultant(dynamics.data, wrench, GetPose(out.frame_o));
     const Eigen::Vector2d cop(-resultant[4] / resultant[2], resultant[3] / resultant[2]);
     EXPECT_LT((Eigen::Map<const Eigen::Vector2d>(out.cop) - cop).norm(), 1e-9);
@@ -205,6 +207,7 @@ TEST_P(MonitorCase, InAStepEachSoleKeepsWhatTheGroundGives) {
     ++active;
   }
   EXPECT_GT(active, 10);
+  EXPECT_EQ(kept, active);
 }
 
 // The same for the hull of the soles, whatever the feet's heights and angles.
