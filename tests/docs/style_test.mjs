@@ -1,0 +1,66 @@
+// The pages of docs/concepts are short, in short sentences, with pictures that are small and what draw.py draws.
+// Usage: node style_test.mjs
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {readFileSync, statSync} from 'node:fs';
+import {join} from 'node:path';
+import {test} from 'node:test';
+import {linesOf, repositoryFiles, root} from './markdown.mjs';
+import {measureOf, sentencesOf, tooLong} from './prose.mjs';
+
+const MOST = {average: 18, words: 40, line: 120, lines: 120};
+const MOST_PICTURE = 15_000;  // bytes: a picture is text of the repository
+const folder = repositoryFiles('docs/concepts');
+const pages = folder.filter((f) => f.endsWith('.md'));
+
+for (const page of pages) {
+  test(`${page} is short`, (t) => {
+    const problems = tooLong(page, linesOf(page), MOST);
+    const {lines, sentences, average, longest} = measureOf(page);
+    t.diagnostic(`${lines} lines, ${sentences} sentences, ${average.toFixed(1)} words a sentence, ${longest} at most`);
+    assert.deepEqual(problems, [], problems.join('\n'));
+  });
+}
+
+test('every page but the index shows a picture and Python, and every picture is shown', () => {
+  const shown = new Set();
+  for (const page of pages) {
+    const text = readFileSync(join(root, page), 'utf8');
+    const pictures = [...text.matchAll(/^!\[[^\]]+\]\((pictures\/[\w.]+)\)$/gm)].map((m) => m[1]);
+    for (const picture of pictures) shown.add(`docs/concepts/${picture}`);
+    if (page.endsWith('/README.md')) continue;
+    assert.ok(pictures.length > 0, `${page} shows no picture`);
+    assert.match(text, /^```python$/m, `${page} has no Python`);
+  }
+  assert.deepEqual(folder.filter((f) => f.endsWith('.svg')).sort(), [...shown].sort());
+});
+
+test('the pictures are small, and what draw.py draws', () => {
+  const large = folder.filter((f) => f.endsWith('.svg') && statSync(join(root, f)).size >= MOST_PICTURE);
+  assert.deepEqual(large, []);
+  const {status, stderr} = spawnSync('python3', [join(root, 'docs/concepts/pictures/draw.py'), '--check'], {encoding: 'utf8'});
+  assert.equal(status, 0, `${stderr}\nRun docs/concepts/pictures/draw.py, and commit what it has written.`);
+});
+
+// What the measures are worth: a page that breaks each is told so.
+const asLines = (text) => text.split('\n').map((line, i) => ({number: i + 1, text: line, code: null}));
+const words = (count) => `${Array(count).fill('word').join(' ')}.`;
+
+test('a page that is too long in any way is told so', () => {
+  const told = (text) => tooLong('page', asLines(text), MOST).map((problem) => problem.replace(/^page:? ?/, ''));
+  assert.deepEqual(told(`${words(18)}\n${words(18)}\n`), []);
+  assert.match(told(`${words(18)}\n${words(19)}\n`)[0], /18\.5 words a sentence/);
+  assert.match(told(`${words(20)}\n${words(21)}\n\nOne. Two. Three.\n`).join(), /^$/);
+  assert.match(told(`One. Two. Three.\n\n${words(20)}\n${words(21).toUpperCase()}\n`).join(), /^$/);
+  const long = `One. Two. Three. Four.\n\n${words(41).replace('word word', 'word\nword').replace(/((?:word ){20})/, '$1\n')}\n`;
+  assert.match(told(long)[0], /41 words, at most 40/);
+  assert.match(told(`- ${'x'.repeat(120)}.\n`)[0], /123 characters/);
+  assert.deepEqual(told(`| ${'x'.repeat(130)} |\n`), []);
+  assert.match(told('Line.\n\n'.repeat(61))[0], /122 lines/);
+});
+
+test('code, tables, equations and headings are no sentences', () => {
+  const text = `# A heading of many words that counts for nothing at all\n\nOne two \`a b c\` $x + y$ [three](four.md) et al. 2012.\n\n` +
+      `| a | table of words |\n\n$$a + b\n= c \\text{in words}$$\n\nFive six: seven.\n- eight nine\n  ten.\n`;
+  assert.deepEqual(sentencesOf(asLines(text)).map((s) => s.words), [8, 3, 3]);
+});
