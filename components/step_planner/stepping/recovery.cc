@@ -19,7 +19,10 @@ constexpr double kHopelessExcess = 0.015;
 constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
-constexpr int kMostSteps = 5;          // in a row: what five do not catch, the sixth does not
+constexpr int kMostSteps = 12;         // in a row: what these do not catch, no more do
+// Share of the ample margin, below which the other foot goes on as one lands: both feet on the ground
+// cost the time in which the capture point leaves them.
+constexpr double kStepOnShare = 0.5;
 // Share of the angular momentum about the COM that counts in the capture point: what the swinging
 // leg and the turning body give to the COM and take from it then moves no foothold.
 constexpr double kMomentumShare = 0.5;
@@ -89,8 +92,11 @@ bool Recovery::Update(const StepInput& input) {
         since_ = time;
         stage_ = Stage::kShifting;
       }
-      step_helps_ = !(spec_.watched_margin >= 0 && stage_ == Stage::kIdle &&
-                      excess > -spec_.watched_margin && !choice_.Choose(state).possible);
+      step_helps_ = true;
+      if (spec_.watched_margin >= 0 && stage_ == Stage::kIdle && excess > -spec_.watched_margin) {
+        const StepPlan plan = choice_.Choose(state);
+        step_helps_ = plan.possible && choice_.Helps(state, plan);
+      }
       if (need == StepReason::kNone) break;
       const Foot stance = state.in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft;
       standing_height_ = input.com_height - input.sole[stance].translation().z();
@@ -109,7 +115,11 @@ bool Recovery::Update(const StepInput& input) {
       if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
       break;
     case Stage::kSwinging:
-      if (Touches(input)) Land(input);
+      if (Touches(input)) {
+        Land(input);
+        state.in_contact = in_contact_;
+        StepOn(input, state);
+      }
       break;
     case Stage::kLoading:
       if (time >= since_ + LoadTime() - kTimeTolerance) {
@@ -276,6 +286,18 @@ void Recovery::Land(const StepInput& input) {
   stage_ = Stage::kLoading;
   since_ = input.time;
   cop_from_ = output_.cop;
+}
+
+void Recovery::StepOn(const StepInput& input, const StepState& state) {
+  if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return;
+  const Foot other = Other(plan_.foot);
+  const double margin = balance::SignedDistance(Soles(state, choice_.limits().sole_margin),
+                                                state.pendulum.capture_point());
+  if (margin > kStepOnShare * choice_.limits().ample_margin) return;
+  const StepPlan next = choice_.Next(state, other);
+  if (!next.possible) return;
+  BeginStep(input, next, StepReason::kAgain);
+  LiftOff(input);
 }
 
 void Recovery::Swings(const StepInput& input, const StepState& state) {

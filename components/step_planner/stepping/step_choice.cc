@@ -20,13 +20,15 @@ constexpr double kFixedPoint = 2e-3;  // s, a tick: the step's time is found to 
 constexpr double kLater = 0.06;       // s, after which a place out of reach is tried again
 // m of margin for which a step may take a second longer.
 constexpr double kMarginOfTime = 0.05;
-// m by which a step that does not catch the capture point must still come nearer than standing.
-constexpr double kLeastGain = 0.02;
 // m by which a way may cut the corner that it keeps off: what standing feet are off by.
 constexpr double kCut = 0.005;
 constexpr double kOffReach = 1e-9;  // m off a polygon that is rounding
 // ωT of a step at most: what the capture point is off by has grown 55 times then, beyond any reach.
 constexpr double kLongest = 4;
+// m by which a step that does not catch the capture point must still come nearer than standing.
+constexpr double kLeastGain = 0.02;
+constexpr int kStepsAhead = 2;        // after the one that is chosen
+constexpr double kCostOfStep = 0.01;  // m of margin that a step must be worth
 constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
 
 /// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
@@ -222,27 +224,53 @@ bool StepChoice::Helps(const StepState& state, const StepPlan& plan) const {
   return plan.margin > balance::SignedDistance(soles, stays) + kLeastGain;
 }
 
+double StepChoice::CostAfter(const StepState& state, const StepPlan& plan, int more) const {
+  const double outside =
+      std::max(0.0, limits_.ample_margin - plan.margin) + std::max(0.0, -plan.follows);
+  double cost = outside;
+  if (more == 0 || outside == 0) return cost;
+  StepState next = state;
+  next.pendulum = After(state.pendulum, plan.cop, plan.time);
+  next.sole[plan.foot] = plan.foothold;
+  next.sole_yaw[plan.foot] = plan.yaw;
+  next.in_contact = {true, true};
+  Best(next, Other(plan.foot), more - 1, &cost);
+  return cost;
+}
+
+StepPlan StepChoice::Best(const StepState& state, Foot foot, int more, double* least) const {
+  StepPlan best;
+  const auto consider = [&](const StepPlan& plan) {
+    if (!std::isfinite(plan.margin)) return;
+    const double cost = CostAfter(state, plan, more) + kCostOfStep + kMarginOfTime * plan.time;
+    if (cost >= *least) return;
+    best = plan;
+    *least = cost;
+  };
+  const StepPlan beside = Plan(state, foot);
+  consider(beside);
+  if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) return best;
+  const Vector2d away = state.pendulum.capture_point() - state.sole[Other(foot)];
+  const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
+  consider(Plan(state, foot, ahead < 0 ? Place::kBehind : Place::kAhead));
+  return best;
+}
+
 StepPlan StepChoice::Choose(const StepState& state) const {
   StepPlan best;
-  double best_score = 0;
+  double least = std::numeric_limits<double>::infinity();
   for (const Foot foot : kFeet) {
     // The stance foot must be there to stand on.
     if (!state.in_contact[Other(foot)]) continue;
-    const auto consider = [&](const StepPlan& plan) {
-      if (!std::isfinite(plan.margin) || !Helps(state, plan)) return;
-      const double score = std::min(plan.margin, limits_.ample_margin) - kMarginOfTime * plan.time;
-      if (best.possible && score <= best_score) return;
-      best = plan;
-      best_score = score;
-    };
-    const StepPlan beside = Plan(state, foot);
-    consider(beside);
-    if (!(limits_.leg_distance > 0) || beside.margin >= limits_.ample_margin) continue;
-    const Vector2d away = state.pendulum.capture_point() - state.sole[Other(foot)];
-    const double ahead = std::cos(state.yaw) * away.x() + std::sin(state.yaw) * away.y();
-    consider(Plan(state, foot, ahead < 0 ? Place::kBehind : Place::kAhead));
+    const StepPlan plan = Best(state, foot, kStepsAhead, &least);
+    if (plan.possible) best = plan;
   }
   return best;
+}
+
+StepPlan StepChoice::Next(const StepState& state, Foot foot) const {
+  double least = std::numeric_limits<double>::infinity();
+  return Best(state, foot, kStepsAhead, &least);
 }
 
 }  // namespace poise::stepping

@@ -67,10 +67,13 @@ class StepChoice {
     if (limits.leg_distance > 0 || !reach.empty()) legs_ = Legs(model);
   }
 
-  /// Chooses of both feet's steps the one whose margin is the largest, counted up to
-  /// `ample_margin`, and of equals the sooner; none when standing still does as well. A foot that
-  /// is not in contact swings at once, from where it is.
+  /// The step to begin with, of the plans of up to three steps the one that leaves the least to be
+  /// desired: m of the capture point outside the last soles less `ample_margin`, and what steps and
+  /// time cost. Not possible without a foot that can step. A foot that is not in contact swings at
+  /// once, from where it is.
   StepPlan Choose(const StepState& state) const;
+  /// The same of a step of `foot`.
+  StepPlan Next(const StepState& state, Foot foot) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
   StepPlan Plan(const StepState& state, Foot foot, Place place = Place::kBeside) const;
@@ -92,6 +95,11 @@ class StepChoice {
   const robot::FootModel& foot(Foot foot) const { return feet_[foot]; }
 
  private:
+  /// m that the capture point is outside after `plan` and up to `more` steps after it, and what those
+  /// cost.
+  double CostAfter(const StepState& state, const StepPlan& plan, int more) const;
+  /// The plan that begins with `foot` and costs less than `least`, which becomes its cost.
+  StepPlan Best(const StepState& state, Foot foot, int more, double* least) const;
   /// m between the legs' lines, `foot` at `foothold`, the other at the origin, the COM at `com`, in
   /// axes of the heading.
   double DistanceOfLegs(Foot foot, const Eigen::Vector2d& foothold,
