@@ -1,4 +1,4 @@
-// Runs what README, docs/reference/README.md and the tutorials show: every command of their ```sh blocks, page by page,
+// Runs what README, docs/reference/README.md, the tutorials and docs/how-to show: every command of their ```sh blocks, page by page,
 // in a copy of deploy/ of the test's own. What their ```text blocks quote must have been printed, digit for digit, and so
 // must every figure with a unit in their prose, or a command holds it. Of other bits than the recorded ones (another
 // instruction set, compiler or library) only the words are compared.
@@ -61,7 +61,7 @@ function untrueFigures(page, output) {
 }
 
 const pages = ['README.md', 'docs/reference/README.md',
-               ...repositoryFiles('docs/tutorials').filter((f) => f.endsWith('.md'))];
+               ...['docs/tutorials', 'docs/how-to'].flatMap(repositoryFiles).filter((f) => f.endsWith('.md'))];
 for (const page of pages) {
   const commands = commandsOf(page).map((command) => ({...command, exit: expectedExit(page, command)}));
   const runnable = commands.filter((c) => c.exit !== null);
@@ -117,7 +117,7 @@ test('deploy/docs writes every command, field, message and metric', () => {
 });
 
 // Each page runs in a folder of its own here; a reader does them one after another in one checkout.
-test('tutorials write into folders of their own, beside what git knows', () => {
+test('tutorials and recipes write into folders of their own, beside what git knows', () => {
   const owner = new Map();
   for (const page of pages) {
     if (rules.some((rule) => rule.kind === 'page' && rule.begin === page)) continue;
