@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "components/balance/box_lcp.h"
+#include "components/balance/step/box_lcp.h"
 
 namespace poise {
 

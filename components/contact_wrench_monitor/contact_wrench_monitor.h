@@ -9,7 +9,7 @@
 #include "components/balance/balance_control.h"
 #include "components/balance/convex_polygon.h"
 #include "components/balance/joint_limits.h"
-#include "components/balance/step_balance.h"
+#include "components/balance/step/step_balance.h"
 #include "components/balance/task_dynamics.h"
 #include "components/balance/whole_body.h"
 #include "components/framework/component.h"

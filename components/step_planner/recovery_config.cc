@@ -30,10 +30,9 @@ constexpr double kOvershoot = 0.04;
 // m of the capture point inside the new support, beyond which a foothold is no better.
 constexpr double kAmpleMargin = 0.04;
 // Share of the hip joints' effort that swings the leg: the rest is for what the leg has to hold.
-// Fitted with the two below on 120 pushes of G1, dyros and heron each (docs/stepping.md).
-constexpr double kSwingEffort = 0.5;
+constexpr double kSwingEffort = 0.35;
 // m/s downward at which the sole meets the ground: sooner down is a larger push, harder a bounce.
-constexpr double kTouchSpeed = 0.4;
+constexpr double kTouchSpeed = 0.25;
 // s before touch-down in which the foothold stays: a move within less would jerk the leg.
 constexpr double kFreeze = 0.05;
 // rad off the joints' limits at footholds: as far as a leg's joint overshoots.

@@ -4,7 +4,7 @@
 #include "components/balance/contact_transition.h"
 #include "components/balance/distribution_ratio.h"
 #include "components/balance/redistribution.h"
-#include "components/balance/step_balance.h"
+#include "components/balance/step/step_balance.h"
 #include "components/balance/task_hierarchy.h"
 #include "components/balance/tasks/task.h"
 #include "tests/allocation_counter.h"

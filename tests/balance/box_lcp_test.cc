@@ -1,4 +1,4 @@
-#include "components/balance/box_lcp.h"
+#include "components/balance/step/box_lcp.h"
 
 #include <gtest/gtest.h>
 

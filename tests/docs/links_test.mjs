@@ -110,7 +110,7 @@ function problemOfSpan(span, page) {
 }
 
 /** What was tried once: its commands, fields and files are those of its day. */
-const isFrozen = (page) => /^docs\/lab\/\d/.test(page);
+const isFrozen = (page) => /^docs\/lab\/[\w-]+\/\d/.test(page);
 
 for (const page of pages) {
   test(`${page} names what there is`, () => {

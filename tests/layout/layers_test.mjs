@@ -9,7 +9,7 @@ const files = repositoryFiles().filter((f) => !/^(tests|examples)\//.test(f));  
 const sources = files.filter((f) => /\.(h|cc|proto)$/.test(f));
 
 const BUS = ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/framework/bus', 'components/framework/runners',
-  'components/robot', 'components/robot_files', 'components/balance', 'components/balance/tasks', 'components/balance/gains', 'components/messages'];
+  'components/robot', 'components/robot_files', 'components/balance', 'components/balance/step', 'components/balance/tasks', 'components/balance/gains', 'components/messages'];
 /** A folder (the longest that fits counts) and those whose files it may include, besides its own. */
 const BELOW = {
   'lcmtypes': [],
@@ -20,6 +20,7 @@ const BELOW = {
   'components/robot': [],
   'components/robot_files': ['components/robot'],
   'components/balance': ['components/robot'],
+  'components/balance/step': ['components/robot', 'components/balance'],
   'components/balance/tasks': ['components/robot', 'components/balance'],
   'components/balance/gains': ['components/robot', 'components/balance', 'components/balance/tasks'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/robot_files', 'components/balance'],

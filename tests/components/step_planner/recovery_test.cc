@@ -446,7 +446,10 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
       world.Tick();
       if (!unloads() || world.recovery().reason() == StepReason::kTogether) continue;
       ++hurried;
-      for (int i = 0; i < 2000 && world.recovery().stage() != Stage::kLoading; ++i) world.Tick();
+      const auto lands = [&, step = world.recovery().num_steps()] {
+        return world.recovery().stage() == Stage::kLoading || world.recovery().num_steps() > step;
+      };
+      for (int i = 0; i < 2000 && !lands(); ++i) world.Tick();
       // Unloaded within 0.04 s, then 0.2 s in the air, or as long as the way takes.
       EXPECT_LT(world.time() - pushed, 0.7) << unloaded << ' ' << degrees;
       const double fastest = kPeriod / world.recovery().choice().limits().unload;

@@ -356,11 +356,6 @@ TEST_P(ReachCase, NoFootholdIsBeyondWhatBothLegsSpan) {
     ASSERT_TRUE(std::isfinite(plan.margin) && plan.foothold.allFinite());
     ASSERT_LT(BeyondSpan(reach, plan.foot, from_stance(plan)), far) << trial;
     ASSERT_LE(plan.time, 4 / frequency) << trial;
-    // Both legs reach what does not catch the capture point, with level soles.
-    if (plan.margin >= 0) continue;
-    const Vector2d com = turn.transpose() * (plan.com - state.sole[robot::Index(Other(plan.foot))]);
-    ASSERT_GE(balance::SignedDistance(reach.Leg(Other(plan.foot), 1), -com), 0) << trial;
-    ASSERT_GE(balance::SignedDistance(reach.Leg(plan.foot, 1), from_stance(plan) - com), -1e-6);
   }
   EXPECT_GT(chosen, 100);
   EXPECT_GT(none, 100);

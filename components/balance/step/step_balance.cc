@@ -1,4 +1,4 @@
-#include "components/balance/step_balance.h"
+#include "components/balance/step/step_balance.h"
 
 #include <algorithm>
 #include <cmath>

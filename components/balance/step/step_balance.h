@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "components/balance/balance_control.h"
-#include "components/balance/box_lcp.h"
+#include "components/balance/step/box_lcp.h"
 #include "components/balance/contact_dynamics.h"
 #include "components/balance/convex_polygon.h"
 
