@@ -1,0 +1,50 @@
+"""What mkdocs does not do by itself for a site that is opened from files."""
+
+import glob
+import json
+import os
+import re
+import shutil
+
+KATEX = "/usr/share/javascript/katex"  # Debian's libjs-katex
+LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)")
+
+
+def on_page_markdown(markdown, page, config, files):
+    """The Markdown as the site shows it: a link to what only the repository has becomes the path, since the site stands without the repository."""
+    page.title = page.title.replace("`", "")  # the navigation shows no code
+    folder = os.path.dirname(page.file.src_uri)
+
+    def replace(match):
+        path = os.path.normpath(os.path.join(folder, match[2]))
+        return match[0] if files.get_file_from_path(path) else f"{match[1]} (`{path}`)"
+
+    return LINK.sub(replace, markdown)
+
+
+def on_post_build(config):
+    site = config["site_dir"]
+
+    # A page from a file may neither fetch the index nor start a worker from a file: a script brings both.
+    with open(f"{site}/search/search_index.json", encoding="utf-8") as file:
+        index = json.load(file)
+    for entry in index["docs"]:
+        if re.match("docs/lab/2|CHANGELOG", entry["location"]):
+            entry["boost"] = 0.2  # what holds now is found before what was once
+    [worker] = glob.glob(f"{site}/assets/javascripts/workers/search.*.js")
+    with open(worker, encoding="utf-8") as file:
+        source = file.read().replace("this.add(s)", "this.add(s,{boost:s.boost||1})")  # Debian 12's theme has no boosts
+    with open(f"{site}/search/search_index.js", "w", encoding="utf-8") as file:
+        file.write(f"var __index = {json.dumps(index)};\nvar __search_worker = {json.dumps(source)};\n")
+
+    katex = f"{site}/assets/katex"
+    os.makedirs(f"{katex}/fonts", exist_ok=True)
+    for name in ("katex.min.css", "katex.min.js", "contrib/auto-render.js"):
+        shutil.copy(f"{KATEX}/{name}", katex)
+    for font in glob.glob(f"{KATEX}/fonts/*.woff2"):
+        shutil.copy(font, f"{katex}/fonts")
+
+    # What the theme brings for its makers and for other languages is most of its size.
+    for path in glob.glob(f"{site}/assets/**/*.map", recursive=True) + glob.glob(f"{site}/sitemap.xml*"):
+        os.remove(path)
+    shutil.rmtree(f"{site}/assets/javascripts/lunr", ignore_errors=True)
