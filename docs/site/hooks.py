@@ -29,8 +29,8 @@ def on_post_build(config):
     with open(f"{site}/search/search_index.json", encoding="utf-8") as file:
         index = json.load(file)
     for entry in index["docs"]:
-        if re.match("docs/lab/2|CHANGELOG", entry["location"]):
-            entry["boost"] = 0.2  # what holds now is found before what was once
+        if re.match("docs/lab/2|CHANGELOG|reference/", entry["location"]):
+            entry["boost"] = 0.2  # what explains comes before what was once, and before the longest lists
     [worker] = glob.glob(f"{site}/assets/javascripts/workers/search.*.js")
     with open(worker, encoding="utf-8") as file:
         source = file.read().replace("this.add(s)", "this.add(s,{boost:s.boost||1})")  # Debian 12's theme has no boosts
@@ -44,7 +44,7 @@ def on_post_build(config):
     for font in glob.glob(f"{KATEX}/fonts/*.woff2"):
         shutil.copy(font, f"{katex}/fonts")
 
-    # What the theme brings for its makers and for other languages is most of its size.
-    for path in glob.glob(f"{site}/assets/**/*.map", recursive=True) + glob.glob(f"{site}/sitemap.xml*"):
+    # What only a server, the theme's makers or other languages use.
+    for path in [f"{site}/404.html", *glob.glob(f"{site}/sitemap.xml*"), *glob.glob(f"{site}/assets/**/*.map", recursive=True)]:
         os.remove(path)
     shutil.rmtree(f"{site}/assets/javascripts/lunr", ignore_errors=True)

@@ -98,10 +98,10 @@ for (const page of pages) {
 test('deploy/docs writes every command, field, message and metric', () => {
   const folder = mkdtempSync(join(tmpdir(), 'poise-docs-'));
   try {
-    const {status, stdout, stderr} = spawnSync(join(root, 'deploy/docs'), [folder],
+    const {status, stdout, stderr} = spawnSync(join(root, 'deploy/docs'), ['--reference', folder],
         {encoding: 'utf8', env: {...process.env, POISE: resolve(options.poise)}});
     assert.equal(status, 0, stdout + stderr);
-    const page = (name) => readFileSync(join(folder, name), 'utf8');
+    const page = (name) => readFileSync(join(folder, 'reference', name), 'utf8');
     const facts = programFacts(options.poise);
     for (const command of facts.commands.keys()) {
       assert.ok(page('commands.md').includes(`\n## \`${`poise ${command}`.trim()}\`\n`), command);

@@ -1,12 +1,26 @@
 // The theme's search without a server: a page from a file may neither fetch the index nor start a worker from a file.
 if (location.protocol === 'file:') {
   const NativeWorker = window.Worker;
-  const script = document.createElement('script');
-  script.src = new URL('../search/search_index.js', document.currentScript.src);
-  const loaded = new Promise((resolve) => { script.onload = () => resolve(); });
-  document.head.append(script);  // beside the page, which is shown meanwhile
+  const address = new URL('../search/search_index.js', document.currentScript.src);
 
-  // The theme makes its worker before the script has come: what it sends waits for it.
+  // A script of 1.6 MB, which most pages are read without: it is loaded for who searches, or comes from a search.
+  const loaded = new Promise((resolve) => {
+    const load = () => {
+      const script = document.createElement('script');
+      script.src = address;
+      script.onload = resolve;
+      document.head.append(script);
+    };
+    const look = ({target}) => {
+      if (!target.matches('.md-search__input')) return;
+      removeEventListener('focusin', look);
+      load();
+    };
+    if (location.search) load();
+    else addEventListener('focusin', look);
+  });
+
+  // What the theme sends to its worker waits until the script has come.
   window.Worker = class extends EventTarget {
     constructor() {
       super();
