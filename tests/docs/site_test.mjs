@@ -1,0 +1,166 @@
+// The site that deploy/docs makes: it asks for nothing beyond its own files, no link of it leads nowhere, every page of
+// docs/ stands in its navigation, its equations are ones that KaTeX can set, and its search finds, from a file.
+// Usage: node site_test.mjs --poise PROGRAM --web DIR [--pictures DIR], where DIR is build/web; --pictures: also takes
+// pictures of some pages, as wide as a desk's screen and a phone's, light and dark
+import assert from 'node:assert/strict';
+import {spawnSync} from 'node:child_process';
+import {existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {createRequire} from 'node:module';
+import {tmpdir} from 'node:os';
+import {dirname, join, normalize, resolve} from 'node:path';
+import {after, test} from 'node:test';
+import {pathToFileURL} from 'node:url';
+import {parseArgs} from 'node:util';
+import {launchBrowser, PATIENCE} from '../web/browser.mjs';
+import {linesOf, repositoryFiles, root} from './markdown.mjs';
+
+const {values: options} = parseArgs({options: {poise: {type: 'string'}, web: {type: 'string'}, pictures: {type: 'string'}}});
+const KATEX = '/usr/share/javascript/katex/katex.js';
+const WIDTHS = [1400, 400];  // CSS pixels: a desk's screen and a phone's
+const MOST = 20e6;  // bytes of the site: what is added unseen, such as another theme's icons, is much more
+
+const missing = ['/usr/bin/mkdocs', '/usr/share/mkdocs/themes/material', KATEX].filter((path) => !existsSync(path));
+const skip = missing.length > 0 && `${missing.join(', ')} is missing: deploy/setup --docs poise installs what the site is made with`;
+
+const folder = mkdtempSync(join(tmpdir(), 'poise-site-'));
+after(() => rmSync(folder, {recursive: true, force: true}));
+const site = join(folder, 'site');
+const pages = new Map();  // "docs/walking.html" -> its text
+
+/** A page's file in the site. */
+const html = (page) => page.replace(/README\.md$/, 'index.md').replace(/\.md$/, '.html');
+const plain = (text) => text.replaceAll('&lt;', '<').replaceAll('&gt;', '>').replaceAll('&quot;', '"').replaceAll('&#39;', "'")
+    .replaceAll('&amp;', '&');
+
+test('deploy/docs makes the site', {skip}, (t) => {
+  const begin = Date.now();
+  const {status, stdout, stderr} = spawnSync(join(root, 'deploy/docs'), [folder],
+      {encoding: 'utf8', env: {...process.env, POISE: resolve(options.poise)}});
+  assert.equal(status, 0, stdout + stderr);
+  assert.equal(stderr, '', 'mkdocs warns of something');
+  let size = 0;
+  for (const file of readdirSync(site, {recursive: true})) {
+    const path = join(site, file);
+    if (!statSync(path).isFile()) continue;
+    size += statSync(path).size;
+    if (file.endsWith('.html')) pages.set(file, readFileSync(path, 'utf8'));
+  }
+  t.diagnostic(`${pages.size} pages, ${(size / 1e6).toFixed(1)} MB, in ${((Date.now() - begin) / 1000).toFixed(1)} s`);
+  assert.ok(size < MOST, `${size} bytes`);
+});
+
+/** The page's links and sources: {target, path (within the site), anchor}; addresses of other sites aside. */
+function linksOf(page) {
+  return [...pages.get(page).matchAll(/\s(href|src)="([^"]*)"/g)].map(([, kind, target]) => ({kind, target}))
+      .filter(({kind, target}) => kind === 'src' || !/^(https?|mailto|javascript):/.test(target)).map(({target}) => {
+        const [path, anchor] = target.replaceAll('&amp;', '&').split('#').map(decodeURIComponent);
+        return {target, anchor, path: path === '' ? page : normalize(join(dirname(page), path.replace(/\?.*/, '')))};
+      });
+}
+
+test('no link leads nowhere, and nothing comes from a network', {skip}, () => {
+  const ids = new Map([...pages].map(([page, text]) => [page, new Set([...text.matchAll(/\sid="([^"]*)"/g)].map((m) => m[1]))]));
+  const problems = [];
+  let count = 0;
+  for (const page of pages.keys()) {
+    for (const {target, path, anchor} of linksOf(page)) {
+      count += 1;
+      const file = join(site, path);
+      if (!existsSync(file) || !statSync(file).isFile()) {
+        problems.push(`${page}: the link to ${target} leads nowhere`);  // a folder, too: a file has no server to find index.html
+      } else if (anchor && ids.has(path) && !ids.get(path).has(anchor)) {
+        problems.push(`${page}: ${path} has no heading #${anchor}`);
+      }
+    }
+  }
+  assert.deepEqual(problems, [], problems.join('\n'));
+  assert.ok(count > 1000, 'there are links to look at');
+});
+
+test('every page of docs/ stands in the navigation, in its section', {skip}, () => {
+  const start = pages.get('index.html');
+  const tabs = [...start.matchAll(/class="md-tabs__link[^"]*">\s*([^<]*?)\s*</g)].map((m) => m[1]);
+  assert.deepEqual(tabs, ['Start', 'Concepts', 'How-to', 'Reference', 'Results', 'Lab']);
+  const navigation = start.slice(start.indexOf('<nav class="md-nav md-nav--primary'), start.indexOf('<div class="md-content"'));
+  const linked = new Set([...navigation.matchAll(/\shref="([^"#]+)/g)].map((m) => m[1]));
+  const wanted = ['README.md', 'CONTRIBUTING.md', 'CHANGELOG.md', ...repositoryFiles('docs').filter((f) => f.endsWith('.md'))];
+  assert.deepEqual(wanted.filter((page) => !pages.has(html(page))), [], 'the site lacks pages');
+  assert.deepEqual(wanted.filter((page) => !linked.has(html(page))), [], 'give them a place in docs/site/mkdocs.yml, under nav');
+});
+
+// What a list holds is code by another indentation here than elsewhere: four columns, and a fence.
+test('what is code in Markdown is code in the site', {skip}, () => {
+  const problems = [];
+  for (const page of repositoryFiles('docs').filter((f) => f.endsWith('.md'))) {
+    const code = [...pages.get(html(page)).matchAll(/<pre>([^]*?)<\/pre>/g)].map((m) => m[1].replace(/<[^>]+>/g, '')).join('\n');
+    const shown = new Set(plain(code).split('\n').map((line) => line.trim()));
+    for (const {number, text, code, mark} of linesOf(page)) {
+      if (code === null || mark || text.trim() === '' || shown.has(text.trim())) continue;
+      problems.push(`${page}:${number}: is words in the site: ${text.trim()}`);
+    }
+  }
+  assert.deepEqual(problems, [], problems.join('\n'));
+});
+
+test('every page says of which commit it is', {skip}, () => {
+  for (const [page, text] of pages) assert.match(text, /poise \d+\.\d+\.\d+, (commit [0-9a-f]{7,} of \d{4}-\d\d-\d\d|a copy)/, page);
+});
+
+test('KaTeX sets every equation', {skip}, (t) => {
+  const katex = createRequire(import.meta.url)(KATEX);
+  let count = 0;
+  for (const [page, text] of pages) {
+    for (const [, , tex] of text.matchAll(/<(span|div) class="arithmatex">\\[([]([^]*?)\\[)\]]<\/\1>/g)) {
+      assert.doesNotThrow(() => katex.renderToString(plain(tex)), `${page}: ${tex}`);
+      count += 1;
+    }
+    const prose = text.replace(/<(pre|code|script|nav)\b[^]*?<\/\1>/g, '');
+    assert.doesNotMatch(prose, /\$\$|\$\\/, `${page}: an equation was taken for words`);
+  }
+  t.diagnostic(`${count} equations`);
+  assert.ok(count > 100);
+});
+
+test('a browser shows, searches and scrolls it from files', {skip}, async (t) => {
+  const browser = await launchBrowser(options.web);
+  try {
+    const context = await browser.newContext();
+    context.setDefaultTimeout(PATIENCE);
+    const tab = await context.newPage();
+    const problems = [];
+    tab.on('console', (message) => { if (message.type() === 'error') problems.push(message.text()); });
+    tab.on('pageerror', (error) => problems.push(String(error)));
+    tab.on('request', (request) => { if (!/^(file|blob|data):/.test(request.url())) problems.push(`request of ${request.url()}`); });
+    await tab.setViewportSize({width: Math.min(...WIDTHS), height: 900});  // what fits here fits a wider one
+    for (const page of pages.keys()) {
+      await tab.goto(pathToFileURL(join(site, page)).href);
+      const shown = await tab.evaluate(() => [...document.querySelectorAll('.arithmatex')].map((e) => e.querySelector('.katex') !== null));
+      if (shown.includes(false)) problems.push(`${page}: shows ${shown.filter(Boolean).length} of ${shown.length} equations`);
+      const beyond = await tab.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      if (beyond > 0) problems.push(`${page}: ${beyond} pixels wider than a phone`);
+    }
+    for (const width of WIDTHS) {
+      await tab.setViewportSize({width, height: 900});
+      await tab.goto(pathToFileURL(join(site, 'docs/concepts/tick.html')).href);
+      if (width < 1000) await tab.click('.md-header__button[for=__search]');
+      await tab.fill('.md-search__input', 'sole_margin');
+      await tab.locator('.md-search-result__link').first().click();
+      await tab.waitForURL(/h=sole_margin/);
+      assert.match(await tab.textContent('.md-content'), /sole_margin/);
+    }
+    assert.deepEqual(problems, [], problems.join('\n'));
+    for (const width of options.pictures ? WIDTHS : []) {
+      for (const colorScheme of ['light', 'dark']) {
+        const view = await (await browser.newContext({viewport: {width, height: 1000}, colorScheme})).newPage();
+        for (const page of ['index', 'docs/concepts/contact_dynamics', 'docs/walking_results', 'reference/fields', 'docs/lab/index']) {
+          await view.goto(pathToFileURL(join(site, `${page}.html`)).href);
+          const name = `${page.replaceAll('/', '_')}_${width}_${colorScheme}.png`;
+          await view.screenshot({path: join(options.pictures, name)});
+          t.diagnostic(name);
+        }
+      }
+    }
+  } finally {
+    await browser.close();
+  }
+});
