@@ -19,8 +19,10 @@ const KATEX = '/usr/share/javascript/katex/katex.js';
 const WIDTHS = [1400, 400];  // CSS pixels: a desk's screen and a phone's
 const MOST = 20e6;  // bytes of the site: what is added unseen, such as another theme's icons, is much more
 
-const missing = ['/usr/bin/mkdocs', '/usr/share/mkdocs/themes/material', KATEX].filter((path) => !existsSync(path));
-const skip = missing.length > 0 && `${missing.join(', ')} is missing: deploy/setup --docs poise installs what the site is made with`;
+const modules = spawnSync('/usr/bin/python3', ['-c', 'import material, mkdocs_literate_nav, mkdocstrings_handlers, pymdownx'],
+    {encoding: 'utf8', env: {...process.env, PYTHONPATH: '/usr/share/mkdocs/themes', PYTHONDONTWRITEBYTECODE: '1'}});
+const skip = (modules.status !== 0 || !existsSync(KATEX)) &&
+  'what makes the site is not installed: deploy/setup --docs poise does it';
 
 const folder = mkdtempSync(join(tmpdir(), 'poise-site-'));
 after(() => rmSync(folder, {recursive: true, force: true}));

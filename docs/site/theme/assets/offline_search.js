@@ -3,7 +3,7 @@ if (location.protocol === 'file:') {
   const NativeWorker = window.Worker;
   const address = new URL('../search/search_index.js', document.currentScript.src);
 
-  // A script of 1.6 MB, which most pages are read without: it is loaded for who searches, or comes from a search.
+  // A script of some MB, which most pages are read without: it is loaded for who searches, or comes from a search.
   const loaded = new Promise((resolve) => {
     const load = () => {
       const script = document.createElement('script');
