@@ -11,7 +11,7 @@ LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)")
 
 
 def on_page_markdown(markdown, page, config, files):
-    """The Markdown as the site shows it: a link to what only the repository has becomes the path, since the site stands without the repository."""
+    """A link to what only the repository has becomes its path, since the site is read without the repository."""
     page.title = page.title.replace("`", "")  # the navigation shows no code
     folder = os.path.dirname(page.file.src_uri)
 
