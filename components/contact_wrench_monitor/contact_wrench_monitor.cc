@@ -35,8 +35,8 @@ constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>
 // remain.
 constexpr int kMostKept = 3;
 // The COM's height and the six of a foot in the air: what a step holds, and how much more a change
-// of it counts than another motion of the same energy. With 1000 a swing that the stance sole cannot
-// bear turned the body; with 10 it is a little later.
+// of it counts than another motion of the same energy. With 1000 a swing that the stance sole
+// cannot bear turned the body; with 10 it is a little later.
 constexpr int kStepRows = 7;
 constexpr double kHeldWeight = 10;
 // Share of the weight that a sole keeps in a step, at least: alone, and with the other one.

@@ -155,7 +155,7 @@ TEST(Step, TheFeetComeSideBySideAfterwards) {
     const RunFolder folder;
     const ProgramResult result =
         RunPoise({"run", "push_double_support", "--variant", "step", "--world", world, "--inline",
-                  "--no-reference", "--duration", "9", "--set",
+                  "--no-reference", "--duration", "12", "--set",
                   "step_planner.recovery.together_after=0.5", "--out", folder / "run"});
     EXPECT_EQ(result.exit_code, 0) << world << result.output;
     const logging::RunRecord run = logging::ReadRun(folder / "run/run.lcm");

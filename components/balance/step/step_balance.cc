@@ -27,8 +27,7 @@ constexpr double kHeldRow = 1e-9;    // squared norm of a row that the contacts 
 
 }  // namespace
 
-StepBalance::StepBalance(int num_joints, int most_held)
-    : num_joints_(num_joints), lcp_(kMostMet) {
+StepBalance::StepBalance(int num_joints, int most_held) : num_joints_(num_joints), lcp_(kMostMet) {
   const Index k = num_joints;
   const Index most = 2 * kMostSole + ConvexPolygon::kMaxCorners + 2 * k;
   torque_of_ = Eigen::MatrixXd::Zero(k, k);

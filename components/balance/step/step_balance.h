@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "components/balance/balance_control.h"
-#include "components/balance/step/box_lcp.h"
 #include "components/balance/contact_dynamics.h"
 #include "components/balance/convex_polygon.h"
+#include "components/balance/step/box_lcp.h"
 
 namespace poise::balance {
 
@@ -57,7 +57,7 @@ class StepBalance {
 
   struct Result {
     /// Robot on environment, sole frames; zero without contact.
-    std::array<Vector6d, 2> task{Vector6d::Zero(), Vector6d::Zero()};   ///< of the torque on entry
+    std::array<Vector6d, 2> task{Vector6d::Zero(), Vector6d::Zero()};    ///< of the torque on entry
     std::array<Vector6d, 2> wrench{Vector6d::Zero(), Vector6d::Zero()};  ///< after the change
     bool changed = false;
   };

@@ -20,8 +20,8 @@ constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
 constexpr int kMostSteps = 12;         // in a row: what these do not catch, no more do
-// Share of the ample margin, below which the other foot goes on as one lands: both feet on the ground
-// cost the time in which the capture point leaves them.
+// Share of the ample margin, below which the other foot goes on as one lands: both feet on the
+// ground cost the time in which the capture point leaves them.
 constexpr double kStepOnShare = 0.5;
 // Share of the angular momentum about the COM that counts in the capture point: what the swinging
 // leg and the turning body give to the COM and take from it then moves no foothold.

@@ -29,7 +29,7 @@ constexpr double kLongest = 4;
 constexpr double kLeastGain = 0.02;
 constexpr int kStepsAhead = 2;        // after the one that is chosen
 constexpr double kCostOfStep = 0.01;  // m of margin that a step must be worth
-constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
+constexpr int kHalvings = 5;          // of a foothold's way back to where the legs are clear
 
 /// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
 /// the swing leg does not get around it.

@@ -95,8 +95,8 @@ class StepChoice {
   const robot::FootModel& foot(Foot foot) const { return feet_[foot]; }
 
  private:
-  /// m that the capture point is outside after `plan` and up to `more` steps after it, and what those
-  /// cost.
+  /// m that the capture point is outside after `plan` and up to `more` steps after it, and what
+  /// those cost.
   double CostAfter(const StepState& state, const StepPlan& plan, int more) const;
   /// The plan that begins with `foot` and costs less than `least`, which becomes its cost.
   StepPlan Best(const StepState& state, Foot foot, int more, double* least) const;
