@@ -69,12 +69,13 @@ export class Footprints {
       }
       return;
     }
+    const before = open?.loaded;  // until when it has stood there, should it stand elsewhere now
     if (open) open.loaded = time;
     if (open?.firm && !firm) return;
     const stands = this.#samples.pose(`sole${foot}`, row);
     if (![...stands.position, ...stands.orientation].every(Number.isFinite)) return;
     if (open?.firm && Math.hypot(...[0, 1].map((i) => stands.position[i] - open.first[i])) > SLID) {
-      open.to = time;
+      open.to = before;
       open = undefined;
     }
     if (!open) {
