@@ -34,9 +34,9 @@ constexpr int kMostCorners = std::extent_v<decltype(balance_torque_t::corner_x)>
 // Joints at their limits that balancing leaves alone, at most: of the legs' six motions some must
 // remain.
 constexpr int kMostKept = 3;
-// The COM's height and the six of a foot in the air: what a step holds, and how much more a change
-// of it counts than another motion of the same energy. With 1000 a swing that the stance sole
-// cannot bear turned the body; with 10 it is a little later.
+// A step holds the COM's height and the six of a foot in the air. The weight says how much more a
+// change of them counts than another motion of the same energy: G1 stood a mean of 20.7 N·s with 3
+// and 10, 19.2 with 100, 15.4 with 1000 (five directions, MuJoCo).
 constexpr int kStepRows = 7;
 constexpr double kHeldWeight = 10;
 // Share of the weight that a sole keeps in a step, at least: alone, and with the other one.

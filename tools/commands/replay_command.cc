@@ -129,7 +129,7 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
     Print(component, messages);
     equal = equal && component.equal();
   }
-  // Of nothing it would say that all is equal.
+  // A comparison of nothing would say that all is equal.
   if (!replayed) fmt::print("nothing was replayed\n");
   return equal && replayed ? kExitOk : kExitFailed;
 }

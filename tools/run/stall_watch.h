@@ -41,8 +41,8 @@ class StallWatch {
 /// kLongestLook (StallWatch).
 class SilenceWatch {
  public:
-  /// Of process `pid`, whose last word was heard at `heard`; a successor has said nothing yet and
-  /// begins anew. `now`: ns. Returns ns.
+  /// How long process `pid` has been silent, its last word heard at `heard`; a successor has said
+  /// nothing yet and begins anew. `now`: ns. Returns ns.
   int64_t Silent(int64_t pid, int64_t heard, const ProcessorTime& time, int64_t now) {
     if (pid != pid_ || heard != heard_) {
       silent_ = 0;

@@ -49,7 +49,7 @@ std::string PlaceText(const SweepPoints& points, const SweepRow& row);
 /// The runs that do not tell whether the robot stood, a line each with what is known of their end;
 /// empty: there are none.
 std::string FormatUntold(const SweepHeader& header, const SweepRows& rows);
-/// Likewise of those that missed what is asked of them.
+/// The runs that missed what is asked of them, in the form of FormatUntold.
 std::string FormatMissed(const SweepHeader& header, const SweepRows& rows);
 
 }  // namespace poise

@@ -38,8 +38,8 @@ struct HeldMotion {
   VectorRef weight;
 };
 
-/// Of all torques that keep the bounds the one that changes the robot's acceleration least, by
-/// Gauss' principle (measured by the robot's own inertia), with the held motions counted more:
+/// Finds the torque that keeps the bounds and changes the robot's acceleration least, by Gauss'
+/// principle (measured by the robot's own inertia), with the held motions counted more:
 ///
 ///   min ½ |Δu|² + ½ Σ w_i (t_iᵀ Δu)² / |t_i|²
 ///
@@ -90,7 +90,7 @@ class StepBalance {
   Eigen::VectorXd held_load_, held_bias_;
   Eigen::VectorXd zero_, unit_, change_, wrench_, wrench_at_rest_;
   Eigen::VectorXd step_;
-  // Of the bounds that have been met: their index, M⁻¹ bound, the dual problem.
+  // These hold the bounds that have been met: index, half of M⁻¹ bound, the dual problem.
   std::vector<Eigen::Index> met_;
   Eigen::MatrixXd answer_, dual_;
   Eigen::VectorXd dual_room_, none_, unbounded_, force_;

@@ -3,15 +3,9 @@
 
 #include <Eigen/Core>
 
-#include "components/robot/foot.h"
+#include "components/step_planner/stepping/feet.h"
 
 namespace poise::stepping {
-
-using robot::Foot;
-using robot::FootArray;
-using robot::kFeet;
-using robot::Other;
-using robot::Side;
 
 /// What is walked: in axes of the heading.
 struct WalkCommand {

@@ -3,15 +3,9 @@
 
 #include <vector>
 
-#include "components/robot/foot.h"
+#include "components/step_planner/stepping/feet.h"
 
 namespace poise::stepping {
-
-using robot::Foot;
-using robot::FootArray;
-using robot::kFeet;
-using robot::Other;
-using robot::Side;
 
 /// What the robot is told of the ground: steps across the way, for a lane each. Empty: nothing.
 class KnownGround {

@@ -4,16 +4,10 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "components/robot/foot.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/feet.h"
 
 namespace poise::stepping {
-
-using robot::Foot;
-using robot::FootArray;
-using robot::kFeet;
-using robot::Other;
-using robot::Side;
 
 /// One leg's joints, m.
 struct LegLine {

@@ -5,16 +5,10 @@
 #include <array>
 
 #include "components/balance/convex_polygon.h"
-#include "components/robot/foot.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/feet.h"
 
 namespace poise::stepping {
-
-using robot::Foot;
-using robot::FootArray;
-using robot::kFeet;
-using robot::Other;
-using robot::Side;
 
 /// A foot's sole, `margin` (m) off its edges, its frame at `centre`, turned by `yaw`, rad.
 balance::ConvexPolygon SoleAt(const robot::FootModel& foot, double margin,

@@ -19,7 +19,7 @@ constexpr double kHopelessExcess = 0.015;
 constexpr double kLeastExcess = 0.02, kLateMargin = 0.03;
 constexpr double kAgainAfter = 0.03;   // s beyond the soles of a step: longer than its touch
 constexpr double kNearEdgeTime = 0.1;  // s near the soles' edge: a push that stands is out sooner
-constexpr int kMostSteps = 12;         // in a row: what these do not catch, no more do
+constexpr int kMostSteps = 12;         // in a row: an end to steps that catch nothing
 // Share of the ample margin, below which the other foot goes on as one lands: both feet on the
 // ground cost the time in which the capture point leaves them.
 constexpr double kStepOnShare = 0.5;

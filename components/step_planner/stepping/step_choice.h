@@ -72,7 +72,7 @@ class StepChoice {
   /// time cost. Not possible without a foot that can step. A foot that is not in contact swings at
   /// once, from where it is.
   StepPlan Choose(const StepState& state) const;
-  /// The same of a step of `foot`.
+  /// Chooses likewise among the plans that begin with `foot`.
   StepPlan Next(const StepState& state, Foot foot) const;
   /// The step of `foot`, whose least time is iterated from the swing that it takes, around the
   /// stance leg where it must. One that takes longer than the pendulum lets a step be is none.
