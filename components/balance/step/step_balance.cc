@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "components/balance/contact_conditions.h"
 
@@ -24,6 +25,14 @@ constexpr double kInternal = 0.01, kLeastInternal = 1e-6;
 constexpr double kSoftness = 1e-9;
 constexpr double kTolerance = 1e-6;  // of a bound's own norm times that of the step
 constexpr double kHeldRow = 1e-9;    // squared norm of a row that the contacts hold already
+
+/// The row a of a · F ≤ 0 that keeps the centre of pressure of F inside the edge from corner `i` on:
+/// out · (−M_y, M_x) ≥ out · corner F_z, as F_z < 0.
+Vector6d EdgeRow(std::span<const Eigen::Vector2d> corners, size_t i) {
+  const Eigen::Vector2d along = (corners[(i + 1) % corners.size()] - corners[i]).normalized();
+  const Eigen::Vector2d out(along.y(), -along.x());
+  return (Vector6d() << 0, 0, out.dot(corners[i]), -out.y(), out.x(), 0).finished();
+}
 
 }  // namespace
 
@@ -115,14 +124,9 @@ void StepBalance::AddSole(const SoleBounds& bounds, Index row) {
   const auto corners = bounds.sole.corners();
   Eigen::Vector2d least = corners[0], most = corners[0];
   for (size_t i = 0; i < corners.size(); ++i) {
-    const Eigen::Vector2d& from = corners[i];
-    const Eigen::Vector2d along = (corners[(i + 1) % corners.size()] - from).normalized();
-    const Eigen::Vector2d out(along.y(), -along.x());
-    // out · (−M_y, M_x) ≥ out · from F_z, as F_z < 0.
-    own << 0, 0, out.dot(from), -out.y(), out.x(), 0;
-    add(own, 0);
-    least = least.cwiseMin(from);
-    most = most.cwiseMax(from);
+    add(EdgeRow(corners, i), 0);
+    least = least.cwiseMin(corners[i]);
+    most = most.cwiseMax(corners[i]);
   }
   // The pyramid within the cone.
   const double friction = bounds.friction / std::sqrt(2.0);
@@ -146,17 +150,18 @@ void StepBalance::AddSole(const SoleBounds& bounds, Index row) {
 
 void StepBalance::AddRegion(const StepBounds& bounds) {
   const auto corners = bounds.region.corners();
+  std::array<Matrix6d, 2> transfer;
+  for (size_t f = 0; f < 2; ++f) {
+    if (!bounds.in_contact[f]) continue;
+    transfer[f] = WrenchTransform(bounds.frame_o, bounds.sole[f]).transpose();
+  }
   for (size_t i = 0; i < corners.size(); ++i) {
-    const Eigen::Vector2d& from = corners[i];
-    const Eigen::Vector2d along = (corners[(i + 1) % corners.size()] - from).normalized();
-    const Eigen::Vector2d out(along.y(), -along.x());
-    Vector6d own;
-    own << 0, 0, out.dot(from), -out.y(), out.x(), 0;
+    const Vector6d own = EdgeRow(corners, i);
     Column12 a = Column12::Zero();
     Index row = 0;
     for (size_t f = 0; f < 2; ++f) {
       if (!bounds.in_contact[f]) continue;
-      a.segment<6>(row) = WrenchTransform(bounds.frame_o, bounds.sole[f]).transpose() * own;
+      a.segment<6>(row) = transfer[f] * own;
       row += 6;
     }
     AddWrench(a, 0);
