@@ -313,8 +313,11 @@ void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {
   stands_otherwise_ = ContactsOf(schedule_->phase().support()) != in_contact_;
   const EstimatedPose estimate = Estimate();
   Eigen::Vector3d rest = 0.5 * (estimate.sole[0].translation() + estimate.sole[1].translation());
-  PointMotion com = steps.com;
-  com.acceleration.setZero();
+  // In x and y the COM has followed a centre of pressure: its reference begins where it is.
+  const robot::RobotData& data = whole_body_->data();
+  PointMotion com;
+  com.position << data.com.head<2>(), steps.com.position.z();
+  com.velocity << data.com_velocity.head<2>(), steps.com.velocity.z();
   rest.z() = com.position.z();
   generator_->Anchor(estimate, com, rest, time, kSettleTime);
 }

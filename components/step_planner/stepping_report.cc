@@ -56,11 +56,9 @@ void ReportStepping(const stepping::Recovery& recovery, double time,
                          recovery.stage() == stepping::Stage::kSwinging;
   const stepping::StepPlan& step = recovery.plan();
   const double ground = sole[robot::Index(Other(step.foot))].translation().z();
-  const Eigen::Vector2d& cop = recovery.output().cop;
   plan->step_reason = ReasonCode(recovery.reason());
   plan->step_foot = static_cast<int8_t>(step.foot);
   SetVector3({step.foothold.x(), step.foothold.y(), ground}, plan->foothold);
-  SetVector3({cop.x(), cop.y(), ground}, plan->cop_reference);
   plan->touch_down_time = under_way ? std::max(0.0, recovery.touch_down() - time) : 0;
   plan->foothold_margin = step.margin;
 }
@@ -89,7 +87,6 @@ int8_t WalkCode(stepping::WalkStage stage) {
 
 void ReportWalking(const stepping::Walk& walk, double time,
                    const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
-  const stepping::StepOutput& steps = walk.output();
   plan->stepping = WalkCode(walk.stage());
   if (!walk.active()) {
     plan->touch_down_time = 0;
@@ -107,7 +104,6 @@ void ReportWalking(const stepping::Walk& walk, double time,
   plan->step_reason = support_plan_t::REASON_WALK;
   plan->step_foot = static_cast<int8_t>(foot);
   SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);
-  SetVector3({steps.cop.x(), steps.cop.y(), ground}, plan->cop_reference);
   plan->touch_down_time = swings ? std::max(0.0, walk.touch_down() - time) : 0;
   const stepping::WalkCommand& command = walk.command();
   SetVector3({command.velocity.x(), command.velocity.y(), command.turn_rate}, plan->walk_velocity);

@@ -15,8 +15,8 @@ int8_t SteppingCode(stepping::Stage stage);
 /// REASON_*.
 int8_t ReasonCode(stepping::StepReason reason);
 
-/// Fills stepping, step_*, num_steps, foothold*, touch_down_time and cop_reference at `time`, s;
-/// soles in the world, right first.
+/// Fills stepping, step_*, num_steps, foothold* and touch_down_time at `time`, s; soles in the
+/// world, right first.
 void ReportStepping(const stepping::Recovery& recovery, double time,
                     const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
 

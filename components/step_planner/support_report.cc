@@ -126,6 +126,10 @@ void StepPlanner::ReportReferences() {
   SetVector3(data.com, out.com_position);
   SetVector3(data.com_velocity, out.com_velocity);
   SetMotion(controlled ? references_.com : PointMotion{.position = data.com}, &out.com_reference);
+  const stepping::StepOutput* const steps = controlled ? Steps() : nullptr;
+  out.com_follows =
+      steps != nullptr ? support_plan_t::FOLLOWS_COP : support_plan_t::FOLLOWS_REFERENCE;
+  if (steps != nullptr) SetVector3(steps->cop_reference, out.cop_reference);
   SetMotion(controlled ? references_.body : RotationMotion{.rotation = estimate.body_rotation},
             &out.body_reference);
   for (size_t i = 0; i < 2; ++i) {

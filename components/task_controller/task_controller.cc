@@ -175,7 +175,7 @@ int8_t TaskController::Control() {
     balance::GravityCompensation(whole_body_->contact(), torque_);
   } else {
     tasks_->Follow(plan);
-    SmoothBase();
+    SmoothBase(plan);
     FollowGround();
     if (!ComputeTorque(state, in_contact)) return task_torque_t::STATUS_SINGULAR;
     const auto body = static_cast<size_t>(model_->body_task_body());
@@ -188,11 +188,13 @@ int8_t TaskController::Control() {
   return task_torque_t::STATUS_OK;
 }
 
-void TaskController::SmoothBase() {
+void TaskController::SmoothBase(const support_plan_t& plan) {
   if (base_share_ == 1) return;
   balance::Vector6d now;
   now << state_.base_linear_velocity, state_.base_angular_velocity;
-  base_velocity_ += base_share_ * (now - base_velocity_);
+  // Steps lead the capture point, which a late velocity would put elsewhere.
+  const double share = plan.com_follows == support_plan_t::FOLLOWS_COP ? 1 : base_share_;
+  base_velocity_ += share * (now - base_velocity_);
   tasks_->set_base_velocity_lag(now - base_velocity_);
 }
 

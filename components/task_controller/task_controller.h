@@ -39,7 +39,7 @@ class TaskController : public Component, public Operated {
   void FollowGround();
   bool ComputeTorque(const balance::TaskState& state, const FeetInContact& in_contact);
   /// Filters the base's velocity for the tasks.
-  void SmoothBase();
+  void SmoothBase(const support_plan_t& plan);
   /// PD to the posture, within the joints' limits; all joints.
   void ComputePosture();
   bool ComputeTasks(const balance::TaskState& state, const FeetInContact& in_contact,

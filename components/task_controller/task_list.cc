@@ -206,6 +206,7 @@ void TaskList::Hold(const balance::TaskState& state) {
 
 void TaskList::Follow(const support_plan_t& plan) {
   SetPoint(GetMotion(plan.com_reference), &com_);
+  com_.accelerates_only = plan.com_follows == support_plan_t::FOLLOWS_COP;
   SetRotation(GetMotion(plan.body_reference), &body_);
   for (size_t i = 0; i < 2; ++i) {
     SetPoint(GetMotion(plan.foot_reference[i]), &foot_[i]);

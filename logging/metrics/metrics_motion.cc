@@ -9,6 +9,11 @@
 namespace poise::logging {
 namespace {
 
+/// False while the COM follows a centre of pressure.
+bool HasComReference(const support_plan_t& plan, int axis) {
+  return std::isfinite(plan.com_reference.position[axis]);
+}
+
 Answer ComMotion(const RunRecord& run) {
   std::optional<Eigen::Vector3d> start;
   return Scaled(Maximum(run,
@@ -39,7 +44,7 @@ Answer ComDifference(const RunRecord& run) {
 Answer ModelComErrorAtEnd(const RunRecord& run) {
   const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
   const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
-  if (plan == nullptr || truth == nullptr) return {};
+  if (plan == nullptr || truth == nullptr || !HasComReference(*plan, 0)) return {};
   robot::RobotState state(run.robot.num_joints());
   state.base_position = GetVector3(truth->base_position);
   const double* q = truth->base_orientation;
@@ -87,7 +92,7 @@ void AddMotion(MetricList* list) {
            return Scaled(Maximum(run,
                                  [&](int64_t t) -> Answer {
                                    const support_plan_t* plan = run.plan.at(t);
-                                   if (plan == nullptr) return {};
+                                   if (plan == nullptr || !HasComReference(*plan, axis)) return {};
                                    return std::abs(plan->com_position[axis] -
                                                    plan->com_reference.position[axis]);
                                  }),
@@ -99,15 +104,18 @@ void AddMotion(MetricList* list) {
         {fmt::format("com_error_true_max_{}", kAxis[axis]), "mm",
          fmt::format("largest distance of the true COM from its reference, {}", kAxis[axis]),
          [axis](const RunRecord& run) {
-           return Scaled(Maximum(run,
-                                 [&](int64_t t) -> Answer {
-                                   const support_plan_t* plan = run.plan.at(t);
-                                   const ground_truth_t* truth = run.truth.at(t);
-                                   if (plan == nullptr || truth == nullptr) return {};
-                                   return std::abs(truth->com_position[axis] -
-                                                   plan->com_reference.position[axis]);
-                                 }),
-                         kMilli);
+           return Scaled(
+               Maximum(run,
+                       [&](int64_t t) -> Answer {
+                         const support_plan_t* plan = run.plan.at(t);
+                         const ground_truth_t* truth = run.truth.at(t);
+                         if (plan == nullptr || truth == nullptr || !HasComReference(*plan, axis)) {
+                           return {};
+                         }
+                         return std::abs(truth->com_position[axis] -
+                                         plan->com_reference.position[axis]);
+                       }),
+               kMilli);
          }});
   }
   list->push_back(
@@ -115,7 +123,7 @@ void AddMotion(MetricList* list) {
        [](const RunRecord& run) -> Answer {
          const support_plan_t* plan = run.plan.at(run.num_ticks - 1);
          const ground_truth_t* truth = run.truth.at(run.num_ticks - 1);
-         if (plan == nullptr || truth == nullptr) return {};
+         if (plan == nullptr || truth == nullptr || !HasComReference(*plan, 0)) return {};
          return kMilli *
                 (GetVector3(truth->com_position) - GetVector3(plan->com_reference.position)).norm();
        }});

@@ -56,7 +56,8 @@ Eigen::Vector3d Draw(double size, std::mt19937* random) {
 }
 
 // The motion that the torque gives, solved from the equations of motion, is the motion that was
-// asked for: k_p e + k_d ė + ẍ of the COM, of the body and of the free foot, turning too.
+// asked for: k_p e + k_d ė + ẍ of the COM, of the body and of the free foot, turning too; of a COM
+// that follows a centre of pressure ẍ alone.
 TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
   const auto body = static_cast<size_t>(model_.body_task_body());
   Harness<TaskController> harness(&context_, TaskControllerText());
@@ -70,6 +71,12 @@ TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
     RotationMotion turn = GetMotion(plan.body_reference);
     com.velocity = Draw(0.3, &random_);
     com.acceleration = Draw(1, &random_);
+    const bool follows_cop = trial % 2 == 1;
+    if (follows_cop) {
+      plan.com_follows = support_plan_t::FOLLOWS_COP;
+      com.position.head<2>().setConstant(std::numeric_limits<double>::quiet_NaN());
+      com.velocity.head<2>() = com.position.head<2>();
+    }
     turn.angular_velocity = Draw(0.5, &random_);
     turn.angular_acceleration = Draw(2, &random_);
     SetMotion(com, &plan.com_reference);
@@ -97,8 +104,9 @@ TEST_P(TaskControllerCase, TheTorqueGivesTheDesiredAccelerations) {
     Eigen::VectorXd acceleration, wrench;
     dynamics.Forward(ToEigen(out.torque), &acceleration, &wrench);
     const robot::RobotData& d = dynamics.data;
-    const Eigen::Vector3d com_wanted =
+    Eigen::Vector3d com_wanted =
         com.acceleration + 225 * (com.position - d.com) + 10 * (com.velocity - d.com_velocity);
+    if (follows_cop) com_wanted.head<2>() = com.acceleration.head<2>();
     const Eigen::Vector3d com_got = d.com_jacobian * acceleration + d.com_bias_acceleration;
     const Eigen::Vector3d error =
         RotationVector(goal.data.body_rotation[body] * d.body_rotation[body].transpose());

@@ -183,7 +183,8 @@ bool ComWasMoved(const RunRecord& run) {
   bool known = false;
   for (int64_t tick = run.first_tick; tick < run.num_ticks; ++tick) {
     const support_plan_t* const plan = run.plan.at(tick);
-    if (plan == nullptr) continue;
+    // None in steps, which a centre of pressure leads.
+    if (plan == nullptr || plan->com_follows != support_plan_t::FOLLOWS_REFERENCE) continue;
     for (size_t i = 0; i < 2; ++i) {
       const double x = plan->com_reference.position[i];
       least[i] = known ? std::min(least[i], x) : x;
@@ -228,8 +229,7 @@ bool WalksAtTheEnd(const RunRecord& run) {
   const std::vector<logging::TrueSupport> supports = logging::TrueSupports(run);
   if (steps.empty() || supports.empty()) return false;
   const std::array<bool, 2>& carries = supports.back().carries;
-  return !carries[0] || !carries[1] ||
-         run.duration(run.num_ticks - steps.back().landed) < kStands;
+  return !carries[0] || !carries[1] || run.duration(run.num_ticks - steps.back().landed) < kStands;
 }
 
 /// Figures beside the paper's; those of any run where the scenario has none.
@@ -301,7 +301,7 @@ std::string TellRun(const RunRecord& run, const std::vector<CheckResult>& checks
   if (!support.moves.empty()) first += fmt::format(" {},", support.moves);
   const std::string and_ = support.moves.empty() ? "" : " and";
   // Whether it fell nobody saw; or it is held up without its motors, or walks on.
-  const char* const stood = run.truth.empty()                            ? "ran"
+  const char* const stood = run.truth.empty()                           ? "ran"
                             : !BridgeFollows(run) || WalksAtTheEnd(run) ? "did not fall"
                                                                         : "stood";
   if (run.spec.has_cut()) {

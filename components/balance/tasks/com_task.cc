@@ -17,9 +17,12 @@ class ComTask : public Task {
     for (int i = 0; i < num_rows(); ++i) {
       const int axis = rows_[static_cast<size_t>(i)];
       rows->bias_acceleration[i] = data.com_bias_acceleration[axis];
-      rows->acceleration[i] =
-          PdAcceleration(gains(), target.acceleration[axis], target.position[axis] - data.com[axis],
-                         target.velocity[axis] - data.com_velocity[axis]);
+      const bool follows = !target.accelerates_only || axis == kZ;
+      rows->acceleration[i] = follows
+                                  ? PdAcceleration(gains(), target.acceleration[axis],
+                                                   target.position[axis] - data.com[axis],
+                                                   target.velocity[axis] - data.com_velocity[axis])
+                                  : target.acceleration[axis];
     }
   }
 
@@ -27,6 +30,7 @@ class ComTask : public Task {
     target->position = state.data.com;
     target->velocity.setZero();
     target->acceleration.setZero();
+    target->accelerates_only = false;
   }
 
  private:

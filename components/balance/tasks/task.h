@@ -25,9 +25,10 @@ using AxisSelection = std::array<bool, 6>;
 
 /// Where a task is to be, world frame. A type reads what it is about and leaves the rest.
 struct TaskTarget {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();              ///< m
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();              ///< m/s
-  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< m/s²
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< m
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s
+  Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s²
+  bool accelerates_only = false;  ///< x and y have neither position nor velocity; of a COM
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< frame to world
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s²

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace poise::stepping {
 namespace {
@@ -17,7 +18,7 @@ void StepOutput::Archive(StateArchive* archive) {
   com.Archive(archive);
   swing.Archive(archive);
   swing_rotation.Archive(archive);
-  archive->Show(searching, cop);
+  archive->Show(searching, cop, cop_reference);
 }
 
 double Yaw(const Eigen::Isometry3d& pose) {
@@ -53,15 +54,15 @@ void HeightLead::Follow(double wanted, double period) {
   point_.position += period * point_.velocity;
 }
 
-PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
-                      const Eigen::Vector2d& cop) {
+PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
+                      const Eigen::Vector3d& cop) {
   const double rate =
-      (robot::kGravity + height.acceleration) / std::max(input.com.z() - ground, kLeastHeight);
-  const Eigen::Vector2d acceleration = rate * (input.com.head<2>() - cop);
+      (robot::kGravity + height.acceleration) / std::max(input.com.z() - cop.z(), kLeastHeight);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   PointMotion com;
-  com.position << input.com.head<2>(), height.position;
-  com.velocity << input.com_velocity.head<2>(), height.velocity;
-  com.acceleration << acceleration, height.acceleration;
+  com.position << kNone, kNone, height.position;
+  com.velocity << kNone, kNone, height.velocity;
+  com.acceleration << rate * (input.com.head<2>() - cop.head<2>()), height.acceleration;
   return com;
 }
 

@@ -44,7 +44,9 @@ struct StepOutput {
   PointMotion swing;
   RotationMotion swing_rotation;
   bool searching = false;                         ///< below where the ground was expected
-  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, asked for
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, where it is to be
+  /// m, world, on the ground: what `com` follows for that, less what moves the pendulum besides.
+  Eigen::Vector3d cop_reference = Eigen::Vector3d::Zero();
 
   void Archive(StateArchive* archive);
 };
@@ -72,11 +74,11 @@ class HeightLead {
   Quintic::Point point_;
 };
 
-/// The COM's reference that asks for this centre of pressure: position and velocity are the COM's
-/// own in x and y, so that their PD adds nothing, with the pendulum's acceleration
-/// (g + z̈)/(z − ground) (c − p).
-PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height, double ground,
-                      const Eigen::Vector2d& cop);
+/// Leads the COM by the centre of pressure `cop`, m, world, on the ground: in x and y it has the
+/// pendulum's acceleration (g + z̈)/(z − ground) (c − p), and neither position nor velocity, which
+/// are NaN; in z it follows `height`.
+PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
+                      const Eigen::Vector3d& cop);
 
 /// A foot that has touched is let go: its reference comes by `share` to where the sole stands, in
 /// height by `pulled` of that, and goes `down`, m, on towards `lowest`, m, where it carries too

@@ -448,7 +448,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   share = balance::SmoothStep(share);
   cop = cop_from_ + share * (cop - cop_from_);
   output_.cop = cop;
-  output_.com = LeadByCop(input, height_.point(), ground, cop);
+  output_.cop_reference << cop, ground;
+  output_.com = LeadByCop(input, height_.point(), output_.cop_reference);
 }
 
 void Recovery::Archive(StateArchive* archive) {

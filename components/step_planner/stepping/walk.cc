@@ -480,8 +480,8 @@ void Walk::Lead(const StepInput& input, const StepState& state) {
   body_yaw_.Follow(yaw + Difference(heading - start_yaw_, yaw), period);
   const Vector2d cop = DesiredCop(input, state);
   output_.cop = cop;
-  output_.com = LeadByCop(input, height_.point(), input.sole[s].translation().z(),
-                          WithoutOffset(state, cop, period));
+  output_.cop_reference << WithoutOffset(state, cop, period), input.sole[s].translation().z();
+  output_.com = LeadByCop(input, height_.point(), output_.cop_reference);
   output_.in_contact = in_contact_;
   output_.searching = false;
   if (stage_ == WalkStage::kSwinging) {
