@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/config_error.h"
 #include "fmt/format.h"
 
 namespace poise {

@@ -68,9 +68,6 @@ class FirstError final : public google::protobuf::io::ErrorCollector {
 
 }  // namespace
 
-ConfigError::ConfigError(std::string_view field, std::string_view problem)
-    : std::runtime_error(fmt::format("{}: {}", field, problem)), field_(field), problem_(problem) {}
-
 void ParseTextProto(std::string_view text, std::string_view source,
                     google::protobuf::Message* message) {
   FirstError errors;

@@ -1,32 +1,16 @@
 // Configuration: protobuf text files with errors that name file, line and field.
 #pragma once
 
-#include <stdexcept>
 #include <string>
 #include <string_view>
+
+#include "components/framework/configuration/config_error.h"
 
 namespace google::protobuf {
 class Message;
 }
 
 namespace poise {
-
-/// A configuration that cannot be used. what() is one line: "file:line: field: problem; what to
-/// do".
-class ConfigError : public std::runtime_error {
- public:
-  explicit ConfigError(const std::string& line) : std::runtime_error(line) {}
-  /// For a value that parses but cannot work. `field` is the dotted path inside the component's own
-  /// configuration ("phase[2].duration"); whoever knows the file turns it into file and line
-  /// (LocateField).
-  ConfigError(std::string_view field, std::string_view problem);
-  const std::string& field() const { return field_; }
-  const std::string& problem() const { return problem_; }
-
- private:
-  std::string field_;
-  std::string problem_;
-};
 
 /// Parses protobuf text. Throws ConfigError "source:line:column: problem"; unknown fields and enum
 /// values are errors.

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/config_error.h"
 #include "components/framework/configuration/field_rules.h"
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"

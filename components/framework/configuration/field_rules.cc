@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "components/framework/configuration/configuration.h"
+#include "components/framework/configuration/config_error.h"
 #include "components/framework/configuration/rule.pb.h"
 
 namespace poise {
