@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "hw_bridge/units.h"
+#include "hw_bridge/drive/units.h"
 #include "poise/bridge_status_t.hpp"
 
 namespace poise {

@@ -7,6 +7,7 @@
 
 #include "components/framework/optional_ports.h"
 #include "components/messages/robot_resource.h"
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
 #include "hw_bridge/ethercat/links/socket_link.h"
 #include "hw_bridge/hw_bridge_type.h"
@@ -14,7 +15,6 @@
 #include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/unitree/dds_link.h"
 #include "hw_bridge/unitree/unitree_drive_bus.h"
-#include "hw_bridge/units.h"
 
 namespace poise {
 

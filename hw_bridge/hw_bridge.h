@@ -7,7 +7,7 @@
 
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
-#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/ethercat/links/link.h"
 #include "hw_bridge/ethercat/links/pcap.h"
 #include "hw_bridge/hw_bridge.pb.h"

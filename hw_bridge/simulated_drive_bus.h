@@ -2,7 +2,7 @@
 #pragma once
 
 #include "components/framework/ports.h"
-#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/drive/drive_bus.h"
 
 namespace poise {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "hw_bridge/units.h"
+#include "hw_bridge/drive/units.h"
 
 namespace poise {
 namespace {

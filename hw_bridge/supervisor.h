@@ -11,7 +11,7 @@
 
 #include "components/robot/robot_model.h"
 #include "hw_bridge/command_gate.h"
-#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/feedback_monitor.h"
 #include "hw_bridge/impedance.h"
 #include "hw_bridge/thermal_budget.h"

@@ -5,7 +5,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
-#include "components/step_planner/reference_generator.h"
+#include "components/messages/quintic_move.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {

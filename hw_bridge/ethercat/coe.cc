@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 
 namespace poise::ethercat {
 namespace {

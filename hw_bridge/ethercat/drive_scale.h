@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "components/robot/robot_model.h"
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/ethercat/ethercat.pb.h"
-#include "hw_bridge/units.h"
 
 namespace poise::ethercat {
 

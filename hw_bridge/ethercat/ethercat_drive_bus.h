@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "components/robot/robot_model.h"
-#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/ethercat/cia402.h"
 #include "hw_bridge/ethercat/drive_scale.h"
 #include "hw_bridge/ethercat/master.h"

@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "hw_bridge/ethercat/bytes.h"
 #include "hw_bridge/ethercat/coe.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 #include "hw_bridge/ethercat/links/link.h"
 #include "hw_bridge/ethercat/registers.h"
 #include "hw_bridge/ethercat/transactions.h"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {

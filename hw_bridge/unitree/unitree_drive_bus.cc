@@ -8,10 +8,10 @@
 #include <limits>
 #include <thread>
 
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
 #include "hw_bridge/unitree/remote.h"
-#include "hw_bridge/units.h"
 #include "poise/message_traits.hpp"
 
 namespace poise::unitree {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "components/robot/robot_model.h"
-#include "hw_bridge/drive_bus.h"
+#include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/unitree/robot_link.h"
 #include "hw_bridge/unitree/unitree.pb.h"
 

@@ -7,10 +7,10 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
 #include "hw_bridge/unitree/remote.h"
-#include "hw_bridge/units.h"
 
 namespace poise::unitree {
 namespace {

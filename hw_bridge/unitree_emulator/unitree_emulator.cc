@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "components/messages/robot_resource.h"
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/unitree_emulator/unitree_emulator_type.h"
-#include "hw_bridge/units.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {

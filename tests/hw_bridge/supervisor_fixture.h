@@ -4,8 +4,8 @@
 #include <array>
 #include <limits>
 
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/supervisor.h"
-#include "hw_bridge/units.h"
 #include "poise/message_traits.hpp"
 
 namespace poise {

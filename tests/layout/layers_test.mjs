@@ -25,17 +25,18 @@ const BELOW = {
   'components/balance/gains': ['components/robot', 'components/balance', 'components/balance/tasks'],
   'components/messages': ['lcmtypes', 'components/framework', 'components/framework/configuration', 'components/robot', 'components/robot_files', 'components/balance'],
   'components': BUS,
-  'components/step_planner/contact': [...BUS, 'components/step_planner'],
+  'components/step_planner/contact': BUS,
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
   'sim_mujoco': [...BUS, 'sim'],
-  'hw_bridge': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/drive_emulator', 'hw_bridge/unitree'],
-  'hw_bridge/unitree': [...BUS, 'hw_bridge'],
-  'hw_bridge/unitree_emulator': [...BUS, 'hw_bridge', 'hw_bridge/unitree'],
-  'hw_bridge/ethercat': [...BUS, 'hw_bridge', 'hw_bridge/ethercat/links'],
-  'hw_bridge/ethercat/links': [...BUS, 'hw_bridge/ethercat'],
+  'hw_bridge': [...BUS, 'hw_bridge/drive', 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/unitree'],
+  'hw_bridge/drive': BUS,
+  'hw_bridge/unitree': [...BUS, 'hw_bridge/drive'],
+  'hw_bridge/unitree_emulator': [...BUS, 'hw_bridge/drive', 'hw_bridge/unitree'],
+  'hw_bridge/ethercat': [...BUS, 'hw_bridge/drive', 'hw_bridge/ethercat/links'],
+  'hw_bridge/ethercat/links': BUS,
   'hw_bridge/ethercat/emulator': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links'],
-  'hw_bridge/drive_emulator': [...BUS, 'hw_bridge', 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/ethercat/emulator'],
+  'hw_bridge/drive_emulator': [...BUS, 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/ethercat/emulator'],
   'logging': BUS,
   'logging/recording': [...BUS, 'logging'],
   'logging/metrics': [...BUS, 'logging'],
@@ -86,6 +87,16 @@ test('every include points down', () => {
   }
   assert.ok(includes > 500, `${includes} includes found`);
   assert.deepEqual(problems, []);
+});
+
+test('no folder stands on itself by way of others', () => {
+  const below = (folder, seen = new Set()) => {
+    for (const other of BELOW[folder] ?? []) {
+      if (other !== folder && !seen.has(other)) below(other, seen.add(other));
+    }
+    return seen;
+  };
+  assert.deepEqual(Object.keys(BELOW).filter((folder) => below(folder).has(folder)), []);
 });
 
 // Neither their sources nor their build name it. (A build that precompiles headers gives all targets the same ones; the presets

@@ -3,7 +3,7 @@
 
 #include "components/framework/state_archive.h"
 #include "components/framework/tick_time.h"
-#include "components/step_planner/step_planner.pb.h"
+#include "components/step_planner/contact/contact_confirmation.pb.h"
 
 namespace poise {
 

@@ -7,8 +7,8 @@
 
 #include "components/framework/tick_time.h"
 #include "components/messages/motion.h"
-#include "components/step_planner/reference_generator.h"
-#include "components/step_planner/step_planner.pb.h"
+#include "components/messages/quintic_move.h"
+#include "components/step_planner/contact/contact_confirmation.pb.h"
 
 namespace poise {
 

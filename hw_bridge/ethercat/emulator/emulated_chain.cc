@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 
 namespace poise::ethercat {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "hw_bridge/ethercat/emulator/emulated_slave.h"
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 #include "hw_bridge/ethercat/registers.h"
 
 namespace poise::ethercat {

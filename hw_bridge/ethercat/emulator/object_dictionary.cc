@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 
 namespace poise::ethercat {
 

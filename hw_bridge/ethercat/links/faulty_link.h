@@ -4,7 +4,7 @@
 #include <array>
 #include <random>
 
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {

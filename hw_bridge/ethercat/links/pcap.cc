@@ -8,8 +8,8 @@
 #include <cstring>
 #include <vector>
 
-#include "hw_bridge/ethercat/bytes.h"
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/bytes.h"
+#include "hw_bridge/ethercat/links/frame.h"
 
 namespace poise::ethercat {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 
 namespace poise::ethercat {
 

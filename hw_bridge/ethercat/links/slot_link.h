@@ -5,7 +5,7 @@
 #include <atomic>
 #include <optional>
 
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
 
 namespace poise::ethercat {

@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
-#include "hw_bridge/ethercat/ethercat.pb.h"
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 #include "hw_bridge/ethercat/links/link.h"
+#include "hw_bridge/ethercat/links/link.pb.h"
 
 namespace poise::ethercat {
 

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "components/robot_files/robot_files.h"
+#include "hw_bridge/drive/units.h"
 #include "hw_bridge/ethercat/ethercat_drive_bus.h"
-#include "hw_bridge/units.h"
 #include "tests/framework/toy_components.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
 

@@ -1,13 +1,13 @@
 // Frame and mailbox layouts against bytes written down from the standard and from other masters.
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "hw_bridge/ethercat/bytes.h"
 #include "hw_bridge/ethercat/coe.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 #include "hw_bridge/ethercat/registers.h"
 
 namespace poise::ethercat {

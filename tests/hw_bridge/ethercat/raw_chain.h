@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 #include "tests/hw_bridge/ethercat/chain_fixture.h"
 
 namespace poise::ethercat {

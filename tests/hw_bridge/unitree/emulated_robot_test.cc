@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "components/framework/configuration/configuration.h"
-#include "hw_bridge/units.h"
+#include "hw_bridge/drive/units.h"
 #include "tests/hw_bridge/unitree/robot_rig.h"
 
 namespace poise {

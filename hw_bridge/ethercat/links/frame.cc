@@ -1,8 +1,8 @@
-#include "hw_bridge/ethercat/frame.h"
+#include "hw_bridge/ethercat/links/frame.h"
 
 #include <algorithm>
 
-#include "hw_bridge/ethercat/bytes.h"
+#include "hw_bridge/ethercat/links/bytes.h"
 
 namespace poise::ethercat {
 namespace {
