@@ -5,16 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "components/framework/configuration/added_fields.h"
 #include "components/framework/optional_ports.h"
 #include "components/messages/robot_resource.h"
 #include "hw_bridge/drive/units.h"
-#include "hw_bridge/ethercat/ethercat_drive_bus.h"
-#include "hw_bridge/ethercat/links/socket_link.h"
 #include "hw_bridge/hw_bridge_type.h"
 #include "hw_bridge/robot_thresholds.h"
-#include "hw_bridge/simulated_drive_bus.h"
-#include "hw_bridge/unitree/dds_link.h"
-#include "hw_bridge/unitree/unitree_drive_bus.h"
 
 namespace poise {
 
@@ -24,17 +20,6 @@ namespace {
 // s: by then a torque beyond friction has moved a joint by a count, with the readings' delay and a
 // rotor of 0.5 kg·m² on the coarsest encoder at the joint.
 constexpr double kResponseTime = 0.02;
-
-void Require(bool condition, const char* field, const char* problem) {
-  if (!condition) throw ConfigError(field, problem);
-}
-
-void Validate(const HwBridgeConfig& config) {
-  Require(!(config.has_ethercat() && config.has_unitree()), "unitree",
-          "must be left out with ethercat: a robot has one bus");
-  Require(config.command_deadline() >= config.sense_deadline(), "command_deadline",
-          "must be sense_deadline or more");
-}
 
 /// Cycles of a time, at least the time.
 int Cycles(double seconds, double period) {
@@ -128,125 +113,60 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
   return result;
 }
 
-/// A link that no frame passes, for checking a configuration without the bus.
-class NoLink final : public ethercat::Link {
- public:
-  int64_t Now() const override { return 0; }
-  bool Send(std::span<const uint8_t>) override { return false; }
-  size_t Receive(std::span<uint8_t>, int64_t) override { return 0; }
-};
+/// Whether a setting of a bus's group, if it has that one, is true.
+bool IsSet(const google::protobuf::Message& group, const std::string& setting) {
+  const auto* const field = group.GetDescriptor()->FindFieldByName(setting);
+  return field != nullptr && group.GetReflection()->GetBool(group, field);
+}
 
 }  // namespace
 
-/// The EtherCAT bus's configuration and, once it is open, its link and capture.
-class HwBridge::Ethercat {
- public:
-  Ethercat(const ethercat::EthercatBusConfig& config, const robot::RobotModel& model, double period)
-      : config_(config) {
-    const auto cycle = static_cast<uint32_t>(std::llround(period * 1e9));
-    if (config.master().has_cycle() && config.master().cycle() != cycle) {
-      throw ConfigError("ethercat.master.cycle",
-                        fmt::format("must be the run's period, {} ns, or be left out", cycle));
+void HwBridge::MakeBus(const HwBridgeConfig& config, double period) {
+  const google::protobuf::Reflection& reflection = *config.GetReflection();
+  const DriveBusType* asked = nullptr;
+  for (const DriveBusType& type : buses_) {
+    const auto* const field = FindField(*HwBridgeConfig::descriptor(), type.name);
+    if (field == nullptr || !reflection.HasField(config, field)) continue;
+    if (asked != nullptr) {
+      throw ConfigError(type.name,
+                        fmt::format("must be left out with {}: a robot has one bus", asked->name));
     }
-    config_.mutable_master()->set_cycle(cycle);
-    try {
-      NoLink none;
-      const ethercat::EthercatDriveBus checked(&none, config_, model);
-    } catch (const ethercat::EthercatError& error) {
-      throw ConfigError("ethercat", error.what());
-    }
+    asked = &type;
   }
-
-  std::unique_ptr<DriveBus> Open(const LinkOpener& open_link, const robot::RobotModel& model) {
-    link_ = open_link(config_.link());
-    ethercat::Link* link = link_.get();
-    if (config_.has_capture()) {
-      using Carrier = ethercat::PcapWriter::Carrier;
-      writer_ = std::make_unique<ethercat::PcapWriter>(
-          config_.capture(), config_.link().has_udp() ? Carrier::kUdp : Carrier::kEthernet);
-      capture_ = std::make_unique<ethercat::CaptureLink>(link, writer_.get());
-      link = capture_.get();
-    }
-    return std::make_unique<ethercat::EthercatDriveBus>(link, config_, model);
+  if (asked == nullptr) {
+    bus_ = &simulated_bus_;
+    return;
   }
-
-  /// Empty: done; else what could not be written.
-  std::string CloseCapture() {
-    if (!writer_) return {};
-    try {
-      writer_->Close();
-    } catch (const ethercat::EthercatError& error) {
-      return error.what();
-    }
-    return {};
+  const google::protobuf::Message& group =
+      reflection.GetMessage(config, FindField(*HwBridgeConfig::descriptor(), asked->name));
+  try {
+    own_bus_ = asked->make(group, *model_, period);
+  } catch (const ConfigError& error) {
+    if (error.field().empty()) throw ConfigError(asked->name, error.what());
+    throw ConfigError(asked->name + "." + error.field(), error.problem());
+  } catch (const std::runtime_error& error) {
+    throw ConfigError(asked->name, error.what());
   }
-
-  const ethercat::EthercatBusConfig& config() const { return config_; }
-
- private:
-  ethercat::EthercatBusConfig config_;
-  std::unique_ptr<ethercat::Link> link_;
-  std::unique_ptr<ethercat::PcapWriter> writer_;
-  std::unique_ptr<ethercat::CaptureLink> capture_;
-};
-
-/// A Unitree robot's configuration and, once it is open, its link.
-class HwBridge::Unitree {
- public:
-  Unitree(const unitree::UnitreeBusConfig& config, const robot::RobotModel& model, double period)
-      : config_(config), period_(period) {
-    try {
-      const unitree::UnitreeDriveBus checked(nullptr, config_, model, period_);
-    } catch (const unitree::UnitreeError& error) {
-      throw ConfigError("unitree", error.what());
-    }
-  }
-
-  std::unique_ptr<DriveBus> Open(const RobotLinkOpener& open_robot,
-                                 const robot::RobotModel& model) {
-    link_ = open_robot(config_.link());
-    return std::make_unique<unitree::UnitreeDriveBus>(link_.get(), config_, model, period_);
-  }
-
- private:
-  unitree::UnitreeBusConfig config_;
-  double period_;
-  std::unique_ptr<unitree::RobotLink> link_;
-};
-
-HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal)
-    : HwBridge(stop_signal, ethercat::OpenLink) {}
-HwBridge::HwBridge(volatile std::sig_atomic_t* stop_signal, LinkOpener open_link,
-                   RobotLinkOpener open_robot)
-    : stop_signal_(stop_signal),
-      open_link_(std::move(open_link)),
-      open_robot_(open_robot ? std::move(open_robot) : [](const unitree::DdsLink& link) {
-        return std::make_unique<unitree::DdsRobotLink>(link);
-      }) {}
-HwBridge::~HwBridge() = default;
+  simulated_time_ = IsSet(group, asked->link.simulated_time);
+  all_sensors_ = IsSet(group, asked->all_sensors);
+}
 
 void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
   const auto config = context.config<HwBridgeConfig>();
-  Validate(config);
+  if (config.command_deadline() < config.sense_deadline()) {
+    throw ConfigError("command_deadline", "must be sense_deadline or more");
+  }
   model_ = LoadRobot(context);
   const int n = model_->num_joints();
   const int feet = static_cast<int>(model_->feet().size());
 
-  AddPorts(config, wiring);
   SupervisorConfig supervisor = MakeSupervisorConfig(config, *model_, context.tick_period);
-  supervisor.drive_impedance = !config.has_ethercat();  // cyclic synchronous torque alone
+  MakeBus(config, context.tick_period);
+  supervisor.drive_impedance = (own_bus_ ? *own_bus_ : simulated_bus_).impedance();
   supervisor_ = std::make_unique<Supervisor>(supervisor);
   enable_at_start_ = config.enable_at_start();
   enable_cycles_ = config.enable_cycles();
-  if (config.has_ethercat()) {
-    ethercat_ = std::make_unique<Ethercat>(config.ethercat(), *model_, context.tick_period);
-    simulated_time_ = config.ethercat().simulated_time();
-  } else if (config.has_unitree()) {
-    unitree_ = std::make_unique<Unitree>(config.unitree(), *model_, context.tick_period);
-    simulated_time_ = config.unitree().simulated_time();
-  } else {
-    bus_ = std::make_unique<SimulatedDriveBus>(&drive_feedback_);
-  }
+  AddPorts(config, wiring);
   MessageTraits<drive_command_t>::Resize(command_, MessageCounts{n});
   MessageTraits<drive_feedback_t>::Resize(feedback_, MessageCounts{n, feet});
 }
@@ -254,36 +174,30 @@ void HwBridge::Configure(const ComponentContext& context, Wiring* wiring) {
 void HwBridge::AddPorts(const HwBridgeConfig& config, Wiring* wiring) {
   const int n = model_->num_joints();
   const int feet = static_cast<int>(model_->feet().size());
-  // A real robot's states bring all that is sensed; an emulated one's tick comes with the port.
-  const bool fed = !config.has_unitree() || !config.unitree().follow_robot();
-  if (fed) wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
+  if (!all_sensors_) wiring->AddInput(&drive_feedback_, "drive_feedback", {n, feet});
   wiring->AddInput(&joint_command_, "joint_command", {n, feet});
   wiring->AddInput(&emergency_stop_, "emergency_stop", {}, InputKind::kLatest);
   wiring->AddOutput(&robot_sensors_, "robot_sensors", {n, feet});
   wiring->AddOutput(&drive_command_, "drive_command", {n});
   wiring->AddOutput(&bridge_status_, "bridge_status", {n});
-  const ethercat::MasterConfig& master = config.ethercat().master();
-  const int drives = master.drive_size() > 0 ? master.drive_size() : n;
-  const bool diagnosed = config.has_ethercat() || config.has_unitree();
-  if (diagnosed) wiring->AddOutput(&bus_status_, "bus_status", {drives + master.other_size()});
+  if (own_bus_) wiring->AddOutput(&bus_status_, "bus_status", {own_bus_->num_slaves()});
   std::vector<InputPort*> senses;
-  if (fed) senses.push_back(&drive_feedback_);
+  if (!all_sensors_) senses.push_back(&drive_feedback_);
   wiring->AddStage(
       "sense", std::move(senses), {&robot_sensors_}, [this](const Tick& tick) { Sense(tick); },
       config.sense_deadline());
   std::vector<OutputPort*> acts = {&drive_command_, &bridge_status_};
-  if (diagnosed) acts.push_back(&bus_status_);
+  if (own_bus_) acts.push_back(&bus_status_);
   wiring->AddStage(
       "actuate", {&joint_command_, &emergency_stop_}, std::move(acts),
       [this](const Tick& tick) { Actuate(tick); }, config.command_deadline());
 }
 
 void HwBridge::Open() {
-  if (ethercat_) bus_ = ethercat_->Open(open_link_, *model_);
-  if (unitree_) bus_ = unitree_->Open(open_robot_, *model_);
+  if (own_bus_) bus_ = own_bus_.get();
   try {
     bus_->Start();
-    if (has_bus() && enable_at_start_) EnableDrives();
+    if (own_bus_ && enable_at_start_) EnableDrives();
   } catch (...) {
     bus_->Stop();  // what went wrong is said already
     throw;
@@ -327,7 +241,7 @@ void HwBridge::Idle() {
 std::string HwBridge::Close() {
   if (!open_) return {};
   supervisor_->Shutdown();
-  if (has_bus()) {
+  if (own_bus_) {
     // One cycle more than the ramp: it tells the drives to stop.
     for (bool last = false; !last;) {
       last = supervisor_->at_rest() || !bus_->health().usable;
@@ -335,13 +249,8 @@ std::string HwBridge::Close() {
       bus_->AwaitNextCycle();
     }
   }
-  std::string problem = bus_->Stop();
-  if (ethercat_) {
-    const std::string capture = ethercat_->CloseCapture();
-    if (!capture.empty()) problem += (problem.empty() ? "" : "; ") + capture;
-  }
   open_ = false;
-  return problem;
+  return bus_->Stop();
 }
 
 void HwBridge::RunDown() {
@@ -356,7 +265,7 @@ void HwBridge::RunDown() {
 const drive_feedback_t* HwBridge::ReadFeedback() {
   if (!bus_) return nullptr;  // that nobody has opened: a replay
   const drive_feedback_t* drives = bus_->Receive();
-  if (drives == nullptr || !has_bus()) return drives;
+  if (drives == nullptr || !own_bus_) return drives;
   feedback_.position_counts = drives->position_counts;
   feedback_.velocity = drives->velocity;
   feedback_.current = drives->current;
@@ -480,16 +389,31 @@ void HwBridge::Actuate(const Tick& tick) {
 }
 
 ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
-  // AddPorts says why.
+  std::vector<std::string> groups, all_sensors;
+  std::vector<DriveLink> links;
+  for (const DriveBusType& bus : DriveBuses()) {
+    const std::string group = "hw_bridge." + bus.name;
+    const auto at = [&](const std::string& field) {
+      return field.empty() ? field : group + "." + field;
+    };
+    groups.push_back(group);
+    if (!bus.all_sensors.empty()) all_sensors.push_back(at(bus.all_sensors));
+    links.push_back({.group = group,
+                     .link = at(bus.link.link),
+                     .simulated_time = at(bus.link.simulated_time),
+                     .profile = at(bus.link.profile),
+                     .capture = at(bus.link.capture),
+                     .tag = at(bus.link.tag)});
+  }
   AddOptionalPort({.component = "hw_bridge",
                    .port = "drive_feedback",
                    .type = MessageTraits<drive_feedback_t>::kName,
-                   .unless = {"hw_bridge.unitree.follow_robot"},
+                   .unless = all_sensors,
                    .input = true});
   AddOptionalPort({.component = "hw_bridge",
                    .port = "bus_status",
                    .type = MessageTraits<bus_status_t>::kName,
-                   .when = {"hw_bridge.ethercat", "hw_bridge.unitree"}});
+                   .when = groups});
   return {"hw_bridge",
           "drives and sensors: units, limits, safety states, e-stop",
           [stop_signal] { return std::make_unique<HwBridge>(stop_signal); },
@@ -498,14 +422,7 @@ ComponentType HwBridgeType(volatile std::sig_atomic_t* stop_signal) {
                 {"hw_bridge.on_lost_command", "hw_bridge.on_lost_command=HOLD"},
                 // Until the controller follows, the robot's joints are held.
                 {"hw_bridge.hold_before_command", "hw_bridge.hold_before_command=true"}},
-           .drive_links = {{.group = "hw_bridge.ethercat",
-                            .link = "hw_bridge.ethercat.link",
-                            .simulated_time = "hw_bridge.ethercat.simulated_time",
-                            .profile = "hw_bridge.ethercat.master.profile",
-                            .capture = "hw_bridge.ethercat.capture"},
-                           {.group = "hw_bridge.unitree",
-                            .simulated_time = "hw_bridge.unitree.simulated_time",
-                            .tag = "hw_bridge.unitree.link.tag"}}},
+           .drive_links = links},
           {Reads<joint_command_t>("joint_command"),
            Reads<emergency_stop_t>("emergency_stop", InputKind::kLatest),
            Writes<robot_sensors_t>("robot_sensors"), Writes<drive_command_t>("drive_command"),

@@ -2,43 +2,32 @@
 #pragma once
 
 #include <csignal>
-#include <functional>
 #include <memory>
+#include <vector>
 
 #include "components/framework/component.h"
 #include "components/robot/robot_model.h"
-#include "hw_bridge/drive/drive_bus.h"
-#include "hw_bridge/ethercat/links/link.h"
-#include "hw_bridge/ethercat/links/pcap.h"
+#include "hw_bridge/drive_buses.h"
 #include "hw_bridge/hw_bridge.pb.h"
+#include "hw_bridge/simulated_drive_bus.h"
 #include "hw_bridge/supervisor.h"
-#include "hw_bridge/unitree/robot_link.h"
 #include "poise/emergency_stop_t.hpp"
 #include "poise/robot_sensors_t.hpp"
 
 namespace poise {
 
-/// Opens the configured EtherCAT link. Throws EthercatError.
-using LinkOpener =
-    std::function<std::unique_ptr<ethercat::Link>(const ethercat::LinkConfig& config)>;
-
-/// Opens the link to a Unitree robot. Throws UnitreeError.
-using RobotLinkOpener =
-    std::function<std::unique_ptr<unitree::RobotLink>(const unitree::DdsLink& link)>;
-
 /// Stage "sense": drive_feedback → robot_sensors, in SI units, wrenches turned into robot on
 /// environment. Stage "actuate": joint_command, emergency_stop (latest) → drive_command,
-/// bridge_status. With EtherCAT, counts, currents and states of the drives come from its frames and
-/// drive_feedback gives the sensors that the bus has not; drive_command is then what the frames
-/// order, and bus_status what each slave shows of itself. With a Unitree robot likewise, its IMU
-/// included; drive_feedback is then a port of emulated robots alone.
+/// bridge_status. With a bus of its own (DriveBusType), counts, currents and states of the drives
+/// come from it and drive_feedback gives the sensors that the bus has not; drive_command is then
+/// what the bus orders, and bus_status what each slave shows of itself.
 class HwBridge : public Component {
  public:
   /// `stop_signal`: not 0 asks for an emergency stop, which takes it back to 0; may be nullptr.
-  explicit HwBridge(volatile std::sig_atomic_t* stop_signal = nullptr);
-  HwBridge(volatile std::sig_atomic_t* stop_signal, LinkOpener open_link,
-           RobotLinkOpener open_robot = nullptr);
-  ~HwBridge() override;
+  /// `buses`: of which a configuration may ask for one.
+  explicit HwBridge(volatile std::sig_atomic_t* stop_signal = nullptr,
+                    std::vector<DriveBusType> buses = DriveBuses())
+      : stop_signal_(stop_signal), buses_(std::move(buses)) {}
 
   /// Resources "robot", "urdf"; configuration HwBridgeConfig.
   void Configure(const ComponentContext& context, Wiring* wiring) override;
@@ -52,11 +41,8 @@ class HwBridge : public Component {
   int64_t cycle_correction() const override { return bus_ ? bus_->cycle_correction() : 0; }
 
  private:
-  class Ethercat;
-  class Unitree;
-
-  /// The drives are beyond a bus of their own, which Open opens.
-  bool has_bus() const { return ethercat_ || unitree_; }
+  /// The bus that the configuration asks for.
+  void MakeBus(const HwBridgeConfig& config, double period);
   void AddPorts(const HwBridgeConfig& config, Wiring* wiring);
   void Sense(const Tick& tick);
   void ReadFootSensors(const drive_feedback_t& feedback);
@@ -78,16 +64,16 @@ class HwBridge : public Component {
   Output<bus_status_t> bus_status_;  // with a bus of its own
 
   volatile std::sig_atomic_t* stop_signal_;
-  LinkOpener open_link_;
-  RobotLinkOpener open_robot_;
+  std::vector<DriveBusType> buses_;
   std::shared_ptr<const robot::RobotModel> model_;
-  std::unique_ptr<Ethercat> ethercat_;  // configuration, and the open link
-  std::unique_ptr<Unitree> unitree_;    // likewise
-  std::unique_ptr<DriveBus> bus_;       // one of its own once it is open
+  SimulatedDriveBus simulated_bus_{&drive_feedback_};
+  std::unique_ptr<DriveBus> own_bus_;
+  DriveBus* bus_ = nullptr;  // one of the two; the own one from Open on
   std::unique_ptr<Supervisor> supervisor_;
   drive_command_t command_;
   drive_feedback_t feedback_;
   bool simulated_time_ = true, enable_at_start_ = false, open_ = false;
+  bool all_sensors_ = false;  // are the own bus's
   int enable_cycles_ = 0;
   bool reset_before_ = false;  // of the operator's message
   int64_t last_cycle_ = -1;

@@ -1,6 +1,10 @@
 #include <csignal>
+#include <exception>
+#include <string>
 
+#include "components/framework/modules.h"
 #include "components/framework/runners/component_main.h"
+#include "components/framework/say_error.h"
 #include "hw_bridge/hw_bridge_type.h"
 
 namespace {
@@ -15,5 +19,11 @@ int main(int argc, char** argv) {
   action.sa_handler = OnEmergencyStop;
   action.sa_flags = SA_RESTART;
   sigaction(SIGUSR1, &action, nullptr);
-  return poise::ComponentMain(argc, argv, poise::HwBridgeType(&emergency_stop));
+  try {
+    poise::LoadModules();  // their drive buses
+    return poise::ComponentMain(argc, argv, poise::HwBridgeType(&emergency_stop));
+  } catch (const std::exception& error) {
+    poise::SayError(std::string("hw_bridge: ") + error.what());
+    return 2;
+  }
 }

@@ -25,7 +25,7 @@ MasterConfig CompleteMasterConfig(MasterConfig config, const robot::RobotModel& 
 /// they are enabled. Receive gives counts, currents and states, of sensors what other slaves of the
 /// bus read, and nullptr in a cycle whose inputs are not whole. In it DRIVE_FAULT stands for a
 /// fault, STO, a mode that is not the one commanded, and a chain that is not in OP.
-class EthercatDriveBus final : public DriveBus {
+class EthercatDriveBus : public DriveBus {
  public:
   /// `link` must outlive this. Throws EthercatError.
   EthercatDriveBus(Link* link, const EthercatBusConfig& config, const robot::RobotModel& model);

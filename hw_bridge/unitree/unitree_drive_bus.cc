@@ -43,9 +43,9 @@ float Finite(double value) {
 
 }  // namespace
 
-UnitreeDriveBus::UnitreeDriveBus(RobotLink* link, const UnitreeBusConfig& config,
+UnitreeDriveBus::UnitreeDriveBus(RobotLinkOpener open_link, const UnitreeBusConfig& config,
                                  const robot::RobotModel& model, double period)
-    : link_(link),
+    : open_link_(std::move(open_link)),
       config_(Checked(config, period)),
       period_(std::llround(period * 1e9)),
       stop_buttons_(ButtonsOf(StopButtons(config))) {
@@ -68,6 +68,7 @@ UnitreeDriveBus::UnitreeDriveBus(RobotLink* link, const UnitreeBusConfig& config
 }
 
 void UnitreeDriveBus::Start() {
+  link_ = open_link_(config_.link());
   const auto limit = static_cast<int64_t>(config_.start_timeout() * static_cast<double>(kSecond));
   const int64_t deadline = link_->Now() + limit;
   if (!ReceiveState(deadline)) {

@@ -3,6 +3,8 @@
 
 #include <bitset>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,9 @@
 
 namespace poise::unitree {
 
+/// Opens the link to a robot. Throws UnitreeError.
+using RobotLinkOpener = std::function<std::unique_ptr<RobotLink>(const DdsLink& link)>;
+
 /// Motors that are commanded enabled get torque (clamped to the motor's peak), position, velocity,
 /// stiffness and damping; others damp with rest_damping, and one that reports an error is free.
 /// Commands carry mode_machine as the robot says it, and the check sum. Receive gives counts of the
@@ -21,11 +26,11 @@ namespace poise::unitree {
 /// voltage, the remote's stop buttons and another mode_machine ask for a stop.
 class UnitreeDriveBus final : public DriveBus {
  public:
-  /// `link` must outlive this. `period`, s, of a cycle. Throws UnitreeError.
-  UnitreeDriveBus(RobotLink* link, const UnitreeBusConfig& config, const robot::RobotModel& model,
-                  double period);
+  /// `period`, s, of a cycle. Throws UnitreeError.
+  UnitreeDriveBus(RobotLinkOpener open_link, const UnitreeBusConfig& config,
+                  const robot::RobotModel& model, double period);
 
-  /// Waits for the robot's states and until no controller of the maker's moves it.
+  /// Opens the link, waits for the robot's states and until no controller of the maker's moves it.
   void Start() override;
   /// Leaves the motors damping.
   std::string Stop() override;
@@ -60,7 +65,8 @@ class UnitreeDriveBus final : public DriveBus {
   void SendMotors(const drive_command_t* command, bool enable = false);
   MotorCmd CommandOf(size_t joint, const drive_command_t& command);
 
-  RobotLink* link_;
+  RobotLinkOpener open_link_;
+  std::unique_ptr<RobotLink> link_;  // from Start on
   UnitreeBusConfig config_;
   int64_t period_;  // ns
   uint16_t stop_buttons_;

@@ -74,6 +74,22 @@ TEST_F(AddedFieldsTest, HaveLinesAndPaths) {
   }
 }
 
+TEST_F(AddedFieldsTest, AreReadWithinOthers) {
+  ToyConfig config;
+  ParseTextProto(
+      "gains { kp: 1 } phase: [{ kp: 1 }, { kp: 2 }] arms { walker { kp: 3 } joints: 5 }\n"
+      "walker { kp: 4 }",
+      "file", &config);
+  EXPECT_EQ(config.phase(1).kp(), 2);
+  EXPECT_EQ(Walker(config).kp(), 4);
+  const auto* arms = FindField(*ToyConfig::descriptor(), "arms");
+  const auto& inner =
+      dynamic_cast<const ToyConfig&>(config.GetReflection()->GetMessage(config, arms));
+  EXPECT_EQ(Walker(inner).kp(), 3);
+  EXPECT_EQ(inner.joints(), 5);
+  EXPECT_THAT(TextOf(config, true), HasSubstr("arms { joints: 5 walker { kp: 3 } }"));
+}
+
 TEST_F(AddedFieldsTest, ErrorsStandInTheirLine) {
   ToyConfig config;
   for (const auto& [text, where] :

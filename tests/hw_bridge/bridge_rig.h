@@ -8,6 +8,7 @@
 
 #include "components/robot_files/robot_files.h"
 #include "hw_bridge/ethercat/emulator/emulated_chain.h"
+#include "hw_bridge/ethercat/ethercat_bus_type.h"
 #include "hw_bridge/ethercat/links/faulty_link.h"
 #include "hw_bridge/ethercat/links/memory_link.h"
 #include "tests/hw_bridge/bridge_bench.h"
@@ -81,9 +82,10 @@ class BridgeRig : public BridgeBench {
     chain = std::make_unique<ethercat::EmulatedChain>(chain_config, loads);
     link = std::make_unique<ethercat::MemoryLink>(chain.get());
     faulty = std::make_unique<ethercat::FaultyLink>(link.get(), 1);
-    bridge = std::make_unique<HwBridge>(&signal, [this](const ethercat::LinkConfig&) {
-      return std::make_unique<Tap>(faulty.get(), &wire);
-    });
+    bridge = std::make_unique<HwBridge>(
+        &signal, std::vector{ethercat::EthercatBusType([this](const ethercat::LinkConfig&) {
+          return std::make_unique<Tap>(faulty.get(), &wire);
+        })});
     Configure(Context("ethercat { link { udp {} } " + bus + " master { " + master +
                       " drift_frames: 200 profile {" + ReadDeployed("drives/elmo_gold.pbtxt") +
                       "} } } " + config_),

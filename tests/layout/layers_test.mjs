@@ -29,7 +29,7 @@ const BELOW = {
   'sim': BUS,
   'sim_ode': [...BUS, 'sim'],
   'sim_mujoco': [...BUS, 'sim'],
-  'hw_bridge': [...BUS, 'hw_bridge/drive', 'hw_bridge/ethercat', 'hw_bridge/ethercat/links', 'hw_bridge/unitree'],
+  'hw_bridge': [...BUS, 'hw_bridge/drive', 'hw_bridge/ethercat', 'hw_bridge/unitree'],
   'hw_bridge/drive': BUS,
   'hw_bridge/unitree': [...BUS, 'hw_bridge/drive'],
   'hw_bridge/unitree_emulator': [...BUS, 'hw_bridge/drive', 'hw_bridge/unitree'],

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "components/framework/modules.h"
+#include "hw_bridge/drive_buses.h"
 
 namespace poise {
 
@@ -20,6 +21,13 @@ std::vector<FieldEntry> FieldReference(Schema schema) {
     if (type.config == nullptr || type.schema == nullptr) continue;
     AddSchema(type.schema());
     for (FieldEntry& entry : FieldsOfGroup(type.config->full_name(), type.name)) {
+      entries.push_back(std::move(entry));
+    }
+  }
+  for (const DriveBusType& bus : DriveBuses()) {
+    if (bus.schema == nullptr) continue;  // the bridge's own schema has it
+    AddSchema(bus.schema());
+    for (FieldEntry& entry : FieldsOfGroup(bus.config->full_name(), "hw_bridge." + bus.name)) {
       entries.push_back(std::move(entry));
     }
   }

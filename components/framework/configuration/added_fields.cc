@@ -115,8 +115,7 @@ std::string TextOf(const pb::Message& message, bool one_line) {
 }
 
 std::string WithBrackets(std::string_view text, const pb::Descriptor& type) {
-  const std::vector<const pb::FieldDescriptor*> fields = AddedFields(type);
-  if (fields.empty()) return std::string(text);
+  if (TheAdded().fields.empty()) return std::string(text);
   NoErrors errors;  // the parser finds them, too
   pb::io::ArrayInputStream stream(text.data(), static_cast<int>(text.size()));
   pb::io::Tokenizer tokens(&stream, &errors);
@@ -125,18 +124,23 @@ std::string WithBrackets(std::string_view text, const pb::Descriptor& type) {
   size_t copied = 0;
   size_t line_start = 0;
   int line = 0;
-  int depth = 0;
-  bool in_name = true;  // a value may be an identifier
+  std::vector<const pb::Descriptor*> open{&type};  // groups around a token; nullptr: not known
+  const pb::Descriptor* named = nullptr;           // type of the last field by name, of a group
+  bool in_name = true;                             // a value may be an identifier
   while (tokens.Next()) {
     const auto& token = tokens.current();
     for (; line < token.line; ++line) line_start = text.find('\n', line_start) + 1;
-    if (token.text == "{" || token.text == "<") ++depth;
-    if (token.text == "}" || token.text == ">") --depth;
-    const bool added = depth == 0 && in_name && token.type == pb::io::Tokenizer::TYPE_IDENTIFIER &&
-                       FindField(type, token.text) != nullptr &&
-                       FindField(type, token.text)->is_extension();
+    if (token.text == "{" || token.text == "<") open.push_back(named);
+    if ((token.text == "}" || token.text == ">") && open.size() > 1) {
+      named = open.back();  // of a list's next element, too
+      open.pop_back();
+    }
+    const bool name = in_name && token.type == pb::io::Tokenizer::TYPE_IDENTIFIER;
     in_name = token.text != ":" && token.text != "[";
-    if (!added) continue;
+    if (!name) continue;
+    const auto* const field = open.back() ? FindField(*open.back(), token.text) : nullptr;
+    named = field != nullptr ? field->message_type() : nullptr;
+    if (field == nullptr || !field->is_extension()) continue;
     size_t at = line_start;
     for (int column = 0; column < token.column; ++at) {
       column = text[at] == '\t' ? (column / kTab + 1) * kTab : column + 1;

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "components/messages/robot_resource.h"
-#include "hw_bridge/ethercat/links/socket_link.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
+#include "hw_bridge/unitree/unitree_bus_type.h"
 #include "tests/hw_bridge/bridge_bench.h"
 
 namespace poise {
@@ -104,8 +104,9 @@ class RobotRig : public BridgeBench {
       if (model->joints()[j].name.find("knee") != std::string::npos) motor.q = 0.6F;
     }
     bridge = std::make_unique<HwBridge>(
-        &signal, ethercat::OpenLink,
-        [this](const unitree::DdsLink&) { return std::make_unique<MemoryRobotLink>(&robot); });
+        &signal, std::vector{unitree::UnitreeBusType([this](const unitree::DdsLink&) {
+          return std::make_unique<MemoryRobotLink>(&robot);
+        })});
     Configure(context, kMotors);
   }
 

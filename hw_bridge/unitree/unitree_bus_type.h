@@ -1,0 +1,14 @@
+// A Unitree robot as one of the bridge's drive buses.
+#pragma once
+
+#include "hw_bridge/drive/drive_bus_type.h"
+#include "hw_bridge/unitree/unitree_drive_bus.h"
+
+namespace poise::unitree {
+
+/// hw_bridge.unitree, on DDS.
+DriveBusType UnitreeBusType();
+/// The same with another link.
+DriveBusType UnitreeBusType(RobotLinkOpener open_link);
+
+}  // namespace poise::unitree
