@@ -41,6 +41,30 @@ void AddLoad(const RobotState& state, RobotData* data) {
 
 }  // namespace
 
+RobotData::RobotData(const RobotModel& model)
+    : body_rotation(model.bodies().size(), Matrix3d::Identity()),
+      body_position(model.bodies().size(), Vector3d::Zero()),
+      joint_axis(model.joints().size(), Vector3d::UnitZ()),
+      body_angular_velocity(model.bodies().size(), Vector3d::Zero()),
+      body_linear_velocity(model.bodies().size(), Vector3d::Zero()),
+      body_angular_bias(model.bodies().size(), Vector3d::Zero()),
+      body_linear_bias(model.bodies().size(), Vector3d::Zero()),
+      base_position(Vector3d::Zero()),
+      foot_pose(model.feet().size(), Eigen::Isometry3d::Identity()),
+      // Columns of joints off a foot's path and entries of A between joints of different limbs stay
+      // zero.
+      foot_jacobian(model.feet().size(), Matrix6X::Zero(6, model.num_velocities())),
+      foot_velocity(model.feet().size(), Vector6d::Zero()),
+      foot_bias_acceleration(model.feet().size(), Vector6d::Zero()),
+      mass_matrix(Eigen::MatrixXd::Zero(model.num_velocities(), model.num_velocities())),
+      bias(Eigen::VectorXd::Zero(model.num_velocities())),
+      gravity(Eigen::VectorXd::Zero(model.num_velocities())),
+      com(Vector3d::Zero()),
+      com_velocity(Vector3d::Zero()),
+      com_jacobian(Eigen::Matrix<double, 3, Eigen::Dynamic>::Zero(3, model.num_velocities())),
+      com_bias_acceleration(Vector3d::Zero()),
+      subtree(model.bodies().size()) {}
+
 void ComputeDynamics(const RobotModel& model, const RobotState& state, RobotData* data) {
   const KinematicTree& tree = model.tree();
   for (size_t b = 0; b < tree.bodies.size(); ++b) {

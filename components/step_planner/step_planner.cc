@@ -16,6 +16,7 @@
 #include "components/step_planner/recovery_config.h"
 #include "components/step_planner/step_planner_type.h"
 #include "components/step_planner/stepping_report.h"
+#include "components/step_planner/support_report.h"
 
 namespace poise {
 
@@ -204,16 +205,7 @@ int8_t StepPlanner::Plan(double time) {
   FollowSoles(time);
   const Capture capture = ComputeCapture();
   UpdateReferences(time, capture);
-  ReportPhase(time);
-  ReportFeet();
-  ReportReferences();
-  ReportCapture(time, capture);
-  if (recovers_) ReportStepping(recovery_, time, Estimate().sole, &*support_plan_);
-  if (walks_ && !recovery_.active()) {
-    ReportWalking(walk_, time, Estimate().sole, &*support_plan_);
-  }
-  support_plan_->num_steps = recovery_.num_steps() + walk_.num_begun();
-  if (recovers_ || walks_) ReportFootsteps(time);
+  Report(time, capture);
   return schedule_->state().waiting() && !Held() ? support_plan_t::STATUS_WAITING
                                                  : support_plan_t::STATUS_OK;
 }
@@ -353,6 +345,34 @@ void StepPlanner::BeginPhase(double time) {
     }
   }
   last_controlled_ = !phase.gravity_compensation();
+}
+
+void StepPlanner::Report(double time, const Capture& capture) {
+  support_plan_t* const plan = &*support_plan_;
+  const robot::RobotData& data = whole_body_->data();
+  const EstimatedPose estimate = Estimate();
+  const SupportView view{.schedule = *schedule_,
+                         .held = Held(),
+                         .steps = Steps(),
+                         .in_contact = in_contact_,
+                         .landing = landing_};
+  ReportPhase(view, time, plan);
+  ReportFeet(view, data, plan);
+  ReportReferences(view, data, estimate, references_,
+                   !schedule_->phase().gravity_compensation(), plan);
+  const balance::ConvexPolygon soles =
+      capture.known ? Soles(capture.frame_o, sole_) : balance::ConvexPolygon();
+  if (soles.num_corners > 0) {
+    ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_, plan);
+  }
+  if (recovers_) ReportStepping(recovery_, time, estimate.sole, plan);
+  if (walks_ && !recovery_.active()) ReportWalking(walk_, time, estimate.sole, plan);
+  plan->num_steps = recovery_.num_steps() + walk_.num_begun();
+  if (!recovers_ && !walks_) return;
+  const FootstepInput input{
+      .time = time, .com_height = data.com.z(), .sole = estimate.sole, .in_contact = in_contact_};
+  footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,
+                          &*footsteps_);
 }
 
 StepPlanner::Capture StepPlanner::ComputeCapture() const {

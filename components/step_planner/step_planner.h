@@ -90,12 +90,7 @@ class StepPlanner : public Component, public Operated {
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced sole. At rest that is the COM's projection, and the CoP.
   std::array<bool, 2> ComOverFoot() const;
-  void ReportPhase(double time);
-  void ReportFeet();
-  void ReportReferences();
-  void ReportCapture(double time, const Capture& capture);
-  void ReportFootsteps(double time);
-  int8_t WaitingCode() const;
+  void Report(double time, const Capture& capture);
 
   Input<robot_state_t> robot_state_;
   ActInput operator_;

@@ -1,8 +1,8 @@
-// What the step planner says in SUPPORT_PLAN of phases, feet, references and capture point.
+#include "components/step_planner/support_report.h"
+
 #include "components/balance/support_polygon.h"
 #include "components/messages/conversions.h"
 #include "components/messages/motion.h"
-#include "components/step_planner/step_planner.h"
 
 namespace poise {
 namespace {
@@ -50,24 +50,13 @@ int8_t FootCode(Landing::State state) {
   return support_plan_t::FOOT_SWING;
 }
 
-}  // namespace
-
-void StepPlanner::ReportFootsteps(double time) {
-  const FootstepInput input{.time = time,
-                            .com_height = whole_body_->data().com.z(),
-                            .sole = Estimate().sole,
-                            .in_contact = in_contact_};
-  footstep_report_.Update(input, recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr,
-                          &*footsteps_);
-}
-
-int8_t StepPlanner::WaitingCode() const {
-  switch (schedule_->state().waiting_for) {
+int8_t WaitingCode(const SupportView& view) {
+  switch (view.schedule.state().waiting_for) {
     case WaitingFor::kCom:
       return support_plan_t::WAITING_COM;
     case WaitingFor::kContact:
       for (size_t i = 0; i < 2; ++i) {
-        if (!in_contact_[i] && landing_[i].state() == Landing::State::kRetracted) {
+        if (!view.in_contact[i] && view.landing[i].state() == Landing::State::kRetracted) {
           return support_plan_t::WAITING_NO_SURFACE;
         }
       }
@@ -78,20 +67,22 @@ int8_t StepPlanner::WaitingCode() const {
   return support_plan_t::WAITING_NONE;
 }
 
-void StepPlanner::ReportPhase(double time) {
-  support_plan_t& out = *support_plan_;
-  const ScheduleState& schedule = schedule_->state();
+}  // namespace
+
+void ReportPhase(const SupportView& view, double time, support_plan_t* plan) {
+  support_plan_t& out = *plan;
+  const ScheduleState& schedule = view.schedule.state();
   out.phase = schedule.phase;
   out.phase_time = time - schedule.phase_start;
   out.began_by = schedule.first ? support_plan_t::OUTCOME_NONE : OutcomeCode(schedule.began_by);
-  out.waiting_for = WaitingCode();
-  out.gravity_compensation = schedule_->phase().gravity_compensation() ? 1 : 0;
+  out.waiting_for = WaitingCode(view);
+  out.gravity_compensation = view.schedule.phase().gravity_compensation() ? 1 : 0;
   out.transition = TransitionCode(schedule.transition);
   out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
   out.transition_progress = schedule.progress;
-  if (!Held()) return;
+  if (!view.held) return;
   out.waiting_for = support_plan_t::WAITING_NONE;
-  const stepping::StepOutput* steps = Steps();
+  const stepping::StepOutput* steps = view.steps;
   const int kind = steps != nullptr ? steps->transition : 0;
   out.transition = kind < 0   ? support_plan_t::TRANSITION_UNLOADING
                    : kind > 0 ? support_plan_t::TRANSITION_LOADING
@@ -100,63 +91,61 @@ void StepPlanner::ReportPhase(double time) {
   out.transition_progress = kind == 0 ? 0 : steps->progress;
 }
 
-void StepPlanner::ReportFeet() {
-  support_plan_t& out = *support_plan_;
-  const int next = schedule_->next();
-  const std::array<bool, 2> then = Steps() != nullptr ? std::array{true, true}
-                                   : next == PhaseGraph::kNone || Held()
-                                       ? in_contact_
-                                       : ContactsOf(schedule_->phase(next).support());
+void ReportFeet(const SupportView& view, const robot::RobotData& data, support_plan_t* plan) {
+  support_plan_t& out = *plan;
+  const int next = view.schedule.next();
+  const std::array<bool, 2> then = view.steps != nullptr ? std::array{true, true}
+                                   : next == PhaseGraph::kNone || view.held
+                                       ? view.in_contact
+                                       : ContactsOf(view.schedule.phase(next).support());
   for (size_t i = 0; i < 2; ++i) {
-    out.in_contact[i] = in_contact_[i] ? 1 : 0;
+    out.in_contact[i] = view.in_contact[i] ? 1 : 0;
     out.next_in_contact[i] = then[i] ? 1 : 0;
-    out.foot_state[i] = in_contact_[i]       ? support_plan_t::FOOT_SUPPORT
-                        : Steps() != nullptr ? (Steps()->searching ? support_plan_t::FOOT_SEARCHING
-                                                                   : support_plan_t::FOOT_SWING)
-                                             : FootCode(landing_[i].state());
-    SetPose(whole_body_->data().foot_pose[i], &out.foot_pose[i]);
+    out.foot_state[i] =
+        view.in_contact[i] ? support_plan_t::FOOT_SUPPORT
+        : view.steps != nullptr
+            ? (view.steps->searching ? support_plan_t::FOOT_SEARCHING : support_plan_t::FOOT_SWING)
+            : FootCode(view.landing[i].state());
+    SetPose(data.foot_pose[i], &out.foot_pose[i]);
   }
 }
 
-void StepPlanner::ReportReferences() {
-  support_plan_t& out = *support_plan_;
-  const robot::RobotData& data = whole_body_->data();
-  const EstimatedPose estimate = Estimate();
-  const bool controlled = !schedule_->phase().gravity_compensation();
+void ReportReferences(const SupportView& view, const robot::RobotData& data,
+                      const EstimatedPose& estimate, const References& references, bool controlled,
+                      support_plan_t* plan) {
+  support_plan_t& out = *plan;
   SetVector3(data.com, out.com_position);
   SetVector3(data.com_velocity, out.com_velocity);
-  SetMotion(controlled ? references_.com : PointMotion{.position = data.com}, &out.com_reference);
-  const stepping::StepOutput* const steps = controlled ? Steps() : nullptr;
+  SetMotion(controlled ? references.com : PointMotion{.position = data.com}, &out.com_reference);
+  const stepping::StepOutput* const steps = controlled ? view.steps : nullptr;
   out.com_follows =
       steps != nullptr ? support_plan_t::FOLLOWS_COP : support_plan_t::FOLLOWS_REFERENCE;
   if (steps != nullptr) SetVector3(steps->cop_reference, out.cop_reference);
-  SetMotion(controlled ? references_.body : RotationMotion{.rotation = estimate.body_rotation},
+  SetMotion(controlled ? references.body : RotationMotion{.rotation = estimate.body_rotation},
             &out.body_reference);
   for (size_t i = 0; i < 2; ++i) {
-    const bool moves = controlled && !in_contact_[i];
+    const bool moves = controlled && !view.in_contact[i];
     const Eigen::Isometry3d& sole = estimate.sole[i];
-    SetMotion(moves ? references_.foot[i] : PointMotion{.position = sole.translation()},
+    SetMotion(moves ? references.foot[i] : PointMotion{.position = sole.translation()},
               &out.foot_reference[i]);
-    SetMotion(moves ? references_.foot_rotation[i] : RotationMotion{.rotation = sole.linear()},
+    SetMotion(moves ? references.foot_rotation[i] : RotationMotion{.rotation = sole.linear()},
               &out.foot_rotation_reference[i]);
   }
 }
 
-void StepPlanner::ReportCapture(double time, const Capture& capture) {
-  if (!capture.known) return;
-  support_plan_t& out = *support_plan_;
-  const Eigen::Isometry3d& frame_o = capture.frame_o;
-  const balance::ConvexPolygon soles = Soles(frame_o, sole_);
-  if (soles.num_corners == 0) return;
+void ReportCapture(double time, const Eigen::Isometry3d& frame_o,
+                   const balance::ConvexPolygon& soles, const balance::CapturePoint& pendulum,
+                   StepDetector* detector, support_plan_t* plan) {
+  support_plan_t& out = *plan;
   const auto world = [&](const Eigen::Vector2d& point) -> Eigen::Vector3d {
     return frame_o * Eigen::Vector3d(point.x(), point.y(), 0);
   };
-  SetVector3(world(capture.pendulum.position), out.capture_point);
-  out.capture_margin = balance::SignedDistance(soles, capture.pendulum.position);
-  out.step_needed = step_.Update(time, out.capture_margin) ? 1 : 0;
+  SetVector3(world(pendulum.position), out.capture_point);
+  out.capture_margin = balance::SignedDistance(soles, pendulum.position);
+  out.step_needed = detector->Update(time, out.capture_margin) ? 1 : 0;
   balance::Step step;
   if (out.step_needed != 0 && out.capture_margin < 0) {
-    step = balance::LatestStep(soles, capture.pendulum, kStepReach);
+    step = balance::LatestStep(soles, pendulum, kStepReach);
     SetVector3(world(step.position), out.step_position);
   } else if (out.step_needed == 0) {
     SetVector3(Eigen::Vector3d::Zero(), out.step_position);

@@ -131,6 +131,17 @@ int Main(const std::vector<std::string>& arguments, const std::string& name,
   return ComponentMain(static_cast<int>(kept.size()), argv.data(), type);
 }
 
+/// The numbers of one field. Throws KeyError.
+py::object Get(const Message& message, const std::string& path) {
+  const Leaf* const leaf = message.layout->Find(path);
+  if (leaf == nullptr) {
+    throw py::key_error(fmt::format("{} has no field '{}'", message.type, path));
+  }
+  py::array array = NewArray(*leaf, -1);
+  MessageLayout::Read(*leaf, message.bytes.data(), array.mutable_data());
+  return leaf->shape.empty() ? array.attr("item")() : py::object(array);
+}
+
 }  // namespace
 
 std::shared_ptr<ForeignFunctions> FunctionsOf(py::object component) {
@@ -139,7 +150,7 @@ std::shared_ptr<ForeignFunctions> FunctionsOf(py::object component) {
 
 void BindComponent(py::module_* module) {
   py::class_<Message>(*module, "Message")
-      .def("get", [](const Message& message, const std::string& path) { return message.Get(path); })
+      .def("get", &Get)
       .def_property_readonly("type", [](const Message& message) { return message.type; })
       .def("fields", [](const Message& message) {
         std::vector<std::pair<std::string, std::vector<int64_t>>> fields;

@@ -36,9 +36,6 @@ struct Message {
   std::vector<uint8_t> bytes;
   std::shared_ptr<const MessageLayout> layout;
   std::string type;
-
-  /// The numbers of one field. Throws KeyError.
-  py::object Get(const std::string& path) const;
 };
 
 /// The functions of a Python object with `_configure(context, ports)` and `_step(tick, inputs,

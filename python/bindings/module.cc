@@ -71,14 +71,6 @@ std::string UnitOfLeaf(std::string_view type, std::string_view path) {
   return std::string(unit);
 }
 
-py::object Message::Get(const std::string& path) const {
-  const Leaf* const leaf = layout->Find(path);
-  if (leaf == nullptr) throw py::key_error(fmt::format("{} has no field '{}'", type, path));
-  py::array array = NewArray(*leaf, -1);
-  MessageLayout::Read(*leaf, bytes.data(), array.mutable_data());
-  return leaf->shape.empty() ? array.attr("item")() : py::object(array);
-}
-
 namespace {
 
 std::vector<std::string> Names(const std::string& kind) { return ListNames(kind); }
