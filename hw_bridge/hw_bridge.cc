@@ -271,26 +271,16 @@ const drive_feedback_t* HwBridge::ReadFeedback() {
   feedback_.current = drives->current;
   feedback_.drive_status = drives->drive_status;
   // Sensors from the bus where it has them, else from the port.
-  const auto take_imu = [this](const drive_feedback_t& from) {
-    std::copy(std::begin(from.imu_angular_velocity), std::end(from.imu_angular_velocity),
-              feedback_.imu_angular_velocity);
-    std::copy(std::begin(from.imu_acceleration), std::end(from.imu_acceleration),
-              feedback_.imu_acceleration);
-    std::copy(std::begin(from.imu_orientation), std::end(from.imu_orientation),
-              feedback_.imu_orientation);
-  };
   const SensorsOfBus own = bus_->sensors();
-  if (own.imu) {
-    take_imu(*drives);
-  } else if (drive_feedback_.present()) {
-    take_imu(*drive_feedback_);
+  const drive_feedback_t* const port = drive_feedback_.present() ? &*drive_feedback_ : nullptr;
+  if (const drive_feedback_t* const imu = own.imu ? drives : port) {
+    std::ranges::copy(imu->imu_angular_velocity, feedback_.imu_angular_velocity);
+    std::ranges::copy(imu->imu_acceleration, feedback_.imu_acceleration);
+    std::ranges::copy(imu->imu_orientation, feedback_.imu_orientation);
   }
-  if (own.feet) {
-    feedback_.foot_wrench = drives->foot_wrench;
-    feedback_.foot_sensor = drives->foot_sensor;
-  } else if (drive_feedback_.present()) {
-    feedback_.foot_wrench = drive_feedback_->foot_wrench;
-    feedback_.foot_sensor = drive_feedback_->foot_sensor;
+  if (const drive_feedback_t* const feet = own.feet ? drives : port) {
+    feedback_.foot_wrench = feet->foot_wrench;
+    feedback_.foot_sensor = feet->foot_sensor;
   }
   return &feedback_;
 }
@@ -320,10 +310,8 @@ void HwBridge::Sense(const Tick& tick) {
                                   ? JointTorque(motors[j], feedback->current[j])
                                   : supervisor_->OrderedTorque(j, command_);
   }
-  std::copy(std::begin(feedback->imu_angular_velocity), std::end(feedback->imu_angular_velocity),
-            sensors.imu_angular_velocity);
-  std::copy(std::begin(feedback->imu_acceleration), std::end(feedback->imu_acceleration),
-            sensors.imu_acceleration);
+  std::ranges::copy(feedback->imu_angular_velocity, sensors.imu_angular_velocity);
+  std::ranges::copy(feedback->imu_acceleration, sensors.imu_acceleration);
   // Poise does not rest on it: what is no orientation is none, and stops nothing.
   const Eigen::Map<const Eigen::Vector4d> orientation(feedback->imu_orientation);
   const bool unit = std::abs(orientation.norm() - 1) < 0.01;  // false for NaN

@@ -1,5 +1,5 @@
-// Users' own code: a module is a shared library with components, messages and metrics, made with
-// poise_module() of the CMake package and found on POISE_PATH.
+// Users' own code: a module is a shared library with components, messages, metrics and drive buses,
+// made with poise_module() of the CMake package and found on POISE_PATH.
 #pragma once
 
 #include <filesystem>

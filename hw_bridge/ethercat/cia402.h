@@ -22,7 +22,6 @@ std::string_view Name(DriveState state);
 
 /// Bits of the statusword beside the state's.
 inline constexpr uint16_t kStatusVoltageEnabled = 0x0010;
-inline constexpr uint16_t kStatusWarning = 0x0080;
 inline constexpr uint16_t kStatusRemote = 0x0200;
 inline constexpr uint16_t kStatusInternalLimit = 0x0800;  ///< a limit of the drive is active
 inline constexpr uint16_t kStatusFollows = 0x1000;        ///< the target of the mode is followed

@@ -109,7 +109,8 @@ EthercatDriveBus::EthercatDriveBus(Link* link, const EthercatBusConfig& config,
     : config_(Checked(config)),
       master_(link, CompleteMasterConfig(config.master(), model)),
       link_(link),
-      steering_(config.master().cycle()) {
+      steering_(config.master().cycle()),
+      judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
   const MasterConfig complete = CompleteMasterConfig(config.master(), model);
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::MotorModel& motor = model.motors()[static_cast<size_t>(j)];
@@ -219,23 +220,6 @@ CycleResult EthercatDriveBus::ReceiveFrames() {
   return master_.Receive(link_->Now() + wait);
 }
 
-void EthercatDriveBus::Judge(const CycleResult& result) {
-  const bool bad = !result.complete;
-  const auto place = static_cast<size_t>(health_.cycles % 100);
-  ++health_.cycles;
-  health_.bad_cycles += bad ? 1 : 0;
-  health_.bad_in_a_row = bad ? health_.bad_in_a_row + 1 : 0;
-  lost_in_a_row_ = result.returned ? 0 : lost_in_a_row_ + 1;
-  bad_[place] = bad;
-  health_.bad_in_100 = static_cast<int>(bad_.count());
-  const auto most = static_cast<int>(config_.most_bad_in_a_row());
-  if (health_.usable && (health_.bad_in_a_row >= most ||
-                         health_.bad_in_100 >= static_cast<int>(config_.most_bad_in_100()))) {
-    health_.usable = false;
-    health_.link_lost = lost_in_a_row_ >= most;
-  }
-}
-
 int32_t EthercatDriveBus::Status(const Drive& drive, uint16_t statusword) const {
   const bool enabled = drive.state == DriveState::kOperationEnabled;
   const bool stopped = (statusword & kStatusVoltageEnabled) == 0;  // STO
@@ -282,7 +266,7 @@ const drive_feedback_t* EthercatDriveBus::Receive() {
   }
   const CycleResult result = ReceiveFrames();
   if (result.returned) health_.al_status = result.al_status;
-  Judge(result);
+  judge_.Count(result.complete, !result.returned, &health_);
   const FrameCounts& counts = master_.counts();
   health_.frames_sent = counts.sent - before_.sent;
   health_.frames_lost = counts.lost - before_.lost;
@@ -354,10 +338,7 @@ void EthercatDriveBus::RequestFaultReset() {
   for (Drive& drive : drives_) {
     if (!drive.commanded) drive.control.RequestFaultReset();
   }
-  health_.usable = true;
-  health_.link_lost = false;
-  health_.bad_in_a_row = lost_in_a_row_ = 0;
-  bad_.reset();
+  judge_.Reset(&health_);
 }
 
 }  // namespace poise::ethercat

@@ -1,13 +1,13 @@
 // The drive bus of real drives: EtherCAT and CiA 402 behind currents and counts by joint.
 #pragma once
 
-#include <bitset>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "components/robot/robot_model.h"
+#include "hw_bridge/drive/cycle_judge.h"
 #include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/ethercat/cia402.h"
 #include "hw_bridge/ethercat/drive_scale.h"
@@ -77,7 +77,6 @@ class EthercatDriveBus : public DriveBus {
   CycleResult ReceiveFrames();
   void TakeInputs();
   void SendOutputs(const drive_command_t& command);
-  void Judge(const CycleResult& result);
   int32_t Status(const Drive& drive, uint16_t statusword) const;
 
   EthercatBusConfig config_;
@@ -94,10 +93,9 @@ class EthercatDriveBus : public DriveBus {
   std::optional<CycleResult> answer_;  // to it, when it has been waited for
   bool released_ = false;              // all drives to be enabled have been
   BusHealth health_;
-  int lost_in_a_row_ = 0;
+  CycleJudge judge_;
   FrameCounts before_;  // the first cycle
   int64_t short_counters_before_ = 0;
-  std::bitset<100> bad_;  // by cycle, modulo 100
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };
 

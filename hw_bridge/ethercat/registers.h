@@ -25,7 +25,7 @@ inline constexpr uint16_t kAlStatusCode = 0x0134;
 inline constexpr uint16_t kEventMask = 0x0200;      ///< of the event bits in each datagram
 inline constexpr uint16_t kReceiveErrors = 0x0300;  ///< a port: invalid frames, physical errors
 inline constexpr uint16_t kForwardedErrors = 0x0308;
-inline constexpr uint16_t kUnitErrors = 0x030C, kPdiErrors = 0x030D;
+inline constexpr uint16_t kUnitErrors = 0x030C;
 inline constexpr uint16_t kLostLinks = 0x0310;        ///< a byte a port
 inline constexpr uint16_t kWatchdogDivider = 0x0400;  ///< of 25 MHz, minus 2
 inline constexpr uint16_t kWatchdogPdi = 0x0410;

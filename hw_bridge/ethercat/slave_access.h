@@ -51,7 +51,6 @@ class SlaveAccess : public SlaveRegisters {
   /// Reads where the mailboxes are from the EEPROM and sets the sync managers 0 and 1. False, and
   /// nothing is set: the slave has no CoE.
   bool SetUpMailbox();
-  bool has_mailbox() const { return out_.size != 0; }
   /// The object's value and, when asked for, its size in bytes (1 to 4), by whatever transfer the
   /// slave chooses.
   uint32_t Upload(ObjectAddress object, uint8_t* size = nullptr);

@@ -48,7 +48,8 @@ UnitreeDriveBus::UnitreeDriveBus(RobotLinkOpener open_link, const UnitreeBusConf
     : open_link_(std::move(open_link)),
       config_(Checked(config, period)),
       period_(std::llround(period * 1e9)),
-      stop_buttons_(ButtonsOf(StopButtons(config))) {
+      stop_buttons_(ButtonsOf(StopButtons(config))),
+      judge_(config.most_bad_in_a_row(), config.most_bad_in_100()) {
   const std::vector<size_t> slots = MotorSlots(model, config.layout(), config.slot());
   for (size_t j = 0; j < slots.size(); ++j) {
     const robot::MotorModel& motor = model.motors()[j];
@@ -86,7 +87,7 @@ void UnitreeDriveBus::Start() {
   ours_ = true;
   mode_machine_ = state_.mode_machine;
   health_ = {};
-  bad_.reset();
+  judge_.Reset(&health_);
 }
 
 void UnitreeDriveBus::Release(int64_t deadline) {
@@ -135,21 +136,6 @@ bool UnitreeDriveBus::ReceiveState(int64_t deadline, bool in_run) {
     taken = true;
   }
   return taken;
-}
-
-void UnitreeDriveBus::Judge(bool complete) {
-  const auto place = static_cast<size_t>(health_.cycles % 100);
-  ++health_.cycles;
-  health_.bad_cycles += complete ? 0 : 1;
-  health_.frames_lost += complete ? 0 : 1;
-  health_.bad_in_a_row = complete ? 0 : health_.bad_in_a_row + 1;
-  bad_[place] = !complete;
-  health_.bad_in_100 = static_cast<int>(bad_.count());
-  if (health_.usable && (health_.bad_in_a_row >= static_cast<int>(config_.most_bad_in_a_row()) ||
-                         health_.bad_in_100 >= static_cast<int>(config_.most_bad_in_100()))) {
-    health_.usable = false;
-    health_.link_lost = silent_in_a_row_ >= static_cast<int>(config_.most_bad_in_a_row());
-  }
 }
 
 void UnitreeDriveBus::TakeMotors() {
@@ -223,8 +209,8 @@ const drive_feedback_t* UnitreeDriveBus::Receive() {
   if (!health_.usable) wait = 0;  // given up: nobody waits for it
   fresh_ = early_ || ReceiveState(cycle_start_ + wait, true);
   early_ = false;
-  silent_in_a_row_ = fresh_ || damaged_ > damaged_before ? 0 : silent_in_a_row_ + 1;
-  Judge(fresh_);
+  judge_.Count(fresh_, !fresh_ && damaged_ == damaged_before, &health_);
+  health_.frames_lost += fresh_ ? 0 : 1;
   health_.working_counter_errors = damaged_;
   cycle_correction_ = 0;
   if (config_.follow_robot() && !config_.simulated_time()) {
@@ -305,10 +291,7 @@ void UnitreeDriveBus::AwaitNextCycle() {
 }
 
 void UnitreeDriveBus::RequestFaultReset() {
-  health_.usable = true;
-  health_.link_lost = false;
-  health_.bad_in_a_row = silent_in_a_row_ = 0;
-  bad_.reset();
+  judge_.Reset(&health_);
   mode_machine_ = state_.mode_machine;
 }
 

@@ -1,7 +1,6 @@
 // The drive bus of a Unitree humanoid: states and commands behind currents and counts by joint.
 #pragma once
 
-#include <bitset>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "components/robot/robot_model.h"
+#include "hw_bridge/drive/cycle_judge.h"
 #include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/unitree/robot_link.h"
 #include "hw_bridge/unitree/unitree.pb.h"
@@ -61,7 +61,6 @@ class UnitreeDriveBus final : public DriveBus {
   bool TakeState();
   void TakeMotors();
   void TakeImu();
-  void Judge(bool complete);
   void SendMotors(const drive_command_t* command, bool enable = false);
   MotorCmd CommandOf(size_t joint, const drive_command_t& command);
 
@@ -83,9 +82,8 @@ class UnitreeDriveBus final : public DriveBus {
   uint32_t last_tick_ = 0;
   uint8_t mode_machine_ = 0;
   BusHealth health_;
-  std::bitset<100> bad_;  // by cycle, modulo 100
-  int64_t damaged_ = 0;   // states with a wrong check sum
-  int silent_in_a_row_ = 0;
+  CycleJudge judge_;
+  int64_t damaged_ = 0;  // states with a wrong check sum
   bool fresh_ = false;
   int64_t cycle_start_ = 0, cycle_correction_ = 0;
 };

@@ -47,7 +47,6 @@ class EmulatedDrive {
   void FreezeEncoder(bool frozen) { frozen_ = frozen; }
 
   DriveState state() const { return state_; }
-  double torque_per_mille() const { return torque_; }
   /// The greatest magnitude since the start.
   double greatest_torque_per_mille() const { return greatest_torque_; }
   /// A fault's code, once for each fault.
