@@ -69,10 +69,11 @@ class StateArchive {
   requires(!std::is_trivially_copyable_v<T>) void Show(std::array<T, N>& values) {
     for (T& value : values) Show(value);
   }
-  template <class T, class... More>
-  void Show(T& first, More&... more) {
+  // Two at least: a class derived from std::array would else be taken for one, for ever.
+  template <class T, class U, class... More>
+  void Show(T& first, U& second, More&... more) {
     Show(first);
-    (Show(more), ...);
+    Show(second, more...);
   }
 
   /// Bytes shown so far.

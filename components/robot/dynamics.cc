@@ -50,12 +50,12 @@ RobotData::RobotData(const RobotModel& model)
       body_angular_bias(model.bodies().size(), Vector3d::Zero()),
       body_linear_bias(model.bodies().size(), Vector3d::Zero()),
       base_position(Vector3d::Zero()),
-      foot_pose(model.feet().size(), Eigen::Isometry3d::Identity()),
+      foot_pose(Eigen::Isometry3d::Identity()),
       // Columns of joints off a foot's path and entries of A between joints of different limbs stay
       // zero.
-      foot_jacobian(model.feet().size(), Matrix6X::Zero(6, model.num_velocities())),
-      foot_velocity(model.feet().size(), Vector6d::Zero()),
-      foot_bias_acceleration(model.feet().size(), Vector6d::Zero()),
+      foot_jacobian(Matrix6X::Zero(6, model.num_velocities())),
+      foot_velocity(Vector6d::Zero()),
+      foot_bias_acceleration(Vector6d::Zero()),
       mass_matrix(Eigen::MatrixXd::Zero(model.num_velocities(), model.num_velocities())),
       bias(Eigen::VectorXd::Zero(model.num_velocities())),
       gravity(Eigen::VectorXd::Zero(model.num_velocities())),

@@ -33,10 +33,10 @@ struct RobotData {
   Eigen::Vector3d base_position;                   ///< m, world
 
   // ComputeFeet (sole frame's origin; rows: linear, angular; world axes)
-  std::vector<Eigen::Isometry3d> foot_pose;      ///< sole frame in the world
-  std::vector<Matrix6X> foot_jacobian;           ///< 6×n
-  std::vector<Vector6d> foot_velocity;           ///< m/s, rad/s
-  std::vector<Vector6d> foot_bias_acceleration;  ///< J̇ v of the sole: m/s², rad/s²
+  FootArray<Eigen::Isometry3d> foot_pose;      ///< sole frame in the world
+  FootArray<Matrix6X> foot_jacobian;           ///< 6×n
+  FootArray<Vector6d> foot_velocity;           ///< m/s, rad/s
+  FootArray<Vector6d> foot_bias_acceleration;  ///< J̇ v of the sole: m/s², rad/s²
 
   // ComputeDynamics
   Eigen::MatrixXd mass_matrix;   ///< A, n×n, reflected rotor inertia included

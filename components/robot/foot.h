@@ -25,6 +25,7 @@ class FootArray : public std::array<T, kFeet.size()> {
   using Base = std::array<T, kFeet.size()>;
   constexpr FootArray() : Base{} {}
   constexpr FootArray(const Base& values) : Base(values) {}
+  explicit constexpr FootArray(const T& both) : Base{both, both} {}
   constexpr FootArray(const T& right, const T& left) : Base{right, left} {}
 
   using Base::operator[];

@@ -71,7 +71,7 @@ void ComputeKinematics(const RobotModel& model, const RobotState& state, RobotDa
 }
 
 void ComputeFeet(const RobotModel& model, RobotData* data) {
-  for (size_t f = 0; f < model.feet().size(); ++f) {
+  for (const Foot f : kFeet) {
     const FootModel& foot = model.feet()[f];
     const size_t b = static_cast<size_t>(foot.body);
     const Matrix3d& rotation = data->body_rotation[b];

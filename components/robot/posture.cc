@@ -60,7 +60,7 @@ class PostureSolver {
     }
     Evaluate();
     Vector3d shift = Vector3d::Zero();
-    for (size_t f = 0; f < 2; ++f) {
+    for (const Foot f : kFeet) {
       shift += 0.5 * (goal_.foot[f].translation() - data_.foot_pose[f].translation());
     }
     state_.base_position += shift;
@@ -101,7 +101,7 @@ class PostureSolver {
     ComputeKinematics(model_, state_, &data_);
     ComputeFeet(model_, &data_);
     ComputeDynamics(model_, state_, &data_);
-    for (size_t f = 0; f < 2; ++f) {
+    for (const Foot f : kFeet) {
       const Eigen::Index row = 6 * static_cast<Eigen::Index>(f);
       error_.segment<3>(row) = data_.foot_pose[f].translation() - goal_.foot[f].translation();
       error_.segment<3>(row + 3) =
@@ -238,7 +238,7 @@ double StandingHeight(const RobotModel& model) {
   ComputeKinematics(model, state, &data);
   ComputeFeet(model, &data);
   ComputeDynamics(model, state, &data);
-  return data.com.z() - data.foot_pose[kRightFoot].translation().z();
+  return data.com.z() - data.foot_pose[Foot::kRight].translation().z();
 }
 
 double StandingSpacing(const RobotModel& model) {
@@ -246,15 +246,15 @@ double StandingSpacing(const RobotModel& model) {
   RobotData data(model);
   ComputeKinematics(model, RobotState(model.num_joints()), &data);
   ComputeFeet(model, &data);
-  return std::abs(data.foot_pose[kLeftFoot].translation().y() -
-                  data.foot_pose[kRightFoot].translation().y());
+  return std::abs(data.foot_pose[Foot::kLeft].translation().y() -
+                  data.foot_pose[Foot::kRight].translation().y());
 }
 
 PostureGoal StandingGoal(const RobotModel& model) {
   PostureGoal goal;
   const double side = 0.5 * StandingSpacing(model);
-  goal.foot[kRightFoot] = Eigen::Isometry3d(Eigen::Translation3d(0, -side, 0));
-  goal.foot[kLeftFoot] = Eigen::Isometry3d(Eigen::Translation3d(0, side, 0));
+  goal.foot[Foot::kRight] = Eigen::Isometry3d(Eigen::Translation3d(0, -side, 0));
+  goal.foot[Foot::kLeft] = Eigen::Isometry3d(Eigen::Translation3d(0, side, 0));
   goal.com_height = StandingHeight(model);
   goal.nominal = model.stance().joint_position;
   return goal;

@@ -2,15 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/robot/robot_model.h"
 
 namespace poise::robot {
 
 struct PostureGoal {
-  /// Sole frames in the world, right first.
-  std::array<Eigen::Isometry3d, 2> foot;
+  /// Sole frames in the world.
+  FootArray<Eigen::Isometry3d> foot;
   /// Desired COM, m, world.
   Eigen::Vector2d com_xy = Eigen::Vector2d::Zero();
   double com_height = 0;  ///< m, world

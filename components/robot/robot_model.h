@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "components/robot/foot.h"
+
 namespace poise::robot {
 
 /// A URDF or robot description that cannot work. what() is one line naming the link, joint or field
@@ -142,14 +144,14 @@ struct KinematicTree {
   std::vector<std::vector<int>> supporting_joints;  ///< by body, nearest first
 };
 
-/// What a robot is made of. Parents come before their children; a motor for each joint; two feet,
-/// right first; indices within range.
+/// What a robot is made of. Parents come before their children; a motor for each joint;
+/// indices within range.
 struct RobotParts {
   std::string name;
   std::vector<Body> bodies;
   std::vector<Joint> joints;
   std::vector<MotorModel> motors;  ///< by joint index
-  std::vector<FootModel> feet;
+  FootArray<FootModel> feet;
   std::vector<Frame> frames;  ///< every link of the URDF, in order of the names
   ImuModel imu;
   StanceModel stance;
@@ -172,7 +174,7 @@ class RobotModel {
   const std::vector<Body>& bodies() const { return parts_.bodies; }
   const std::vector<Joint>& joints() const { return parts_.joints; }
   const std::vector<MotorModel>& motors() const { return parts_.motors; }  ///< by joint index
-  const std::vector<FootModel>& feet() const { return parts_.feet; }       ///< right first
+  const FootArray<FootModel>& feet() const { return parts_.feet; }
   const ImuModel& imu() const { return parts_.imu; }
   const StanceModel& stance() const { return parts_.stance; }
   const DriveTrainModel& drive_train() const { return parts_.drive_train; }

@@ -129,7 +129,7 @@ std::vector<MotorModel> LoadMotors(const Robot& description, const LinkTree& tre
   return motors;
 }
 
-void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
+void LoadSole(const poise::Foot& foot, const std::string& field, FootModel* result) {
   if (foot.vertex_size() == 0) {
     result->length = Positive(foot.length(), field + ".length");
     result->width = Positive(foot.width(), field + ".width");
@@ -152,7 +152,7 @@ void LoadSole(const Foot& foot, const std::string& field, FootModel* result) {
   result->width = extent.y();
 }
 
-FootModel LoadFoot(const Foot& foot, const LinkTree& tree, const std::string& field) {
+FootModel LoadFoot(const poise::Foot& foot, const LinkTree& tree, const std::string& field) {
   FootModel result;
   result.name = foot.name();
   if (result.name.empty()) throw RobotError(field + ".name is missing: e.g. \"right\"");
@@ -181,33 +181,30 @@ double LateralPlace(const FootModel& foot, const LinkTree& tree) {
   return point.y();
 }
 
-std::vector<FootModel> LoadFeet(const Robot& description, const LinkTree& tree) {
+FootArray<FootModel> LoadFeet(const Robot& description, const LinkTree& tree) {
   if (description.foot_size() != 2) {
     throw RobotError(fmt::format("foot: {} given, exactly two are needed, the right one first",
                                  description.foot_size()));
   }
-  std::vector<FootModel> feet;
-  for (int f = 0; f < 2; ++f) {
-    feet.push_back(LoadFoot(description.foot(f), tree, fmt::format("foot[{}]", f)));
-  }
-  if (feet[0].name == feet[1].name) {
+  const FootModel right = LoadFoot(description.foot(0), tree, "foot[0]");
+  const FootModel left = LoadFoot(description.foot(1), tree, "foot[1]");
+  if (right.name == left.name) {
     throw RobotError(
-        fmt::format("foot: both are named '{}': name them apart, right first", feet[0].name));
+        fmt::format("foot: both are named '{}': name them apart, right first", right.name));
   }
-  if (feet[0].body == feet[1].body) {
+  if (right.body == left.body) {
     throw RobotError(
         fmt::format("foot: '{}' and '{}' are parts of one rigid body: name links of two legs",
-                    feet[0].name, feet[1].name));
+                    right.name, left.name));
   }
-  const double right = LateralPlace(feet[kRightFoot], tree);
-  const double left = LateralPlace(feet[kLeftFoot], tree);
-  if (!(right < left)) {
+  const double right_y = LateralPlace(right, tree), left_y = LateralPlace(left, tree);
+  if (!(right_y < left_y)) {
     throw RobotError(fmt::format(
         "foot: with all joints at zero, foot[0] '{}' lies at y = {:.3g} m and foot[1] '{}' at y = "
         "{:.3g} m: list the right foot (smaller y) first",
-        feet[0].name, right, feet[1].name, left));
+        right.name, right_y, left.name, left_y));
   }
-  return feet;
+  return {right, left};
 }
 
 StanceModel LoadStance(const Stance& stance, const LinkTree& tree) {

@@ -253,7 +253,7 @@ py::array_t<double> Support(const RobotHandle& robot, const Array& frame, const 
   balance::ContactGeometry geometry;
   geometry.sole = PosesAt(soles.data());
   geometry.in_contact = in_contact;
-  const std::vector<robot::FootModel>& feet = robot.model().feet();
+  const robot::FootArray<robot::FootModel>& feet = robot.model().feet();
   const std::array<ConvexPolygon, 2> polygons = {balance::SolePolygon(feet[0], margin),
                                                  balance::SolePolygon(feet[1], margin)};
   return ArrayOf(balance::SupportPolygon(PoseAt(frame.data()), geometry, polygons));
