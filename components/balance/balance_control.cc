@@ -98,8 +98,8 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
                                           Movers movers) {
   const ReducedDynamics& reduced = contact.reduced();
   *result = BalanceResult{};
-  const int feet = geometry.in_contact[0] + geometry.in_contact[1];
-  if (6 * feet != reduced.num_contact_rows || protected_task.num_rows() > projection_.rows() ||
+  const int contacts = Count(geometry.in_contact);
+  if (6 * contacts != reduced.num_contact_rows || protected_task.num_rows() > projection_.rows() ||
       reduced.num_joints != num_joints_ || torque.size() != num_joints_ ||
       !FrameO(geometry.sole, geometry.in_contact, &result->frame_o)) {
     return BalanceStatus::kSingular;
@@ -111,7 +111,8 @@ BalanceStatus BalanceControl::ComputeWith(const Nearest& nearest, const ContactD
 
     // (35): the base rows of the equations of motion are the resultant of all contacts, seen from
     // the base.
-    const Eigen::Isometry3d& root = geometry.sole[geometry.in_contact[0] ? 0 : 1];
+    const Eigen::Isometry3d& root =
+        geometry.sole[geometry.in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft];
     const Matrix6d to_o = WrenchTransform(result->frame_o, root).lazyProduct(reduced.root_transfer);
     result->resultant_task = to_o.lazyProduct(BaseWrench<S, Loop>(reduced, torque));
     result->resultant = result->resultant_task;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/balance/contact_conditions.h"
 #include "components/balance/contact_dynamics.h"
@@ -12,11 +11,11 @@
 
 namespace poise::balance {
 
-/// The contacts of one tick, right foot first.
+/// The contacts of one tick.
 struct ContactGeometry {
-  std::array<Eigen::Isometry3d, 2> sole{
-      Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity()};  ///< sole frames in the world
-  std::array<bool, 2> in_contact{true, true};
+  FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(),
+                                    Eigen::Isometry3d::Identity()};  ///< sole frames in the world
+  FootArray<bool> in_contact{true, true};
 };
 
 struct BalanceResult {

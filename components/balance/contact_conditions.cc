@@ -34,19 +34,20 @@ Eigen::Vector2d CenterOfPressure(const Vector6d& wrench) {
   return {-wrench(4) / wrench(2), wrench(3) / wrench(2)};
 }
 
-bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool, 2>& in_contact,
+bool FrameO(const FootArray<Eigen::Isometry3d>& sole, const FootArray<bool>& in_contact,
             Eigen::Isometry3d* frame) {
-  if (!in_contact[0] || !in_contact[1]) {
-    const int foot = in_contact[0] ? 0 : 1;
+  if (!in_contact[Foot::kRight] || !in_contact[Foot::kLeft]) {
+    const Foot foot = in_contact[Foot::kRight] ? Foot::kRight : Foot::kLeft;
     if (!in_contact[foot] || !sole[foot].matrix().allFinite()) return false;
     *frame = sole[foot];
     return true;
   }
   constexpr double kCoincident = 1e-6;  // m
   constexpr double kParallel = 1e-6;    // sine
-  const Eigen::Vector3d line = sole[1].translation() - sole[0].translation();
+  const Eigen::Isometry3d &right = sole[Foot::kRight], &left = sole[Foot::kLeft];
+  const Eigen::Vector3d line = left.translation() - right.translation();
   const double distance = line.norm();
-  const Eigen::Vector3d normal = sole[0].linear().col(2) + sole[1].linear().col(2);
+  const Eigen::Vector3d normal = right.linear().col(2) + left.linear().col(2);
   if (!(distance > kCoincident && distance < HUGE_VAL)) return false;
   const Eigen::Vector3d y = line / distance;
   const Eigen::Vector3d upright = normal - y * y.dot(normal);
@@ -54,7 +55,7 @@ bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool,
   if (!(height > kParallel && height < HUGE_VAL)) return false;
   const Eigen::Vector3d z = upright / height;
   frame->linear() << y.cross(z), y, z;
-  frame->translation() = sole[0].translation() + line / 2;
+  frame->translation() = right.translation() + line / 2;
   frame->makeAffine();
   return true;
 }

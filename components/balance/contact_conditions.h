@@ -4,12 +4,16 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/balance/contact_dynamics.h"
 #include "components/balance/convex_polygon.h"
+#include "components/robot/foot.h"
 
 namespace poise::balance {
+
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
 
 /// Limits of one contact patch, in its own frame.
 struct ContactLimits {
@@ -41,10 +45,10 @@ Eigen::Vector2d CenterOfPressure(const Vector6d& wrench);
 
 /// Frame O in the world. Both feet: midway between the soles, y along the line from the right to
 /// the left sole centre, z as near to the soles' mean normal as that allows. One foot: that sole's
-/// frame. `in_contact` right first. False, and `frame` unchanged, without a contact, when the
+/// frame. False, and `frame` unchanged, without a contact, when the
 /// soles' centres coincide (within 1 µm), when the line between them is parallel to the mean normal
 /// or when a pose is not finite.
-bool FrameO(const std::array<Eigen::Isometry3d, 2>& sole, const std::array<bool, 2>& in_contact,
+bool FrameO(const FootArray<Eigen::Isometry3d>& sole, const FootArray<bool>& in_contact,
             Eigen::Isometry3d* frame);
 
 /// K block of one foot, (35) and (44) corrected: wrench in its sole frame → wrench in `frame`, [R

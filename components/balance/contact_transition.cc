@@ -4,8 +4,8 @@
 
 namespace poise::balance {
 
-double TransitionRatio(double free_ratio, int foot, bool unloading, double progress) {
-  const double unloaded = foot == 0 ? 0.0 : 1.0;
+double TransitionRatio(double free_ratio, robot::Foot foot, bool unloading, double progress) {
+  const double unloaded = foot == robot::Foot::kRight ? 0.0 : 1.0;
   const double share = SmoothStep(progress);
   // Both ends exact.
   return unloading ? free_ratio * (1 - share) + unloaded * share

@@ -18,8 +18,8 @@ struct LinearMoment {
   Eigen::Vector3d slope, offset;
 };
 
-LinearMoment OwnMoments(const Vector6d& resultant, const Eigen::Vector3d& right,
-                        const Eigen::Vector3d& left) {
+LinearMoment OwnMoments(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position) {
+  const Eigen::Vector3d &right = position[Foot::kRight], &left = position[Foot::kLeft];
   const Eigen::Vector3d force = resultant.head<3>();
   return {-(right - left).cross(force), resultant.tail<3>() - left.cross(force)};
 }
@@ -45,11 +45,11 @@ class Bounds {
 };
 
 /// (70)–(79) of both feet, each in its own sole frame. `rotation`: sole to O.
-Bounds MomentBounds(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                    const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits) {
-  const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
+Bounds MomentBounds(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
+                    const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits) {
+  const LinearMoment moment = OwnMoments(resultant, position);
   Bounds bounds;
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     const ContactLimits& own = limits[foot];
     const Eigen::Matrix3d to_sole = rotation[foot].transpose();
     const Eigen::Vector3d a = to_sole * moment.slope, b = to_sole * moment.offset;
@@ -83,18 +83,18 @@ double Reach(const ConvexPolygon& sole, const Eigen::Matrix3d& rotation,
 /// The same where each foot has a centre of pressure of its own: η S_r + (1 − η) S_l holds what
 /// both can have together, and along each edge of either sole that sum reaches as far as η h_r +
 /// (1 − η) h_l.
-Bounds FreeMomentBounds(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
-                        const std::array<ConvexPolygon, 2>& sole) {
-  const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
+Bounds FreeMomentBounds(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
+                        const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits,
+                        const FootArray<ConvexPolygon>& sole) {
+  const LinearMoment moment = OwnMoments(resultant, position);
   const double load = std::abs(resultant[2]);
   Bounds bounds;
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     for (const HalfPlane& edge : limits[foot].edges.planes()) {
       const Eigen::Vector2d normal =
           (rotation[foot].topLeftCorner<2, 2>() * edge.normal).normalized();
-      const double right = Reach(sole[0], rotation[0], normal) * load,
-                   left = Reach(sole[1], rotation[1], normal) * load;
+      const auto reach = [&](Foot of) { return Reach(sole[of], rotation[of], normal) * load; };
+      const double right = reach(Foot::kRight), left = reach(Foot::kLeft);
       const Eigen::Vector2d turned(-normal.y(), normal.x());
       bounds.AddBelow(turned.dot(moment.slope.head<2>()) - (right - left),
                       turned.dot(moment.offset.head<2>()), left, "edge");
@@ -109,11 +109,11 @@ Bounds FreeMomentBounds(const Vector6d& resultant, const std::array<Eigen::Vecto
 
 /// `bounds`: of the moments, made once the force is known to press.
 template <class MakeBounds>
-RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
+RatioInterval Intersect(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
+                        const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits,
                         double eta_min, double eta_max, const MakeBounds& bounds) {
   RatioInterval interval;
-  const LinearMoment moment = OwnMoments(resultant, position[0], position[1]);
+  const LinearMoment moment = OwnMoments(resultant, position);
   const double optimal = -moment.offset.x() / moment.slope.x();
   if (std::isfinite(optimal)) interval.optimal = optimal;
   interval.min = std::max(eta_min, 0.0);
@@ -126,7 +126,7 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
     return interval;
   };
   if (!(interval.min <= interval.max)) return infeasible("ratio limits");
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     const Eigen::Vector3d force = rotation[foot].transpose() * resultant.head<3>();
     if (!(force.z() < 0)) return infeasible("normal");
     if (!(std::hypot(force.x(), force.y()) < limits[foot].friction * -force.z()))
@@ -148,8 +148,8 @@ RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vecto
   return interval;
 }
 
-RatioInterval Intersect(const Vector6d& resultant, const std::array<Eigen::Vector3d, 2>& position,
-                        const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
+RatioInterval Intersect(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& position,
+                        const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits,
                         double eta_min, double eta_max) {
   return Intersect(resultant, position, rotation, limits, eta_min, eta_max,
                    [&] { return MomentBounds(resultant, position, rotation, limits); });
@@ -190,9 +190,9 @@ double LeastViolation(const Bounds& bounds, double eta_min, double eta_max) {
 }
 
 double Select(const RatioInterval& interval, const Vector6d& resultant,
-              const std::array<Eigen::Vector3d, 2>& position,
-              const std::array<Eigen::Matrix3d, 2>& rotation, const SoleLimits& limits,
-              double eta_min, double eta_max) {
+              const FootArray<Eigen::Vector3d>& position,
+              const FootArray<Eigen::Matrix3d>& rotation, const SoleLimits& limits, double eta_min,
+              double eta_max) {
   if (interval.feasible) return std::clamp(interval.optimal, interval.min, interval.max);
   const Bounds bounds = MomentBounds(resultant, position, rotation, limits);
   // Side by side the soles lack as much at any η: noise alone would tell the best, and η, with the
@@ -210,38 +210,37 @@ double Select(const RatioInterval& interval, const Vector6d& resultant,
   return lower <= upper ? std::clamp(interval.optimal, lower, upper) : eta_min;
 }
 
-std::array<Eigen::Matrix3d, 2> Level() {
-  return {Eigen::Matrix3d::Identity(), Eigen::Matrix3d::Identity()};
+FootArray<Eigen::Matrix3d> Level() {
+  return FootArray<Eigen::Matrix3d>(Eigen::Matrix3d::Identity());
 }
 
-std::array<Eigen::Vector3d, 2> Positions(const std::array<Eigen::Isometry3d, 2>& foot) {
-  return {foot[0].translation(), foot[1].translation()};
+FootArray<Eigen::Vector3d> Positions(const FootArray<Eigen::Isometry3d>& foot) {
+  return {foot[Foot::kRight].translation(), foot[Foot::kLeft].translation()};
 }
 
-std::array<Eigen::Matrix3d, 2> Rotations(const std::array<Eigen::Isometry3d, 2>& foot) {
-  return {foot[0].linear(), foot[1].linear()};
+FootArray<Eigen::Matrix3d> Rotations(const FootArray<Eigen::Isometry3d>& foot) {
+  return {foot[Foot::kRight].linear(), foot[Foot::kLeft].linear()};
 }
 
 }  // namespace
 
-RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
                             const SoleLimits& limits, double eta_min, double eta_max) {
   return Intersect(resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
 }
 
-RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
                             const ContactLimits& limits, double eta_min, double eta_max) {
-  return FeasibleRatio(resultant, foot, SoleLimits{limits, limits}, eta_min, eta_max);
+  return FeasibleRatio(resultant, foot, SoleLimits(limits), eta_min, eta_max);
 }
 
-RatioInterval FeasibleRatio(const Vector6d& resultant,
-                            const std::array<Eigen::Vector3d, 2>& foot_in_o,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& foot_in_o,
                             const ContactLimits& limits, double eta_min, double eta_max) {
-  return Intersect(resultant, foot_in_o, Level(), {limits, limits}, eta_min, eta_max);
+  return Intersect(resultant, foot_in_o, Level(), SoleLimits(limits), eta_min, eta_max);
 }
 
-RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
-                        const SoleLimits& limits, const std::array<ConvexPolygon, 2>& sole,
+RatioInterval FreeRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
+                        const SoleLimits& limits, const FootArray<ConvexPolygon>& sole,
                         double eta_min, double eta_max) {
   const auto position = Positions(foot);
   const auto rotation = Rotations(foot);
@@ -250,43 +249,43 @@ RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isome
 }
 
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Isometry3d, 2>& foot, const SoleLimits& limits,
+                   const FootArray<Eigen::Isometry3d>& foot, const SoleLimits& limits,
                    double eta_min, double eta_max) {
   return Select(interval, resultant, Positions(foot), Rotations(foot), limits, eta_min, eta_max);
 }
 
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Isometry3d, 2>& foot, const ContactLimits& limits,
+                   const FootArray<Eigen::Isometry3d>& foot, const ContactLimits& limits,
                    double eta_min, double eta_max) {
-  return SelectRatio(interval, resultant, foot, SoleLimits{limits, limits}, eta_min, eta_max);
+  return SelectRatio(interval, resultant, foot, SoleLimits(limits), eta_min, eta_max);
 }
 
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
+                   const FootArray<Eigen::Vector3d>& foot_in_o, const ContactLimits& limits,
                    double eta_min, double eta_max) {
-  return Select(interval, resultant, foot_in_o, Level(), {limits, limits}, eta_min, eta_max);
+  return Select(interval, resultant, foot_in_o, Level(), SoleLimits(limits), eta_min, eta_max);
 }
 
-std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,
-                                            const std::array<Eigen::Isometry3d, 2>& foot,
-                                            double eta) {
-  const LinearMoment own = OwnMoments(resultant, foot[0].translation(), foot[1].translation());
+FootArray<Vector6d> DistributeResultant(const Vector6d& resultant,
+                                        const FootArray<Eigen::Isometry3d>& foot, double eta) {
+  const LinearMoment own = OwnMoments(resultant, Positions(foot));
   const Eigen::Vector3d moment = own.slope * eta + own.offset;
   const Eigen::Vector3d force = resultant.head<3>();
-  std::array<Vector6d, 2> share;
-  for (int i = 0; i < 2; ++i) {
-    const double part = i == 0 ? eta : 1 - eta;
-    share[i].head<3>() = foot[i].linear().transpose() * (force * part);
-    share[i].tail<3>() = foot[i].linear().transpose() * (moment * part);
+  FootArray<Vector6d> share;
+  for (const Foot of : kFeet) {
+    const double part = of == Foot::kRight ? eta : 1 - eta;
+    share[of].head<3>() = foot[of].linear().transpose() * (force * part);
+    share[of].tail<3>() = foot[of].linear().transpose() * (moment * part);
   }
   return share;
 }
 
-void MoveIntoSoles(const std::array<Eigen::Isometry3d, 2>& foot,
-                   const std::array<ConvexPolygon, 2>& sole, std::array<Vector6d, 2>* share) {
-  std::array<Vector6d, 2>& wrench = *share;
-  if (!(wrench[0](2) < 0 && wrench[1](2) < 0)) return;
-  const size_t light = wrench[0](2) > wrench[1](2) ? 0 : 1, heavy = 1 - light;
+void MoveIntoSoles(const FootArray<Eigen::Isometry3d>& foot, const FootArray<ConvexPolygon>& sole,
+                   FootArray<Vector6d>* share) {
+  FootArray<Vector6d>& wrench = *share;
+  const double right = wrench[Foot::kRight](2), left = wrench[Foot::kLeft](2);
+  if (!(right < 0 && left < 0)) return;
+  const Foot light = right > left ? Foot::kRight : Foot::kLeft, heavy = Other(light);
   const Eigen::Vector2d from = CenterOfPressure(wrench[light]),
                         other = CenterOfPressure(wrench[heavy]);
   if (!from.allFinite() || !other.allFinite()) return;

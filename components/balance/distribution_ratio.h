@@ -27,26 +27,25 @@ struct RatioInterval {
 };
 
 /// Limits of the right and the left sole, in their own frames.
-using SoleLimits = std::array<ContactLimits, 2>;
+using SoleLimits = FootArray<ContactLimits>;
 
 /// Bounds of η from |a η + b| < |c| for M_x, M_y, M_z, (70)–(79), intersected with [eta_min,
 /// eta_max] and [0, 1]. (29) and (30) do not depend on η: broken, no η is feasible. `foot`: soles
 /// in O; each foot's conditions hold in its own sole frame, however it is turned or tilted.
-RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
                             const SoleLimits& limits, double eta_min, double eta_max);
 /// The same for soles of the same limits.
-RatioInterval FeasibleRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
                             const ContactLimits& limits, double eta_min, double eta_max);
 /// The same for feet parallel to O. `foot_in_o`: sole centres in O, m.
-RatioInterval FeasibleRatio(const Vector6d& resultant,
-                            const std::array<Eigen::Vector3d, 2>& foot_in_o,
+RatioInterval FeasibleRatio(const Vector6d& resultant, const FootArray<Eigen::Vector3d>& foot_in_o,
                             const ContactLimits& limits, double eta_min, double eta_max);
 
 /// The same where each foot may have a centre of pressure of its own, as MoveIntoSoles gives it: of
 /// soles that are not alike more than of one that both have. `sole`: the polygons of `limits`'
 /// edges, which both have. Exact for soles parallel to O's plane.
-RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isometry3d, 2>& foot,
-                        const SoleLimits& limits, const std::array<ConvexPolygon, 2>& sole,
+RatioInterval FreeRatio(const Vector6d& resultant, const FootArray<Eigen::Isometry3d>& foot,
+                        const SoleLimits& limits, const FootArray<ConvexPolygon>& sole,
                         double eta_min, double eta_max);
 
 /// The ratio to use: η* clipped to a feasible interval. Infeasible: η* clipped to the ratios in
@@ -54,27 +53,26 @@ RatioInterval FreeRatio(const Vector6d& resultant, const std::array<Eigen::Isome
 /// moment conditions is the least, to a millimetre of centre of pressure. Always finite and within
 /// [eta_min, eta_max], which lie in [0, 1].
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Isometry3d, 2>& foot, const SoleLimits& limits,
+                   const FootArray<Eigen::Isometry3d>& foot, const SoleLimits& limits,
                    double eta_min, double eta_max);
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Isometry3d, 2>& foot, const ContactLimits& limits,
+                   const FootArray<Eigen::Isometry3d>& foot, const ContactLimits& limits,
                    double eta_min, double eta_max);
 double SelectRatio(const RatioInterval& interval, const Vector6d& resultant,
-                   const std::array<Eigen::Vector3d, 2>& foot_in_o, const ContactLimits& limits,
+                   const FootArray<Eigen::Vector3d>& foot_in_o, const ContactLimits& limits,
                    double eta_min, double eta_max);
 
 /// (62)–(67): each foot's share of the resultant, in its own sole frame. `foot`: sole frames in O.
 /// The shares' resultant is `resultant` for every η.
-std::array<Vector6d, 2> DistributeResultant(const Vector6d& resultant,
-                                            const std::array<Eigen::Isometry3d, 2>& foot,
-                                            double eta);
+FootArray<Vector6d> DistributeResultant(const Vector6d& resultant,
+                                        const FootArray<Eigen::Isometry3d>& foot, double eta);
 
 /// Where a share's centre of pressure is outside its sole: the lighter foot's moves to the nearest
 /// point from which both are inside, the heavier one's so that the resultant stays. Soles that are
 /// not alike can then do what their hull promises. Without such a point the lighter foot's goes
 /// into its own sole. `sole`: what of each the centre of pressure may be in, sole frame, not empty.
 /// Shares that do not press stay.
-void MoveIntoSoles(const std::array<Eigen::Isometry3d, 2>& foot,
-                   const std::array<ConvexPolygon, 2>& sole, std::array<Vector6d, 2>* share);
+void MoveIntoSoles(const FootArray<Eigen::Isometry3d>& foot, const FootArray<ConvexPolygon>& sole,
+                   FootArray<Vector6d>* share);
 
 }  // namespace poise::balance

@@ -1,6 +1,7 @@
 #include "components/balance/support_polygon.h"
 
 #include <algorithm>
+#include <array>
 
 namespace poise::balance {
 
@@ -25,10 +26,10 @@ ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin, double si
 }
 
 ConvexPolygon SupportPolygon(const Eigen::Isometry3d& frame_o, const ContactGeometry& geometry,
-                             const std::array<ConvexPolygon, 2>& sole) {
+                             const FootArray<ConvexPolygon>& sole) {
   std::array<Eigen::Vector2d, ConvexPolygon::kMaxCorners> corner;
   size_t count = 0;
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const Foot foot : kFeet) {
     if (!geometry.in_contact[foot]) continue;
     for (const Eigen::Vector2d& at : sole[foot].corners()) {
       if (count == corner.size()) break;

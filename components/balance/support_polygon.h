@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/balance/balance_control.h"
 #include "components/balance/convex_polygon.h"
@@ -19,7 +18,7 @@ ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin);
 ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin, double side_margin);
 
 /// Hull of the soles in contact, each a polygon of at most robot::kMaxSoleVertices corners in its
-/// own frame (m, right foot first), seen along the normal of `frame_o` on its plane.
+/// own frame (m), seen along the normal of `frame_o` on its plane.
 ///
 /// With soles less a margin it is the polygon of the soles with that margin inside, and every
 /// centre of pressure in it can be shared so that each foot's own stays inside its smaller sole:
@@ -29,6 +28,6 @@ ConvexPolygon SolePolygon(const robot::FootModel& foot, double margin, double si
 /// (feet at different heights) reaches somewhat farther than its projection, as forces are nearer
 /// to the vertical than the plane's normal is.
 ConvexPolygon SupportPolygon(const Eigen::Isometry3d& frame_o, const ContactGeometry& geometry,
-                             const std::array<ConvexPolygon, 2>& sole);
+                             const FootArray<ConvexPolygon>& sole);
 
 }  // namespace poise::balance

@@ -71,7 +71,7 @@ void WholeBody::UpdateDynamics(const robot::RobotState& state) {
   have_dynamics_ = true;
 }
 
-bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact) {
+bool WholeBody::Update(const robot::RobotState& state, const FootArray<bool>& in_contact) {
   UpdateDynamics(state);
   if (!have_contacts_ || in_contact != in_contact_) {
     in_contact_ = in_contact;
@@ -82,22 +82,22 @@ bool WholeBody::Update(const robot::RobotState& state, const std::array<bool, 2>
 }
 
 bool WholeBody::UpdateContacts() {
-  const int feet = in_contact_[0] + in_contact_[1];
+  const int contacts = Count(in_contact_);
   // A quaternion of zero length would pass for an upright base.
-  if (feet == 0 || !(std::abs(state_.base_orientation.squaredNorm() - 1) < 1e-6)) return false;
-  Eigen::MatrixXd& jacobian = contact_jacobian_[feet - 1];
+  if (contacts == 0 || !(std::abs(state_.base_orientation.squaredNorm() - 1) < 1e-6)) return false;
+  Eigen::MatrixXd& jacobian = contact_jacobian_[static_cast<size_t>(contacts) - 1];
   ContactJacobian(in_contact_, &jacobian);
   int row = 0;
-  for (int i = 0; i < 2; ++i) {
-    if (!in_contact_[i]) continue;
+  for (const Foot foot : kFeet) {
+    if (!in_contact_[foot]) continue;
     // The sole stands still, so that turning J̇ v into its axes is all that its rotation asks for.
-    const auto to_sole = data_.foot_pose[i].linear().transpose();
-    contact_bias_.segment<3>(row) = to_sole * data_.foot_bias_acceleration[i].head<3>();
-    contact_bias_.segment<3>(row + 3) = to_sole * data_.foot_bias_acceleration[i].tail<3>();
+    const auto to_sole = data_.foot_pose[foot].linear().transpose();
+    contact_bias_.segment<3>(row) = to_sole * data_.foot_bias_acceleration[foot].head<3>();
+    contact_bias_.segment<3>(row + 3) = to_sole * data_.foot_bias_acceleration[foot].tail<3>();
     row += 6;
   }
   return contact_.Compute(data_.mass_matrix, data_.bias, data_.gravity, jacobian,
-                          contact_bias_.head(6 * feet));
+                          contact_bias_.head(6 * contacts));
 }
 
 Eigen::Vector3d WholeBody::AngularMomentum() const {
@@ -112,20 +112,18 @@ Eigen::Vector3d WholeBody::AngularMomentum() const {
          (data_.com - data_.base_position).cross(data_.total_mass * data_.com_velocity);
 }
 
-ContactGeometry WholeBody::geometry() const {
-  return {{data_.foot_pose[0], data_.foot_pose[1]}, in_contact_};
-}
+ContactGeometry WholeBody::geometry() const { return {data_.foot_pose, in_contact_}; }
 
-void WholeBody::ContactJacobian(const std::array<bool, 2>& in_contact,
+void WholeBody::ContactJacobian(const FootArray<bool>& in_contact,
                                 Eigen::MatrixXd* jacobian) const {
   const Eigen::Index n = model_->num_velocities();
-  const Eigen::Index rows = 6 * (in_contact[0] + in_contact[1]);
+  const Eigen::Index rows = 6 * Count(in_contact);
   jacobian->setZero(rows, n);  // columns of joints that are no leg's
   Eigen::Index row = 0;
-  for (int i = 0; i < 2; ++i) {
-    if (!in_contact[i]) continue;
-    const Eigen::Matrix3d to_sole = data_.foot_pose[i].linear().transpose();
-    const robot::Matrix6X& world = data_.foot_jacobian[i];
+  for (const Foot foot : kFeet) {
+    if (!in_contact[foot]) continue;
+    const Eigen::Matrix3d to_sole = data_.foot_pose[foot].linear().transpose();
+    const robot::Matrix6X& world = data_.foot_jacobian[foot];
     const auto turn = [&](Eigen::Index j) {
       jacobian->block<3, 1>(row, j) = to_sole * world.block<3, 1>(0, j);
       jacobian->block<3, 1>(row + 3, j) = to_sole * world.block<3, 1>(3, j);

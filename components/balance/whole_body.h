@@ -26,9 +26,9 @@ class WholeBody {
   void UpdateKinematics(const robot::RobotState& state);
   /// Those, mass matrix and COM, whatever the contacts: enough for data(), contact() is not valid.
   void UpdateDynamics(const robot::RobotState& state);
-  /// Everything, for the given contacts (right first). False when the contact dynamics do not exist
+  /// Everything, for the given contacts. False when the contact dynamics do not exist
   /// (non-finite state, feet in a singular posture, no contact).
-  bool Update(const robot::RobotState& state, const std::array<bool, 2>& in_contact);
+  bool Update(const robot::RobotState& state, const FootArray<bool>& in_contact);
 
   const robot::RobotModel& model() const { return *model_; }
   const robot::RobotData& data() const { return data_; }
@@ -39,7 +39,7 @@ class WholeBody {
   ContactGeometry geometry() const;
   /// J_c (6 per contact) in sole axes for the given contacts, from data(): rows [force; moment]
   /// right first. `jacobian` is resized when it does not have the right size already.
-  void ContactJacobian(const std::array<bool, 2>& in_contact, Eigen::MatrixXd* jacobian) const;
+  void ContactJacobian(const FootArray<bool>& in_contact, Eigen::MatrixXd* jacobian) const;
 
  private:
   bool UpdateContacts();
@@ -48,7 +48,7 @@ class WholeBody {
   robot::RobotData data_;
   ContactDynamics contact_;
   robot::RobotState state_;
-  std::array<bool, 2> in_contact_{false, false};
+  FootArray<bool> in_contact_{false, false};
   bool have_kinematics_ = false, have_dynamics_ = false, have_contacts_ = false;
   bool contacts_valid_ = false;
   std::array<Eigen::MatrixXd, 2> contact_jacobian_;  // 6×n for one foot, 12×n for two

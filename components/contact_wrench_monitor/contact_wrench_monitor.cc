@@ -20,6 +20,10 @@ namespace poise {
 std::string_view contact_wrench_monitor_proto_schema();  // generated
 namespace {
 
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+
 // Shares of the start's region that an operator may go to: a quarter still lets the robot stand; at
 // one and a half it ends beyond the soles, and nothing is kept. Chosen.
 constexpr double kLeastRegion = 0.25, kMostRegion = 1.5;
@@ -161,12 +165,12 @@ void ContactWrenchMonitor::Prepare() {
 void ContactWrenchMonitor::Balance(const Tick& tick) {
   const task_torque_t& task = *task_torque_;
   balance_torque_t& out = *balance_torque_;
-  const std::array<bool, 2> in_contact{support_plan_->in_contact[0] != 0,
-                                       support_plan_->in_contact[1] != 0};
+  const FootArray<bool> in_contact{support_plan_->in_contact[0] != 0,
+                                   support_plan_->in_contact[1] != 0};
   std::copy(task.torque.begin(), task.torque.end(), torque_.data());
   if (task.status != task_torque_t::STATUS_OK) {
     out.status = balance_torque_t::STATUS_HELD;
-  } else if (!state_valid_ || !torque_.allFinite() || !(in_contact[0] || in_contact[1])) {
+  } else if (!state_valid_ || !torque_.allFinite() || Count(in_contact) == 0) {
     out.status = balance_torque_t::STATUS_INVALID_STATE;
   } else {
     in_contact_ = in_contact;
@@ -181,7 +185,7 @@ void ContactWrenchMonitor::Balance(const Tick& tick) {
   out.active_x = out.active_y = 0;
 }
 
-int8_t ContactWrenchMonitor::ComputeDynamics(const std::array<bool, 2>& in_contact) {
+int8_t ContactWrenchMonitor::ComputeDynamics(const FootArray<bool>& in_contact) {
   if (!whole_body_->Update(state_, in_contact)) return balance_torque_t::STATUS_SINGULAR;
   const robot::RobotData& data = whole_body_->data();
   height_jacobian_ = data.com_jacobian.row(2);
@@ -191,8 +195,7 @@ int8_t ContactWrenchMonitor::ComputeDynamics(const std::array<bool, 2>& in_conta
              : balance_torque_t::STATUS_SINGULAR;
 }
 
-int8_t ContactWrenchMonitor::ComputeBalance(const std::array<bool, 2>& in_contact,
-                                            const Tick& tick) {
+int8_t ContactWrenchMonitor::ComputeBalance(const FootArray<bool>& in_contact, const Tick& tick) {
   if (const int8_t status = ComputeDynamics(in_contact); status != balance_torque_t::STATUS_OK) {
     return status;
   }
@@ -313,21 +316,22 @@ bool ContactWrenchMonitor::KeepLimits(const balance::ContactGeometry& geometry,
 bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
                                        const balance::ConvexPolygon& region,
                                        balance::BalanceResult* result) {
-  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  const bool both = Count(geometry.in_contact) == 2;
   balance::StepBounds& bounds = step_bounds_;
   if (!balance::FrameO(geometry.sole, geometry.in_contact, &bounds.frame_o)) return false;
   bounds.in_contact = geometry.in_contact;
   bounds.sole = geometry.sole;
   bounds.region = region;
   const double weight = model_->total_mass() * robot::kGravity;
-  for (size_t f = 0; f < 2; ++f) {
-    bounds.foot[f] = {both ? shared_sole_[f] : sole_[f],
-                      (both ? double_support_ : single_support_).friction,
-                      (both ? kLeastShared : kLeastAlone) * weight};
+  for (const Foot f : kFeet) {
+    bounds.foot[Index(f)] = {both ? shared_sole_[f] : sole_[f],
+                             (both ? double_support_ : single_support_).friction,
+                             (both ? kLeastShared : kLeastAlone) * weight};
   }
   step_jacobian_.row(0) = height_jacobian_.row(0);
   if (!both) {
-    step_jacobian_.bottomRows<6>() = whole_body_->data().foot_jacobian[geometry.in_contact[0]];
+    const Foot free = geometry.in_contact[Foot::kRight] ? Foot::kLeft : Foot::kRight;
+    step_jacobian_.bottomRows<6>() = whole_body_->data().foot_jacobian[free];
   }
   const Eigen::Index held = both ? 1 : kStepRows;
   balance::StepBalance::Result step;
@@ -340,11 +344,11 @@ bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
   result->frame_o = bounds.frame_o;
   result->resultant_task.setZero();
   result->resultant.setZero();
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     if (!geometry.in_contact[f]) continue;
     const balance::Matrix6d transfer = balance::WrenchTransform(bounds.frame_o, geometry.sole[f]);
-    result->resultant_task += transfer * step.task[f];
-    result->resultant += transfer * step.wrench[f];
+    result->resultant_task += transfer * step.task[Index(f)];
+    result->resultant += transfer * step.wrench[Index(f)];
   }
   result->cop_task = balance::CenterOfPressure(result->resultant_task);
   result->cop = result->cop_desired = balance::CenterOfPressure(result->resultant);
@@ -353,21 +357,20 @@ bool ContactWrenchMonitor::MoveForStep(const balance::ContactGeometry& geometry,
 }
 
 void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
-                                          const std::array<bool, 2>& in_contact, const Tick& tick) {
+                                          const FootArray<bool>& in_contact, const Tick& tick) {
   const balance_torque_t& last = *balance_torque_;
-  const bool same_contacts =
-      (last.in_contact[0] != 0) == in_contact[0] && (last.in_contact[1] != 0) == in_contact[1];
-  if (balanced_index_ < 0 || !same_contacts) {
+  const FootArray<bool> last_contact{last.in_contact[0] != 0, last.in_contact[1] != 0};
+  if (balanced_index_ < 0 || last_contact != in_contact) {
     cop_error_.setZero();
     return;
   }
   // A reading shows the tick before; after skipped ticks it may show any.
   if (balanced_index_ != tick.index - 1) return;
   balance::Vector6d measured = balance::Vector6d::Zero();
-  for (size_t i = 0; i < 2; ++i) {
-    if (!in_contact[i]) continue;
-    measured += balance::WrenchTransform(frame_o, whole_body_->data().foot_pose[i]) *
-                GetWrench(robot_state_->foot_wrench[i]);
+  for (const Foot f : kFeet) {
+    if (!in_contact[f]) continue;
+    measured += balance::WrenchTransform(frame_o, whole_body_->data().foot_pose[f]) *
+                GetWrench(robot_state_->foot_wrench[Index(f)]);
   }
   const Eigen::Vector2d error =
       balance::CenterOfPressure(measured) - Eigen::Vector2d(last.cop[0], last.cop[1]);
@@ -378,8 +381,8 @@ void ContactWrenchMonitor::UpdateCopError(const Eigen::Isometry3d& frame_o,
 }
 
 void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,
-                                    std::array<balance::ConvexPolygon, 2>* soles) const {
-  constexpr std::array<const char*, 2> kField = {"sole_margin", "side_margin"};
+                                    FootArray<balance::ConvexPolygon>* soles) const {
+  constexpr const char* kField[] = {"sole_margin", "side_margin"};
   for (int axis = 0; axis < 2; ++axis) {
     for (const robot::FootModel& foot : model_->feet()) {
       if (margin[axis] < robot::InnerRadius(foot)) continue;
@@ -389,25 +392,26 @@ void ContactWrenchMonitor::CutSoles(const Eigen::Vector2d& margin,
                                     margin[axis], foot.name, foot.length, foot.width));
     }
   }
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     (*soles)[f] = balance::SolePolygon(model_->feet()[f], margin.x(), margin.y());
   }
 }
 
 balance::ConvexPolygon ContactWrenchMonitor::Soles(const Eigen::Isometry3d& frame_o) const {
   const balance::ContactGeometry& geometry = whole_body_->geometry();
-  const bool both = geometry.in_contact[0] && geometry.in_contact[1];
+  const bool both = Count(geometry.in_contact) == 2;
   return balance::WithFewerCorners(
       balance::SupportPolygon(frame_o, geometry, both ? shared_sole_ : sole_), kMostCorners);
 }
 
-balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& in_contact) const {
-  if (!(in_contact[0] && in_contact[1])) return single_support_;
+balance::ContactLimits ContactWrenchMonitor::Limits(const FootArray<bool>& in_contact) const {
+  if (Count(in_contact) < 2) return single_support_;
   balance::ContactLimits limits = double_support_;
   if (beyond_soles_) {
     const auto& sole = whole_body_->geometry().sole;
     limits.half_width =
-        0.5 * (sole[0].translation() - sole[1].translation()).norm() + *beyond_soles_;
+        0.5 * (sole[Foot::kRight].translation() - sole[Foot::kLeft].translation()).norm() +
+        *beyond_soles_;
   }
   return limits;
 }
@@ -415,7 +419,7 @@ balance::ContactLimits ContactWrenchMonitor::Limits(const std::array<bool, 2>& i
 void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
                                   const balance::ContactLimits& limits,
                                   const balance::ConvexPolygon& region,
-                                  const std::array<bool, 2>& in_contact) {
+                                  const FootArray<bool>& in_contact) {
   balance_torque_t& out = *balance_torque_;
   for (size_t i = 0; i < out.torque.size(); ++i) {
     out.torque[i] = torque_[static_cast<Eigen::Index>(i)];
@@ -425,9 +429,10 @@ void ContactWrenchMonitor::Report(const balance::BalanceResult& result,
   auto wrench = foot_wrench_.head(contact.num_contact_rows());
   contact.ExpectedWrench(torque_, wrench);
   Eigen::Index row = 0;
-  for (size_t i = 0; i < 2; ++i) {
-    out.in_contact[i] = in_contact[i] ? 1 : 0;
-    if (in_contact[i]) {
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    out.in_contact[i] = in_contact[f] ? 1 : 0;
+    if (in_contact[f]) {
       SetWrench(wrench.segment<6>(row), &out.foot_wrench[i]);
       row += 6;
     } else {

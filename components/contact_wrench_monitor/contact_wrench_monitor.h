@@ -2,7 +2,6 @@
 // balancing (39)–(46).
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 
@@ -38,8 +37,8 @@ class ContactWrenchMonitor : public Component, public Operated {
   void Prepare();
   void Balance(const Tick& tick);
   /// Dynamics and protected task for these contacts; STATUS_*.
-  int8_t ComputeDynamics(const std::array<bool, 2>& in_contact);
-  int8_t ComputeBalance(const std::array<bool, 2>& in_contact, const Tick& tick);
+  int8_t ComputeDynamics(const robot::FootArray<bool>& in_contact);
+  int8_t ComputeBalance(const robot::FootArray<bool>& in_contact, const Tick& tick);
   /// BalanceControl by the configured movers, within the joints' limits. torque_ on entry the task
   /// torque.
   template <class Bounds>
@@ -59,17 +58,18 @@ class ContactWrenchMonitor : public Component, public Operated {
   /// air. False, and torque_ as it was, where it finds nothing.
   bool MoveForStep(const balance::ContactGeometry& geometry, const balance::ConvexPolygon& region,
                    balance::BalanceResult* result);
-  balance::ContactLimits Limits(const std::array<bool, 2>& in_contact) const;
+  balance::ContactLimits Limits(const robot::FootArray<bool>& in_contact) const;
   /// Both soles less `margin`, m: x at toe and heel, y at the sides. ConfigError: nothing is left.
-  void CutSoles(const Eigen::Vector2d& margin, std::array<balance::ConvexPolygon, 2>* soles) const;
+  void CutSoles(const Eigen::Vector2d& margin,
+                robot::FootArray<balance::ConvexPolygon>* soles) const;
   /// The hull of the soles in contact, less the margin.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o) const;
   /// Measured less computed centre of pressure, filtered, m, frame O: what a reading of this tick
   /// says of the tick before.
-  void UpdateCopError(const Eigen::Isometry3d& frame_o, const std::array<bool, 2>& in_contact,
+  void UpdateCopError(const Eigen::Isometry3d& frame_o, const robot::FootArray<bool>& in_contact,
                       const Tick& tick);
   void Report(const balance::BalanceResult& result, const balance::ContactLimits& limits,
-              const balance::ConvexPolygon& region, const std::array<bool, 2>& in_contact);
+              const balance::ConvexPolygon& region, const robot::FootArray<bool>& in_contact);
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
@@ -96,16 +96,16 @@ class ContactWrenchMonitor : public Component, public Operated {
   std::optional<double> beyond_soles_;  // m
   bool polygon_ = false;                // the region is the soles' hull
   // Less the margin, m, sole frames: alone on the ground, and with the other foot.
-  std::array<balance::ConvexPolygon, 2> sole_, shared_sole_;
+  robot::FootArray<balance::ConvexPolygon> sole_, shared_sole_;
   double cop_feedback_ = 0, cop_feedback_time_ = 0;  // share, s
   Eigen::Vector2d cop_error_ = Eigen::Vector2d::Zero();
   int64_t balanced_index_ = -1;  // tick of the output's centre of pressure; −1: none
   double balanced_time_ = 0;     // s
   robot::RobotState state_;
   bool state_valid_ = false;
-  std::array<bool, 2> in_contact_{true, true};  // of the last tick
-  Eigen::MatrixXd height_jacobian_;             // 1×n
-  Eigen::VectorXd height_bias_;                 // 1×1
+  robot::FootArray<bool> in_contact_{true, true};  // of the last tick
+  Eigen::MatrixXd height_jacobian_;                // 1×n
+  Eigen::VectorXd height_bias_;                    // 1×1
   Eigen::VectorXd torque_;
   Eigen::VectorXd foot_wrench_;  // room for both feet
 };

@@ -13,6 +13,9 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+using robot::FootArray;
+
 double TwoDigits(double value) {
   if (!(value > 0)) return 0;
   const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
@@ -41,23 +44,22 @@ WrenchFeedback WithRobotLimits(WrenchFeedback feedback, const robot::RobotModel&
   return feedback;
 }
 
-InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measured,
-                                 const std::array<Eigen::Isometry3d, 2>& foot, double eta) {
-  const balance::Vector6d right = IntoO(foot[0]) * measured[0];
-  const balance::Vector6d resultant = right + IntoO(foot[1]) * measured[1];
+InternalWrench DistributionError(const FootArray<balance::Vector6d>& measured,
+                                 const FootArray<Eigen::Isometry3d>& foot, double eta) {
+  const balance::Matrix6d right_into_o = IntoO(foot[Foot::kRight]);
+  const balance::Vector6d right = right_into_o * measured[Foot::kRight];
+  const balance::Vector6d resultant = right + IntoO(foot[Foot::kLeft]) * measured[Foot::kLeft];
   const auto wanted = balance::DistributeResultant(resultant, foot, eta);
-  return IntoO(foot[0]) * wanted[0] - right;
+  return right_into_o * wanted[Foot::kRight] - right;
 }
 
 Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
-                                          const std::array<Eigen::Isometry3d, 2>& foot) {
+                                          const FootArray<Eigen::Isometry3d>& foot) {
   Eigen::Matrix<double, 12, 1> change;
-  for (int i = 0; i < 2; ++i) {
-    const auto f = static_cast<size_t>(i);
+  for (const Foot f : robot::kFeet) {
     // From O into the sole's frame: the transform of the inverse pose.
-    change.segment<6>(6 * i) =
-        (i == 0 ? 1.0 : -1.0) *
-        (balance::WrenchTransform(foot[f], Eigen::Isometry3d::Identity()) * internal);
+    change.segment<6>(6 * static_cast<Eigen::Index>(f)) =
+        -Side(f) * (balance::WrenchTransform(foot[f], Eigen::Isometry3d::Identity()) * internal);
   }
   return change;
 }

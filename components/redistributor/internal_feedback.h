@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/balance/contact_dynamics.h"
 #include "components/framework/state_archive.h"
@@ -15,13 +14,13 @@ namespace poise {
 using InternalWrench = balance::Vector6d;
 
 /// What the feet lack to share their measured resultant at `eta` as (62)–(67) do. `measured`: robot
-/// on environment, each in its sole frame; `foot`: soles in frame O, right first.
-InternalWrench DistributionError(const std::array<balance::Vector6d, 2>& measured,
-                                 const std::array<Eigen::Isometry3d, 2>& foot, double eta);
+/// on environment, each in its sole frame; `foot`: soles in frame O.
+InternalWrench DistributionError(const robot::FootArray<balance::Vector6d>& measured,
+                                 const robot::FootArray<Eigen::Isometry3d>& foot, double eta);
 
 /// The change of both feet's wrenches, each in its sole frame, 12×1, right first.
 Eigen::Matrix<double, 12, 1> WrenchChange(const InternalWrench& internal,
-                                          const std::array<Eigen::Isometry3d, 2>& foot);
+                                          const robot::FootArray<Eigen::Isometry3d>& foot);
 
 /// `config`, with what it leaves to the robot: docs/reference/robots.md has the rules.
 WrenchFeedback WithRobotLimits(WrenchFeedback config, const robot::RobotModel& model);

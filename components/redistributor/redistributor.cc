@@ -19,8 +19,11 @@ std::string_view redistributor_proto_schema();  // generated
 namespace {
 
 using balance::Vector6d;
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
 
-constexpr std::array<bool, 2> kBoth{true, true};
+constexpr FootArray<bool> kBoth(true);
 // What an operator may ask of the lighter foot at most; at a half nothing would be left to choose.
 constexpr double kMostLightShare = 0.45;
 // s that an operator's change takes, so that the torque makes no step.
@@ -42,7 +45,7 @@ void Redistributor::Configure(const ComponentContext& context, Wiring* wiring) {
   const double margin = SoleMargin(*model_);
   double_support_ = ReadSoleLimits(config.double_support(), *model_, margin, "double_support");
   single_support_ = ReadSoleLimits(config.single_support(), *model_, margin, "single_support");
-  for (size_t i = 0; i < 2; ++i) sole_[i] = balance::CornersOf(double_support_[i].edges);
+  for (const Foot f : kFeet) sole_[f] = balance::CornersOf(double_support_[f].edges);
   eta_min_ = config.eta_min();
   eta_max_ = config.eta_max();
   if (eta_min_ >= eta_max_) throw ConfigError("eta_min", "must be less than eta_max");
@@ -115,26 +118,26 @@ void Redistributor::Redistribute(const Tick& tick) {
   joint_command_t& out = *joint_command_;
   const bool held = balance.status == balance_torque_t::STATUS_HELD ||
                     balance.status == balance_torque_t::STATUS_INVALID_STATE;
-  const std::array<bool, 2> in_contact{support_plan_->in_contact[0] != 0,
-                                       support_plan_->in_contact[1] != 0};
-  if (held || !state_valid_ || !AllFinite(balance.torque) || !(in_contact[0] || in_contact[1])) {
+  const FootArray<bool> in_contact{support_plan_->in_contact[0] != 0,
+                                   support_plan_->in_contact[1] != 0};
+  if (held || !state_valid_ || !AllFinite(balance.torque) || Count(in_contact) == 0) {
     ClearImpedance(&out);  // its target is of another tick
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }
-  for (size_t i = 0; i < 2; ++i) out.in_contact[i] = in_contact[i] ? 1 : 0;
+  for (const Foot f : kFeet) out.in_contact[Index(f)] = in_contact[f] ? 1 : 0;
   if (balance.status == balance_torque_t::STATUS_SINGULAR) {
     PassTorqueThrough();
     ClearImpedance(&out);
     out.status = joint_command_t::STATUS_INVALID_INPUT;
     return;
   }
-  out.status = in_contact[0] && in_contact[1] ? ComputeDouble(tick) : ComputeSingle(in_contact);
+  out.status = Count(in_contact) == 2 ? ComputeDouble(tick) : ComputeSingle(in_contact);
   swing_friction_.Ramp(in_contact, out.eta);
   if (impedance_.enabled() || swing_friction_.acts()) FollowMotion(in_contact);
 }
 
-void Redistributor::FollowMotion(const std::array<bool, 2>& in_contact) {
+void Redistributor::FollowMotion(const FootArray<bool>& in_contact) {
   joint_command_t& out = *joint_command_;
   if (!whole_body_->Update(state_, in_contact)) return ClearImpedance(&out);
   const int num_joints = model_->num_joints();
@@ -147,12 +150,12 @@ void Redistributor::FollowMotion(const std::array<bool, 2>& in_contact) {
   swing_friction_.Add(state_.joint_velocity, joint_acceleration, out.torque);
 }
 
-int8_t Redistributor::ComputeSingle(const std::array<bool, 2>& in_contact) {
+int8_t Redistributor::ComputeSingle(const FootArray<bool>& in_contact) {
   joint_command_t& out = *joint_command_;
   PassTorqueThrough();
   ForgetDistribution();
-  landed_foot_ = -1;
-  out.eta = out.eta_optimal = in_contact[0] ? 1.0 : 0.0;
+  landed_foot_.reset();
+  out.eta = out.eta_optimal = in_contact[Foot::kRight] ? 1.0 : 0.0;
   out.eta_min = out.eta_max = out.eta;
   out.eta_feasible = 1;
   Report({GetWrench(balance_torque_->foot_wrench[0]), GetWrench(balance_torque_->foot_wrench[1])},
@@ -164,13 +167,13 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   joint_command_t& out = *joint_command_;
   const Vector6d resultant = GetWrench(balance_torque_->resultant);
   const Eigen::Isometry3d frame_o = GetPose(balance_torque_->frame_o);
-  std::array<Eigen::Isometry3d, 2> sole_in_o;
+  FootArray<Eigen::Isometry3d> sole_in_o;
   Wrenches wrench;
-  for (size_t i = 0; i < 2; ++i) {
-    sole_in_o[i] = frame_o.inverse() * whole_body_->data().foot_pose[i];
-    wrench[i] = GetWrench(balance_torque_->foot_wrench[i]);
+  for (const Foot f : kFeet) {
+    sole_in_o[f] = frame_o.inverse() * whole_body_->data().foot_pose[f];
+    wrench[f] = GetWrench(balance_torque_->foot_wrench[Index(f)]);
   }
-  const bool own_soles = sole_[0].num_corners > 0 && sole_[1].num_corners > 0;
+  const bool own_soles = sole_[Foot::kRight].num_corners > 0 && sole_[Foot::kLeft].num_corners > 0;
   const auto allowed = [&](double least, double most) {
     return own_soles ? balance::FreeRatio(resultant, sole_in_o, double_support_, sole_, least, most)
                      : balance::FeasibleRatio(resultant, sole_in_o, double_support_, least, most);
@@ -193,7 +196,8 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
     Wrenches desired = balance::DistributeResultant(resultant, sole_in_o, out.eta);
     if (own_soles) balance::MoveIntoSoles(sole_in_o, sole_, &desired);
     Eigen::Matrix<double, 12, 1> change;
-    change << desired[0] - wrench[0], desired[1] - wrench[1];
+    change << desired[Foot::kRight] - wrench[Foot::kRight],
+        desired[Foot::kLeft] - wrench[Foot::kLeft];
     balance::RedistributionTorque(contact_jacobian_, change, torque_);
     for (size_t i = 0; i < out.torque.size(); ++i) {
       out.redistribution_torque[i] = torque_[static_cast<Eigen::Index>(i)];
@@ -204,7 +208,7 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
   } else {
     PassTorqueThrough();
     ForgetDistribution();
-    const double right = (sole_in_o[0].linear() * wrench[0].head<3>()).z();
+    const double right = (sole_in_o[Foot::kRight].linear() * wrench[Foot::kRight].head<3>()).z();
     out.eta = pressed ? right / resultant[2] : 0.5;
   }
   Report(wrench, double_support_, kBoth);
@@ -213,27 +217,28 @@ int8_t Redistributor::ComputeDouble(const Tick& tick) {
 
 balance::RatioInterval Redistributor::KeepLanded(balance::RatioInterval interval) {
   const support_plan_t& plan = *support_plan_;
-  if (plan.transition == support_plan_t::TRANSITION_LOADING) landed_foot_ = plan.transition_foot;
-  if (landed_foot_ == robot::kRightFoot) {
+  if (plan.transition == support_plan_t::TRANSITION_LOADING)
+    landed_foot_ = robot::FootAt(plan.transition_foot);
+  if (landed_foot_ == Foot::kRight) {
     interval.min = std::clamp(landed_share_, interval.min, interval.max);
-  } else if (landed_foot_ >= 0) {
+  } else if (landed_foot_ == Foot::kLeft) {
     interval.max = std::clamp(1 - landed_share_, interval.min, interval.max);
   }
   return interval;
 }
 
 double Redistributor::RampedRatio(double free_ratio, const Vector6d& resultant,
-                                  std::array<Eigen::Isometry3d, 2> sole_in_o) const {
+                                  FootArray<Eigen::Isometry3d> sole_in_o) const {
   const support_plan_t& plan = *support_plan_;
   if (!transition_ || plan.transition == support_plan_t::TRANSITION_NONE) return free_ratio;
   const bool unloading = plan.transition == support_plan_t::TRANSITION_UNLOADING;
-  const double ramped = balance::TransitionRatio(free_ratio, plan.transition_foot, unloading,
-                                                 plan.transition_progress);
+  const Foot light = robot::FootAt(plan.transition_foot);
+  const double ramped =
+      balance::TransitionRatio(free_ratio, light, unloading, plan.transition_progress);
   // Only the loaded foot's conditions count: both soles turned like it, the other's are the same.
-  const size_t light = plan.transition_foot == robot::kRightFoot ? 0 : 1;
-  sole_in_o[light].linear() = sole_in_o[1 - light].linear();
+  sole_in_o[light].linear() = sole_in_o[Other(light)].linear();
   const balance::RatioInterval allowed =
-      balance::FeasibleRatio(resultant, sole_in_o, double_support_[1 - light], 0.0, 1.0);
+      balance::FeasibleRatio(resultant, sole_in_o, double_support_[Other(light)], 0.0, 1.0);
   return allowed.feasible ? std::clamp(ramped, allowed.min, allowed.max) : ramped;
 }
 
@@ -247,14 +252,14 @@ double Redistributor::FeedbackShare(double eta) const {
 }
 
 bool Redistributor::AboutToTip(const Wrenches& desired) const {
-  for (size_t i = 0; i < 2; ++i) {
-    const Eigen::Vector2d cop = balance::CenterOfPressure(desired[i]);
-    if (!(robot::DistanceInside(model_->feet()[i], cop) >= feedback_edge_)) return true;
+  for (const Foot f : kFeet) {
+    const Eigen::Vector2d cop = balance::CenterOfPressure(desired[f]);
+    if (!(robot::DistanceInside(model_->feet()[f], cop) >= feedback_edge_)) return true;
   }
   return false;
 }
 
-void Redistributor::AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o,
+void Redistributor::AddFeedback(const Tick& tick, const FootArray<Eigen::Isometry3d>& sole_in_o,
                                 const Wrenches& desired) {
   joint_command_t& out = *joint_command_;
   InternalWrench answer = InternalWrench::Zero();
@@ -298,15 +303,16 @@ void Redistributor::PassTorqueThrough() {
 }
 
 void Redistributor::Report(const Wrenches& wrench, const balance::SoleLimits& limits,
-                           const std::array<bool, 2>& in_contact) {
+                           const FootArray<bool>& in_contact) {
   joint_command_t& out = *joint_command_;
-  for (size_t i = 0; i < 2; ++i) {
-    const Vector6d value = in_contact[i] ? wrench[i] : Vector6d(Vector6d::Zero());
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    const Vector6d value = in_contact[f] ? wrench[f] : Vector6d(Vector6d::Zero());
     const balance::ContactMargins margins =
-        in_contact[i] ? balance::CheckContact(value, limits[i]) : balance::ContactMargins{};
+        in_contact[f] ? balance::CheckContact(value, limits[f]) : balance::ContactMargins{};
     SetWrench(value, &out.foot_wrench[i]);
     SetMargins(margins, &out.margins[i]);
-    out.conditions_met[i] = !in_contact[i] || margins.Met() ? 1 : 0;
+    out.conditions_met[i] = !in_contact[f] || margins.Met() ? 1 : 0;
   }
 }
 

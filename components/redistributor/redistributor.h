@@ -2,7 +2,6 @@
 // the feet, (47)–(53).
 #pragma once
 
-#include <array>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -36,22 +35,22 @@ class Redistributor : public Component, public Operated {
   const LiveSettings& live_settings() const override { return operator_.settings(); }
 
  private:
-  using Wrenches = std::array<balance::Vector6d, 2>;
+  using Wrenches = robot::FootArray<balance::Vector6d>;
 
   void AddSettings(double tick_period);
   void TakeActs(const Tick& tick);
   void Prepare();
   void Redistribute(const Tick& tick);
   int8_t ComputeDouble(const Tick& tick);
-  int8_t ComputeSingle(const std::array<bool, 2>& in_contact);
+  int8_t ComputeSingle(const robot::FootArray<bool>& in_contact);
   /// `interval` less the ratios that leave a landed foot less than its share; never empty.
   balance::RatioInterval KeepLanded(balance::RatioInterval interval);
   /// η on the ramp of section 6.2, kept inside what the conditions of the loaded foot allow.
   double RampedRatio(double free_ratio, const balance::Vector6d& resultant,
-                     std::array<Eigen::Isometry3d, 2> sole_in_o) const;
+                     robot::FootArray<Eigen::Isometry3d> sole_in_o) const;
   /// Adds what answers the measured wrenches to the command; `sole_in_o` as distributed, `desired`
   /// in the sole frames.
-  void AddFeedback(const Tick& tick, const std::array<Eigen::Isometry3d, 2>& sole_in_o,
+  void AddFeedback(const Tick& tick, const robot::FootArray<Eigen::Isometry3d>& sole_in_o,
                    const Wrenches& desired);
   /// A foot's centre of pressure is nearer than feedback.edge to the edge of its sole.
   bool AboutToTip(const Wrenches& desired) const;
@@ -59,11 +58,11 @@ class Redistributor : public Component, public Operated {
   /// a change of support makes no step.
   double FeedbackShare(double eta) const;
   /// Adds to the command what follows from the motion that its torque is computed to cause.
-  void FollowMotion(const std::array<bool, 2>& in_contact);
+  void FollowMotion(const robot::FootArray<bool>& in_contact);
   void ForgetDistribution();
   void PassTorqueThrough();
   void Report(const Wrenches& wrench, const balance::SoleLimits& limits,
-              const std::array<bool, 2>& in_contact);
+              const robot::FootArray<bool>& in_contact);
 
   Input<robot_state_t> robot_state_;
   Input<support_plan_t> support_plan_;
@@ -76,7 +75,7 @@ class Redistributor : public Component, public Operated {
   bool redistribution_ = true, transition_ = true;
   double eta_min_ = 0, eta_max_ = 1;
   double landed_share_ = 0;
-  int landed_foot_ = -1;  // -1: none
+  std::optional<robot::Foot> landed_foot_;
   RatioMoves ratio_moves_;
   InternalFeedback feedback_;
   PlannedImpedance impedance_;
@@ -92,7 +91,7 @@ class Redistributor : public Component, public Operated {
   balance::SoleLimits double_support_, single_support_;
   // double_support_'s edges make these, sole frames; empty for rectangles, which both feet have
   // alike.
-  std::array<balance::ConvexPolygon, 2> sole_;
+  robot::FootArray<balance::ConvexPolygon> sole_;
   robot::RobotState state_;
   bool state_valid_ = false;
   Eigen::MatrixXd contact_jacobian_;  // 12×n

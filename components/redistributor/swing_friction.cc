@@ -7,6 +7,10 @@
 
 namespace poise {
 
+using robot::Foot;
+using robot::FootArray;
+using robot::kFeet;
+
 double FrictionTorque(const robot::MotorModel& motor, double velocity, double smoothing) {
   return motor.coulomb_friction * std::tanh(velocity / smoothing) +
          motor.viscous_friction * velocity;
@@ -22,18 +26,18 @@ SwingFriction::SwingFriction(const FrictionCompensation& config, const robot::Ro
   if (share_ == 0) return;
   for (int j = 0; j < model.num_joints(); ++j) {
     Joint joint{.index = j, .motor = model.motors()[static_cast<size_t>(j)]};
-    for (size_t f = 0; f < 2; ++f) {
+    for (const Foot f : kFeet) {
       const std::span<const int> leg = model.supporting_joints(model.feet()[f].body);
       joint.carries[f] = std::ranges::find(leg, j) != leg.end();
     }
-    if (joint.carries[0] || joint.carries[1]) joints_.push_back(joint);
+    if (Count(joint.carries) > 0) joints_.push_back(joint);
   }
 }
 
-void SwingFriction::Ramp(const std::array<bool, 2>& in_contact, double eta) {
+void SwingFriction::Ramp(const FootArray<bool>& in_contact, double eta) {
   if (joints_.empty()) return;
-  const std::array<double, 2> load{eta, 1 - eta};
-  for (size_t f = 0; f < 2; ++f) {
+  const FootArray<double> load{eta, 1 - eta};
+  for (const Foot f : kFeet) {
     double open = 1;
     if (in_contact[f]) open = load[f] < fade_load_ ? 1 - std::max(load[f], 0.0) / fade_load_ : 0;
     swing_[f] = std::clamp(open, swing_[f] - rate_, swing_[f] + rate_);
@@ -44,8 +48,8 @@ void SwingFriction::Add(const Eigen::Ref<const Eigen::VectorXd>& velocity,
                         const Eigen::Ref<const Eigen::VectorXd>& acceleration,
                         std::span<double> torque) const {
   for (const Joint& joint : joints_) {
-    const double swing =
-        std::min(joint.carries[0] ? swing_[0] : 1.0, joint.carries[1] ? swing_[1] : 1.0);
+    const auto left_by = [&](Foot f) { return joint.carries[f] ? swing_[f] : 1.0; };
+    const double swing = std::min(left_by(Foot::kRight), left_by(Foot::kLeft));
     if (swing == 0) continue;
     const double asked = velocity[joint.index] + lead_ * acceleration[joint.index];
     torque[static_cast<size_t>(joint.index)] +=

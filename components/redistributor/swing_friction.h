@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <span>
 #include <vector>
 
@@ -33,9 +32,9 @@ class SwingFriction {
 
   /// Once a tick, before Add: leads what each leg gets to what its foot leaves open, 1 out of
   /// contact, less with its load, along the ramp. `eta`: share of F_z that the right foot carries.
-  void Ramp(const std::array<bool, 2>& in_contact, double eta);
+  void Ramp(const robot::FootArray<bool>& in_contact, double eta);
   /// Whether Add would add anything.
-  bool acts() const { return swing_[0] > 0 || swing_[1] > 0; }
+  bool acts() const { return swing_[robot::Foot::kRight] > 0 || swing_[robot::Foot::kLeft] > 0; }
   /// Adds to `torque` (N·m, by joint). `velocity` rad/s and `acceleration` rad/s² by joint. A joint
   /// that carries both feet gets what the more loaded one leaves.
   void Add(const Eigen::Ref<const Eigen::VectorXd>& velocity,
@@ -45,17 +44,17 @@ class SwingFriction {
  private:
   struct Joint {
     int index = -1;
-    std::array<bool, 2> carries{};  // by foot
+    robot::FootArray<bool> carries{};
     robot::MotorModel motor;
   };
 
   std::vector<Joint> joints_;  // of the legs, with friction; none: not enabled
   double share_ = 0;
-  double lead_ = 0;                // s
-  double smoothing_ = 1;           // rad/s
-  double rate_ = 0;                // of the ramp, in a tick
-  double fade_load_ = 0;           // share of F_z
-  std::array<double, 2> swing_{};  // by foot: 0 holds the leg, 1 swings
+  double lead_ = 0;                 // s
+  double smoothing_ = 1;            // rad/s
+  double rate_ = 0;                 // of the ramp, in a tick
+  double fade_load_ = 0;            // share of F_z
+  robot::FootArray<double> swing_;  // 0 holds the leg, 1 swings
 };
 
 }  // namespace poise

@@ -10,6 +10,9 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+using robot::kFeet;
+
 // The COM's frequency is this share of the foot's own. Chosen, as the next, on blocks that three
 // robots fell from; others judge it (docs/gains.md).
 constexpr double kShare = 0.5;
@@ -21,12 +24,12 @@ constexpr double kFilterTime = 0.2;  // s, of the compliance: no step of the gai
 }  // namespace
 
 SoftGround::SoftGround(const robot::RobotModel& model, double period)
-    : inertia_{LegInertia(model, 0), LegInertia(model, 1)},
+    : inertia_{LegInertia(model, Foot::kRight), LegInertia(model, Foot::kLeft)},
       share_(period / (kFilterTime + period)),
       least_load_(kLoadShare * model.total_mass() * robot::kGravity),
       least_frequency_(kLeast * balance::PendulumFrequency(model)) {}
 
-double SoftGround::LegInertia(const robot::RobotModel& model, size_t foot) {
+double SoftGround::LegInertia(const robot::RobotModel& model, Foot foot) {
   robot::RobotData data(model);
   robot::RobotState state(model.num_joints());
   state.joint_position = model.stance().joint_position;
@@ -47,10 +50,10 @@ double SoftGround::LegInertia(const robot::RobotModel& model, size_t foot) {
   return mobility.llt().solve(Eigen::Matrix<double, 6, 1>::Unit(2))[2];
 }
 
-void SoftGround::Update(const std::array<Foot, 2>& feet) {
-  for (size_t i = 0; i < 2; ++i) {
-    Trace& trace = trace_[i];
-    const Foot& foot = feet[i];
+void SoftGround::Update(const robot::FootArray<FootState>& feet) {
+  for (const Foot f : kFeet) {
+    Trace& trace = trace_[f];
+    const FootState& foot = feet[f];
     if (!foot.put_down) {
       trace = {.stands = false};
       continue;
@@ -65,9 +68,9 @@ void SoftGround::Update(const std::array<Foot, 2>& feet) {
 
 balance::TaskGains SoftGround::Limited(balance::TaskGains gains) const {
   double most = HUGE_VAL;  // rad/s
-  for (size_t i = 0; i < 2; ++i) {
-    if (trace_[i].compliance > 0) {
-      most = std::min(most, kShare / std::sqrt(trace_[i].compliance * inertia_[i]));
+  for (const Foot f : kFeet) {
+    if (trace_[f].compliance > 0) {
+      most = std::min(most, kShare / std::sqrt(trace_[f].compliance * inertia_[f]));
     }
   }
   most = std::max(most, least_frequency_);

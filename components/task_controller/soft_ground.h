@@ -1,8 +1,6 @@
 // How fast the COM may be controlled on a foot that was put down on something soft.
 #pragma once
 
-#include <array>
-
 #include "components/balance/tasks/task.h"
 #include "components/framework/state_archive.h"
 #include "components/robot/robot_model.h"
@@ -15,7 +13,7 @@ namespace poise {
 /// sunk under its load since it became a contact.
 class SoftGround {
  public:
-  struct Foot {
+  struct FootState {
     bool put_down = false;  ///< a contact, made by no step of the planner's own
     double height = 0;      ///< m, of the sole
     double load = 0;        ///< N
@@ -26,14 +24,14 @@ class SoftGround {
   SoftGround(const robot::RobotModel& model, double period);
 
   /// Once a tick.
-  void Update(const std::array<Foot, 2>& feet);
+  void Update(const robot::FootArray<FootState>& feet);
   /// `gains` at a lower frequency, with the same damping ratio, where the ground is soft.
   balance::TaskGains Limited(balance::TaskGains gains) const;
   void Archive(StateArchive* archive);
 
   /// kg, that a foot of this leg weighs vertically in the stance while its sole does not turn and
   /// the base rests: links and rotors.
-  static double LegInertia(const robot::RobotModel& model, size_t foot);
+  static double LegInertia(const robot::RobotModel& model, robot::Foot foot);
 
  private:
   struct Trace {
@@ -43,11 +41,11 @@ class SoftGround {
     double compliance = 0;        // m/N, filtered
   };
 
-  std::array<Trace, 2> trace_;
-  std::array<double, 2> inertia_{};  // kg
-  double share_ = 0;                 // of the filter, in a tick
-  double least_load_ = 0;            // N, more, from which on the ground shows itself
-  double least_frequency_ = 0;       // rad/s
+  robot::FootArray<Trace> trace_;
+  robot::FootArray<double> inertia_;  // kg
+  double share_ = 0;                  // of the filter, in a tick
+  double least_load_ = 0;             // N, more, from which on the ground shows itself
+  double least_frequency_ = 0;        // rad/s
 };
 
 }  // namespace poise

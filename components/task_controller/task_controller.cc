@@ -16,6 +16,9 @@ namespace poise {
 std::string_view task_controller_proto_schema();  // generated
 namespace {
 
+using robot::Foot;
+using robot::kFeet;
+
 // Shares of the start's gains that an operator may go to: beyond, the delay of the drive train
 // makes them unstable, or they hold nothing up. Chosen.
 constexpr double kLeastGain = 0.25, kMostGain = 4;
@@ -38,11 +41,10 @@ int NumOthers(const robot::RobotModel& model) {
 /// theirs.
 void CheckRows(const TaskList& tasks, const robot::RobotModel& model, const FeetInContact& feet,
                int others) {
-  const char* support = feet[0] && feet[1] ? "on both feet"
-                        : feet[0]          ? "on the right foot"
-                                           : "on the left foot";
-  const int motions =
-      model.num_velocities() - others - 6 * (feet[0] ? 1 : 0) - 6 * (feet[1] ? 1 : 0);
+  const char* support = Count(feet) == 2     ? "on both feet"
+                        : feet[Foot::kRight] ? "on the right foot"
+                                             : "on the left foot";
+  const int motions = model.num_velocities() - others - 6 * Count(feet);
   const TaskList::Rows rows = tasks.CountRows(feet);
   if (rows.first > motions) {
     throw ConfigError("task", fmt::format("asks for {} motions on its first level, and robot '{}' "
@@ -74,7 +76,7 @@ void TaskController::Configure(const ComponentContext& context, Wiring* wiring) 
   if (config.joint_limits()) {
     limits_.emplace(*model_, balance::LimitHorizon(*model_, context.tick_period));
   }
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     leg_[f].assign(static_cast<size_t>(num_joints), 0);
     for (const int joint : model_->supporting_joints(model_->feet()[f].body)) {
       leg_[f][static_cast<size_t>(joint)] = 1;
@@ -129,11 +131,11 @@ void TaskController::SetGains() {
 void TaskController::FollowGround() {
   if (!soft_ground_) return;
   const support_plan_t& plan = *support_plan_;
-  std::array<SoftGround::Foot, 2> feet;
-  for (size_t i = 0; i < 2; ++i) {
-    feet[i].put_down = in_contact_[i] && plan.stepping == support_plan_t::STEPPING_NONE;
-    feet[i].height = whole_body_->data().foot_pose[i].translation().z();
-    feet[i].load = -robot_state_->foot_wrench[i].force[2];
+  robot::FootArray<SoftGround::FootState> feet;
+  for (const Foot f : kFeet) {
+    feet[f].put_down = in_contact_[f] && plan.stepping == support_plan_t::STEPPING_NONE;
+    feet[f].height = whole_body_->data().foot_pose[f].translation().z();
+    feet[f].load = -robot_state_->foot_wrench[Index(f)].force[2];
   }
   soft_ground_->Update(feet);
   if (soft_ground_->Limited(gains_.com).kp != com_gains_.kp) SetGains();
@@ -261,14 +263,14 @@ bool TaskController::FindLimits() {
 
 bool TaskController::Stands(int joint) const {
   const auto j = static_cast<size_t>(joint);
-  return (in_contact_[0] && leg_[0][j] != 0) || (in_contact_[1] && leg_[1][j] != 0);
+  return std::ranges::any_of(kFeet, [&](Foot f) { return in_contact_[f] && leg_[f][j] != 0; });
 }
 
 bool TaskController::SoleTurns(int joint) const {
   const auto j = static_cast<size_t>(joint);
   const robot::RobotData& data = whole_body_->data();
   const double speed = state_.joint_velocity[joint];
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     if (!in_contact_[f] || leg_[f][j] == 0) continue;
     const double turn = data.foot_velocity[f].tail<3>().dot(data.joint_axis[j]);
     if (std::abs(turn) > kSoleRate && turn * speed > kSoleShare * speed * speed) return true;

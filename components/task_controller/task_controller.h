@@ -73,8 +73,8 @@ class TaskController : public Component, public Operated {
   std::optional<balance::JointLimits> limits_;  // none: they do not enter the control
   std::array<TaskList::ForcedJoint, TaskList::kMostForced> forced_;
   size_t num_forced_ = 0;
-  std::array<std::vector<char>, 2> leg_;  // by foot: the joint lies between it and the base
-  Eigen::VectorXd acceleration_;          // n×1
+  robot::FootArray<std::vector<char>> leg_;  // the joint lies between the foot and the base
+  Eigen::VectorXd acceleration_;             // n×1
   Eigen::VectorXd posture_reference_, posture_acceleration_, posture_torque_;
   Eigen::VectorXd torque_, free_torque_;
 };

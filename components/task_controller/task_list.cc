@@ -12,6 +12,8 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+
 /// The paper's list.
 std::vector<TaskConfig> PaperTasks() {
   std::vector<TaskConfig> tasks(4);
@@ -24,13 +26,13 @@ std::vector<TaskConfig> PaperTasks() {
   return tasks;
 }
 
-TaskConfig::Reference FootReference(TaskConfig::Foot foot) {
-  return foot == TaskConfig::RIGHT ? TaskConfig::RIGHT_FOOT : TaskConfig::LEFT_FOOT;
+TaskConfig::Reference FootReference(Foot foot) {
+  return foot == Foot::kRight ? TaskConfig::RIGHT_FOOT : TaskConfig::LEFT_FOOT;
 }
 
 /// What the plan has for a task, where it has anything.
 TaskConfig::Reference DefaultReference(const TaskConfig& task) {
-  if (task.has_foot()) return FootReference(task.foot());
+  if (task.has_foot()) return FootReference(robot::FootAt(task.foot()));
   if (task.type() == "com") return TaskConfig::COM;
   if (task.type() == "orientation" && !task.has_link()) return TaskConfig::BODY;
   return TaskConfig::START;
@@ -147,7 +149,7 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
   balance::TaskSpec spec;
   spec.type = task.type();
   spec.link = task.link();
-  spec.foot = task.has_foot() ? static_cast<int>(task.foot()) : -1;
+  if (task.has_foot()) spec.foot = robot::FootAt(task.foot());
   spec.point = {task.point().x(), task.point().y(), task.point().z()};
   spec.joints.assign(task.joint().begin(), task.joint().end());
   for (const int axis : task.axis()) spec.axes[static_cast<size_t>(axis)] = true;
@@ -170,10 +172,8 @@ void TaskList::Add(const TaskConfig& task, const std::string& field,
                                          : GainsOf(needed, entry.reference, task.type(), gains));
   entry.type = task.type();
   entry.own_gains = task.has_gains();
-  for (const int foot : {0, 1}) {
-    const auto own = static_cast<TaskConfig::Foot>(foot);
-    entry.rests[static_cast<size_t>(foot)] =
-        (task.has_foot() && task.foot() == own) || entry.reference == FootReference(own);
+  for (const Foot foot : robot::kFeet) {
+    entry.rests[foot] = spec.foot == foot || entry.reference == FootReference(foot);
   }
   entry.held.joint_position = Eigen::VectorXd::Zero(model_->num_joints());
   entries_.push_back(std::move(entry));
@@ -208,9 +208,9 @@ void TaskList::Follow(const support_plan_t& plan) {
   SetPoint(GetMotion(plan.com_reference), &com_);
   com_.accelerates_only = plan.com_follows == support_plan_t::FOLLOWS_COP;
   SetRotation(GetMotion(plan.body_reference), &body_);
-  for (size_t i = 0; i < 2; ++i) {
-    SetPoint(GetMotion(plan.foot_reference[i]), &foot_[i]);
-    SetRotation(GetMotion(plan.foot_rotation_reference[i]), &foot_[i]);
+  for (const Foot f : robot::kFeet) {
+    SetPoint(GetMotion(plan.foot_reference[Index(f)]), &foot_[f]);
+    SetRotation(GetMotion(plan.foot_rotation_reference[Index(f)]), &foot_[f]);
   }
 }
 
@@ -221,9 +221,9 @@ const balance::TaskTarget& TaskList::Target(const Entry& entry) const {
     case TaskConfig::BODY:
       return body_;
     case TaskConfig::RIGHT_FOOT:
-      return foot_[0];
+      return foot_[Foot::kRight];
     case TaskConfig::LEFT_FOOT:
-      return foot_[1];
+      return foot_[Foot::kLeft];
     case TaskConfig::START:
       break;
   }

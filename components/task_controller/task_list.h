@@ -1,7 +1,7 @@
 // The controller's tasks as its configuration lists them: types, levels, and what each one follows.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,8 +17,8 @@
 
 namespace poise {
 
-/// Which feet are in contact; right first.
-using FeetInContact = std::array<bool, 2>;
+/// Which feet are in contact.
+using FeetInContact = robot::FootArray<bool>;
 
 /// Gains at `field` of the configuration. Throws ConfigError for what is no positive number, and,
 /// without `has_position`, for a kp.
@@ -73,7 +73,7 @@ class TaskList {
     std::unique_ptr<balance::Task> task;
     int level = 0;
     TaskConfig::Reference reference = TaskConfig::START;
-    std::array<bool, 2> rests{false, false};  // while this foot is in contact
+    FeetInContact rests;  // while this foot is in contact
     balance::TaskTarget held;
     std::string type;
     bool own_gains = false;
@@ -82,13 +82,14 @@ class TaskList {
   void Add(const TaskConfig& task, const std::string& field, const balance::StandingGains& gains);
   const balance::TaskTarget& Target(const Entry& entry) const;
   static bool IsActive(const Entry& entry, const FeetInContact& in_contact) {
-    return !(entry.rests[0] && in_contact[0]) && !(entry.rests[1] && in_contact[1]);
+    return std::ranges::none_of(robot::kFeet,
+                                [&](robot::Foot f) { return entry.rests[f] && in_contact[f]; });
   }
 
   std::shared_ptr<const robot::RobotModel> model_;
   std::vector<Entry> entries_;  // by level
   balance::TaskTarget com_, body_;
-  std::array<balance::TaskTarget, 2> foot_;
+  robot::FootArray<balance::TaskTarget> foot_;
   std::optional<balance::TaskHierarchy> hierarchy_;
   std::vector<int> level_rows_;
   Eigen::MatrixXd jacobian_;

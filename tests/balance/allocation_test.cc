@@ -53,7 +53,7 @@ void CountOn(const std::shared_ptr<const robot::RobotModel>& model,
   const RatioInterval interval = FeasibleRatio(result.resultant, foot, limits, 0.02, 0.98);
   const double eta = SelectRatio(interval, result.resultant, foot, limits, 0.02, 0.98);
   const auto share =
-      DistributeResultant(result.resultant, foot, TransitionRatio(eta, 0, true, 0.5));
+      DistributeResultant(result.resultant, foot, TransitionRatio(eta, Foot::kRight, true, 0.5));
   if (in_contact == kDouble) {
     Eigen::Matrix<double, 12, 1> change;
     change << share[0], share[1];

@@ -278,8 +278,8 @@ TEST(ContactTransition, RampsEndExactlyAndNeverTurnBack) {
   // Slope and curvature vanish at both ends: the step departs from them as s³.
   EXPECT_NEAR(SmoothStep(1e-3), 1e-8, 2e-11);
   EXPECT_NEAR(1 - SmoothStep(1 - 1e-3), 1e-8, 2e-11);
-  for (const int foot : {0, 1}) {
-    const double empty = foot == 0 ? 0 : 1;
+  for (const Foot foot : kFeet) {
+    const double empty = foot == Foot::kRight ? 0 : 1;
     EXPECT_EQ(TransitionRatio(0.37, foot, true, 0), 0.37);
     EXPECT_EQ(TransitionRatio(0.37, foot, true, 1), empty);
     EXPECT_EQ(TransitionRatio(0.37, foot, false, 0), empty);
@@ -301,8 +301,10 @@ TEST(ContactTransition, AtTheEndTheFootCarriesNothing) {
   Random random(6);
   const auto foot = LevelFeet(0.21);
   const Vector6d resultant = RandomResultant(random);
-  EXPECT_EQ(DistributeResultant(resultant, foot, TransitionRatio(0.4, 0, true, 1))[0].norm(), 0);
-  EXPECT_EQ(DistributeResultant(resultant, foot, TransitionRatio(0.4, 1, true, 1))[1].norm(), 0);
+  for (const Foot empty : kFeet) {
+    const double ratio = TransitionRatio(0.4, empty, true, 1);
+    EXPECT_EQ(DistributeResultant(resultant, foot, ratio)[empty].norm(), 0);
+  }
 }
 
 }  // namespace

@@ -267,7 +267,7 @@ TEST(PolygonSole, RectangleAsFourCornersIsTheRectangle) {
 /// m, that the worse foot's centre of pressure lacks of its sole, weighted as the conditions are:
 /// N·m per unit of load share.
 double Lack(const Stand& stand, const std::array<std::vector<Vector2d>, 2>& corners, double eta) {
-  const std::array<Vector6d, 2> share = DistributeResultant(stand.resultant, stand.foot, eta);
+  const FootArray<Vector6d> share = DistributeResultant(stand.resultant, stand.foot, eta);
   double worst = -HUGE_VAL;
   for (size_t i = 0; i < 2; ++i) {
     const double part = i == 0 ? eta : 1 - eta;
@@ -351,7 +351,7 @@ TEST(PolygonSole, SharesAreMovedIntoSolesWhereTheSumOfSolesHasThem) {
                                           Eigen::Isometry3d::Identity()};
     foot[0].translation() << 0.03, -0.1, 0;
     foot[1].translation() << -0.02, 0.11, 0;
-    std::array<Vector6d, 2> share{Pressed(cop, 500 * eta), Pressed(cop, 500 * (1 - eta))};
+    FootArray<Vector6d> share{Pressed(cop, 500 * eta), Pressed(cop, 500 * (1 - eta))};
     const Vector6d before = Sum(share, foot);
     MoveIntoSoles(foot, sole, &share);
     EXPECT_LT((Sum(share, foot) - before).norm(), 1e-9);
@@ -404,7 +404,7 @@ TEST(PolygonSole, MirroredSolesCanDoWhatTheirHullPromises) {
     const RatioInterval interval = FreeRatio(stand.resultant, stand.foot, limits, sole, 0.02, 0.98);
     ASSERT_TRUE(interval.feasible) << interval.limiting_condition;
     const double eta = SelectRatio(interval, stand.resultant, stand.foot, limits, 0.02, 0.98);
-    std::array<Vector6d, 2> share = DistributeResultant(stand.resultant, stand.foot, eta);
+    FootArray<Vector6d> share = DistributeResultant(stand.resultant, stand.foot, eta);
     ++tried;
     needed += !FeasibleRatio(stand.resultant, stand.foot, limits, 0.02, 0.98).feasible;
     MoveIntoSoles(stand.foot, sole, &share);

@@ -141,11 +141,11 @@ TaskSpec Spec(const std::string& type, AxisSelection axes = {}, const std::strin
 
 /// Levels of a support: the COM and the free foot; the body's orientation, and with a hand its
 /// pose; angular momentum; all joints.
-std::vector<std::vector<TaskSpec>> Levels(const std::array<bool, 2>& in_contact,
+std::vector<std::vector<TaskSpec>> Levels(const FootArray<bool>& in_contact,
                                           const std::string& hand) {
   std::vector<std::vector<TaskSpec>> levels{{Spec("com")}, {}, {}, {}};
-  for (int foot = 0; foot < 2; ++foot) {
-    if (in_contact[static_cast<size_t>(foot)]) continue;
+  for (const Foot foot : kFeet) {
+    if (in_contact[foot]) continue;
     TaskSpec free = Spec("frame");
     free.foot = foot;
     levels[0].push_back(free);

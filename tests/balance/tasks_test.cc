@@ -67,7 +67,7 @@ std::vector<TaskSpec> AllTypes(const std::string& link) {
   specs[1].link = link;
   specs[2].link = link;
   specs[2].point = Vector3d(0.1, -0.2, 0.3);
-  specs[3].foot = 1;
+  specs[3].foot = robot::Foot::kLeft;
   return specs;
 }
 
@@ -213,13 +213,13 @@ TEST(Tasks, AWrongSpecificationIsRefusedByName) {
   spec = Spec("frame");
   spec.link = "tail";
   EXPECT_EQ(refusal(spec), "link: robot 'mantis' has no link 'tail'");
-  spec.foot = 0;
+  spec.foot = robot::Foot::kRight;
   EXPECT_EQ(refusal(spec), "link: stands beside foot; give one");
   spec = Spec("joint_posture");
   spec.joints = {"left_knee", "tail"};
   EXPECT_EQ(refusal(spec), "joint: robot 'mantis' has no joint 'tail'");
   spec = Spec("angular_momentum");
-  spec.foot = 1;
+  spec.foot = robot::Foot::kLeft;
   EXPECT_EQ(refusal(spec), "foot: this task has none");
   spec = Spec("orientation");
   spec.point.x() = 1;

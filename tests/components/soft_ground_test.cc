@@ -20,13 +20,13 @@ class SoftGroundTest : public testing::Test {
  protected:
   /// The left foot comes down, and carries more and more on a spring of `stiffness`, N/m.
   balance::TaskGains AfterLanding(double stiffness, double load) {
-    std::array<SoftGround::Foot, 2> feet;
-    feet[0] = {true, 0, weight_};
-    feet[1] = {false, kTouchHeight, 0};
+    robot::FootArray<SoftGround::FootState> feet;
+    feet[robot::Foot::kRight] = {true, 0, weight_};
+    feet[robot::Foot::kLeft] = {false, kTouchHeight, 0};
     ground_.Update(feet);
     for (int tick = 0; tick < 1000; ++tick) {
       const double now = std::min(1.0, tick / 500.0) * load;
-      feet[1] = {true, kTouchHeight - now / stiffness, kTouch + now};
+      feet[robot::Foot::kLeft] = {true, kTouchHeight - now / stiffness, kTouch + now};
       ground_.Update(feet);
     }
     return ground_.Limited(kGains);
@@ -43,7 +43,7 @@ TEST_F(SoftGroundTest, ALegWeighsWhatItsKineticEnergySays) {
   robot::RobotState state(model_.num_joints());
   state.joint_position = model_.stance().joint_position;
   const robot::RobotData data = robot::Evaluate(model_, state);
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     const auto joints = model_.supporting_joints(model_.feet()[foot].body);
     ASSERT_EQ(joints.size(), 6u);
     Eigen::Matrix<double, 6, 6> jacobian;
@@ -62,7 +62,7 @@ TEST_F(SoftGroundTest, ALegWeighsWhatItsKineticEnergySays) {
 
 TEST_F(SoftGroundTest, HalfTheFrequencyOfTheFootOnItsSpring) {
   // A COM at 0.8 of kGains' frequency, so that the rule and not the least one decides.
-  const double stiffness = std::pow(2 * 8, 2) * SoftGround::LegInertia(model_, 1);
+  const double stiffness = std::pow(2 * 8, 2) * SoftGround::LegInertia(model_, robot::Foot::kLeft);
   const balance::TaskGains gains = AfterLanding(stiffness, 0.5 * weight_);
   EXPECT_NEAR(std::sqrt(gains.kp), 8, 0.01);
   EXPECT_NEAR(gains.kd / (2 * std::sqrt(gains.kp)), 0.7, 1e-12);  // the damping ratio stays
@@ -84,15 +84,15 @@ TEST_F(SoftGroundTest, WithoutLoadNothingIsSaidOfTheGround) {
 
 TEST_F(SoftGroundTest, AFootThatLeavesTheGroundForgets) {
   EXPECT_LT(AfterLanding(500, 0.5 * weight_).kp, kGains.kp);
-  ground_.Update({SoftGround::Foot{true, 0, weight_}, SoftGround::Foot{false, 0.1, 0}});
+  ground_.Update({SoftGround::FootState{true, 0, weight_}, SoftGround::FootState{false, 0.1, 0}});
   EXPECT_EQ(ground_.Limited(kGains).kp, kGains.kp);
 }
 
 // Nobody knows from where feet sank that have stood all the time.
 TEST_F(SoftGroundTest, FeetThatStandFromTheStartAreTakenAsHard) {
-  std::array<SoftGround::Foot, 2> feet;
+  robot::FootArray<SoftGround::FootState> feet;
   for (int tick = 0; tick < 500; ++tick) {
-    for (SoftGround::Foot& foot : feet) foot = {true, -1e-4 * tick, 0.001 * tick * weight_};
+    for (SoftGround::FootState& foot : feet) foot = {true, -1e-4 * tick, 0.001 * tick * weight_};
     ground_.Update(feet);
   }
   EXPECT_EQ(ground_.Limited(kGains).kp, kGains.kp);

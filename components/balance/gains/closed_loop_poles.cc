@@ -61,24 +61,24 @@ robot::RobotState WithVelocity(const robot::RobotState& at, const VectorXd& velo
 class StandingLaw {
  public:
   StandingLaw(const std::shared_ptr<const robot::RobotModel>& model, const StandingGains& gains,
-              const std::array<bool, 2>& in_contact, const robot::RobotState& stance)
+              const FootArray<bool>& in_contact, const robot::RobotState& stance)
       : model_(model),
         body_(model),
         in_contact_(in_contact),
         posture_(gains.posture),
         stance_(stance),
         hierarchy_(model->num_joints(), 18, 1) {
-    const auto add = [&](const char* type, int foot, const TaskGains& with) {
+    const auto add = [&](const char* type, std::optional<Foot> foot, const TaskGains& with) {
       TaskSpec spec;
       spec.type = type;
       spec.foot = foot;
       tasks_.push_back(CreateTask(spec, *model));
       tasks_.back()->set_gains(with);
     };
-    add("com", -1, gains.com);
-    add("orientation", -1, gains.orientation);
-    for (const int foot : {0, 1}) {
-      if (!in_contact[static_cast<size_t>(foot)]) add("frame", foot, gains.foot);
+    add("com", {}, gains.com);
+    add("orientation", {}, gains.orientation);
+    for (const Foot foot : kFeet) {
+      if (!in_contact[foot]) add("frame", foot, gains.foot);
     }
     body_.UpdateDynamics(stance);
     targets_.resize(tasks_.size());
@@ -126,7 +126,7 @@ class StandingLaw {
  private:
   std::shared_ptr<const robot::RobotModel> model_;
   WholeBody body_;
-  std::array<bool, 2> in_contact_;
+  FootArray<bool> in_contact_;
   TaskGains posture_;
   robot::RobotState stance_;
   std::vector<std::unique_ptr<Task>> tasks_;
@@ -144,7 +144,7 @@ struct Plant {
 /// Standing on contacts that hold: links move by N z, rotors by θ, u is the torque that is asked
 /// for.
 Plant MakePlant(const std::shared_ptr<const robot::RobotModel>& model,
-                const robot::RobotState& stance, const std::array<bool, 2>& in_contact,
+                const robot::RobotState& stance, const FootArray<bool>& in_contact,
                 StandingLaw* law, double period, const LoopChange& change) {
   const Index k = model->num_joints(), n = k + 6;
   const VectorXd torque = law->Torque(stance);
@@ -342,7 +342,7 @@ class TickMap {
 class Loop {
  public:
   Loop(const robot::RobotModel& model, const StandingGains& gains,
-       const std::array<bool, 2>& in_contact, double period)
+       const FootArray<bool>& in_contact, double period)
       : model_(std::make_shared<robot::RobotModel>(model)),
         in_contact_(in_contact),
         gains_(gains),
@@ -363,7 +363,7 @@ class Loop {
 
  private:
   std::shared_ptr<const robot::RobotModel> model_;
-  std::array<bool, 2> in_contact_;
+  FootArray<bool> in_contact_;
   StandingGains gains_;
   double period_;
   robot::RobotState stance_;
@@ -373,11 +373,11 @@ class Loop {
 
 }  // namespace
 
-robot::RobotState StandingState(const robot::RobotModel& model,
-                                const std::array<bool, 2>& in_contact, double lift) {
+robot::RobotState StandingState(const robot::RobotModel& model, const FootArray<bool>& in_contact,
+                                double lift) {
   robot::PostureGoal goal = robot::StandingGoal(model);
-  const bool both = in_contact[0] && in_contact[1];
-  for (const size_t foot : {0, 1}) {
+  const bool both = Count(in_contact) == 2;
+  for (const Foot foot : kFeet) {
     if (!in_contact[foot]) goal.foot[foot].translation().z() = lift;
     if (!both && in_contact[foot]) goal.com_xy = goal.foot[foot].translation().head<2>();
   }
@@ -397,7 +397,7 @@ double ClosedLoopPoles::LeastDamping(double frequency) const {
 }
 
 ClosedLoopPoles ComputeClosedLoopPoles(const robot::RobotModel& model, const StandingGains& gains,
-                                       const std::array<bool, 2>& in_contact, double period,
+                                       const FootArray<bool>& in_contact, double period,
                                        const LoopChange& change) {
   const Eigen::VectorXcd poles = Loop(model, gains, in_contact, period).Poles(change);
   ClosedLoopPoles result;
@@ -415,7 +415,7 @@ ClosedLoopPoles ComputeClosedLoopPoles(const robot::RobotModel& model, const Sta
 }
 
 double GainMargin(const robot::RobotModel& model, const StandingGains& gains,
-                  const std::array<bool, 2>& in_contact, double period, double most) {
+                  const FootArray<bool>& in_contact, double period, double most) {
   Loop loop(model, gains, in_contact, period);
   const auto stands = [&](double feedback) {
     return loop.Poles({.feedback = feedback}).cwiseAbs().maxCoeff() < 1;
@@ -431,7 +431,7 @@ double GainMargin(const robot::RobotModel& model, const StandingGains& gains,
 }
 
 int DelayMargin(const robot::RobotModel& model, const StandingGains& gains,
-                const std::array<bool, 2>& in_contact, double period, int most) {
+                const FootArray<bool>& in_contact, double period, int most) {
   Loop loop(model, gains, in_contact, period);
   for (int ticks = 0; ticks <= most; ++ticks) {
     if (!(loop.Poles({.extra_delay = ticks * period}).cwiseAbs().maxCoeff() < 1)) return ticks - 1;

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <complex>
 #include <vector>
 
@@ -35,7 +34,7 @@ double BaseVelocityShare(double cutoff, double period);
 /// The state in which a robot stands by its stance; on one foot with the COM above its sole and the
 /// other foot `lift` (m) up. RobotError when it cannot be reached.
 robot::RobotState StandingState(const robot::RobotModel& model,
-                                const std::array<bool, 2>& in_contact, double lift = 0.02);
+                                const robot::FootArray<bool>& in_contact, double lift = 0.02);
 
 /// Changes to the loop that a margin is measured with.
 struct LoopChange {
@@ -62,16 +61,16 @@ struct ClosedLoopPoles {
 /// `in_contact`: right first. `period` s, of the tick. RobotError when the stance cannot be reached
 /// or its contacts are singular.
 ClosedLoopPoles ComputeClosedLoopPoles(const robot::RobotModel& model, const StandingGains& gains,
-                                       const std::array<bool, 2>& in_contact, double period,
+                                       const robot::FootArray<bool>& in_contact, double period,
                                        const LoopChange& change = {});
 
 /// The largest factor on the feedback, from 1 up to `most`, with which it still stands, to a
 /// twentieth; below 1 when it does not stand at all: 0.
 double GainMargin(const robot::RobotModel& model, const StandingGains& gains,
-                  const std::array<bool, 2>& in_contact, double period, double most = 4);
+                  const robot::FootArray<bool>& in_contact, double period, double most = 4);
 /// The largest additional delay in ticks, up to `most`, with which it still stands; −1: not even
 /// without.
 int DelayMargin(const robot::RobotModel& model, const StandingGains& gains,
-                const std::array<bool, 2>& in_contact, double period, int most = 5);
+                const robot::FootArray<bool>& in_contact, double period, int most = 5);
 
 }  // namespace poise::balance

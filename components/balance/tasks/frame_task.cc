@@ -8,8 +8,9 @@ namespace {
 
 class FrameTask : public Task {
  public:
-  /// `sole`: the foot whose sole's centre the frame is, or −1.
-  FrameTask(robot::Frame frame, int sole, std::vector<int> rows, int num_velocities)
+  /// `sole`: the foot whose sole's centre the frame is.
+  FrameTask(robot::Frame frame, std::optional<robot::Foot> sole, std::vector<int> rows,
+            int num_velocities)
       : frame_(std::move(frame)),
         sole_(sole),
         rows_(std::move(rows)),
@@ -22,8 +23,8 @@ class FrameTask : public Task {
 
   void Write(const TaskState& state, const TaskTarget& target, TaskRows* rows) const override {
     const FrameMotion motion = Motion(state);
-    if (sole_ >= 0) {
-      CopySelected(rows_, state.data.foot_jacobian[static_cast<size_t>(sole_)], rows->jacobian);
+    if (sole_) {
+      CopySelected(rows_, state.data.foot_jacobian[*sole_], rows->jacobian);
     } else {
       FillFrameJacobian(state.model, state.data, frame_, jacobian_);
       CopySelected(rows_, jacobian_, rows->jacobian);
@@ -53,14 +54,13 @@ class FrameTask : public Task {
 
  private:
   FrameMotion Motion(const TaskState& state) const {
-    if (sole_ < 0) return ComputeFrameMotion(state.data, frame_);
-    const auto i = static_cast<size_t>(sole_);
-    return {state.data.foot_pose[i], state.data.foot_velocity[i],
-            state.data.foot_bias_acceleration[i]};
+    if (!sole_) return ComputeFrameMotion(state.data, frame_);
+    return {state.data.foot_pose[*sole_], state.data.foot_velocity[*sole_],
+            state.data.foot_bias_acceleration[*sole_]};
   }
 
   robot::Frame frame_;
-  int sole_;
+  std::optional<robot::Foot> sole_;
   std::vector<int> rows_;
   // Scratch; columns of joints that do not carry the frame stay 0.
   mutable robot::Matrix6X jacobian_;
@@ -70,7 +70,7 @@ class FrameTask : public Task {
 
 std::unique_ptr<Task> MakeFrameTask(const TaskSpec& spec, const robot::RobotModel& model) {
   RefuseJoints(spec);
-  const int sole = spec.point.isZero(0) ? spec.foot : -1;
+  const auto sole = spec.point.isZero(0) ? spec.foot : std::nullopt;
   return std::make_unique<FrameTask>(TaskFrame(spec, model), sole, SelectedRows(spec.axes, kX, 6),
                                      model.num_velocities());
 }

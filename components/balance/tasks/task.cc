@@ -48,9 +48,9 @@ std::vector<int> SelectedRows(const AxisSelection& axes, int first, int count) {
 
 robot::Frame TaskFrame(const TaskSpec& spec, const robot::RobotModel& model) {
   robot::Frame frame;
-  if (spec.foot >= 0) {
+  if (spec.foot) {
     if (!spec.link.empty()) throw std::invalid_argument("link: stands beside foot; give one");
-    const robot::FootModel& foot = model.feet().at(static_cast<size_t>(spec.foot));
+    const robot::FootModel& foot = model.feet()[*spec.foot];
     frame = {foot.name, foot.body, foot.sole};
   } else if (spec.link.empty()) {
     frame.body = model.body_task_body();
@@ -70,7 +70,7 @@ robot::Frame TaskFrame(const TaskSpec& spec, const robot::RobotModel& model) {
 
 void RefuseFrame(const TaskSpec& spec) {
   if (!spec.link.empty()) throw std::invalid_argument("link: this task has none");
-  if (spec.foot >= 0) throw std::invalid_argument("foot: this task has none");
+  if (spec.foot) throw std::invalid_argument("foot: this task has none");
   RefusePoint(spec);
 }
 

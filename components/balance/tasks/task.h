@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -83,8 +84,8 @@ class Task {
 struct TaskSpec {
   std::string type;  ///< as TaskTypes() names it
   AxisSelection axes{};
-  std::string link;  ///< URDF link; empty: the link of the body task
-  int foot = -1;     ///< the sole of this foot in place of a link; right: 0
+  std::string link;                                 ///< URDF link; empty: the link of the body task
+  std::optional<robot::Foot> foot;                  ///< its sole in place of a link
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< m, in the frame of link or sole
   std::vector<std::string> joints;                  ///< empty: all
 };
