@@ -42,7 +42,7 @@ double Sideways(const balance::ConvexPolygon& polygon, double sign) {
 }
 
 bool Raises(const robot::RobotModel& model, double clearance) {
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     robot::PostureGoal goal = robot::StandingGoal(model);
     goal.foot[foot].translation().z() += clearance;
     try {

@@ -12,9 +12,11 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+
 std::string Field(int phase) { return fmt::format("phase[{}]", phase); }
 
-size_t Slot(Outcome outcome, int foot) {
+size_t Slot(Outcome outcome, Foot foot) {
   switch (outcome) {
     case DONE:
       return 0;
@@ -25,7 +27,7 @@ size_t Slot(Outcome outcome, int foot) {
     case CONTACT_LOST:
       break;
   }
-  return foot == RIGHT_FOOT ? 3 : 4;
+  return 3 + Index(foot);
 }
 
 std::map<std::string, int> ReadNames(const StepPlannerConfig& config) {
@@ -57,7 +59,7 @@ int FindPhase(const StepPlannerConfig& config, const std::map<std::string, int>&
 
 }  // namespace
 
-std::array<bool, 2> ContactsOf(Support support) { return {support != LEFT, support != RIGHT}; }
+robot::FootArray<bool> ContactsOf(Support support) { return {support != LEFT, support != RIGHT}; }
 
 PhaseGraph::PhaseGraph(const StepPlannerConfig& config) {
   if (config.phase_size() == 0) throw ConfigError("phase", "is missing; give at least one phase");
@@ -69,7 +71,7 @@ PhaseGraph::PhaseGraph(const StepPlannerConfig& config) {
   CheckLoops(config);
 }
 
-int PhaseGraph::Follower(int phase, Outcome outcome, int foot) const {
+int PhaseGraph::Follower(int phase, Outcome outcome, Foot foot) const {
   return follower_[static_cast<size_t>(phase)][Slot(outcome, foot)];
 }
 
@@ -77,7 +79,7 @@ void PhaseGraph::AddArrows(const StepPlannerConfig& config, int phase) {
   const std::map<std::string, int> names = ReadNames(config);
   const Phase& from = config.phase(phase);
   Followers& followers = follower_[static_cast<size_t>(phase)];
-  const auto add = [&](Outcome outcome, int foot, int to, int next) {
+  const auto add = [&](Outcome outcome, Foot foot, int to, int next) {
     int& follower = followers[Slot(outcome, foot)];
     if (follower != kNone) {
       throw ConfigError(fmt::format("{}.next[{}].on", Field(phase), next),
@@ -96,19 +98,19 @@ void PhaseGraph::AddArrows(const StepPlannerConfig& config, int phase) {
     }
     if (next.on() != CONTACT_LOST) {
       if (next.has_foot()) throw ConfigError(field + ".foot", "belongs to CONTACT_LOST; remove it");
-      add(next.on(), 0, to, k);
+      add(next.on(), Foot::kRight, to, k);
       continue;
     }
-    for (const int foot : {RIGHT_FOOT, LEFT_FOOT}) {
-      if (!next.has_foot() || next.foot() == foot) add(CONTACT_LOST, foot, to, k);
+    for (const Foot foot : robot::kFeet) {
+      if (!next.has_foot() || robot::FootAt(next.foot()) == foot) add(CONTACT_LOST, foot, to, k);
     }
   }
-  if (!from.has_duration() || followers[Slot(DONE, 0)] != kNone) return;
+  if (!from.has_duration() || followers[Slot(DONE, Foot::kRight)] != kNone) return;
   if (phase + 1 == size()) {
     throw ConfigError(Field(phase) + ".duration",
                       "has no phase after it; remove it, or give next { on: DONE to: ... }");
   }
-  add(DONE, 0, phase + 1, kNone);
+  add(DONE, Foot::kRight, phase + 1, kNone);
 }
 
 void PhaseGraph::CheckReached(const StepPlannerConfig& config) const {

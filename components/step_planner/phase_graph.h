@@ -4,12 +4,13 @@
 #include <array>
 #include <vector>
 
+#include "components/robot/foot.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
 
-/// Feet in contact, right first.
-std::array<bool, 2> ContactsOf(Support support);
+/// Feet in contact.
+robot::FootArray<bool> ContactsOf(Support support);
 
 /// Which phase follows which, by their index in the configuration. Immutable.
 class PhaseGraph {
@@ -23,13 +24,13 @@ class PhaseGraph {
   int size() const { return static_cast<int>(follower_.size()); }
   /// What follows `phase` after `outcome`; of CONTACT_LOST that of `foot`. kNone: the outcome
   /// changes nothing.
-  int Follower(int phase, Outcome outcome, int foot = 0) const;
+  int Follower(int phase, Outcome outcome, robot::Foot foot = robot::Foot::kRight) const;
   /// An arrow from a phase to another.
   struct Arrow {
     int from, to;
     Outcome outcome;
-    int foot;  ///< CONTACT_LOST: of this one
-    int next;  ///< its index in the phase's `next`; kNone: the phase after it in the list
+    robot::Foot foot;  ///< CONTACT_LOST: of this one
+    int next;          ///< its index in the phase's `next`; kNone: the phase after it in the list
   };
   const std::vector<Arrow>& arrows() const { return arrows_; }
 

@@ -7,7 +7,7 @@
 namespace poise {
 namespace {
 
-int Other(int foot) { return 1 - foot; }
+using robot::Foot;
 
 }  // namespace
 
@@ -46,17 +46,18 @@ void PhaseSchedule::Begin(int phase, Outcome outcome, double time, double origin
 }
 
 bool PhaseSchedule::BeginByOutcome(const ScheduleInput& input) {
-  const auto begin = [&](Outcome outcome, int foot) {
+  const auto begin = [&](Outcome outcome, Foot foot) {
     const int follower = graph_.Follower(state_.phase, outcome, foot);
     if (follower == PhaseGraph::kNone) return false;
     Begin(follower, outcome, input.time, input.time);
     return true;
   };
-  for (const int foot : {RIGHT_FOOT, LEFT_FOOT}) {
-    if (input.contact_lost[static_cast<size_t>(foot)] && begin(CONTACT_LOST, foot)) return true;
+  for (const Foot foot : robot::kFeet) {
+    if (input.contact_lost[foot] && begin(CONTACT_LOST, foot)) return true;
   }
-  if (input.no_surface && begin(NO_SURFACE, 0)) return true;
-  return phase().has_timeout() && held_ >= phase().timeout() - kTimeTolerance && begin(TIMEOUT, 0);
+  if (input.no_surface && begin(NO_SURFACE, Foot::kRight)) return true;
+  return phase().has_timeout() && held_ >= phase().timeout() - kTimeTolerance &&
+         begin(TIMEOUT, Foot::kRight);
 }
 
 void PhaseSchedule::Hold(double time) {
@@ -65,7 +66,7 @@ void PhaseSchedule::Hold(double time) {
   origin_ += delay;
   state_.phase_began = false;
   state_.transition = TransitionKind::kNone;
-  state_.transition_foot = -1;
+  state_.transition_foot.reset();
   state_.progress = 0;
   if (!phase().has_transition()) return;
   // Steps end with both feet loaded: an unloading begins anew from there, a loading is over.
@@ -115,12 +116,12 @@ bool PhaseSchedule::Unloads() const {
 
 WaitingFor PhaseSchedule::Hindrance(const ScheduleInput& input) const {
   // The ramp has ended by then: CheckStepPlannerConfig sees to that.
-  if (Unloads() && !input.com_over_foot[static_cast<size_t>(Other(phase().transition().foot()))]) {
+  if (Unloads() && !input.com_over_foot[Other(robot::FootAt(phase().transition().foot()))]) {
     return WaitingFor::kCom;
   }
   if (config_.contact().required() && BeforeTouchDown()) {
-    const int foot = phase().support() == RIGHT ? LEFT_FOOT : RIGHT_FOOT;
-    if (!input.foot_confirmed[static_cast<size_t>(foot)]) return WaitingFor::kContact;
+    const Foot foot = phase().support() == RIGHT ? Foot::kLeft : Foot::kRight;
+    if (!input.foot_confirmed[foot]) return WaitingFor::kContact;
   }
   return WaitingFor::kNothing;
 }
@@ -128,7 +129,7 @@ WaitingFor PhaseSchedule::Hindrance(const ScheduleInput& input) const {
 void PhaseSchedule::AdvanceTransition(const ScheduleInput& input) {
   state_.waiting_for = WaitingFor::kNothing;
   state_.transition = TransitionKind::kNone;
-  state_.transition_foot = -1;
+  state_.transition_foot.reset();
   state_.progress = 0;
   if (!phase().has_transition()) return;
 
@@ -137,8 +138,7 @@ void PhaseSchedule::AdvanceTransition(const ScheduleInput& input) {
   const double due = origin_ + transition.delay();
   if (!transition_began_) {
     const bool is_due = input.time >= due - kTimeTolerance;
-    if (is_due && unloading &&
-        !input.com_over_foot[static_cast<size_t>(Other(transition.foot()))]) {
+    if (is_due && unloading && !input.com_over_foot[Other(robot::FootAt(transition.foot()))]) {
       state_.waiting_for = WaitingFor::kCom;
       Postpone(input.time - due);
       return;
@@ -162,7 +162,7 @@ void PhaseSchedule::AdvanceTransition(const ScheduleInput& input) {
     return;
   }
   state_.transition = unloading ? TransitionKind::kUnloading : TransitionKind::kLoading;
-  state_.transition_foot = transition.foot();
+  state_.transition_foot = robot::FootAt(transition.foot());
 }
 
 }  // namespace poise

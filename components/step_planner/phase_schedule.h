@@ -1,7 +1,7 @@
 // The plan's phases in time: which one, how it ended, and how far its contact transition has come.
 #pragma once
 
-#include <array>
+#include <optional>
 
 #include "components/framework/state_archive.h"
 #include "components/step_planner/phase_graph.h"
@@ -18,12 +18,12 @@ enum class WaitingFor {
   kContact,  ///< of the foot that comes down, before double support
 };
 
-/// What the robot says in one tick; feet right first.
+/// What the robot says in one tick.
 struct ScheduleInput {
-  double time = 0;                                   ///< s, not decreasing
-  std::array<bool, 2> com_over_foot{false, false};   ///< that foot alone can carry the robot
-  std::array<bool, 2> foot_confirmed{false, false};  ///< of the foot that comes down
-  std::array<bool, 2> contact_lost{false, false};    ///< a foot that is to carry does not
+  double time = 0;                                      ///< s, not decreasing
+  robot::FootArray<bool> com_over_foot{false, false};   ///< that foot alone can carry the robot
+  robot::FootArray<bool> foot_confirmed{false, false};  ///< of the foot that comes down
+  robot::FootArray<bool> contact_lost{false, false};    ///< a foot that is to carry does not
   bool no_surface = false;  ///< the foot that came down found none and is up again
 };
 
@@ -35,7 +35,7 @@ struct ScheduleState {
   Outcome began_by = DONE;   ///< what the phase before came to; of no meaning in the first
   WaitingFor waiting_for = WaitingFor::kNothing;
   TransitionKind transition = TransitionKind::kNone;
-  int transition_foot = -1;
+  std::optional<robot::Foot> transition_foot;
   double progress = 0;  ///< 0..1
 
   bool waiting() const { return waiting_for != WaitingFor::kNothing; }

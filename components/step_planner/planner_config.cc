@@ -18,9 +18,10 @@
 namespace poise {
 namespace {
 
-const char* Name(int foot) { return foot == RIGHT_FOOT ? "right" : "left"; }
-Support SupportOn(int foot) { return foot == RIGHT_FOOT ? RIGHT : LEFT; }
-int Other(int foot) { return 1 - foot; }
+using robot::Foot;
+
+const char* Name(Foot foot) { return foot == Foot::kRight ? "right" : "left"; }
+Support SupportOn(Foot foot) { return foot == Foot::kRight ? RIGHT : LEFT; }
 std::string Field(int phase) { return fmt::format("phase[{}]", phase); }
 
 void CheckTurn(const Turn& turn, const std::string& field) {
@@ -34,11 +35,12 @@ void CheckTurn(const Turn& turn, const std::string& field) {
 void CheckFoot(const Phase& phase, const std::string& field) {
   const FootReference& foot = phase.foot();
   if (!foot.has_foot()) throw ConfigError(field + ".foot", "is missing; name the foot that moves");
-  if (phase.support() != SupportOn(Other(foot.foot()))) {
+  const Foot moves = robot::FootAt(foot.foot());
+  if (phase.support() != SupportOn(Other(moves))) {
     throw ConfigError(field + ".foot",
                       fmt::format("moves the {0} foot, which is in contact; the phase's support "
                                   "must be {1}",
-                                  Name(foot.foot()), Support_Name(SupportOn(Other(foot.foot())))));
+                                  Name(moves), Support_Name(SupportOn(Other(moves)))));
   }
   if (foot.has_turn()) CheckTurn(foot.turn(), field + ".turn");
 }
@@ -64,7 +66,7 @@ void CheckRamp(const Phase& phase, const std::string& field) {
 void CheckTransition(const StepPlannerConfig& config, const PhaseGraph& graph, int index) {
   const std::string field = Field(index) + ".transition";
   const ContactTransition& transition = config.phase(index).transition();
-  const int foot = transition.foot();
+  const Foot foot = robot::FootAt(transition.foot());
   const Support single = SupportOn(Other(foot));
   if (transition.kind() == ContactTransition::UNLOAD) {
     const int next = graph.Follower(index, DONE);

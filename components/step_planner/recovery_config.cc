@@ -51,7 +51,7 @@ double SwingAcceleration(const robot::RobotModel& model, double share) {
   robot::ComputeFeet(model, &data);
   robot::ComputeDynamics(model, state, &data);
   double least = std::numeric_limits<double>::infinity();
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : robot::kFeet) {
     // By direction, ahead and sideways, the best joint.
     for (const int axis : {0, 1}) {
       double best = 0;
@@ -92,8 +92,9 @@ double TurningInertia(const robot::RobotModel& model) {
   Eigen::MatrixXd held(18, columns);
   for (Eigen::Index c = 0; c < columns; ++c) {
     const int from = moving[static_cast<size_t>(c)];
-    held.col(c) << data.foot_jacobian[0].col(from), data.foot_jacobian[1].col(from),
-        data.com_jacobian.col(from), body.col(from).tail<3>();
+    held.col(c) << data.foot_jacobian[robot::Foot::kRight].col(from),
+        data.foot_jacobian[robot::Foot::kLeft].col(from), data.com_jacobian.col(from),
+        body.col(from).tail<3>();
   }
   const auto solver = held.completeOrthogonalDecomposition();
   double least = std::numeric_limits<double>::infinity();

@@ -8,6 +8,9 @@
 
 namespace poise {
 
+using robot::Foot;
+using robot::kFeet;
+
 void ReferencePoint::Hold(const Eigen::Vector3d& position) {
   move_.Hold(position);
   pending_ = false;
@@ -118,8 +121,8 @@ void ReferenceGenerator::Archive(StateArchive* archive) {
 Eigen::Vector3d ReferenceGenerator::ComTarget(const ComReference& com,
                                               const EstimatedPose& estimate,
                                               const Eigen::Vector3d& standing) const {
-  const Eigen::Vector3d right = estimate.sole[0].translation();
-  const Eigen::Vector3d left = estimate.sole[1].translation();
+  const Eigen::Vector3d right = estimate.sole[Foot::kRight].translation();
+  const Eigen::Vector3d left = estimate.sole[Foot::kLeft].translation();
   Eigen::Vector3d target = standing;
   switch (com.target()) {
     case ComReference::HOLD:
@@ -163,21 +166,21 @@ void ReferenceGenerator::BeginPhase(const Phase& phase, const EstimatedPose& est
     reference->Schedule({turn.x(), turn.y(), turn.z()}, time + turn.delay(), turn.duration());
   };
   if (phase.has_body()) schedule(phase.body(), &body_turn_);
-  const std::array<bool, 2> in_contact = ContactsOf(phase.support());
-  for (size_t i = 0; i < 2; ++i) {
-    if (!in_contact[i] && !foot_free_[i]) {
-      foot_[i].Hold(estimate.sole[i].translation());
-      foot_turn_[i].Hold(estimate.sole[i].linear());
+  const robot::FootArray<bool> in_contact = ContactsOf(phase.support());
+  for (const Foot f : kFeet) {
+    if (!in_contact[f] && !foot_free_[f]) {
+      foot_[f].Hold(estimate.sole[f].translation());
+      foot_turn_[f].Hold(estimate.sole[f].linear());
     }
-    foot_free_[i] = !in_contact[i];
+    foot_free_[f] = !in_contact[f];
   }
   if (phase.has_foot()) {
     const FootReference& foot = phase.foot();
-    const auto swing = static_cast<size_t>(foot.foot());
+    const Foot swing = robot::FootAt(foot.foot());
     Eigen::Vector3d target =
         foot_[swing].At(time).position + Eigen::Vector3d(foot.x(), foot.y(), foot.z());
     if (foot.has_height_above_support()) {
-      target.z() = estimate.sole[1 - swing].translation().z() + foot.height_above_support();
+      target.z() = estimate.sole[Other(swing)].translation().z() + foot.height_above_support();
     }
     foot_[swing].Schedule(target, time + foot.delay(), foot.duration());
     if (foot.has_turn()) schedule(foot.turn(), &foot_turn_[swing]);
@@ -191,10 +194,10 @@ const References& ReferenceGenerator::Update(double time, const Eigen::Vector3d&
   const double rate = std::clamp(2 * (1 - lag / com_lag_), 0.0, 1.0);
   references_.com = com_.Slow(time, TickPeriod(time - time_), rate);
   time_ = time;
-  for (size_t i = 0; i < 2; ++i) {
-    if (!foot_free_[i]) continue;
-    references_.foot[i] = foot_[i].At(time);
-    references_.foot_rotation[i] = foot_turn_[i].At(time);
+  for (const Foot f : kFeet) {
+    if (!foot_free_[f]) continue;
+    references_.foot[f] = foot_[f].At(time);
+    references_.foot_rotation[f] = foot_turn_[f].At(time);
   }
   references_.body = body_turn_.At(time);
   return references_;
@@ -204,12 +207,12 @@ void ReferenceGenerator::Anchor(const EstimatedPose& estimate, const PointMotion
                                 const Eigen::Vector3d& com_target, double time, double duration) {
   com_.Lead(com, com_target, time, duration);
   shifts_ = false;
-  for (size_t i = 0; i < 2; ++i) {
-    HoldFoot(i, estimate.sole[i].translation(), estimate.sole[i].linear());
+  for (const Foot f : kFeet) {
+    HoldFoot(f, estimate.sole[f].translation(), estimate.sole[f].linear());
   }
 }
 
-void ReferenceGenerator::HoldFoot(size_t foot, const Eigen::Vector3d& position,
+void ReferenceGenerator::HoldFoot(Foot foot, const Eigen::Vector3d& position,
                                   const Eigen::Matrix3d& rotation) {
   foot_[foot].Hold(position);
   foot_turn_[foot].Hold(rotation);

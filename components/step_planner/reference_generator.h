@@ -8,6 +8,7 @@
 #include "components/framework/state_archive.h"
 #include "components/messages/motion.h"
 #include "components/messages/quintic_move.h"
+#include "components/robot/foot.h"
 #include "components/step_planner/step_planner.pb.h"
 
 namespace poise {
@@ -58,15 +59,15 @@ class ReferenceTurn {
 struct EstimatedPose {
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
   Eigen::Matrix3d body_rotation = Eigen::Matrix3d::Identity();
-  std::array<Eigen::Isometry3d, 2> sole{Eigen::Isometry3d::Identity(),
-                                        Eigen::Isometry3d::Identity()};  ///< right first
+  robot::FootArray<Eigen::Isometry3d> sole{Eigen::Isometry3d::Identity(),
+                                           Eigen::Isometry3d::Identity()};
 };
 
 struct References {
   PointMotion com;
   RotationMotion body;
-  std::array<PointMotion, 2> foot;  ///< sole centre; meaningful for a foot out of contact
-  std::array<RotationMotion, 2> foot_rotation;  ///< likewise
+  robot::FootArray<PointMotion> foot;  ///< sole centre; meaningful for a foot out of contact
+  robot::FootArray<RotationMotion> foot_rotation;  ///< likewise
 
   void Archive(StateArchive* archive);
 };
@@ -85,7 +86,7 @@ class ReferenceGenerator {
   /// Once a tick. The COM's move waits for the COM at `com`, m, world.
   const References& Update(double time, const Eigen::Vector3d& com);
   /// From here on the free foot rests there; its moves under way and to come are dropped.
-  void HoldFoot(size_t foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
+  void HoldFoot(robot::Foot foot, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation);
   /// COM and body come to rest here, from their present motion, in `duration` s; the feet's moves
   /// under way are dropped. After another planner has led them.
   void Anchor(const EstimatedPose& estimate, const PointMotion& com,
@@ -102,7 +103,7 @@ class ReferenceGenerator {
   bool ComRests(double time) const { return time >= com_.end(); }
   /// The body rests at `rotation` from here on; its turns under way and to come are dropped.
   void HoldBody(const Eigen::Matrix3d& rotation) { body_turn_.Hold(rotation); }
-  const ReferencePoint& foot(size_t index) const { return foot_[index]; }
+  const ReferencePoint& foot(robot::Foot foot) const { return foot_[foot]; }
   void Archive(StateArchive* archive);
 
  private:
@@ -113,11 +114,11 @@ class ReferenceGenerator {
   double time_ = 0;  // s, of the last update
   bool anchored_ = false;
   bool shifts_ = false;  // the COM's last move is a shift
-  std::array<bool, 2> foot_free_{false, false};
+  robot::FootArray<bool> foot_free_{false, false};
   ReferencePoint com_;
-  std::array<ReferencePoint, 2> foot_;
+  robot::FootArray<ReferencePoint> foot_;
   ReferenceTurn body_turn_;
-  std::array<ReferenceTurn, 2> foot_turn_;
+  robot::FootArray<ReferenceTurn> foot_turn_;
   References references_;
 };
 

@@ -5,6 +5,8 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+
 // s for which both feet must carry: a foot that comes down bounces, or is put down elsewhere again.
 constexpr double kCarryTime = 0.1;
 // Share of the distance that is left as it is. More would be an error that stays, less noise.
@@ -24,11 +26,12 @@ Eigen::Vector3d StanceFollower::Update(double time, const Stance& stance) {
   }
   if (!stance.carried || !carried_) since_ = time;
   carried_ = stance.carried;
-  const Eigen::Vector3d line = sole_[1] - sole_[0];
+  const Eigen::Vector3d& right = sole_[Foot::kRight];
+  const Eigen::Vector3d line = sole_[Foot::kLeft] - right;
   const double share =
-      std::clamp((stance.com - sole_[0]).dot(line) / std::max(line.squaredNorm(), 1e-12), 0.0, 1.0);
-  Eigen::Vector3d way =
-      (1 - share) * (stance.sole[0] - sole_[0]) + share * (stance.sole[1] - sole_[1]);
+      std::clamp((stance.com - right).dot(line) / std::max(line.squaredNorm(), 1e-12), 0.0, 1.0);
+  Eigen::Vector3d way = (1 - share) * (stance.sole[Foot::kRight] - right) +
+                        share * (stance.sole[Foot::kLeft] - sole_[Foot::kLeft]);
   way.z() = 0;
   const bool settled = carried_ && time - since_ >= kCarryTime && stance.resting;
   if (!settled || !way.allFinite()) return none;

@@ -6,9 +6,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/framework/state_archive.h"
+#include "components/robot/foot.h"
 
 namespace poise {
 
@@ -19,8 +19,8 @@ class StanceFollower {
 
   /// What the robot stands on in a tick.
   struct Stance {
-    /// m, world, right first.
-    std::array<Eigen::Vector3d, 2> sole = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+    /// m, world.
+    robot::FootArray<Eigen::Vector3d> sole{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
     Eigen::Vector3d com = Eigen::Vector3d::Zero();  ///< m, world, where its reference rests
     bool planned = false;  ///< both feet are contacts of the plan, which nothing else leads
     bool carried = false;  ///< both feet carry the robot
@@ -34,7 +34,7 @@ class StanceFollower {
   /// The COM's reference goes to where the soles are now: what they did before counts no more.
   void Restart() { known_ = following_ = false; }
   void Archive(StateArchive* archive) {
-    archive->Show(known_, following_, carried_, since_, sole_[0], sole_[1]);
+    archive->Show(known_, following_, carried_, since_, sole_);
   }
 
  private:
@@ -44,7 +44,7 @@ class StanceFollower {
   bool carried_ = false;    // in the last tick
   double since_ = 0;        // s, from when on
   // m, that the reference belongs to.
-  std::array<Eigen::Vector3d, 2> sole_ = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  robot::FootArray<Eigen::Vector3d> sole_{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
 };
 
 }  // namespace poise

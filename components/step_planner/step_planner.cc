@@ -23,6 +23,9 @@ namespace poise {
 std::string_view step_planner_proto_schema();  // generated
 namespace {
 
+using robot::Foot;
+using robot::kFeet;
+
 // m/s and rad/s that an operator may ask for at most; a step's length limits what is walked.
 constexpr double kFastestWalk = 1;
 // m/s to the left: far below what moves a foothold by a rounding that anyone could measure.
@@ -55,8 +58,8 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   stance_follower_ = StanceFollower(kFollowFrom);
   ConfigureLimits(config);
   contact_ = config.contact();
-  landing_.assign(2, Landing(config.contact()));
-  contact_loss_.assign(2, ContactLoss(config.contact()));
+  landing_ = robot::FootArray<Landing>(Landing(contact_));
+  contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
   step_ = StepDetector(kNeededExcess, kNeededPersistence);
   recovers_ = config.recovery().enabled();
   if (recovers_) {
@@ -89,25 +92,25 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   const Eigen::Isometry3d identity = Eigen::Isometry3d::Identity();
   out.transition_foot = out.step_foot = -1;
   SetMotion(RotationMotion(), &out.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    out.in_contact[i] = out.next_in_contact[i] = in_contact_[i] ? 1 : 0;
-    SetPose(identity, &out.foot_pose[i]);
-    SetMotion(RotationMotion(), &out.foot_rotation_reference[i]);
+  for (const Foot f : kFeet) {
+    out.in_contact[Index(f)] = out.next_in_contact[Index(f)] = in_contact_[f] ? 1 : 0;
+    SetPose(identity, &out.foot_pose[Index(f)]);
+    SetMotion(RotationMotion(), &out.foot_rotation_reference[Index(f)]);
   }
 }
 
 void StepPlanner::ConfigureLimits(const StepPlannerConfig& config) {
   const HipStrategyConfig& hip = config.hip_strategy();
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model_->feet()[i];
+  for (const Foot f : kFeet) {
+    const robot::FootModel& foot = model_->feet()[f];
     if (hip.start() >= robot::InnerRadius(foot)) {
       throw ConfigError("hip_strategy.start",
                         fmt::format("is {} m and leaves nothing of the {} foot's sole, {} x {} m",
                                     hip.start(), foot.name, foot.length, foot.width));
     }
-    sole_[i] = balance::SolePolygon(foot, 0);
-    tilt_sole_[i] = balance::SolePolygon(foot, hip.start());
-    stance_sole_[i] = StanceSole(foot, config);
+    sole_[f] = balance::SolePolygon(foot, 0);
+    tilt_sole_[f] = balance::SolePolygon(foot, hip.start());
+    stance_sole_[f] = StanceSole(foot, config);
   }
   hip_strategy_.emplace(hip);
 }
@@ -153,7 +156,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
     case act_t::KIND_STAND:
       if (!walks_ && !recovers_) return answer_t::VERDICT_NOT_ABLE;
       if (recovers_ && !walk_.active()) {
-        const bool stands = in_contact_[0] && in_contact_[1] && last_controlled_;
+        const bool stands = Count(in_contact_) == 2 && last_controlled_;
         if (!walks_ && (!stands || recovery_.active())) return answer_t::VERDICT_NOT_NOW;
         if (stands && !recovery_.active()) recovery_.BringTogether();
       }
@@ -161,12 +164,12 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STEP: {
       if (!walks_) return answer_t::VERDICT_NOT_ABLE;
-      if (act.foot > robot::kLeftFoot) return answer_t::VERDICT_UNKNOWN;
-      const bool stands = in_contact_[0] && in_contact_[1] && last_controlled_;
+      if (act.foot >= static_cast<int>(kFeet.size())) return answer_t::VERDICT_UNKNOWN;
+      const bool stands = Count(in_contact_) == 2 && last_controlled_;
       if (!stands || walk_.active() || recovery_.active()) return answer_t::VERDICT_NOT_NOW;
       operator_walk_ = {.given = true, .one_step = true, .steps_before = walk_.num_steps()};
       // Walking begins with the foot of the side that it goes to.
-      if (act.foot == robot::kLeftFoot) operator_walk_.velocity[1] = kLeftFirst;
+      if (robot::FootAt(act.foot) == Foot::kLeft) operator_walk_.velocity[1] = kLeftFirst;
       return answer_t::VERDICT_DONE;
     }
     case act_t::KIND_NEXT_PHASE:
@@ -190,9 +193,10 @@ stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
 }
 
 int8_t StepPlanner::Plan(double time) {
-  const std::array<double, 2> load{-robot_state_->foot_wrench[0].force[2],
-                                   -robot_state_->foot_wrench[1].force[2]};
-  if (!ReadState(*robot_state_, &state_) || !std::isfinite(load[0] + load[1])) {
+  const robot::FootArray<double> load{-robot_state_->foot_wrench[0].force[2],
+                                      -robot_state_->foot_wrench[1].force[2]};
+  if (!ReadState(*robot_state_, &state_) ||
+      !std::isfinite(load[Foot::kRight] + load[Foot::kLeft])) {
     return support_plan_t::STATUS_INVALID_STATE;
   }
   whole_body_->UpdateDynamics(state_);
@@ -210,28 +214,27 @@ int8_t StepPlanner::Plan(double time) {
                                                  : support_plan_t::STATUS_OK;
 }
 
-ScheduleInput StepPlanner::Observe(double time, const std::array<double, 2>& load) {
+ScheduleInput StepPlanner::Observe(double time, const robot::FootArray<double>& load) {
   ScheduleInput input{.time = time, .com_over_foot = ComOverFoot()};
-  const int ramped = schedule_->state().transition_foot;
-  for (size_t i = 0; i < 2; ++i) {
-    const double deviation = LoadDeviation(i);
-    landing_[i].Measure(time, load[i], deviation);
-    contact_loss_[i].Update(time, load[i], in_contact_[i] && ramped != static_cast<int>(i),
-                            deviation);
-    input.foot_confirmed[i] = landing_[i].confirmed();
-    input.contact_lost[i] = contact_loss_[i].lost();
-    input.no_surface = input.no_surface || (!in_contact_[i] && landing_[i].found_none());
+  for (const Foot f : kFeet) {
+    const double deviation = LoadDeviation(f);
+    landing_[f].Measure(time, load[f], deviation);
+    contact_loss_[f].Update(time, load[f],
+                            in_contact_[f] && schedule_->state().transition_foot != f, deviation);
+    input.foot_confirmed[f] = landing_[f].confirmed();
+    input.contact_lost[f] = contact_loss_[f].lost();
+    input.no_surface = input.no_surface || (!in_contact_[f] && landing_[f].found_none());
   }
   return input;
 }
 
-double StepPlanner::LoadDeviation(size_t foot) const {
-  return robot_state_->foot_wrench_source[foot] == robot_state_t::SOURCE_OBSERVER
-             ? robot_state_->foot_wrench_deviation[foot].force[2]
+double StepPlanner::LoadDeviation(Foot foot) const {
+  return robot_state_->foot_wrench_source[Index(foot)] == robot_state_t::SOURCE_OBSERVER
+             ? robot_state_->foot_wrench_deviation[Index(foot)].force[2]
              : 0;
 }
 
-bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
+bool StepPlanner::Step(double time, const robot::FootArray<double>& load) {
   if (!recovers_ && !walks_) return false;
   const stepping::StepInput input = SeeSteps(time, load);
   if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
@@ -243,7 +246,7 @@ bool StepPlanner::Step(double time, const std::array<double, 2>& load) {
   return (walks_ && WalkOn(input)) || stands_otherwise_;
 }
 
-stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 2>& load) {
+stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<double>& load) {
   const robot::RobotData& data = whole_body_->data();
   stepping::StepInput input;
   input.time = time;
@@ -254,20 +257,20 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const std::array<double, 
                                references_.body.rotation.transpose());
   input.lean = lean.angle() * lean.axis();
   input.turning = data.body_angular_velocity[static_cast<size_t>(model_->body_task_body())];
-  input.sole = {data.foot_pose[0], data.foot_pose[1]};
+  input.sole = data.foot_pose;
   input.load = load;
-  for (size_t i = 0; i < 2; ++i) {
-    const double deviation = LoadDeviation(i);
-    if (deviation > 0) input.least_load[i] = LoadLevels(contact_, deviation).touch;
+  for (const Foot f : kFeet) {
+    const double deviation = LoadDeviation(f);
+    if (deviation > 0) input.least_load[f] = LoadLevels(contact_, deviation).touch;
   }
   input.in_contact = in_contact_;
   input.com_height = references_.com.position.z();
   input.step_needed = support_plan_->step_needed != 0;
   input.allowed = last_controlled_;
-  for (size_t i = 0; i < 2; ++i) {
-    if (in_contact_[i]) continue;
-    input.free_foot = references_.foot[i];
-    input.free_rotation = references_.foot_rotation[i].rotation;
+  for (const Foot f : kFeet) {
+    if (in_contact_[f]) continue;
+    input.free_foot = references_.foot[f];
+    input.free_rotation = references_.foot_rotation[f].rotation;
   }
   return input;
 }
@@ -304,7 +307,8 @@ void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {
   in_contact_ = steps.in_contact;
   stands_otherwise_ = ContactsOf(schedule_->phase().support()) != in_contact_;
   const EstimatedPose estimate = Estimate();
-  Eigen::Vector3d rest = 0.5 * (estimate.sole[0].translation() + estimate.sole[1].translation());
+  Eigen::Vector3d rest =
+      0.5 * (estimate.sole[Foot::kRight].translation() + estimate.sole[Foot::kLeft].translation());
   // In x and y the COM has followed a centre of pressure: its reference begins where it is.
   const robot::RobotData& data = whole_body_->data();
   PointMotion com;
@@ -324,24 +328,24 @@ void StepPlanner::BeginPhase(double time) {
   if (above_soles) stance_follower_.Restart();
   // The first phase begins with the run; its moves wait for the scenario's time 0.
   generator_->BeginPhase(phase, estimate, schedule.first ? std::max(time, 0.0) : time);
-  const std::array<bool, 2> last_contact = in_contact_;
+  const robot::FootArray<bool> last_contact = in_contact_;
   in_contact_ = ContactsOf(phase.support());
-  for (size_t i = 0; i < 2; ++i) {
-    contact_loss_[i].Reset();
-    if (in_contact_[i]) continue;
+  for (const Foot f : kFeet) {
+    contact_loss_[f].Reset();
+    if (in_contact_[f]) continue;
     was_free_ = true;
-    if (last_contact[i] || !last_controlled_) {
-      references_.foot[i].position = estimate.sole[i].translation();
-      references_.foot_rotation[i].rotation = estimate.sole[i].linear();
-      landing_[i].LiftOff(references_.foot[i].position.z());
+    if (last_contact[f] || !last_controlled_) {
+      references_.foot[f].position = estimate.sole[f].translation();
+      references_.foot_rotation[f].rotation = estimate.sole[f].linear();
+      landing_[f].LiftOff(references_.foot[f].position.z());
     } else if (schedule.began_by != DONE) {
-      landing_[i].Release();
+      landing_[f].Release();
     }
-    const bool moves = phase.has_foot() && static_cast<size_t>(phase.foot().foot()) == i;
-    const PointMotion& standing = references_.foot[i];
-    if (moves && !landing_[i].BeginMove(standing.position.z(), generator_->foot(i).target().z(),
-                                        generator_->foot(i).end())) {
-      generator_->HoldFoot(i, standing.position, references_.foot_rotation[i].rotation);
+    const bool moves = phase.has_foot() && robot::FootAt(phase.foot().foot()) == f;
+    const PointMotion& standing = references_.foot[f];
+    if (moves && !landing_[f].BeginMove(standing.position.z(), generator_->foot(f).target().z(),
+                                        generator_->foot(f).end())) {
+      generator_->HoldFoot(f, standing.position, references_.foot_rotation[f].rotation);
     }
   }
   last_controlled_ = !phase.gravity_compensation();
@@ -389,9 +393,9 @@ StepPlanner::Capture StepPlanner::ComputeCapture() const {
 void StepPlanner::FollowSoles(double time) {
   const EstimatedPose estimate = Estimate();
   const StanceFollower::Stance stance{
-      .sole = {estimate.sole[0].translation(), estimate.sole[1].translation()},
+      .sole = {estimate.sole[Foot::kRight].translation(), estimate.sole[Foot::kLeft].translation()},
       .com = generator_->com_target(),
-      .planned = in_contact_[0] && in_contact_[1] && last_controlled_ && !Held() && !was_free_,
+      .planned = Count(in_contact_) == 2 && last_controlled_ && !Held() && !was_free_,
       .carried = robot_state_->foot_load_share[0] > 0 && robot_state_->foot_load_share[1] > 0,
       .resting = generator_->ComRests(time)};
   const Eigen::Vector3d way = stance_follower_.Update(time, stance);
@@ -404,10 +408,10 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   if (schedule_->phase().gravity_compensation()) return;
   if (const stepping::StepOutput* steps = Steps(); steps != nullptr) {
     references_.com = steps->com;
-    for (size_t i = 0; i < 2; ++i) {
-      if (in_contact_[i]) continue;
-      references_.foot[i] = steps->swing;
-      references_.foot_rotation[i] = steps->swing_rotation;
+    for (const Foot f : kFeet) {
+      if (in_contact_[f]) continue;
+      references_.foot[f] = steps->swing;
+      references_.foot_rotation[f] = steps->swing_rotation;
     }
     if (walk_.active()) TurnBody();
     untilted_ = references_.body.rotation;
@@ -415,14 +419,14 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
     return;
   }
   const bool due = schedule_->state().waiting_for == WaitingFor::kContact;
-  for (size_t i = 0; i < 2; ++i) {
-    if (in_contact_[i]) continue;
-    PointMotion* foot = &references_.foot[i];
-    Eigen::Matrix3d* rotation = &references_.foot_rotation[i].rotation;
-    if (landing_[i].Update(schedule_->BeforeTouchDown(), due, data.foot_pose[i], foot, rotation)) {
+  for (const Foot f : kFeet) {
+    if (in_contact_[f]) continue;
+    PointMotion* foot = &references_.foot[f];
+    Eigen::Matrix3d* rotation = &references_.foot_rotation[f].rotation;
+    if (landing_[f].Update(schedule_->BeforeTouchDown(), due, data.foot_pose[f], foot, rotation)) {
       // Where the landing ends, the plan goes on from here.
-      generator_->HoldFoot(i, foot->position, *rotation);
-      references_.foot_rotation[i] = {.rotation = *rotation};
+      generator_->HoldFoot(f, foot->position, *rotation);
+      references_.foot_rotation[f] = {.rotation = *rotation};
     }
   }
   if (hip_strategy_->enabled()) TiltBody(time, capture);
@@ -463,9 +467,9 @@ void StepPlanner::TiltBody(double time, const Capture& capture) {
 }
 
 bool StepPlanner::NearJointLimit() const {
-  for (size_t i = 0; i < 2; ++i) {
-    if (!in_contact_[i]) continue;
-    for (const int joint : model_->supporting_joints(model_->feet()[i].body)) {
+  for (const Foot f : kFeet) {
+    if (!in_contact_[f]) continue;
+    for (const int joint : model_->supporting_joints(model_->feet()[f].body)) {
       const robot::Joint& limits = model_->joints()[static_cast<size_t>(joint)];
       const double position = state_.joint_position[joint], speed = state_.joint_velocity[joint];
       const double room = speed > 0 ? limits.upper - position : position - limits.lower;
@@ -480,24 +484,24 @@ EstimatedPose StepPlanner::Estimate() const {
   const robot::RobotData& data = whole_body_->data();
   return {.com = data.com,
           .body_rotation = data.body_rotation[static_cast<size_t>(model_->body_task_body())],
-          .sole = {data.foot_pose[0], data.foot_pose[1]}};
+          .sole = data.foot_pose};
 }
 
 balance::ContactGeometry StepPlanner::Geometry() const {
   const robot::RobotData& data = whole_body_->data();
-  return {{data.foot_pose[0], data.foot_pose[1]}, in_contact_};
+  return {data.foot_pose, in_contact_};
 }
 
-balance::ConvexPolygon StepPlanner::Soles(const Eigen::Isometry3d& frame_o,
-                                          const std::array<balance::ConvexPolygon, 2>& sole) const {
+balance::ConvexPolygon StepPlanner::Soles(
+    const Eigen::Isometry3d& frame_o, const robot::FootArray<balance::ConvexPolygon>& sole) const {
   return balance::SupportPolygon(frame_o, Geometry(), sole);
 }
 
-std::array<bool, 2> StepPlanner::ComOverFoot() const {
+robot::FootArray<bool> StepPlanner::ComOverFoot() const {
   const robot::RobotData& data = whole_body_->data();
-  std::array<bool, 2> over{};
-  for (size_t i = 0; i < 2; ++i) {
-    const Eigen::Isometry3d& sole = data.foot_pose[i];
+  robot::FootArray<bool> over;
+  for (const Foot f : kFeet) {
+    const Eigen::Isometry3d& sole = data.foot_pose[f];
     // Along the vertical onto the sole's plane, then into its axes.
     const Eigen::Vector3d normal = sole.linear().col(2);
     Eigen::Vector3d offset = data.com - sole.translation();
@@ -505,7 +509,7 @@ std::array<bool, 2> StepPlanner::ComOverFoot() const {
     offset += std::sqrt(offset.z() / robot::kGravity) * data.com_velocity;
     offset.z() -= offset.dot(normal) / normal.z();
     const Eigen::Vector2d at = (sole.linear().transpose() * offset).head<2>();
-    over[i] = balance::Contains(stance_sole_[i], at);
+    over[f] = balance::Contains(stance_sole_[f], at);
   }
   return over;
 }

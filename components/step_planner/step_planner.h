@@ -1,7 +1,6 @@
 // The step planner: phases, references and capture point, the support plan of a tick.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -52,12 +51,12 @@ class StepPlanner : public Component, public Operated {
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.
-  ScheduleInput Observe(double time, const std::array<double, 2>& load);
+  ScheduleInput Observe(double time, const robot::FootArray<double>& load);
   /// N, standard deviation of an observed load; 0 of a measured one.
-  double LoadDeviation(size_t foot) const;
+  double LoadDeviation(robot::Foot foot) const;
   /// The tick of what leads in place of the schedule; false: the schedule goes on.
-  bool Step(double time, const std::array<double, 2>& load);
-  stepping::StepInput SeeSteps(double time, const std::array<double, 2>& load);
+  bool Step(double time, const robot::FootArray<double>& load);
+  stepping::StepInput SeeSteps(double time, const robot::FootArray<double>& load);
   /// The recovery's tick; false: it does not act, and the schedule goes on.
   bool Recover(const stepping::StepInput& input);
   /// The same of walking.
@@ -86,10 +85,10 @@ class StepPlanner : public Component, public Operated {
   balance::ContactGeometry Geometry() const;
   /// Hull of the soles in contact; `sole`: in their own frames.
   balance::ConvexPolygon Soles(const Eigen::Isometry3d& frame_o,
-                               const std::array<balance::ConvexPolygon, 2>& sole) const;
+                               const robot::FootArray<balance::ConvexPolygon>& sole) const;
   /// By foot: it alone can carry the robot, as the capture point, where the COM can be brought to
   /// rest, lies inside its reduced sole. At rest that is the COM's projection, and the CoP.
-  std::array<bool, 2> ComOverFoot() const;
+  robot::FootArray<bool> ComOverFoot() const;
   void Report(double time, const Capture& capture);
 
   Input<robot_state_t> robot_state_;
@@ -104,8 +103,8 @@ class StepPlanner : public Component, public Operated {
   StanceFollower stance_follower_{0};
   std::optional<HipStrategy> hip_strategy_;
   ContactConfirmation contact_;
-  std::vector<Landing> landing_;           // by foot
-  std::vector<ContactLoss> contact_loss_;  // by foot
+  robot::FootArray<Landing> landing_{Landing(contact_)};
+  robot::FootArray<ContactLoss> contact_loss_{ContactLoss(contact_)};
   StepDetector step_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
@@ -127,10 +126,10 @@ class StepPlanner : public Component, public Operated {
   Eigen::Matrix3d untilted_ =
       Eigen::Matrix3d::Identity();  // the body's reference less the hip strategy's tilt
   robot::RobotState state_;
-  std::array<bool, 2> in_contact_{true, true};
+  robot::FootArray<bool> in_contact_{true, true};
   bool last_controlled_ = false;  // the phase before had tasks
   // m, sole frames: whole, less what the hip strategy starts from, and what one foot balances on.
-  std::array<balance::ConvexPolygon, 2> sole_, tilt_sole_, stance_sole_;
+  robot::FootArray<balance::ConvexPolygon> sole_, tilt_sole_, stance_sole_;
 };
 
 }  // namespace poise

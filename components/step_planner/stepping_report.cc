@@ -46,7 +46,7 @@ int8_t ReasonCode(stepping::StepReason reason) {
 }
 
 void ReportStepping(const stepping::Recovery& recovery, double time,
-                    const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
+                    const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan) {
   plan->stepping = SteppingCode(recovery.stage());
   if (recovery.stage() == stepping::Stage::kIdle) {
     plan->touch_down_time = 0;
@@ -86,7 +86,7 @@ int8_t WalkCode(stepping::WalkStage stage) {
 }  // namespace
 
 void ReportWalking(const stepping::Walk& walk, double time,
-                   const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan) {
+                   const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan) {
   plan->stepping = WalkCode(walk.stage());
   if (!walk.active()) {
     plan->touch_down_time = 0;

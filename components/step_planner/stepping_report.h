@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 
 #include "components/step_planner/stepping/recovery.h"
 #include "components/step_planner/stepping/walk.h"
@@ -18,10 +17,10 @@ int8_t ReasonCode(stepping::StepReason reason);
 /// Fills stepping, step_*, num_steps, foothold* and touch_down_time at `time`, s; soles in the
 /// world, right first.
 void ReportStepping(const stepping::Recovery& recovery, double time,
-                    const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
+                    const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan);
 
 /// The same of walking, and walk_velocity.
 void ReportWalking(const stepping::Walk& walk, double time,
-                   const std::array<Eigen::Isometry3d, 2>& sole, support_plan_t* plan);
+                   const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan);
 
 }  // namespace poise

@@ -7,6 +7,9 @@
 namespace poise {
 namespace {
 
+using robot::Foot;
+using robot::kFeet;
+
 // m from the soles' edge that a foot can be put down at the most, of the step that is announced.
 constexpr double kStepReach = 0.4;
 
@@ -55,8 +58,8 @@ int8_t WaitingCode(const SupportView& view) {
     case WaitingFor::kCom:
       return support_plan_t::WAITING_COM;
     case WaitingFor::kContact:
-      for (size_t i = 0; i < 2; ++i) {
-        if (!view.in_contact[i] && view.landing[i].state() == Landing::State::kRetracted) {
+      for (const Foot f : kFeet) {
+        if (!view.in_contact[f] && view.landing[f].state() == Landing::State::kRetracted) {
           return support_plan_t::WAITING_NO_SURFACE;
         }
       }
@@ -78,7 +81,8 @@ void ReportPhase(const SupportView& view, double time, support_plan_t* plan) {
   out.waiting_for = WaitingCode(view);
   out.gravity_compensation = view.schedule.phase().gravity_compensation() ? 1 : 0;
   out.transition = TransitionCode(schedule.transition);
-  out.transition_foot = static_cast<int8_t>(schedule.transition_foot);
+  out.transition_foot =
+      schedule.transition_foot ? static_cast<int8_t>(*schedule.transition_foot) : int8_t{-1};
   out.transition_progress = schedule.progress;
   if (!view.held) return;
   out.waiting_for = support_plan_t::WAITING_NONE;
@@ -94,19 +98,19 @@ void ReportPhase(const SupportView& view, double time, support_plan_t* plan) {
 void ReportFeet(const SupportView& view, const robot::RobotData& data, support_plan_t* plan) {
   support_plan_t& out = *plan;
   const int next = view.schedule.next();
-  const std::array<bool, 2> then = view.steps != nullptr ? std::array{true, true}
-                                   : next == PhaseGraph::kNone || view.held
-                                       ? view.in_contact
-                                       : ContactsOf(view.schedule.phase(next).support());
-  for (size_t i = 0; i < 2; ++i) {
-    out.in_contact[i] = view.in_contact[i] ? 1 : 0;
-    out.next_in_contact[i] = then[i] ? 1 : 0;
-    out.foot_state[i] =
-        view.in_contact[i] ? support_plan_t::FOOT_SUPPORT
+  const robot::FootArray<bool> then = view.steps != nullptr ? robot::FootArray<bool>(true)
+                                      : next == PhaseGraph::kNone || view.held
+                                          ? view.in_contact
+                                          : ContactsOf(view.schedule.phase(next).support());
+  for (const Foot f : kFeet) {
+    out.in_contact[Index(f)] = view.in_contact[f] ? 1 : 0;
+    out.next_in_contact[Index(f)] = then[f] ? 1 : 0;
+    out.foot_state[Index(f)] =
+        view.in_contact[f] ? support_plan_t::FOOT_SUPPORT
         : view.steps != nullptr
             ? (view.steps->searching ? support_plan_t::FOOT_SEARCHING : support_plan_t::FOOT_SWING)
-            : FootCode(view.landing[i].state());
-    SetPose(data.foot_pose[i], &out.foot_pose[i]);
+            : FootCode(view.landing[f].state());
+    SetPose(data.foot_pose[f], &out.foot_pose[Index(f)]);
   }
 }
 
@@ -123,13 +127,13 @@ void ReportReferences(const SupportView& view, const robot::RobotData& data,
   if (steps != nullptr) SetVector3(steps->cop_reference, out.cop_reference);
   SetMotion(controlled ? references.body : RotationMotion{.rotation = estimate.body_rotation},
             &out.body_reference);
-  for (size_t i = 0; i < 2; ++i) {
-    const bool moves = controlled && !view.in_contact[i];
-    const Eigen::Isometry3d& sole = estimate.sole[i];
-    SetMotion(moves ? references.foot[i] : PointMotion{.position = sole.translation()},
-              &out.foot_reference[i]);
-    SetMotion(moves ? references.foot_rotation[i] : RotationMotion{.rotation = sole.linear()},
-              &out.foot_rotation_reference[i]);
+  for (const Foot f : kFeet) {
+    const bool moves = controlled && !view.in_contact[f];
+    const Eigen::Isometry3d& sole = estimate.sole[f];
+    SetMotion(moves ? references.foot[f] : PointMotion{.position = sole.translation()},
+              &out.foot_reference[Index(f)]);
+    SetMotion(moves ? references.foot_rotation[f] : RotationMotion{.rotation = sole.linear()},
+              &out.foot_rotation_reference[Index(f)]);
   }
 }
 

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
-#include <vector>
 
 #include "components/balance/capture_point.h"
 #include "components/balance/convex_polygon.h"
@@ -22,8 +20,8 @@ struct SupportView {
   const PhaseSchedule& schedule;
   bool held;                          ///< the schedule
   const stepping::StepOutput* steps;  ///< nullptr: the schedule leads
-  std::array<bool, 2> in_contact;
-  const std::vector<Landing>& landing;  ///< by foot
+  robot::FootArray<bool> in_contact;
+  const robot::FootArray<Landing>& landing;
 };
 
 /// Phase, what it waits for, and transition; `time`, s.

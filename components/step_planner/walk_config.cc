@@ -180,13 +180,12 @@ void CheckCommands(const WalkConfig& config) {
 }
 
 void CheckGround(const WalkConfig& config) {
-  std::array<double, 2> from{-std::numeric_limits<double>::infinity(),
-                             -std::numeric_limits<double>::infinity()};
+  robot::FootArray<double> from(-std::numeric_limits<double>::infinity());
   for (int i = 0; i < config.ground_size(); ++i) {
     const KnownGroundConfig& ground = config.ground(i);
     const std::string field = fmt::format("walk.ground[{}]", i);
     if (!ground.has_foot()) throw ConfigError(field + ".foot", "is missing: whose lane is it?");
-    double& last_from = from[static_cast<size_t>(ground.foot())];
+    double& last_from = from[robot::FootAt(ground.foot())];
     if (!(ground.from() > last_from)) {
       throw ConfigError(field + ".from", "must come after the last one's of this foot");
     }
@@ -280,8 +279,7 @@ stepping::WalkSpec MakeWalkSpec(const WalkConfig& config, const ContactConfirmat
   spec.soft = kSoftShare * radius;
   spec.slowest_swing = config.slowest_swing();
   for (const KnownGroundConfig& edge : config.ground()) {
-    spec.ground.Add(edge.foot() == LEFT_FOOT ? robot::Foot::kLeft : robot::Foot::kRight,
-                    edge.from(), edge.height());
+    spec.ground.Add(robot::FootAt(edge.foot()), edge.from(), edge.height());
   }
   return spec;
 }

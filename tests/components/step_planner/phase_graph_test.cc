@@ -41,13 +41,13 @@ TEST(PhaseGraph, ArrowsLeadWhereTheyAreTold) {
             next { to: "stand" } next { on: CONTACT_LOST to: "right" } }
   )"));
   EXPECT_EQ(graph.Follower(0, DONE), 2);
-  EXPECT_EQ(graph.Follower(0, CONTACT_LOST, LEFT_FOOT), 1);
-  EXPECT_EQ(graph.Follower(0, CONTACT_LOST, RIGHT_FOOT), PhaseGraph::kNone);
+  EXPECT_EQ(graph.Follower(0, CONTACT_LOST, robot::Foot::kLeft), 1);
+  EXPECT_EQ(graph.Follower(0, CONTACT_LOST, robot::Foot::kRight), PhaseGraph::kNone);
   EXPECT_EQ(graph.Follower(1, DONE), PhaseGraph::kNone);
   EXPECT_EQ(graph.Follower(2, DONE), 0);
   EXPECT_EQ(graph.Follower(2, NO_SURFACE), 1);
   EXPECT_EQ(graph.Follower(2, TIMEOUT), 2);
-  for (const int foot : {RIGHT_FOOT, LEFT_FOOT}) {
+  for (const robot::Foot foot : robot::kFeet) {
     EXPECT_EQ(graph.Follower(2, CONTACT_LOST, foot), 1);
   }
 }

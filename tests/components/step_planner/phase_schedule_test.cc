@@ -61,7 +61,7 @@ TEST(PhaseSchedule, FollowsTheScenarioToTheTick) {
     }
     ASSERT_EQ(state.transition, kind);
     ASSERT_NEAR(state.progress, progress, 1e-8);
-    ASSERT_EQ(state.transition_foot, kind == TransitionKind::kNone ? -1 : 1);
+    ASSERT_EQ(state.transition_foot == robot::Foot::kLeft, kind != TransitionKind::kNone);
   }
 }
 

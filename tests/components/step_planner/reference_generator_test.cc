@@ -183,13 +183,13 @@ TEST(ReferenceGenerator, AHeldFootRestsAndLaterMovesStartThere) {
   references.BeginPhase(ParsePhase("support: RIGHT foot { foot: LEFT_FOOT z: 0.1 "
                                    "duration: 1 }"),
                         Pose(), 0);
-  EXPECT_NEAR(references.foot(1).target().z(), 0.102, 1e-15);
-  EXPECT_NEAR(references.foot(1).end(), 1, 1e-15);
+  EXPECT_NEAR(references.foot(robot::Foot::kLeft).target().z(), 0.102, 1e-15);
+  EXPECT_NEAR(references.foot(robot::Foot::kLeft).end(), 1, 1e-15);
   references.Update(0.5, Pose().com);
   const Eigen::Vector3d place(0.01, 0.12, 0.07);
   const Eigen::Matrix3d rotation =
       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  references.HoldFoot(1, place, rotation);
+  references.HoldFoot(robot::Foot::kLeft, place, rotation);
   for (const double time : {0.5, 0.7, 2.0}) {
     const References& held = references.Update(time, Pose().com);
     EXPECT_EQ(held.foot[1].position, place);
@@ -264,7 +264,7 @@ TEST(ReferenceGenerator, BodyAndFreeFootTurn) {
   const Eigen::Matrix3d foot = turned(-0.2, Eigen::Vector3d::UnitY(), Pose().sole[1].linear());
   EXPECT_LT((at.foot_rotation[1].rotation - foot).norm(), 1e-14);
   // Held, it turns no more, and later turns count from there.
-  references.HoldFoot(1, Pose().sole[1].translation(), foot);
+  references.HoldFoot(robot::Foot::kLeft, Pose().sole[1].translation(), foot);
   references.BeginPhase(ParsePhase("support: RIGHT foot { foot: LEFT_FOOT turn { y: 0.3 } }"),
                         Pose(), 2);
   EXPECT_LT((references.Update(2.1, Pose().com).foot_rotation[1].rotation -
