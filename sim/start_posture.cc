@@ -14,8 +14,8 @@ using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Translation3d;
 using Eigen::Vector3d;
-using robot::kLeftFoot;
-using robot::kRightFoot;
+using robot::FootArray;
+using robot::kFeet;
 using robot::RobotData;
 using robot::RobotModel;
 using robot::RobotState;
@@ -51,22 +51,23 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
     spacing = *model.stance().foot_spacing;
   } else if (!config.has_foot_spacing()) {
     evaluate(Eigen::VectorXd::Zero(model.num_joints()));
-    spacing =
-        data.foot_pose[kLeftFoot].translation().y() - data.foot_pose[kRightFoot].translation().y();
+    spacing = data.foot_pose[robot::Foot::kLeft].translation().y() -
+              data.foot_pose[robot::Foot::kRight].translation().y();
   }
   double com_height = config.com_height();
   if (!config.has_com_height() && stands && model.stance().com_height) {
     com_height = *model.stance().com_height;
   } else if (!config.has_com_height()) {
     evaluate(goal.nominal);
-    com_height = data.com.z() - data.foot_pose[kRightFoot].translation().z();
+    com_height = data.com.z() - data.foot_pose[robot::Foot::kRight].translation().z();
   }
   // Both may follow from the robot.
   CheckPositive(spacing, "start.foot_spacing");
   CheckPositive(com_height, "start.com_height");
 
-  goal.foot[kRightFoot] = Isometry3d(Translation3d(0, -spacing / 2, 0));
-  goal.foot[kLeftFoot] = Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));
+  goal.foot[robot::Foot::kRight] = Isometry3d(Translation3d(0, -spacing / 2, 0));
+  goal.foot[robot::Foot::kLeft] =
+      Isometry3d(Translation3d(0, spacing / 2, config.left_foot_height()));
   const double above_right = config.left_foot_height() > 0 ? -spacing / 2 : 0;
   goal.com_xy = {config.com_x(), config.has_com_y() ? config.com_y() : above_right};
   goal.com_height = com_height;
@@ -77,43 +78,44 @@ RobotState SolveStart(const RobotModel& model, const StartPosture& config) {
   }
 }
 
-std::array<Vector6d, 2> RestWrenches(const RobotModel& model, const RobotState& state,
-                                     const std::array<bool, 2>& in_contact) {
+FootArray<Vector6d> RestWrenches(const RobotModel& model, const RobotState& state,
+                                 const FootArray<bool>& in_contact) {
   RobotData data(model);
   robot::ComputeKinematics(model, state, &data);
   robot::ComputeFeet(model, &data);
   robot::ComputeDynamics(model, state, &data);
-  const double arm = model.feet()[kRightFoot].length / 2;
+  const double arm = model.feet()[robot::Foot::kRight].length / 2;
   // Force and moment about the COM, world axes, of the wrenches [f; m / arm] in the sole frames.
   Eigen::Matrix<double, 6, 12> balance = Eigen::Matrix<double, 6, 12>::Zero();
-  for (int f = 0; f < 2; ++f) {
-    if (!in_contact[static_cast<size_t>(f)]) continue;
-    const Isometry3d& sole = data.foot_pose[static_cast<size_t>(f)];
+  for (const robot::Foot f : kFeet) {
+    if (!in_contact[f]) continue;
+    const Isometry3d& sole = data.foot_pose[f];
+    const Eigen::Index column = 6 * static_cast<Eigen::Index>(f);
     const Matrix3d r = sole.linear();
     const Vector3d lever = sole.translation() - data.com;
-    balance.block<3, 3>(0, 6 * f) = r;
-    for (int i = 0; i < 3; ++i) balance.block<3, 1>(3, 6 * f + i) = lever.cross(r.col(i));
-    balance.block<3, 3>(3, 6 * f + 3) = arm * r;
+    balance.block<3, 3>(0, column) = r;
+    for (int i = 0; i < 3; ++i) balance.block<3, 1>(3, column + i) = lever.cross(r.col(i));
+    balance.block<3, 3>(3, column + 3) = arm * r;
   }
   Vector6d weight = Vector6d::Zero();
   weight.z() = model.total_mass() * robot::kGravity;
   Eigen::Matrix<double, 12, 1> wrenches = balance.completeOrthogonalDecomposition().solve(weight);
-  std::array<Vector6d, 2> result;
-  for (int f = 0; f < 2; ++f) {
-    result[static_cast<size_t>(f)] = wrenches.segment<6>(6 * f);
-    result[static_cast<size_t>(f)].tail<3>() *= arm;
+  FootArray<Vector6d> result;
+  for (const robot::Foot f : kFeet) {
+    result[f] = wrenches.segment<6>(6 * static_cast<Eigen::Index>(f));
+    result[f].tail<3>() *= arm;
   }
   return result;
 }
 
 Eigen::VectorXd RestTorques(const RobotModel& model, const RobotState& state,
-                            const std::array<Vector6d, 2>& wrenches) {
+                            const FootArray<Vector6d>& wrenches) {
   RobotData data(model);
   robot::ComputeKinematics(model, state, &data);
   robot::ComputeFeet(model, &data);
   robot::ComputeDynamics(model, state, &data);
   Eigen::VectorXd force = data.gravity;
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     const Matrix3d r = data.foot_pose[f].linear();
     Vector6d wrench;
     wrench << r * wrenches[f].head<3>(), r * wrenches[f].tail<3>();

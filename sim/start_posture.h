@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/robot/dynamics.h"
 #include "components/robot/robot_model.h"
@@ -15,15 +14,15 @@ namespace poise {
 /// range, out of reach.
 robot::RobotState SolveStart(const robot::RobotModel& model, const StartPosture& config);
 
-/// Contact wrenches (environment on robot, [force; moment], sole frames, right first) that hold the
+/// Contact wrenches (environment on robot, [force; moment], sole frames) that hold the
 /// robot at rest: of all that do, those of least norm with moments measured over half a sole's
 /// length. A foot out of contact has none.
-std::array<robot::Vector6d, 2> RestWrenches(const robot::RobotModel& model,
-                                            const robot::RobotState& state,
-                                            const std::array<bool, 2>& in_contact);
+robot::FootArray<robot::Vector6d> RestWrenches(const robot::RobotModel& model,
+                                               const robot::RobotState& state,
+                                               const robot::FootArray<bool>& in_contact);
 
 /// Joint torques (N·m) that hold the robot at rest under these wrenches.
 Eigen::VectorXd RestTorques(const robot::RobotModel& model, const robot::RobotState& state,
-                            const std::array<robot::Vector6d, 2>& wrenches);
+                            const robot::FootArray<robot::Vector6d>& wrenches);
 
 }  // namespace poise

@@ -100,8 +100,6 @@ struct DriveTrainModel {
   double sensor_delay = 0;  ///< s
 };
 
-inline constexpr int kRightFoot = 0;
-inline constexpr int kLeftFoot = 1;
 inline constexpr double kGravity = 9.80665;  ///< m/s², standard gravity, along -z of the world
 
 /// Configuration and velocity. Velocity order of the whole project: v = [base linear; base angular;

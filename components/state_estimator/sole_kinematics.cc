@@ -77,8 +77,8 @@ FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, do
 }
 
 Placement PlaceOnGround(const SoleKinematics& kinematics, const FootWeights& weights) {
-  const Sole& right = kinematics.sole(robot::kRightFoot);
-  const Sole& left = kinematics.sole(robot::kLeftFoot);
+  const Sole& right = kinematics.sole(Index(robot::Foot::kRight));
+  const Sole& left = kinematics.sole(Index(robot::Foot::kLeft));
   std::array<double, 2> weight = weights.share;
   const auto normal = [&] {
     return Vector3d(weight[0] * right.rotation.col(2) + weight[1] * left.rotation.col(2))

@@ -35,8 +35,8 @@ SwingFriction OnTheRightFoot(const robot::RobotModel& model, double share) {
   return friction;
 }
 
-int AnkleOf(const robot::RobotModel& model, int foot) {
-  return model.supporting_joints(model.feet()[static_cast<size_t>(foot)].body)[0];
+int AnkleOf(const robot::RobotModel& model, robot::Foot foot) {
+  return model.supporting_joints(model.feet()[foot].body)[0];
 }
 
 // A joint of inertia J with Coulomb and viscous friction, PD by a model without friction, and dry
@@ -47,7 +47,7 @@ class JointWithFriction {
 
   JointWithFriction(TestRobot robot, double share)
       : model_(robot::LoadTestRobot(robot)),
-        joint_(AnkleOf(model_, robot::kLeftFoot)),
+        joint_(AnkleOf(model_, robot::Foot::kLeft)),
         motor_(model_.motors()[static_cast<size_t>(joint_)]),
         friction_(OnTheRightFoot(model_, share)) {}
 
@@ -170,13 +170,13 @@ TEST(SwingFrictionTest, ComesAsTheLoadGoes) {
   const auto count = static_cast<size_t>(model.num_joints());
   FrictionCompensation none = Config(kShare);
   none.set_fade_load(0);
-  for (const int light : {robot::kRightFoot, robot::kLeftFoot}) {
+  for (const robot::Foot light : robot::kFeet) {
     SwingFriction friction(Config(kShare), model, kPeriod), airborne(none, model, kPeriod);
     const auto at = static_cast<size_t>(AnkleOf(model, light));
-    const auto loaded = static_cast<size_t>(AnkleOf(model, 1 - light));
+    const auto loaded = static_cast<size_t>(AnkleOf(model, Other(light)));
     double before = 0;
     for (double share = 0.5; share > -0.1; share -= 0.1) {
-      const double eta = light == robot::kRightFoot ? share : 1 - share;
+      const double eta = light == robot::Foot::kRight ? share : 1 - share;
       for (int tick = 0; tick < 100; ++tick) friction.Ramp({true, true}, eta);
       std::vector<double> torque(count, 0.0);
       friction.Add(velocity, rest, torque);
@@ -218,7 +218,7 @@ TEST(SwingFrictionTest, IsAddedBehindTheCommandOfTheSwingingLeg) {
     }
     Eigen::VectorXd q, wrench;
     Dynamics(model, state, {true, false}).Forward(ToEigen(without.torque), &q, &wrench);
-    const auto leg = model.supporting_joints(model.feet()[robot::kLeftFoot].body);
+    const auto leg = model.supporting_joints(model.feet()[robot::Foot::kLeft].body);
     double most = 0;
     for (int j = 0; j < model.num_joints(); ++j) {
       const auto i = static_cast<size_t>(j);

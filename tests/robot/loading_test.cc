@@ -33,7 +33,7 @@ TEST(Loading, DyrosIsThePapersRobot) {
   EXPECT_EQ(model.num_joints(), 12);
   EXPECT_NEAR(model.total_mass(), 54.63, 1e-9);
   ASSERT_EQ(model.feet().size(), 2u);
-  EXPECT_EQ(model.feet()[kRightFoot].name, "right");
+  EXPECT_EQ(model.feet()[Foot::kRight].name, "right");
   for (const FootModel& foot : model.feet()) {
     EXPECT_EQ(foot.length, 0.30);
     EXPECT_EQ(foot.width, 0.15);
@@ -51,9 +51,9 @@ TEST(Loading, DyrosIsThePapersRobot) {
   EXPECT_EQ(model.FindJoint("no_such_joint"), -1);
   // Standing straight, all joints at zero: the soles lie 0.72 + 0.105 + 0.10 m below the base.
   const RobotData data = Evaluate(model, RobotState(12));
-  EXPECT_NEAR((data.foot_pose[kRightFoot].translation() - Vector3d(0.03, -0.105, -0.925)).norm(), 0,
-              1e-12);
-  EXPECT_NEAR((data.foot_pose[kLeftFoot].translation() - Vector3d(0.03, 0.105, -0.925)).norm(), 0,
+  EXPECT_NEAR((data.foot_pose[Foot::kRight].translation() - Vector3d(0.03, -0.105, -0.925)).norm(),
+              0, 1e-12);
+  EXPECT_NEAR((data.foot_pose[Foot::kLeft].translation() - Vector3d(0.03, 0.105, -0.925)).norm(), 0,
               1e-12);
 }
 
@@ -187,7 +187,7 @@ TEST(Loading, SupportingJointsLeadToTheBase) {
   const RobotModel model = LoadTestRobot(TestRobot::kMantis);
   EXPECT_TRUE(model.supporting_joints(0).empty());
   std::vector<std::string> names;
-  for (const int j : model.supporting_joints(model.feet()[kRightFoot].body)) {
+  for (const int j : model.supporting_joints(model.feet()[Foot::kRight].body)) {
     names.push_back(model.joints()[static_cast<size_t>(j)].name);
   }
   EXPECT_THAT(names, testing::ElementsAre("right_ankle_roll", "right_ankle_pitch", "right_knee",

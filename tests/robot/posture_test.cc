@@ -19,8 +19,8 @@ using Eigen::VectorXd;
 // Soles flat, `width` apart, the right one `stagger` ahead.
 PostureGoal Standing(const RobotModel& model, double width, double stagger, double height) {
   PostureGoal goal;
-  for (size_t f = 0; f < 2; ++f) {
-    const double side = f == kRightFoot ? -1 : 1;
+  for (const Foot f : kFeet) {
+    const double side = Side(f);
     goal.foot[f] = Eigen::Isometry3d::Identity();
     goal.foot[f].translation() = Vector3d(-side * stagger / 2, side * width / 2, 0);
   }
@@ -59,8 +59,8 @@ TEST(Posture, DyrosStandsAndShifts) {
 TEST(Posture, SoleAtDifferentHeightsAndTilts) {
   const RobotModel model = LoadTestRobot(TestRobot::kDyros);
   PostureGoal goal = Standing(model, 0.24, 0.1, 0.72);
-  goal.foot[kLeftFoot].translation().z() = 0.09;
-  goal.foot[kLeftFoot].linear() =
+  goal.foot[Foot::kLeft].translation().z() = 0.09;
+  goal.foot[Foot::kLeft].linear() =
       (Eigen::AngleAxisd(0.1, Vector3d::UnitX()) * Eigen::AngleAxisd(-0.15, Vector3d::UnitY()) *
        Eigen::AngleAxisd(0.2, Vector3d::UnitZ()))
           .toRotationMatrix();
@@ -123,7 +123,7 @@ TEST(Posture, SaysWhatCannotBeReached) {
                              HasSubstr(" m")));
   EXPECT_THAT(Refusal(model, Standing(model, 2.0, 0, 0.7)), HasSubstr("misses by"));
   PostureGoal tilted = Standing(model, 0.21, 0, 0.75);
-  tilted.foot[kRightFoot].linear() = Eigen::AngleAxisd(1.2, Vector3d::UnitX()).toRotationMatrix();
+  tilted.foot[Foot::kRight].linear() = Eigen::AngleAxisd(1.2, Vector3d::UnitX()).toRotationMatrix();
   EXPECT_THAT(Refusal(model, tilted), HasSubstr("joints at their limits"));
 }
 

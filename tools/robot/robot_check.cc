@@ -100,7 +100,7 @@ double ReachAlong(const RobotCheck& check, const Vector3d& direction) {
   const robot::PostureGoal stance = StanceGoal(check);
   const auto reaches = [&](double distance) {
     robot::PostureGoal goal = stance;
-    goal.foot[robot::kLeftFoot].translation() += distance * direction;
+    goal.foot[robot::Foot::kLeft].translation() += distance * direction;
     goal.com_xy += 0.5 * distance * direction.head<2>();
     return TrySolve(check.model, goal).has_value();
   };

@@ -50,8 +50,8 @@ class Step {
 
   /// The robot on the sole of `stance`, whose frame lies at the origin, at each sample, with its
   /// velocities. Nothing where it is out of reach.
-  std::optional<std::vector<RobotState>> States(size_t stance) const {
-    const double side = stance == robot::kRightFoot ? 1 : -1;
+  std::optional<std::vector<RobotState>> States(robot::Foot stance) const {
+    const double side = -Side(stance);
     const double period = single() + both(), length = kCheckedSpeed * period;
     const Vector3d across(0, side * spacing_, 0), ahead(length, 0, 0);
     const double turn = side * 2 * kCheckedTurn * period;  // outwards in every second step
@@ -71,7 +71,7 @@ class Step {
     for (int i = 0; i <= kSamples; ++i) {
       const double time = std::min(i * interval(), spec_.swing);
       const double middle = i * interval() - 0.5 * single();
-      Eigen::Isometry3d& foot = goal.foot[1 - stance];
+      Eigen::Isometry3d& foot = goal.foot[Other(stance)];
       foot.translation() = swing.At(time).position;
       foot.linear() = swing.RotationAt(time).rotation;
       goal.foot[stance] = Eigen::Isometry3d::Identity();
@@ -95,7 +95,7 @@ class Step {
   }
 
   /// N·m, of the motors: of the whole acceleration, on the sole of `stance` alone, and of friction.
-  VectorXd Torque(const RobotState& state, const VectorXd& acceleration, size_t stance) const {
+  VectorXd Torque(const RobotState& state, const VectorXd& acceleration, robot::Foot stance) const {
     robot::RobotData data(model_);
     robot::ComputeKinematics(model_, state, &data);
     robot::ComputeFeet(model_, &data);
@@ -142,7 +142,7 @@ std::optional<StepLoads> LoadsOfAStep(const robot::RobotModel& model, const Robo
   const VectorXd none = VectorXd::Zero(model.num_joints());
   StepLoads loads{standing, none, none};
   VectorXd square = none;  // mean over the time on one foot, of both feet's steps
-  for (size_t foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     const auto states = step.States(foot);
     if (!states) return {};
     // At the ends a difference to one side alone is known: half a sample off.

@@ -22,8 +22,8 @@ struct Leg {
 };
 
 struct Anatomy {
-  std::array<Leg, 2> leg;  ///< right first
-  int hips = 0;            ///< body where they part: the root, or one below a waist
+  robot::FootArray<Leg> leg;
+  int hips = 0;  ///< body where they part: the root, or one below a waist
   /// In the root link: x forward, y left, z up.
   Eigen::Matrix3d facing = Eigen::Matrix3d::Identity();
   Sureness sides = Sureness::kGuess, forward = Sureness::kGuess;

@@ -48,7 +48,7 @@ double PitchBetween(const Vector3d& a, const Vector3d& b) {
   return std::atan2(a.z() * b.x() - a.x() * b.z(), a.x() * b.x() + a.z() * b.z());
 }
 
-void BendLeg(const RobotModel& model, const Anatomy& anatomy, size_t foot, double bend,
+void BendLeg(const RobotModel& model, const Anatomy& anatomy, robot::Foot foot, double bend,
              Eigen::VectorXd* joints) {
   const Leg& leg = anatomy.leg[foot];
   const robot::RobotData data = Kinematics(model, *joints);
@@ -104,9 +104,8 @@ FoundStance StanceAt(const RobotModel& model, const Anatomy& anatomy,
     const robot::RobotData data = Kinematics(model, goal.nominal);
     goal.com_height = Rounded(data.com.z() - 0.5 * (data.foot_pose[0].translation().z() +
                                                     data.foot_pose[1].translation().z()));
-    for (size_t f = 0; f < 2; ++f) {
-      goal.foot[f] = Eigen::Isometry3d(
-          Eigen::Translation3d(0, f == robot::kRightFoot ? -spacing / 2 : spacing / 2, 0));
+    for (const robot::Foot f : robot::kFeet) {
+      goal.foot[f] = Eigen::Isometry3d(Eigen::Translation3d(0, Side(f) * spacing / 2, 0));
     }
     try {
       FoundStance found;
@@ -157,15 +156,15 @@ Eigen::VectorXd WithinLimits(const RobotModel& model, Eigen::VectorXd wanted) {
 
 Eigen::VectorXd WithBentKnees(const RobotModel& model, const Anatomy& anatomy, double bend,
                               Eigen::VectorXd nominal) {
-  for (size_t f = 0; f < 2; ++f) BendLeg(model, anatomy, f, bend, &nominal);
+  for (const robot::Foot f : robot::kFeet) BendLeg(model, anatomy, f, bend, &nominal);
   return WithinLimits(model, nominal);
 }
 
 FoundStance FindStance(const RobotModel& model, const Anatomy& anatomy,
                        const Eigen::VectorXd& nominal, bool bend_knees) {
   const robot::RobotData zero = Kinematics(model, nominal);
-  const double spacing = Rounded(std::abs(zero.foot_pose[robot::kLeftFoot].translation().y() -
-                                          zero.foot_pose[robot::kRightFoot].translation().y()));
+  const double spacing = Rounded(std::abs(zero.foot_pose[robot::Foot::kLeft].translation().y() -
+                                          zero.foot_pose[robot::Foot::kRight].translation().y()));
   const FoundStance widest = StanceAt(model, anatomy, nominal, bend_knees, spacing);
   const Strain strain = StrainOnOneFoot(model, anatomy, widest);
   if (strain.share <= kComfort) return widest;
