@@ -10,6 +10,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 // No robot exceeds these: they keep every finite reading from making a number that is not.
 constexpr double kMaxRate = 100;          // rad/s, gyro and joints
@@ -56,13 +58,13 @@ BaseEstimator::BaseEstimator(std::shared_ptr<const robot::RobotModel> model,
       state_(model_->num_joints()),
       joint_rate_(Eigen::VectorXd::Zero(model_->num_joints())),
       rest_position_(Eigen::VectorXd::Zero(model_->num_joints())) {
-  for (Foot& foot : feet_) foot.anchor.setIdentity();
+  for (FootState& foot : feet_) foot.anchor.setIdentity();
 }
 
-Eigen::Isometry3d BaseEstimator::foot_pose(int foot) const {
-  const Foot& f = feet_[static_cast<size_t>(foot)];
+Eigen::Isometry3d BaseEstimator::foot_pose(Foot foot) const {
+  const FootState& f = feet_[foot];
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = orientation_ * kinematics_.sole(static_cast<size_t>(foot)).rotation;
+  pose.linear() = orientation_ * kinematics_.sole(foot).rotation;
   pose.translation() = state_.base_position + f.last_offset;
   return pose;
 }
@@ -99,7 +101,7 @@ void BaseEstimator::Archive(StateArchive* archive) {
                 state_.base_angular_velocity, state_.joint_position, state_.joint_velocity,
                 orientation_, gyro_bias_, imu_orientation_, gyro_, imu_rotation_, angular_velocity_,
                 imu_velocity_, imu_acceleration_);
-  for (Foot& foot : feet_) archive->Show(foot.last_offset, foot.anchor);
+  for (FootState& foot : feet_) archive->Show(foot.last_offset, foot.anchor);
   archive->Show(accelerometer_bias_, averaged_, foot_weight_, rest_position_, rest_load_,
                 rest_gyro_, rest_samples_, rest_left_, placed_);
 }
@@ -119,10 +121,10 @@ void BaseEstimator::UpdateWeights(const BaseSensors& sensors) {
   const FootWeights weights =
       WeighFeet(sensors.foot_load, weight_, config_.light_load(), config_.full_load());
   grip_ = weights.standing;
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    feet_[i].grip = weights.grip[i];
-    feet_[i].weight = weights.share[i];
-    foot_weight_[i] = grip_ * feet_[i].weight;
+  for (const Foot f : kFeet) {
+    feet_[f].grip = weights.grip[f];
+    feet_[f].weight = weights.share[f];
+    foot_weight_[f] = grip_ * feet_[f].weight;
   }
 }
 
@@ -137,11 +139,11 @@ void BaseEstimator::Place(const BaseSensors& sensors) {
   StartGyroBias(sensors);
   ReadImu(sensors);
   imu_orientation_ = Quaterniond(orientation_ * imu_rotation_).normalized();
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    const Sole& sole = kinematics_.sole(i);
-    feet_[i].last_offset = orientation_ * sole.position;
-    feet_[i].anchor.linear() = orientation_ * sole.rotation;
-    feet_[i].anchor.translation() = state_.base_position + feet_[i].last_offset;
+  for (const Foot f : kFeet) {
+    const Sole& sole = kinematics_.sole(f);
+    feet_[f].last_offset = orientation_ * sole.position;
+    feet_[f].anchor.linear() = orientation_ * sole.rotation;
+    feet_[f].anchor.translation() = state_.base_position + feet_[f].last_offset;
   }
 }
 
@@ -160,9 +162,9 @@ void BaseEstimator::AverageGyroBias(const BaseSensors& sensors, double dt) {
   bool at_rest =
       (sensors.joint_position - rest_position_).cwiseAbs().maxCoeff() <= kRestJointMotion &&
       sensors.angular_velocity.cwiseAbs().maxCoeff() <= kMaxGyroBias;
-  for (size_t i = 0; i < feet_.size(); ++i) {
+  for (const Foot f : kFeet) {
     at_rest =
-        at_rest && std::abs(sensors.foot_load[i] - rest_load_[i]) <= kRestLoadChange * weight_;
+        at_rest && std::abs(sensors.foot_load[f] - rest_load_[f]) <= kRestLoadChange * weight_;
   }
   if (!at_rest) {
     // The mean so far may hold the start of the motion: the first reading does not.
@@ -196,7 +198,7 @@ void BaseEstimator::UpdateOrientation(const BaseSensors& sensors, double dt) {
 
   Vector3d error = Vector3d::Zero();  // of the feet, world axes
   UpdateTrust();
-  for (const Foot& foot : feet_) error += grip_ * foot.weight * foot.trust * foot.turn;
+  for (const FootState& foot : feet_) error += grip_ * foot.weight * foot.trust * foot.turn;
   Vector3d correction = Approach(dt, config_.orientation_time_constant()) * error;
   const Vector3d up = orientation_ * imu_acceleration_;
   const double size = up.norm() / robot::kGravity;
@@ -215,26 +217,27 @@ void BaseEstimator::UpdateOrientation(const BaseSensors& sensors, double dt) {
 }
 
 void BaseEstimator::UpdateTrust() {
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    feet_[i].turn =
-        RotationError(feet_[i].anchor.linear(), orientation_ * kinematics_.sole(i).rotation);
+  for (const Foot f : kFeet) {
+    feet_[f].turn =
+        RotationError(feet_[f].anchor.linear(), orientation_ * kinematics_.sole(f).rotation);
   }
   // Gyro, right and left foot have a vote each: a foot has turned when neither of the others agrees
   // with it.
-  const bool both = feet_[0].weight > 0 && feet_[1].weight > 0;
-  const double gap = both ? (feet_[0].turn - feet_[1].turn).squaredNorm()
-                          : std::numeric_limits<double>::infinity();
+  const FootState &right = feet_[Foot::kRight], &left = feet_[Foot::kLeft];
+  const bool both = right.weight > 0 && left.weight > 0;
+  const double gap =
+      both ? (right.turn - left.turn).squaredNorm() : std::numeric_limits<double>::infinity();
   const double tolerance = config_.foot_rotation_tolerance() * config_.foot_rotation_tolerance();
-  for (Foot& foot : feet_) {
+  for (FootState& foot : feet_) {
     foot.trust = tolerance / (tolerance + std::min(foot.turn.squaredNorm(), gap));
   }
 }
 
 void BaseEstimator::UpdatePosition(double dt) {
   Vector3d step = Vector3d::Zero(), foot_speed = Vector3d::Zero();
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    Foot& foot = feet_[i];
-    const Sole& sole = kinematics_.sole(i);
+  for (const Foot f : kFeet) {
+    FootState& foot = feet_[f];
+    const Sole& sole = kinematics_.sole(f);
     const Vector3d offset = orientation_ * sole.position;
     step -= foot.weight * (offset - foot.last_offset);
     foot_speed +=
@@ -255,24 +258,24 @@ void BaseEstimator::UpdatePosition(double dt) {
 void BaseEstimator::UpdateAnchors(double dt) {
   const double share = Approach(dt, config_.anchor_time_constant());
   // How far each foot stands from its anchor, and the weighted mean, which is the base's error.
-  std::array<Vector3d, 2> shift;
+  robot::FootArray<Vector3d> shift;
   Vector3d mean_shift = Vector3d::Zero();
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    const Foot& foot = feet_[i];
-    shift[i] = state_.base_position + foot.last_offset - foot.anchor.translation();
-    mean_shift += foot.weight * shift[i];
+  for (const Foot f : kFeet) {
+    const FootState& foot = feet_[f];
+    shift[f] = state_.base_position + foot.last_offset - foot.anchor.translation();
+    mean_shift += foot.weight * shift[f];
   }
-  for (size_t i = 0; i < feet_.size(); ++i) {
-    Foot& foot = feet_[i];
-    const Matrix3d rotation = orientation_ * kinematics_.sole(i).rotation;
+  for (const Foot f : kFeet) {
+    FootState& foot = feet_[f];
+    const Matrix3d rotation = orientation_ * kinematics_.sole(f).rotation;
     if (foot.grip == 0) {
       foot.anchor.linear() = rotation;
-      foot.anchor.translation() += shift[i];
+      foot.anchor.translation() += shift[f];
       continue;
     }
     const double loose = 1 - foot.grip, standing = foot.grip * share;
     // Less the mean: disagreement vanishes, while the weighted mean of the anchors stays.
-    foot.anchor.translation() += loose * shift[i] + standing * (shift[i] - mean_shift);
+    foot.anchor.translation() += loose * shift[f] + standing * (shift[f] - mean_shift);
     const Vector3d turn =
         (loose + standing * (1 - foot.trust)) * RotationError(rotation, foot.anchor.linear());
     foot.anchor.linear() = Orthonormal(Exp(turn).toRotationMatrix() * foot.anchor.linear());

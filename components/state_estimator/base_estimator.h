@@ -16,7 +16,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 #include <memory>
 
 #include "components/framework/state_archive.h"
@@ -47,19 +46,17 @@ class BaseEstimator {
   const robot::RobotState& state() const { return state_; }
   /// Weight of each foot as an anchor, 0..1; their sum falls below 1 as the robot leaves the
   /// ground.
-  const std::array<double, 2>& foot_weight() const { return foot_weight_; }
+  const robot::FootArray<double>& foot_weight() const { return foot_weight_; }
   const Eigen::Vector3d& gyro_bias() const { return gyro_bias_; }  ///< rad/s, IMU frame
   /// m/s², IMU frame: what the accelerometer reads on average beyond gravity, as the orientation
   /// has it. Of no effect on the state.
   const Eigen::Vector3d& accelerometer_bias() const { return accelerometer_bias_; }
   /// Sole in the world: where the estimator holds it to stand, and where the kinematics see it.
-  const Eigen::Isometry3d& anchor(int foot) const {
-    return feet_[static_cast<size_t>(foot)].anchor;
-  }
-  Eigen::Isometry3d foot_pose(int foot) const;
+  const Eigen::Isometry3d& anchor(robot::Foot foot) const { return feet_[foot].anchor; }
+  Eigen::Isometry3d foot_pose(robot::Foot foot) const;
 
  private:
-  struct Foot {
+  struct FootState {
     // From the base origin, world axes, of the step before.
     Eigen::Vector3d last_offset;
     Eigen::Isometry3d anchor;  ///< in the world
@@ -104,12 +101,12 @@ class BaseEstimator {
   // The step before had these, in world axes.
   Eigen::Vector3d last_imu_velocity_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d last_acceleration_ = Eigen::Vector3d::Zero();
-  std::array<Foot, 2> feet_;
-  std::array<double, 2> foot_weight_{};
+  robot::FootArray<FootState> feet_;
+  robot::FootArray<double> foot_weight_{};
   double grip_ = 0;  // 0: in flight, 1: standing
   // The readings at rest: of the first step, and their sum, over `rest_left_` s more.
   Eigen::VectorXd rest_position_;
-  std::array<double, 2> rest_load_{};
+  robot::FootArray<double> rest_load_{};
   Eigen::Vector3d rest_gyro_ = Eigen::Vector3d::Zero();
   int rest_samples_ = 0;
   double rest_left_ = 0;

@@ -2,7 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
+
+#include "components/robot/foot.h"
 
 namespace poise {
 
@@ -11,9 +12,9 @@ struct BaseSensors {
   Eigen::Map<const Eigen::VectorXd> joint_position;  ///< rad
   Eigen::Vector3d angular_velocity;                  ///< rad/s, IMU frame
   Eigen::Vector3d acceleration;                      ///< m/s², IMU frame, specific force
-  std::array<double, 2> foot_load;  ///< N, upward force on the sole (−F_z), right first
+  robot::FootArray<double> foot_load;                ///< N, upward force on the sole (−F_z)
   /// m, centre of pressure in the sole's frame; of no meaning without load.
-  std::array<Eigen::Vector2d, 2> foot_cop = {Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  robot::FootArray<Eigen::Vector2d> foot_cop{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
   /// N·m, of the motors at the joints; empty: not measured.
   Eigen::Map<const Eigen::VectorXd> joint_torque{nullptr, 0};
 };

@@ -10,6 +10,8 @@ namespace poise {
 namespace {
 
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 // Standard deviations at first: of the mass a share of the robot's, of its place m. A load of 15 %
 // anywhere, a COM off by 3 cm.
@@ -31,8 +33,8 @@ Calibrator::Calibrator(std::shared_ptr<const robot::RobotModel> model,
       Vector3d::Constant(Square(kStartShift * mass));
 }
 
-void Calibrator::Track(const std::array<robot::Vector6d, 2>& wrench, double dt) {
-  for (size_t f = 0; f < 2; ++f) input_.segment<6>(static_cast<Eigen::Index>(6 * f)) = wrench[f];
+void Calibrator::Track(const robot::FootArray<robot::Vector6d>& wrench, double dt) {
+  for (const Foot f : kFeet) input_.segment<6>(6 * static_cast<Eigen::Index>(f)) = wrench[f];
   if (started_) {
     filter_.Step(input_, dt);
   } else {
@@ -56,8 +58,8 @@ void Calibrator::Update(const WrenchObserver& observer, bool usable) {
   if (!running_) return;
   // Environment on robot, base axes, about the base's origin.
   robot::Vector6d ground = robot::Vector6d::Zero();
-  for (size_t f = 0; f < 2; ++f) {
-    const robot::Vector6d wrench = -filter_.value().segment<6>(static_cast<Eigen::Index>(6 * f));
+  for (const Foot f : kFeet) {
+    const robot::Vector6d wrench = -filter_.value().segment<6>(6 * static_cast<Eigen::Index>(f));
     const Vector3d force = observer.sole_rotation(f) * wrench.head<3>();
     ground.head<3>() += force;
     ground.tail<3>() +=

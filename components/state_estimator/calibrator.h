@@ -9,7 +9,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 
 #include "components/framework/state_archive.h"
@@ -30,7 +29,7 @@ class Calibrator {
 
   bool enabled() const { return config_.enabled(); }
   /// Each tick, `dt` s after the last: the soles' wrenches, robot on environment, sole frames.
-  void Track(const std::array<robot::Vector6d, 2>& wrench, double dt);
+  void Track(const robot::FootArray<robot::Vector6d>& wrench, double dt);
   /// With what the observer has found in this tick without any load; `usable`: both wrenches are
   /// measured.
   void Update(const WrenchObserver& observer, bool usable);

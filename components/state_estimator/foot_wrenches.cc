@@ -1,7 +1,12 @@
 #include "components/state_estimator/foot_wrenches.h"
 
+#include <algorithm>
+
 namespace poise {
 namespace {
+
+using robot::Foot;
+using robot::kFeet;
 
 // Share of the weight by which sensor and observer must differ. A push that turns the joints'
 // friction over makes the observer wrong by up to an eighth of it (7.2); no loop is hurt by less.
@@ -24,24 +29,24 @@ FootWrenches::FootWrenches(std::shared_ptr<const robot::RobotModel> model,
 }
 
 void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
-                          const std::array<FootReading, 2>& reading,
+                          const robot::FootArray<FootReading>& reading,
                           const ObserverCorrection& correction) {
   observer_.Track(sensors, dt);
   since_ += dt;
-  for (size_t f = 0; f < 2; ++f) check_[f].Read(reading[f].state, reading[f].wrench, dt);
-  const bool needed = !check_[0].good() || !check_[1].good();
+  for (const Foot f : kFeet) check_[f].Read(reading[f].state, reading[f].wrench, dt);
+  const bool needed = !std::ranges::all_of(check_, &FootSensorCheck::good);
   observed_ = (needed || (observer_.torque_known() && tick % check_every_ == 0)) &&
               observer_.Observe(correction, needed);
   if (observed_) {
     if (observer_.torque_known()) Compare();
     since_ = 0;
   }
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     if (check_[f].good()) {
       wrench_[f] = reading[f].wrench;
       deviation_[f] = noise_;
     } else {
-      const auto at = static_cast<Eigen::Index>(6 * f);
+      const auto at = 6 * static_cast<Eigen::Index>(f);
       wrench_[f] = observer_.wrenches().segment<6>(at);
       deviation_[f] =
           observer_.settled_covariance().diagonal().segment<6>(at).cwiseMax(0).cwiseSqrt();
@@ -52,8 +57,8 @@ void FootWrenches::Update(int64_t tick, double dt, const BaseSensors& sensors,
 void FootWrenches::Compare() {
   // While something pushes the robot, the observer has the legs alone to go by.
   if (observer_.push_excess() > push_gate_) return;
-  for (size_t f = 0; f < 2; ++f) {
-    const auto at = static_cast<Eigen::Index>(6 * f);
+  for (const Foot f : kFeet) {
+    const auto at = 6 * static_cast<Eigen::Index>(f);
     check_[f].Compare(observer_.wrenches().segment<6>(at),
                       observer_.covariance().block<6, 6>(at, at), noise_, least_force_, since_);
   }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <memory>
 
@@ -25,14 +24,14 @@ class FootWrenches {
   /// Once a tick, `dt` s after the last. `correction`: what is known before this tick. Allocates
   /// nothing. Any finite input gives finite wrenches.
   void Update(int64_t tick, double dt, const BaseSensors& sensors,
-              const std::array<FootReading, 2>& reading, const ObserverCorrection& correction);
+              const robot::FootArray<FootReading>& reading, const ObserverCorrection& correction);
 
   /// Robot on environment, sole frame, and its standard deviations.
-  const robot::Vector6d& wrench(size_t foot) const { return wrench_[foot]; }
-  const robot::Vector6d& deviation(size_t foot) const { return deviation_[foot]; }
+  const robot::Vector6d& wrench(robot::Foot foot) const { return wrench_[foot]; }
+  const robot::Vector6d& deviation(robot::Foot foot) const { return deviation_[foot]; }
   /// Whether the foot's wrench is its sensor's; else it is observed.
-  bool measured(size_t foot) const { return check_[foot].good(); }
-  const FootSensorCheck& check(size_t foot) const { return check_[foot]; }
+  bool measured(robot::Foot foot) const { return check_[foot].good(); }
+  const FootSensorCheck& check(robot::Foot foot) const { return check_[foot]; }
   const WrenchObserver& observer() const { return observer_; }
   /// Whether this tick's Update has observed.
   bool observed() const { return observed_; }
@@ -45,8 +44,8 @@ class FootWrenches {
   int check_every_;
   double push_gate_, least_force_;
   robot::Vector6d noise_;
-  std::array<FootSensorCheck, 2> check_;
-  std::array<robot::Vector6d, 2> wrench_, deviation_;
+  robot::FootArray<FootSensorCheck> check_;
+  robot::FootArray<robot::Vector6d> wrench_, deviation_;
   double since_ = 0;  // s, since the last observation
   bool observed_ = false;
 };

@@ -13,6 +13,8 @@ using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 constexpr double kLongestPrediction = 1;  // s: what lies further back is not extrapolated
 constexpr double kMaxJointRate = 100;     // rad/s: no joint is faster
@@ -148,7 +150,7 @@ void InvariantEstimator::ReadImu(const BaseSensors& sensors) {
 // motion.
 void InvariantEstimator::ReadSoles() {
   const Matrix3d base = filter_.state().rotation * kinematics_.imu_rotation().transpose();
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     const Sole& sole = kinematics_.sole(f);
     SoleReading& reading = feet_[f].reading;
     reading.position =
@@ -209,15 +211,14 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
   state.rotation = Orthonormal(placement.orientation * kinematics_.imu_rotation());
   state.position = placement.position + placement.orientation * kinematics_.imu_position();
   Begin(state, kUnplacedTurn, kStartSpeed, kUnplaced);
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     if (!(weights.grip[f] > 0)) continue;  // a leg that hangs carries little
     for (const int j : kinematics_.joints(f)) unrest_[j] = config_.start_torque();
   }
   UpdateContacts(sensors);
-  for (size_t f = 0; f < 2; ++f) {
-    Foot& foot = feet_[f];
-    const int i = static_cast<int>(f);
-    if (foot.loaded && !filter_.holds_rotation(i)) filter_.HoldRotation(i, foot.reading);
+  for (const Foot f : kFeet) {
+    FootState& foot = feet_[f];
+    if (foot.loaded && !filter_.holds_rotation(f)) filter_.HoldRotation(f, foot.reading);
     foot.slip_left = foot.turn_left = 0;  // at rest
   }
   DefineWorld(weights);
@@ -228,11 +229,11 @@ void InvariantEstimator::Place(const BaseSensors& sensors) {
 void InvariantEstimator::DefineWorld(const FootWeights& weights) {
   using Row = InvariantFilter::Error;
   const auto row = [](int first, int axis) { return Row(Row::Unit(first + axis)); };
-  std::array<double, 2> share{};
-  for (size_t f = 0; f < 2; ++f) {
+  robot::FootArray<double> share;
+  for (const Foot f : kFeet) {
     if (feet_[f].loaded) share[f] = weights.share[f];
   }
-  const double sum = share[0] + share[1];
+  const double sum = share[Foot::kRight] + share[Foot::kLeft];
   if (!(sum > 0)) {  // on a hoist
     for (int axis = 0; axis < 3; ++axis) {
       filter_.Know(row(InvariantFilter::kRotation, axis),
@@ -246,10 +247,10 @@ void InvariantEstimator::DefineWorld(const FootWeights& weights) {
   const auto moved = [&](int axis, double right, double left, double deviation) {
     Row h = Row::Zero();
     double variance = Square(deviation);
-    for (size_t f = 0; f < 2; ++f) {
-      const double weight = f == 0 ? right : left;
+    for (const Foot f : kFeet) {
+      const double weight = f == Foot::kRight ? right : left;
       const SoleReading& reading = feet_[f].reading;
-      const bool held = filter_.holds_position(static_cast<int>(f));
+      const bool held = filter_.holds_position(f);
       const int place =
           held ? InvariantFilter::kFoot + 3 * static_cast<int>(f) : InvariantFilter::kPosition;
       h[place + axis] += weight;
@@ -267,14 +268,14 @@ void InvariantEstimator::DefineWorld(const FootWeights& weights) {
                   left * row(InvariantFilter::kFootRotation + 3, axis);
     filter_.Know(h, deviation);
   };
-  const double right = share[0] / sum, left = share[1] / sum;
+  const double right = share[Foot::kRight] / sum, left = share[Foot::kLeft] / sum;
   for (int axis = 0; axis < 2; ++axis) {
     turned(axis, right, left, config_.start_tilt());
     moved(axis, 0.5, 0.5, config_.start_position());
   }
   moved(2, right, left, config_.start_position());
-  const double apart =
-      filter_.SeenPosition(feet_[1].reading).y() - filter_.SeenPosition(feet_[0].reading).y();
+  const double apart = filter_.SeenPosition(feet_[Foot::kLeft].reading).y() -
+                       filter_.SeenPosition(feet_[Foot::kRight].reading).y();
   if (apart > kLeastStance) {
     moved(0, -1 / apart, 1 / apart, config_.start_yaw());
   } else {
@@ -309,10 +310,10 @@ void InvariantEstimator::Propagate(double dt) {
       worst(InvariantFilter::kVelocity) > Square(kLostSpeed)) {
     Recover(finite);
   }
-  for (size_t f = 0; f < 2; ++f) {
-    const Foot& foot = feet_[f];
+  for (const Foot f : kFeet) {
+    const FootState& foot = feet_[f];
     filter_.Loosen(
-        static_cast<int>(f),
+        f,
         foot.slip_left > 0 ? Square(config_.slip_speed() * dt)
                            : Square(config_.contact_walk()) * dt,
         foot.turn_left > 0 ? Square(config_.turn_speed() * dt) : Square(config_.turn_walk()) * dt);
@@ -331,63 +332,63 @@ void InvariantEstimator::UpdateContacts(const BaseSensors& sensors) {
   const FootWeights weights =
       WeighFeet(sensors.foot_load, weight_, loads_.light_load(), loads_.full_load());
   ReadSoles();
-  for (size_t f = 0; f < 2; ++f) {
-    Foot& foot = feet_[f];
-    const int i = static_cast<int>(f);
+  for (const Foot f : kFeet) {
+    FootState& foot = feet_[f];
     foot_weight_[f] = weights.standing * weights.share[f];
     foot.loaded = foot.loaded ? weights.grip[f] > 0 : weights.grip[f] >= 1;
     if (!foot.loaded) {
-      filter_.ReleasePosition(i);
-      filter_.ReleaseRotation(i);
+      filter_.ReleasePosition(f);
+      filter_.ReleaseRotation(f);
       foot.slip_left = foot.turn_left = 0;
       foot.innovation = 0;
       foot.excess = 1;
       continue;
     }
-    if (!filter_.holds_position(i)) {
-      filter_.HoldPosition(i, foot.reading);
+    if (!filter_.holds_position(f)) {
+      filter_.HoldPosition(f, foot.reading);
       LetSlip(f);  // it has yet to settle
     }
     const double inside = robot::DistanceInside(model_->feet()[f], sensors.foot_cop[f]);
-    if (filter_.holds_rotation(i)) {
-      if (!(inside > 0.5 * config_.cop_margin())) filter_.ReleaseRotation(i);
+    if (filter_.holds_rotation(f)) {
+      if (!(inside > 0.5 * config_.cop_margin())) filter_.ReleaseRotation(f);
     } else if (inside > config_.cop_margin()) {
-      filter_.HoldRotation(i, foot.reading);
+      filter_.HoldRotation(f, foot.reading);
       LetTurn(f);
     }
   }
 }
 
-void InvariantEstimator::LetSlip(size_t foot) {
+void InvariantEstimator::LetSlip(Foot foot) {
   feet_[foot].slip_left = config_.rest_time();
   feet_[foot].slip_time = 0;
   BeginRest(foot);
 }
 
-void InvariantEstimator::BeginRest(size_t foot) {
+void InvariantEstimator::BeginRest(Foot foot) {
   feet_[foot].slip_start = filter_.SeenPosition(feet_[foot].reading);
   feet_[foot].apart_start = Apart(foot);
 }
 
-Eigen::Vector3d InvariantEstimator::Apart(size_t foot) const {
-  return filter_.SeenPosition(feet_[1 - foot].reading) - filter_.SeenPosition(feet_[foot].reading);
+Eigen::Vector3d InvariantEstimator::Apart(Foot foot) const {
+  return filter_.SeenPosition(feet_[Other(foot)].reading) -
+         filter_.SeenPosition(feet_[foot].reading);
 }
 
-void InvariantEstimator::LetTurn(size_t foot) {
+void InvariantEstimator::LetTurn(Foot foot) {
   feet_[foot].turn_left = config_.rest_time();
   feet_[foot].turn_start = filter_.SeenRotation(feet_[foot].reading);
 }
 
 void InvariantEstimator::Correct(double dt) {
   // How far each foot is off, if it stands still. One that slips may be off.
-  std::array<bool, 2> moved{};
+  robot::FootArray<bool> moved;
   int firm = 0;
-  for (size_t f = 0; f < 2; ++f) {
-    Foot& foot = feet_[f];
+  for (const Foot f : kFeet) {
+    FootState& foot = feet_[f];
     if (!foot.loaded) continue;
     const double scale = std::max(1.0, foot.excess);
     foot.reading.noise *= scale;
-    const InvariantFilter::Innovation test = filter_.Test(static_cast<int>(f), foot.reading);
+    const InvariantFilter::Innovation test = filter_.Test(f, foot.reading);
     foot.innovation = test.position;
     moved[f] = (foot.slip_left <= 0 && test.position > config_.gate()) ||
                (foot.turn_left <= 0 && test.rotation > config_.gate());
@@ -399,32 +400,31 @@ void InvariantEstimator::Correct(double dt) {
   }
   // Feet that stand still first: they tell whether the others do.
   for (const bool after : {false, true}) {
-    for (size_t f = 0; f < 2; ++f) {
-      Foot& foot = feet_[f];
-      const int i = static_cast<int>(f);
+    for (const Foot f : kFeet) {
+      FootState& foot = feet_[f];
       if (!foot.loaded || moved[f] != after) continue;
       if (moved[f]) {
-        const InvariantFilter::Innovation test = filter_.Test(i, foot.reading);
+        const InvariantFilter::Innovation test = filter_.Test(f, foot.reading);
         if (foot.slip_left <= 0 && test.position > config_.gate()) {
           LetSlip(f);
-          filter_.Loosen(i, Square(config_.slip_speed() * dt), 0);
+          filter_.Loosen(f, Square(config_.slip_speed() * dt), 0);
         }
         if (foot.turn_left <= 0 && test.rotation > config_.gate()) {
           LetTurn(f);
-          filter_.Loosen(i, 0, Square(config_.turn_speed() * dt));
+          filter_.Loosen(f, 0, Square(config_.turn_speed() * dt));
         }
       }
-      filter_.Correct(i, foot.reading);
+      filter_.Correct(f, foot.reading);
     }
   }
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     if (feet_[f].loaded) ComeToRest(f, firm > 0, dt);
   }
 }
 
 // A sole has come to rest when it has hardly moved for rest_time.
-void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
-  Foot& foot = feet_[f];
+void InvariantEstimator::ComeToRest(Foot f, bool other_stands, double dt) {
+  FootState& foot = feet_[f];
   if (foot.slip_left > 0) {
     foot.slip_left -= dt;
     foot.slip_time += dt;
@@ -433,7 +433,7 @@ void InvariantEstimator::ComeToRest(size_t f, bool other_stands, double dt) {
       const double way = (filter_.SeenPosition(feet_[f].reading) - foot.slip_start).norm();
       const double speed =
           std::sqrt(filter_.covariance().diagonal().segment<3>(InvariantFilter::kVelocity).sum());
-      const bool together = feet_[1 - f].loaded &&
+      const bool together = feet_[Other(f)].loaded &&
                             (Apart(f) - foot.apart_start).norm() < kTogether * config_.rest_time();
       if (!other_stands && (together || foot.slip_time > kLongestSlip)) {
         // Then it is the world, and the base's velocity is what is wrong.
@@ -533,19 +533,18 @@ void InvariantEstimator::Publish() {
   base_covariance_.noalias() += Square(config_.timing()) * motion * motion.transpose();
 }
 
-FootContact InvariantEstimator::contact(int foot) const {
-  const Foot& f = feet_[static_cast<size_t>(foot)];
+FootContact InvariantEstimator::contact(Foot foot) const {
+  const FootState& f = feet_[foot];
   if (!f.loaded) return FootContact::kNone;
   return f.slip_left > 0 ? FootContact::kSlipping : FootContact::kFirm;
 }
 
-Isometry3d InvariantEstimator::foot_pose(int foot) const {
-  const auto f = static_cast<size_t>(foot);
+Isometry3d InvariantEstimator::foot_pose(Foot foot) const {
   Isometry3d pose = Isometry3d::Identity();
-  pose.translation() = filter_.holds_position(foot) ? filter_.state().foot[f]
-                                                    : filter_.SeenPosition(feet_[f].reading);
-  pose.linear() = filter_.holds_rotation(foot) ? filter_.state().foot_rotation[f]
-                                               : filter_.SeenRotation(feet_[f].reading);
+  pose.translation() = filter_.holds_position(foot) ? filter_.state().foot[foot]
+                                                    : filter_.SeenPosition(feet_[foot].reading);
+  pose.linear() = filter_.holds_rotation(foot) ? filter_.state().foot_rotation[foot]
+                                               : filter_.SeenRotation(feet_[foot].reading);
   return pose;
 }
 
@@ -554,7 +553,7 @@ void InvariantEstimator::Archive(StateArchive* archive) {
   filter_.Archive(archive);
   archive->Show(joint_position_, torque_, unrest_, gyro_, last_gyro_, force_, last_force_,
                 imu_good_, last_imu_good_, placed_);
-  for (Foot& foot : feet_) {
+  for (FootState& foot : feet_) {
     archive->Show(foot.loaded, foot.excess, foot.slip_left, foot.slip_time, foot.turn_left,
                   foot.slip_start, foot.apart_start, foot.turn_start);
   }

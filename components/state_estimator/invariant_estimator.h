@@ -11,7 +11,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <memory>
 
@@ -46,15 +45,15 @@ class InvariantEstimator {
   const BaseCovariance& covariance() const { return base_covariance_; }
   const InvariantFilter& filter() const { return filter_; }
   /// Share of each foot in what stands, 0..1, as BaseEstimator weighs its anchors.
-  const std::array<double, 2>& foot_weight() const { return foot_weight_; }
-  FootContact contact(int foot) const;
+  const robot::FootArray<double>& foot_weight() const { return foot_weight_; }
+  FootContact contact(robot::Foot foot) const;
   /// Squared normalised innovation of the sole's position before the correction; 0 out of contact.
-  double innovation(int foot) const { return feet_[static_cast<size_t>(foot)].innovation; }
+  double innovation(robot::Foot foot) const { return feet_[foot].innovation; }
   /// The sole in the world.
-  Eigen::Isometry3d foot_pose(int foot) const;
+  Eigen::Isometry3d foot_pose(robot::Foot foot) const;
 
  private:
-  struct Foot {
+  struct FootState {
     bool loaded = false;
     double slip_left = 0, turn_left = 0;  // s, until it may stand still again; 0: it does
     double slip_time = 0;                 // s, since it began to slip
@@ -80,12 +79,12 @@ class InvariantEstimator {
   void Recover(bool finite);
   void UpdateContacts(const BaseSensors& sensors);
   void Correct(double dt);
-  void LetSlip(size_t foot);
-  void LetTurn(size_t foot);
-  void ComeToRest(size_t foot, bool other_stands, double dt);
-  void BeginRest(size_t foot);
+  void LetSlip(robot::Foot foot);
+  void LetTurn(robot::Foot foot);
+  void ComeToRest(robot::Foot foot, bool other_stands, double dt);
+  void BeginRest(robot::Foot foot);
   /// From this foot's sole to the other one's, m, world.
-  Eigen::Vector3d Apart(size_t foot) const;
+  Eigen::Vector3d Apart(robot::Foot foot) const;
   void Publish();
 
   std::shared_ptr<const robot::RobotModel> model_;
@@ -101,8 +100,8 @@ class InvariantEstimator {
   Eigen::VectorXd joint_position_, link_position_, joint_rate_;  // rad, rad, rad/s, read
   robot::RobotState state_;
   BaseCovariance base_covariance_ = BaseCovariance::Zero();
-  std::array<Foot, 2> feet_;
-  std::array<double, 2> foot_weight_{};
+  robot::FootArray<FootState> feet_;
+  robot::FootArray<double> foot_weight_{};
   // Readings of this step and of the one before: rad/s, m/s², IMU frame.
   Eigen::Vector3d gyro_ = Eigen::Vector3d::Zero(), last_gyro_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero(), last_force_ = Eigen::Vector3d::Zero();

@@ -8,6 +8,8 @@ namespace poise {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 void InvariantFilter::Set(const InvariantState& state, const Covariance& covariance) {
   state_ = state;
@@ -37,8 +39,8 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
   const Matrix3d v_gyro = -(dt * Skew(v) + 0.5 * dt * dt * Skew(gravity)) * r;
   const Matrix3d p_gyro = -(dt * Skew(p) + 0.5 * dt * dt * Skew(v)) * r;
   const Matrix3d v_force = r_gyro, p_force = 0.5 * dt * r_gyro;
-  std::array<Matrix3d, 2> foot_gyro;
-  for (size_t f = 0; f < 2; ++f) {
+  robot::FootArray<Matrix3d> foot_gyro;
+  for (const Foot f : kFeet) {
     foot_gyro[f].setZero();
     if (holds_position_[f]) foot_gyro[f] = -dt * Skew(state_.foot[f]) * r;
   }
@@ -56,8 +58,8 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
           times(m, kGyroBias, v_gyro, i) + times(m, kAccelerometerBias, v_force, i);
       x->col(kPosition + i) = dt * m.col(kVelocity + i) + times(m, kGyroBias, p_gyro, i) +
                               times(m, kAccelerometerBias, p_force, i);
-      for (size_t f = 0; f < 2; ++f) {
-        const int row = FootRow(static_cast<int>(f)) + i;
+      for (const Foot f : kFeet) {
+        const int row = FootRow(f) + i;
         if (holds_position_[f]) {
           x->col(row) = times(m, kGyroBias, foot_gyro[f], i);
         } else {
@@ -83,8 +85,8 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
   add_noise(kGyroBias, kRotation, r_gyro, imu.angular_velocity_noise);
   add_noise(kGyroBias, kVelocity, v_gyro, imu.angular_velocity_noise);
   add_noise(kGyroBias, kPosition, p_gyro, imu.angular_velocity_noise);
-  for (size_t f = 0; f < 2; ++f) {
-    add_noise(kGyroBias, FootRow(static_cast<int>(f)), foot_gyro[f], imu.angular_velocity_noise);
+  for (const Foot f : kFeet) {
+    add_noise(kGyroBias, FootRow(f), foot_gyro[f], imu.angular_velocity_noise);
   }
   add_noise(kAccelerometerBias, kVelocity, v_force, imu.acceleration_noise);
   add_noise(kAccelerometerBias, kPosition, p_force, imu.acceleration_noise);
@@ -102,7 +104,7 @@ void InvariantFilter::Propagate(const ImuStep& imu, double dt) {
       imu.accelerometer_bias_walk * imu.accelerometer_bias_walk * dt;
 }
 
-void InvariantFilter::Loosen(int foot, double position_variance, double rotation_variance) {
+void InvariantFilter::Loosen(Foot foot, double position_variance, double rotation_variance) {
   if (holds_position(foot)) {
     covariance_.diagonal().segment<3>(FootRow(foot)).array() += position_variance;
   }
@@ -153,46 +155,43 @@ Matrix3d InvariantFilter::SeenRotation(const SoleReading& reading) const {
          state_.rotation * reading.rotation;
 }
 
-void InvariantFilter::HoldPosition(int foot, const SoleReading& reading) {
-  const auto f = static_cast<size_t>(foot);
-  state_.foot[f] = SeenPosition(reading);
+void InvariantFilter::HoldPosition(Foot foot, const SoleReading& reading) {
+  state_.foot[foot] = SeenPosition(reading);
   // ξ_d = ξ_p + the reading's error.
   CopyRows(kPosition, FootRow(foot), reading.by_compliance.head<3>(),
            reading.noise.topLeftCorner<3, 3>());
-  holds_position_[f] = true;
+  holds_position_[foot] = true;
 }
 
-void InvariantFilter::HoldRotation(int foot, const SoleReading& reading) {
-  const auto f = static_cast<size_t>(foot);
-  state_.foot_rotation[f] = Orthonormal(SeenRotation(reading));
+void InvariantFilter::HoldRotation(Foot foot, const SoleReading& reading) {
+  state_.foot_rotation[foot] = Orthonormal(SeenRotation(reading));
   CopyRows(kRotation, FootRotationRow(foot), reading.by_compliance.tail<3>(),
            reading.noise.bottomRightCorner<3, 3>());
-  holds_rotation_[f] = true;
+  holds_rotation_[foot] = true;
 }
 
-void InvariantFilter::ReleasePosition(int foot) {
+void InvariantFilter::ReleasePosition(Foot foot) {
   if (holds_position(foot)) ClearRows(FootRow(foot));
-  holds_position_[static_cast<size_t>(foot)] = false;
+  holds_position_[foot] = false;
 }
 
-void InvariantFilter::ReleaseRotation(int foot) {
+void InvariantFilter::ReleaseRotation(Foot foot) {
   if (holds_rotation(foot)) ClearRows(FootRotationRow(foot));
-  holds_rotation_[static_cast<size_t>(foot)] = false;
+  holds_rotation_[foot] = false;
 }
 
 // R̂ y − (d̂ − p̂) = ξ_p − ξ_d + the reading's error: exact in ξ, whatever the estimate; the reading's
 // error is noise and what the compliance's error makes of it.
-Vector3d InvariantFilter::PositionInnovation(int foot, const SoleReading& reading) const {
-  return SeenPosition(reading) - state_.foot[static_cast<size_t>(foot)];
+Vector3d InvariantFilter::PositionInnovation(Foot foot, const SoleReading& reading) const {
+  return SeenPosition(reading) - state_.foot[foot];
 }
 
 // log(R̂ C F̂ᵀ) = ξ_R − ξ_F + the reading's error, to first order in ξ.
-Vector3d InvariantFilter::RotationInnovation(int foot, const SoleReading& reading) const {
-  return RotationLog(SeenRotation(reading) *
-                     state_.foot_rotation[static_cast<size_t>(foot)].transpose());
+Vector3d InvariantFilter::RotationInnovation(Foot foot, const SoleReading& reading) const {
+  return RotationLog(SeenRotation(reading) * state_.foot_rotation[foot].transpose());
 }
 
-InvariantFilter::Innovation InvariantFilter::Test(int foot, const SoleReading& reading) const {
+InvariantFilter::Innovation InvariantFilter::Test(Foot foot, const SoleReading& reading) const {
   const auto spread = [&](int minuend, int subtrahend, const Vector3d& by_compliance) -> Matrix3d {
     const Covariance& c = covariance_;
     const Vector3d cross =
@@ -226,7 +225,7 @@ InvariantFilter::Innovation InvariantFilter::Test(int foot, const SoleReading& r
   return result;
 }
 
-bool InvariantFilter::Correct(int foot, const SoleReading& reading) {
+bool InvariantFilter::Correct(Foot foot, const SoleReading& reading) {
   const Covariance& c = covariance_;
   Eigen::Matrix<double, kSize, 6> ph;  // P Hᵀ
   ph.leftCols<3>() = c.middleCols<3>(kPosition) - c.middleCols<3>(FootRow(foot));
@@ -289,11 +288,10 @@ void InvariantFilter::TakeOut(const Error& error) {
   state_.rotation = gamma.zero * state_.rotation;
   state_.velocity = vector(state_.velocity, kVelocity);
   state_.position = vector(state_.position, kPosition);
-  for (int foot = 0; foot < 2; ++foot) {
-    const auto f = static_cast<size_t>(foot);
-    state_.foot[f] = vector(state_.foot[f], FootRow(foot));
+  for (const Foot f : kFeet) {
+    state_.foot[f] = vector(state_.foot[f], FootRow(f));
     state_.foot_rotation[f] =
-        RotationExp(-error.segment<3>(FootRotationRow(foot))) * state_.foot_rotation[f];
+        RotationExp(-error.segment<3>(FootRotationRow(f))) * state_.foot_rotation[f];
   }
   state_.gyro_bias -= error.segment<3>(kGyroBias);
   state_.accelerometer_bias -= error.segment<3>(kAccelerometerBias);

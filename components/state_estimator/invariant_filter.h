@@ -11,9 +11,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 #include "components/framework/state_archive.h"
+#include "components/robot/foot.h"
 #include "components/state_estimator/lie_group.h"
 
 namespace poise {
@@ -23,8 +23,8 @@ struct InvariantState {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< IMU to world
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s, of the IMU, world
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< m
-  std::array<Eigen::Vector3d, 2> foot = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  std::array<Eigen::Matrix3d, 2> foot_rotation = {Eigen::Matrix3d::Identity(),
+  robot::FootArray<Eigen::Vector3d> foot{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  robot::FootArray<Eigen::Matrix3d> foot_rotation{Eigen::Matrix3d::Identity(),
                                                   Eigen::Matrix3d::Identity()};
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();           ///< rad/s, IMU frame
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();  ///< m/s²
@@ -72,8 +72,8 @@ class InvariantFilter {
   /// the covariance with the transition to second order in dt (exact but for the biases' columns)
   /// and noise to first order.
   void Propagate(const ImuStep& imu, double dt);
-  /// Lets a held sole move: variances (m², rad²) by axis. `foot` 0: right.
-  void Loosen(int foot, double position_variance, double rotation_variance);
+  /// Lets a held sole move: variances (m², rad²) by axis.
+  void Loosen(robot::Foot foot, double position_variance, double rotation_variance);
   /// Adds to rotation (rad²), velocity ((m/s)²) and position (m²) what the readings cannot explain.
   void Doubt(double rotation_variance, double velocity_variance, double position_variance);
 
@@ -82,34 +82,36 @@ class InvariantFilter {
   void Know(const Error& row, double deviation);
 
   /// Takes a sole into the state where the reading sees it; what it was before is forgotten.
-  void HoldPosition(int foot, const SoleReading& reading);
-  void HoldRotation(int foot, const SoleReading& reading);
+  void HoldPosition(robot::Foot foot, const SoleReading& reading);
+  void HoldRotation(robot::Foot foot, const SoleReading& reading);
   /// Takes it out.
-  void ReleasePosition(int foot);
-  void ReleaseRotation(int foot);
+  void ReleasePosition(robot::Foot foot);
+  void ReleaseRotation(robot::Foot foot);
   /// The sole in the world as IMU and joints show it, with the compliance as it is estimated.
   Eigen::Vector3d SeenPosition(const SoleReading& reading) const;
   Eigen::Matrix3d SeenRotation(const SoleReading& reading) const;
-  bool holds_position(int foot) const { return holds_position_[static_cast<size_t>(foot)]; }
-  bool holds_rotation(int foot) const { return holds_rotation_[static_cast<size_t>(foot)]; }
+  bool holds_position(robot::Foot foot) const { return holds_position_[foot]; }
+  bool holds_rotation(robot::Foot foot) const { return holds_rotation_[foot]; }
 
   /// Squared innovation of a held sole over its covariance: chi-squared with 3 degrees of freedom
   /// each when model and covariance hold. 0 for what is not held.
   struct Innovation {
     double position = 0, rotation = 0;
   };
-  Innovation Test(int foot, const SoleReading& reading) const;
+  Innovation Test(robot::Foot foot, const SoleReading& reading) const;
   /// Takes a reading of what is held of a sole. False, and nothing changes, when the innovation's
   /// covariance is not positive definite.
-  bool Correct(int foot, const SoleReading& reading);
+  bool Correct(robot::Foot foot, const SoleReading& reading);
 
   void Archive(StateArchive* archive);
 
  private:
   using Block = Eigen::Block<Covariance, 3, kSize>;
 
-  static int FootRow(int foot) { return kFoot + 3 * foot; }
-  static int FootRotationRow(int foot) { return kFootRotation + 3 * foot; }
+  static int FootRow(robot::Foot foot) { return kFoot + 3 * static_cast<int>(foot); }
+  static int FootRotationRow(robot::Foot foot) {
+    return kFootRotation + 3 * static_cast<int>(foot);
+  }
   /// The error at row `to` becomes that at `from` plus `by_compliance` times the compliance's plus
   /// one of covariance `noise`.
   void CopyRows(int from, int to, const Eigen::Vector3d& by_compliance,
@@ -119,15 +121,15 @@ class InvariantFilter {
   bool CorrectRows(const Eigen::Matrix<double, N, 1>& innovation,
                    const Eigen::Matrix<double, kSize, N>& covariance_h,
                    const Eigen::Matrix<double, N, N>& innovation_covariance);
-  Eigen::Vector3d PositionInnovation(int foot, const SoleReading& reading) const;
-  Eigen::Vector3d RotationInnovation(int foot, const SoleReading& reading) const;
+  Eigen::Vector3d PositionInnovation(robot::Foot foot, const SoleReading& reading) const;
+  Eigen::Vector3d RotationInnovation(robot::Foot foot, const SoleReading& reading) const;
   /// X̂ ← exp(−ξ) X̂, biases and soles' rotations likewise.
   void TakeOut(const Error& error);
 
   double gravity_;
   InvariantState state_;
   Covariance covariance_ = Covariance::Zero();
-  std::array<bool, 2> holds_position_{}, holds_rotation_{};
+  robot::FootArray<bool> holds_position_{}, holds_rotation_{};
 };
 
 }  // namespace poise

@@ -7,6 +7,8 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 // No foot carries more, shares of the robot's weight: keeps every finite reading finite.
 constexpr double kMaxLoad = 100;
@@ -23,16 +25,16 @@ double CubicStep(double x) {
 
 SoleKinematics::SoleKinematics(std::shared_ptr<const robot::RobotModel> model)
     : model_(std::move(model)), state_(model_->num_joints()), data_(*model_) {
-  for (size_t foot = 0; foot < 2; ++foot) {
-    sign_[foot].assign(static_cast<size_t>(model_->num_joints()), 0);
-    for (const int j : model_->supporting_joints(model_->feet()[foot].body)) {
-      sign_[foot][static_cast<size_t>(j)] += 1;
+  for (const Foot f : kFeet) {
+    sign_[f].assign(static_cast<size_t>(model_->num_joints()), 0);
+    for (const int j : model_->supporting_joints(model_->feet()[f].body)) {
+      sign_[f][static_cast<size_t>(j)] += 1;
     }
     for (const int j : model_->supporting_joints(model_->imu().body)) {
-      sign_[foot][static_cast<size_t>(j)] -= 1;
+      sign_[f][static_cast<size_t>(j)] -= 1;
     }
     for (int j = 0; j < model_->num_joints(); ++j) {
-      if (sign_[foot][static_cast<size_t>(j)] != 0) joints_[foot].push_back(j);
+      if (sign_[f][static_cast<size_t>(j)] != 0) joints_[f].push_back(j);
     }
   }
 }
@@ -42,13 +44,13 @@ void SoleKinematics::Update(const Eigen::Ref<const Eigen::VectorXd>& position,
   state_.joint_position = position;
   state_.joint_velocity = velocity;
   robot::ComputeKinematics(*model_, state_, &data_);
-  for (size_t i = 0; i < soles_.size(); ++i) {
-    const robot::FootModel& model = model_->feet()[i];
+  for (const Foot f : kFeet) {
+    const robot::FootModel& model = model_->feet()[f];
     const size_t b = static_cast<size_t>(model.body);
     const Vector3d arm = data_.body_rotation[b] * model.sole.translation();
-    soles_[i].position = data_.body_position[b] + arm;
-    soles_[i].rotation.noalias() = data_.body_rotation[b] * model.sole.linear();
-    soles_[i].velocity = data_.body_linear_velocity[b] + data_.body_angular_velocity[b].cross(arm);
+    soles_[f].position = data_.body_position[b] + arm;
+    soles_[f].rotation.noalias() = data_.body_rotation[b] * model.sole.linear();
+    soles_[f].velocity = data_.body_linear_velocity[b] + data_.body_angular_velocity[b].cross(arm);
   }
   const robot::ImuModel& imu = model_->imu();
   const size_t b = static_cast<size_t>(imu.body);
@@ -59,29 +61,30 @@ void SoleKinematics::Update(const Eigen::Ref<const Eigen::VectorXd>& position,
   imu_velocity_ = data_.body_linear_velocity[b] + imu_angular_velocity_.cross(arm);
 }
 
-FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, double light_load,
+FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight, double light_load,
                       double full_load) {
   FootWeights weights;
-  std::array<double, 2> pull;
+  robot::FootArray<double> pull;
   double sum = 0, grip = 0;
-  for (size_t i = 0; i < load.size(); ++i) {
-    const double share = std::clamp(load[i] / robot_weight, 0.0, kMaxLoad);
-    weights.grip[i] = CubicStep((share - light_load) / (full_load - light_load));
-    pull[i] = weights.grip[i] * share;
-    sum += pull[i];
-    grip += weights.grip[i];
+  for (const Foot f : kFeet) {
+    const double share = std::clamp(load[f] / robot_weight, 0.0, kMaxLoad);
+    weights.grip[f] = CubicStep((share - light_load) / (full_load - light_load));
+    pull[f] = weights.grip[f] * share;
+    sum += pull[f];
+    grip += weights.grip[f];
   }
   weights.standing = sum > 0 ? std::min(grip, 1.0) : 0.0;
-  for (size_t i = 0; i < load.size(); ++i) weights.share[i] = sum > 0 ? pull[i] / sum : 0.0;
+  for (const Foot f : kFeet) weights.share[f] = sum > 0 ? pull[f] / sum : 0.0;
   return weights;
 }
 
 Placement PlaceOnGround(const SoleKinematics& kinematics, const FootWeights& weights) {
-  const Sole& right = kinematics.sole(Index(robot::Foot::kRight));
-  const Sole& left = kinematics.sole(Index(robot::Foot::kLeft));
-  std::array<double, 2> weight = weights.share;
+  const Sole& right = kinematics.sole(Foot::kRight);
+  const Sole& left = kinematics.sole(Foot::kLeft);
+  robot::FootArray<double> weight = weights.share;
   const auto normal = [&] {
-    return Vector3d(weight[0] * right.rotation.col(2) + weight[1] * left.rotation.col(2))
+    return Vector3d(weight[Foot::kRight] * right.rotation.col(2) +
+                    weight[Foot::kLeft] * left.rotation.col(2))
         .normalized();
   };
   if (weights.standing == 0) {
@@ -107,7 +110,8 @@ Placement PlaceOnGround(const SoleKinematics& kinematics, const FootWeights& wei
   const Vector3d right_offset = placement.orientation * right.position;
   const Vector3d left_offset = placement.orientation * left.position;
   placement.position = -0.5 * (right_offset + left_offset);
-  placement.position.z() = -(weight[0] * right_offset.z() + weight[1] * left_offset.z());
+  placement.position.z() =
+      -(weight[Foot::kRight] * right_offset.z() + weight[Foot::kLeft] * left_offset.z());
   return placement;
 }
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 
 #include "components/robot/dynamics.h"
@@ -27,7 +26,7 @@ class SoleKinematics {
   void Update(const Eigen::Ref<const Eigen::VectorXd>& position,
               const Eigen::Ref<const Eigen::VectorXd>& velocity);
 
-  const Sole& sole(size_t foot) const { return soles_[foot]; }           ///< right first
+  const Sole& sole(robot::Foot foot) const { return soles_[foot]; }
   const Eigen::Matrix3d& imu_rotation() const { return imu_rotation_; }  ///< IMU to base
   const Eigen::Vector3d& imu_position() const { return imu_position_; }  ///< m
   const Eigen::Vector3d& imu_velocity() const { return imu_velocity_; }  ///< m/s
@@ -37,7 +36,7 @@ class SoleKinematics {
   /// What rates of the joints (rad/s) make of a sole's motion relative to the IMU, in base axes:
   /// column of joint `joint` of the 6×n Jacobian, linear (of the sole's origin, for an observer who
   /// turns with the IMU) over angular. Zero for a joint between neither.
-  robot::Vector6d RelativeColumn(size_t foot, int joint) const {
+  robot::Vector6d RelativeColumn(robot::Foot foot, int joint) const {
     const auto j = static_cast<size_t>(joint);
     const Eigen::Vector3d& axis = data_.joint_axis[j];
     const Eigen::Vector3d& origin = data_.body_position[j + 1];  // of the joint's child
@@ -47,15 +46,16 @@ class SoleKinematics {
     return sign_[foot][j] * column;
   }
   /// Joints with a column that is not zero.
-  const std::vector<int>& joints(size_t foot) const { return joints_[foot]; }
+  const std::vector<int>& joints(robot::Foot foot) const { return joints_[foot]; }
 
  private:
   std::shared_ptr<const robot::RobotModel> model_;
   robot::RobotState state_;  // base at the origin and at rest
   robot::RobotData data_;
-  std::array<Sole, 2> soles_;
-  std::array<std::vector<int>, 2> joints_;
-  std::array<std::vector<double>, 2> sign_;  // by joint: 1 between base and sole, −1 base and IMU
+  robot::FootArray<Sole> soles_;
+  robot::FootArray<std::vector<int>> joints_;
+  robot::FootArray<std::vector<double>>
+      sign_;  // by joint: 1 between base and sole, −1 base and IMU
   Eigen::Matrix3d imu_rotation_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d imu_position_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d imu_velocity_ = Eigen::Vector3d::Zero();
@@ -64,13 +64,13 @@ class SoleKinematics {
 
 /// How far feet stand by their loads.
 struct FootWeights {
-  std::array<double, 2> grip{};   ///< 0: light; 1: stands
-  std::array<double, 2> share{};  ///< among the gripping feet, sums to 1; 0 when none grips
-  double standing = 0;            ///< 0: in flight; 1: the robot stands
+  robot::FootArray<double> grip{};   ///< 0: light; 1: stands
+  robot::FootArray<double> share{};  ///< among the gripping feet, sums to 1; 0 when none grips
+  double standing = 0;               ///< 0: in flight; 1: the robot stands
 };
 /// `load`: N, upward force on each sole; `robot_weight` N. A foot grips from `light_load` on and
 /// fully from `full_load` on, shares of the weight.
-FootWeights WeighFeet(const std::array<double, 2>& load, double robot_weight, double light_load,
+FootWeights WeighFeet(const robot::FootArray<double>& load, double robot_weight, double light_load,
                       double full_load);
 
 struct Placement {

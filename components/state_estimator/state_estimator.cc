@@ -17,6 +17,8 @@ std::string_view state_estimator_proto_schema();  // generated
 namespace {
 
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 
 constexpr double kLongestDelay = 0.05;  // s
 
@@ -37,14 +39,14 @@ void CheckConfig(const StateEstimatorConfig& config, const robot::RobotModel& mo
   }
 }
 
-FootReading ReadFoot(const robot_sensors_t& sensors, size_t foot) {
+FootReading ReadFoot(const robot_sensors_t& sensors, Foot foot) {
   FootReading reading;
-  if (sensors.foot_sensor[foot] == drive_feedback_t::SENSOR_ABSENT) {
+  if (sensors.foot_sensor[Index(foot)] == drive_feedback_t::SENSOR_ABSENT) {
     reading.state = FootSensorCheck::State::kAbsent;
-  } else if (sensors.foot_sensor[foot] != drive_feedback_t::SENSOR_OK) {
+  } else if (sensors.foot_sensor[Index(foot)] != drive_feedback_t::SENSOR_OK) {
     reading.state = FootSensorCheck::State::kInvalid;
   }
-  reading.wrench = GetWrench(sensors.foot_wrench[foot]);
+  reading.wrench = GetWrench(sensors.foot_wrench[Index(foot)]);
   return reading;
 }
 
@@ -106,15 +108,18 @@ void StateEstimator::Estimate(const Tick& tick) {
   };
   const double dt = tick.time - last_time_;
   last_time_ = tick.time;
-  wrenches_->Update(tick.index, dt, sensors, {ReadFoot(in, 0), ReadFoot(in, 1)}, Correction());
-  for (size_t f = 0; f < 2; ++f) {
+  wrenches_->Update(tick.index, dt, sensors,
+                    {ReadFoot(in, Foot::kRight), ReadFoot(in, Foot::kLeft)}, Correction());
+  for (const Foot f : kFeet) {
     sensors.foot_load[f] = -wrenches_->wrench(f)[2];
     sensors.foot_cop[f] = CenterOfPressure(wrenches_->wrench(f));
   }
   if (calibrator_->enabled()) {
-    calibrator_->Track({wrenches_->wrench(0), wrenches_->wrench(1)}, dt);
+    calibrator_->Track({wrenches_->wrench(Foot::kRight), wrenches_->wrench(Foot::kLeft)}, dt);
     if (wrenches_->observed()) {
-      calibrator_->Update(wrenches_->observer(), wrenches_->measured(0) && wrenches_->measured(1));
+      calibrator_->Update(wrenches_->observer(), std::ranges::all_of(kFeet, [this](Foot f) {
+                            return wrenches_->measured(f);
+                          }));
     }
   }
   if (invariant_) {
@@ -145,20 +150,21 @@ ObserverCorrection StateEstimator::Correction() const {
 
 void StateEstimator::PublishWrenches() {
   robot_state_t& out = *robot_state_;
-  for (size_t f = 0; f < out.foot_wrench.size(); ++f) {
-    SetWrench(wrenches_->wrench(f), &out.foot_wrench[f]);
-    SetWrench(wrenches_->deviation(f), &out.foot_wrench_deviation[f]);
-    out.foot_wrench_source[f] =
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    SetWrench(wrenches_->wrench(f), &out.foot_wrench[i]);
+    SetWrench(wrenches_->deviation(f), &out.foot_wrench_deviation[i]);
+    out.foot_wrench_source[i] =
         wrenches_->measured(f) ? robot_state_t::SOURCE_SENSOR : robot_state_t::SOURCE_OBSERVER;
-    estimator_status_->foot_sensor[f] = static_cast<int8_t>(wrenches_->check(f).state());
+    estimator_status_->foot_sensor[i] = static_cast<int8_t>(wrenches_->check(f).state());
   }
   estimator_status_t& status = *estimator_status_;
   const WrenchObserver& observer = wrenches_->observer();
   status.has_observer = observer.torque_known() ? 1 : 0;
   status.push_excess = observer.push_excess();
-  for (size_t f = 0; f < status.observed_wrench.size(); ++f) {
-    SetWrench(observer.wrenches().segment<6>(static_cast<Eigen::Index>(6 * f)),
-              &status.observed_wrench[f]);
+  for (const Foot f : kFeet) {
+    SetWrench(observer.wrenches().segment<6>(6 * static_cast<Eigen::Index>(f)),
+              &status.observed_wrench[Index(f)]);
   }
   size_t next = 0;
   for (int row = 0; row < 12; ++row) {
@@ -207,10 +213,11 @@ void StateEstimator::PublishAnchored() {
   SetVector3(anchored_->gyro_bias(), robot_state_->imu_bias_angular_velocity);
   estimator_status_t& status = *estimator_status_;
   SetVector3(anchored_->gyro_bias(), status.imu_bias_angular_velocity);
-  for (size_t f = 0; f < status.foot_contact.size(); ++f) {
-    status.foot_contact[f] = anchored_->foot_weight()[f] > 0 ? estimator_status_t::CONTACT_FIRM
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    status.foot_contact[i] = anchored_->foot_weight()[f] > 0 ? estimator_status_t::CONTACT_FIRM
                                                              : estimator_status_t::CONTACT_NONE;
-    SetPose(anchored_->anchor(static_cast<int>(f)), &status.foot_pose[f]);
+    SetPose(anchored_->anchor(f), &status.foot_pose[i]);
   }
 }
 
@@ -229,21 +236,21 @@ void StateEstimator::PublishInvariant() {
       status.covariance[next++] = covariance(row, column);
     }
   }
-  for (size_t f = 0; f < status.foot_contact.size(); ++f) {
-    const int i = static_cast<int>(f);
-    switch (invariant_->contact(i)) {
+  for (const Foot f : kFeet) {
+    const size_t i = Index(f);
+    switch (invariant_->contact(f)) {
       case FootContact::kNone:
-        status.foot_contact[f] = estimator_status_t::CONTACT_NONE;
+        status.foot_contact[i] = estimator_status_t::CONTACT_NONE;
         break;
       case FootContact::kFirm:
-        status.foot_contact[f] = estimator_status_t::CONTACT_FIRM;
+        status.foot_contact[i] = estimator_status_t::CONTACT_FIRM;
         break;
       case FootContact::kSlipping:
-        status.foot_contact[f] = estimator_status_t::CONTACT_SLIPPING;
+        status.foot_contact[i] = estimator_status_t::CONTACT_SLIPPING;
         break;
     }
-    status.foot_innovation[f] = invariant_->innovation(i);
-    SetPose(invariant_->foot_pose(i), &status.foot_pose[f]);
+    status.foot_innovation[i] = invariant_->innovation(f);
+    SetPose(invariant_->foot_pose(f), &status.foot_pose[i]);
   }
 }
 

@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using robot::Foot;
+using robot::kFeet;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Matrix6x12 = Eigen::Matrix<double, 6, 12>;
 
@@ -49,13 +51,13 @@ WrenchObserver::WrenchObserver(std::shared_ptr<const robot::RobotModel> model,
       joint_torque_(Eigen::VectorXd::Zero(model_->num_joints())),
       errors_(0, {}) {
   for (int j = 0; j < model_->num_joints(); ++j) {
-    std::array<bool, 2> supports{};
-    for (size_t f = 0; f < 2; ++f) {
+    robot::FootArray<bool> supports{};
+    for (const Foot f : kFeet) {
       for (const int other : model_->supporting_joints(model_->feet()[f].body)) {
         supports[f] = supports[f] || other == j;
       }
     }
-    if (!supports[0] && !supports[1]) continue;
+    if (Count(supports) == 0) continue;
     leg_joints_.push_back(j);
     supports_.push_back(supports);
   }
@@ -235,20 +237,21 @@ void WrenchObserver::AddJointRows() {
     const JointErrors::Corrected corrected = errors_.Correct(k, torques_[k], variance);
     known -= corrected.error;
     variance = std::max(corrected.variance, noise_[static_cast<Eigen::Index>(k)]);
-    std::array<robot::Vector6d, 2> row;
-    for (size_t f = 0; f < 2; ++f) {
+    robot::FootArray<robot::Vector6d> row;
+    for (const Foot f : kFeet) {
       if (!supports_[k][f]) continue;
       const Vector3d& axis = data_.joint_axis[j];
       row[f] << sole_rotation_[f].transpose() *
                     axis.cross(sole_position_[f] - data_.body_position[j + 1]),
           sole_rotation_[f].transpose() * axis;
       const robot::Vector6d weighted = row[f] / variance;
-      const auto at = static_cast<Eigen::Index>(6 * f);
+      const auto at = 6 * static_cast<Eigen::Index>(f);
       information.block<6, 6>(at, at).noalias() += weighted * row[f].transpose();
       sum.segment<6>(at) += known * weighted;
     }
-    if (supports_[k][0] && supports_[k][1]) {
-      information.block<6, 6>(6, 0).noalias() += row[1] * row[0].transpose() / variance;
+    if (Count(supports_[k]) == 2) {
+      information.block<6, 6>(6, 0).noalias() +=
+          row[Foot::kLeft] * row[Foot::kRight].transpose() / variance;
     }
   }
   information.block<6, 6>(0, 6) = information.block<6, 6>(6, 0).transpose();
@@ -261,8 +264,8 @@ bool WrenchObserver::AddBaseRows() {
   const double mass = std::max(mass_, 0.1 * model_->total_mass());
   const Vector3d com = com_ / mass;
   Matrix6x12 sum;  // of both feet, about the COM
-  for (size_t f = 0; f < 2; ++f) {
-    const auto at = static_cast<Eigen::Index>(6 * f);
+  for (const Foot f : kFeet) {
+    const auto at = 6 * static_cast<Eigen::Index>(f);
     const Matrix3d& r = sole_rotation_[f];
     sum.block<3, 3>(0, at) = r;
     sum.block<3, 3>(0, at + 3).setZero();
@@ -299,11 +302,12 @@ bool WrenchObserver::AddBaseRows() {
 
 // What a leg that swings seems to carry is its joints' error.
 void WrenchObserver::Learn(double dt) {
-  const Vector3d between = sole_rotation_[0].transpose() * (sole_position_[1] - sole_position_[0]);
+  const Vector3d between = sole_rotation_[Foot::kRight].transpose() *
+                           (sole_position_[Foot::kLeft] - sole_position_[Foot::kRight]);
   const double speed = observed_ ? (between - between_).norm() / dt : 0;
   between_ = between;
-  for (size_t f = 0; f < 2; ++f) {
-    const auto at = static_cast<Eigen::Index>(6 * f);
+  for (const Foot f : kFeet) {
+    const auto at = 6 * static_cast<Eigen::Index>(f);
     const robot::Vector6d wrench = estimate_.segment<6>(at);
     const Matrix6 spread = spread_.block<6, 6>(at, at);
     const double excess = wrench.dot(spread.llt().solve(wrench));
@@ -318,7 +322,7 @@ void WrenchObserver::Learn(double dt) {
     const double size = std::clamp(Square(load), kLeastFit, 1.0);
     fit_[f] += std::min(dt / (pressed ? kPressedFitTime : kFitTime), 1.0) * (size - fit_[f]);
     for (size_t k = 0; k < leg_joints_.size(); ++k) {
-      if (!supports_[k][f] || supports_[k][1 - f]) continue;
+      if (!supports_[k][f] || supports_[k][Other(f)]) continue;
       if (begins) errors_.Begin(k);
       errors_.Learn(k, torques_[k], residual_[static_cast<Eigen::Index>(k)],
                     variance_[static_cast<Eigen::Index>(k)], pressed, dt);
@@ -330,7 +334,7 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   mass_ = model_->total_mass();
   com_.setZero();
   ReadMotion(correction);
-  for (size_t f = 0; f < 2; ++f) {
+  for (const Foot f : kFeet) {
     const robot::FootModel& foot = model_->feet()[f];
     const auto b = static_cast<size_t>(foot.body);
     sole_position_[f] = data_.body_position[b] + data_.body_rotation[b] * foot.sole.translation();
@@ -358,8 +362,9 @@ bool WrenchObserver::Observe(const ObserverCorrection& correction, bool learn) {
   observed_ = true;
   wrenches_ = estimate_;
   covariance_ = settled_covariance_ = spread_;
-  for (Eigen::Index f = 0; f < 2; ++f) {
-    settled_covariance_.block<6, 6>(6 * f, 6 * f) *= fit_[static_cast<size_t>(f)];
+  for (const Foot f : kFeet) {
+    const auto at = 6 * static_cast<Eigen::Index>(f);
+    settled_covariance_.block<6, 6>(at, at) *= fit_[f];
   }
   const Wrenches late = config_.latency() * rate_;
   covariance_.noalias() += late * late.transpose();

@@ -12,7 +12,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 #include <vector>
 
@@ -56,7 +55,7 @@ class WrenchObserver {
   /// that hangs free, or did a moment ago, as small as what it seemed to carry.
   const Covariance& settled_covariance() const { return settled_covariance_; }
   /// Whether the foot was seen to hang free at the last Observe that learns.
-  bool free(size_t foot) const { return free_foot_[foot].free(); }
+  bool free(robot::Foot foot) const { return free_foot_[foot].free(); }
   /// Whether a joint torque is known; without, the base's rows alone tell the sum of both feet.
   bool torque_known() const { return torque_known_; }
   /// Squared normalised disagreement of the base's rows with the legs': chi-squared with 6 degrees
@@ -70,8 +69,8 @@ class WrenchObserver {
   const robot::Vector6d& base_wrench() const { return base_wrench_; }
   const robot::RobotData& data() const { return data_; }
   /// m from the base's origin, and rotation: the sole in the base frame.
-  const Eigen::Vector3d& sole_position(size_t foot) const { return sole_position_[foot]; }
-  const Eigen::Matrix3d& sole_rotation(size_t foot) const { return sole_rotation_[foot]; }
+  const Eigen::Vector3d& sole_position(robot::Foot foot) const { return sole_position_[foot]; }
+  const Eigen::Matrix3d& sole_rotation(robot::Foot foot) const { return sole_rotation_[foot]; }
   void Archive(StateArchive* archive);
 
  private:
@@ -86,8 +85,8 @@ class WrenchObserver {
   std::shared_ptr<const robot::RobotModel> model_;
   WrenchObserverConfig config_;
   std::vector<int> leg_joints_;
-  std::vector<std::array<bool, 2>> supports_;  // by leg joint: of which feet
-  LowPass filter_;                             // positions, gyro, accelerometer, torques
+  std::vector<robot::FootArray<bool>> supports_;  // by leg joint: of which feet
+  LowPass filter_;                                // positions, gyro, accelerometer, torques
   Eigen::VectorXd input_;
   robot::RobotState state_;  // of the filter, base at the origin
   robot::RobotData data_;
@@ -99,8 +98,8 @@ class WrenchObserver {
   Eigen::Vector3d com_ = Eigen::Vector3d::Zero();  // m, from the base's origin
   double mass_ = 0;                                // kg
   robot::Vector6d base_wrench_ = robot::Vector6d::Zero();
-  std::array<Eigen::Vector3d, 2> sole_position_;
-  std::array<Eigen::Matrix3d, 2> sole_rotation_;
+  robot::FootArray<Eigen::Vector3d> sole_position_;
+  robot::FootArray<Eigen::Matrix3d> sole_rotation_;
   Wrenches wrenches_ = Wrenches::Zero(), rate_ = Wrenches::Zero(), estimate_ = Wrenches::Zero();
   Covariance covariance_ = Covariance::Identity(), spread_ = Covariance::Identity();
   Covariance settled_covariance_ = Covariance::Identity();
@@ -112,9 +111,9 @@ class WrenchObserver {
   JointErrors errors_;     // by leg joint
   std::vector<JointErrors::Torques> torques_;  // by leg joint, of this Observe
   Eigen::VectorXd residual_, variance_;        // N·m, (N·m)², by leg joint, of this Observe
-  std::array<FreeFoot, 2> free_foot_;
+  robot::FootArray<FreeFoot> free_foot_;
   // Square of what a free foot seems to carry over its variance, at most 1.
-  std::array<double, 2> fit_ = {1, 1};
+  robot::FootArray<double> fit_ = {1, 1};
   Eigen::Vector3d between_ = Eigen::Vector3d::Zero();  // m, from right to left sole, right's axes
   double push_excess_ = 0;
   double since_ = 0;  // s, since the last Observe

@@ -235,8 +235,9 @@ TEST(BaseEstimator, AStepUpKeepsTheBaseContinuousAndAnchorsTheFootWhereItLands) 
   }
   const Eigen::Isometry3d landed = motion.script().foot[1](8);
   EXPECT_GT(landed.translation().z(), 0.0499);
-  EXPECT_LT((follow.estimator().anchor(1).translation() - landed.translation()).norm(),
-            2 * tilt * kLeg + jump);
+  EXPECT_LT(
+      (follow.estimator().anchor(robot::Foot::kLeft).translation() - landed.translation()).norm(),
+      2 * tilt * kLeg + jump);
   EXPECT_GT(follow.estimator().foot_weight()[1], 0.75);
 }
 
@@ -255,8 +256,10 @@ TEST(BaseEstimator, ALightFootIsFollowedAndNotTrusted) {
   EXPECT_LT(e.position, 1e-6);
   EXPECT_LT(e.tilt, 1e-6);
   const Eigen::Isometry3d foot = motion.script().foot[1](2);
-  EXPECT_LT((follow.estimator().anchor(1).translation() - foot.translation()).norm(), 1e-6);
-  EXPECT_LT((follow.estimator().anchor(1).linear() - foot.linear()).norm(), 1e-6);
+  EXPECT_LT(
+      (follow.estimator().anchor(robot::Foot::kLeft).translation() - foot.translation()).norm(),
+      1e-6);
+  EXPECT_LT((follow.estimator().anchor(robot::Foot::kLeft).linear() - foot.linear()).norm(), 1e-6);
 }
 
 // Both feet carry the same; the ground under the left one gives way by 20 mm and tilts.
@@ -284,7 +287,7 @@ TEST(BaseEstimator, AFootMaySinkIntoSoftGround) {
     if (motion.time() < 4.5) continue;
     worst_tilt_late = std::max(worst_tilt_late, follow.Difference().tilt);
     // The two feet agree again on where the base is (five time constants later).
-    for (int f = 0; f < 2; ++f) {
+    for (const robot::Foot f : robot::kFeet) {
       const double gap = (follow.estimator().foot_pose(f).translation() -
                           follow.estimator().anchor(f).translation())
                              .norm();
@@ -382,9 +385,9 @@ TEST(BaseEstimator, FiniteGarbageGivesFiniteStates) {
                   estimator.gyro_bias().allFinite())
           << run << " " << i;
       ASSERT_NEAR(s.base_orientation.norm(), 1, 1e-12) << run << " " << i;
-      for (int f = 0; f < 2; ++f) {
+      for (const robot::Foot f : robot::kFeet) {
         ASSERT_TRUE(estimator.anchor(f).matrix().allFinite());
-        const double w = estimator.foot_weight()[static_cast<size_t>(f)];
+        const double w = estimator.foot_weight()[f];
         ASSERT_TRUE(w >= 0 && w <= 1);
       }
     }

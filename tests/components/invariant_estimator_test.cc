@@ -91,7 +91,7 @@ TEST_P(AnyInvariantRobot, FollowsExactReadings) {
     ASSERT_LT(error.head<3>().norm(), 2e-5) << motion.time();
     ASSERT_LT(error.segment<3>(3).norm(), waist ? 6e-3 : 5e-4) << motion.time();
     ASSERT_LT(error.tail<3>().norm(), 1e-4) << motion.time();
-    for (int foot = 0; foot < 2; ++foot) {
+    for (const robot::Foot foot : robot::kFeet) {
       ASSERT_EQ(follow.estimator().contact(foot), FootContact::kFirm) << motion.time();
     }
   }
@@ -134,14 +134,16 @@ TEST(InvariantEstimator, AStepUpIsFollowedAndTheFootAnchoredWhereItLands) {
     const double t = motion.time();
     ASSERT_LT(follow.Error().tail<3>().norm(), 2e-3) << t;
     if (t > 1.3 && t < 2.7) {
-      ASSERT_EQ(follow.estimator().contact(1), FootContact::kNone) << t;
+      ASSERT_EQ(follow.estimator().contact(robot::Foot::kLeft), FootContact::kNone) << t;
     }
-    ASSERT_EQ(follow.estimator().contact(0), FootContact::kFirm) << t;
+    ASSERT_EQ(follow.estimator().contact(robot::Foot::kRight), FootContact::kFirm) << t;
   }
-  EXPECT_EQ(follow.estimator().contact(1), FootContact::kFirm);
+  EXPECT_EQ(follow.estimator().contact(robot::Foot::kLeft), FootContact::kFirm);
   const Isometry3d landed = motion.script().foot[1](8);
   EXPECT_GT(landed.translation().z(), 0.0499);
-  EXPECT_LT((follow.estimator().foot_pose(1).translation() - landed.translation()).norm(), 2e-3);
+  EXPECT_LT((follow.estimator().foot_pose(robot::Foot::kLeft).translation() - landed.translation())
+                .norm(),
+            2e-3);
 }
 
 // One foot slides, sinks or turns while both carry the same; the other and the IMU tell.
@@ -168,17 +170,21 @@ TEST_P(MovingFoot, IsFoundAndLeavesTheBaseAlone) {
   double slipping = 0;
   while (motion.time() < 2) {
     follow.Step();
-    const bool slips = follow.estimator().contact(1) == FootContact::kSlipping;
+    const bool slips = follow.estimator().contact(robot::Foot::kLeft) == FootContact::kSlipping;
     slipping += slips ? kTick : 0;
-    ASSERT_EQ(follow.estimator().contact(0), FootContact::kFirm) << motion.time();
+    ASSERT_EQ(follow.estimator().contact(robot::Foot::kRight), FootContact::kFirm) << motion.time();
   }
   const auto moved = follow.Error() - before;
   EXPECT_LT(moved.tail<3>().norm(), 1e-3);
   EXPECT_LT(moved.head<3>().norm(), 1e-3);
-  EXPECT_EQ(follow.estimator().contact(1), FootContact::kFirm);  // at rest again
+  EXPECT_EQ(follow.estimator().contact(robot::Foot::kLeft), FootContact::kFirm);  // at rest again
   const Isometry3d end = motion.script().foot[1](2);
-  EXPECT_LT((follow.estimator().foot_pose(1).translation() - end.translation()).norm(), 1.5e-3);
-  EXPECT_LT(RotationLog(follow.estimator().foot_pose(1).linear() * end.linear().transpose()).norm(),
+  EXPECT_LT(
+      (follow.estimator().foot_pose(robot::Foot::kLeft).translation() - end.translation()).norm(),
+      1.5e-3);
+  EXPECT_LT(RotationLog(follow.estimator().foot_pose(robot::Foot::kLeft).linear() *
+                        end.linear().transpose())
+                .norm(),
             2e-3);
   if (GetParam().way.norm() > 0) {
     EXPECT_GT(slipping, 0.25);
@@ -202,7 +208,7 @@ TEST(InvariantEstimator, AStandingFootIsSeldomTakenForASlippingOne) {
   double innovation = 0;
   for (int i = 0; i < 10000; ++i) {
     follow.Step();
-    for (int foot = 0; foot < 2; ++foot) {
+    for (const robot::Foot foot : robot::kFeet) {
       slipping += follow.estimator().contact(foot) == FootContact::kSlipping ? 1 : 0;
       innovation += follow.estimator().innovation(foot);
     }
@@ -234,7 +240,7 @@ TEST(InvariantEstimator, ASoleOnItsEdgeDoesNotTurnTheBase) {
     estimator.Update(sensors, kTick);
     worst = std::max(worst, follow.Error().head<3>().norm());
     if (motion.time() > 0.5) {
-      ASSERT_FALSE(estimator.filter().holds_rotation(1));
+      ASSERT_FALSE(estimator.filter().holds_rotation(robot::Foot::kLeft));
     }
   }
   EXPECT_LT(worst, 5e-4);
@@ -373,7 +379,7 @@ TEST(InvariantEstimator, ReadingsWorseThanTheirNoiseCountLess) {
                       sensors.foot_load,
                       sensors.foot_cop},
                      kTick);
-    slips += estimator.contact(0) == FootContact::kSlipping ? 1 : 0;
+    slips += estimator.contact(robot::Foot::kRight) == FootContact::kSlipping ? 1 : 0;
   }
   EXPECT_EQ(slips, 0);
   const auto error = BaseError(estimator.state(), motion.truth());
@@ -438,7 +444,7 @@ TEST(InvariantEstimator, FlightIntegratesTheImuAndTheCovarianceGrows) {
   follow.RunTo(0.42);
   const double known = follow.estimator().covariance()(3, 3);
   follow.RunTo(0.8);
-  EXPECT_EQ(follow.estimator().contact(0), FootContact::kNone);
+  EXPECT_EQ(follow.estimator().contact(robot::Foot::kRight), FootContact::kNone);
   EXPECT_LT(follow.Error().segment<3>(3).norm(), 0.05);
   EXPECT_LT(follow.Error().tail<3>().norm(), 0.02);
   EXPECT_GT(follow.estimator().covariance()(3, 3), 4 * known);
@@ -475,7 +481,7 @@ TEST(InvariantEstimator, FiniteGarbageGivesFiniteStates) {
                   s.joint_position.allFinite() && estimator.covariance().allFinite())
           << run << " " << i;
       ASSERT_NEAR(s.base_orientation.norm(), 1, 1e-12) << run << " " << i;
-      for (int f = 0; f < 2; ++f) {
+      for (const robot::Foot f : robot::kFeet) {
         ASSERT_TRUE(estimator.foot_pose(f).matrix().allFinite());
         ASSERT_TRUE(std::isfinite(estimator.innovation(f)));
       }
@@ -516,11 +522,12 @@ TEST(InvariantEstimator, SolesThatMoveAlikeStand) {
     BaseSensors sensors = motion.sensors();
     if (i >= 500 && i < 502) sensors.acceleration.x() += kBlow;
     estimator.Update(sensors, kTick);
-    both_slipped = both_slipped || (estimator.contact(0) == FootContact::kSlipping &&
-                                    estimator.contact(1) == FootContact::kSlipping);
+    both_slipped =
+        both_slipped || (estimator.contact(robot::Foot::kRight) == FootContact::kSlipping &&
+                         estimator.contact(robot::Foot::kLeft) == FootContact::kSlipping);
     if (i < 502 + 1.2 * config.invariant_ekf().rest_time() / kTick) continue;
-    EXPECT_EQ(estimator.contact(0), FootContact::kFirm) << i;
-    EXPECT_EQ(estimator.contact(1), FootContact::kFirm) << i;
+    EXPECT_EQ(estimator.contact(robot::Foot::kRight), FootContact::kFirm) << i;
+    EXPECT_EQ(estimator.contact(robot::Foot::kLeft), FootContact::kFirm) << i;
     ASSERT_LT(estimator.state().base_linear_velocity.norm(), 0.01) << i;
   }
   EXPECT_TRUE(both_slipped);

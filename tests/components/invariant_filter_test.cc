@@ -249,7 +249,7 @@ TEST(InvariantFilter, TheCovariancePropagatesAsTheError) {
   }
   // The way in: soles are held through readings.
   filter.Set(world.state, root * root.transpose());
-  for (int foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     SoleReading reading;
     reading.position = random.Normal3();
     reading.rotation = random.Rotation();
@@ -321,27 +321,27 @@ class Swaying {
     state.accelerometer_bias += scale * kForceWalk * root * random_.Normal3();
     return imu;
   }
-  SoleReading Sole(int foot) {
-    const auto f = static_cast<size_t>(foot);
+  SoleReading Sole(robot::Foot foot) {
     SoleReading reading;
     // As torques that change wind up the gears, read as if these had no compliance to find.
     for (int i = 0; i < 6; ++i) {
-      reading.by_compliance[i] = kWindup * std::sin((1 + 0.3 * i) * time + i + 3 * foot);
+      reading.by_compliance[i] =
+          kWindup * std::sin((1 + 0.3 * i) * time + i + 3 * static_cast<int>(foot));
     }
     const double unknown = reading.compliance - state.compliance;
     const Vector3d slip =
         scale * kSole * random_.Normal3() + unknown * reading.by_compliance.head<3>();
     const Vector3d turn =
         scale * kTurn * random_.Normal3() + unknown * reading.by_compliance.tail<3>();
-    reading.position = state.rotation.transpose() * (state.foot[f] - state.position + slip);
-    reading.rotation = state.rotation.transpose() * Gamma(turn).zero * state.foot_rotation[f];
+    reading.position = state.rotation.transpose() * (state.foot[foot] - state.position + slip);
+    reading.rotation = state.rotation.transpose() * Gamma(turn).zero * state.foot_rotation[foot];
     reading.noise.setZero();
     reading.noise.diagonal().head<3>().setConstant(kSole * kSole);
     reading.noise.diagonal().tail<3>().setConstant(kTurn * kTurn);
     return reading;
   }
   static void Loosen(InvariantFilter* filter) {
-    for (int foot = 0; foot < 2; ++foot) {
+    for (const robot::Foot foot : robot::kFeet) {
       filter->Loosen(foot, kWalk * kWalk * kStep, kTurnWalk * kTurnWalk * kStep);
     }
   }
@@ -370,7 +370,7 @@ Covariance StartCovariance() {
 InvariantFilter Begin(Swaying* truth, const Error& error, const Covariance& covariance) {
   InvariantFilter filter(kGravity);
   filter.Set(Moved(truth->state, error), covariance);
-  for (int foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     const SoleReading reading = truth->Sole(foot);
     filter.HoldPosition(foot, reading);
     filter.HoldRotation(foot, reading);
@@ -383,7 +383,8 @@ void FollowTruth(Swaying* truth, InvariantFilter* filter, double duration) {
     const ImuStep imu = truth->Next();
     filter->Propagate(imu, Swaying::kStep);
     Swaying::Loosen(filter);
-    for (int foot = 0; foot < 2; ++foot) ASSERT_TRUE(filter->Correct(foot, truth->Sole(foot)));
+    for (const robot::Foot foot : robot::kFeet)
+      ASSERT_TRUE(filter->Correct(foot, truth->Sole(foot)));
   }
 }
 
@@ -411,7 +412,8 @@ TEST(InvariantFilter, TheCovarianceIsThatOfTheErrors) {
           off.dot(Eigen::MatrixXd(filter.covariance()).ldlt().solve(Eigen::VectorXd(off)));
       sum += nees;
       inside += nees < 41.337 ? 1 : 0;
-      const InvariantFilter::Innovation test = filter.Test(0, truth.Sole(0));
+      const InvariantFilter::Innovation test =
+          filter.Test(robot::Foot::kRight, truth.Sole(robot::Foot::kRight));
       sum_innovation += test.position + test.rotation;
     }
     EXPECT_NEAR(sum / kRuns, 28, 4 * std::sqrt(2.0 * 28 / kRuns)) << duration;
@@ -458,7 +460,7 @@ TEST(InvariantFilter, FindsTheBiases) {
   wrong.gyro_bias.setZero();
   wrong.accelerometer_bias.setZero();
   filter.Set(wrong, unknown);
-  for (int foot = 0; foot < 2; ++foot) {
+  for (const robot::Foot foot : robot::kFeet) {
     filter.HoldPosition(foot, truth.Sole(foot));
     filter.HoldRotation(foot, truth.Sole(foot));
   }
@@ -477,7 +479,7 @@ TEST(InvariantFilter, FindsTheCompliance) {
     InvariantState unaware = truth.state;
     unaware.compliance = 0;
     filter.Set(unaware, StartCovariance());
-    for (int foot = 0; foot < 2; ++foot) {
+    for (const robot::Foot foot : robot::kFeet) {
       filter.HoldPosition(foot, truth.Sole(foot));
       filter.HoldRotation(foot, truth.Sole(foot));
     }
@@ -561,21 +563,21 @@ TEST(InvariantFilter, AReleasedFootNoLongerCountsAndComesBackWhereItIs) {
   Swaying truth(11);
   InvariantFilter filter = Begin(&truth, Error::Zero(), StartCovariance());
   FollowTruth(&truth, &filter, 0.5);
-  filter.ReleasePosition(1);
-  filter.ReleaseRotation(1);
+  filter.ReleasePosition(robot::Foot::kLeft);
+  filter.ReleaseRotation(robot::Foot::kLeft);
   const Covariance before = filter.covariance();
-  EXPECT_TRUE(filter.Correct(1, truth.Sole(1)));
+  EXPECT_TRUE(filter.Correct(robot::Foot::kLeft, truth.Sole(robot::Foot::kLeft)));
   EXPECT_EQ(filter.covariance(), before);
-  EXPECT_EQ(filter.Test(1, truth.Sole(1)).position, 0);
+  EXPECT_EQ(filter.Test(robot::Foot::kLeft, truth.Sole(robot::Foot::kLeft)).position, 0);
   truth.state.foot[1] += Vector3d(0.3, 0, 0.1);
   truth.state.foot_rotation[1] = AngleAxisd(0.4, Vector3d::UnitX()).toRotationMatrix();
-  const SoleReading reading = truth.Sole(1);
-  filter.HoldPosition(1, reading);
-  filter.HoldRotation(1, reading);
+  const SoleReading reading = truth.Sole(robot::Foot::kLeft);
+  filter.HoldPosition(robot::Foot::kLeft, reading);
+  filter.HoldRotation(robot::Foot::kLeft, reading);
   EXPECT_LT((filter.state().foot[1] - truth.state.foot[1]).norm(), 0.01);
   // What is known of it is what is known of the IMU and its reading: nothing is learned by taking
   // it in.
-  EXPECT_LT(filter.Test(1, reading).position, 1e-9);
+  EXPECT_LT(filter.Test(robot::Foot::kLeft, reading).position, 1e-9);
   const Covariance& after = filter.covariance();
   EXPECT_EQ((after.topLeftCorner<9, 9>()), (before.topLeftCorner<9, 9>()));
 }

@@ -53,7 +53,8 @@ TEST(FootWrenchesAndCalibrator, AllocateNothingPerTick) {
         {torque.data(), torque.size()}};
     const long before = allocations;
     wrenches.Update(i, BaseMotion::kPeriod, sensors, {}, {});
-    calibrator.Track({wrenches.wrench(0), wrenches.wrench(1)}, BaseMotion::kPeriod);
+    calibrator.Track({wrenches.wrench(robot::Foot::kRight), wrenches.wrench(robot::Foot::kLeft)},
+                     BaseMotion::kPeriod);
     calibrator.Update(wrenches.observer(), true);
     ASSERT_EQ(allocations - before, 0) << i;
   }

@@ -224,8 +224,8 @@ TEST(WrenchObserver, ASwingingFootTeachesItsLegAndATouchIsSeenInTime) {
       if (t > 1 && t < 3) {
         squares += std::pow(observed - truth, 2);
         ++count;
-        ASSERT_EQ(observer.free(1), learn) << t;
-        ASSERT_FALSE(observer.free(0)) << t;
+        ASSERT_EQ(observer.free(robot::Foot::kLeft), learn) << t;
+        ASSERT_FALSE(observer.free(robot::Foot::kRight)) << t;
         deviation[learn] = std::sqrt(observer.settled_covariance()(8, 8));
         ASSERT_TRUE(!learn || observed < 10) << t << ": a false touch";
       }
@@ -237,7 +237,7 @@ TEST(WrenchObserver, ASwingingFootTeachesItsLegAndATouchIsSeenInTime) {
     ASSERT_GT(touched, 0);
     ASSERT_GT(seen, 0);
     late[learn] = seen - touched;
-    EXPECT_FALSE(observer.free(1)) << "it stands again";
+    EXPECT_FALSE(observer.free(robot::Foot::kLeft)) << "it stands again";
   }
   EXPECT_LT(error[1], 0.5 * error[0]);
   EXPECT_LT(deviation[1], 0.5 * deviation[0]);
@@ -391,14 +391,16 @@ TEST_P(FootSensorFault, IsNoticedNamedAndForgiven) {
     if (!broken) first = reading[1].wrench;
     if (broken) reading[1].wrench = GetParam().broken(reading[1].wrench, first);
     wrenches.Update(tick, kPeriod, motion.sensors(), reading, {});
-    ASSERT_TRUE(wrenches.measured(0)) << t;
-    ASSERT_TRUE(t >= 1 || wrenches.measured(1)) << t;
+    ASSERT_TRUE(wrenches.measured(robot::Foot::kRight)) << t;
+    ASSERT_TRUE(t >= 1 || wrenches.measured(robot::Foot::kLeft)) << t;
     if (t > 1.6 && t < 3) {
-      ASSERT_EQ(wrenches.check(1).state(), GetParam().state) << t;
-      ASSERT_LT((wrenches.wrench(1) - truth.tail<6>()).norm(), 0.03 * motion.weight()) << t;
+      ASSERT_EQ(wrenches.check(robot::Foot::kLeft).state(), GetParam().state) << t;
+      ASSERT_LT((wrenches.wrench(robot::Foot::kLeft) - truth.tail<6>()).norm(),
+                0.03 * motion.weight())
+          << t;
     }
   }
-  EXPECT_TRUE(wrenches.measured(1)) << "well again for 2 s";
+  EXPECT_TRUE(wrenches.measured(robot::Foot::kLeft)) << "well again for 2 s";
 }
 
 // A sole that comes off the ground and strikes it again, up to 125 times a second: a good sensor
@@ -426,18 +428,21 @@ TEST(FootSensorCheck, ASoleThatRattlesIsNoFault) {
     int tick = 0;
     for (; tick < 1000; ++tick) {
       update(tick, tick >= 100, 0);
-      ASSERT_TRUE(wrenches.measured(0) && wrenches.measured(1)) << period << " " << tick;
+      ASSERT_TRUE(wrenches.measured(robot::Foot::kRight) && wrenches.measured(robot::Foot::kLeft))
+          << period << " " << tick;
     }
     for (; tick < 1500; ++tick) {
       update(tick, false, 0);
-      ASSERT_TRUE(wrenches.measured(0) && wrenches.measured(1)) << period << " " << tick;
+      ASSERT_TRUE(wrenches.measured(robot::Foot::kRight) && wrenches.measured(robot::Foot::kLeft))
+          << period << " " << tick;
     }
     for (; tick < 1550; ++tick) update(tick, false, 150);
-    EXPECT_EQ(wrenches.check(1).state(), FootSensorCheck::State::kBiased) << period;
+    EXPECT_EQ(wrenches.check(robot::Foot::kLeft).state(), FootSensorCheck::State::kBiased)
+        << period;
     // What rattles does not agree: the bias is still there.
     for (; tick < 3000; ++tick) {
       update(tick, true, 150);
-      ASSERT_FALSE(wrenches.measured(1)) << period << " " << tick;
+      ASSERT_FALSE(wrenches.measured(robot::Foot::kLeft)) << period << " " << tick;
     }
   }
 }
@@ -458,13 +463,13 @@ TEST(FootSensorCheck, AReadingThatDoesNotChangeIsFrozenThoughItAgrees) {
       reading[1].wrench = truth.tail<6>();  // zero, exactly, of a free foot
       if (free) reading[1].wrench.setZero();
       wrenches.Update(tick, kPeriod, motion.sensors(), reading, {});
-      ASSERT_TRUE(wrenches.measured(0));
-      if (noticed < 0 && !wrenches.measured(1)) noticed = kPeriod * tick;
+      ASSERT_TRUE(wrenches.measured(robot::Foot::kRight));
+      if (noticed < 0 && !wrenches.measured(robot::Foot::kLeft)) noticed = kPeriod * tick;
     }
     if (free) {
       EXPECT_LT(noticed, 0) << "a sensor without noise reads zero in the air";
     } else {
-      EXPECT_EQ(wrenches.check(1).state(), FootSensorCheck::State::kFrozen);
+      EXPECT_EQ(wrenches.check(robot::Foot::kLeft).state(), FootSensorCheck::State::kFrozen);
       EXPECT_LE(noticed, 0.15);
     }
   }
