@@ -9,23 +9,25 @@
 
 namespace poise {
 
+using robot::kFeet;
+
 FootSensors::FootSensors(const robot::RobotModel& model, const SimConfig& config) {
   last_.fill(robot::Vector6d::Zero());
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     present_[f] = config.foot_sensors() && model.feet()[f].force_sensor;
   }
   for (int i = 0; i < config.foot_sensor_fault_size(); ++i) {
     const FootSensorFault& in = config.foot_sensor_fault(i);
     const std::string field = fmt::format("foot_sensor_fault[{}]", i);
     Fault fault;
-    for (size_t f = 0; f < 2; ++f) {
+    for (const robot::Foot f : kFeet) {
       fault.foot[f] = !in.has_foot() || in.foot() == model.feet()[f].name;
     }
-    if (!fault.foot[0] && !fault.foot[1]) {
-      throw ConfigError(
-          field + ".foot",
-          fmt::format("robot '{}' has no foot '{}'; it has '{}' and '{}'", model.name(), in.foot(),
-                      model.feet()[0].name, model.feet()[1].name));
+    if (Count(fault.foot) == 0) {
+      throw ConfigError(field + ".foot",
+                        fmt::format("robot '{}' has no foot '{}'; it has '{}' and '{}'",
+                                    model.name(), in.foot(), model.feet()[robot::Foot::kRight].name,
+                                    model.feet()[robot::Foot::kLeft].name));
     }
     fault.start = in.start();
     fault.end = in.has_end() ? in.end() : std::numeric_limits<double>::infinity();
@@ -38,7 +40,7 @@ FootSensors::FootSensors(const robot::RobotModel& model, const SimConfig& config
 }
 
 void FootSensors::Apply(double time, SensorReadings* readings) {
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     robot::Vector6d& wrench = readings->foot_wrench[f];
     int8_t& state = readings->foot_sensor[f];
     state = present_[f] ? drive_feedback_t::SENSOR_OK : drive_feedback_t::SENSOR_ABSENT;

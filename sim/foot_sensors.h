@@ -1,7 +1,6 @@
 // How the feet's simulated sensors fail.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -22,14 +21,14 @@ class FootSensors {
 
  private:
   struct Fault {
-    std::array<bool, 2> foot{};
+    robot::FootArray<bool> foot{};
     double start = 0, end = 0;  // s
     FootSensorFault::Kind kind = FootSensorFault::DEAD;
     robot::Vector6d bias = robot::Vector6d::Zero();
   };
-  std::array<bool, 2> present_{};
+  robot::FootArray<bool> present_{};
   std::vector<Fault> faults_;
-  std::array<robot::Vector6d, 2> last_;  // reported
+  robot::FootArray<robot::Vector6d> last_;  // reported
 };
 
 }  // namespace poise

@@ -6,6 +6,7 @@
 namespace poise {
 
 using Eigen::Vector3d;
+using robot::kFeet;
 
 namespace {
 
@@ -52,7 +53,7 @@ void Sensors::Measure(const SimulationTruth& truth, SensorReadings* readings) {
   const Vector3d seen_up = up + accelerometer_bias_ / robot::kGravity;
   readings->imu_orientation =
       truth.imu_orientation * Eigen::Quaterniond::FromTwoVectors(seen_up, up);
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     readings->foot_wrench[f] = truth.foot_wrench[f];
     readings->foot_wrench[f].head<3>() += Noise(noise_.force);
     readings->foot_wrench[f].tail<3>() += Noise(noise_.moment);

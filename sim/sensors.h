@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,14 +15,14 @@ namespace poise {
 struct SensorReadings {
   explicit SensorReadings(int num_joints);
 
-  std::vector<int64_t> position_counts;        ///< at the motor shaft, multi-turn
-  Eigen::VectorXd velocity;                    ///< rad/s, of the joint
-  Eigen::Vector3d imu_angular_velocity;        ///< rad/s, IMU frame
-  Eigen::Vector3d imu_acceleration;            ///< m/s², IMU frame, specific force
-  Eigen::Quaterniond imu_orientation;          ///< IMU to world, of the IMU's own filter
-  std::array<robot::Vector6d, 2> foot_wrench;  ///< environment on robot, sole frame
-  std::array<int8_t, 2> foot_sensor{};         ///< drive_feedback_t::SENSOR_*
-  Eigen::Vector3d push_force;                  ///< N, world
+  std::vector<int64_t> position_counts;           ///< at the motor shaft, multi-turn
+  Eigen::VectorXd velocity;                       ///< rad/s, of the joint
+  Eigen::Vector3d imu_angular_velocity;           ///< rad/s, IMU frame
+  Eigen::Vector3d imu_acceleration;               ///< m/s², IMU frame, specific force
+  Eigen::Quaterniond imu_orientation;             ///< IMU to world, of the IMU's own filter
+  robot::FootArray<robot::Vector6d> foot_wrench;  ///< environment on robot, sole frame
+  robot::FootArray<int8_t> foot_sensor{};         ///< drive_feedback_t::SENSOR_*
+  Eigen::Vector3d push_force;                     ///< N, world
 };
 
 /// Gaussian noise of each sample and IMU biases drawn once. Every

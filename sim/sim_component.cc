@@ -150,9 +150,9 @@ void SimComponent::PublishFeedback() {
   SetVector3(readings_->imu_angular_velocity, message.imu_angular_velocity);
   SetVector3(readings_->imu_acceleration, message.imu_acceleration);
   SetQuaternion(readings_->imu_orientation, message.imu_orientation);
-  for (size_t f = 0; f < message.foot_wrench.size(); ++f) {
-    SetWrench(readings_->foot_wrench[f], &message.foot_wrench[f]);
-    message.foot_sensor[f] = readings_->foot_sensor[f];
+  for (const robot::Foot f : robot::kFeet) {
+    SetWrench(readings_->foot_wrench[f], &message.foot_wrench[Index(f)]);
+    message.foot_sensor[Index(f)] = readings_->foot_sensor[f];
   }
 }
 
@@ -178,10 +178,11 @@ void SimComponent::PublishTruth() {
   }
   SetVector3(truth.com, message.com_position);
   SetVector3(truth.com_velocity, message.com_velocity);
-  for (size_t f = 0; f < message.foot_pose.size(); ++f) {
-    SetPose(truth.foot_pose[f], &message.foot_pose[f]);
-    SetWrench(-truth.foot_wrench[f], &message.foot_wrench[f]);  // robot on environment
-    message.foot_contact_points[f] = truth.contact_points[f];
+  for (const robot::Foot f : robot::kFeet) {
+    const size_t i = Index(f);
+    SetPose(truth.foot_pose[f], &message.foot_pose[i]);
+    SetWrench(-truth.foot_wrench[f], &message.foot_wrench[i]);  // robot on environment
+    message.foot_contact_points[i] = truth.contact_points[f];
   }
   SetVector3(truth.push_force, message.push_force);
   message.fallen = simulation_->fallen() ? 1 : 0;

@@ -18,6 +18,7 @@ namespace poise {
 using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using robot::kFeet;
 using robot::kGravity;
 using robot::RobotModel;
 using robot::RobotState;
@@ -145,10 +146,10 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
   for (int i = 0; i < config.hand_size(); ++i) {
     hands_.emplace_back(config.hand(i), model_, step_, "hand[" + std::to_string(i) + "]");
   }
-  for (const robot::FootModel& foot : model_.feet()) {
-    auto& corners = corners_.emplace_back();
+  for (const robot::Foot f : kFeet) {
+    const robot::FootModel& foot = model_.feet()[f];
     for (const Eigen::Vector2d& corner : robot::SoleCorners(foot)) {
-      corners.push_back(foot.sole * Vector3d(corner.x(), corner.y(), 0));
+      corners_[f].push_back(foot.sole * Vector3d(corner.x(), corner.y(), 0));
     }
   }
   SetState(start);
@@ -167,7 +168,7 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
 }
 
 void Simulation::CheckStart() const {
-  for (size_t f = 0; f < corners_.size(); ++f) {
+  for (const robot::Foot f : kFeet) {
     const Isometry3d body = world_->pose(model_.feet()[f].body);
     for (const Vector3d& corner : corners_[f]) {
       const Vector3d p = body * corner;
@@ -187,8 +188,8 @@ void Simulation::SetState(const RobotState& state) {
   for (size_t j = 0; j < model_.joints().size(); ++j) {
     drivetrains_.emplace_back(model_.joints()[j], motors_[j], drivetrain_options_);
   }
-  std::array<bool, 2> in_contact{};
-  for (size_t f = 0; f < 2; ++f) {
+  robot::FootArray<bool> in_contact{};
+  for (const robot::Foot f : kFeet) {
     truth_.contact_points[f] = CollectContacts(f, false);
     in_contact[f] = truth_.contact_points[f] > 0;
   }
@@ -196,7 +197,7 @@ void Simulation::SetState(const RobotState& state) {
   imu_acceleration_.setZero();
   if (current_loop_.lags() || drivetrain_options_.elastic()) {
     Eigen::VectorXd torque = RestTorques(model_, state, truth_.foot_wrench);
-    if (!in_contact[0] && !in_contact[1]) torque.setZero();  // in flight nothing rests
+    if (Count(in_contact) == 0) torque.setZero();  // in flight nothing rests
     for (int j = 0; j < model_.num_joints(); ++j) {
       const auto i = static_cast<size_t>(j);
       drivetrains_[i].Place(state.joint_position[j], state.joint_velocity[j], torque[j]);
@@ -323,9 +324,9 @@ void Simulation::StepOnce() {
     const Vector3d point = world_->pose(0) * crane_->point();
     world_->AddForce(0, crane_->Force(point, PointVelocity(0, point)), point);
   }
-  std::array<Isometry3d, 2> sole;
-  std::array<Vector3d, 2> com;
-  for (size_t f = 0; f < 2; ++f) {
+  robot::FootArray<Isometry3d> sole;
+  robot::FootArray<Vector3d> com;
+  for (const robot::Foot f : kFeet) {
     const robot::FootModel& foot = model_.feet()[f];
     sole[f] = world_->pose(foot.body) * foot.sole;
     com[f] = world_->com_position(foot.body);
@@ -350,7 +351,7 @@ void Simulation::StepOnce() {
   if (!delayed_.empty()) Delay();
 }
 
-int Simulation::CollectContacts(size_t foot, bool add) {
+int Simulation::CollectContacts(robot::Foot foot, bool add) {
   const int body = model_.feet()[foot].body;
   const Isometry3d pose = world_->pose(body);
   int count = 0;
@@ -378,10 +379,10 @@ int Simulation::CollectContacts(size_t foot, bool add) {
 // An ideal six-axis sensor between the foot and a sole without mass: it reads exactly the contact
 // forces. A plate on a fixed joint would measure its own weight too and cost six constraint rows
 // per foot.
-void Simulation::ReadFootWrenches(const std::array<Isometry3d, 2>& sole,
-                                  const std::array<Vector3d, 2>& com) {
+void Simulation::ReadFootWrenches(const robot::FootArray<Isometry3d>& sole,
+                                  const robot::FootArray<Vector3d>& com) {
   int contact = 0;
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     Vector3d force = Vector3d::Zero(), moment = Vector3d::Zero();
     for (int c = 0; c < truth_.contact_points[f]; ++c, ++contact) {
       force += world_->contact_force(contact);
@@ -413,7 +414,7 @@ void Simulation::ReadTruth() {
     truth_.com += share * world_->com_position(b);
     truth_.com_velocity += share * world_->com_velocity(b);
   }
-  for (size_t f = 0; f < 2; ++f) {
+  for (const robot::Foot f : kFeet) {
     truth_.foot_pose[f] = world_->pose(model_.feet()[f].body) * model_.feet()[f].sole;
   }
   truth_.motor_current = mean_current_;

@@ -4,7 +4,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -30,12 +29,12 @@ struct SimulationTruth {
   explicit SimulationTruth(int num_joints);
 
   robot::RobotState state;
-  Eigen::Vector3d com, com_velocity;           ///< m, m/s, world
-  std::array<Eigen::Isometry3d, 2> foot_pose;  ///< of the sole, world
+  Eigen::Vector3d com, com_velocity;              ///< m, m/s, world
+  robot::FootArray<Eigen::Isometry3d> foot_pose;  ///< of the sole, world
   /// Environment on robot, [force; moment], sole frame: mean over the last step. Before the first:
   /// RestWrenches.
-  std::array<robot::Vector6d, 2> foot_wrench;
-  std::array<int, 2> contact_points;
+  robot::FootArray<robot::Vector6d> foot_wrench;
+  robot::FootArray<int> contact_points;
   Eigen::VectorXd encoder_position;      ///< rad at the joint, where the encoders sit
   Eigen::VectorXd encoder_velocity;      ///< rad/s, likewise
   Eigen::VectorXd motor_current;         ///< A, mean over the last step
@@ -112,9 +111,9 @@ class Simulation {
   /// The drive of a joint over the next step: its torque, and what it adds while that is within
   /// limits.
   DriveImpedance Drive(size_t joint, double* torque) const;
-  int CollectContacts(size_t foot, bool add);
-  void ReadFootWrenches(const std::array<Eigen::Isometry3d, 2>& sole,
-                        const std::array<Eigen::Vector3d, 2>& com);
+  int CollectContacts(robot::Foot foot, bool add);
+  void ReadFootWrenches(const robot::FootArray<Eigen::Isometry3d>& sole,
+                        const robot::FootArray<Eigen::Vector3d>& com);
   Eigen::Vector3d ImuVelocity() const;
   Eigen::Vector3d PointVelocity(int body, const Eigen::Vector3d& point) const;
   void ReadTruth();
@@ -146,7 +145,7 @@ class Simulation {
   Drivetrain::Options drivetrain_options_;
   std::vector<Drivetrain> drivetrains_;
   CurrentLoop current_loop_;
-  std::vector<std::vector<Eigen::Vector3d>> corners_;  // m, body frame, by foot
+  robot::FootArray<std::vector<Eigen::Vector3d>> corners_;  // m, body frame
   int64_t steps_ = 0;
   // By joint: A commanded, flowing now, mean of the last step, and N·m of that mean.
   Eigen::VectorXd command_, current_, mean_current_, torque_;
