@@ -106,7 +106,8 @@ double HullMargin(const robot::RobotModel& model) {
 
 ContactLimitsConfig WithinSoles(ContactLimitsConfig config, const robot::RobotModel& model,
                                 double margin) {
-  const robot::FootModel &right = model.feet()[0], &left = model.feet()[1];
+  const robot::FootModel &right = model.feet()[robot::Foot::kRight],
+                         &left = model.feet()[robot::Foot::kLeft];
   if (!right.rectangular() || !left.rectangular()) {
     balance::ConvexPolygon common = balance::SolePolygon(right, margin);
     const balance::HalfPlanes edges = balance::EdgesOf(balance::SolePolygon(left, margin));
@@ -141,19 +142,19 @@ balance::ContactLimits ReadLimits(const ContactLimitsConfig& config, const std::
 balance::SoleLimits ReadSoleLimits(const ContactLimitsConfig& config,
                                    const robot::RobotModel& model, double margin,
                                    const std::string& field) {
-  const bool rectangles = model.feet()[0].rectangular() && model.feet()[1].rectangular();
+  const bool rectangles = std::ranges::all_of(model.feet(), &robot::FootModel::rectangular);
   const balance::ContactLimits both = ReadLimits(WithinSoles(config, model, margin), field);
-  balance::SoleLimits limits{both, both};
+  balance::SoleLimits limits(both);
   if (rectangles) return limits;
-  for (size_t i = 0; i < 2; ++i) {
-    balance::ConvexPolygon sole = balance::SolePolygon(model.feet()[i], margin);
+  for (const robot::Foot f : robot::kFeet) {
+    balance::ConvexPolygon sole = balance::SolePolygon(model.feet()[f], margin);
     for (const double sign : {1.0, -1.0}) {
       if (config.has_half_length()) sole = balance::Clip(sole, {{sign, 0}, both.half_length});
       if (config.has_half_width()) sole = balance::Clip(sole, {{0, sign}, both.half_width});
     }
-    limits[i].edges = balance::EdgesOf(sole);
-    if (limits[i].edges.count == 0) {
-      throw ConfigError(field, "leaves nothing of the " + model.feet()[i].name +
+    limits[f].edges = balance::EdgesOf(sole);
+    if (limits[f].edges.count == 0) {
+      throw ConfigError(field, "leaves nothing of the " + model.feet()[f].name +
                                    " foot's sole; raise half_length and half_width");
     }
   }

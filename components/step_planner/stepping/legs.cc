@@ -20,8 +20,8 @@ Legs::Legs(const robot::RobotModel& model) : height_(robot::StandingHeight(model
   robot::RobotData data(model);
   robot::ComputeKinematics(model, robot::SolvePosture(model, goal), &data);
   const Vector3d com = Vector3d(0, 0, height_) - data.base_position;
-  for (size_t i = 0; i < 2; ++i) {
-    const robot::FootModel& foot = model.feet()[i];
+  for (const Foot f : kFeet) {
+    const robot::FootModel& foot = model.feet()[f];
     const auto joints = model.supporting_joints(foot.body);
     if (joints.empty()) continue;
     const auto at = [&](int joint) -> Vector3d {
@@ -38,10 +38,10 @@ Legs::Legs(const robot::RobotModel& model) : height_(robot::StandingHeight(model
         knee = at(joint);
       }
     }
-    const Vector3d sole = goal.foot[i].translation() - data.base_position;
+    const Vector3d sole = goal.foot[f].translation() - data.base_position;
     const Vector3d line = (ankle - hip).normalized();
     const Vector3d out = (knee - hip) - line.dot(knee - hip) * line;
-    leg_[i] = {hip - com, ankle - sole, (knee - hip).norm(), (ankle - knee).norm(),
+    leg_[f] = {hip - com, ankle - sole, (knee - hip).norm(), (ankle - knee).norm(),
                out.x() < 0 ? -1.0 : 1.0};
   }
 }

@@ -32,7 +32,7 @@ constexpr double kMaxTurn = 0.3;  // rad, of a joint in one iteration
 class Leg {
  public:
   Leg(const robot::RobotModel& model, const robot::RobotState& standing, Foot foot, double reserve)
-      : model_(model), data_(model), state_(standing), foot_(robot::Index(foot)) {
+      : model_(model), data_(model), state_(standing), foot_(foot) {
     const auto joints = model.supporting_joints(model.feet()[foot_].body);
     joints_.assign(joints.begin(), joints.end());
     reserve_ = reserve;
@@ -113,7 +113,7 @@ class Leg {
   const robot::RobotModel& model_;
   robot::RobotData data_;
   robot::RobotState state_;
-  size_t foot_;
+  Foot foot_;
   std::vector<int> joints_;
   double reserve_ = 0;
   Eigen::Matrix3d level_;
