@@ -89,7 +89,7 @@ function writeRobot(name, visuals) {
 
 /** What is drawn of a body's meshes: their boxes, in its frame, m. */
 const meshBoxes = (page, body) => page.evaluate((name) => {
-  const {view} = window.poise.still;
+  const {robotView: view} = window.poise.still;
   const {visuals, bodies} = view.robot;
   const b = bodies.findIndex((x) => x.name === name);
   return view.groups[b].children.filter((o) => o.isMesh && visuals.some((v) => v.shape === 'mesh' && v.body === b)
@@ -134,6 +134,53 @@ test('meshes of each format lie where their files say; what is missing is told',
   await page.context().close();
 });
 
+test('soles are shown with their corners and sizes, on ground whose horizon is no edge', async () => {
+  // As the robot's text has them, mm.
+  const told = [...heron('pbtxt').matchAll(/^foot \{[^]*?^\}/gm)].map(([foot]) =>
+    [...foot.matchAll(/vertex \{ x: (\S+) y: (\S+) \}/g)].map(([, x, y]) => [1e3 * x, 1e3 * y]));
+  assert.deepEqual(told.map((corners) => corners.length), [8, 8]);
+  check('heron/heron', '--page', path('soles.html'));
+  for (const colorScheme of ['light', 'dark']) {
+    const {page, problems} = await openPage(browser, path('soles.html'), {colorScheme});
+    const {drawn, sizes} = await page.evaluate(() => {
+      const {layers: {soles}, labels, robotView, scene} = window.poise.still;
+      scene.updateMatrixWorld(true);
+      const feet = soles.children.filter((o) => o.isGroup);
+      return {sizes: labels.map(({label}) => label.shown), drawn: feet.map((foot, f) => {
+        const dots = foot.children[0].children.filter((o) => o.isMesh);
+        return dots.map((dot) => {
+          const at = dot.getWorldPosition(dot.position.clone());
+          return [at.z, ...robotView.groups[robotView.robot.feet[f].body].worldToLocal(at).toArray()];
+        });
+      })};
+    });
+    assert.deepEqual(sizes, ['220 × 92 mm', '220 × 92 mm']);
+    drawn.forEach((corners, f) => {
+      near(corners.map(([z]) => z), corners.map(() => 0), 1e-3);  // on the ground
+      // The sole's frame lies 30 mm before the foot's, which turns as it does.
+      const places = corners.map(([, x, y]) => [1e3 * (x - 0.03), 1e3 * y]);
+      for (const [x, y] of told[f]) assert.ok(places.some((p) => Math.hypot(p[0] - x, p[1] - y) < 0.01), `${x}, ${y} of ${places.join('; ')}`);
+    });
+    const numbers = await page.locator('.soles text').allTextContents();
+    for (const [x, y] of told.flat()) assert.ok(numbers.includes(`${x}, ${y}`), `${x}, ${y} of ${numbers.join('; ')}`);
+    // Down the picture's side no line differs from the next by more than one can see.
+    const steps = await page.evaluate(async () => {
+      const {still} = window.poise;
+      still.grid.visible = false;
+      const image = Object.assign(new Image(), {src: still.imageUrl()});
+      await image.decode();
+      const pen = new OffscreenCanvas(1, image.height).getContext('2d');
+      pen.drawImage(image, -8, 0);
+      const {data} = pen.getImageData(0, 0, 1, image.height);
+      const reds = Array.from({length: image.height}, (_, y) => data[4 * y]);
+      return {range: Math.max(...reds) - Math.min(...reds), largest: Math.max(...reds.slice(1).map((red, y) => Math.abs(red - reds[y])))};
+    });
+    assert.ok(steps.range >= 5 && steps.largest <= 2, JSON.stringify(steps));
+    assert.deepEqual(problems, []);
+    await page.context().close();
+  }
+});
+
 test('a mesh of half a million triangles is drawn with few, in its place', async () => {
   // A folder told finds it, whatever folders its name begins with.
   const robot = writeRobot('large', {torso: '<mesh filename="package://nobody/large.stl"/>'});
@@ -143,7 +190,7 @@ test('a mesh of half a million triangles is drawn with few, in its place', async
   assert.ok(statSync(path('large.html')).size < 3e6, `${statSync(path('large.html')).size} bytes`);
   const {page, problems} = await openPage(browser, path('large.html'));
   const {radii, triangles} = await page.evaluate(() => {
-    const {view} = window.poise.still;
+    const {robotView: view} = window.poise.still;
     const mesh = view.groups.flatMap((g) => g.children).find((o) => o.material === view.meshMaterial);
     const {position} = mesh.geometry.attributes;
     const of = Array.from({length: position.count}, (_, i) => Math.hypot(position.getX(i), position.getY(i), position.getZ(i)));

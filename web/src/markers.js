@@ -1,8 +1,8 @@
 // What is drawn beside the robot: arrows, points on the ground, outlines, the soft block.
 import {
-  BufferAttribute, BufferGeometry, CircleGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group,
-  Line, LineDashedMaterial, LineLoop, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, RingGeometry,
-  Vector3,
+  BufferAttribute, BufferGeometry, CanvasTexture, CircleGeometry, ConeGeometry, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group,
+  Line, LineDashedMaterial, LineLoop, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, RingGeometry, SRGBColorSpace,
+  Sprite, SpriteMaterial, Vector3,
 } from 'three';
 import {BLOCK_CORNERS, blockTop} from './spatial.js';
 
@@ -57,6 +57,41 @@ function crossGeometry(size) {
   const geometry = new BufferGeometry();
   geometry.setAttribute('position', new Float32BufferAttribute([...quad(size, t), ...quad(t, size)], 3));
   return geometry;
+}
+
+export const LABEL = {width: 128, height: 36, size: 0.00125};  // pixels, pixels, m a pixel
+
+/** A word or two over a place; `width`: pixels, `size`: m a pixel. */
+export class Label {
+  constructor(width = LABEL.width, size = LABEL.size) {
+    this.canvas = Object.assign(document.createElement('canvas'), {width, height: LABEL.height});
+    this.texture = new CanvasTexture(this.canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.object = new Sprite(new SpriteMaterial({map: this.texture, transparent: true, depthTest: false}));
+    this.object.scale.set(size * width, size * LABEL.height, 1);
+    this.object.renderOrder = OVERLAY_ORDER + 2;
+  }
+
+  /** Without a text it is hidden. */
+  set(text, [x, y, z] = [0, 0, 0], dark = false) {
+    this.object.visible = Boolean(text);
+    this.object.position.set(x, y, z + 0.03);
+    if (this.shown === text && this.dark === dark) return;
+    Object.assign(this, {shown: text, dark});
+    if (!text) return;
+    const pen = this.canvas.getContext('2d');
+    const {width} = this.canvas;
+    pen.clearRect(0, 0, width, LABEL.height);
+    pen.font = 'bold 28px system-ui, sans-serif';
+    pen.textAlign = 'center';
+    pen.textBaseline = 'middle';
+    pen.lineWidth = 3;
+    pen.strokeStyle = dark ? '#14171c' : '#ffffff';
+    pen.fillStyle = dark ? '#f2f2f2' : '#1d1d1f';
+    pen.strokeText(text, width / 2, LABEL.height / 2);
+    pen.fillText(text, width / 2, LABEL.height / 2);
+    this.texture.needsUpdate = true;
+  }
 }
 
 /** A closed outline of up to `capacity` points. */

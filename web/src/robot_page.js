@@ -1,56 +1,44 @@
 // The page of `poise robot check`: a robot standing, with its frames, joint axes and soles, and what was found of it.
-import {
-  AmbientLight, AxesHelper, Box3, CircleGeometry, Color, DirectionalLight, Group, HemisphereLight, Mesh, MeshBasicMaterial,
-  PerspectiveCamera, Quaternion, Scene, Vector3, WebGLRenderer,
-} from 'three';
-import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
-import {element, table} from './dom.js';
-import {Arrow} from './markers.js';
+import {AxesHelper, Group, Quaternion, Vector3} from 'three';
+import {element, shape, table} from './dom.js';
+import {Arrow, Label, Outline, mark} from './markers.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';
-import {RobotView} from './robot_view.js';
+import {place} from './robot_view.js';
+import {FOOT_COLORS} from './steps_view.js';
 import {formatNumber} from './units.js';
+import {VIEWS, View3D} from './view3d.js';
 
 const FRAME = 0.06;  // m, of a drawn frame's axes
 const AXIS = 0.09;   // m, of a drawn joint axis
-const VIEWS = {free: [0.75, -0.62, 0.28], front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1]};
+const CORNER = 0.006;  // m, of a drawn corner's dot
+const BESIDE = 0.26;  // m from a sole's middle outwards, where its size stands
 
-/** Three.js's picture of the robot in its stance; `show` switches what is drawn over it. */
-class StillView {
+const mm = (metres) => formatNumber(Math.round(1e4 * metres) / 10);
+
+/** "220 × 110 mm": how long and how wide a sole is at the most. */
+function sizeOf(corners) {
+  const [length, width] = [0, 1].map((k) => Math.max(...corners.map((c) => c[k])) - Math.min(...corners.map((c) => c[k])));
+  return `${mm(length)} × ${mm(width)} mm`;
+}
+
+/** The robot in its stance; `show` switches what is drawn over it. */
+class StillView extends View3D {
   constructor(host, {robot, stance}) {
-    this.host = host;
-    this.renderer = new WebGLRenderer({antialias: true});
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
-    this.renderer.domElement.setAttribute('role', 'img');
-    this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
-    host.append(this.renderer.domElement);
-    this.scene = new Scene();
-    this.camera = new PerspectiveCamera(32, 1, 0.05, 60);
-    this.camera.up.set(0, 0, 1);
-    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener('change', () => this.draw());
-    const sun = new DirectionalLight(0xffffff, 1.6);
-    sun.position.set(2, -3, 5);
-    this.ground = new Mesh(new CircleGeometry(3, 48), new MeshBasicMaterial({depthWrite: false}));
-    this.ground.renderOrder = -1;
-    this.view = new RobotView(robot);
-    this.view.setPose(stance.base, stance.joints);
-    this.layers = {frames: new Group(), axes: new Group()};
+    super(host, robot);
+    this.robotView.setPose(stance.base, stance.joints);
+    this.layers = {frames: new Group(), axes: new Group(), soles: new Group()};
     this.#mark(robot);
-    this.scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), new AmbientLight(0xffffff, 0.35), sun, this.ground,
-      this.view.object, ...Object.values(this.layers));
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.setTheme());
-    this.setTheme();
-    new ResizeObserver(() => this.#resize()).observe(host);
-    this.look('free');
+    this.scene.add(...Object.values(this.layers));
+    this.start();
   }
 
-  /** A frame of each body, an arrow along each joint's axis. */
+  /** A frame of each body, an arrow along each joint's axis, each sole with its corners and size. */
   #mark(robot) {
-    this.view.object.updateMatrixWorld(true);
+    this.robotView.object.updateMatrixWorld(true);
     const at = new Vector3(), turn = new Quaternion(), size = new Vector3();
     robot.bodies.forEach((body, b) => {
-      this.view.groups[b].matrixWorld.decompose(at, turn, size);
+      this.robotView.groups[b].matrixWorld.decompose(at, turn, size);
       const frame = new AxesHelper(FRAME);
       frame.material.depthTest = false;
       frame.position.copy(at);
@@ -62,61 +50,55 @@ class StillView {
       arrow.set(at.toArray(), axis.toArray());
       this.layers.axes.add(arrow.object);
     });
+    this.labels = robot.feet.map(({body, sole, corners}, f) => {
+      const drawn = new Group(), outline = new Outline(FOOT_COLORS[f], corners.length), label = new Label(220, 0.0018);
+      outline.set(corners.map(([x, y]) => [x, y, 0]));
+      drawn.add(outline.object, ...corners.map(([x, y]) => {
+        const dot = mark('disc', FOOT_COLORS[f], CORNER);
+        dot.position.set(x, y, 0);
+        return dot;
+      }));
+      const holder = new Group();
+      this.robotView.groups[body].matrixWorld.decompose(holder.position, holder.quaternion, size);
+      place(drawn, sole);
+      holder.add(drawn);
+      this.layers.soles.add(holder, label.object);
+      holder.updateMatrixWorld(true);
+      const at = drawn.localToWorld(new Vector3());
+      return {label, text: sizeOf(corners), at: at.setY(at.y + Math.sign(at.y) * BESIDE).toArray()};
+    });
   }
 
   setTheme() {
-    const dark = isDark();
-    this.scene.background = new Color(dark ? 0x14171c : 0xeef1f5);
-    this.ground.material.color.set(dark ? 0x1b1f26 : 0xe4e8ee);
-    this.draw();
-  }
-
-  /** One of VIEWS, with the robot in the middle. */
-  look(name) {
-    const box = new Box3().setFromObject(this.view.object), size = box.getSize(new Vector3());
-    box.getCenter(this.controls.target);
-    const distance = 1.15 * Math.max(size.x, size.y, size.z) / 2 / Math.tan(this.camera.fov * Math.PI / 360);
-    this.camera.position.set(...VIEWS[name]).normalize().multiplyScalar(distance + size.x / 2).add(this.controls.target);
-    this.controls.update();
-    this.draw();
+    for (const {label, text, at} of this.labels) label.set(text, at, isDark());
+    super.setTheme();
   }
 
   show(name, on) {
     this.layers[name].visible = on;
     this.draw();
   }
-
-  #resize() {
-    const {clientWidth: width, clientHeight: height} = this.host;
-    if (width === 0 || height === 0) return;
-    this.renderer.setSize(width, height);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.draw();
-  }
-
-  draw() { this.renderer.render(this.scene, this.camera); }
 }
 
-/** The soles from above, forwards up, to one scale. */
-function solesPicture(soles) {
-  const scale = 900, pad = 8;  // pixels a metre
-  return element('div', {class: 'soles'}, ...[...soles].reverse().map((sole) => {
-    const reach = (k) => Math.max(...sole.corners.map((c) => Math.abs(c[k])));
-    const [height, width] = [2 * reach(0) * scale + 2 * pad, 2 * reach(1) * scale + 2 * pad];
-    const points = sole.corners.map(([x, y]) => [width / 2 - y * scale, height / 2 - x * scale]);
-    const canvas = element('canvas', {width: Math.ceil(width), height: Math.ceil(height), role: 'img',
-      'aria-label': `The ${sole.foot} sole from above`});
-    const context = canvas.getContext('2d');
-    context.strokeStyle = context.fillStyle = isDark() ? '#9fb0c5' : '#5b6675';
-    context.beginPath();
-    points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
-    context.closePath();
-    context.lineWidth = 2;
-    context.stroke();
-    context.fillRect(width / 2 - 2, height / 2 - 2, 4, 4);  // the sole frame's origin
-    return element('figure', {}, canvas, element('figcaption', {}, sole.foot));
-  }));
+const MARGIN = 50;  // mm about a drawn sole, where its corners' numbers stand
+const APART = 11;   // mm between two of these numbers
+
+/** A sole from above, forwards up, with the place of each corner about the sole frame's origin, mm. */
+function solePicture({foot, corners}) {
+  const points = corners.map(([x, y]) => [-1e3 * y, -1e3 * x]);
+  const [left, top, right, bottom] = [Math.min, Math.max].flatMap((most) => [0, 1].map((k) => most(0, ...points.map((p) => p[k]))));
+  const taken = [];
+  const numbers = points.map(([x, y], i) => {
+    const at = [x + 5 * Math.sign(x), y + (y < (top + bottom) / 2 ? -4 : 11)];
+    if (taken.some(([u, v]) => Math.abs(v - at[1]) < APART && u * at[0] > 0)) return '';
+    taken.push(at);
+    return shape('text', {x: at[0], y: at[1], 'text-anchor': x < 0 ? 'end' : 'start'}, corners[i].map(mm).join(', '));
+  });
+  return element('figure', {}, shape('svg', {viewBox: [left - MARGIN, top - 18, right - left + 2 * MARGIN, bottom - top + 36].join(' '), role: 'img',
+    'aria-label': `The ${foot} sole from above, ${sizeOf(corners)}`},
+  shape('polygon', {points: points.join(' ')}), shape('path', {d: 'M-6 0H6M0 -6V6'}),
+  ...points.map(([cx, cy], i) => shape('circle', {cx, cy, r: 2}, shape('title', {}, `${corners[i].map(mm).join(', ')} mm`))), ...numbers),
+  element('figcaption', {}, `${foot}, ${sizeOf(corners)}`));
 }
 
 const cm = (metres) => `${formatNumber(100 * metres, 3)} cm`;
@@ -126,7 +108,7 @@ function tables(check) {
   const rows = [['mass', `${formatNumber(check.mass, 4)} kg`], ['joints', String(check.joints)],
     ['COM above the soles', cm(check.com_height)], ['ω', `${formatNumber(check.frequency, 3)} rad/s`],
     ['between the soles', cm(check.foot_spacing)],
-    ...check.soles.map((s) => [`${s.foot} sole`, `${formatNumber(1e4 * s.area, 3)} cm², nearest edge ${cm(s.inner_radius)} from the origin`]),
+    ...check.soles.map((s) => [`${s.foot} sole`, `${sizeOf(s.corners)}, ${formatNumber(1e4 * s.area, 3)} cm², nearest edge ${cm(s.inner_radius)} from the origin`]),
     ...Object.entries({forward: 'forwards', back: 'back', outward: 'outwards', up: 'up'})
       .map(([key, name]) => [`left foot reaches ${name}`, cm(check.reach[key])]),
     ['gears', check.gear_stiffness > 0 ? `${formatNumber(check.gear_stiffness, 3)} N·m/rad` : 'rigid'],
@@ -154,10 +136,11 @@ export function robotPage(data) {
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: true,
     change: (e) => still.show(name, e.target.checked)}), label);
   if (drawn3d) host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
-    element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes')));
+    element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles')));
   const [drawn, inFiles] = data.triangles;
   const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);
-  document.getElementById('side').append(element('h2', {}, 'Soles, from above'), solesPicture(check.soles),
+  document.getElementById('side').append(element('h2', {}, 'Soles from above: corners x, y in mm'),
+    element('div', {class: 'soles'}, ...[...check.soles].reverse().map(solePicture)),
     ...(notes.length > 0 ? [element('h2', {}, 'Picture'), element('p', {class: 'note', role: 'note'}, notes.join(' '))] : []),
     ...(good ? [] : [element('h2', {}, 'Defects'), element('ul', {}, ...check.defects.map((d) => element('li', {}, d)))]));
   document.getElementById('tables').append(...tables(check));

@@ -1,37 +1,27 @@
 // The robot in 3D with contact wrenches, centre of pressure and push; from above in the corner.
-import {
-  AmbientLight, Box3, BufferGeometry, CircleGeometry, Color, DirectionalLight, Float32BufferAttribute, Fog, Group, HemisphereLight,
-  LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, OrthographicCamera, PerspectiveCamera, Scene, SphereGeometry,
-  Vector3, WebGLRenderer,
-} from 'three';
-import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
+import {Color, Group, Mesh, MeshBasicMaterial, OrthographicCamera, SphereGeometry, Vector3} from 'three';
 import {CraneView} from './crane.js';
 import {lightLoad} from './derived.js';
 import {element} from './dom.js';
 import {GroundBlocks} from './ground.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
-import {place, RobotView} from './robot_view.js';
+import {RobotView, place} from './robot_view.js';
 import {isDark} from './palette.js';
 import {Samples, pose, vector} from './samples.js';
 import {add, blockRise, convexHull, rotate} from './spatial.js';
 import {StepsView} from './steps_view.js';
+import {GRID, PIECE, View3D} from './view3d.js';
 
 const METRES_PER_NEWTON = 1 / 900;
 const METRES_PER_NEWTON_METRE = 1 / 100;
 const LEAST_PUSH = 3;  // N: below it the sensor's noise
 const INSET = 0.34;    // of the picture's smaller side
-const FILL = 1.15;  // of the picture's height that the robot may take, as its inverse
 const ABOVE = 0.26;    // m, half of what the view from above shows, at least
 const ABOVE_STEP = 0.1;  // m
-const FINEST = Math.min(2, globalThis.devicePixelRatio);  // pixels of the picture per CSS pixel
 const COARSEST = 0.5;
 const SLOW_FRAME = 22;      // ms
 const FRAME_SHARE = 0.1;    // of a new frame in the mean
 const LONGEST_PAUSE = 500;  // ms; what took longer was no frame
-const GROUND = 6;      // m, across
-const GRID = 0.1;      // m
-const PIECE = 5;       // squares
-const FOG = [3.2, 6];  // m, where the ground begins to fade and where it ends
 const REGION_CORNERS = 16;  // of a message, at the most
 const GROUND_LAYER = 1;  // what the view from above shows
 const FOLLOW = 0.15;     // m that the robot goes from the middle before the view goes with it
@@ -44,20 +34,6 @@ export const COLORS = {
   desired: {light: '#a11fb0', dark: '#e58cff'}, push: {light: '#c2410c', dark: '#ff9a4d'},
   support: {light: '#5b6675', dark: '#9fb0c5'},
 };
-
-const VIEWS = {front: [1, 0, 0.12], side: [0, -1, 0.12], top: [0, -0.001, 1], free: [0.75, -0.62, 0.28]};
-
-/** Squares of GRID on the ground, of short pieces: software renderers drop lines that reach behind the camera. */
-function gridGeometry() {
-  const n = Math.round(GROUND / GRID / 2);
-  const points = [];
-  for (let i = -n; i <= n; ++i) {
-    for (let k = -n; k < n; k += PIECE) {
-      points.push(i * GRID, k * GRID, 0, i * GRID, (k + PIECE) * GRID, 0, k * GRID, i * GRID, 0, (k + PIECE) * GRID, i * GRID, 0);
-    }
-  }
-  return new BufferGeometry().setAttribute('position', new Float32BufferAttribute(points, 3));
-}
 
 /** True motion when the run has it, else the estimated one. */
 function motionSignals(run) {
@@ -92,36 +68,24 @@ function contactSignals(run) {
     active_x: ['balance_torque_t', 'active_x'], active_y: ['balance_torque_t', 'active_y']});
 }
 
-export class SceneView {
+export class SceneView extends View3D {
   /** `host` is the element to fill; `overlay` a second run, drawn as a ghost, or undefined. */
   constructor(host, run, overlay) {
-    Object.assign(this, {host, run, overlay});
+    super(host, run.robot);
+    Object.assign(this, {run, overlay});
     this.samples = new Samples();
     this.overlaySamples = new Samples();
     this.row = 0;
     this.visible = true;
     this.leastLoad = lightLoad(run);
     this.show = {forces: true, moments: false, pressure: true, com: true, steps: true};
-    this.renderer = new WebGLRenderer({antialias: true, preserveDrawingBuffer: false});
-    this.#setRatio(FINEST);
-    host.append(this.renderer.domElement);
     this.note = element('p', {class: 'stale', role: 'status', hidden: true});
     host.append(this.note);
-    this.renderer.domElement.setAttribute('role', 'img');
-    this.renderer.domElement.setAttribute('aria-label', 'The robot in 3D');
-    this.scene = new Scene();
-    this.camera = new PerspectiveCamera(32, 1, 0.05, 60);
-    this.camera.up.set(0, 0, 1);
     this.above = new OrthographicCamera(-ABOVE, ABOVE, ABOVE, -ABOVE, 0.01, 20);
     this.above.up.set(1, 0, 0);  // forward is up
     this.above.layers.set(GROUND_LAYER);
-    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener('change', () => this.draw());
     this.#build();
-    this.setTheme();
-    this.look('free');
-    new ResizeObserver(() => this.#resize()).observe(host);
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.setTheme());
+    this.start();
   }
 
   async load() {
@@ -136,18 +100,6 @@ export class SceneView {
 
   #build() {
     const {scene} = this;
-    scene.add(new HemisphereLight(0xffffff, 0x8890a0, 1.6), new AmbientLight(0xffffff, 0.35));
-    const sun = new DirectionalLight(0xffffff, 1.6);
-    sun.position.set(2, -3, 5);
-    scene.add(sun);
-    // Drawn first and without depth, so that nothing that lies on it flickers.
-    this.ground = new Mesh(new CircleGeometry(2 * GROUND, 48), new MeshBasicMaterial({depthWrite: false}));
-    this.ground.renderOrder = -2;
-    this.grid = new LineSegments(gridGeometry(), new LineBasicMaterial({depthWrite: false, depthTest: false}));
-    this.grid.renderOrder = -1;
-    this.scene.fog = new Fog(0, ...FOG);
-    this.robotView = new RobotView(this.run.robot);
-    scene.add(this.ground, this.grid, this.robotView.object);
     if (this.overlay) {
       this.ghost = new RobotView(this.overlay.robot, {ghost: true});
       scene.add(this.ghost.object);
@@ -214,24 +166,8 @@ export class SceneView {
   setTheme() {
     const dark = isDark();
     for (const [material, name] of this.colored) material.color.set(COLORS[name][dark ? 'dark' : 'light']);
-    this.background = new Color(dark ? 0x14171c : 0xeef1f5);
     this.insetBackground = new Color(dark ? 0x20252c : 0xffffff);
-    this.scene.background = this.background;
-    this.scene.fog.color = this.background;
-    this.ground.material.color.set(dark ? 0x1b1f26 : 0xe4e8ee);
-    this.grid.material.color.set(dark ? 0x333b47 : 0xc3cbd6);
-    this.draw();
-  }
-
-  /** 'front', 'side', 'top' or 'free', with the robot in the middle. */
-  look(name) {
-    const box = new Box3().setFromObject(this.robotView.object);
-    const size = box.getSize(new Vector3());
-    box.getCenter(this.controls.target);
-    const distance = FILL * Math.max(size.z, size.x, size.y) / 2 / Math.tan(this.camera.fov * Math.PI / 360);
-    this.camera.position.set(...VIEWS[name]).normalize().multiplyScalar(distance + size.x / 2).add(this.controls.target);
-    this.controls.update();
-    this.draw();
+    super.setTheme();
   }
 
   setShow(name, on) {
@@ -358,15 +294,6 @@ export class SceneView {
     put(this.marks.desired, 'desired_cop', balancing);
   }
 
-  #resize() {
-    const {clientWidth: width, clientHeight: height} = this.host;
-    if (width === 0 || height === 0) return;
-    this.renderer.setSize(width, height);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.renderNow();
-  }
-
   /** Both soles in the view from above; in steps, so that it holds still. */
   #fitAbove(soles, middle) {
     const reach = soles.map((sole, f) => Math.hypot(sole[0] - middle[0], sole[1] - middle[1])
@@ -377,45 +304,22 @@ export class SceneView {
     this.above.updateProjectionMatrix();
   }
 
-  /** In the next frame, once. */
-  draw() {
-    if (this.#waiting || !this.visible) return;
-    this.#waiting = true;
-    requestAnimationFrame(() => {
-      this.#waiting = false;
-      this.renderNow();
-    });
-  }
-  #waiting = false;
+  draw() { if (this.visible) super.draw(); }
 
   /** Once a frame while the run plays: coarser while frames are slow to come, as without a graphics card. */
   pace(playing) {
     const now = performance.now();
     const took = now - this.#lastPace;
     this.#lastPace = now;
-    if (!playing) this.#setRatio(FINEST);
+    if (!playing) this.setRatio(this.finest);
     else if (took < LONGEST_PAUSE) this.#frameTime += FRAME_SHARE * (took - this.#frameTime);
-    if (playing && this.#frameTime > SLOW_FRAME && this.#ratio > COARSEST) {
-      this.#setRatio(Math.max(COARSEST, 0.75 * this.#ratio));
+    if (playing && this.#frameTime > SLOW_FRAME && this.ratio > COARSEST) {
+      this.setRatio(Math.max(COARSEST, 0.75 * this.ratio));
       this.#frameTime = 0;  // measured anew
     }
   }
   #lastPace = 0;
   #frameTime = 0;
-  #ratio = 0;
-
-  #setRatio(ratio) {
-    if (ratio === this.#ratio) return;
-    this.#ratio = ratio;
-    this.renderer.setPixelRatio(ratio);
-    this.draw();
-  }
-
-  /** The picture as it is, as the address of an image. */
-  imageUrl() {
-    this.renderNow();
-    return this.renderer.domElement.toDataURL();
-  }
 
   /** At once. */
   renderNow() {
@@ -424,9 +328,8 @@ export class SceneView {
     if (width === 0 || height === 0) return;
     renderer.setViewport(0, 0, width, height);
     renderer.setScissorTest(false);
-    this.scene.background = this.background;
     this.steps.clear(this.camera, width, height);
-    renderer.render(this.scene, this.camera);
+    super.renderNow();
     const side = Math.round(INSET * Math.min(width, height));
     const soles = this.run.robot.feet.map((_, f) => this.samples.pose(`sole${f}`, this.row).position);
     const middle = [0, 1, 2].map((i) => soles.reduce((sum, sole) => sum + sole[i], 0) / soles.length);
@@ -437,8 +340,10 @@ export class SceneView {
     renderer.setViewport(width - side - 8, 8, side, side);
     renderer.setScissor(width - side - 8, 8, side, side);
     renderer.setScissorTest(true);
+    const {background} = this.scene;
     this.scene.background = this.insetBackground;
     renderer.render(this.scene, this.above);
+    this.scene.background = background;
     renderer.setScissorTest(false);
   }
 }

@@ -1,10 +1,10 @@
 // Footprints with the time of their touch-down, planned footholds, the capture point's trace, and the regions of 0, 1 and 2 steps.
 import {
-  BufferAttribute, BufferGeometry, CanvasTexture, DoubleSide, DynamicDrawUsage, Group, Line, LineBasicMaterial, LineSegments, Mesh,
-  MeshBasicMaterial, Sprite, SpriteMaterial, Vector3,
+  BufferAttribute, BufferGeometry, DoubleSide, DynamicDrawUsage, Group, Line, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial,
+  Vector3,
 } from 'three';
 import {apart, Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsAt} from './footsteps.js';
-import {Outline} from './markers.js';
+import {LABEL, Label, Outline} from './markers.js';
 import {isDark} from './palette.js';
 import {Samples, vector} from './samples.js';
 import {add, rotate} from './spatial.js';
@@ -17,7 +17,6 @@ export const TRACE = 3;  // s
 const TRACE_POINTS = 400;
 const AHEAD = [1, 0.55, 0.35];        // opacity of the step under way and of those after it
 const WITHIN = [1, 0.75, 0.5];        // of the regions of 0, 1, 2 steps
-const LABEL = {width: 128, height: 36, size: 0.16};  // pixels, pixels, m wide
 
 /** A point's place that changes in every frame. */
 const growing = (count) => new BufferAttribute(new Float32Array(3 * count), 3).setUsage(DynamicDrawUsage);
@@ -54,38 +53,6 @@ class Prints {
   }
 }
 
-/** A time beside a footprint. */
-class TimeLabel {
-  constructor() {
-    this.canvas = Object.assign(document.createElement('canvas'), {width: LABEL.width, height: LABEL.height});
-    this.texture = new CanvasTexture(this.canvas);
-    this.object = new Sprite(new SpriteMaterial({map: this.texture, transparent: true, depthTest: false}));
-    this.object.scale.set(LABEL.size, LABEL.size * LABEL.height / LABEL.width, 1);
-    this.object.renderOrder = 12;
-  }
-
-  set(print, dark) {
-    this.object.visible = this.told = print !== undefined;
-    if (!print) return;
-    const [x, y, z] = print.pose.position;
-    this.object.position.set(x, y, z + 0.03);
-    const text = `${print.from.toFixed(2)} s`;
-    if (this.shown === text && this.dark === dark) return;
-    Object.assign(this, {shown: text, dark});
-    const pen = this.canvas.getContext('2d');
-    pen.clearRect(0, 0, LABEL.width, LABEL.height);
-    pen.font = 'bold 28px system-ui, sans-serif';
-    pen.textAlign = 'center';
-    pen.textBaseline = 'middle';
-    pen.lineWidth = 3;
-    pen.strokeStyle = dark ? '#14171c' : '#ffffff';
-    pen.fillStyle = dark ? '#f2f2f2' : '#1d1d1f';
-    pen.strokeText(text, LABEL.width / 2, LABEL.height / 2);
-    pen.fillText(text, LABEL.width / 2, LABEL.height / 2);
-    this.texture.needsUpdate = true;
-  }
-}
-
 const place = new Vector3();
 
 export class StepsView {
@@ -97,7 +64,7 @@ export class StepsView {
     this.shown = true;
     const {feet} = run.robot;
     this.prints = feet.map((foot, f) => new Prints(FOOT_COLORS[f], foot.corners));
-    this.labels = Array.from({length: LABELLED}, () => new TimeLabel());
+    this.labels = Array.from({length: LABELLED}, () => new Label());
     this.planned = AHEAD.map((opacity) => {
       const outline = new Outline(0, Math.max(...feet.map((foot) => foot.corners.length)) + 1, true);
       outline.material.opacity = opacity;
@@ -135,7 +102,10 @@ export class StepsView {
     const prints = apart(this.footprints.until(run.timeAt(row), SHOWN));
     this.prints.forEach((view, f) => view.set(prints.filter((print) => print.foot === f)));
     const dark = isDark();
-    this.labels.forEach((label, i) => label.set(prints[prints.length - 1 - i], dark));
+    this.labels.forEach((label, i) => {
+      const print = prints[prints.length - 1 - i];
+      label.set(print && `${print.from.toFixed(2)} s`, print?.pose.position, dark);
+    });
     const planned = plannedAt(samples, row);
     this.planned.forEach((outline, i) => {
       const step = planned[i];
@@ -154,10 +124,10 @@ export class StepsView {
   clear(camera, width, height) {
     const taken = [];
     const pixels = height / 2 / Math.tan(camera.fov * Math.PI / 360);
-    for (const {object, told} of this.labels) {
-      if (!told) continue;
+    for (const {object, shown} of this.labels) {
+      if (!shown) continue;
       place.copy(object.position).applyMatrix4(camera.matrixWorldInverse);
-      const w = LABEL.size * pixels / -place.z, h = w * LABEL.height / LABEL.width;
+      const [w, h] = [LABEL.width, LABEL.height].map((length) => length * LABEL.size * pixels / -place.z);
       place.applyMatrix4(camera.projectionMatrix);
       const x = (place.x + 1) / 2 * width, y = (1 - place.y) / 2 * height;
       object.visible = !taken.some((t) => Math.abs(t.x - x) < (t.w + w) / 2 && Math.abs(t.y - y) < (t.h + h) / 2);
