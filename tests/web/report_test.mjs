@@ -324,7 +324,7 @@ async function ofWidth(width, height = 800) {
 }
 const widths = new Map();
 
-test('values and events are on the first screen, also of a phone', async () => {
+test('values and events are on the first screen, also of a phone; of a desk the outcome, the story, the robot and a plot, too', async () => {
   for (const [width, height] of [[1400, 900], [400, 800]]) {
     const {page} = await ofWidth(width, height);
     const bar = await page.evaluate(() => document.getElementById('player').getBoundingClientRect().top);
@@ -332,6 +332,13 @@ test('values and events are on the first screen, also of a phone', async () => {
       const box = await page.locator(place).first().boundingBox();
       assert.ok(box.y >= 0 && box.y + box.height <= bar, `${place} at ${width} px: ${JSON.stringify(box)}`);
     }
+    if (width === 400) continue;
+    for (const place of ['.badge.ok, .badge.failed', '.story', '#scene canvas', '.scene-key ul', '.panel h3']) {
+      const box = await page.locator(place).first().boundingBox();
+      assert.ok(box.y >= 0 && box.y + box.height <= bar, `${place}: ${JSON.stringify(box)}`);
+    }
+    const plot = await page.locator('.plot-host').first().boundingBox();
+    assert.ok(plot.y + plot.height / 2 <= bar, `the first plot: ${JSON.stringify(plot)}`);
   }
 });
 

@@ -203,13 +203,12 @@ async function start() {
       readout.element, regionsNote(run)),
     ...lists.map((list) => list.element), acting?.settings ?? '', element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
-  document.getElementById('figures-bar').append(signalSearch(run, grid), element('ul', {class: 'key'},
+  document.getElementById('figures-bar').append(signalSearch(run, grid), drawn ? dockedScene(scene) : '', printer.button, element('ul', {class: 'key'},
     element('li', {}, element('span', {class: 'area balancing'}), 'balancing runs'),
     element('li', {}, element('span', {class: 'area single'}), 'single support'),
     element('li', {}, element('span', {class: 'area missing'}), 'no message tells'),
     element('li', {}, element('span', {class: 'area event'}), 'event'),
-    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')), rowsNote(run),
-  drawn ? dockedScene(scene) : '', printer.button);
+    element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')), rowsNote(run));
   for (const definition of figuresFor(run)) grid.add(definition);
   const live = feed && liveTables(run, feed);
   document.getElementById('tables').append(...(live ? live.elements : tables(run, overlay)));

@@ -7,7 +7,7 @@ import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import {isDark} from './palette.js';
 import {RobotView} from './robot_view.js';
 
-const FILL = 1.15;  // of the picture's height that the robot may take, as its inverse
+const FILL = 1.22;  // of the picture's height that the robot may take, as its inverse
 const FINEST = Math.min(2, globalThis.devicePixelRatio);  // pixels of the picture per CSS pixel
 const SAVED = 2;        // likewise, of a saved picture, at least
 const GROUND = 6;       // m, across
