@@ -47,6 +47,15 @@ const signal = (page, name, which = 'run') => page.evaluate(async ([n, w]) => {
 const near = (actual, expected, tolerance) =>
   assert.ok(Math.abs(actual - expected) < tolerance, `${actual} is not ${expected}`);
 
+/** The file that a click on `locator` gives. */
+async function saved(page, locator) {
+  const download = page.waitForEvent('download');
+  await locator.click();
+  const file = await download;
+  await file.saveAs(path(file.suggestedFilename()));
+  return {name: file.suggestedFilename(), bytes: readFileSync(path(file.suggestedFilename()))};
+}
+
 /** Where the soles are drawn at a time, and where the simulator says they are. */
 const soles = (page, time) => page.evaluate((t) => {
   const {scene, run, player} = window.poise;
@@ -174,13 +183,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
   await page.keyboard.press('Escape');
 
   // Save.
-  const save = async (panel, name) => {
-    const download = page.waitForEvent('download');
-    await page.locator('.panel', {hasText: panel}).first().getByRole('button', {name}).click();
-    const file = await download;
-    await file.saveAs(path(file.suggestedFilename()));
-    return {name: file.suggestedFilename(), bytes: readFileSync(path(file.suggestedFilename()))};
-  };
+  const save = (panel, name) => saved(page, page.locator('.panel', {hasText: panel}).first().getByRole('button', {name}));
   const csv = await save('External push', 'Save the stretch shown as CSV');
   assert.match(csv.name, /^push-double-support-fig-9b-.*\.csv$/);
   const rows = csv.bytes.toString().trim().split('\r\n');
@@ -191,7 +194,7 @@ test('the page shows the run, plays it, and needs no network', async () => {
   const png = await save('External push', 'Save as PNG');
   assert.deepEqual([...png.bytes.subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
   assert.ok(png.bytes.length > 3000);
-  assert.equal(png.bytes.readUInt32BE(16), 450, 'its width: 900 CSS pixels of the half that this browser has');
+  assert.equal(png.bytes.readUInt32BE(16), 1800, 'its width: two pixels for each of 900 units, whatever the screen has');
 
   // Latencies: all that the log's last health counted, a sample a stage and tick.
   const label = await page.locator('svg.latencies').getAttribute('aria-label');
@@ -605,6 +608,93 @@ test('what a robot has no sensor for is not told as zero', async () => {
   await page.context().close();
 });
 
+/** Of an SVG's text: its words, and its curves in the units of its axes' numbers, which stand at even distances. */
+const readSvg = (page, text) => page.evaluate((source) => {
+  const svg = new DOMParser().parseFromString(source, 'image/svg+xml').documentElement;
+  const words = [...svg.querySelectorAll('text')].map((e) => ({word: e.textContent, x: Number(e.getAttribute('x')), y: Number(e.getAttribute('y')), anchor: e.getAttribute('text-anchor')}));
+  const scale = (place, anchor) => {
+    const numbers = words.filter((w) => w.anchor === anchor && /^-?[\d.]+$/.test(w.word)).map((w) => [w[place], Number(w.word)]);
+    const [[p, a], [q, b]] = [numbers[0], numbers.at(-1)];
+    return (at) => a + (at - p) * (b - a) / (q - p);
+  };
+  const time = scale('x', 'middle'), value = scale('y', 'end');
+  return {root: svg.nodeName, words: words.map((w) => w.word), curves: [...svg.querySelectorAll('polyline')].map((line) => ({dash: line.getAttribute('stroke-dasharray'),
+    points: line.getAttribute('points').split(' ').map((point) => point.split(',').map(Number)).map(([x, y]) => [time(x), value(y + 4)])}))};  // numbers stand 4 lower
+}, text);
+
+test('a plot is saved as vectors, which name run, signal and unit, and have the run\'s numbers', async () => {
+  const {page} = await plain();
+  const svg = await saved(page, page.locator('.panel', {hasText: 'External push'}).first().getByRole('button', {name: 'Save as SVG'}));
+  assert.match(svg.name, /^push-double-support-fig-9b-external-push.*\.svg$/);
+  const {root, words, curves} = await readSvg(page, svg.bytes.toString());
+  assert.equal(root, 'svg');
+  assert.equal(words.find((word) => word.startsWith('push_double_support:')), 'push_double_support: Fig. 9b External push, magnitude (N)');
+  assert.ok(words.some((word) => /^push_double_support \(a, \d{4}-/.test(word)) && words.includes('measured'), words.join('; '));
+  const force = await signal(page, 'derived.push_magnitude'), most = Math.max(...force);
+  assert.equal(curves.length, 1);
+  for (const [time, value] of curves[0].points) {
+    // Places are rounded to 0.01 units, some 3 µs and 0.01 N; a signal's time is its tick's.
+    near(value, force[Math.round(time / 0.002)], 2e-3 * most);
+  }
+  near(Math.max(...curves[0].points.map(([, value]) => value)), most, 1e-3 * most);
+});
+
+test('the picture is saved as PNG, and as a video while the run plays', async () => {
+  const {page, problems} = await openPage(browser, path('a/report.html'));
+  await page.evaluate(() => window.poise.player.seek(1.8));
+  const png = await saved(page, page.locator('#scene button', {hasText: 'PNG'}));
+  assert.equal(png.name, 'push-double-support-1.800-s.png');
+  const width = await page.evaluate(() => document.getElementById('scene').clientWidth);
+  assert.equal(png.bytes.readUInt32BE(16), 2 * width);
+  const colors = await page.evaluate(async (data) => {
+    const image = Object.assign(new Image(), {src: `data:image/png;base64,${data}`});
+    await image.decode();
+    const pen = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    pen.drawImage(image, 0, 0);
+    return new Set(new Uint32Array(pen.getImageData(0, 0, image.width, image.height).data.buffer)).size;
+  }, png.bytes.toString('base64'));
+  assert.ok(colors > 500, `${colors} colours: no robot`);
+  const video = await saved(page, page.locator('#scene button', {hasText: 'Video'}));
+  assert.match(video.name, /^push-double-support-.* ?s\.webm$/);
+  assert.equal((await state(page)).time, await page.evaluate(() => window.poise.run.end));
+  // The browser's own player sees it move.
+  const seen = await page.evaluate(async (data) => {
+    const film = Object.assign(document.createElement('video'), {muted: true, src: `data:video/webm;base64,${data}`});
+    const pictures = new Set();
+    let size;
+    await new Promise((done, failed) => {
+      film.onerror = () => failed(film.error);
+      film.onended = done;
+      const look = () => {
+        size = [film.videoWidth, film.videoHeight];
+        const pen = new OffscreenCanvas(...size).getContext('2d');
+        pen.drawImage(film, 0, 0);
+        pictures.add(pen.getImageData(0, 0, ...size).data.reduce((sum, x, i) => (sum * 31 + x * (i % 7)) | 0, 0));
+        film.requestVideoFrameCallback(look);
+      };
+      film.requestVideoFrameCallback(look);
+      film.play();
+    });
+    return {size, pictures: pictures.size};
+  }, video.bytes.toString('base64'));
+  assert.ok(seen.pictures > 1 && seen.size[0] >= width / 2, JSON.stringify(seen));
+  assert.equal(await page.locator('#scene button', {hasText: 'Video'}).textContent(), 'Video');
+  assert.deepEqual(problems, []);
+  await page.context().close();
+});
+
+test('a browser that records no video says why', async () => {
+  const context = await browser.newContext();
+  await context.addInitScript(() => { delete window.MediaRecorder; });
+  const page = await context.newPage();
+  await page.goto(`file://${path('a/report.html')}`);
+  const button = page.locator('#scene button', {hasText: 'Video'});
+  await button.waitFor();
+  assert.equal(await button.isDisabled(), true);
+  assert.match(await button.getAttribute('title'), /has no MediaRecorder/);
+  await context.close();
+});
+
 test('a second run is drawn over the first', async () => {
   assert.ok(poise('report', path('a'), path('b'), '-o', path('both.html')).status <= 1);
   const {page, problems} = await openPage(browser, path('both.html'), {colorScheme: 'dark'});
@@ -616,6 +706,12 @@ test('a second run is drawn over the first', async () => {
   await panel.scrollIntoViewIfNeeded();
   await panel.locator('.legend .entry').nth(1).waitFor();
   assert.match(await panel.locator('.legend').innerText(), /second run/);
+  // Saved, each curve stands under its run's name.
+  const {words, curves} = await readSvg(page, (await saved(page, panel.getByRole('button', {name: 'Save as SVG'}))).bytes.toString());
+  const names = words.slice(words.findIndex((word) => word.startsWith('First run:')));
+  for (const [i, pattern] of [/^First run: push_double_support \(a, /, /^measured$/, /^Second run: push_double_support, sim\.push\[0\]\.duration=0\.09 \(b, /,
+    /^measured \(second run\)$/].entries()) assert.match(names[i], pattern);
+  assert.equal(new Set(curves.map(({dash}) => dash)).size, 2);
   await page.evaluate(() => window.poise.player.seek(0.8));
   const apart = await page.evaluate(() => {
     const {scene} = window.poise;

@@ -1,10 +1,13 @@
 // A plot as a file.
-import {saveFile} from './dom.js';
+import {element, saveFile, shape} from './dom.js';
 import {changesOf} from './figures.js';
 import {cssColor, styleOf} from './palette.js';
 
-const MARGIN = 12;  // CSS px
-const LINE = 18;
+const MARGIN = 12, LINE = 18;      // units of the picture, as all below
+const WIDTH = 900, HEIGHT = 300;   // of the picture, and of its plot
+const AXIS = {left: 66, below: 34};
+const PIXELS = 2;                  // of a PNG, for each unit
+const SWATCH = 28;
 
 /** RFC 4180. */
 export function quoted(text) {
@@ -31,65 +34,118 @@ export function csvOf(panel) {
   return rows.join('\r\n') + '\r\n';
 }
 
-/** "push_double_support, without balancing: fall, 2026-11-24T14:22:14Z", a line for each run. */
-function captions({run, overlay}) {
-  return [run, overlay].filter(Boolean).map(({meta: {run: r}}, i) => `${overlay ? `${['first', 'second'][i]} run: ` : ''}`
-    + `${[r.scenario, ...changesOf(r)].join(', ')} (${[r.log?.replace(/\/run\.lcm$/, ''), r.started_at].filter(Boolean).join(', ')})`);
+/** [name, where and when it ran] of each run: "push_double_support, without balancing". */
+const runsOf = ({run, overlay}) => [run, overlay].filter(Boolean).map(({meta: {run: r}}) => [[r.scenario, ...changesOf(r)].join(', '),
+  [r.log?.replace(/\/run\.lcm$/, ''), r.started_at].filter(Boolean).join(', ')]);
+
+/** Rows from the first to the last shown, and one more at each side, in stretches of which every one has a number. */
+function stretches(times, values, {min, max}, bridged) {
+  const result = [[]];
+  for (let i = 0; i < times.length; ++i) {
+    if (times[i + 1] < min || times[i - 1] > max) continue;
+    if (Number.isFinite(values[i])) result.at(-1).push(i);
+    else if (!bridged) result.push([]);
+  }
+  return result.filter((rows) => rows.length > 0);
 }
 
-/** The plot with its title, its legend and the names of its runs. */
-export function pngOf(panel) {
-  const source = panel.plot.ctx.canvas;
-  const scale = source.width / panel.plot.width;
-  const canvas = document.createElement('canvas');
-  const context = canvas.getContext('2d');
-  const {figure, title} = panel.definition;
-  const entries = panel.lines.filter((line) => !panel.hidden.has(line.label) && line.constant === undefined);
-  context.font = '12px system-ui, sans-serif';
-  const width = panel.plot.width;
-  let x = MARGIN, rows = 1;
-  const places = entries.map((line) => {
-    const size = 30 + context.measureText(line.label).width + 16;
-    if (x + size > width && x > MARGIN) {
-      x = MARGIN;
-      ++rows;
+/** "x,y x,y": of the points within half a unit the first, the least, the largest and the last, in order. */
+function pointsOf(rows, x, y) {
+  const groups = Object.values(Object.groupBy(rows, (row) => Math.round(2 * x(row) + 1e4)));
+  return groups.flatMap((group) => {
+    const by = [...group].sort((a, b) => y(a) - y(b));
+    return [...new Set([group[0], by[0], by.at(-1), group.at(-1)])].sort((a, b) => a - b);
+  }).map((row) => `${x(row).toFixed(2)},${y(row).toFixed(2)}`);
+}
+
+/** The stretch shown, with a title of run, signal and unit, and a legend that names each run. */
+export function svgOf(panel) {
+  const {plot, data, definition, shared, lines} = panel;
+  const {min, max} = plot.scales.x, {min: low, max: high} = plot.scales.y;
+  const box = {x: AXIS.left, y: LINE + 2 * MARGIN, width: WIDTH - AXIS.left - MARGIN, height: HEIGHT};
+  const bottom = box.y + HEIGHT, right = box.x + box.width;
+  const xAt = (time) => box.x + (time - min) / (max - min) * box.width;
+  const yAt = (value) => bottom - (value - low) / (high - low) * HEIGHT;
+  const pen = document.createElement('canvas').getContext('2d');
+  const text = (content, x, y, more) => shape('text', {x, y, fill: 'var(--ink-soft)', ...more}, content);
+  const full = (content, y, font) => {  // as wide as there is room at the most
+    pen.font = `${font} system-ui, sans-serif`;
+    const room = WIDTH - 2 * MARGIN;
+    return text(content, MARGIN, y, {style: `font: ${font} system-ui, sans-serif`, fill: 'var(--ink)',
+      ...(pen.measureText(content).width > room && {textLength: room, lengthAdjust: 'spacingAndGlyphs'})});
+  };
+  const rule = (x1, y1, x2, y2, more) => shape('line', {x1, y1, x2, y2, stroke: 'var(--grid)', ...more});
+  const ticks = (axis) => axis._splits.map((at, i) => [at, axis._values[i] ?? '']);  // as uPlot has chosen and written them
+  const shown = lines.map((line, i) => ({...line, values: data[i + 1], style: styleOf(line.role, line.overlay)}))
+    .filter((line) => !panel.hidden.has(line.label));
+  const rows = (line) => stretches(data[0], line.values, {min, max}, line.signal?.channel.sparse);
+  const band = (line) => {
+    const [most, least] = panel.boundsOf(line.signal);
+    const edge = (values, part) => pointsOf(part, (row) => xAt(data[0][row]), (row) => yAt(values[row]));
+    return stretches(data[0], most, {min, max}).map((part) => shape('polygon', {points: [...edge(most, part), ...edge(least, part).reverse()].join(' '),
+      fill: line.style.color(), 'fill-opacity': 0.3}));
+  };
+  const curve = (line) => rows(line).flatMap((part) => {
+    const points = pointsOf(part, (row) => xAt(data[0][row]), (row) => yAt(line.values[row]));
+    return [shape('polyline', {points: points.join(' '), fill: 'none', stroke: line.style.color(), 'stroke-width': line.style.width,
+      'stroke-dasharray': (line.style.dash ?? ['none']).join(' ')}), ...(line.signal?.channel.sparse || part.length === 1
+      ? points.map((point) => shape('circle', {cx: point.split(',')[0], cy: point.split(',')[1], r: 2.5, fill: line.style.color()})) : [])];
+  });
+  const areas = panel.areas().flatMap(([list, color]) => list.filter(({from, to}) => to > min && from < max).map(({from, to}) =>
+    shape('rect', {x: xAt(from), y: box.y, width: Math.max(1, xAt(to) - xAt(from)), height: HEIGHT, fill: `var(${color})`})));
+
+  const legend = [], unit = plot.axes[1].label(plot);
+  let y = bottom + AXIS.below + LINE;
+  runsOf(shared).forEach(([name, where], k) => {
+    legend.push(full(`${shared.overlay ? `${['First', 'Second'][k]} run: ` : ''}${name} (${where})`, y, '12px'));
+    let x = WIDTH;
+    for (const {label, style} of shown.filter((line) => line.constant === undefined && Boolean(line.overlay) === k > 0)) {
+      const width = SWATCH + pen.measureText(label).width + 2 * MARGIN;
+      if (x + width > WIDTH) [x, y] = [MARGIN, y + LINE];
+      legend.push(rule(x, y - 4, x + 22, y - 4, {stroke: style.color(), 'stroke-width': 2, 'stroke-dasharray': (style.dash ?? ['none']).join(' ')}),
+        text(label, x + SWATCH, y));
+      x += width;
     }
-    const at = {x, row: rows};
-    x += size;
-    return at;
+    y += LINE + 4;
   });
-  const top = LINE + MARGIN, names = captions(panel.shared);
-  canvas.width = source.width;
-  canvas.height = Math.round((top + panel.plot.height + LINE * (rows + names.length) + MARGIN) * scale);
-  context.scale(scale, scale);
-  context.fillStyle = cssColor('--panel');
-  context.fillRect(0, 0, width, canvas.height);
-  context.fillStyle = cssColor('--ink');
-  context.font = '600 13px system-ui, sans-serif';
-  context.fillText((figure ? `Fig. ${figure}  ` : '') + title, MARGIN, LINE, width - 2 * MARGIN);
-  context.drawImage(source, 0, top, width, panel.plot.height);
-  context.font = '12px system-ui, sans-serif';
-  entries.forEach((line, i) => {
-    const style = styleOf(line.role, line.overlay);
-    const y = top + panel.plot.height + LINE * places[i].row - 4;
-    context.strokeStyle = style.color();
-    context.lineWidth = 2;
-    context.setLineDash(style.dash ?? []);
-    context.beginPath();
-    context.moveTo(places[i].x, y - 4);
-    context.lineTo(places[i].x + 22, y - 4);
-    context.stroke();
-    context.fillText(line.label, places[i].x + 28, y);
-  });
-  context.fillStyle = cssColor('--ink-soft');
-  names.forEach((name, i) => context.fillText(name, MARGIN, top + panel.plot.height + LINE * (rows + 1 + i) - 4, width - 2 * MARGIN));
-  return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
-    : failed(new Error('the browser cannot write this plot as PNG')), 'image/png'));
+  const {figure, title} = definition;
+  return shape('svg', {viewBox: `0 0 ${WIDTH} ${y}`, width: WIDTH, height: y, 'font-family': 'system-ui, sans-serif', 'font-size': 12},
+    shape('rect', {width: WIDTH, height: y, fill: 'var(--panel)'}), shape('clipPath', {id: 'plot'}, shape('rect', box)),
+    full(`${runsOf(shared).map(([name]) => name).join(' and ')}: ${figure ? `Fig. ${figure} ` : ''}${title}${unit ? ` (${unit})` : ''}`, LINE + 4, '600 13px'),
+    ...ticks(plot.axes[0]).flatMap(([at, word]) => [rule(xAt(at), box.y, xAt(at), bottom), text(word, xAt(at), bottom + 15, {'text-anchor': 'middle'})]),
+    ...ticks(plot.axes[1]).flatMap(([at, word]) => [rule(box.x, yAt(at), right, yAt(at)), text(word, box.x - 6, yAt(at) + 4, {'text-anchor': 'end'})]),
+    text('time (s)', (box.x + right) / 2, bottom + 30, {'text-anchor': 'middle'}),
+    text(unit, 0, 0, {'text-anchor': 'middle', transform: `translate(16 ${(box.y + bottom) / 2}) rotate(-90)`}),
+    shape('g', {'clip-path': 'url(#plot)'}, ...areas, ...shared.events.filter(({time}) => time >= min && time <= max).map(({time}) =>
+      rule(xAt(time), box.y, xAt(time), bottom, {stroke: 'var(--event)', 'stroke-dasharray': '2 3'})),
+    ...shown.filter((line) => panel.boundsOf(line.signal)).flatMap(band), ...shown.flatMap(curve)), ...legend);
 }
 
-export function savePanel(panel, ending, blob) {
-  const {figure, title} = panel.definition;
-  const name = `${panel.shared.run.meta.run.scenario} ${figure ? `fig ${figure} ` : ''}${title}`.toLowerCase().normalize('NFKD')
-    .replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
+/** A picture's text, light or dark as it is now. */
+function sourceOf(svg) {
+  const [, , width, height] = svg.getAttribute('viewBox').split(' ');
+  const sized = svg.cloneNode(true);
+  sized.setAttribute('width', width);
+  sized.setAttribute('height', height);
+  return new XMLSerializer().serializeToString(sized).replace(/var\((--[a-z-]+)\)/g, (_, name) => cssColor(name));
+}
+
+export const svgFile = (svg) => new Blob([sourceOf(svg)], {type: 'image/svg+xml'});
+
+export async function pngFile(svg) {
+  const image = Object.assign(new Image(), {src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(sourceOf(svg))}`});
+  await image.decode();
+  const canvas = element('canvas', {width: PIXELS * image.width, height: PIXELS * image.height});
+  const context = canvas.getContext('2d');
+  context.fillStyle = cssColor('--panel');
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.drawImage(image, 0, 0, canvas.width, canvas.height);
+  return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
+    : failed(new Error('the browser cannot write this picture as PNG')), 'image/png'));
+}
+
+/** Gives the browser a file, called after what it shows. */
+export function saveNamed(what, ending, blob) {
+  const name = what.toLowerCase().normalize('NFKD').replace(/[^a-z0-9.]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
   saveFile(`${name || 'plot'}.${ending}`, blob);
 }

@@ -5,6 +5,7 @@ import {CONTROL_KEYS, controlPanel} from './live/control_panel.js';
 import {embeddedRuns} from './data.js';
 import {addDerivedSignals, findPhases} from './derived.js';
 import {element} from './dom.js';
+import {saveNamed} from './export.js';
 import {changesOf, figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
@@ -20,6 +21,7 @@ import {EventList, Readout, storyText} from './side.js';
 import {TRACE} from './steps_view.js';
 import {liveTables, stateBadges, tables} from './table.js';
 import {quantity} from './units.js';
+import {videoButton} from './video.js';
 
 const READOUT_PERIOD = 80;  // ms
 
@@ -80,6 +82,13 @@ function sceneToolbar(scene) {
     change: (e) => scene.setShow(name, e.target.checked)}), label);
   return element('div', {class: 'toolbar'}, ...['free', 'front', 'side', 'top'].map(button),
     box('forces', 'forces'), box('moments', 'moments'), box('pressure', 'CoP'), box('com', 'COM'), box('steps', 'steps'));
+}
+
+/** The picture as a file. */
+function savingToolbar(scene, {run, player}) {
+  const save = (ending) => (blob) => saveNamed(`${run.meta.run.scenario} ${player.time.toFixed(3)} s`, ending, blob);
+  return element('div', {class: 'toolbar saving'},
+    element('button', {type: 'button', title: 'Save the picture as PNG', click: () => scene.png().then(save('png'))}, 'PNG'), videoButton(scene, player, save('webm')));
 }
 
 /** What the regions about the standing foot leave out. */
@@ -169,7 +178,7 @@ async function start() {
   const drawn = has3D(), host = document.getElementById('scene');
   const scene = drawn ? new SceneView(host, run, overlay) : new NoPicture(host);
   if (drawn) {
-    host.append(sceneToolbar(scene), element('span', {class: 'inset'}, 'soles from above, forward is up'));
+    host.append(sceneToolbar(scene), savingToolbar(scene, {run, player}), element('span', {class: 'inset'}, 'soles from above, forward is up'));
     document.getElementById('scene-place').after(sceneKey(run, overlay));
   }
   const [phases] = await Promise.all([phasesFound, scene.load()]);

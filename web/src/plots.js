@@ -1,13 +1,12 @@
 // Plots over time: one zoom and one time cursor for all of them.
 import uPlot from 'uplot';
 import {element, shape} from './dom.js';
-import {csvOf, pngOf, savePanel} from './export.js';
+import {csvOf, pngFile, saveNamed, svgFile, svgOf} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from './units.js';
 
 const HEIGHT = 200;       // px
-const EXPORT_WIDTH = 900; // px, of a PNG
 const CLICK_SLACK = 4;    // px that a click may move
 const ZOOM_STEP = 1.25;
 const SHADE = '4d';       // how opaque a line's colour is between its bounds, 30 %
@@ -110,8 +109,9 @@ export class Panel {
         definition.figure ? element('span', {class: 'figure-number'}, `Fig. ${definition.figure}`) : '',
         element('h3', {}, definition.title),
         element('span', {class: 'panel-buttons'},
-          button('CSV', 'Save the stretch shown as CSV', () => this.saveCsv()),
-          button('PNG', 'Save as PNG', () => this.savePng()),
+          button('CSV', 'Save the stretch shown as CSV', async () => this.#save('csv', await this.csv())),
+          button('PNG', 'Save as PNG', async () => this.#save('png', await pngFile(await this.svg()))),
+          button('SVG', 'Save as SVG', async () => this.#save('svg', svgFile(await this.svg()))),
           onRemove ? button('×', 'Remove this plot', () => onRemove(this)) : '')),
       this.host, this.legend, definition.note ? element('p', {class: 'note'}, definition.note) : '');
   }
@@ -161,6 +161,12 @@ export class Panel {
 
   /** Lines whose rows have a least and a largest value. */
   #bounded() { return this.lines.filter((line) => line.signal?.least && !line.overlay); }
+
+  /** The columns of the largest and the least values of a signal's rows; undefined: it has none. */
+  boundsOf(signal) {
+    const k = this.#bounded().findIndex((line) => line.signal === signal);
+    return k < 0 ? undefined : this.data.slice(this.lines.length + 1 + 2 * k).slice(0, 2);
+  }
 
   #readAll() {
     this.firstTick = this.shared.run.firstTick;
@@ -291,23 +297,26 @@ export class Panel {
     return name === undefined ? '' : `${value} ${name}`;
   }
 
+  /** [stretches of time, the name of their colour]: what lies beneath the lines. */
+  areas() {
+    const {support, balancing, missing} = this.shared.phases;
+    return [[support.filter((p) => p.value !== 'both feet'), '--single-support'], [balancing, '--balancing'], [missing, '--missing']];
+  }
+
   #shade(u) {
     const {ctx, bbox} = u;
-    const {phases, events} = this.shared;
+    const {events} = this.shared;
     const {min, max} = u.scales.x;
     ctx.save();
     const x = (time) => Math.min(bbox.left + bbox.width, Math.max(bbox.left, u.valToPos(time, 'x', true)));
-    const fill = (list, color) => {
-      ctx.fillStyle = color;
+    for (const [list, color] of this.areas()) {
+      ctx.fillStyle = cssColor(color);
       for (const {from, to} of list) {
         if (to > min && from < max) {
           ctx.fillRect(x(from), bbox.top, Math.max(1, x(to) - x(from)), bbox.height);
         }
       }
-    };
-    fill(phases.support.filter((p) => p.value !== 'both feet'), cssColor('--single-support'));
-    fill(phases.balancing, cssColor('--balancing'));
-    fill(phases.missing, cssColor('--missing'));
+    }
     ctx.strokeStyle = cssColor('--event');
     ctx.lineWidth = 1;
     ctx.setLineDash([2, 3]);
@@ -366,20 +375,23 @@ export class Panel {
     this.building.catch((error) => this.fail(error));
   }
 
-  async saveCsv() {
+  async csv() {
     await this.show();
     this.redraw();
-    savePanel(this, 'csv', new Blob([csvOf(this)], {type: 'text/csv'}));
+    return new Blob([csvOf(this)], {type: 'text/csv'});
   }
 
-  async savePng() {
+  /** The plot as it is now, to be saved. */
+  async svg() {
     await this.show();
     this.redraw();
-    this.resize(EXPORT_WIDTH);
-    await null;  // uPlot draws
-    const png = await pngOf(this);
-    this.resize();
-    savePanel(this, 'png', png);
+    await null;  // uPlot chooses its axes' numbers
+    return svgOf(this);
+  }
+
+  #save(ending, blob) {
+    const {figure, title} = this.definition;
+    saveNamed(`${this.shared.run.meta.run.scenario} ${figure ? `fig ${figure} ` : ''}${title}`, ending, blob);
   }
 }
 

@@ -1,6 +1,7 @@
 // The page of `poise robot check`: a robot standing, with its frames, joint axes and soles, and what was found of it.
 import {AxesHelper, Group, Quaternion, Vector3} from 'three';
 import {element, shape, table} from './dom.js';
+import {saveNamed} from './export.js';
 import {Arrow, Label, Outline, mark} from './markers.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';
@@ -136,7 +137,8 @@ export function robotPage(data) {
   const box = (name, label) => element('label', {}, element('input', {type: 'checkbox', checked: true,
     change: (e) => still.show(name, e.target.checked)}), label);
   if (drawn3d) host.append(element('div', {class: 'toolbar'}, ...Object.keys(VIEWS).map((name) =>
-    element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles')));
+    element('button', {type: 'button', click: () => still.look(name)}, name)), box('frames', 'frames'), box('axes', 'joint axes'), box('soles', 'soles'),
+    element('button', {type: 'button', title: 'Save the picture as PNG', click: () => still.png().then((blob) => saveNamed(check.name, 'png', blob))}, 'PNG')));
   const [drawn, inFiles] = data.triangles;
   const notes = [data.drawn_instead, drawn < inFiles ? `Of the meshes' ${inFiles} triangles ${drawn} are drawn.` : ''].filter(Boolean);
   document.getElementById('side').append(element('h2', {}, 'Soles from above: corners x, y in mm'),

@@ -304,13 +304,14 @@ export class SceneView extends View3D {
     this.above.updateProjectionMatrix();
   }
 
-  draw() { if (this.visible) super.draw(); }
+  draw() { if (this.visible || this.recorded) super.draw(); }
 
   /** Once a frame while the run plays: coarser while frames are slow to come, as without a graphics card. */
   pace(playing) {
     const now = performance.now();
     const took = now - this.#lastPace;
     this.#lastPace = now;
+    if (this.recorded) return;  // a video keeps its size
     if (!playing) this.setRatio(this.finest);
     else if (took < LONGEST_PAUSE) this.#frameTime += FRAME_SHARE * (took - this.#frameTime);
     if (playing && this.#frameTime > SLOW_FRAME && this.ratio > COARSEST) {

@@ -119,13 +119,17 @@ export class View3D {
     this.renderer.render(this.scene, this.camera);
   }
 
-  /** The picture as it is, as the address of an image. */
-  imageUrl() {
+  /** What `take` makes of the canvas, with as many pixels as a saved picture has. */
+  #saved(take) {
     const ratio = this.#ratio;
     this.setRatio(Math.max(SAVED, ratio));
     this.renderNow();
-    const url = this.canvas.toDataURL();
+    const result = take(this.canvas);
     this.setRatio(ratio);
-    return url;
+    return result;
   }
+
+  /** The picture as it is, as the address of an image, and as a file. */
+  imageUrl() { return this.#saved((canvas) => canvas.toDataURL()); }
+  png() { return this.#saved((canvas) => new Promise((done) => canvas.toBlob(done, 'image/png'))); }
 }

@@ -1,12 +1,10 @@
 // How long each component took: a histogram on a logarithmic axis, and its counters.
 import {element, saveFile, shape, table} from '../dom.js';
-import {quoted} from '../export.js';
-import {cssColor} from '../palette.js';
+import {pngFile, quoted} from '../export.js';
 import {formatNumber} from '../units.js';
 
 const WIDTH = 900, NAMES = 200, RIGHT = 20;  // of the picture, in its own units
 const ROW = 46, BARS = 34, AXIS = 34;
-const SCALE = 2;                             // pixels of a PNG for each of them
 
 const us = (value) => value >= 1000 ? `${formatNumber(value / 1000)} ms` : `${formatNumber(value)} µs`;
 const timed = (components) => components.filter((c) => c.latency_us.histogram?.length > 0);
@@ -57,23 +55,6 @@ function picture(components) {
   ...components.map(row));
 }
 
-/** The picture's pixels as they are now, light or dark. */
-async function png(svg) {
-  const [, , width, height] = svg.getAttribute('viewBox').split(' ').map(Number);
-  const source = new XMLSerializer().serializeToString(svg).replace(/var\((--[a-z-]+)\)/g, (_, name) => cssColor(name));
-  const image = new Image(width, height);
-  const sized = source.replace('<svg ', `<svg width="${width}" height="${height}" `);
-  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(sized)}`;
-  await image.decode();
-  const canvas = element('canvas', {width: SCALE * width, height: SCALE * height});
-  const context = canvas.getContext('2d');
-  context.fillStyle = cssColor('--panel');
-  context.fillRect(0, 0, canvas.width, canvas.height);
-  context.drawImage(image, 0, 0, canvas.width, canvas.height);
-  return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
-    : failed(new Error('the browser cannot write this picture as PNG')), 'image/png'));
-}
-
 /** Histograms of all components that were timed; '' when none was. */
 export function latencyFigure(components) {
   const shown = timed(components);
@@ -82,7 +63,7 @@ export function latencyFigure(components) {
   const button = (text, label, click) =>
     element('button', {type: 'button', title: label, 'aria-label': label, click}, text);
   const saveCsv = () => saveFile('latency.csv', new Blob([latencyCsv(shown)], {type: 'text/csv'}));
-  const savePng = async () => saveFile('latency.png', await png(svg));
+  const savePng = async () => saveFile('latency.png', await pngFile(svg));
   return element('section', {class: 'table'},
     element('header', {class: 'panel-head'},
       element('h2', {}, 'Latency of each stage, from its last input to its outputs sent'),

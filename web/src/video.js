@@ -1,0 +1,45 @@
+// The picture as a video, while the run plays.
+import {element} from './dom.js';
+
+const FRAMES = 30;   // a second
+const BITS = 8e6;    // a second
+const TYPE = 'video/webm';
+
+/** Why this browser records none; '' where it does. */
+function reasonAgainst(canvas) {
+  if (!globalThis.MediaRecorder || !canvas.captureStream) return 'This browser records no video: it has no MediaRecorder';
+  return MediaRecorder.isTypeSupported(TYPE) ? '' : 'This browser records no WebM';
+}
+
+/** Plays the run from the time cursor and records what `scene` shows, until the run's end or the next click; `save(blob)` takes it. */
+export function videoButton(scene, player, save) {
+  let recorder;
+  const start = () => {
+    player.play();
+    if (!player.playing) return;  // a run of one tick
+    const parts = [];
+    recorder = new MediaRecorder(scene.canvas.captureStream(FRAMES), {mimeType: TYPE, videoBitsPerSecond: BITS});
+    recorder.addEventListener('dataavailable', ({data}) => parts.push(data));
+    recorder.addEventListener('stop', () => {
+      recorder = undefined;
+      update();
+      save(new Blob(parts, {type: TYPE}));
+    });
+    recorder.start();
+    update();
+  };
+  const against = reasonAgainst(scene.canvas);
+  const button = element('button', {type: 'button', disabled: against !== '', title: against || 'Play the run and record the picture as WebM',
+    click: () => (recorder ? player.pause() : start())});
+  const update = () => {
+    scene.recorded = recorder !== undefined;
+    button.textContent = recorder ? 'Stop and save the video' : 'Video';
+  };
+  player.addEventListener('state', () => {
+    if (player.playing || recorder?.state !== 'recording') return;
+    scene.renderNow();  // the last picture belongs to it
+    requestAnimationFrame(() => recorder.stop());
+  });
+  update();
+  return button;
+}
