@@ -6,7 +6,7 @@ import {mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync} f
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
-import {fileURLToPath} from 'node:url';
+import {fileURLToPath, pathToFileURL} from 'node:url';
 import {parseArgs} from 'node:util';
 import {launchBrowser, openPage} from './browser.mjs';
 import {readLog, writeLog} from './lcm_log.mjs';
@@ -608,6 +608,53 @@ test('what a robot has no sensor for is not told as zero', async () => {
   await page.context().close();
 });
 
+test('the address leads to the time, the stretch and the plots that were looked at, of this run and of another', async () => {
+  const {page} = await openPage(browser, path('a/report.html'), {picture: false});
+  assert.equal(new URL(page.url()).hash, '');
+  await page.evaluate(() => {
+    window.poise.view.set(0.5, 1.2);
+    window.poise.player.seek(0.75);
+  });
+  await page.fill('#signal-search', 'joint_command eta_max');
+  await page.keyboard.press('Enter');
+  await page.fill('#signal-search', 'joint_command eta_min');
+  await page.click('text=into last');
+  const motion = page.locator('.panel', {hasText: 'COM motion, lateral'}).first();
+  await motion.scrollIntoViewIfNeeded();
+  await motion.locator('.entry', {hasText: 'desired'}).click();
+  await page.waitForFunction(() => /plot=.*hide=/.test(location.hash));
+  const {hash} = new URL(page.url());
+  assert.deepEqual(Object.fromEntries(new URLSearchParams(hash.slice(1))), {t: '0.75', from: '0.5', to: '1.2',
+    plot: 'JOINT_COMMAND.eta_max JOINT_COMMAND.eta_min', hide: `desired@${await motion.locator('h3').innerText()}`});
+  const seen = async () => {
+    await page.waitForFunction(() => document.documentElement.dataset.ready);
+    await page.evaluate(() => window.poise.printer.drawAll());
+    return page.evaluate(() => {
+      const {player, view, grid} = window.poise;
+      const added = grid.panels.filter((p) => p.definition.added);
+      return [player.time, view.min, view.max, added.map((p) => [p.element.matches(':first-child'), ...p.lines.map((line) => line.signal.name)]),
+        grid.panels.flatMap((p) => p.plot.series.filter((line) => line.show === false).map((line) => line.label))];
+    });
+  };
+  const wanted = [0.75, 0.5, 1.2, [[true, 'JOINT_COMMAND.eta_max', 'JOINT_COMMAND.eta_min']], ['desired']];
+  await page.reload();
+  assert.deepEqual(await seen(), wanted);
+  assert.equal(new URL(page.url()).hash, hash);
+  // A link within the page: what it does not tell is as at first.
+  await page.evaluate(() => { location.hash = '#t=0.25'; });
+  await page.waitForFunction(() => window.poise.player.time === 0.25);
+  const [, min, max, added, hidden] = await seen();
+  assert.ok(min === 0 && max > 1.9 && added.length === 0 && hidden.length === 0, JSON.stringify([min, max, added, hidden]));
+  // A place of the page is no such address.
+  await page.locator('a.badge[href]').first().click();
+  assert.equal(await page.evaluate(() => window.poise.player.time), 0.25);
+  // The same layout of another run; what that one lacks is passed over.
+  poise('report', path('b'));
+  await page.goto(`${pathToFileURL(path('b/report.html'))}${hash}&plot=NO_CHANNEL.here`);
+  assert.deepEqual(await seen(), wanted);
+  await page.context().close();
+});
+
 /** Of an SVG's text: its words, and its curves in the units of its axes' numbers, which stand at even distances. */
 const readSvg = (page, text) => page.evaluate((source) => {
   const svg = new DOMParser().parseFromString(source, 'image/svg+xml').documentElement;
@@ -658,7 +705,8 @@ test('the picture is saved as PNG, and as a video while the run plays', async ()
   assert.match(video.name, /^push-double-support-.* ?s\.webm$/);
   assert.equal((await state(page)).time, await page.evaluate(() => window.poise.run.end));
   // The browser's own player sees it move.
-  const seen = await page.evaluate(async (data) => {
+  const cinema = await page.context().newPage();  // the run's own page may load nothing
+  const seen = await cinema.evaluate(async (data) => {
     const film = Object.assign(document.createElement('video'), {muted: true, src: `data:video/webm;base64,${data}`});
     const pictures = new Set();
     let size;
@@ -687,7 +735,7 @@ test('a browser that records no video says why', async () => {
   const context = await browser.newContext();
   await context.addInitScript(() => { delete window.MediaRecorder; });
   const page = await context.newPage();
-  await page.goto(`file://${path('a/report.html')}`);
+  await page.goto(pathToFileURL(path('a/report.html')).href);
   const button = page.locator('#scene button', {hasText: 'Video'});
   await button.waitFor();
   assert.equal(await button.isDisabled(), true);

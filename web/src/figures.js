@@ -180,3 +180,6 @@ export function panelOf(signal) {
   return {title: signal.title, unit: signal.unit, note: signal.text, added: true,
     series: [{label: signal.label, role: 'computed', name: signal.name, signal}]};
 }
+
+/** A signal as a further line, of `count` others. */
+export const lineOf = (signal, count) => ({label: signal.title, role: `hue-${count}`, name: signal.name, signal});

@@ -9,6 +9,7 @@ import {saveNamed} from './export.js';
 import {changesOf, figuresFor} from './figures.js';
 import {FOOTSTEPS} from './footsteps.js';
 import {grabbing} from './live/grab.js';
+import {linkButton} from './link.js';
 import {LiveFeed, firstTicks, followGrowth, showEnd} from './live/live.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {Player} from './player.js';
@@ -260,6 +261,7 @@ async function start() {
     for (const event of ['status', 'restart']) feed.addEventListener(event, refreshStatus);
     refreshStatus();
   }
+  printer.button.before(linkButton({...shared, grid}));
   if (!feed) printer.drawWhenIdle(run);
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.

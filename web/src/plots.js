@@ -263,17 +263,23 @@ export class Panel {
       const style = styleOf(line.role, line.overlay);
       const swatch = shape('svg', {class: 'swatch', viewBox: '0 0 26 2', width: 26, height: 2}, shape('line', {x1: 0, x2: 26, y1: 1, y2: 1,
         stroke: style.color(), 'stroke-width': 2, 'stroke-dasharray': (style.dash ?? []).join(' ')}));
-      return element('button', {type: 'button', class: 'entry', title: line.signal?.title ?? 'limit',
-        'aria-pressed': String(!this.hidden.has(line.label)), click: (e) => {
-          const on = this.hidden.delete(line.label);
-          if (!on) this.hidden.add(line.label);
-          e.currentTarget.setAttribute('aria-pressed', String(on));
-          this.plot.series.forEach((other, k) => {
-            if (k > 0 && other.label === line.label) this.plot.setSeries(k, {show: on});
-          });
+      return element('button', {type: 'button', class: 'entry', title: line.signal?.title ?? 'limit', value: line.label,
+        'aria-pressed': String(!this.hidden.has(line.label)), click: () => {
+          const others = [...this.hidden].filter((label) => label !== line.label);
+          this.hide(this.hidden.has(line.label) ? others : [...others, line.label]);
         }}, swatch, line.label, this.values[i]);
     }).filter(Boolean));
     this.#updateValues(null);
+  }
+
+  /** Hides the lines of these labels, and shows the others. */
+  hide(labels) {
+    this.hidden = new Set(labels);
+    for (const entry of this.legend.children) entry.setAttribute('aria-pressed', String(!this.hidden.has(entry.value)));
+    this.plot?.series.forEach((line, k) => {
+      const show = !this.hidden.has(line.label);
+      if (k > 0 && line.show !== show) this.plot.setSeries(k, {show});
+    });
   }
 
   /** Values in the row under the pointer, else at the time cursor: the signals', which a plot that has still to grow lacks. */

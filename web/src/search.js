@@ -1,6 +1,6 @@
 // Every signal can be found and added as a plot.
 import {element} from './dom.js';
-import {panelOf} from './figures.js';
+import {lineOf, panelOf} from './figures.js';
 
 const MOST_RESULTS = 40;
 const RAW = /^drive_/;  // messages in the drives' own units
@@ -37,7 +37,7 @@ export function signalSearch(run, grid) {
   };
   const addLine = (signal) => {
     if (!grid.panels.includes(last)) return addPlot(signal);  // it was removed meanwhile
-    last.addLine({label: signal.title, role: `hue-${last.definition.series.length}`, name: signal.name, signal});
+    last.addLine(lineOf(signal, last.definition.series.length));
     close();
   };
   let found = [], chosen = 0;
