@@ -701,6 +701,10 @@ test('the picture is saved as PNG, and as a video while the run plays', async ()
     return new Set(new Uint32Array(pen.getImageData(0, 0, image.width, image.height).data.buffer)).size;
   }, png.bytes.toString('base64'));
   assert.ok(colors > 500, `${colors} colours: no robot`);
+  await page.evaluate(() => {  // 5 s: a busy machine draws some of them
+    window.poise.player.setSpeed(0.1);
+    window.poise.player.seek(1.5);
+  });
   const video = await saved(page, page.locator('#scene button', {hasText: 'Video'}));
   assert.match(video.name, /^push-double-support-.* ?s\.webm$/);
   assert.equal((await state(page)).time, await page.evaluate(() => window.poise.run.end));

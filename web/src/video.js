@@ -27,6 +27,7 @@ export function videoButton(scene, player, save) {
     });
     recorder.start();
     update();
+    scene.renderNow();  // the first picture belongs to it, and the last one below
   };
   const against = reasonAgainst(scene.canvas);
   const button = element('button', {type: 'button', disabled: against !== '', title: against || 'Play the run and record the picture as WebM',
@@ -37,8 +38,8 @@ export function videoButton(scene, player, save) {
   };
   player.addEventListener('state', () => {
     if (player.playing || recorder?.state !== 'recording') return;
-    scene.renderNow();  // the last picture belongs to it
-    requestAnimationFrame(() => recorder.stop());
+    scene.renderNow();
+    requestAnimationFrame(() => recorder?.stop());
   });
   update();
   return button;
