@@ -34,7 +34,7 @@ class ChainCase : public testing::TestWithParam<Case> {
   std::mt19937 random_{TestSeed(23)};
 };
 
-// The independent route of docs/equations.md: no matrix of section 3 is formed.
+// The independent route of docs/reference/equations/redistribution.md: no matrix of section 3 is formed.
 class SquareRoute : public ChainCase {};
 
 TEST_P(SquareRoute, GivesTheSameTorqueAndWrenches) {

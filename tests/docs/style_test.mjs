@@ -1,5 +1,5 @@
-// The pages of docs/concepts and the recipes of docs/how-to are short, in short sentences; the pictures of the concepts are
-// small and what draw.py draws.
+// The pages of docs/concepts, the recipes of docs/how-to and the paper's equations are short, in short sentences; the pictures
+// of the concepts are small and what draw.py draws.
 // Usage: node style_test.mjs
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -14,11 +14,14 @@ const MOST_PICTURE = 15_000;  // bytes: a picture is text of the repository
 const folder = repositoryFiles('docs/concepts');
 const pages = folder.filter((f) => f.endsWith('.md'));
 
-const recipes = repositoryFiles('docs/how-to').filter((f) => f.endsWith('.md'));
+/** Other folders of short pages: their lines. */
+const OTHERS = {'docs/how-to': 50, 'docs/reference/equations': 150};
+const others = Object.entries(OTHERS).flatMap(([folder, lines]) =>
+  repositoryFiles(folder).filter((f) => f.endsWith('.md')).map((page) => ({page, lines})));
 
-for (const page of [...pages, ...recipes]) {
+for (const {page, lines: most} of [...pages.map((page) => ({page, lines: MOST.lines})), ...others]) {
   test(`${page} is short`, (t) => {
-    const problems = tooLong(page, linesOf(page), recipes.includes(page) ? {...MOST, lines: 50} : MOST);
+    const problems = tooLong(page, linesOf(page), {...MOST, lines: most});
     const {lines, sentences, average, longest} = measureOf(page);
     t.diagnostic(`${lines} lines, ${sentences} sentences, ${average.toFixed(1)} words a sentence, ${longest} at most`);
     assert.deepEqual(problems, [], problems.join('\n'));
