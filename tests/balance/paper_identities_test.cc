@@ -236,7 +236,7 @@ void CheckState(const WholeBody& body, const std::array<bool, 2>& in_contact, St
   add("(21) E_a is the energy of the acceleration",
       ScalarResidual(own.dot(w * own) / 2, moved_by.dot(paper.a * moved_by) / 2));
   const VectorL force_part = task.JTildeTranspose().cast<Real>() * wanted.cast<Real>();
-  add("(21), (23) least E_a: any torque in the null space adds its own",
+  add("(21), (23) least E_a: a null-space torque adds its own",
       ScalarResidual((force_part + own).dot(w * (force_part + own)),
                      force_part.dot(w * force_part) + own.dot(w * own)));
 
