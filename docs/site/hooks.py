@@ -5,6 +5,10 @@ import json
 import os
 import re
 import shutil
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import older
 
 KATEX = "/usr/share/javascript/katex"  # Debian's libjs-katex
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?:|mailto:|#)([^)#\s]+)[^)]*\)")
@@ -19,6 +23,8 @@ def on_page_markdown(markdown, page, config, files):
         path = os.path.normpath(os.path.join(folder, match[2]))
         return match[0] if files.get_file_from_path(path) else f"{match[1]} (`{path}`)"
 
+    if folder == "docs/results":
+        markdown = older.marked(markdown)
     return LINK.sub(replace, markdown)
 
 

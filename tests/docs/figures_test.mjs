@@ -1,19 +1,23 @@
 // Tables of measured figures say by which commit, when and how they were measured, in a line above them that begins with
-// "Measured:". Those whose line ends with "Compared by the tests." are measured again: every figure with a unit in the
+// "Measured:". In docs/results/ the line stands below and names folders: docs/site/older.py asks git whether they have
+// changed since. Tables whose line ends with "Compared by the tests." are measured again: every figure with a unit in the
 // columns "ours" and "measured" must be among what the line's commands print.
 // Usage: node figures_test.mjs --poise PROGRAM
 import assert from 'node:assert/strict';
 import {execFileSync, spawnSync} from 'node:child_process';
-import {mkdtempSync, rmSync} from 'node:fs';
+import {cpSync, mkdirSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {dirname, join, resolve} from 'node:path';
 import {test} from 'node:test';
 import {parseArgs} from 'node:util';
-import {figuresOf, isPrinted, linesOf, otherBits, repositoryFiles, root, tablesOf} from './markdown.mjs';
+import {exists, figuresOf, isPrinted, linesOf, otherBits, repositoryFiles, root, tablesOf} from './markdown.mjs';
 
 const {values: options} = parseArgs({options: {poise: {type: 'string'}}});
 const pages = ['README.md', ...repositoryFiles('docs').filter((f) => f.endsWith('.md'))];
 const MEASURED = /^Measured: (by the commit of this line, \d{4}-\d\d-\d\d|[0-9a-f]{7}(?: to [0-9a-f]{7})?, \d{4}-\d\d-\d\d)[,;.]/;
+/** Pages with a table a claim: its line has commit, date, seed, machine, folders that the figures depend on, command. */
+const RESULTS = new Set(pages.filter((f) => /^docs\/results\/(?!README)/.test(f)));
+const RESULT = /^Measured: [0-9a-f]{7}(?: to [0-9a-f]{7})?, \d{4}-\d\d-\d\d, (?:seeds? \d|no seed)[^:]*(?:machine|cores)[^:]*, of ((?:`[\w/]+\/`(?:, )?)+): /;
 const COMPARED = /Compared by the tests\.$/;
 
 /** Columns of what was chosen or is prescribed, not measured: a field's values, too, are an interface's. */
@@ -27,17 +31,25 @@ function isMeasured({rows}) {
   return cells.length >= 4 && figures.length >= 0.54 * cells.length;
 }
 
+/** A paragraph that begins with "Measured:": {number, text}. */
+function paragraphAt(lines, number) {
+  let end = number;
+  while (lines[end]?.text.trim()) end += 1;
+  return {number, text: lines.slice(number - 1, end).map((l) => l.text).join(' ')};
+}
+
+/** The "Measured:" line of a table: of a page of results the one right below it; undefined: there is none. */
+function lineBelow(lines, {line, rows}) {
+  const number = line + rows.length + 1;
+  return lines[number - 1]?.text.startsWith('Measured:') ? paragraphAt(lines, number) : undefined;
+}
+
 /** The "Measured:" line of a table: the nearest one above it below a heading of its own; undefined: none. */
 function measuredLine(lines, {line, headings}) {
   const begin = headings[0]?.line ?? 1;
   for (let number = line - 1; number >= begin; --number) {
     const {text} = lines[number - 1];
-    if (text.startsWith('Measured:')) {
-      // Its paragraph: it may go over several lines.
-      let end = number;
-      while (lines[end]?.text.trim()) end += 1;
-      return {number, text: lines.slice(number - 1, end).map((l) => l.text).join(' ')};
-    }
+    if (text.startsWith('Measured:')) return paragraphAt(lines, number);
     if (/^#+ /.test(text) && !headings.some((h) => h.line === number)) return undefined;
   }
   return undefined;
@@ -46,14 +58,21 @@ function measuredLine(lines, {line, headings}) {
 const compared = [];
 for (const page of pages) {
   const lines = linesOf(page);
-  const tables = tablesOf(page).filter(isMeasured);
-  for (const table of tables) table.measured = measuredLine(lines, table);
+  const isResult = RESULTS.has(page);
+  const tables = tablesOf(page).filter((table) => isResult || isMeasured(table));
+  for (const table of tables) table.measured = (isResult ? lineBelow : measuredLine)(lines, table);
   compared.push(...tables.filter((t) => t.measured && COMPARED.test(t.measured.text)).map((t) => ({page, ...t})));
   if (tables.length === 0) continue;
   test(`${page}: ${tables.length} tables say when and how they were measured`, () => {
-    const problems = tables.filter((t) => !t.measured || !MEASURED.test(t.measured.text)).map((t) => t.measured
-      ? `${page}:${t.measured.number}: write "Measured: COMMIT, YYYY-MM-DD, ...": ${t.measured.text}`
-      : `${page}:${t.line}: has no line above it that begins with "Measured:"`);
+    const form = isResult ? RESULT : MEASURED;
+    const problems = tables.filter((t) => !t.measured || !form.test(t.measured.text)).map((t) => t.measured
+      ? `${page}:${t.measured.number}: is not of the form ${form}: ${t.measured.text}`
+      : `${page}:${t.line}: has no line ${isResult ? 'below' : 'above'} it that begins with "Measured:"`);
+    for (const {measured} of isResult ? tables : []) {
+      for (const [, folder] of RESULT.exec(measured?.text ?? '')?.[1].matchAll(/`([^`]+)`/g) ?? []) {
+        if (!exists(folder)) problems.push(`${page}:${measured.number}: there is no ${folder}`);
+      }
+    }
     assert.deepEqual(problems, [], problems.join('\n'));
   });
 }
@@ -70,6 +89,39 @@ test('commits of "Measured:" lines are of this history', (t) => {
             `${page}:${number}: git knows no commit ${hash}`);
       }
     }
+  }
+});
+
+test('a table is told to be older than the code once a folder of its line has changed', () => {
+  const folder = mkdtempSync(join(tmpdir(), 'poise-older-'));
+  const git = (...words) => execFileSync('git', ['-C', folder, '-c', 'user.name=a', '-c', 'user.email=b', ...words],
+      {encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore']}).trim();
+  const change = (file) => {
+    writeFileSync(join(folder, file), `${Math.random()}`);
+    git('add', '.');
+    git('commit', '-qm', file);
+    return git('rev-parse', '--short=7', 'HEAD');
+  };
+  const told = () => execFileSync('python3', [join(folder, 'docs/site/older.py')], {encoding: 'utf8'});
+  try {
+    for (const part of ['docs/site', 'docs/results', 'gait', 'arms']) mkdirSync(join(folder, part), {recursive: true});
+    cpSync(join(root, 'docs/site/older.py'), join(folder, 'docs/site/older.py'));
+    const page = (commit) => writeFileSync(join(folder, 'docs/results/a.md'),
+        `# A\n\n| a |\n|---|\n| 1 |\n\nMeasured: ${commit}, 2026-11-26, seed 1, any machine,\nof \`gait/\`, \`legs/\`: \`poise\`.\n`);
+    page('0123abc');
+    assert.equal(told(), '', 'without a history');
+    git('init', '-q');
+    page(change('gait/a'));
+    change('arms/a');
+    assert.equal(told(), '', 'another folder');
+    const last = change('gait/a');
+    assert.match(told(), new RegExp(`^docs/results/a.md:7: older than the code, which ${last}, \\d{4}-\\d\\d-\\d\\d, has changed\n$`));
+    page('0123abc');
+    assert.equal(told(), '', 'a commit that is not of this history');
+    page(last);
+    assert.equal(told(), '', 'measured again');
+  } finally {
+    rmSync(folder, {recursive: true, force: true});
   }
 });
 

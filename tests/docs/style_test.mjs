@@ -1,5 +1,5 @@
-// The pages of docs/concepts, the recipes of docs/how-to and the paper's equations are short, in short sentences; the pictures
-// of the concepts are small and what draw.py draws.
+// The pages of docs/concepts and docs/results, the recipes of docs/how-to and the paper's equations are short, in short
+// sentences; the pictures of the concepts are small and what draw.py draws.
 // Usage: node style_test.mjs
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -15,7 +15,7 @@ const folder = repositoryFiles('docs/concepts');
 const pages = folder.filter((f) => f.endsWith('.md'));
 
 /** Other folders of short pages: their lines. */
-const OTHERS = {'docs/how-to': 50, 'docs/reference/equations': 150};
+const OTHERS = {'docs/how-to': 50, 'docs/reference/equations': 150, 'docs/results': 100};
 const others = Object.entries(OTHERS).flatMap(([folder, lines]) =>
   repositoryFiles(folder).filter((f) => f.endsWith('.md')).map((page) => ({page, lines})));
 
