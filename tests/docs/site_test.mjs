@@ -154,7 +154,7 @@ test('a browser shows, searches and scrolls it from files', {skip}, async (t) =>
     for (const width of options.pictures ? WIDTHS : []) {
       for (const colorScheme of ['light', 'dark']) {
         const view = await (await browser.newContext({viewport: {width, height: 1000}, colorScheme})).newPage();
-        for (const page of ['index', 'docs/concepts/contact_dynamics', 'docs/walking_results', 'reference/fields', 'docs/lab/index']) {
+        for (const page of ['index', 'docs/concepts/contact_dynamics', 'docs/results/walking', 'reference/fields', 'docs/lab/index']) {
           await view.goto(pathToFileURL(join(site, `${page}.html`)).href);
           const name = `${page.replaceAll('/', '_')}_${width}_${colorScheme}.png`;
           await view.screenshot({path: join(options.pictures, name)});

@@ -1,6 +1,6 @@
 // Which courses of soft blocks the paper's robot can walk at all: how high it can have a level sole
 // above the one that it stands on, by inverse kinematics of the whole robot and by two links, and
-// how far a block gives way under its weight. Prints what docs/walking_results.md says.
+// how far a block gives way under its weight. Prints what docs/results/soft_ground.md says.
 #include <gtest/gtest.h>
 
 #include <algorithm>
