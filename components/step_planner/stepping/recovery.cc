@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // m beyond the soles from which on neither ankles nor hips are trusted to bring the capture point
-// back. Fitted to what stands from both feet (docs/stepping.md).
+// back. Fitted to what stands from both feet (docs/reference/steps.md).
 constexpr double kHopelessExcess = 0.015;
 // A capture point this far beyond the soles, m, steps as soon as the best step would leave it less
 // than kLateMargin, m, inside the new ones: noise makes no step, and waiting none that comes late.
