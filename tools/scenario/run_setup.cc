@@ -318,7 +318,7 @@ std::string EngineOfField(const std::string& field) {
 
 namespace {
 
-/// Walking needs other values than standing where the scenario leaves them open (docs/walking.md):
+/// Walking needs other values than standing where the scenario leaves them open (docs/reference/walking.md):
 /// with those of the rule for standing the paper's robot falls after some 15 s.
 void FillForWalking(Scenario* scenario) {
   TaskControllerConfig& tasks = *scenario->mutable_task_controller();
