@@ -40,7 +40,7 @@ constexpr double kSettleTime = 0.5;
 
 // A step is needed once the capture point has been 0.01 m beyond the soles for 0.1 s: of 145 pushes
 // that stood none raised this alarm, as the turning body brings a capture point back that is out
-// for a moment (docs/beyond_the_paper.md).
+// for a moment (docs/reference/balance.md).
 constexpr double kNeededExcess = 0.01, kNeededPersistence = 0.1;
 // rad, nearer than which no stance leg's joint may come to its limit while the body turns.
 constexpr double kJointReserve = 0.02;
