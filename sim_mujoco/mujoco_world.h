@@ -32,7 +32,7 @@ ContactLaw SpringDamperLaw(double k, double d, double depth, double h);
 ///  - A contact that slides does not push itself off the ground (Coulomb's law; MuJoCo's cone of
 ///    forces alone would lift it by friction times the slip).
 ///  - The robot's COM moves by the forces on it, exactly.
-/// docs/engines.md derives them. First order in the step; repeatable bit for bit.
+/// docs/reference/engines.md derives them. First order in the step; repeatable bit for bit.
 class MujocoWorld : public World {
  public:
   /// See WorldFactory.
