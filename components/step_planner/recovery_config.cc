@@ -25,7 +25,8 @@ constexpr double kLegShare = 0.6;
 // m that the centre of pressure asked for keeps off a sole's edge: what it is off by in a step.
 constexpr double kSoleMargin = 0.02;
 // m beyond the capture point that the sole's centre comes down: what is left for errors of the
-// prediction. Fitted, as the numbers below, to pushes of the paper's robot (docs/reference/steps.md).
+// prediction. Fitted, as the numbers below, to pushes of the paper's robot
+// (docs/reference/steps.md).
 constexpr double kOvershoot = 0.04;
 // m of the capture point inside the new support, beyond which a foothold is no better.
 constexpr double kAmpleMargin = 0.04;

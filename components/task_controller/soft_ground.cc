@@ -14,7 +14,7 @@ using robot::Foot;
 using robot::kFeet;
 
 // The COM's frequency is this share of the foot's own. Chosen, as the next, on blocks that three
-// robots fell from; others judge it (docs/gains.md).
+// robots fell from; others judge it (docs/reference/gains.md).
 constexpr double kShare = 0.5;
 // Times ω = √(g/h): with less the COM does not come back from where it falls.
 constexpr double kLeast = 1.4;

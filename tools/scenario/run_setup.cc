@@ -318,8 +318,9 @@ std::string EngineOfField(const std::string& field) {
 
 namespace {
 
-/// Walking needs other values than standing where the scenario leaves them open (docs/reference/walking.md):
-/// with those of the rule for standing the paper's robot falls after some 15 s.
+/// Walking needs other values than standing where the scenario leaves them open
+/// (docs/reference/walking.md): with those of the rule for standing the paper's robot falls after
+/// some 15 s.
 void FillForWalking(Scenario* scenario) {
   TaskControllerConfig& tasks = *scenario->mutable_task_controller();
   // The COM's reference has its velocity from the same tick.

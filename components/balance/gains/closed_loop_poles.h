@@ -19,7 +19,7 @@
 
 namespace poise::balance {
 
-/// What the rule of docs/gains.md derives, or a scenario gives.
+/// What the rule of docs/reference/gains.md derives, or a scenario gives.
 struct StandingGains {
   TaskGains com, orientation, foot, posture;
   double velocity_cutoff = 20;  ///< Hz, of the low-pass on joint velocities

@@ -1,5 +1,5 @@
-// Gains that nobody sets: from the robot's mass, height, gears, delay and limits. docs/gains.md has
-// each rule with its reason, and the poles that it makes.
+// Gains that nobody sets: from the robot's mass, height, gears, delay and limits.
+// docs/reference/gains.md has each rule with its reason, and the poles that it makes.
 #pragma once
 
 #include "components/balance/gains/closed_loop_poles.h"
