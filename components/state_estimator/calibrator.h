@@ -5,7 +5,7 @@
 // the base frame): a load, or an error of the model's COM, which is a moment without mass. A Kalman
 // filter of constant parameters with a slow walk. The moment along z, the COM's height, is
 // considered and not estimated (Schmidt): standing tells it by a sway whose own errors are as
-// large. docs/estimation.md says what standing still, a sway, and neither can tell.
+// large. docs/reference/estimation.md says what standing still, a sway, and neither can tell.
 #pragma once
 
 #include <Eigen/Core>
