@@ -6,8 +6,8 @@
 // biases and, since soles are flat, each sole's rotation F in SO(3). Errors: ξ = log(X̂ X⁻¹), of a
 // sole's rotation log(F̂ Fᵀ), of a bias estimate − truth. Without biases ξ propagates and is
 // measured independently of the estimate. The last state is the gears' compliance, of which the
-// readings of the soles depend: c, relative to what was assumed. docs/reference/estimation.md has the
-// matrices.
+// readings of the soles depend: c, relative to what was assumed.
+// docs/reference/estimation.md has the matrices.
 #pragma once
 
 #include <Eigen/Core>
