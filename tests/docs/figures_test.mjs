@@ -96,8 +96,8 @@ test('a table is told to be older than the code once a folder of its line has ch
   const folder = mkdtempSync(join(tmpdir(), 'poise-older-'));
   const git = (...words) => execFileSync('git', ['-C', folder, '-c', 'user.name=a', '-c', 'user.email=b', ...words],
       {encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore']}).trim();
-  const change = (file) => {
-    writeFileSync(join(folder, file), `${Math.random()}`);
+  const change = (file, text = `${Math.random()}`) => {
+    writeFileSync(join(folder, file), text);
     git('add', '.');
     git('commit', '-qm', file);
     return git('rev-parse', '--short=7', 'HEAD');
@@ -113,9 +113,10 @@ test('a table is told to be older than the code once a folder of its line has ch
     git('init', '-q');
     page(change('gait/a'));
     change('arms/a');
-    assert.equal(told(), '', 'another folder');
+    change('gait/b', '// A comment.\n');
+    assert.equal(told(), '', 'another folder, and a comment');
     const last = change('gait/a');
-    assert.match(told(), new RegExp(`^docs/results/a.md:7: older than the code, which ${last}, \\d{4}-\\d\\d-\\d\\d, has changed\n$`));
+    assert.match(told(), new RegExp(`^docs/results/a.md:7: older than the code, which commit ${last}, \\d{4}-\\d\\d-\\d\\d, has changed\n$`));
     page('0123abc');
     assert.equal(told(), '', 'a commit that is not of this history');
     page(last);

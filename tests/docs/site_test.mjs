@@ -108,6 +108,16 @@ test('every page says of which commit it is', {skip}, () => {
   for (const [page, text] of pages) assert.match(text, /poise \d+\.\d+\.\d+, (commit [0-9a-f]{7,} of \d{4}-\d\d-\d\d|commit unknown)/, page);
 });
 
+test('a table of results that is older than the code says so', {skip}, (t) => {
+  const {stdout} = spawnSync('python3', [join(root, 'docs/site/older.py')], {encoding: 'utf8'});
+  const told = stdout.split('\n').filter(Boolean).map((line) => line.split(':')[0]);
+  for (const page of repositoryFiles('docs/results')) {
+    const marks = pages.get(html(page)).match(/<strong>Older than the code<\/strong>/g) ?? [];
+    assert.equal(marks.length, told.filter((name) => name === page).length, page);
+  }
+  t.diagnostic(`${told.length} tables are older than the code`);
+});
+
 test('KaTeX sets every equation', {skip}, (t) => {
   const katex = createRequire(import.meta.url)(KATEX);
   let count = 0;
