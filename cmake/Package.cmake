@@ -21,7 +21,7 @@ set(CPACK_DEBIAN_POISE_PACKAGE_NAME poise)
 set(CPACK_DEBIAN_POISE_DESCRIPTION "Poise: programs, scenarios and robots
  Keeps a torque-controlled humanoid on its feet by controlling its contact
  forces and moments: a graph of processes on LCM, with simulated robots.")
-set(CPACK_DEBIAN_POISE_PACKAGE_SUGGESTS "python3-poise, librsvg2-bin, liblcm-bin")
+set(CPACK_DEBIAN_POISE_PACKAGE_SUGGESTS "python3-poise, liblcm-bin")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME poise-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_DESCRIPTION "Poise: for components, messages and metrics of one's own

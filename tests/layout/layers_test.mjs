@@ -47,7 +47,7 @@ const BELOW = {
   'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */
-const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'operator', 'run', 'foxglove', 'ros2', 'live', 'sweep', 'maps', 'benchmark', 'commands'];
+const TOOLS = ['cli', 'reference', 'scenario', 'host', 'robot', 'robot_import', 'report', 'operator', 'run', 'foxglove', 'ros2', 'live', 'sweep', 'charts', 'benchmark', 'commands'];
 /** Folders that one file may name although it is not below them: where all processes are listed. */
 const REGISTRY = ['tools/scenario/registry.cc', 'tools/scenario/scenario.proto'];
 

@@ -10,11 +10,11 @@
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/modules.h"
 #include "fmt/format.h"
+#include "tools/charts/sweep_charts.h"
 #include "tools/cli/output_place.h"
+#include "tools/cli/output_style.h"
 #include "tools/cli/shell_word.h"
-#include "tools/maps/sweep_charts.h"
-#include "tools/maps/sweep_maps.h"
-#include "tools/maps/sweep_page.h"
+#include "tools/report/html_report.h"
 #include "tools/scenario/library_versions.h"
 
 namespace poise {
@@ -142,21 +142,17 @@ std::string WriteBenchmark(const fs::path& folder, const BenchmarkSet& set,
   json["table_sha1"] = sha1;
   WriteFile(folder / kBenchmarkJson, json.dump(1) + "\n");
 
-  MapsPageContent page;
-  page.title = fmt::format("{}: {}", set.benchmark().name(), set.robot().name);
-  page.description = set.benchmark().description();
-  page.tables.push_back(FormatBenchmark(results));
-  fs::create_directories(folder / "maps");
+  ordered_json charts = {{"format", kChartsFormat},
+                         {"title", fmt::format("{}: {}", set.benchmark().name(), set.robot().name)},
+                         {"description", set.benchmark().description()},
+                         {"text", WithoutTones(FormatBenchmark(results))},
+                         {"parts", ordered_json::array()}};
   for (const BenchmarkResult& result : results) {
-    const std::vector<std::string> charts =
-        MapCharts(result.header, result.rows, RunOf(set, result.part)).all();
-    for (size_t i = 0; i < charts.size(); ++i) {
-      const std::string name = fmt::format("{}_{}.svg", result.part.name(), i + 1);
-      WriteFile(folder / "maps" / name, StandaloneSvg(charts[i]));
-    }
-    page.survival.insert(page.survival.end(), charts.begin(), charts.end());
+    charts["parts"].push_back(SweepChartsPart(result.header, result.rows, RunOf(set, result.part)));
+    charts["parts"].back()["name"] = result.part.name();
+    charts["parts"].back()["title"] = result.part.title();
   }
-  WriteFile(folder / kBenchmarkPage, FormatMapsPage(page));
+  WriteCharts(folder, charts);
   return sha1;
 }
 

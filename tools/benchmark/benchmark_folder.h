@@ -12,15 +12,14 @@ namespace poise {
 
 inline constexpr char kBenchmarkCsv[] = "benchmark.csv";
 inline constexpr char kBenchmarkJson[] = "benchmark.json";
-inline constexpr char kBenchmarkPage[] = "benchmark.html";
 
 /// Where the parts are run from, and where each leaves its runs.
 std::filesystem::path SetFolder(const std::filesystem::path& folder);
 std::filesystem::path PartFolder(const std::filesystem::path& folder, const BenchmarkPart& part);
 
 /// Writes benchmark.csv, benchmark.json (set, program, libraries, robot, controller and results,
-/// each with a hash; `command`: as it was typed), benchmark.html with all maps, and each map as
-/// maps/PART_N.svg. Returns the SHA-1 of benchmark.csv. Throws ConfigError.
+/// each with a hash; `command`: as it was typed), charts.json and charts.html of all parts. Returns
+/// the SHA-1 of benchmark.csv. Throws ConfigError.
 std::string WriteBenchmark(const std::filesystem::path& folder, const BenchmarkSet& set,
                            const std::vector<BenchmarkResult>& results, bool quick,
                            const std::string& command);

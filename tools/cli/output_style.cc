@@ -124,6 +124,16 @@ std::string Toned(std::string_view text, Tone tone) {
   return toned;
 }
 
+std::string WithoutTones(std::string_view text) {
+  std::string plain;
+  for (size_t i = 0; i < text.size();) {
+    const size_t end = EndOfEscape(text, i);
+    if (end == i) plain += text[i++];
+    i = std::max(end, i);
+  }
+  return plain;
+}
+
 int DisplayWidth(std::string_view text) {
   const std::string plain = ScreenStyle().unicode ? std::string(text) : PlainText(text);
   int width = 0;

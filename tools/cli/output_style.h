@@ -21,6 +21,9 @@ enum class Tone { kPlain, kStrong, kDim, kGood, kBad };
 /// `text` in the colour of `tone`, where stdout shows colours.
 std::string Toned(std::string_view text, Tone tone);
 
+/// `text` as it is without colours, for files.
+std::string WithoutTones(std::string_view text);
+
 /// Columns that a UTF-8 text takes on stdout; colours take none.
 int DisplayWidth(std::string_view text);
 

@@ -12,12 +12,13 @@
 #include "components/framework/configuration/suggest.h"
 #include "fmt/format.h"
 #include "tools/benchmark/benchmark_folder.h"
+#include "tools/charts/sweep_output.h"
 #include "tools/cli/output_place.h"
 #include "tools/cli/shell_word.h"
 #include "tools/cli/signals.h"
 #include "tools/cli/temporary_dir.h"
 #include "tools/commands/commands.h"
-#include "tools/maps/sweep_output.h"
+#include "tools/report/html_report.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/ablations.h"
 #include "tools/sweep/sweep_session.h"
@@ -72,7 +73,7 @@ fs::path MakeFolder(const BenchmarkArguments& arguments, const std::string& name
   }
   if (session.force && !session.resume) {
     for (const char* old :
-         {"parts", "set", "maps", kBenchmarkCsv, kBenchmarkPage, kBenchmarkJson}) {
+         {"parts", "set", kBenchmarkCsv, kChartsFile, kChartsPage, kBenchmarkJson}) {
       fs::remove_all(folder / old);
     }
   }
@@ -154,7 +155,7 @@ int RunBenchmark(const BenchmarkArguments& arguments) {
   }
   const std::string sha1 = WriteBenchmark(folder, set, results, arguments.quick, CommandLine());
   fmt::print("\n{}\n", FormatBenchmark(results));
-  for (const char* file : {kBenchmarkCsv, kBenchmarkPage, kBenchmarkJson}) {
+  for (const char* file : {kBenchmarkCsv, kChartsPage, kBenchmarkJson}) {
     fmt::print("{}\n", (folder / file).string());
   }
   fmt::print("{} has the SHA-1 {}\n", kBenchmarkCsv, sha1);
@@ -216,10 +217,11 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
       "modules and programs on POISE_PATH; one that has a program of its own runs as processes, in "
       "lockstep. Robot, engine and controller are yours, everything else is the set's. OUT has "
       "benchmark.csv (a row a point; its SHA-1 is the same for one build, as seen on one machine "
-      "so far), benchmark.html (table and maps), benchmark.json (what is needed to repeat it), "
-      "set/ (what was run) and parts/ (every run). docs/benchmark.md says what is measured and "
-      "why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run could not be made; 2 "
-      "wrong usage or configuration.\nExample: poise benchmark --quick --part push_double");
+      "so far), charts.json and charts.html (table and charts), benchmark.json (what is needed to "
+      "repeat it), set/ (what was run) and parts/ (every run). docs/benchmark.md says what is "
+      "measured and why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run could not "
+      "be made; 2 wrong usage or configuration.\nExample: poise benchmark --quick --part "
+      "push_double");
   benchmark->callback(
       [arguments, command] { *command = [arguments] { return RunBenchmark(*arguments); }; });
 }

@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "fmt/format.h"
+#include "tools/charts/sweep_output.h"
 #include "tools/commands/commands.h"
-#include "tools/maps/sweep_output.h"
 #include "tools/sweep/sweep_session.h"
 
 namespace poise {
@@ -25,9 +25,7 @@ int RunLimit(const SweepArguments& arguments, const SessionOptions& options) {
                session.rows().size(), session.folder().string());
     return kExitFailed;
   }
-  const bool all_ran =
-      Deliver(session.folder(), session.header(), session.rows(), options.all_pictures);
-  return all_ran ? kExitOk : kExitFailed;
+  return Deliver(session.folder(), session.header(), session.rows()) ? kExitOk : kExitFailed;
 }
 
 }  // namespace

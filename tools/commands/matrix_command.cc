@@ -14,8 +14,10 @@
 #include "tools/cli/output_place.h"
 #include "tools/cli/output_style.h"
 #include "tools/cli/progress.h"
+#include "tools/cli/shell_word.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/report/html_report.h"
 #include "tools/report/matrix_table.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/several_runs.h"
@@ -74,6 +76,10 @@ Job MakeJob(const std::string& scenario, const std::string& unique_name, const s
   if (!world.empty()) job.arguments.insert(job.arguments.end(), {"--world", world});
   for (const std::string& flag : ablation.flags()) job.arguments.push_back(flag);
   job.name = fmt::format("{}/{}", unique_name, variant.empty() ? ablation.name : variant);
+  job.cell.command = "poise";
+  for (const std::string& word : job.arguments) {
+    if (word != "--quiet") job.cell.command += " " + ShellWord(word);
+  }
   job.log_size = ExpectedLogSize(spec) * (loaded.scenario.has_reference() ? 2 : 1);
   job.work = loaded.scenario.duration() * (loaded.scenario.has_reference() ? 2 : 1);
   return job;
@@ -214,7 +220,10 @@ int Matrix(const MatrixOptions& options) {
   }
   std::vector<MatrixCell> cells;
   bool good = true;
-  for (Job& job : jobs) cells.push_back(std::move(job.cell));
+  for (Job& job : jobs) {
+    job.cell.folder = job.name;
+    cells.push_back(std::move(job.cell));
+  }
   fmt::print("\n{}\n", FormatMatrix(cells));
   for (size_t i = 0; i < cells.size(); ++i) {
     const MatrixCell& cell = cells[i];
@@ -227,12 +236,14 @@ int Matrix(const MatrixOptions& options) {
     good = good && !cell.problem && (cell.passed || !cell.must_pass);
   }
   WriteFile(folder / "matrix.csv", MatrixCsv(cells));
+  WriteCharts(folder, MatrixCharts(cells));
   const auto ran = std::find_if(cells.begin(), cells.end(),
                                 [](const MatrixCell& cell) { return !cell.problem; });
   if (ran != cells.end()) {
     PointLatestTo(folder / jobs[static_cast<size_t>(ran - cells.begin())].name);
   }
-  fmt::print("{} runs in {:.1f} s; {}\n", jobs.size(), wall, (folder / "matrix.csv").string());
+  fmt::print("{} runs in {:.1f} s; {}, {}\n", jobs.size(), wall, (folder / "matrix.csv").string(),
+             kChartsPage);
   return good ? kExitOk : kExitFailed;
 }
 
@@ -260,8 +271,8 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   matrix->add_option("--out", options->out,
-                     "folder for a run's folder each and matrix.csv; default: a dated one under "
-                     "runs/");
+                     "folder for a run's folder each, matrix.csv and charts.html; default: a dated "
+                     "one under runs/");
   matrix->add_flag(
       "--force", options->force,
       "replace the matrix that --out holds; start though the logs may not fit the disk");
@@ -269,7 +280,8 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       "Each run is `poise run --inline` with the flags of its column. matrix.csv has a line for "
       "each check of each run: scenario, paper_section, variant, ablation, outcome, fell_at [s], "
       "simulated_time [s], passed, metric, label, unit, measured, at_least, at_most, check_passed, "
-      "paper, paper_value.\nExit code: 0 when everything ran; a fall in an ablation is a result. 1 "
+      "paper, paper_value. charts.html draws charts.json: docs/charts.md.\nExit code: 0 when "
+      "everything ran; a fall in an ablation is a result. 1 "
       "when a run could not be made, or an experiment (or a variant that has checks of its own) "
       "fails without ablation. 2 wrong usage or configuration.\nExample: poise matrix "
       "push_double_support --ablation without_balancing");

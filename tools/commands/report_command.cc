@@ -62,8 +62,21 @@ std::filesystem::path DefaultHtml(const std::string& log) {
   return std::filesystem::path(path).replace_extension(".html");
 }
 
+/// The page of one set of charts, or of two laid over each other.
+int ReportCharts(const ReportOptions& options) {
+  std::vector<std::filesystem::path> folders = {options.run};
+  if (!options.overlay.empty()) folders.emplace_back(options.overlay);
+  const std::filesystem::path html =
+      options.html.empty() ? folders.front() / "report.html" : std::filesystem::path(options.html);
+  WriteChartsPage(html, folders);
+  fmt::print("The charts: {}\n", FileAddress(html));
+  return kExitOk;
+}
+
 int Report(const ReportOptions& options) {
   if (!options.html.empty()) CheckFileFree("--html", options.html, options.force);
+  const std::filesystem::path charts = std::filesystem::path(options.run) / kChartsFile;
+  if (!options.run.empty() && std::filesystem::exists(charts)) return ReportCharts(options);
   StageLine line(/*quiet=*/false);
   std::vector<ReportedRun> runs;
   runs.push_back(ReadReportedRun(options.run, &line));
@@ -107,8 +120,11 @@ void AddReportCommand(CLI::App* app, Command* command) {
   auto options = std::make_shared<ReportOptions>();
   CLI::App* report = app->add_subcommand(
       "report", "the table of a run from its log, and the run as a page to look at");
-  report->add_option("run", options->run, "folder of a run or a log; default: the latest run");
-  report->add_option("overlay", options->overlay, "a second run, drawn over the first in the page");
+  report->add_option("run", options->run,
+                     "folder of a run or a log, or of charts: a sweep's, limit's, matrix' or "
+                     "benchmark's; default: the latest run");
+  report->add_option("overlay", options->overlay,
+                     "a second one of the kind, drawn over the first in the page");
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
   CLI::Option* no_html =

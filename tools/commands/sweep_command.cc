@@ -3,9 +3,9 @@
 
 #include "components/framework/configuration/configuration.h"
 #include "fmt/format.h"
+#include "tools/charts/sweep_output.h"
 #include "tools/cli/output_place.h"
 #include "tools/commands/commands.h"
-#include "tools/maps/sweep_output.h"
 #include "tools/run/run_dir.h"
 #include "tools/sweep/sweep_session.h"
 #include "tools/sweep/sweep_table.h"
@@ -20,7 +20,6 @@ struct MergeOptions {
   std::string out;
   bool force = false;
   bool partial = false;
-  bool all_pictures = false;
 };
 
 int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
@@ -39,9 +38,7 @@ int RunSweep(const SweepArguments& arguments, const SessionOptions& options) {
                CountDone(first, end, session.rows()), end - first, session.folder().string());
     return kExitFailed;
   }
-  const bool all_ran =
-      Deliver(session.folder(), session.header(), session.rows(), options.all_pictures);
-  return all_ran ? kExitOk : kExitFailed;
+  return Deliver(session.folder(), session.header(), session.rows()) ? kExitOk : kExitFailed;
 }
 
 /// Throws ConfigError when points are missing or not searched to the end.
@@ -96,8 +93,7 @@ int Merge(const MergeOptions& options) {
     SweepResultsWriter writer(out, merged->header, {});
     for (const auto& [key, row] : merged->rows) writer.Append(row);
   }
-  const bool all_ran = Deliver(out, merged->header, merged->rows, options.all_pictures);
-  return all_ran ? kExitOk : kExitFailed;
+  return Deliver(out, merged->header, merged->rows) ? kExitOk : kExitFailed;
 }
 
 }  // namespace
@@ -111,12 +107,12 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   AddSweepOptions(sweep, arguments.get(), session.get());
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
-      "table.csv (a row a run, the same bytes whether resumed, split or in parallel) and "
-      "maps.html, and each map as map_N.svg; as map_N.png, too, those that the sweep's file asks "
-      "for and those of what stands; with --png all. A sweep's file: tools/sweep/sweep.proto; "
-      "docs/sweeps.md.\nExit code: 0 when every run was made, fallen or not; 1 when interrupted or "
-      "a run could not be made; 2 wrong usage or configuration.\nExample: poise sweep "
-      "push_double_support --vary 'sim.push[0].peak=100:250:7'");
+      "table.csv (a row a run, the same bytes whether resumed, split or in parallel), charts.json "
+      "(docs/charts.md) and charts.html, which draws it; poise report OUT OTHER lays two of them "
+      "over each other. A sweep's file: tools/sweep/sweep.proto; docs/sweeps.md.\nExit code: 0 "
+      "when every run was made, fallen or not; 1 when interrupted or a run could not be made; 2 "
+      "wrong usage or configuration.\nExample: poise sweep push_double_support --vary "
+      "'sim.push[0].peak=100:250:7'");
   CLI::App* merge = sweep->add_subcommand(
       "merge", "one table from the folders of a sweep's, or a limit's, parts");
   sweep->require_subcommand(0, 1);
@@ -124,7 +120,6 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   merge->add_option("--out", merge_options->out, "folder for the whole")->required();
   merge->add_flag("--force", merge_options->force, "replace what --out holds");
   merge->add_flag("--partial", merge_options->partial, "though points are missing");
-  merge->add_flag("--png", merge_options->all_pictures, "every map as PNG, too");
   merge->footer(
       "The whole has what one sweep has.\nExit code: 0 when every run was made, fallen or not; 1 "
       "when one could not be made; 2 wrong usage or configuration.\nExample: poise sweep merge "

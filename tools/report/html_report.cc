@@ -47,25 +47,27 @@ constexpr const char* kFocus[] = {
     "contact_late", "phase_began",    "push_ends",   "balancing_on",    "eta_infeasible_begins",
     "crane_let_go", "loading_begins", "searching",   "unloading_begins"};
 
-/// PREFIX/share/poise/report.html where Poise is installed; else build/web/report.html, beside
+constexpr char kReportPage[] = "report.html";
+
+/// PREFIX/share/poise/NAME where Poise is installed; else build/web/NAME, beside
 /// build/PRESET/bin/poise.
-fs::path TemplatePath() {
+fs::path TemplatePath(const char* name) {
   const fs::path prefix = InstalledPrefix();
-  if (!prefix.empty()) return prefix / "share" / "poise" / "report.html";
-  return fs::read_symlink("/proc/self/exe").parent_path() / ".." / ".." / "web" / "report.html";
+  if (!prefix.empty()) return prefix / "share" / "poise" / name;
+  return fs::read_symlink("/proc/self/exe").parent_path() / ".." / ".." / "web" / name;
 }
 
-std::string ReadTemplate() {
-  const fs::path path = TemplatePath();
+std::string ReadTemplate(const char* name) {
+  const fs::path path = TemplatePath(name);
   std::ifstream in(path, std::ios::binary);
   std::stringstream text;
   if (!in || !(text << in.rdbuf())) {
     throw ConfigError(
-        fmt::format("{}: the page of reports is not built; run deploy/setup, or give --no-html",
-                    path.lexically_normal().string()));
+        fmt::format("{}: is not built; run deploy/setup{}", path.lexically_normal().string(),
+                    name == std::string_view(kReportPage) ? ", or give --no-html" : ""));
   }
   if (text.view().find(kDataMark) == std::string_view::npos) {
-    throw ConfigError(fmt::format("{}: is no template of a report; run deploy/setup",
+    throw ConfigError(fmt::format("{}: is no template of a page; run deploy/setup",
                                   path.lexically_normal().string()));
   }
   return text.str();
@@ -263,8 +265,9 @@ Json Metadata(const logging::RunRecord& record, const Scenario& scenario,
   return json;
 }
 
-void WriteMetadata(const Json& json, std::ostream* out) {
-  *out << "<script type=\"application/json\" class=\"poise-run\">" << ScriptText(json)
+/// `what`: "run", "robot" or "charts".
+void WriteData(const char* what, const Json& json, std::ostream* out) {
+  *out << "<script type=\"application/json\" class=\"poise-" << what << "\">" << ScriptText(json)
        << "</script>\n";
 }
 
@@ -288,12 +291,12 @@ void WriteRun(const ReportedRun& run, size_t index, double megabytes, std::ostre
     json["channels"] =
         RowChannelsJson(logging::ReadRows(run.log, run.record, rows), run.record.num_ticks, &blobs);
   }
-  WriteMetadata(json, out);
+  WriteData("run", json, out);
 }
 
 /// The template with what `write` says of its runs.
-void WritePage(std::ostream* out, const std::function<void()>& write) {
-  const std::string page = ReadTemplate();
+void WritePage(const char* name, std::ostream* out, const std::function<void()>& write) {
+  const std::string page = ReadTemplate(name);
   const size_t mark = page.find(kDataMark);
   *out << std::string_view(page).substr(0, mark);
   write();
@@ -322,6 +325,14 @@ void WriteFile(const fs::path& file, const char* flag,
   partial->Keep();
 }
 
+void WriteChartsData(const fs::path& file, const char* flag, const std::vector<Json>& sets) {
+  WriteFile(file, flag, [&](std::ostream* out) {
+    WritePage(kChartsPage, out, [&] {
+      for (const Json& set : sets) WriteData("charts", set, out);
+    });
+  });
+}
+
 }  // namespace
 
 Json PageRunJson(const logging::RunRecord& record, const Scenario& scenario,
@@ -340,11 +351,37 @@ void WriteHtmlReport(const fs::path& file, const std::vector<ReportedRun>& runs,
         fmt::format("{}: is the log itself; name another file with --html", file.string()));
   }
   WriteFile(file, "--html", [&](std::ostream* out) {
-    WritePage(out, [&] {
+    WritePage(kReportPage, out, [&] {
       const double share = megabytes / static_cast<double>(runs.size());
       for (size_t i = 0; i < runs.size(); ++i) WriteRun(runs[i], i, share, out);
     });
   });
+}
+
+void WriteCharts(const fs::path& folder, const Json& charts) {
+  WriteFile(folder / kChartsFile, "--out", [&](std::ostream* out) {
+    *out << charts.dump(-1, ' ', false, Json::error_handler_t::replace) << "\n";
+  });
+  try {
+    WriteChartsData(folder / kChartsPage, "--out", std::vector<Json>(1, charts));
+  } catch (const ConfigError& error) {
+    fmt::print(stderr, "poise: {} is not written: {}\n", kChartsPage, error.what());
+  }
+}
+
+void WriteChartsPage(const fs::path& file, const std::vector<fs::path>& folders) {
+  std::vector<Json> sets;
+  for (const fs::path& folder : folders) {
+    const fs::path data = folder / kChartsFile;
+    try {
+      sets.push_back(Json::parse(ReadFile(data.string())));
+    } catch (const Json::exception& error) {
+      throw ConfigError(fmt::format("{}: is no data of charts: {}", data.string(), error.what()));
+    }
+    // Where its runs lie, from the page.
+    sets.back()["folder"] = fs::relative(folder, fs::absolute(file).parent_path()).string();
+  }
+  WriteChartsData(file, "--html", sets);
 }
 
 void WriteRobotPage(const fs::path& file, const RobotCheck& check, const RobotDrawing& drawing) {
@@ -361,10 +398,7 @@ void WriteRobotPage(const fs::path& file, const RobotCheck& check, const RobotDr
   json["drawn_instead"] = WhatIsDrawnInstead(drawing);
   json["triangles"] = {drawing.triangles, drawing.file_triangles};
   WriteFile(file, "--page", [&](std::ostream* out) {
-    WritePage(out, [&] {
-      *out << "<script type=\"application/json\" class=\"poise-robot\">" << ScriptText(json)
-           << "</script>\n";
-    });
+    WritePage(kReportPage, out, [&] { WriteData("robot", json, out); });
   });
 }
 
@@ -374,7 +408,7 @@ std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario,
   json["channels"] = std::move(channels);
   json["live"] = {{"keep", keep}};
   std::ostringstream out;
-  WritePage(&out, [&] { WriteMetadata(json, &out); });
+  WritePage(kReportPage, &out, [&] { WriteData("run", json, &out); });
   return std::move(out).str();
 }
 

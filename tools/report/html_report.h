@@ -1,4 +1,4 @@
-// A run as one page that opens from disk: docs/report-format.md.
+// Pages that open from disk: of a run (docs/report-format.md), of charts (docs/charts.md).
 #pragma once
 
 #include <cstdint>
@@ -35,6 +35,19 @@ inline constexpr double kPageSize = 30;  // MB: opens in seconds, goes by mail
 /// for a log that is gone. A page that is not finished leaves `file` as it was.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs,
                      double megabytes = kPageSize);
+
+inline constexpr char kChartsFile[] = "charts.json";
+inline constexpr char kChartsPage[] = "charts.html";
+inline constexpr int kChartsFormat = 1;
+
+/// Writes charts.json (docs/charts.md) into `folder`, and charts.html, which draws it; says on
+/// stderr why there is no page. Throws ConfigError where the data cannot be written.
+void WriteCharts(const std::filesystem::path& folder, const nlohmann::ordered_json& charts);
+
+/// Writes the page of the charts.json in `folders`, laid over each other. Throws ConfigError as
+/// WriteHtmlReport, and for a folder without such a file.
+void WriteChartsPage(const std::filesystem::path& file,
+                     const std::vector<std::filesystem::path>& folders);
 
 /// Writes the page of a robot that was checked. Throws ConfigError likewise.
 void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check,

@@ -5,10 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "fmt/format.h"
+#include "tools/cli/output_style.h"
 #include "tools/cli/text_table.h"
+#include "tools/report/html_report.h"
 
 namespace poise {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 std::string ColumnTitle(const MatrixCell& cell) {
   if (!cell.variant.empty()) return "variant " + cell.variant;
@@ -49,19 +53,25 @@ bool FailedUnseen(const MatrixCell& cell, const std::vector<const CheckResult*>&
   return !seen;
 }
 
-/// The cells of one scenario.
-std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
-  std::vector<TableRow> rows = {{"what", "paper"}, {"outcome", ""}};
-  std::vector<const CheckResult*> figures;  // in the order in which the cells have them
+/// Checks that have a figure of the paper, in the order in which the cells have them.
+std::vector<const CheckResult*> PaperFigures(const std::vector<const MatrixCell*>& cells) {
+  std::vector<const CheckResult*> figures;
   for (const MatrixCell* cell : cells) {
-    rows[0].emplace_back(ColumnTitle(*cell));
     for (const CheckResult& check : cell->checks) {
       const auto same = [&](const CheckResult* other) { return Same(*other, check); };
       const bool paper = !check.paper.empty() || check.paper_value;
       if (paper && std::none_of(figures.begin(), figures.end(), same)) figures.push_back(&check);
     }
   }
+  return figures;
+}
+
+/// The cells of one scenario.
+std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
+  std::vector<TableRow> rows = {{"what", "paper"}, {"outcome", ""}};
+  const std::vector<const CheckResult*> figures = PaperFigures(cells);
   for (const MatrixCell* cell : cells) {
+    rows[0].emplace_back(ColumnTitle(*cell));
     rows[1].push_back(Outcome(*cell, cell->outcome, FailedUnseen(*cell, figures)));
   }
   for (const CheckResult* figure : figures) {
@@ -80,21 +90,23 @@ std::string FormatScenario(const std::vector<const MatrixCell*>& cells) {
   return FormatColumns(rows);
 }
 
+/// Index of `name`, which is added where it is not there.
+size_t IndexOf(const std::string& name, std::vector<std::string>* names) {
+  const auto found = std::find(names->begin(), names->end(), name);
+  const auto at = static_cast<size_t>(found - names->begin());
+  if (found == names->end()) names->push_back(name);
+  return at;
+}
+
 /// What each part of the controller is worth: a row for each ablation, a column for each scenario.
 std::string FormatOverview(const std::vector<MatrixCell>& cells) {
   std::vector<TableRow> rows(1, TableRow{TableCell("")});
   std::vector<std::string> scenarios;
   std::vector<std::string> ablations;
-  const auto index = [](std::vector<std::string>* names, const std::string& name) {
-    const auto found = std::find(names->begin(), names->end(), name);
-    const auto at = static_cast<size_t>(found - names->begin());
-    if (found == names->end()) names->push_back(name);
-    return at;
-  };
   for (const MatrixCell& cell : cells) {
     if (!cell.variant.empty()) continue;
-    const size_t column = 1 + index(&scenarios, cell.scenario);
-    const size_t row = 1 + index(&ablations, cell.ablation);
+    const size_t column = 1 + IndexOf(cell.scenario, &scenarios);
+    const size_t row = 1 + IndexOf(cell.ablation, &ablations);
     if (column == rows[0].size()) {
       rows[0].emplace_back(cell.paper_section.empty() ? cell.scenario : cell.paper_section);
     }
@@ -109,8 +121,68 @@ std::string FormatOverview(const std::vector<MatrixCell>& cells) {
   return grid ? FormatColumns(rows) : "";
 }
 
+/// A cell's row without its values, at `at`.
+Json CellRow(const MatrixCell& cell, size_t run, const std::vector<size_t>& at) {
+  std::string told = cell.problem ? "could not be run: " + *cell.problem : cell.outcome;
+  for (const CheckResult& check : cell.checks) {
+    if (!check.passed) told += "; failed: " + check.label;
+  }
+  const char* const outcome = cell.problem               ? "invalid"
+                              : cell.fell_at             ? "fell"
+                              : cell.outcome == "stands" ? "stands"
+                                                         : "stopped";
+  Json row = {{"run", run}, {"at", at}, {"outcome", outcome}, {"told", told}};
+  row["values"] = Json::array();
+  row["set"] = cell.command;
+  if (!cell.problem) row["log"] = cell.folder;
+  return row;
+}
+
+/// The ablations and variants of one scenario, over which its figures are drawn.
+Json ScenarioPart(const std::vector<const MatrixCell*>& cells) {
+  Json choices = Json::array(), values = Json::array(), maps = Json::array(), rows = Json::array();
+  for (size_t i = 0; i < cells.size(); ++i) {
+    choices.push_back(ColumnTitle(*cells[i]));
+    rows.push_back(CellRow(*cells[i], i, {i}));
+  }
+  for (const CheckResult* const figure : PaperFigures(cells)) {
+    maps.push_back({{"x", 0}, {"value", values.size()}});
+    values.push_back({{"name", figure->name + " " + figure->label},
+                      {"label", figure->label},
+                      {"unit", figure->unit}});
+    if (figure->paper_value) values.back()["paper"] = *figure->paper_value;
+    for (size_t i = 0; i < cells.size(); ++i) {
+      const CheckResult* const check = FindCheck(*cells[i], *figure);
+      const bool measured = check != nullptr && check->measured;
+      rows[i]["values"].push_back(measured ? Json(*check->measured) : Json(nullptr));
+    }
+  }
+  const MatrixCell& first = *cells.front();
+  return {
+      {"name", first.scenario},
+      {"title",
+       first.paper_section.empty() ? first.scenario : first.paper_section + "  " + first.scenario},
+      {"kind", "matrix"},
+      {"sentences", Json::array({first.description})},
+      {"command", ""},
+      {"variables", Json::array({{{"name", "controller"}, {"unit", ""}, {"choices", choices}}})},
+      {"values", values},
+      {"maps", maps},
+      {"rows", rows}};
+}
+
 std::string Number(const std::optional<double>& value) {
   return value ? fmt::format("{}", *value) : "";
+}
+
+/// Cells of a scenario stand together.
+std::vector<std::vector<const MatrixCell*>> ByScenario(const std::vector<MatrixCell>& cells) {
+  std::vector<std::vector<const MatrixCell*>> groups;
+  for (const MatrixCell& cell : cells) {
+    if (groups.empty() || groups.back().front()->scenario != cell.scenario) groups.emplace_back();
+    groups.back().push_back(&cell);
+  }
+  return groups;
 }
 
 std::string Truth(bool value) { return value ? "true" : "false"; }
@@ -139,22 +211,16 @@ void ReadCellSummary(const std::filesystem::path& file, MatrixCell* cell) {
 std::string FormatMatrix(const std::vector<MatrixCell>& cells) {
   std::string text = FormatOverview(cells);
   if (!text.empty()) text += "\n";
-  bool failed = false;
-  for (size_t begin = 0; begin < cells.size();) {
-    std::vector<const MatrixCell*> group;
-    size_t end = begin;
-    for (; end < cells.size() && cells[end].scenario == cells[begin].scenario; ++end) {
-      group.push_back(&cells[end]);
-      failed = failed || (!cells[end].problem && !cells[end].passed);
-    }
-    const MatrixCell& first = cells[begin];
+  const bool failed = std::ranges::any_of(
+      cells, [](const MatrixCell& cell) { return !cell.problem && !cell.passed; });
+  for (const std::vector<const MatrixCell*>& group : ByScenario(cells)) {
+    const MatrixCell& first = *group.front();
     text += Wrapped(fmt::format("{}{}{}: {}", first.paper_section,
                                 first.paper_section.empty() ? "" : "  ", first.scenario,
                                 first.description),
                     ScreenStyle().columns, 2) +
             "\n";
     text += FormatScenario(group) + "\n";
-    begin = end;
   }
   if (failed) {
     text += Wrapped(
@@ -187,6 +253,33 @@ std::string MatrixCsv(const std::vector<MatrixCell>& cells) {
     }
   }
   return csv;
+}
+
+Json MatrixCharts(const std::vector<MatrixCell>& cells) {
+  std::vector<std::string> scenarios, columns;
+  Json rows = Json::array(), parts = Json::array();
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (!cells[i].variant.empty()) continue;  // of one scenario alone: it is in that one's part
+    const size_t column = IndexOf(ColumnTitle(cells[i]), &columns);
+    rows.push_back(CellRow(cells[i], i, {column, IndexOf(cells[i].scenario, &scenarios)}));
+  }
+  parts.push_back({{"name", "matrix"},
+                   {"kind", "matrix"},
+                   {"command", ""},
+                   {"variables",
+                    {{{"name", "controller"}, {"unit", ""}, {"choices", columns}},
+                     {{"name", "scenario"}, {"unit", ""}, {"choices", scenarios}}}},
+                   {"values", Json::array()},
+                   {"maps", Json::array({{{"x", 0}, {"y", 1}}})},
+                   {"rows", rows}});
+  for (const std::vector<const MatrixCell*>& group : ByScenario(cells)) {
+    parts.push_back(ScenarioPart(group));
+  }
+  return {{"format", kChartsFormat},
+          {"title", "Experiments with and without parts of the controller"},
+          {"description", ""},
+          {"text", WithoutTones(FormatMatrix(cells))},
+          {"parts", parts}};
 }
 
 }  // namespace poise

@@ -1,7 +1,8 @@
-// The results of `poise matrix`, as tables and as CSV.
+// The results of `poise matrix`, as tables, as CSV and as data of charts.
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,8 @@ struct MatrixCell {
   std::string paper_section;
   std::string variant;                 ///< empty: the scenario itself
   std::string ablation;                ///< name of one of Ablations()
+  std::string command;                 ///< makes it
+  std::string folder;                  ///< its run's, below the matrix'
   bool must_pass = false;              ///< an experiment without ablation, with checks of its own
   std::optional<std::string> problem;  ///< why it could not be run; the rest is then empty
   bool passed = false;
@@ -38,5 +41,9 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells);
 /// A line for each check of each cell, below a line with the columns' names (RFC 4180). A cell that
 /// could not be run has one line, without check.
 std::string MatrixCsv(const std::vector<MatrixCell>& cells);
+
+/// charts.json (docs/charts.md): what stands by scenario and ablation, then of each scenario the
+/// checks that have a figure of the paper.
+nlohmann::ordered_json MatrixCharts(const std::vector<MatrixCell>& cells);
 
 }  // namespace poise

@@ -75,7 +75,7 @@ void RemoveResults(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     const bool made = name == kResultsFile || name == "table.csv" || name == "limits.csv" ||
-                      name == "maps.html" || name.starts_with("map_");
+                      name == "charts.json" || name == "charts.html";
     if (made && entry.is_regular_file()) old.push_back(entry.path());
   }
   for (const fs::path& file : old) fs::remove(file);
@@ -143,7 +143,6 @@ void AddSweepOptions(CLI::App* app, SweepArguments* arguments, SessionOptions* s
       ->type_name("K/N")
       ->excludes(range);
   app->add_flag("--logs", session->logs, "keep each run's log and files in OUT/logs/POINT");
-  app->add_flag("--png", session->all_pictures, "every map as PNG, not only what stands");
   app->add_flag("--quiet", session->quiet, "no progress");
 }
 

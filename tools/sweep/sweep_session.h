@@ -32,7 +32,6 @@ struct SessionOptions {
   bool force = false;  ///< replace what `out` holds
   bool logs = false;
   bool quiet = false;
-  bool all_pictures = false;  ///< every map as PNG, too
 };
 
 /// Adds the options that `poise sweep` and `poise limit` share. Both structs must outlive the

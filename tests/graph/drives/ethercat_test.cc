@@ -103,7 +103,7 @@ TEST(Ethercat, ASweepIsOfTheRunsThatPoiseRunMakes) {
   EXPECT_EQ(rows[1].at("outcome"), "stands");
   EXPECT_GT(std::stod(rows[1].at("bus_frames_sent")), 0);
   EXPECT_TRUE(logging::CompareLogs(run + "/run.lcm", sweep + "/logs/1/run.lcm").equal());
-  EXPECT_NE(ReadAll(sweep + "/maps.html").find("--drives ethercat"), std::string::npos);
+  EXPECT_NE(ReadAll(sweep + "/charts.json").find("--drives ethercat"), std::string::npos);
 }
 
 TEST(Ethercat, RefusesWhatCannotBe) {

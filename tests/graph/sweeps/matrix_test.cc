@@ -75,6 +75,21 @@ TEST_F(MatrixTest, HasEveryCheckOfEveryRun) {
   EXPECT_EQ(cell.back().at("paper_value"), "60");
   EXPECT_EQ(ReadSummary(run)["ablations"], nlohmann::json::array({"--without balancing"}));
 
+  const nlohmann::json charts = nlohmann::json::parse(std::ifstream(out + "/charts.json"));
+  ASSERT_EQ(charts["parts"].size(), 3u);
+  const nlohmann::json& overview = charts["parts"][0];
+  EXPECT_EQ(overview["variables"][1]["choices"], nlohmann::json({"quiet", "pushed"}));
+  EXPECT_EQ(overview["rows"].size(), 10u);
+  const nlohmann::json& figures = charts["parts"][2];
+  EXPECT_EQ(figures["values"][0]["label"], "push, largest");
+  EXPECT_EQ(figures["values"][0]["paper"], 60);
+  ASSERT_EQ(figures["rows"].size(), 6u);
+  EXPECT_EQ(figures["rows"][5]["outcome"], "fell");
+  EXPECT_EQ(figures["rows"][1]["values"][0], std::stod(cell.back().at("measured")));
+  EXPECT_EQ(figures["rows"][1]["log"], "pushed/without_balancing");
+  EXPECT_NE(figures["rows"][1]["set"].get<std::string>().find(" --inline --without balancing"),
+            std::string::npos);
+
   EXPECT_NE(result.output.find("7.2  pushed: Two, \"quoted\"\n"), std::string::npos)
       << result.output;
   EXPECT_NE(result.output.find("without balancing  without redistribution  without transition  "

@@ -1,10 +1,8 @@
 // `poise sweep` and `poise limit`: the same table however it is made, and what is refused.
 #include <gtest/gtest.h>
-#include <png.h>
 #include <signal.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -96,7 +94,7 @@ TEST_F(SweepTest, ARowIsWhatTheRunByItselfGives) {
     }
   }
   EXPECT_GT(compared, 40) << run.output;
-  EXPECT_TRUE(ReadAll(fs::path(out) / "maps.html").ends_with("</html>\n"));
+  EXPECT_TRUE(ReadAll(fs::path(out) / "charts.html").ends_with("</html>\n"));
 }
 
 TEST_F(SweepTest, TheTableIsTheSameHoweverItIsMade) {
@@ -105,8 +103,8 @@ TEST_F(SweepTest, TheTableIsTheSameHoweverItIsMade) {
   ASSERT_FALSE(table.empty());
   Expect(0, {"sweep", "tiny", "--jobs", "4", "--out", Out("four")});
   EXPECT_EQ(Table(Out("four")), table);
-  EXPECT_EQ(ReadAll(fs::path(Out("four")) / "maps.html"),
-            ReadAll(fs::path(Out("one")) / "maps.html"));
+  EXPECT_EQ(ReadAll(fs::path(Out("four")) / "charts.json"),
+            ReadAll(fs::path(Out("one")) / "charts.json"));
   // In parts, the last one first.
   std::vector<std::string> merge = {"sweep", "merge", "--out", Out("merged")};
   for (const char* part : {"3/3", "2/3", "1/3"}) {
@@ -172,52 +170,17 @@ TEST_F(SweepTest, AnotherSweepsFolderIsRefused) {
   ExpectUsageError({"sweep", "merge", out, Out("other"), "--out", Out("both")}, {"another sweep"});
 }
 
-// A heat map of 2 x 2 runs on 560 x 440, drawn twice as large: the colours of the least and the
-// largest value, which is viridis from (68, 1, 84) to (253, 231, 37), and white outside.
-TEST_F(SweepTest, MapsAreThereAsPng) {
-  const std::string sweep =
-      Sweep("heat",
-            "scenario: \"pushed\" column: \"push_peak\"\n"
-            "vary { name: \"force\" field: \"sim.push[0].peak\" value: 20 value: 60 }\n"
-            "vary { field: \"seed\" value: 1 value: 2 }\n"
-            "map { x: \"force\" y: \"seed\" value: \"push_peak\" }\n");
-  Expect(0, {"sweep", sweep, "--out", Out("sweep")});
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  ASSERT_NE(png_image_begin_read_from_file(&image, (Out("sweep") + "/map_1.png").c_str()), 0)
-      << image.message;
-  image.format = PNG_FORMAT_RGB;
-  EXPECT_EQ(image.width, 1120u);
-  EXPECT_EQ(image.height, 880u);
-  std::vector<uint8_t> pixels(PNG_IMAGE_SIZE(image));
-  ASSERT_NE(png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr), 0) << image.message;
-  const auto at = [&](size_t x, size_t y) {
-    const uint8_t* const p = &pixels[3 * (y * 1120 + x)];
-    return std::array<int, 3>{p[0], p[1], p[2]};
-  };
-  const auto near = [](const std::array<int, 3>& a, const std::array<int, 3>& b) {
-    return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
-  };
-  EXPECT_LT(near(at(240, 200), {68, 1, 84}), 12);     // 20 N
-  EXPECT_LT(near(at(600, 200), {253, 231, 37}), 12);  // 60 N
-  EXPECT_EQ(at(4, 4), (std::array<int, 3>{255, 255, 255}));
-  EXPECT_FALSE(fs::exists(Out("sweep") + "/map_1.log"));
-}
-
-// Nobody asked for a curve of each metric.
-TEST_F(SweepTest, CurvesOfMetricsAreDrawnAsPngWhenAskedFor) {
-  const std::vector<std::string> sweep = {
-      "sweep", "pushed", "--vary", "sim.push[0].peak=20,40,60", "--column", "push_peak", "--out"};
-  const auto run = [&](std::vector<std::string> command, const std::vector<std::string>& more) {
-    command.insert(command.end(), more.begin(), more.end());
-    Expect(0, command);
-  };
-  run(sweep, {Out("some")});
-  EXPECT_TRUE(fs::exists(Out("some") + "/map_1.png"));
-  EXPECT_TRUE(fs::exists(Out("some") + "/map_2.svg"));
-  EXPECT_FALSE(fs::exists(Out("some") + "/map_2.png"));
-  run(sweep, {Out("all"), "--png"});
-  EXPECT_TRUE(fs::exists(Out("all") + "/map_2.png"));
+TEST_F(SweepTest, ASecondSweepIsLaidOverTheFirst) {
+  for (const char* out : {"a", "b"}) {
+    Expect(0, {"sweep", "pushed", "--vary", "sim.push[0].peak=20,40", "--logs", "--out", Out(out)});
+  }
+  const nlohmann::json charts = nlohmann::json::parse(ReadAll(Out("a") + "/charts.json"));
+  EXPECT_EQ(charts["parts"][0]["rows"][1]["log"], "logs/1");
+  EXPECT_TRUE(fs::is_directory(fs::path(Out("a")) / "logs/1"));
+  Expect(0, {"report", Out("a"), Out("b"), "--html", Out("a") + "/both.html"});
+  const std::string page = ReadAll(Out("a") + "/both.html");
+  EXPECT_NE(page.find("\"folder\":\".\""), std::string::npos);
+  EXPECT_NE(page.find("\"folder\":\"../b\""), std::string::npos);
 }
 
 TEST_F(SweepTest, AFallNamesTheStepThatItWouldHaveTaken) {

@@ -1,4 +1,4 @@
-// What a sweep's variables and metrics are called in maps: words and units instead of paths.
+// What a sweep's variables and metrics are called in charts: words and units instead of paths.
 #pragma once
 
 #include <string>

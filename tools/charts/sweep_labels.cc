@@ -1,4 +1,4 @@
-#include "tools/maps/sweep_labels.h"
+#include "tools/charts/sweep_labels.h"
 
 #include <algorithm>
 #include <regex>

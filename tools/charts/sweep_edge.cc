@@ -1,4 +1,4 @@
-#include "tools/maps/sweep_edge.h"
+#include "tools/charts/sweep_edge.h"
 
 #include <algorithm>
 #include <map>
@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "fmt/format.h"
+#include "tools/charts/sweep_labels.h"
 #include "tools/cli/text_table.h"
-#include "tools/maps/sweep_labels.h"
 #include "tools/sweep/sweep_points.h"
 #include "tools/sweep/sweep_table.h"
 
