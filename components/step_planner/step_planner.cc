@@ -126,7 +126,7 @@ bool StepPlanner::Archive(StateArchive* archive) {
   for (ContactLoss& loss : contact_loss_) loss.Archive(archive);
   step_.Archive(archive);
   references_.Archive(archive);
-  archive->Show(in_contact_, last_controlled_, stands_otherwise_, untilted_, was_free_);
+  archive->Show(in_contact_, last_controlled_, owner_, untilted_, was_free_);
   recovery_.Archive(archive);
   walk_.Archive(archive);
   footstep_report_.Archive(archive);
@@ -155,10 +155,11 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STAND:
       if (!walks_ && !recovers_) return answer_t::VERDICT_NOT_ABLE;
-      if (recovers_ && !walk_.active()) {
+      if (recovers_ && owner_ != FeetOwner::kWalk) {
         const bool stands = Count(in_contact_) == 2 && last_controlled_;
-        if (!walks_ && (!stands || recovery_.active())) return answer_t::VERDICT_NOT_NOW;
-        if (stands && !recovery_.active()) recovery_.BringTogether();
+        const bool rests = stands && owner_ != FeetOwner::kRecovery;
+        if (!walks_ && !rests) return answer_t::VERDICT_NOT_NOW;
+        if (rests) recovery_.BringTogether();
       }
       operator_walk_ = {.given = true};
       return answer_t::VERDICT_DONE;
@@ -166,7 +167,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       if (!walks_) return answer_t::VERDICT_NOT_ABLE;
       if (act.foot >= static_cast<int>(kFeet.size())) return answer_t::VERDICT_UNKNOWN;
       const bool stands = Count(in_contact_) == 2 && last_controlled_;
-      if (!stands || walk_.active() || recovery_.active()) return answer_t::VERDICT_NOT_NOW;
+      if (!stands || Steps() != nullptr) return answer_t::VERDICT_NOT_NOW;
       operator_walk_ = {.given = true, .one_step = true, .steps_before = walk_.num_steps()};
       // Walking begins with the foot of the side that it goes to.
       if (robot::FootAt(act.foot) == Foot::kLeft) operator_walk_.velocity[1] = kLeftFirst;
@@ -201,7 +202,8 @@ int8_t StepPlanner::Plan(double time) {
   }
   whole_body_->UpdateDynamics(state_);
   const ScheduleInput observed = Observe(time, load);
-  if (Step(time, load)) {
+  LeadFeet(time, load);
+  if (Held()) {
     schedule_->Hold(time);
   } else if (schedule_->Advance(observed).phase_began) {
     BeginPhase(time);
@@ -234,16 +236,34 @@ double StepPlanner::LoadDeviation(Foot foot) const {
              : 0;
 }
 
-bool StepPlanner::Step(double time, const robot::FootArray<double>& load) {
-  if (!recovers_ && !walks_) return false;
+void StepPlanner::LeadFeet(double time, const robot::FootArray<double>& load) {
+  if (!recovers_ && !walks_) return;
   const stepping::StepInput input = SeeSteps(time, load);
-  if (recovers_ && (!walk_.active() || walk_.Lost(input)) && Recover(input)) {
-    // Where the walk has turned it.
-    if (walk_.active()) generator_->HoldBody(untilted_);
+  if (recovers_ && (owner_ != FeetOwner::kWalk || walk_.Lost(input)) && recovery_.Update(input)) {
+    HandOver(FeetOwner::kRecovery, time);
     walk_.Stop(time);
-    return true;
+  } else if (walks_ && walk_.Update(input, WalkCommandAt(time))) {
+    HandOver(FeetOwner::kWalk, time);
+  } else if (const stepping::StepOutput* last = Steps(); last != nullptr) {
+    const bool as_planned = ContactsOf(schedule_->phase().support()) == last->in_contact;
+    HandOver(as_planned ? FeetOwner::kPhases : FeetOwner::kStance, time);
   }
-  return (walks_ && WalkOn(input)) || stands_otherwise_;
+  const stepping::StepOutput* const steps = Steps();
+  if (steps == nullptr) return;
+  in_contact_ = steps->in_contact;
+  for (ContactLoss& loss : contact_loss_) loss.Reset();
+}
+
+void StepPlanner::HandOver(FeetOwner to, double time) {
+  const FeetOwner from = owner_;
+  if (from == to) return;
+  // A recovery goes on from where it takes the feet out of a walk.
+  const bool ends =
+      from == FeetOwner::kRecovery || (from == FeetOwner::kWalk && to != FeetOwner::kRecovery);
+  if (ends) EndSteps(*Steps(), time);
+  // The body stays where the walk has turned it.
+  if (from == FeetOwner::kWalk) generator_->HoldBody(untilted_);
+  owner_ = to;
 }
 
 stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<double>& load) {
@@ -276,36 +296,20 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
 }
 
 const stepping::StepOutput* StepPlanner::Steps() const {
-  return recovery_.active() ? &recovery_.output() : walk_.active() ? &walk_.output() : nullptr;
-}
-
-bool StepPlanner::Recover(const stepping::StepInput& input) {
-  const bool was_active = recovery_.active();
-  const bool acts = recovery_.Update(input);
-  if (acts) TakeContacts(recovery_.output());
-  if (was_active && !acts) EndSteps(recovery_.output(), input.time);
-  return acts;
-}
-
-bool StepPlanner::WalkOn(const stepping::StepInput& input) {
-  const bool was_active = walk_.active();
-  const bool acts = walk_.Update(input, WalkCommandAt(input.time));
-  if (acts) TakeContacts(walk_.output());
-  if (was_active && !acts) {
-    EndSteps(walk_.output(), input.time);
-    generator_->HoldBody(untilted_);
+  switch (owner_) {
+    case FeetOwner::kRecovery:
+      return &recovery_.output();
+    case FeetOwner::kWalk:
+      return &walk_.output();
+    case FeetOwner::kPhases:
+    case FeetOwner::kStance:
+      break;
   }
-  return acts;
-}
-
-void StepPlanner::TakeContacts(const stepping::StepOutput& steps) {
-  in_contact_ = steps.in_contact;
-  for (ContactLoss& loss : contact_loss_) loss.Reset();
+  return nullptr;
 }
 
 void StepPlanner::EndSteps(const stepping::StepOutput& steps, double time) {
   in_contact_ = steps.in_contact;
-  stands_otherwise_ = ContactsOf(schedule_->phase().support()) != in_contact_;
   const EstimatedPose estimate = Estimate();
   Eigen::Vector3d rest =
       0.5 * (estimate.sole[Foot::kRight].translation() + estimate.sole[Foot::kLeft].translation());
@@ -362,15 +366,15 @@ void StepPlanner::Report(double time, const Capture& capture) {
                          .landing = landing_};
   ReportPhase(view, time, plan);
   ReportFeet(view, data, plan);
-  ReportReferences(view, data, estimate, references_,
-                   !schedule_->phase().gravity_compensation(), plan);
+  ReportReferences(view, data, estimate, references_, !schedule_->phase().gravity_compensation(),
+                   plan);
   const balance::ConvexPolygon soles =
       capture.known ? Soles(capture.frame_o, sole_) : balance::ConvexPolygon();
   if (soles.num_corners > 0) {
     ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_, plan);
   }
   if (recovers_) ReportStepping(recovery_, time, estimate.sole, plan);
-  if (walks_ && !recovery_.active()) ReportWalking(walk_, time, estimate.sole, plan);
+  if (walks_ && owner_ != FeetOwner::kRecovery) ReportWalking(walk_, time, estimate.sole, plan);
   plan->num_steps = recovery_.num_steps() + walk_.num_begun();
   if (!recovers_ && !walks_) return;
   const FootstepInput input{
@@ -413,7 +417,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
       references_.foot[f] = steps->swing;
       references_.foot_rotation[f] = steps->swing_rotation;
     }
-    if (walk_.active()) TurnBody();
+    if (owner_ == FeetOwner::kWalk) TurnBody();
     untilted_ = references_.body.rotation;
     if (hip_strategy_->enabled()) TiltBody(time, capture);
     return;

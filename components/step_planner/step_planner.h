@@ -26,6 +26,18 @@
 
 namespace poise {
 
+/// Who moves the feet in a tick.
+///
+/// | from           | to       | when |
+/// |----------------|----------|------|
+/// | phases, stance | recovery | a push needs a step, or the feet are to be put side by side |
+/// | phases, stance | walk     | it is told to walk |
+/// | walk           | recovery | on one foot the capture point has left the stance sole |
+/// | recovery       | walk     | at rest, and told to walk |
+/// | recovery, walk | phases   | at rest on the feet that the phase stands on |
+/// | recovery, walk | stance   | at rest on both feet, where the phase stands on one |
+enum class FeetOwner { kPhases, kRecovery, kWalk, kStance };
+
 /// ROBOT_STATE -> SUPPORT_PLAN, and FOOTSTEPS where it makes steps. When a state is invalid the
 /// plan of the last good tick is sent again with the status set.
 class StepPlanner : public Component, public Operated {
@@ -54,20 +66,16 @@ class StepPlanner : public Component, public Operated {
   ScheduleInput Observe(double time, const robot::FootArray<double>& load);
   /// N, standard deviation of an observed load; 0 of a measured one.
   double LoadDeviation(robot::Foot foot) const;
-  /// The tick of what leads in place of the schedule; false: the schedule goes on.
-  bool Step(double time, const robot::FootArray<double>& load);
+  /// The tick of recovery and walk, and who owns the feet in it.
+  void LeadFeet(double time, const robot::FootArray<double>& load);
+  void HandOver(FeetOwner to, double time);
   stepping::StepInput SeeSteps(double time, const robot::FootArray<double>& load);
-  /// The recovery's tick; false: it does not act, and the schedule goes on.
-  bool Recover(const stepping::StepInput& input);
-  /// The same of walking.
-  bool WalkOn(const stepping::StepInput& input);
   /// What leads COM and feet in place of the schedule; null: nothing does.
   const stepping::StepOutput* Steps() const;
-  void TakeContacts(const stepping::StepOutput& steps);
   /// References from where `steps` have left the robot.
   void EndSteps(const stepping::StepOutput& steps, double time);
-  /// The schedule is held, by steps or because the robot stands otherwise than it says.
-  bool Held() const { return Steps() != nullptr || stands_otherwise_; }
+  /// The schedule waits.
+  bool Held() const { return owner_ != FeetOwner::kPhases; }
   /// The body's heading follows the feet.
   void TurnBody();
   /// Contacts, references and landings of a phase's first tick.
@@ -119,7 +127,7 @@ class StepPlanner : public Component, public Operated {
     int32_t steps_before = 0;
     double velocity[3] = {0, 0, 0};  // m/s ahead, m/s to the left, rad/s
   } operator_walk_;
-  bool stands_otherwise_ = false;  // on both feet after steps, where the phase is on one
+  FeetOwner owner_ = FeetOwner::kPhases;
   // A foot that a phase put down may stand on ground that gives way: its sole is not followed.
   bool was_free_ = false;
   References references_;
