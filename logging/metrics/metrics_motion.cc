@@ -11,7 +11,7 @@ namespace {
 
 /// False while the COM follows a centre of pressure.
 bool HasComReference(const support_plan_t& plan, int axis) {
-  return std::isfinite(plan.com_reference.position[axis]);
+  return axis == 2 || plan.com_follows == support_plan_t::FOLLOWS_REFERENCE;
 }
 
 Answer ComMotion(const RunRecord& run) {

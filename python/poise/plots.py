@@ -35,6 +35,8 @@ def com_error(run, axes=None):
     truth, plan = run["GROUND_TRUTH"], run["SUPPORT_PLAN"]
     _, i, j = np.intersect1d(truth.tick, plan.tick, return_indices=True)
     error = 1e3 * (truth.com_position[i] - plan["com_reference.position"][j])
+    # In steps a centre of pressure is followed, and the COM has no reference.
+    error[plan.com_follows[j] != 0, :2] = np.nan
     figure, axes = _axes(axes)
     for k, name in enumerate(("forward", "lateral", "vertical")):
         axes[0].plot(truth.time[i], error[:, k], label=name)

@@ -63,6 +63,9 @@ function measuredCop(run, axis, least) {
 
 const relative = ([values], i, memory) => values[i] - firstNumber(memory, values[i]);
 
+/** In x and y the COM has a reference where it follows no centre of pressure; a run of old has no such field. */
+const hasReference = (follows, axis) => axis === 2 || !(follows > 0);
+
 function comSignals() {
   return AXES.flatMap((axis, i) => [
     {name: `com_motion_${axis}`, unit: 'm', text: 'estimated COM from where it was first',
@@ -70,11 +73,16 @@ function comSignals() {
     {name: `com_motion_true_${axis}`, unit: 'm', text: 'true COM from where it was first',
       deps: [['ground_truth_t', `com_position[${i}]`]], compute: relative},
     {name: `com_motion_desired_${axis}`, unit: 'm', text: 'desired COM from where the estimated one was first',
-      deps: [['support_plan_t', `com_reference.position[${i}]`], ['support_plan_t', `com_position[${i}]`]],
-      compute: ([desired, estimated], k, memory) => desired[k] - firstNumber(memory, estimated[k])},
+      deps: [['support_plan_t', `com_reference.position[${i}]`], ['support_plan_t', `com_position[${i}]`],
+        ['support_plan_t', 'com_follows']],
+      compute: ([desired, estimated, follows], k, memory) => {
+        const first = firstNumber(memory, estimated[k]);
+        return hasReference(follows[k], i) ? desired[k] - first : NaN;
+      }},
     {name: `com_error_${axis}`, unit: 'm', text: 'estimated COM less desired',
-      deps: [['support_plan_t', `com_position[${i}]`], ['support_plan_t', `com_reference.position[${i}]`]],
-      compute: pointwise(([a, b]) => a - b)},
+      deps: [['support_plan_t', `com_position[${i}]`], ['support_plan_t', `com_reference.position[${i}]`],
+        ['support_plan_t', 'com_follows']],
+      compute: pointwise(([a, b, follows]) => hasReference(follows, i) ? a - b : NaN)},
   ]);
 }
 

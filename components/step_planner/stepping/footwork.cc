@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace poise::stepping {
 namespace {
@@ -58,10 +57,9 @@ PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
                       const Eigen::Vector3d& cop) {
   const double rate =
       (robot::kGravity + height.acceleration) / std::max(input.com.z() - cop.z(), kLeastHeight);
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   PointMotion com;
-  com.position << kNone, kNone, height.position;
-  com.velocity << kNone, kNone, height.velocity;
+  com.position << input.com.head<2>(), height.position;
+  com.velocity << input.com_velocity.head<2>(), height.velocity;
   com.acceleration << rate * (input.com.head<2>() - cop.head<2>()), height.acceleration;
   return com;
 }

@@ -75,8 +75,8 @@ class HeightLead {
 };
 
 /// Leads the COM by the centre of pressure `cop`, m, world, on the ground: in x and y it has the
-/// pendulum's acceleration (g + z̈)/(z − ground) (c − p), and neither position nor velocity, which
-/// are NaN; in z it follows `height`.
+/// pendulum's acceleration (g + z̈)/(z − ground) (c − p), and neither position nor velocity to
+/// follow: they are the COM's own; in z it follows `height`.
 PointMotion LeadByCop(const StepInput& input, const Quintic::Point& height,
                       const Eigen::Vector3d& cop);
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "components/messages/robot_resource.h"
+#include "hw_bridge/ethercat/ethercat_bus_type.h"
 #include "hw_bridge/unitree/crc.h"
 #include "hw_bridge/unitree/motor_slots.h"
 #include "hw_bridge/unitree/unitree_bus_type.h"
@@ -103,10 +104,11 @@ class RobotRig : public BridgeBench {
       // Off their range's end.
       if (model->joints()[j].name.find("knee") != std::string::npos) motor.q = 0.6F;
     }
+    const auto open = [this](const unitree::DdsLink&) {
+      return std::make_unique<MemoryRobotLink>(&robot);
+    };
     bridge = std::make_unique<HwBridge>(
-        &signal, std::vector{unitree::UnitreeBusType([this](const unitree::DdsLink&) {
-          return std::make_unique<MemoryRobotLink>(&robot);
-        })});
+        &signal, std::vector{unitree::UnitreeBusType(open), ethercat::EthercatBusType()});
     Configure(context, kMotors);
   }
 
