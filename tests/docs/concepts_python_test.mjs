@@ -1,4 +1,5 @@
-// What the pages of docs/concepts show in Python runs: the blocks of a page, one after the other, in one process.
+// What the pages of docs/concepts show in Python runs: the blocks of a page, one after the other, in one process. The moving
+// picture of a short run is what animate.py draws of the run of today.
 // Usage: node concepts_python_test.mjs --python PROGRAM, with the module poise on PYTHONPATH
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -29,3 +30,11 @@ for (const page of repositoryFiles('docs/concepts').filter((f) => f.endsWith('.m
     }
   });
 }
+
+test('the moving picture of a push is what animate.py draws', () => {
+  const script = join(root, 'docs/concepts/pictures/animate.py');
+  const {status, stderr} = spawnSync(options.python, [script, '--check', 'push'], {
+    encoding: 'utf8', timeout: LIMIT,
+    env: {...process.env, PYTHONDONTWRITEBYTECODE: '1', POISE_DEPLOY_DIR: join(root, 'deploy')}});
+  assert.equal(status, 0, `${stderr}\nRun docs/concepts/pictures/animate.py, and commit what it has written.`);
+});
