@@ -8,6 +8,7 @@
 The true state of the simulated robot moves the links, through poise.Robot; the controller's messages give the rest.
 """
 import os
+import re
 import sys
 from collections import namedtuple
 
@@ -29,8 +30,9 @@ FORCE = 0.16  # pixels a newton, of the ground's forces
 TRUNK = (0.12, 0.18, -0.1, 0.48)  # m, of the root link: half its depth and width, its lower and upper end
 
 # scenario, changes: of poise.run. start, end: s of the run. speed: s of the run in a second of the picture.
-# view: "behind" or "side", whence one sees the robot. marks: those of MARKS, drawn in this order.
-Animation = namedtuple("Animation", "name title scenario changes start end speed view marks")
+# view: "behind" or "side", whence one sees the robot. height: m above the floor that are shown.
+# marks: those of MARKS, drawn in this order.
+Animation = namedtuple("Animation", "name title scenario changes start end speed view height marks")
 
 
 def rotation(w, x, y, z):
@@ -75,7 +77,7 @@ class Scene:
         across, up = (0, 1) if animation.view == "side" else (1, 0)
         size = high - low
         self.scale = min((PLAN[1] - PLAN[0] - 20) / size[across], (FLOOR - TOP - 20) / size[up], 560)
-        self.figure_scale = min(156, (FIGURE[1] - FIGURE[0]) / (size[across] + 0.3))
+        self.figure_scale = min((FLOOR - TOP + 10) / animation.height, (FIGURE[1] - FIGURE[0]) / (size[across] + 0.1))
 
     def figure(self, world):
         """Pixels of points (..., 3): seen from behind the left is left; from the robot's right, ahead is right."""
@@ -242,19 +244,22 @@ def landing(scene):
 
 
 def block(scene):
-    """The block below the left foot, at rest, from the scenario's figures."""
-    x, y, length, width, height = (scene.run.scenario[f"sim.block.{name}"] for name in ("x", "y", "length", "width", "height"))
-    corners = np.array([[[x, y + width / 2, height], [x, y - width / 2, height], [x, y - width / 2, 0], [x, y + width / 2, 0]]])
-    scene.line(scene.figure(corners), "ff", close=True)
+    """The block below the left foot as the scenario has it, unloaded."""
+    text = re.search(r"\bblock \{(.*?)\}", scene.run.scenario, re.DOTALL)[1]
+    y, width, height = (float(re.search(rf"\b{name}: (\S+)", text)[1]) for name in ("y", "width", "height"))
+    sides = [[0, y + width / 2, 0], [0, y + width / 2, height], [0, y - width / 2, height], [0, y - width / 2, 0]]
+    scene.line(scene.figure(np.array([sides])), "ff", close=True)
 
 
 MARKS = {mark.__name__: mark for mark in (com, forces, push, region, balancing, feet, landing, block)}
 
 ANIMATIONS = (
-    Animation("push", "Pushed from the right: the robot sways and stands", "push_double_support", {}, 0.3, 2.3, 0.4, "behind",
+    Animation("push", "Pushed from the right: the robot sways and stands", "push_double_support", {}, 0.3, 2.3, 0.4, "behind", 1.4,
               "region balancing com forces push"),
     Animation("shared_load", "The load goes from foot to foot, and the robot stands still", "gravity_compensation",
-              {"duration": 13}, 7, 12, 1, "behind", "feet com forces"),
+              {"duration": 13}, 7, 12, 1, "behind", 1.4, "feet com forces"),
+    Animation("unknown_ground", "The left foot comes down onto a soft block, lower than it was told", "unknown_surface",
+              {"changes": {"sim.block.height": 0.06}, "duration": 32}, 24, 32, 1.6, "behind", 0.45, "block feet com forces landing"),
 )
 
 
@@ -266,8 +271,10 @@ def animation(what):
     scene.robot_lines()
     spans = [span for mark in what.marks.split() for span in MARKS[mark](scene) or []]
     where = "from its right" if what.view == "side" else "from behind"
-    slower = "" if what.speed == 1 else f", slowed {1 / what.speed:g} times"
-    scene.picture.text(sum(FIGURE) / 2, 24, where + slower, "s", "middle")
+    scene.picture.box(0, 0, sum(FIGURE), TOP - 10, "bg", 8)  # the rest of the robot is beyond the picture's edge
+    slowed, hurried = f", slowed {1 / what.speed:g} times", f", {what.speed:g} times as fast"
+    pace = slowed if what.speed < 1 else hurried if what.speed > 1 else ""
+    scene.picture.text(sum(FIGURE) / 2, 24, where + pace, "s", "middle")
     scene.picture.text(sum(PLAN) / 2, 24, "soles from above", "s", "middle")
     x = PLAN[0]
     for text, style in scene.legend:
