@@ -280,7 +280,7 @@ def animation(what):
     for text, style in scene.legend:
         scene.picture.dot(x, FLOOR + 14, style)
         scene.picture.text(x + 8, FLOOR + 18, text, "s")
-        x += 24 + 6 * len(text)
+        x += 28 + 6 * len(text)
     scene.clock(spans)
     return scene.picture
 
