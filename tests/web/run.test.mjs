@@ -431,7 +431,7 @@ const settled = async (condition) => { while (!condition()) await new Promise((d
 
 test('a page begins with what is new, and what was before comes behind it', async (t) => {
   const run = makeRun('', {}, 0, {keep: 2000});
-  const error = run.signals.get('derived.com_error_y');
+  const error = run.signals.get('derived.com_error_z');
   await error.load();
   // The server holds ticks from 100 on, and gives 50 at a time.
   const {feed, come, text, asked} = fakeFeed(t, run, (before) => {
