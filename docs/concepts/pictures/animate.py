@@ -236,6 +236,23 @@ def feet(scene):
     scene.legend.append(("CoP of a foot", "fb"))
 
 
+def capture(scene):
+    """The capture point, and the centre of pressure of both feet, measured."""
+    total, moment = 1e-9, 0
+    for foot, placed in enumerate(scene.feet):
+        place, force = (values[scene.ticks] for values in centre(scene.truth.foot_wrench, foot))
+        load = np.maximum(force[:, 2:], 0)
+        total, moment = total + load, moment + load * placed.points(place[:, None])[:, 0]
+    scene.dot(scene.plan(moment / total), "fb")
+    scene.dot(scene.plan(scene.support.capture_point[scene.ticks]), "fa")
+    scene.legend += [("capture point", "fa"), ("CoP", "fb")]
+
+
+def stepping(scene):
+    """When the planner has a foot on its way."""
+    return scene.spans(scene.support.stepping == 2, "a foot swings", "c")
+
+
 def landing(scene):
     """What the planner makes of the left foot."""
     state = scene.support.foot_state[:, 1]
@@ -251,13 +268,17 @@ def block(scene):
     scene.line(scene.figure(np.array([sides])), "ff", close=True)
 
 
-MARKS = {mark.__name__: mark for mark in (com, forces, push, region, balancing, feet, landing, block)}
+MARKS = {mark.__name__: mark for mark in (com, forces, push, region, balancing, feet, capture, stepping, landing, block)}
 
 ANIMATIONS = (
     Animation("push", "Pushed from the right: the robot sways and stands", "push_double_support", {}, 0.3, 2.3, 0.4, "behind", 1.4,
               "region balancing com forces push"),
     Animation("shared_load", "The load goes from foot to foot, and the robot stands still", "gravity_compensation",
               {"duration": 13}, 7, 12, 1, "behind", 1.4, "feet com forces"),
+    Animation("step", "Pushed ahead, too hard to stand: a step catches the robot", "push_double_support",
+              {"variant": "step", "duration": 3}, 0.3, 2.3, 0.4, "side", 1.4, "com capture forces push stepping"),
+    Animation("walk", "Walking ahead: capture point and centre of pressure from foot to foot", "walk", {"duration": 8},
+              2, 7, 1, "side", 1.4, "com capture forces stepping"),
     Animation("unknown_ground", "The left foot comes down onto a soft block, lower than it was told", "unknown_surface",
               {"changes": {"sim.block.height": 0.06}, "duration": 32}, 24, 32, 1.6, "behind", 0.45, "block feet com forces landing"),
 )
