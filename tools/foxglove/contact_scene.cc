@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// As on the page of a run (web/src/scene.js).
+// As on the page of a run (web/src/picture/scene.js).
 constexpr SceneColor kComputed{0.26, 0.50, 0.95}, kMeasured{0.95, 0.95, 0.95};
 constexpr SceneColor kPush{0.95, 0.40, 0.10}, kOutline{0.50, 0.58, 0.70};
 constexpr SceneColor kRegion{0.92, 0.20, 0.20}, kCapture{0.90, 0.78, 0.20};

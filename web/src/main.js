@@ -16,7 +16,7 @@ import {Player} from './player.js';
 import {PanelGrid, TimeView} from './plots.js';
 import {Printer} from './print.js';
 import {robotPage} from './robot_page.js';
-import {COLORS, SceneView} from './scene.js';
+import {COLORS, SceneView} from './picture/scene.js';
 import {signalSearch} from './search.js';
 import {EventList, Readout, storyText} from './side.js';
 import {TRACE} from './steps_view.js';

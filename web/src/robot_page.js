@@ -2,13 +2,13 @@
 import {AxesHelper, Group, Quaternion, Vector3} from 'three';
 import {element, shape, table} from './dom.js';
 import {saveNamed} from './export.js';
-import {Arrow, Label, Outline, mark} from './markers.js';
+import {Arrow, Label, Outline, mark} from './picture/markers.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';
 import {place} from './robot_view.js';
 import {FOOT_COLORS} from './steps_view.js';
 import {formatNumber} from './units.js';
-import {VIEWS, View3D} from './view3d.js';
+import {VIEWS, View3D} from './picture/view3d.js';
 
 const FRAME = 0.06;  // m, of a drawn frame's axes
 const AXIS = 0.09;   // m, of a drawn joint axis

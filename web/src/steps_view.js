@@ -4,7 +4,7 @@ import {
   Vector3,
 } from 'three';
 import {apart, Footprints, PLANNED, REGIONS, plannedAt, plannedSignals, regionsAt} from './footsteps.js';
-import {LABEL, Label, Outline} from './markers.js';
+import {LABEL, Label, Outline} from './picture/markers.js';
 import {isDark} from './palette.js';
 import {Samples, vector} from './samples.js';
 import {add, rotate} from './spatial.js';

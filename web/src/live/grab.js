@@ -2,9 +2,9 @@
 import {Plane, Raycaster, Vector2, Vector3} from 'three';
 import {springForce} from './control.js';
 import {element} from '../dom.js';
-import {Arrow} from '../markers.js';
+import {Arrow} from '../picture/markers.js';
 import {formatForce} from '../units.js';
-import {COLORS} from '../scene.js';
+import {COLORS} from '../picture/scene.js';
 import {isDark} from '../palette.js';
 
 const METRES_PER_NEWTON = 1 / 600;

@@ -4,8 +4,8 @@ import {
   LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, PerspectiveCamera, Scene, Vector3, WebGLRenderer,
 } from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
-import {isDark} from './palette.js';
-import {RobotView} from './robot_view.js';
+import {isDark} from '../palette.js';
+import {RobotView} from '../robot_view.js';
 
 const FILL = 1.22;  // of the picture's height that the robot may take, as its inverse
 const FINEST = Math.min(2, globalThis.devicePixelRatio);  // pixels of the picture per CSS pixel

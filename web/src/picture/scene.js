@@ -1,15 +1,15 @@
 // The robot in 3D with contact wrenches, centre of pressure and push; from above in the corner.
 import {Color, Group, Mesh, MeshBasicMaterial, OrthographicCamera, SphereGeometry, Vector3} from 'three';
 import {CraneView} from './crane.js';
-import {lightLoad} from './derived.js';
-import {element} from './dom.js';
+import {lightLoad} from '../derived.js';
+import {element} from '../dom.js';
 import {GroundBlocks} from './ground.js';
 import {Arrow, Block, mark, Outline} from './markers.js';
-import {RobotView, place} from './robot_view.js';
-import {isDark} from './palette.js';
-import {Samples, pose, vector} from './samples.js';
-import {add, blockRise, convexHull, rotate} from './spatial.js';
-import {StepsView} from './steps_view.js';
+import {RobotView, place} from '../robot_view.js';
+import {isDark} from '../palette.js';
+import {Samples, pose, vector} from '../samples.js';
+import {add, blockRise, convexHull, rotate} from '../spatial.js';
+import {StepsView} from '../steps_view.js';
 import {GRID, PIECE, View3D} from './view3d.js';
 
 const METRES_PER_NEWTON = 1 / 900;

@@ -4,7 +4,7 @@ import {
   Line, LineDashedMaterial, LineLoop, LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, RingGeometry, SRGBColorSpace,
   Sprite, SpriteMaterial, Vector3,
 } from 'three';
-import {BLOCK_CORNERS, blockTop} from './spatial.js';
+import {BLOCK_CORNERS, blockTop} from '../spatial.js';
 
 const UP = new Vector3(0, 1, 0);
 const OVERLAY_ORDER = 10;
