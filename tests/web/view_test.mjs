@@ -206,13 +206,12 @@ test('a page that loses its server goes on with the next one where it was', asyn
   await until(page, () => window.poise.feed.state === 'live');
   await more(page);
   // What came between the two is a gap, and what was there has stayed.
+  await until(page, () => !Number.isNaN([...window.poise.run.signals.get('ROBOT_STATE.utime').values].at(-1)));
   // Read together: what was before the page's beginning may still come.
   const [first, values] = await page.evaluate(() => [window.poise.run.firstTick,
     [...window.poise.run.signals.get('ROBOT_STATE.utime').values]]);
   values.forEach((utime, row) => assert.ok(Number.isNaN(utime) || utime === 2000 * (first + row), `${utime} in row ${row}`));
   assert.ok(values.slice(0, ticks).some((x) => !Number.isNaN(x)));
-  // A single tick of a run in real time may be lost on a busy machine, the last one too.
-  assert.ok(values.slice(-20).some((x) => !Number.isNaN(x)));
   await page.context().close();
   await run.stop();
   await next.stop();
