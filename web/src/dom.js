@@ -38,9 +38,30 @@ export function table(caption, columns, rows, {numbers = []} = {}) {
         element('td', {class: numbers.includes(i) ? 'number' : null}, cell))))))));
 }
 
+const PNG_PIXELS = 2;  // for each of a picture's units: sharp in print
+
+/** The SVG `text` of `width` by `height` as PNG, on `paper` where it is clear. */
+export async function pngOf(text, width, height, paper) {
+  const image = Object.assign(new Image(width, height), {src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`});
+  await image.decode();
+  const canvas = element('canvas', {width: Math.round(PNG_PIXELS * width), height: Math.round(PNG_PIXELS * height)});
+  const context = canvas.getContext('2d');
+  context.fillStyle = paper;
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.drawImage(image, 0, 0, canvas.width, canvas.height);
+  return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
+    : failed(new Error('the browser cannot write this picture as PNG')), 'image/png'));
+}
+
 /** Gives the browser a file to save. */
 export function saveFile(name, blob) {
   const url = URL.createObjectURL(blob);
   element('a', {href: url, download: name}).click();
   setTimeout(() => URL.revokeObjectURL(url), 10000);
+}
+
+/** Gives the browser a file, called after what it shows. */
+export function saveNamed(what, ending, blob) {
+  const name = what.toLowerCase().normalize('NFKD').replace(/[^a-z0-9.]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
+  saveFile(`${name || 'plot'}.${ending}`, blob);
 }

@@ -1,12 +1,11 @@
 // A plot as a file.
-import {element, saveFile, shape} from './dom.js';
+import {pngOf, shape} from './dom.js';
 import {changesOf} from './figures.js';
 import {cssColor, styleOf} from './palette.js';
 
 const MARGIN = 12, LINE = 18;      // units of the picture, as all below
 const WIDTH = 900, HEIGHT = 300;   // of the picture, and of its plot
 const AXIS = {left: 66, below: 34};
-const PIXELS = 2;                  // of a PNG, for each unit
 const SWATCH = 28;
 
 /** RFC 4180. */
@@ -132,20 +131,7 @@ function sourceOf(svg) {
 
 export const svgFile = (svg) => new Blob([sourceOf(svg)], {type: 'image/svg+xml'});
 
-export async function pngFile(svg) {
-  const image = Object.assign(new Image(), {src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(sourceOf(svg))}`});
-  await image.decode();
-  const canvas = element('canvas', {width: PIXELS * image.width, height: PIXELS * image.height});
-  const context = canvas.getContext('2d');
-  context.fillStyle = cssColor('--panel');
-  context.fillRect(0, 0, canvas.width, canvas.height);
-  context.drawImage(image, 0, 0, canvas.width, canvas.height);
-  return new Promise((done, failed) => canvas.toBlob((blob) => blob ? done(blob)
-    : failed(new Error('the browser cannot write this picture as PNG')), 'image/png'));
-}
-
-/** Gives the browser a file, called after what it shows. */
-export function saveNamed(what, ending, blob) {
-  const name = what.toLowerCase().normalize('NFKD').replace(/[^a-z0-9.]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
-  saveFile(`${name || 'plot'}.${ending}`, blob);
+export function pngFile(svg) {
+  const {width, height} = svg.viewBox.baseVal;
+  return pngOf(sourceOf(svg), width, height, cssColor('--panel'));
 }

@@ -1,7 +1,7 @@
 // Plots over time: one zoom and one time cursor for all of them.
 import uPlot from 'uplot';
-import {element, shape} from './dom.js';
-import {csvOf, pngFile, saveNamed, svgFile, svgOf} from './export.js';
+import {element, saveNamed, shape} from './dom.js';
+import {csvOf, pngFile, svgFile, svgOf} from './export.js';
 import {findSignal} from './figures.js';
 import {cssColor, onThemeChange, styleOf} from './palette.js';
 import {formatNumber, leastSpan, limitedEnd, paddedRange, quantity, scaled} from './units.js';

@@ -1,7 +1,6 @@
 // The page of `poise robot check`: a robot standing, with its frames, joint axes and soles, and what was found of it.
 import {AxesHelper, Group, Quaternion, Vector3} from 'three';
-import {element, shape, table} from './dom.js';
-import {saveNamed} from './export.js';
+import {element, saveNamed, shape, table} from './dom.js';
 import {Arrow, Label, Outline, mark} from './picture/markers.js';
 import {NoPicture, has3D} from './no_picture.js';
 import {isDark} from './palette.js';

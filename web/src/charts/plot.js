@@ -1,8 +1,8 @@
 // A chart in a plot of uPlot's, which has the axes; the marks, the polar grid and the legend are drawn into it.
 import uPlot from 'uplot';
 import {colorOf, linesOf, rangeOf, ticksTo} from './data.js';
-import {pngOf, svgOf} from './svg.js';
-import {element, saveFile} from '../dom.js';
+import {svgOf} from './svg.js';
+import {element, pngOf, saveNamed} from '../dom.js';
 import {cssColor, setPaper, styleOf} from '../palette.js';
 import {formatNumber, withUnit} from '../units.js';
 
@@ -439,7 +439,7 @@ export class Chart {
     const svg = svgOf(this.plot, this.chart.title, {paper: '#ffffff', ink: cssColor('--ink')});
     setPaper(false);
     this.redraw();
-    const name = this.chart.title.toLowerCase().normalize('NFKD').replace(/[^a-z0-9]+/g, '-').replace(/^-|-$/g, '').slice(0, 80);
-    saveFile(`${name || 'chart'}.${ending}`, ending === 'svg' ? new Blob([svg.text], {type: 'image/svg+xml'}) : await pngOf(svg));
+    saveNamed(this.chart.title, ending, ending === 'svg' ? new Blob([svg.text], {type: 'image/svg+xml'})
+      : await pngOf(svg.text, svg.width, svg.height, '#ffffff'));
   }
 }

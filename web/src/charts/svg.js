@@ -2,7 +2,6 @@
 
 const TITLE_LINE = 18;  // CSS px
 const MARGIN = 10;
-const PNG_ZOOM = 2;     // sharp in print
 
 const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`);
 const short = (number) => Number(number.toFixed(2));
@@ -78,17 +77,4 @@ export function svgOf(u, title, {paper, ink}) {
     + lines.map((line, i) => `<text x="${MARGIN * zoom}" y="${short(-top + (i + 0.9) * TITLE_LINE * zoom)}" fill="${ink}" style="font:600 ${13 * zoom}px system-ui,sans-serif">${escaped(line)}</text>`).join('')
     + `${elements.join('\n')}</svg>\n`;
   return {text, width: u.width, height: u.height + top / zoom};
-}
-
-/** A picture of what svgOf gives. */
-export async function pngOf({text, width, height}) {
-  const image = new Image(width, height);
-  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`;
-  await image.decode();
-  const canvas = document.createElement('canvas');
-  canvas.width = Math.round(width * PNG_ZOOM);
-  canvas.height = Math.round(height * PNG_ZOOM);
-  canvas.getContext('2d').drawImage(image, 0, 0, canvas.width, canvas.height);
-  return new Promise((done, failed) => canvas.toBlob((blob) => (blob ? done(blob)
-    : failed(new Error('the browser cannot write this chart as PNG'))), 'image/png'));
 }
