@@ -7,7 +7,6 @@
 
 The true state of the simulated robot moves the links, through poise.Robot; the controller's messages give the rest.
 """
-import os
 import re
 import sys
 from collections import namedtuple
@@ -15,7 +14,7 @@ from collections import namedtuple
 import numpy as np
 
 import poise
-from draw import HERE, Picture, number
+from draw import Picture, keep, number
 
 FRAMES = 12  # a second of the picture
 WIDTH, HEIGHT = 640, 330
@@ -311,16 +310,7 @@ def main():
     chosen = [a for a in ANIMATIONS if not names or a.name in names]
     if not chosen or {a.name for a in chosen} < set(names):
         sys.exit("usage: animate.py [--check] [NAME...], of " + ", ".join(a.name for a in ANIMATIONS))
-    different = []
-    for what in chosen:
-        path, text = os.path.join(HERE, what.name + ".svg"), animation(what).file()
-        if "--check" not in sys.argv:
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(text)
-        elif not os.path.exists(path) or open(path, encoding="utf-8").read() != text:
-            different.append(path)
-    if different:
-        sys.exit("not what animate.py draws: " + ", ".join(different))
+    keep(map(animation, chosen), "--check" in sys.argv)
 
 
 if __name__ == "__main__":

@@ -570,13 +570,10 @@ PICTURES = (notation, tick, contact_dynamics, centre_of_pressure, sharing_the_lo
             simulation, same_bits)
 
 
-def main():
-    check = sys.argv[1:] == ["--check"]
-    if sys.argv[1:] and not check:
-        sys.exit("usage: draw.py [--check]")
+def keep(pictures, check):
+    """Writes each picture beside this file, or with `check` ends the program where a file is not that picture."""
     different = []
-    for draw in PICTURES:
-        picture = draw()
+    for picture in pictures:
         path, text = os.path.join(HERE, picture.name + ".svg"), picture.file()
         if not check:
             with open(path, "w", encoding="utf-8") as file:
@@ -584,7 +581,14 @@ def main():
         elif not os.path.exists(path) or open(path, encoding="utf-8").read() != text:
             different.append(path)
     if different:
-        sys.exit("not what draw.py draws: " + ", ".join(different))
+        sys.exit(f"not what {os.path.basename(sys.argv[0])} draws: " + ", ".join(different))
+
+
+def main():
+    check = sys.argv[1:] == ["--check"]
+    if sys.argv[1:] and not check:
+        sys.exit("usage: draw.py [--check]")
+    keep((draw() for draw in PICTURES), check)
 
 
 if __name__ == "__main__":
