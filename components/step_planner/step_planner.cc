@@ -257,7 +257,7 @@ void StepPlanner::LeadFeet(double time, const robot::FootArray<double>& load) {
 void StepPlanner::HandOver(FeetOwner to, double time) {
   const FeetOwner from = owner_;
   if (from == to) return;
-  // A recovery goes on from where it takes the feet out of a walk.
+  // A recovery takes over a walk's references as they are; the phases need references at rest.
   const bool ends =
       from == FeetOwner::kRecovery || (from == FeetOwner::kWalk && to != FeetOwner::kRecovery);
   if (ends) EndSteps(*Steps(), time);

@@ -66,7 +66,7 @@ class StepPlanner : public Component, public Operated {
   ScheduleInput Observe(double time, const robot::FootArray<double>& load);
   /// N, standard deviation of an observed load; 0 of a measured one.
   double LoadDeviation(robot::Foot foot) const;
-  /// The tick of recovery and walk, and who owns the feet in it.
+  /// Runs the tick of recovery and walk, and settles who owns the feet.
   void LeadFeet(double time, const robot::FootArray<double>& load);
   void HandOver(FeetOwner to, double time);
   stepping::StepInput SeeSteps(double time, const robot::FootArray<double>& load);

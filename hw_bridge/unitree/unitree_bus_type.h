@@ -8,7 +8,7 @@ namespace poise::unitree {
 
 /// hw_bridge.unitree, on DDS.
 DriveBusType UnitreeBusType();
-/// The same with another link.
+/// Opens its link by `open_link`, in place of DDS.
 DriveBusType UnitreeBusType(RobotLinkOpener open_link);
 
 }  // namespace poise::unitree

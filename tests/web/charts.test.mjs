@@ -71,7 +71,7 @@ test('two sets are laid over each other by names, in whatever order they have th
   assert.deepEqual(chart.marks.map((m) => [m.set, m.x, m.value]), [[0, 0, 1], [1, 0, 4], [1, 2, 5]]);
   // A set without the quantity is left out.
   assert.deepEqual(chartOf(layers(a, part([force], ['error'], [], [[[50], 'stands', [4]]])), a.maps[0]).marks.length, 1);
-  // Of benchmarks the parts of one name.
+  // Two benchmarks meet in the parts that have one name.
   const of = (...names) => ({parts: names.map((name) => ({...a, name}))});
   assert.deepEqual(layersOf([of('push', 'late'), of('late', 'soft')]).map((l) => l.map(({set, part: {name}}) => [set, name])),
     [[[0, 'push']], [[0, 'late'], [1, 'late']], [[1, 'soft']]]);

@@ -648,7 +648,7 @@ test('the address leads to the time, the stretch and the plots that were looked 
   // A place of the page is no such address.
   await page.locator('a.badge[href]').first().click();
   assert.equal(await page.evaluate(() => window.poise.player.time), 0.25);
-  // The same layout of another run; what that one lacks is passed over.
+  // Another run takes the layout over, less what it lacks.
   poise('report', path('b'));
   await page.goto(`${pathToFileURL(path('b/report.html'))}${hash}&plot=NO_CHANNEL.here`);
   assert.deepEqual(await seen(), wanted);

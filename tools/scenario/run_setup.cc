@@ -323,7 +323,7 @@ namespace {
 /// some 15 s.
 void FillForWalking(Scenario* scenario) {
   TaskControllerConfig& tasks = *scenario->mutable_task_controller();
-  // The COM's reference has its velocity from the same tick.
+  // It has no lag while it stands, either: a walk that begins takes none over.
   if (!tasks.has_base_velocity_cutoff()) tasks.set_base_velocity_cutoff(0);
   if (!tasks.has_foot()) {
     // The rule's swing foot comes down late.

@@ -29,7 +29,7 @@ struct TaskTarget {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< m
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();      ///< m/s
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();  ///< m/s²
-  bool accelerates_only = false;  ///< x and y have neither position nor velocity; of a COM
+  bool accelerates_only = false;  ///< a COM: x and y follow `acceleration` alone
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< frame to world
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< rad/s
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< rad/s²

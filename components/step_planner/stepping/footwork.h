@@ -44,8 +44,9 @@ struct StepOutput {
   PointMotion swing;
   RotationMotion swing_rotation;
   bool searching = false;                         ///< below where the ground was expected
-  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, where it is to be
-  /// m, world, on the ground: what `com` follows for that, less what moves the pendulum besides.
+  Eigen::Vector2d cop = Eigen::Vector2d::Zero();  ///< m, world, that is wanted
+  /// m, world, on the ground: the centre of pressure that `com` follows, `cop` less the observed
+  /// offset of the pendulum.
   Eigen::Vector3d cop_reference = Eigen::Vector3d::Zero();
 
   void Archive(StateArchive* archive);
