@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
@@ -134,6 +135,7 @@ Simulation::Simulation(const RobotModel& model, const SimConfig& config, const W
       torque_(Eigen::VectorXd::Zero(model_.num_joints())),
       impedance_(static_cast<size_t>(model_.num_joints())),
       enabled_(static_cast<size_t>(model_.num_joints()), 0),
+      imu_velocity_(static_cast<size_t>(steps_per_tick_), Vector3d::Zero()),
       truth_(model_.num_joints()),
       measured_(truth_),
       delayed_(DelaySteps(drive_train_, step_), truth_) {
@@ -194,6 +196,7 @@ void Simulation::SetState(const RobotState& state) {
     in_contact[f] = truth_.contact_points[f] > 0;
   }
   truth_.foot_wrench = RestWrenches(model_, state, in_contact);
+  std::ranges::fill(imu_velocity_, ImuVelocity());
   imu_acceleration_.setZero();
   if (current_loop_.lags() || drivetrain_options_.elastic()) {
     Eigen::VectorXd torque = RestTorques(model_, state, truth_.foot_wrench);
@@ -332,7 +335,6 @@ void Simulation::StepOnce() {
     com[f] = world_->com_position(foot.body);
     truth_.contact_points[f] = CollectContacts(f, true);
   }
-  const Vector3d imu_velocity = ImuVelocity();
 
   const bool quiet = world_->Step();
   ++steps_;
@@ -347,7 +349,9 @@ void Simulation::StepOnce() {
     mean_current_[j] = torque_[j] / motors_[i].torque_per_ampere();
   }
   ReadFootWrenches(sole, com);
-  imu_acceleration_ = (ImuVelocity() - imu_velocity) / step_;
+  imu_step_ = (imu_step_ + 1) % imu_velocity_.size();
+  const Vector3d before = std::exchange(imu_velocity_[imu_step_], ImuVelocity());
+  imu_acceleration_ = (imu_velocity_[imu_step_] - before) / (steps_per_tick_ * step_);
   if (!delayed_.empty()) Delay();
 }
 

@@ -41,7 +41,8 @@ struct SimulationTruth {
   Eigen::VectorXd motor_torque;          ///< N·m at the joint, likewise
   Eigen::VectorXd friction_torque;       ///< N·m on the joint, likewise
   Eigen::Vector3d imu_angular_velocity;  ///< rad/s, IMU frame
-  /// m/s², IMU frame: velocity gained over the last step divided by the step, minus gravity.
+  /// m/s², IMU frame: velocity gained over the last control period divided by it, minus gravity. An
+  /// IMU's low-pass or its increments of velocity lose no impact either.
   Eigen::Vector3d imu_specific_force;
   Eigen::Quaterniond imu_orientation;  ///< IMU to world
   Eigen::Vector3d push_force;          ///< N, world, sum of the pushes and hands at this instant
@@ -151,7 +152,9 @@ class Simulation {
   Eigen::VectorXd command_, current_, mean_current_, torque_;
   std::vector<DriveImpedance> impedance_;
   std::vector<char> enabled_;
-  Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> imu_velocity_;  // m/s, world, by step, a ring of a control period
+  size_t imu_step_ = 0;                        // the newest of them
+  Eigen::Vector3d imu_acceleration_ = Eigen::Vector3d::Zero();  // m/s², mean over that period
   SimulationTruth truth_, measured_;
   std::vector<SimulationTruth> delayed_;  // by step, a ring of sensor_delay
   size_t oldest_ = 0;

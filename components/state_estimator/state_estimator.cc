@@ -66,6 +66,8 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   if (!config.has_joint_velocity_cutoff()) {
     config.set_joint_velocity_cutoff(balance::VelocityCutoff(*model));
   }
+  config.set_joint_velocity_cutoff(
+      std::min(config.joint_velocity_cutoff(), balance::MostVelocityCutoff(*model)));
   CheckConfig(config, *model);
   wrenches_ = std::make_unique<FootWrenches>(model, config);
   calibrator_ = std::make_unique<Calibrator>(

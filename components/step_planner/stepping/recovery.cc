@@ -117,11 +117,10 @@ bool Recovery::Update(const StepInput& input) {
     case Stage::kSwinging:
       if (Touches(input)) {
         Land(input);
-        state.in_contact = in_contact_;
-        StepOn(input, state);
       }
       break;
     case Stage::kLoading:
+      if (StepOn(input, state)) break;
       if (time >= since_ + LoadTime() - kTimeTolerance) {
         stage_ = Stage::kCatching;
         since_ = moving_since_ = time;
@@ -288,16 +287,19 @@ void Recovery::Land(const StepInput& input) {
   cop_from_ = output_.cop;
 }
 
-void Recovery::StepOn(const StepInput& input, const StepState& state) {
-  if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return;
+bool Recovery::StepOn(const StepInput& input, const StepState& state) {
+  if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return false;
   const Foot other = Other(plan_.foot);
+  // A foot that has tapped the ground carries nothing yet: were the other one to leave, it fell.
+  if (!(input.load[plan_.foot] > input.load[other])) return false;
   const double margin = balance::SignedDistance(Soles(state, choice_.limits().sole_margin),
                                                 state.pendulum.capture_point());
-  if (margin > kStepOnShare * choice_.limits().ample_margin) return;
+  if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
   const StepPlan next = choice_.Next(state, other);
-  if (!next.possible) return;
+  if (!next.possible) return false;
   BeginStep(input, next, StepReason::kAgain);
   LiftOff(input);
+  return true;
 }
 
 void Recovery::Swings(const StepInput& input, const StepState& state) {

@@ -89,8 +89,9 @@ class Recovery {
   /// It stands on the ground, and is not a contact of the model yet.
   void Settle(const StepInput& input);
   void Land(const StepInput& input);
-  /// The other foot leaves as this one lands, until the capture point is well inside the soles.
-  void StepOn(const StepInput& input, const StepState& state);
+  /// The other foot leaves as soon as the one that has landed carries more, until the capture point
+  /// is well inside the soles. True: it does.
+  bool StepOn(const StepInput& input, const StepState& state);
   bool AtRest(const StepInput& input, const StepState& state);
   /// What the body's return to upright takes of the centre of pressure, m, at most `budget`.
   Eigen::Vector2d ForBody(const StepInput& input, double budget) const;
