@@ -1,4 +1,4 @@
-// The component of examples/foot_load, which docs/tutorials/own_component.md shows.
+// The component of examples/foot_load, which docs/start/own_component.md shows.
 #include "foot_load.h"
 
 #include <gtest/gtest.h>

@@ -4,7 +4,7 @@
     run = poise.run("push_double_support", {"sim.push[0].peak": 120}, duration=2)
     run["ROBOT_STATE"].joint_position        # ticks × joints, rad
 
-docs/python.md says what there is.
+docs/reference/python.md says what there is.
 """
 
 import os

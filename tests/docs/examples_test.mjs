@@ -61,7 +61,7 @@ function untrueFigures(page, output) {
 }
 
 const pages = ['README.md', 'docs/reference/README.md',
-               ...['docs/tutorials', 'docs/how-to'].flatMap(repositoryFiles).filter((f) => f.endsWith('.md'))];
+               ...['docs/start', 'docs/how-to'].flatMap(repositoryFiles).filter((f) => f.endsWith('.md'))];
 for (const page of pages) {
   const commands = commandsOf(page).map((command) => ({...command, exit: expectedExit(page, command)}));
   const runnable = commands.filter((c) => c.exit !== null);

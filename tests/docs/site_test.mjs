@@ -27,7 +27,7 @@ const skip = (modules.status !== 0 || !existsSync(KATEX)) &&
 const folder = mkdtempSync(join(tmpdir(), 'poise-site-'));
 after(() => rmSync(folder, {recursive: true, force: true}));
 const site = join(folder, 'site');
-const pages = new Map();  // "docs/walking.html" -> its text
+const pages = new Map();  // "docs/reference/walking.html" -> its text
 
 /** A page's file in the site. */
 const html = (page) => page.replace(/README\.md$/, 'index.md').replace(/\.md$/, '.html');

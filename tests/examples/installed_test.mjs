@@ -15,7 +15,7 @@ const build = process.env.POISE_BUILD ?? join(root, 'build/release');
 const folder = mkdtempSync(join(tmpdir(), 'poise-installed-'));
 const home = join(folder, 'home'), checkout = join(folder, 'checkout');
 const prefix = join(home, 'poise'), project = join(home, 'foot_load'), own = join(project, 'build');  // as the tutorial has them
-const page = 'docs/tutorials/own_component.md';
+const page = 'docs/start/own_component.md';
 
 /** What a command prints; only the environment given, so that nothing of this checkout is found by it. */
 function run(command, args, {env = {}, exit = 0} = {}) {

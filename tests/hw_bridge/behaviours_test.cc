@@ -21,7 +21,7 @@ constexpr size_t kHip = 2;  // right_hip_pitch: -1.9 to 0.7 rad, 150 N·m
 
 class Behaviour : public testing::Test {
  protected:
-  /// A row of docs/ethercat.md's table.
+  /// A row of docs/reference/ethercat.md's table.
   static void Report(const std::string& fault, const std::string& reaction, int cycles) {
     RecordProperty(reaction.c_str(), cycles);
     Rows().push_back(fmt::format("  {:<44} {:<44} {:>3}", fault, reaction, cycles));

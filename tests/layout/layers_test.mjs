@@ -1,4 +1,4 @@
-// The house keeps its order: every folder includes only what stands below it. docs/architecture.md has the folders' table. Usage: node --test layers_test.mjs
+// The house keeps its order: every folder includes only what stands below it. docs/reference/architecture.md has the folders' table. Usage: node --test layers_test.mjs
 import assert from 'node:assert/strict';
 import {readFileSync} from 'node:fs';
 import {join} from 'node:path';

@@ -46,7 +46,8 @@ class TickRingTest : public ::testing::Test {
   void AddTick(TickRing* ring, int64_t tick) {
     for (const int channel : dense) Add(ring, channel, tick, static_cast<double>(tick));
   }
-  /// EXTERNAL_PUSH.force[0] of the ticks held, read from a batch as docs/report-format.md has it.
+  /// EXTERNAL_PUSH.force[0] of the ticks held, read from a batch as docs/reference/report_format.md
+  /// has it.
   std::vector<double> Pushes(const TickRing& ring) {
     const int64_t count = ring.end_tick() - ring.first_tick();
     const std::string batch = ring.Encode(ring.first_tick(), ring.end_tick(), 7.5);

@@ -3,7 +3,7 @@ import {test} from 'node:test';
 import {deflateSync} from 'node:zlib';
 import {unpack} from '../../web/src/codec.js';
 
-/** Packs 32-bit words, as docs/report-format.md says, without any arithmetic of the code under test. */
+/** Packs 32-bit words, as docs/reference/report_format.md says, without any arithmetic of the code under test. */
 function pack(words) {
   const planes = [0, 8, 16, 24].flatMap((shift) => words.map((w) => Number((BigInt(w) >> BigInt(shift)) & 255n)));
   return deflateSync(Uint8Array.from(planes)).toString('base64');

@@ -373,7 +373,7 @@ test('a live run keeps its last ticks, and what is derived goes on', async () =>
   }
 });
 
-/** A batch as docs/report-format.md says, every number telling its column and tick. */
+/** A batch as docs/reference/report_format.md says, every number telling its column and tick. */
 function batchOf(run, first, count, {end = first + count, time = 0} = {}) {
   const signals = [...run.signals.values()].filter((s) => s.append);
   const integers = signals.filter((s) => s.integer), reals = signals.filter((s) => !s.integer);

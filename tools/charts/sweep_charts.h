@@ -1,4 +1,4 @@
-// What a sweep or a search for limits came to, as data of a page: docs/charts.md.
+// What a sweep or a search for limits came to, as data of a page: docs/reference/charts.md.
 #pragma once
 
 #include <filesystem>

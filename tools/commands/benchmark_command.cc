@@ -218,9 +218,9 @@ void AddBenchmarkCommand(CLI::App* app, Command* command) {
       "lockstep. Robot, engine and controller are yours, everything else is the set's. OUT has "
       "benchmark.csv (a row a point; its SHA-1 is the same for one build, as seen on one machine "
       "so far), charts.json and charts.html (table and charts), benchmark.json (what is needed to "
-      "repeat it), set/ (what was run) and parts/ (every run). docs/benchmark.md says what is "
-      "measured and why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run could not "
-      "be made; 2 wrong usage or configuration.\nExample: poise benchmark --quick --part "
+      "repeat it), set/ (what was run) and parts/ (every run). docs/reference/benchmark.md says "
+      "what is measured and why.\nExit code: 0 measured, whatever fell; 1 interrupted, or a run "
+      "could not be made; 2 wrong usage or configuration.\nExample: poise benchmark --quick --part "
       "push_double");
   benchmark->callback(
       [arguments, command] { *command = [arguments] { return RunBenchmark(*arguments); }; });

@@ -280,11 +280,11 @@ void AddMatrixCommand(CLI::App* app, Command* command) {
       "Each run is `poise run --inline` with the flags of its column. matrix.csv has a line for "
       "each check of each run: scenario, paper_section, variant, ablation, outcome, fell_at [s], "
       "simulated_time [s], passed, metric, label, unit, measured, at_least, at_most, check_passed, "
-      "paper, paper_value. charts.html draws charts.json: docs/charts.md.\nExit code: 0 when "
-      "everything ran; a fall in an ablation is a result. 1 "
-      "when a run could not be made, or an experiment (or a variant that has checks of its own) "
-      "fails without ablation. 2 wrong usage or configuration.\nExample: poise matrix "
-      "push_double_support --ablation without_balancing");
+      "paper, paper_value. charts.html draws charts.json: docs/reference/charts.md.\nExit code: 0 "
+      "when everything ran; a fall in an ablation is a result. 1 when a run could not be made, or "
+      "an experiment (or a variant that has checks of its own) fails without ablation. 2 wrong "
+      "usage or configuration.\nExample: poise matrix push_double_support --ablation "
+      "without_balancing");
   matrix->callback([options, command] { *command = [options] { return Matrix(*options); }; });
 }
 

@@ -108,11 +108,11 @@ void AddSweepCommand(CLI::App* app, Command* command) {
   sweep->footer(
       "OUT holds results.jsonl (a finished run a line, on the disk before the next begins), "
       "table.csv (a row a run, the same bytes whether resumed, split or in parallel), charts.json "
-      "(docs/charts.md) and charts.html, which draws it; poise report OUT OTHER lays two of them "
-      "over each other. A sweep's file: tools/sweep/sweep.proto; docs/sweeps.md.\nExit code: 0 "
-      "when every run was made, fallen or not; 1 when interrupted or a run could not be made; 2 "
-      "wrong usage or configuration.\nExample: poise sweep push_double_support --vary "
-      "'sim.push[0].peak=100:250:7'");
+      "(docs/reference/charts.md) and charts.html, which draws it; poise report OUT OTHER lays two "
+      "of them over each other. A sweep's file: tools/sweep/sweep.proto; "
+      "docs/reference/sweeps.md.\nExit code: 0 when every run was made, fallen or not; 1 when "
+      "interrupted or a run could not be made; 2 wrong usage or configuration.\nExample: poise "
+      "sweep push_double_support --vary 'sim.push[0].peak=100:250:7'");
   CLI::App* merge = sweep->add_subcommand(
       "merge", "one table from the folders of a sweep's, or a limit's, parts");
   sweep->require_subcommand(0, 1);

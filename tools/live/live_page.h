@@ -10,7 +10,7 @@
 
 namespace poise {
 
-/// Channels and their signals, without values: docs/report-format.md#a-run-in-progress.
+/// Channels and their signals, without values: docs/reference/report_format.md#a-run-in-progress.
 nlohmann::ordered_json ChannelsJson(const TickRing& ring);
 
 /// RUN_INFO of a log that is being written, with the robot that it holds. Throws LogError,

@@ -41,9 +41,9 @@ struct OperatorAct {
 /// "push", "set", ...
 std::string_view ActName(OperatorAct::Kind kind);
 
-/// Reads an act from a page's text (docs/interactive.md#what-a-page-sends). Any bytes are allowed:
-/// what is none gives false and says why in `problem`. All numbers are finite, names short and
-/// printable.
+/// Reads an act from a page's text (docs/reference/interactive.md#what-a-page-sends). Any bytes are
+/// allowed: what is none gives false and says why in `problem`. All numbers are finite, names short
+/// and printable.
 bool ReadAct(std::string_view text, OperatorAct* act, std::string* problem);
 
 }  // namespace poise

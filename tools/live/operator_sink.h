@@ -27,7 +27,7 @@ class OperatorSink {
   /// Those that have come since the last call.
   virtual std::vector<Answer> TakeAnswers() = 0;
   /// What can be done here and what is in force, as receivers have told: keys as in
-  /// docs/interactive.md#what-a-page-is-told.
+  /// docs/reference/interactive.md#what-a-page-is-told.
   virtual nlohmann::ordered_json Standing() const = 0;
 };
 

@@ -10,10 +10,10 @@
 
 namespace poise {
 
-/// Every scalar of every channel of a run's graph by tick: the signals of docs/report-format.md. A
-/// tick is taken when all channels have it, or when the run is kMaxLead ticks beyond it and what
-/// lacks is lost; its numbers are then NaN. The first one held is whole. Memory is all taken at the
-/// start.
+/// Every scalar of every channel of a run's graph by tick: the signals of
+/// docs/reference/report_format.md. A tick is taken when all channels have it, or when the run is
+/// kMaxLead ticks beyond it and what lacks is lost; its numbers are then NaN. The first one held is
+/// whole. Memory is all taken at the start.
 class TickRing {
  public:
   struct Signal {
@@ -48,8 +48,8 @@ class TickRing {
 
   /// Bytes of a tick in a batch.
   size_t tick_size() const { return integers_ * sizeof(double) + reals_ * sizeof(float); }
-  /// The ticks [from, to), which must be held, as a batch of docs/report-format.md that says that
-  /// it was made at `time`, s.
+  /// The ticks [from, to), which must be held, as a batch of docs/reference/report_format.md that
+  /// says that it was made at `time`, s.
   std::string Encode(int64_t from, int64_t to, double time) const;
 
  private:

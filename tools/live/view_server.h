@@ -20,11 +20,11 @@ struct ViewControl {
   std::function<bool(std::string_view text)> receive;
 };
 
-/// HTTP on 127.0.0.1: GET / is the page, /stream a WebSocket (docs/report-format.md). Requests that
-/// name another host or come from another origin are refused, and with a token those without it.
-/// All that is received is bounded in size, rate and time, and so is what waits to be sent: one
-/// batch a client; who takes none for 5 s is dropped. A page that streams keeps its place whoever
-/// else connects. Runs on the caller's thread, no error of a client throws.
+/// HTTP on 127.0.0.1: GET / is the page, /stream a WebSocket (docs/reference/report_format.md).
+/// Requests that name another host or come from another origin are refused, and with a token those
+/// without it. All that is received is bounded in size, rate and time, and so is what waits to be
+/// sent: one batch a client; who takes none for 5 s is dropped. A page that streams keeps its place
+/// whoever else connects. Runs on the caller's thread, no error of a client throws.
 class ViewServer {
  public:
   /// `port` 0: a free one. `ring` must outlive the server. Throws ConfigError when the port cannot

@@ -1,4 +1,4 @@
-// The ground of a run as its page draws it: docs/report-format.md.
+// The ground of a run as its page draws it: docs/reference/report_format.md.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Pages that open from disk: of a run (docs/report-format.md), of charts (docs/charts.md).
+// Pages that open from disk: of a run (docs/reference/report_format.md), of charts
+// (docs/reference/charts.md).
 #pragma once
 
 #include <cstdint>
@@ -30,9 +31,9 @@ nlohmann::ordered_json PageRunJson(const logging::RunRecord& record, const Scena
 inline constexpr double kPageSize = 30;  // MB: opens in seconds, goes by mail
 
 /// Writes the page with the first run, and the others drawn over it, in about `megabytes` at most:
-/// of a run too long for that it shows rows of several ticks (docs/report-format.md). Throws
-/// ConfigError: the page's template is not built, `file` cannot be written or is a log; LogError
-/// for a log that is gone. A page that is not finished leaves `file` as it was.
+/// of a run too long for that it shows rows of several ticks (docs/reference/report_format.md).
+/// Throws ConfigError: the page's template is not built, `file` cannot be written or is a log;
+/// LogError for a log that is gone. A page that is not finished leaves `file` as it was.
 void WriteHtmlReport(const std::filesystem::path& file, const std::vector<ReportedRun>& runs,
                      double megabytes = kPageSize);
 
@@ -40,8 +41,8 @@ inline constexpr char kChartsFile[] = "charts.json";
 inline constexpr char kChartsPage[] = "charts.html";
 inline constexpr int kChartsFormat = 1;
 
-/// Writes charts.json (docs/charts.md) into `folder`, and charts.html, which draws it; says on
-/// stderr why there is no page. Throws ConfigError where the data cannot be written.
+/// Writes charts.json (docs/reference/charts.md) into `folder`, and charts.html, which draws it;
+/// says on stderr why there is no page. Throws ConfigError where the data cannot be written.
 void WriteCharts(const std::filesystem::path& folder, const nlohmann::ordered_json& charts);
 
 /// Writes the page of the charts.json in `folders`, laid over each other. Throws ConfigError as
@@ -54,8 +55,8 @@ void WriteRobotPage(const std::filesystem::path& file, const RobotCheck& check,
                     const RobotDrawing& drawing);
 
 /// The page of a run in progress: no ticks, which come from its stream. `channels` as in
-/// docs/report-format.md, `keep` the ticks that it holds. Throws ConfigError: the template is not
-/// built.
+/// docs/reference/report_format.md, `keep` the ticks that it holds. Throws ConfigError: the
+/// template is not built.
 std::string LiveHtml(const logging::RunRecord& record, const Scenario& scenario,
                      nlohmann::ordered_json channels, int64_t keep);
 

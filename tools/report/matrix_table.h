@@ -42,8 +42,8 @@ std::string FormatMatrix(const std::vector<MatrixCell>& cells);
 /// could not be run has one line, without check.
 std::string MatrixCsv(const std::vector<MatrixCell>& cells);
 
-/// charts.json (docs/charts.md): what stands by scenario and ablation, then of each scenario the
-/// checks that have a figure of the paper.
+/// charts.json (docs/reference/charts.md): what stands by scenario and ablation, then of each
+/// scenario the checks that have a figure of the paper.
 nlohmann::ordered_json MatrixCharts(const std::vector<MatrixCell>& cells);
 
 }  // namespace poise

@@ -39,7 +39,7 @@ RobotDrawing DrawRobot(const robot::RobotModel& model, std::string_view maker_te
 /// One or two sentences for the page and the terminal; empty where the picture is the file's.
 std::string WhatIsDrawnInstead(const RobotDrawing& drawing);
 
-/// "visuals", "meshes" and "capsules" of docs/report-format.md.
+/// "visuals", "meshes" and "capsules" of docs/reference/report_format.md.
 void AddDrawing(const RobotDrawing& drawing, nlohmann::ordered_json* json);
 
 }  // namespace poise

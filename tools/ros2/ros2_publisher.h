@@ -15,8 +15,8 @@
 
 namespace poise {
 
-/// The topics of docs/ros2.md. What is told is what the robot knows (ROBOT_STATE, ROBOT_SENSORS),
-/// also where a simulation knows better. Stamps are the run's time.
+/// The topics of docs/reference/ros2.md. What is told is what the robot knows (ROBOT_STATE,
+/// ROBOT_SENSORS), also where a simulation knows better. Stamps are the run's time.
 class Ros2Publisher {
  public:
   /// Takes a run's info, spec and robot; `run` must outlive it. `rate` in Hz, at most the ticks'.

@@ -1,4 +1,4 @@
-// Columns as logging/export/column_codec.h packs them; see docs/report-format.md.
+// Columns as logging/export/column_codec.h packs them; see docs/reference/report_format.md.
 
 function bytesOfBase64(text) {
   if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);

@@ -194,7 +194,7 @@ class Rows {
 }
 
 /**
- * One run. `meta`: the JSON of docs/report-format.md; `messages`: of messages.js; `blob`: gives the text of a packed
+ * One run. `meta`: the JSON of docs/reference/report_format.md; `messages`: of messages.js; `blob`: gives the text of a packed
  * column by its id. It holds the ticks from `firstTick` on, a row each, or of a long run in `rows` of several (meta.rows); a part of a run begins later than 0.
  * A live run (meta.live) starts without ticks, grows by appendTicks, which fires 'append', and keeps the last meta.live.keep ticks.
  */

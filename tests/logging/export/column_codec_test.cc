@@ -1,4 +1,4 @@
-// What a page's reader does is written out here once more, from docs/report-format.md.
+// What a page's reader does is written out here once more, from docs/reference/report_format.md.
 #include "logging/export/column_codec.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The data of charts of sweeps that exist in memory only: docs/charts.md.
+// The data of charts of sweeps that exist in memory only: docs/reference/charts.md.
 #include "tools/charts/sweep_charts.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// What the page of charts draws, worked out of the sets' data (docs/charts.md), without drawing it.
+// What the page of charts draws, worked out of the sets' data (docs/reference/charts.md), without drawing it.
 
 const TOLD = ['stands', 'fell', 'missed'];  // outcomes that tell whether the robot stood
 

@@ -1,4 +1,4 @@
-// The page of charts: sets of results (docs/charts.md), one or several laid over each other.
+// The page of charts: sets of results (docs/reference/charts.md), one or several laid over each other.
 import {chartOf, commandOf, layersOf} from './data.js';
 import {Chart} from './plot.js';
 import {element} from '../dom.js';

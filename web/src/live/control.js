@@ -1,4 +1,4 @@
-// A page that may act: what it sends, and what the receivers have answered. docs/interactive.md says the words.
+// A page that may act: what it sends, and what the receivers have answered. docs/reference/interactive.md says the words.
 const REPEAT = 33;        // ms between the pushes of one drag
 const HOLD = 0.15;        // s that one push lasts: the hand lets go by itself when its page is gone
 const FULL_REACH = 0.4;   // m from the grabbed point to the cursor at which a drag asks for the largest force

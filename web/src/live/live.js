@@ -10,7 +10,7 @@ const LIVE = 0.3;            // s behind the run that still count as live: a per
 const FILL_LEAST = 500;      // ticks of the past that are taken over at once, or as many as the page has: each time all is drawn anew
 const FILL_PAUSE = 3;        // times what a request of the past took: the pause after it, while the page is behind
 
-/** {first, count, end (tick of the server), time (s, of its clock), values by name} of a batch of docs/report-format.md. Throws when it is none of `run`. */
+/** {first, count, end (tick of the server), time (s, of its clock), values by name} of a batch of docs/reference/report_format.md. Throws when it is none of `run`. */
 export function decodeBatch(buffer, run) {
   const head = new DataView(buffer);
   if (buffer.byteLength < HEADER || head.getUint32(0, true) !== FORMAT) throw new Error('the stream is of another version');
