@@ -28,6 +28,17 @@ def on_page_markdown(markdown, page, config, files):
     return LINK.sub(replace, markdown)
 
 
+def list_versions(folder):
+    """Writes what the pages of each version in `folder` read of the others, and a page that leads to the newest."""
+    names = [os.path.basename(os.path.dirname(path)) for path in glob.glob(f"{folder}/*/search")]
+    names.sort(key=lambda name: (name == "newest", [int(part) for part in re.findall(r"\d+", name)]), reverse=True)
+    pages = {name: sorted(glob.glob("**/*.html", root_dir=f"{folder}/{name}", recursive=True)) for name in names}
+    with open(f"{folder}/versions.js", "w", encoding="utf-8") as file:
+        file.write(f"var __versions = {json.dumps(pages)};\n")
+    with open(f"{folder}/index.html", "w", encoding="utf-8") as file:
+        file.write(f'<!doctype html><title>Poise</title><meta http-equiv="refresh" content="0; url={names[0]}/index.html">\n')
+
+
 def on_post_build(config):
     site = config["site_dir"]
 
@@ -54,3 +65,4 @@ def on_post_build(config):
     for path in [f"{site}/404.html", *glob.glob(f"{site}/sitemap.xml*"), *glob.glob(f"{site}/assets/**/*.map", recursive=True)]:
         os.remove(path)
     shutil.rmtree(f"{site}/assets/javascripts/lunr", ignore_errors=True)
+    list_versions(os.path.dirname(site))

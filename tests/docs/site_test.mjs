@@ -4,10 +4,10 @@
 // pictures of some pages, as wide as a desk's screen and a phone's, light and dark
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
-import {existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync} from 'node:fs';
+import {cpSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, statSync} from 'node:fs';
 import {createRequire} from 'node:module';
 import {tmpdir} from 'node:os';
-import {dirname, join, normalize, resolve} from 'node:path';
+import {basename, dirname, join, normalize, resolve} from 'node:path';
 import {after, test} from 'node:test';
 import {pathToFileURL} from 'node:url';
 import {parseArgs} from 'node:util';
@@ -26,7 +26,8 @@ const skip = (modules.status !== 0 || !existsSync(KATEX)) &&
 
 const folder = mkdtempSync(join(tmpdir(), 'poise-site-'));
 after(() => rmSync(folder, {recursive: true, force: true}));
-const site = join(folder, 'site');
+const versions = join(folder, 'site');
+let site = join(versions, 'newest');  // a release has its tag's name
 const pages = new Map();  // "docs/reference/walking.html" -> its text
 
 /** A page's file in the site. */
@@ -40,6 +41,7 @@ test('deploy/docs makes the site', {skip}, (t) => {
       {encoding: 'utf8', env: {...process.env, POISE: resolve(options.poise)}});
   assert.equal(status, 0, stdout + stderr);
   assert.equal(stderr, '', 'mkdocs warns of something');
+  [site] = readdirSync(versions, {withFileTypes: true}).filter((f) => f.isDirectory()).map((f) => join(versions, f.name));
   let size = 0;
   for (const file of readdirSync(site, {recursive: true})) {
     const path = join(site, file);
@@ -131,6 +133,37 @@ test('KaTeX sets every equation', {skip}, (t) => {
   }
   t.diagnostic(`${count} equations`);
   assert.ok(count > 100);
+});
+
+test('a page leads to itself in another version, and says that it is an older one', {skip}, async () => {
+  const older = join(versions, 'v0.0.1');
+  for (const part of ['assets', 'search', 'index.html', 'docs/index.html']) cpSync(join(site, part), join(older, part), {recursive: true});
+  const {status, stderr} = spawnSync('/usr/bin/python3', ['-c', 'import hooks, sys; hooks.list_versions(sys.argv[1])', versions],
+      {encoding: 'utf8', cwd: join(root, 'docs/site'), env: {...process.env, PYTHONDONTWRITEBYTECODE: '1'}});
+  assert.equal(status, 0, stderr);
+  const browser = await launchBrowser(options.web);
+  try {
+    const tab = await (await browser.newContext()).newPage();
+    tab.setDefaultTimeout(PATIENCE);
+    const address = (...parts) => pathToFileURL(join(versions, ...parts)).href;
+    const own = basename(site);
+    const choose = async (version, page) => {
+      await tab.selectOption('select.version', version);
+      await tab.waitForURL(address(version, page));
+    };
+    await tab.goto(address('index.html'));
+    await tab.waitForURL(address(own, 'index.html'));
+    await tab.goto(address(own, 'docs/concepts/tick.html'));
+    assert.deepEqual(await tab.locator('select.version option').allTextContents(), [own, 'v0.0.1']);
+    assert.equal(await tab.inputValue('select.version'), own);
+    assert.equal(await tab.locator('.md-content .warning').count(), 0);
+    await choose('v0.0.1', 'index.html');  // it lacks that page
+    assert.match(await tab.textContent('.md-content .warning'), /^This page is of v0\.0\.1\./);
+    await tab.goto(address('v0.0.1', 'docs/index.html'));
+    await choose(own, 'docs/index.html');
+  } finally {
+    await browser.close();
+  }
 });
 
 test('a browser shows, searches and scrolls it from files', {skip}, async (t) => {
