@@ -181,7 +181,7 @@ TEST_F(ScenarioPlaceTest, AGraphLeavesOutWhatItNamesOfItsBase) {
                     "unknown channel 'SUPORT_PLAN'"});
 }
 
-// The maker's page has it (docs/reference/unitree.md).
+// The recipe has it (docs/how-to/unitree_robot.md).
 TEST_F(ScenarioPlaceTest, AGraphForARealRobotIsBalanceWithoutItsSimulator) {
   const std::string page = ReadFile(POISE_SOURCE_DIR "/docs/unitree.md");
   const size_t begin = page.find("    base: \"balance\"\n");
