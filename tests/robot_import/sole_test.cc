@@ -189,6 +189,7 @@ TEST(Sole, OfAMeshThatOneFootMirrors) {
   ASSERT_EQ(without.defects.size(), 1u);
   EXPECT_NE(without.defects[0].what.find("package://maker/foot.stl"), std::string::npos);
   EXPECT_NE(without.defects[0].done.find("--meshes"), std::string::npos);
+  for (const Foot& foot : without.robot.foot()) EXPECT_TRUE(foot.guessed());
   const auto folder = options.file.parent_path() / "elsewhere";
   std::filesystem::create_directories(folder);
   WriteWedge(folder / "foot.stl", face);
@@ -199,6 +200,7 @@ TEST(Sole, OfAMeshThatOneFootMirrors) {
   for (int f = 0; f < 2; ++f) {
     const Foot& foot = with.robot.foot(f);
     ASSERT_EQ(foot.vertex_size(), 5) << f;
+    EXPECT_FALSE(foot.guessed()) << f;
     for (const SoleVertex& v : foot.vertex()) {
       corners[static_cast<size_t>(f)].emplace_back(v.x() + foot.sole().x(),
                                                    v.y() + foot.sole().y());

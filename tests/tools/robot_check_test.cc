@@ -230,6 +230,17 @@ TEST(RobotCheck, AMakersFileInPlaceOfARobotIsNamed) {
   }
 }
 
+TEST(RobotCheck, AGuessedSoleIsTold) {
+  const RobotCheck check = Edited("length: 0.30", "length: 0.30 guessed: true");
+  const nlohmann::ordered_json soles = RobotCheckJson(check)["soles"];
+  EXPECT_TRUE(soles[0]["guessed"].get<bool>());
+  EXPECT_FALSE(soles[1]["guessed"].get<bool>());
+  const std::string text = FormatRobotCheck(check, 300);
+  const size_t told = text.find("from the origin: a guess");
+  EXPECT_GT(told, text.find("right: 4 corners"));
+  EXPECT_LT(told, text.find("left: 4 corners"));
+}
+
 TEST(RobotCheck, FitsATerminalAndSaysTheSameAsJson) {
   std::istringstream text(FormatRobotCheck(Heron(), 80));
   for (std::string line; std::getline(text, line);) EXPECT_LE(DisplayWidth(line), 80) << line;

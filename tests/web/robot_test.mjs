@@ -181,6 +181,20 @@ test('soles are shown with their corners and sizes, on ground whose horizon is n
   }
 });
 
+test('a sole that is a guess is told beside its picture and in the table', async () => {
+  const robot = writeRobot('guess', {});
+  writeFileSync(robot, heron('pbtxt').replace('name: "left"', 'name: "left" guessed: true'));
+  check(robot, '--page', path('guess.html'));
+  const {page} = await openPage(browser, path('guess.html'));
+  const told = async (selector) => (await page.locator(selector).allTextContents()).filter((text) => /guess/.test(text));
+  for (const selector of ['.soles figcaption', '#tables tr']) {
+    const [text, ...more] = await told(selector);
+    assert.match(text, /^left/, selector);
+    assert.equal(more.length, 0, selector);
+  }
+  await page.context().close();
+});
+
 test('a mesh of half a million triangles is drawn with few, in its place', async () => {
   // A folder told finds it, whatever folders its name begins with.
   const robot = writeRobot('large', {torso: '<mesh filename="package://nobody/large.stl"/>'});

@@ -120,9 +120,12 @@ double ReachAlong(const RobotCheck& check, const Vector3d& direction) {
   return reached;
 }
 
-void FindSoles(RobotCheck* check) {
-  for (const robot::FootModel& foot : check->model.feet()) {
-    SoleFacts facts{.foot = foot.name, .inner_radius = robot::InnerRadius(foot)};
+void FindSoles(const Robot& description, RobotCheck* check) {
+  for (int f = 0; f < description.foot_size(); ++f) {
+    const robot::FootModel& foot = check->model.feet()[static_cast<size_t>(f)];
+    SoleFacts facts{.foot = foot.name,
+                    .inner_radius = robot::InnerRadius(foot),
+                    .guessed = description.foot(f).guessed()};
     const balance::ConvexPolygon polygon = balance::SolePolygon(foot, 0);
     facts.corners.assign(polygon.corners().begin(), polygon.corners().end());
     for (size_t i = 0; i < facts.corners.size(); ++i) {
@@ -317,7 +320,7 @@ RobotCheck CheckRobot(const std::filesystem::path& file) {
   check.com_height = data.com.z() - data.foot_pose[0].translation().z();
   check.frequency = std::sqrt(robot::kGravity / check.com_height);
   check.foot_spacing = data.foot_pose[1].translation().y() - data.foot_pose[0].translation().y();
-  FindSoles(&check);
+  FindSoles(description, &check);
   FindLoads(&check);
   check.reach = {ReachAlong(check, Vector3d::UnitX()), ReachAlong(check, -Vector3d::UnitX()),
                  ReachAlong(check, Vector3d::UnitY()), ReachAlong(check, Vector3d::UnitZ())};
@@ -346,8 +349,9 @@ std::string FormatRobotCheck(const RobotCheck& check, int columns) {
                              Centimetres(check.foot_spacing)));
   for (const SoleFacts& sole : check.soles) {
     line(&sole == &check.soles.front() ? "soles" : "",
-         fmt::format("{}: {} corners, {:.0f} cm², nearest edge {} from the origin", sole.foot,
-                     sole.corners.size(), 1e4 * sole.area, Centimetres(sole.inner_radius)));
+         fmt::format("{}: {} corners, {:.0f} cm², nearest edge {} from the origin{}", sole.foot,
+                     sole.corners.size(), 1e4 * sole.area, Centimetres(sole.inner_radius),
+                     sole.guessed ? ": a guess" : ""));
   }
   line("reach", fmt::format("left foot {} forwards, {} back, {} outwards, {} up",
                             Centimetres(check.reach.forward), Centimetres(check.reach.back),
@@ -395,7 +399,8 @@ Json RobotCheckJson(const RobotCheck& check) {
     json["soles"].push_back({{"foot", sole.foot},
                              {"corners", std::move(corners)},
                              {"area", sole.area},
-                             {"inner_radius", sole.inner_radius}});
+                             {"inner_radius", sole.inner_radius},
+                             {"guessed", sole.guessed}});
   }
   json["reach"] = {{"forward", check.reach.forward},
                    {"back", check.reach.back},

@@ -34,6 +34,7 @@ struct SoleFacts {
   std::vector<Eigen::Vector2d> corners = {};  ///< m, sole frame, anticlockwise
   double area = 0;                            ///< m²
   double inner_radius = 0;                    ///< m, robot::InnerRadius
+  bool guessed = false;                       ///< Foot.guessed
 };
 
 /// How far the left foot can be put from where it stands, m, the COM midway between the feet at the

@@ -55,6 +55,7 @@ class FeetImport {
       foot->set_name(f == 0 ? "right" : "left");
       WriteSole(leg.body, options_.foot[f].empty() ? sole.link : options_.foot[f], sole.found,
                 foot);
+      if (sole.sureness == Sureness::kGuess) foot->set_guessed(true);
       Say(fmt::format("{} sole", foot->name()), SoleValue(*foot), sole.from, sole.sureness);
       const auto [sensor, why] = ForceSensor(leg);
       foot->set_force_sensor(sensor);

@@ -84,7 +84,7 @@ const MARGIN = 50;  // mm about a drawn sole, where its corners' numbers stand
 const APART = 11;   // mm between two of these numbers
 
 /** A sole from above, forwards up, with the place of each corner about the sole frame's origin, mm. */
-function solePicture({foot, corners}) {
+function solePicture({foot, corners, guessed}) {
   const points = corners.map(([x, y]) => [-1e3 * y, -1e3 * x]);
   const [left, top, right, bottom] = [Math.min, Math.max].flatMap((most) => [0, 1].map((k) => most(0, ...points.map((p) => p[k]))));
   const taken = [];
@@ -98,7 +98,7 @@ function solePicture({foot, corners}) {
     'aria-label': `The ${foot} sole from above, ${sizeOf(corners)}`},
   shape('polygon', {points: points.join(' ')}), shape('path', {d: 'M-6 0H6M0 -6V6'}),
   ...points.map(([cx, cy], i) => shape('circle', {cx, cy, r: 2}, shape('title', {}, `${corners[i].map(mm).join(', ')} mm`))), ...numbers),
-  element('figcaption', {}, `${foot}, ${sizeOf(corners)}`));
+  element('figcaption', {}, `${foot}, ${sizeOf(corners)}${guessed ? ': a guess' : ''}`));
 }
 
 const cm = (metres) => `${formatNumber(100 * metres, 3)} cm`;
@@ -108,7 +108,7 @@ function tables(check) {
   const rows = [['mass', `${formatNumber(check.mass, 4)} kg`], ['joints', String(check.joints)],
     ['COM above the soles', cm(check.com_height)], ['ω', `${formatNumber(check.frequency, 3)} rad/s`],
     ['between the soles', cm(check.foot_spacing)],
-    ...check.soles.map((s) => [`${s.foot} sole`, `${sizeOf(s.corners)}, ${formatNumber(1e4 * s.area, 3)} cm², nearest edge ${cm(s.inner_radius)} from the origin`]),
+    ...check.soles.map((s) => [`${s.foot} sole`, `${sizeOf(s.corners)}, ${formatNumber(1e4 * s.area, 3)} cm², nearest edge ${cm(s.inner_radius)} from the origin${s.guessed ? ': a guess' : ''}`]),
     ...Object.entries({forward: 'forwards', back: 'back', outward: 'outwards', up: 'up'})
       .map(([key, name]) => [`left foot reaches ${name}`, cm(check.reach[key])]),
     ['gears', check.gear_stiffness > 0 ? `${formatNumber(check.gear_stiffness, 3)} N·m/rad` : 'rigid'],
