@@ -34,6 +34,10 @@ EmulatedRobot::EmulatedRobot(const UnitreeEmulatorConfig& config, const robot::R
     trouble.config = config.trouble(i);
     trouble.buttons = ButtonsOf({trouble.config.button().begin(), trouble.config.button().end()});
     const auto kind = trouble.config.kind();
+    if (kind == UnitreeTrouble::BUTTON && trouble.buttons == 0) {
+      throw ConfigError(fmt::format("trouble[{}].button", i),
+                        "must name the buttons that are pressed, e.g. button[0]=B");
+    }
     if (kind != UnitreeTrouble::HOT_MOTOR && kind != UnitreeTrouble::MOTOR_ERROR) continue;
     const int joint = model.FindJoint(trouble.config.joint());
     if (joint < 0) {

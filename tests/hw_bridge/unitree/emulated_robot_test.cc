@@ -131,5 +131,14 @@ TEST_F(EmulatedRobotTest, HasTroublesOfATime) {
   EXPECT_EQ(robot_->State(feedback_, 4), nullptr);
 }
 
+TEST_F(EmulatedRobotTest, RefusesAButtonWithoutAName) {
+  try {
+    Make("trouble { kind: NO_STATE } trouble { kind: BUTTON from: 1 }");
+    FAIL();
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(error.field(), "trouble[1].button");
+  }
+}
+
 }  // namespace
 }  // namespace poise
