@@ -54,6 +54,33 @@ int Count(const Message& message, std::string_view field) {
   }
 }
 
+/// Clears the field at a path without indexes. False: it is not set, or a part of a list.
+bool Clear(std::string_view path, Message* message) {
+  const auto field = [&](std::string_view name) {
+    return FindField(*message->GetDescriptor(), name);
+  };
+  for (size_t dot = path.find('.'); dot != std::string_view::npos; dot = path.find('.')) {
+    const FieldDescriptor* const group = field(path.substr(0, dot));
+    if (group == nullptr || group->is_repeated() ||
+        group->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) {
+      return false;
+    }
+    message = message->GetReflection()->MutableMessage(message, group);
+    path.remove_prefix(dot + 1);
+  }
+  if (Count(*message, path) == 0) return false;
+  message->GetReflection()->ClearField(message, field(path));
+  return true;
+}
+
+/// Whether the field at `path`, without indexes, goes where `file` takes what its base has.
+bool Removes(const Scenario& file, std::string_view path) {
+  return std::ranges::any_of(file.remove(), [path](const std::string& removed) {
+    return path.starts_with(removed) &&
+           (path.size() == removed.size() || path[removed.size()] == '.');
+  });
+}
+
 /// `field` with its first index less `shift`; nullopt when that is below 0. Elements of the lists
 /// further down are all of one file.
 std::optional<std::string> ShiftFirstIndex(std::string_view field, int shift) {
@@ -112,8 +139,22 @@ ScenarioFiles::ScenarioFiles(const fs::path& file, const fs::path& overlay) {
 
 Scenario ScenarioFiles::Merged() const {
   Scenario merged;
-  for (const File& file : files_) merged.MergeFrom(file.fields);
+  for (const File& file : files_) {
+    for (int i = 0; i < file.fields.remove_size(); ++i) {
+      const std::string& path = file.fields.remove(i);
+      if (path.find('[') == std::string::npos && Clear(path, &merged)) continue;
+      const std::string field = fmt::format("remove[{}]", i);
+      throw ConfigError(fmt::format(
+          "{}:{}: {}: {}", file.name, LocateField(file.text, field, file.fields), field,
+          &file == &files_.front()
+              ? "there is no base to remove from; name one with base"
+              : fmt::format("the base sets no field '{}'; name a list, a group or a value, whole",
+                            path)));
+    }
+    merged.MergeFrom(file.fields);
+  }
   merged.clear_base();
+  merged.clear_remove();
   return merged;
 }
 
@@ -124,6 +165,10 @@ FieldPlace ScenarioFiles::Locate(std::string_view field) const {
     FieldPlace place;
     int before = 0;  // elements of the list in earlier files
     for (const File& file : files_) {
+      if (Removes(file.fields, indexed ? list : path)) {
+        place = {};
+        before = 0;
+      }
       const auto own = indexed ? ShiftFirstIndex(path, before) : std::string(path);
       if (own && HasField(file.fields, *own)) {
         place = {file.name, LocateField(file.text, *own, file.fields),

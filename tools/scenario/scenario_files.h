@@ -27,7 +27,9 @@ class ScenarioFiles {
   explicit ScenarioFiles(const std::filesystem::path& file,
                          const std::filesystem::path& overlay = {});
 
-  /// All fields: the furthest base's first, single values replaced, lists appended. `base` is gone.
+  /// All fields: the furthest base's first, single values replaced, lists appended, what a file
+  /// removes left out. `base` and `remove` are gone. Throws ConfigError "file:line: remove[i]:
+  /// problem": the base does not set it.
   Scenario Merged() const;
   /// File of the scenario itself.
   const std::string& file() const { return files_[own_].name; }

@@ -202,7 +202,7 @@ void ApplyChange(const FieldChange& change, LoadedScenario* loaded) {
   const std::string path = change.set.substr(0, equals);
   const std::string first = path.substr(0, path.find_first_of(".["));
   // A change of what is read before any change, or is written alone, would do nothing.
-  if (first == "base" || first == "variant" || first == "applied") {
+  if (first == "base" || first == "remove" || first == "variant" || first == "applied") {
     throw ConfigError(Describe(*loaded, change, path,
                                first == "applied" ? "cannot be set; poise run writes it"
                                                   : "cannot be set here; write it in the "

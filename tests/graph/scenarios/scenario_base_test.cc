@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "components/framework/configuration/configuration.h"
+#include "fmt/format.h"
 #include "tests/graph/poise_program.h"
 
 namespace poise {
@@ -132,6 +133,36 @@ TEST_F(ScenarioBaseTest, IndexesOfListsMapToTheFileOfTheElement) {
   Write("base/robot", base);
   ExpectRefused(File("derived"),
                 {BaseLine("nominal { joint: \"left_knee_patch"), "sim.start.nominal[4]"});
+}
+
+TEST_F(ScenarioBaseTest, WhatTheBaseHasIsRemovedAndReplaced) {
+  Write("base/robot", ReadFile(File("base/robot")) +
+                          "check { metric: \"push_peek\" }\nvariant { name: \"one\" }\n");
+  const std::string remove = "remove: \"check\"\nremove: \"variant\"\nremove: \"sim.push\"\n";
+  const std::string file =
+      Derived(remove + "duration: 0.1\ncheck { metric: \"violated_ticks\" }\n");
+  const ProgramResult result = RunPoise({"run", file, "--inline", "--out", folder_ / "run"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  const nlohmann::json checks = ReadSummary(folder_ / "run")["checks"];
+  ASSERT_EQ(checks.size(), 6u);  // five of every run
+  EXPECT_EQ(checks[5]["name"], "violated_ticks");
+  const std::string merged = ReadFile(folder_ / "run/scenario.pbtxt");
+  for (const char* gone : {"remove:", "variant {", "push {"}) {
+    EXPECT_EQ(merged.find(gone), std::string::npos) << merged;
+  }
+
+  // The elements that are left are counted from 0, in their own file.
+  Derived(remove + "check { metric: \"fallen\" }\ncheck { metric: \"push_peek\" }\n");
+  ExpectRefused(File("derived"), {File("derived") + ":6: check[1].metric", "push_peek"});
+  const auto refused = [this](const std::string& path, const std::string& problem) {
+    Derived("description: \"x\"\nremove: \"" + path + "\"\n");
+    ExpectRefused(File("derived"), {File("derived") + ":3: remove[0]: ", problem});
+  };
+  for (const char* path : {"chek", "sim.pushes", "check[0]", "check.metric", "seed"}) {
+    refused(path, fmt::format("the base sets no field '{}'", path));
+  }
+  Write("derived", "remove: \"check\"\n");
+  ExpectRefused(File("derived"), {File("derived") + ":1: remove[0]: there is no base"});
 }
 
 TEST_F(ScenarioBaseTest, BasesNestAndRelativeNamesAreThoseOfTheirFile) {
