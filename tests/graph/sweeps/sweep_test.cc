@@ -248,6 +248,17 @@ TEST_F(SweepTest, WhatARunIsToDoIsAskedOfIt) {
   EXPECT_EQ(row.at("outcome"), "stands");
 }
 
+// Within a second no step lands, and nobody falls either.
+TEST(ShippedSweep, ACourseCountsByWhoHasWalkedIt) {
+  const RunFolder folder;
+  const ProgramResult result = RunPoise(
+      {"sweep", "walk_courses", "--random", "1", "--duration", "1", "--out", folder / "courses"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  const CsvRow row = ReadCsv(folder / "courses/table.csv").at(0);
+  EXPECT_EQ(row.at("outcome"), "missed");
+  EXPECT_NE(row.at("reason").find("steps: 0, must be ≥ 20; way: "), std::string::npos);
+}
+
 TEST_F(SweepTest, ErrorsNameFileAndLineOrFlag) {
   const std::string out = Out("sweep");
   const auto expect = [&](const std::string& text, const std::vector<std::string>& parts) {
