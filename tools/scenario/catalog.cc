@@ -205,6 +205,7 @@ std::vector<std::string> NearestLast(const std::string& name, const std::set<std
   }
   std::set<std::string> all = names;
   all.insert(listed.begin(), listed.end());
+  all.erase(name);  // a file of that name is of another kind
   if (bases == BaseFiles::kRefused) {
     std::erase_if(all, IsBase);
     std::erase_if(listed, IsBase);

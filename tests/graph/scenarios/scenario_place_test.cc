@@ -203,9 +203,10 @@ TEST_F(ScenarioPlaceTest, AGraphMayHaveItsScenariosName) {
   fs::copy_file(StandScenario(), "own/stand.pbtxt");
   Write("own/policy.pbtxt",
         "# proto-message: poise.Scenario\nbase: \"stand\"\ngraph: \"policy\"\n");
-  ExpectUsageError({"graph", "check", "own/policy.pbtxt"},
-                   {Full("own/policy.pbtxt") + ":3: graph: no graph named 'policy'",
-                    Full("own/policy.pbtxt") + " (which says that it is a Scenario)"});
+  ExpectUsageError(
+      {"graph", "check", "own/policy.pbtxt"},
+      {Full("own/policy.pbtxt") + ":3: graph: no graph named 'policy'; use one of balance",
+       Full("own/policy.pbtxt") + " (which says that it is a Scenario)"});
   Write("path/share/poise/graphs/policy.pbtxt",
         std::string(kGraphHead) + "name: \"policy\"\nbase: \"balance\"\n");
   setenv("POISE_PATH", fs::absolute("path").c_str(), 1);
