@@ -198,6 +198,7 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   push->add_option("--point", push_options->point, "m, in the body's frame: x,y,z")
       ->capture_default_str();
   push->add_option("--run", push_options->run, kWhichRun);
+  push->footer("Example: poise push --force 0,60,0 --duration 0.1");
   push->callback(
       [push_options, command] { *command = [push_options] { return PushRobot(*push_options); }; });
 
@@ -237,6 +238,7 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   walk->add_flag("--stop", walk_options->stop,
                  "stand, with the feet side by side, or as they are with walk.stand_apart");
   walk->add_option("--run", walk_options->run, kWhichRun);
+  walk->footer("Example: poise walk --velocity 0.1,0 --turn 0.1");
   walk->callback([walk_options, turn, command] {
     const bool turns = turn->count() > 0;
     *command = [walk_options, turns] { return WalkRobot(*walk_options, turns); };

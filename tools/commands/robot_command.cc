@@ -88,6 +88,7 @@ void AddRobotCommand(CLI::App* app, Command* command) {
       ->allow_extra_args(false)
       ->take_all()
       ->check(CLI::ExistingDirectory);
+  check->footer("Example: poise robot check heron/heron --page heron.html");
   check->callback([options, command] { *command = [options] { return CheckOneRobot(*options); }; });
   CLI::App* list = robot->add_subcommand("list", "the robots that there are");
   list->callback([command] { *command = ListRobots; });
