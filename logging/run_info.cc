@@ -1,5 +1,6 @@
 #include "logging/run_info.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 
@@ -88,6 +89,14 @@ RunInfo FindRunInfo(LogReader* reader, const std::string& path) {
         fmt::format("{}; the run is taken from run_spec.pbtxt beside the log", problem);
     return result;
   } catch (const std::exception& error) {
+    // What a module would know, the files beside the log do not tell.
+    const bool read = !result.info.run_spec.empty();
+    const auto unknown = [](const Channel& channel) {
+      return FindMessageType(channel.type()) == nullptr;
+    };
+    if (read && std::ranges::any_of(result.spec.graph().channel(), unknown)) {
+      throw LogError(problem);
+    }
     throw LogError(fmt::format(
         "{}; nor is the run's folder beside it ({}): put the run's run_spec.pbtxt and "
         "scenario.pbtxt beside the log, or take its messages alone with poise log export",

@@ -18,6 +18,7 @@ namespace poise::logging {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr int64_t kRunInfoTicks = 10;
 
@@ -112,6 +113,17 @@ TEST_F(RunInfoTest, TheFolderOfAnotherRunDoesNotStandIn) {
   EXPECT_THAT(Refusal(), HasSubstr("tick_period"));
   WriteBytes(folder_.path("run_spec.pbtxt"), "run_id: many");
   EXPECT_THAT(Refusal(), HasSubstr("run_spec.pbtxt"));
+}
+
+TEST_F(RunInfoTest, AMessageOfAModuleThatIsNotThereAsksForTheModuleAlone) {
+  RunSpec spec = SmallSpec();
+  spec.mutable_graph()->mutable_channel(0)->set_type("foreign_t");
+  WriteSpec(spec);
+  events_[0] = RunInfoEvent(spec);
+  WriteRawLog(log_, events_);
+  EXPECT_THAT(Refusal(), HasSubstr("has no known type 'foreign_t'"));
+  EXPECT_THAT(Refusal(), HasSubstr("modules with others are looked for in"));
+  EXPECT_THAT(Refusal(), Not(HasSubstr("beside the log")));
 }
 
 TEST_F(RunInfoTest, WithoutTheFolderMessagesAreExportedAndTheRestRefusesSayingWhatToDo) {
