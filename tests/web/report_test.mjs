@@ -37,12 +37,12 @@ after(async () => {
   rmSync(folder, {recursive: true, force: true});
 });
 
-/** The page's own run, with a signal's values loaded. */
-const signal = (page, name, which = 'run') => page.evaluate(async ([n, w]) => {
-  const s = window.poise[w].signals.get(n);
+/** A signal's values, of the page's run in this place. */
+const signal = (page, name, place = 0) => page.evaluate(async ([n, k]) => {
+  const s = window.poise.runs[k].signals.get(n);
   await s.load();
   return [...s.values];
-}, [name, which]);
+}, [name, place]);
 
 const near = (actual, expected, tolerance) =>
   assert.ok(Math.abs(actual - expected) < tolerance, `${actual} is not ${expected}`);
@@ -747,30 +747,43 @@ test('a browser that records no video says why', async () => {
   await context.close();
 });
 
-test('a second run is drawn over the first', async () => {
-  assert.ok(poise('report', path('a'), path('b'), '-o', path('both.html')).status <= 1);
-  const {page, problems} = await openPage(browser, path('both.html'), {colorScheme: 'dark'});
+test('any number of runs are drawn over the first', async () => {
+  poise('run', 'push_double_support', '--inline', '--duration', '1', '--set', 'sim.push[0].duration=0.3', '--out', path('c'));
+  assert.ok(poise('report', path('a'), path('b'), path('c'), '-o', path('three.html')).status <= 1);
+  const {page, problems} = await openPage(browser, path('three.html'), {colorScheme: 'dark'});
   const first = await signal(page, 'EXTERNAL_PUSH.force[1]');
-  const second = await signal(page, 'EXTERNAL_PUSH.force[1]', 'overlay');
+  const [second, third] = await Promise.all([1, 2].map((k) => signal(page, 'EXTERNAL_PUSH.force[1]', k)));
   const end = (values) => values.findLastIndex((x) => x > 20);
-  assert.ok(end(second) < end(first));  // the shorter push
+  assert.ok(end(second) < end(first) && end(first) < end(third));  // the pushes' lengths
   const panel = page.locator('.panel', {hasText: 'External push'}).first();
   await panel.scrollIntoViewIfNeeded();
-  await panel.locator('.legend .entry').nth(1).waitFor();
-  assert.match(await panel.locator('.legend').innerText(), /second run/);
+  await panel.locator('.legend .entry').nth(2).waitFor();
+  assert.match(await panel.locator('.legend').innerText(), /second run[^]*third run/);
   // Saved, each curve stands under its run's name.
   const {words, curves} = await readSvg(page, (await saved(page, panel.getByRole('button', {name: 'Save as SVG'}))).bytes.toString());
-  const names = words.slice(words.findIndex((word) => word.startsWith('First run:')));
-  for (const [i, pattern] of [/^First run: push_double_support \(a, /, /^measured$/, /^Second run: push_double_support, sim\.push\[0\]\.duration=0\.09 \(b, /,
-    /^measured \(second run\)$/].entries()) assert.match(names[i], pattern);
-  assert.equal(new Set(curves.map(({dash}) => dash)).size, 2);
+  const names = words.slice(words.findIndex((word) => word.startsWith('first run:')));
+  for (const [i, pattern] of [/^first run: push_double_support \(a, /, /^measured$/, /^second run: push_double_support, sim\.push\[0\]\.duration=0\.09 \(b, /,
+    /^measured \(second run\)$/, /^third run: push_double_support, sim\.push\[0\]\.duration=0\.3 \(c, /, /^measured \(third run\)$/].entries()) assert.match(names[i], pattern);
+  assert.equal(new Set(curves.map(({dash}) => dash)).size, 3);
   await page.evaluate(() => window.poise.player.seek(0.8));
   const apart = await page.evaluate(() => {
     const {scene} = window.poise;
-    return scene.ghost.object.position.distanceTo(scene.robotView.object.position);
+    return scene.ghosts.map(({view}) => view.object.position.distanceTo(scene.robotView.object.position));
   });
-  assert.ok(apart > 0.002, `the ghost stands ${apart} m away`);
-  assert.match(await page.locator('#tables').innerText(), /second run/i);
+  assert.ok(apart.length === 2 && apart.every((d) => d > 0.002), `the ghosts stand ${apart} m away`);
+  // Each run is told of as the first is: in the header, the events, the checks and its own table.
+  assert.deepEqual(await page.locator('.which').allInnerTexts(), ['first run', 'second run', 'third run']);
+  assert.equal(await page.locator('.run-head .story').count(), 3);
+  assert.match(await page.locator('.events').nth(2).innerText(), /^Events of the third run/);
+  const checks = page.locator('#tables table').first();
+  assert.deepEqual((await checks.locator('th').allInnerTexts()).slice(0, 4), ['what', 'measured', 'second run', 'third run']);
+  assert.match(await page.locator('#tables').innerText(), /The second run[^]*The third run/);
+  // The third run has ended by then: its numbers are not those of its end.
+  await page.evaluate(() => window.poise.player.seek(1.5));
+  const told = await page.locator('.readout tr', {hasText: 'bridge'}).locator('td div').allInnerTexts();
+  assert.equal(told.length, 3);
+  assert.equal(told[0], 'running');
+  assert.notEqual(told[2], 'running');
   assert.deepEqual(problems, []);
   await page.context().close();
 });

@@ -12,48 +12,19 @@
 #include "tools/report/run_screen.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/scenario_run.h"
-#include "tools/scenario/former_fields.h"
 
 namespace poise {
 namespace {
 
 struct ReportOptions {
   std::string run;
-  std::string overlay;
+  std::vector<std::string> others;
   std::string html;
   bool no_html = false;
   bool full = false;
   bool force = false;
   double page_size = kPageSize;  // MB
 };
-
-ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {
-  ReportedRun result;
-  result.log = FindLog(run).string();
-  WarnOfRunInfo(result.log);
-  line->Begin("reading the log");
-  result.record = logging::ReadRun(result.log);
-  line->End();
-  if (result.record.info.scenario.empty()) {
-    throw logging::LogError(
-        fmt::format("{}: RUN_INFO is damaged and scenario.pbtxt is not beside it: put the "
-                    "scenario's text there",
-                    result.log));
-  }
-  ParseScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
-  line->Begin("figures of the table");
-  PrepareRecord(result.log, result.scenario, &result.record);
-  if (result.scenario.has_reference() && result.record.reference == nullptr) {
-    line->End();
-    fmt::print(
-        stderr, "warning: {}: is missing; what compares with it has no value\n",
-        (ReferenceDir(std::filesystem::path(result.log).parent_path()) / "run.lcm").string());
-  }
-  line->Begin("figures of the table");
-  result.checks = EvaluateChecks(result.scenario, result.record);
-  line->End();
-  return result;
-}
 
 /// report.html in a run's folder; beside any other log, under the log's name.
 std::filesystem::path DefaultHtml(const std::string& log) {
@@ -62,10 +33,10 @@ std::filesystem::path DefaultHtml(const std::string& log) {
   return std::filesystem::path(path).replace_extension(".html");
 }
 
-/// The page of one set of charts, or of two laid over each other.
+/// The page of one set of charts, or of several laid over each other.
 int ReportCharts(const ReportOptions& options) {
   std::vector<std::filesystem::path> folders = {options.run};
-  if (!options.overlay.empty()) folders.emplace_back(options.overlay);
+  folders.insert(folders.end(), options.others.begin(), options.others.end());
   const std::filesystem::path html =
       options.html.empty() ? folders.front() / "report.html" : std::filesystem::path(options.html);
   WriteChartsPage(html, folders);
@@ -80,7 +51,7 @@ int Report(const ReportOptions& options) {
   StageLine line(/*quiet=*/false);
   std::vector<ReportedRun> runs;
   runs.push_back(ReadReportedRun(options.run, &line));
-  if (!options.overlay.empty()) runs.push_back(ReadReportedRun(options.overlay, &line));
+  for (const std::string& other : options.others) runs.push_back(ReadReportedRun(other, &line));
   const ReportedRun& run = runs.front();
   const std::string commit = run.record.spec.poise_commit().empty()
                                  ? ""
@@ -123,8 +94,8 @@ void AddReportCommand(CLI::App* app, Command* command) {
   report->add_option("run", options->run,
                      "folder of a run or a log, or of charts: a sweep's, limit's, matrix' or "
                      "benchmark's; default: the latest run");
-  report->add_option("overlay", options->overlay,
-                     "a second one of the kind, drawn over the first in the page");
+  report->add_option("others", options->others,
+                     "more of the kind, drawn over the first in the page");
   CLI::Option* html = report->add_option(
       "--html,-o", options->html, "file of the page; default: report.html in the run's folder");
   CLI::Option* no_html =

@@ -14,7 +14,9 @@
 #include "fmt/format.h"
 #include "logging/printable.h"
 #include "tools/cli/child_process.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
+#include "tools/report/html_report.h"
 #include "tools/report/realtime_verdict.h"
 #include "tools/report/run_screen.h"
 #include "tools/run/estimates.h"
@@ -23,6 +25,7 @@
 #include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
 #include "tools/scenario/described_components.h"
+#include "tools/scenario/former_fields.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
@@ -327,6 +330,33 @@ void PrepareRecord(const fs::path& log, const Scenario& scenario, logging::RunRe
   std::vector<const logging::Metric*> metrics;
   for (int i = 0; i < scenario.check_size(); ++i) metrics.push_back(MetricOfCheck(scenario, i));
   AddOtherEstimates(metrics, record);
+}
+
+ReportedRun ReadReportedRun(const std::string& run, StageLine* line) {
+  ReportedRun result;
+  result.log = FindLog(run).string();
+  WarnOfRunInfo(result.log);
+  line->Begin("reading the log");
+  result.record = logging::ReadRun(result.log);
+  line->End();
+  if (result.record.info.scenario.empty()) {
+    throw logging::LogError(
+        fmt::format("{}: RUN_INFO is damaged and scenario.pbtxt is not beside it: put the "
+                    "scenario's text there",
+                    result.log));
+  }
+  ParseScenario(result.record.info.scenario, result.log + ": RUN_INFO.scenario", &result.scenario);
+  line->Begin("figures of the table");
+  PrepareRecord(result.log, result.scenario, &result.record);
+  if (result.scenario.has_reference() && result.record.reference == nullptr) {
+    line->End();
+    fmt::print(stderr, "warning: {}: is missing; what compares with it has no value\n",
+               (ReferenceDir(fs::path(result.log).parent_path()) / "run.lcm").string());
+  }
+  line->Begin("figures of the table");
+  result.checks = EvaluateChecks(result.scenario, result.record);
+  line->End();
+  return result;
 }
 
 }  // namespace poise

@@ -15,6 +15,9 @@
 
 namespace poise {
 
+class StageLine;
+struct ReportedRun;
+
 struct RunOptions {
   RunChanges changes;
   bool in_process = false;
@@ -86,5 +89,9 @@ class ScenarioRun {
 /// if a check is of them. Throws LogError, RobotError or ConfigError.
 void PrepareRecord(const std::filesystem::path& log, const Scenario& scenario,
                    logging::RunRecord* record);
+
+/// What a report shows of `run` (FindLog), read and checked; `line` says what goes on. Throws as
+/// PrepareRecord.
+ReportedRun ReadReportedRun(const std::string& run, StageLine* line);
 
 }  // namespace poise

@@ -9,8 +9,8 @@ export const KEYS = [['space', 'play or pause'], ['← →', 'one tick'], ['shif
   ['[ ]', 'slower, faster'], ['+ −', 'zoom the plots at the cursor'], ['0', 'all of it in the plots'], ['/', 'search signals']];
 
 function track(shared) {
-  const {run, phases, events, otherEvents = []} = shared;
-  // A live run lets go of its beginning, and a second one may be longer.
+  const {run, phases, events, otherEvents} = shared;
+  // A live run lets go of its beginning, and another one may be longer.
   const inSight = (list) => list.filter((e) => e.time >= run.start - run.period && e.time <= run.end + run.period);
   const length = Math.max(run.end - run.start, run.period);
   const share = (t) => 100 * Math.min(1, Math.max(0, (t - run.start) / length));
@@ -25,7 +25,7 @@ function track(shared) {
     ...phases.balancing.map((p) => span('balancing', p)),
     ...phases.missing.map((p) => span('missing', p)),
     ...[...inSight(events), ...inSight(otherEvents)].map((e) => {
-      const mark = element('span', {class: `event${otherEvents.includes(e) ? ' second' : ''}${e.name === 'fall' ? ' fall' : ''}`});
+      const mark = element('span', {class: `event${e.called ? ' second' : ''}${e.name === 'fall' ? ' fall' : ''}`});
       mark.style.left = `${share(e.time)}%`;
       return mark;
     }));
@@ -34,10 +34,10 @@ function track(shared) {
 const NEAR = 0.008;  // of the bar, from the pointer to an event that it is told of
 
 /** Which events there are about a time, a line each. */
-function eventsNear(time, {run, events, otherEvents = []}) {
+function eventsNear(time, {run, events, otherEvents}) {
   const length = NEAR * Math.max(run.end - run.start, run.period);
   return [...events, ...otherEvents].filter((e) => Math.abs(e.time - time) <= length)
-    .map((e) => `${e.time.toFixed(3)} s: ${e.name.replaceAll('_', ' ')}${otherEvents.includes(e) ? ' (second run)' : ''}`).join('\n');
+    .map((e) => `${e.time.toFixed(3)} s: ${e.name.replaceAll('_', ' ')}${e.called ? ` (${e.called})` : ''}`).join('\n');
 }
 
 export const LAG_PERIOD = 200;  // ms between looks at how far the page is behind

@@ -292,10 +292,13 @@ export class Run extends EventTarget {
   }
 }
 
-/** The runs that `poise report` wrote into the page. */
+const ORDINALS = ['first', 'second', 'third', 'fourth', 'fifth', 'sixth', 'seventh', 'eighth', 'ninth', 'tenth'];
+
+/** The runs that `poise report` wrote into the page, each with its place among them: `index`, and in words `called`. */
 export function embeddedRuns(document) {
   const messages = JSON.parse(document.getElementById('poise-messages').textContent);
   const blob = (id) => document.getElementById(id).textContent;
   return [...document.querySelectorAll('script.poise-run')]
-    .map((element) => new Run(JSON.parse(element.textContent), messages, blob));
+    .map((element, index) => Object.assign(new Run(JSON.parse(element.textContent), messages, blob),
+      {index, called: `${ORDINALS[index] ?? `${index + 1}th`} run`}));
 }

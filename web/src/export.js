@@ -33,9 +33,9 @@ export function csvOf(panel) {
   return rows.join('\r\n') + '\r\n';
 }
 
-/** [name, where and when it ran] of each run: "push_double_support, without balancing". */
-const runsOf = ({run, overlay}) => [run, overlay].filter(Boolean).map(({meta: {run: r}}) => [[r.scenario, ...changesOf(r)].join(', '),
-  [r.log?.replace(/\/run\.lcm$/, ''), r.started_at].filter(Boolean).join(', ')]);
+/** [name, where and when it ran, of several which] of each run: "push_double_support, without balancing". */
+const runsOf = ({run, others}) => [run, ...others].map(({called, meta: {run: r}}) => [[r.scenario, ...changesOf(r)].join(', '),
+  [r.log?.replace(/\/run\.lcm$/, ''), r.started_at].filter(Boolean).join(', '), others.length > 0 ? `${called}: ` : '']);
 
 /** Rows from the first to the last shown, and one more at each side, in stretches of which every one has a number. */
 function stretches(times, values, {min, max}, bridged) {
@@ -95,10 +95,10 @@ export function svgOf(panel) {
 
   const legend = [], unit = plot.axes[1].label(plot);
   let y = bottom + AXIS.below + LINE;
-  runsOf(shared).forEach(([name, where], k) => {
-    legend.push(full(`${shared.overlay ? `${['First', 'Second'][k]} run: ` : ''}${name} (${where})`, y, '12px'));
+  runsOf(shared).forEach(([name, where, called], k) => {
+    legend.push(full(`${called}${name} (${where})`, y, '12px'));
     let x = WIDTH;
-    for (const {label, style} of shown.filter((line) => line.constant === undefined && Boolean(line.overlay) === k > 0)) {
+    for (const {label, style} of shown.filter((line) => line.constant === undefined && (line.overlay ?? 0) === k)) {
       const width = SWATCH + pen.measureText(label).width + 2 * MARGIN;
       if (x + width > WIDTH) [x, y] = [MARGIN, y + LINE];
       legend.push(rule(x, y - 4, x + 22, y - 4, {stroke: style.color(), 'stroke-width': 2, 'stroke-dasharray': (style.dash ?? ['none']).join(' ')}),

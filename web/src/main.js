@@ -44,8 +44,8 @@ function changeChips(changes) {
     rest.length > 0 ? chip(`${rest.length} more change${rest.length === 1 ? '' : 's'}`, rest.join('\n')) : ''];
 }
 
-/** A run in the header: its names, how it ended and its story. `name`: "first run", of several. */
-function runHead({run, name, feed, player}) {
+/** A run in the header: its names, how it ended and its story. `several`: it is one of several. */
+function runHead({run, several, feed, player}) {
   const {run: r} = run.meta;
   const changes = changesOf(r);
   const variant = (run.scenario.variant ?? []).find((v) => v.name === r.variant);
@@ -58,8 +58,8 @@ function runHead({run, name, feed, player}) {
   };
   for (const event of feed ? ['state', 'status', 'control', 'restart'] : []) feed.addEventListener(event, update);
   update();
-  return element('section', {class: `run-head${name === 'second run' ? ' second' : ''}`},
-    name ? element('span', {class: 'which'}, name) : '', element(name === 'second run' ? 'h2' : 'h1', {}, r.scenario), ...changeChips(changes), state,
+  return element('section', {class: `run-head${run.index > 0 ? ' second' : ''}`},
+    several ? element('span', {class: 'which'}, run.called) : '', element(run.index > 0 ? 'h2' : 'h1', {}, r.scenario), ...changeChips(changes), state,
     element('p', {class: 'description'}, variant?.description ? `${variant.description} (a variant of: ${run.scenario.description ?? ''})`
       : run.scenario.description ?? ''),
     r.paper_section ? element('span', {class: 'badge'}, changes.length ? `changed from the paper's section ${r.paper_section}`
@@ -70,10 +70,9 @@ function runHead({run, name, feed, player}) {
 /** "stands", of its log's "stands/run.lcm"; of a log on its own its name. */
 const folderOf = ({log}) => log.replace(/\/run\.lcm$/, '');
 
-function header(run, overlay, feed, player) {
-  const runs = overlay ? [{run, name: 'first run'}, {run: overlay, name: 'second run'}] : [{run}];
-  document.title = `${runs.map((one) => [one.run.meta.run.scenario, ...changesOf(one.run.meta.run).slice(0, CHIPS)].join(', ')).join(' and ')} – Poise`;
-  document.getElementById('header').append(...runs.map((one) => runHead({...one, feed, player})));
+function header(runs, feed, player) {
+  document.title = `${runs.map(({meta}) => [meta.run.scenario, ...changesOf(meta.run).slice(0, CHIPS)].join(', ')).join(' and ')} – Poise`;
+  document.getElementById('header').append(...runs.map((run) => runHead({run, several: runs.length > 1, feed, player})));
 }
 
 function sceneToolbar(scene) {
@@ -100,7 +99,7 @@ function regionsNote(run) {
 }
 
 /** What the picture's signs mean, beneath it; folded where there is little room. */
-function sceneKey(run, overlay) {
+function sceneKey(run, others) {
   const entry = (name, symbol, text) => {
     const mark = element('span', {class: 'symbol'}, symbol);
     mark.style.color = `light-dark(${COLORS[name].light}, ${COLORS[name].dark})`;
@@ -116,7 +115,7 @@ function sceneKey(run, overlay) {
       entry('com', '✚', 'COM and below it'), entry('push', '↑', 'push'),
       run.meta.ground?.length ? element('li', {class: 'blocks-key'}, element('span', {class: 'symbol'}, '▦'), 'blocks as nothing stands on them; light: soft') : '',
       run.scenario.sim?.crane ? entry('support', '│', 'crane; ↑ its pull') : '',
-      overlay ? entry('desired', '▒', 'second run') : ''));
+      others.length > 0 ? entry('desired', '▒', others.map((other) => other.called).join(', ')) : ''));
   WIDE.addEventListener('change', () => { key.open = WIDE.matches; });
   return key;
 }
@@ -166,33 +165,34 @@ async function start() {
     robotPage(JSON.parse(robot.textContent));
     return;
   }
-  const [run, overlay] = embeddedRuns(document);
+  const runs = embeddedRuns(document), [run, ...others] = runs;
   if (!run) throw new Error('this page holds no run: write one with poise report');
-  for (const r of [run, overlay].filter(Boolean)) addDerivedSignals(r);
+  for (const r of runs) addDerivedSignals(r);
   const feed = run.meta.live ? new LiveFeed(run) : undefined;
   const player = new Player(run);
-  header(run, overlay, feed, player);
+  header(runs, feed, player);
   if (feed) await firstTicks(feed);
-  const events = run.meta.events ?? [], otherEvents = overlay?.meta.events ?? [];
+  const events = run.meta.events ?? [];
+  const otherEvents = others.flatMap(({called, meta}) => meta.events.map((event) => ({...event, called})));
   const phasesFound = findPhases(run);  // unpacked while the browser prepares its 3D
   const drawn = has3D(), host = document.getElementById('scene');
-  const scene = drawn ? new SceneView(host, run, overlay) : new NoPicture(host);
+  const scene = drawn ? new SceneView(host, run, others) : new NoPicture(host);
   if (drawn) {
     host.append(sceneToolbar(scene), savingToolbar(scene, {run, player}), element('span', {class: 'inset'}, 'soles from above, forward is up'));
-    document.getElementById('scene-place').after(sceneKey(run, overlay));
+    document.getElementById('scene-place').after(sceneKey(run, others));
   }
   const [phases] = await Promise.all([phasesFound, scene.load()]);
   document.documentElement.dataset.picture = String(Math.round(performance.now()));
 
   const view = new TimeView(run);
-  const shared = {run, overlay, player, view, phases, events, otherEvents, feed};
+  const shared = {run, others, player, view, phases, events, otherEvents, feed};
   const bar = playerBar(document.getElementById('player'), shared);
   const grid = new PanelGrid(document.getElementById('figures'), shared);
   const printer = new Printer(grid, scene);
-  const readout = new Readout([run, overlay].filter(Boolean));
-  const lists = [[events, overlay ? ' of the first run' : ''], ...(overlay ? [[otherEvents, ' of the second run']] : [])].map(([list, name]) => {
-    const shown = new EventList(player, name);
-    shown.show(list);
+  const readout = new Readout(runs);
+  const lists = runs.map((one) => {
+    const shown = new EventList(player, others.length > 0 ? one : undefined);
+    shown.show(one.meta.events ?? []);
     return shown;
   });
   const control = feed && new Control(feed);
@@ -208,7 +208,7 @@ async function start() {
   }
   const keys = feed && new URL(location.href).searchParams.has('token') ? [...KEYS, ...CONTROL_KEYS] : KEYS;
   document.getElementById('side').append(acting?.element ?? '',
-    element('section', {class: 'now'}, element('h2', {}, 'At the time cursor'), overlay ? element('p', {class: 'soft'}, 'The second run is beneath the first.') : '',
+    element('section', {class: 'now'}, element('h2', {}, 'At the time cursor'), others.length > 0 ? element('p', {class: 'soft'}, 'The other runs are beneath the first, in their order.') : '',
       readout.element, regionsNote(run)),
     ...lists.map((list) => list.element), acting?.settings ?? '', element('section', {class: 'keys'}, element('h2', {}, 'Keys'), element('dl', {},
       ...keys.flatMap(([key, what]) => [element('dt', {}, key), element('dd', {}, what)]))));
@@ -220,7 +220,7 @@ async function start() {
     element('li', {}, 'drag: zoom; click: time; ctrl + wheel: zoom; double click: all')), rowsNote(run));
   for (const definition of figuresFor(run)) grid.add(definition);
   const live = feed && liveTables(run, feed);
-  document.getElementById('tables').append(...(live ? live.elements : tables(run, overlay)));
+  document.getElementById('tables').append(...(live ? live.elements : tables(run, others)));
   await readout.load();
 
   let shown = 0;
@@ -264,7 +264,7 @@ async function start() {
   if (!feed) printer.drawWhenIdle(run);
   document.documentElement.dataset.ready = String(Math.round(performance.now()));
   // For whoever looks closer from the browser's console.
-  window.poise = {run, overlay, player, view, grid, scene, feed, printer, control};
+  window.poise = {run, runs, player, view, grid, scene, feed, printer, control};
 }
 
 start().catch((error) => {

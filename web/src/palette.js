@@ -22,16 +22,17 @@ export function setPaper(on) {
 export const isDark = () => query.matches && !onPaper;
 export const onThemeChange = (listener) => query.addEventListener('change', listener);
 
-/** By what a line is: of the first run, and of the second. */
-const DASHES = {curve: [undefined, [3, 3]], desired: [[5, 3], [8, 3, 1.5, 3]], limit: [[7, 4], [7, 3, 1.5, 3, 1.5, 3]]};
+/** By what a line is: its dash in the first run, and in the others, of which `k` makes the dashes longer. */
+const DASHES = {curve: [undefined, (k) => [3 * k, 3]], desired: [[5, 3], (k) => [5 + 3 * k, 3, 1.5, 3]],
+  limit: [[7, 4], (k) => [4 + 3 * k, 3, 1.5, 3, 1.5, 3]]};
 
-/** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ... */
-export function styleOf(role, overlay = false) {
+/** {color(), dash, width} of a role: "computed", "foot-0-measured", "axis-x-thin", ..., in the run of this place. */
+export function styleOf(role, index = 0) {
   const [, name, variant] = /^(.*?)(?:-(thin))?$/.exec(role);
   const hue = /^hue-(\d+)$/.exec(name);
   const pair = COLORS[hue ? `hue-${hue[1] % HUES}` : name] ?? COLORS.computed;
   const kind = name === 'limit' ? 'limit' : name === 'desired' || /^foot-.*-computed$/.test(name) ? 'desired' : 'curve';
-  return {color: () => pair[isDark() ? 1 : 0], dash: DASHES[kind][overlay ? 1 : 0], width: variant === 'thin' || overlay ? 1 : 1.5};
+  return {color: () => pair[isDark() ? 1 : 0], dash: index ? DASHES[kind][1](index) : DASHES[kind][0], width: variant === 'thin' || index ? 1 : 1.5};
 }
 
 export const cssColor = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -79,7 +79,7 @@ function resampled(values, run, other) {
   });
 }
 
-/** Whether a line of the second run is the first one's of the same series, `lines` being those before it. */
+/** Whether a line of another run is the first one's of the same series, `lines` being those before it. */
 function sameValues({signal, run: other, series}, lines, run) {
   const first = lines.find((line) => line.series === series).signal.values;
   return resampled(signal.values, run, other).every((value, row) => value === null || Number.isNaN(first[row]) || value === first[row]);
@@ -94,7 +94,7 @@ function lastNumber(values, row) {
   return NaN;
 }
 
-/** One plot. `definition` as figures.js gives it; `shared`: {run, overlay, player, view, phases, events}. */
+/** One plot. `definition` as figures.js gives it; `shared`: {run, others, player, view, phases, events}. */
 export class Panel {
   constructor(definition, shared, onRemove) {
     Object.assign(this, {definition, shared});
@@ -135,18 +135,18 @@ export class Panel {
   }
 
   async #load() {
-    const {run, overlay} = this.shared;
+    const {run, others} = this.shared;
     const {definition} = this;
     const lines = definition.series.map((s) => ({...s, series: s, run, signal: s.signal ?? findSignal(run, s)}));
     for (const limit of definition.limits ?? []) lines.push({label: 'limit', role: 'limit', constant: limit});
-    if (overlay) {
+    for (const other of others) {
       for (const s of definition.series) {
-        const signal = findSignal(overlay, {...s, name: s.name ?? undefined});
-        if (signal) lines.push({...s, series: s, signal, run: overlay, label: `${s.label} (second run)`, overlay: true});
+        const signal = findSignal(other, {...s, name: s.name ?? undefined});
+        if (signal) lines.push({...s, series: s, signal, run: other, label: `${s.label} (${other.called})`, overlay: other.index});
       }
     }
     await Promise.all(lines.map((line) => line.signal?.load()));
-    // The second run's limits where they are others.
+    // The other runs' limits where they differ from the first one's.
     this.lines = lines.filter((line, k) => !(line.overlay && line.role === 'limit' && sameValues(line, lines.slice(0, k), run)));
   }
 
@@ -176,12 +176,12 @@ export class Panel {
 
   /** Brings the plot to what the run holds. */
   #grow() {
-    const {run, overlay} = this.shared;
+    const {run, others} = this.shared;
     const dropped = run.firstTick - this.firstTick;
     const held = this.data[0].length - dropped;
     const restarted = run.restarts !== this.restarts;  // the ticks that it holds are others
     if (!restarted && dropped === 0 && held === run.numRows) return;
-    if (restarted || held <= 0 || overlay) {
+    if (restarted || held <= 0 || others.length > 0) {
       this.#readAll();
     } else {
       const columns = this.data.slice(1);
@@ -222,7 +222,7 @@ export class Panel {
       }), ...this.#bounded().flatMap((line) => [0, 1].map(() => ({label: line.label, stroke: 'transparent', width: 0,
         points: {show: false}, show: !this.hidden.has(line.label)})))],
       bands: this.#bounded().map((line, k) => {
-        const {color} = styleOf(line.role, false);
+        const {color} = styleOf(line.role);
         const first = this.lines.length + 1 + 2 * k;
         return {series: [first, first + 1], fill: () => translucent(color())};
       }),

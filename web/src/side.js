@@ -5,7 +5,7 @@ import {formatNumber, quantity} from './units.js';
 
 const DIGITS = 3;
 
-/** What holds at the time cursor, of a second run beneath the first: {element, load(), update(time)}. */
+/** What holds at the time cursor, of the other runs beneath the first: {element, load(), update(time)}. */
 export class Readout {
   constructor(runs) {
     this.parts = runs.map((run) => ({run, rows: rowsOf(run), cells: new Map()}));
@@ -27,7 +27,7 @@ export class Readout {
 
   update(time) {
     for (const {run, rows, cells} of this.parts) {
-      const row = run === this.parts[0].run ? run.rowAt(time) : run.rowOf(time);  // the second run may have ended before
+      const row = run === this.parts[0].run ? run.rowAt(time) : run.rowOf(time);  // the others may have ended before
       for (const [name, signals, text] of rows) cells.get(name).textContent = text(signals.map((s) => s.values?.[row] ?? NaN));
     }
   }
@@ -85,10 +85,10 @@ export class EventList {
   element = element('section', {class: 'events'});
   #buttons = [];  // [time, element]
 
-  /** `name`: of several runs', which. */
-  constructor(player, name = '') {
-    Object.assign(this, {player, name});
-    if (name.includes('second')) this.element.classList.add('second');
+  /** `run`: of several, which. */
+  constructor(player, run) {
+    Object.assign(this, {player, name: run ? ` of the ${run.called}` : ''});
+    this.element.classList.toggle('second', run?.index > 0);
     player.addEventListener('time', () => this.#mark());
   }
 

@@ -18,17 +18,17 @@ function partOf(run) {
   return cut ? `part of a run: ${seconds(cut.first_tick)} to ${seconds(cut.last_tick + 1)}` : '';
 }
 
-function checkTable(run, overlay, caption = partOf(run) ? `Checks of this part of the run (${partOf(run)})` : 'Checks') {
+function checkTable(run, others, caption = partOf(run) ? `Checks of this part of the run (${partOf(run)})` : 'Checks') {
   const pending = run.meta.run.checks.some((c) => c.passed === null && !isUnknown(c));
-  const other = new Map((overlay?.meta.run.checks ?? []).map((c) => [`${c.name}|${c.label}`, c]));
+  const same = (other, {name, label}) => other.meta.run.checks.find((c) => c.name === name && c.label === label);
   const measured = (c) => isUnknown(c) ? 'not known' : c.measured !== null ? withUnit(c.measured, c.unit) : pending ? 'none yet' : 'none';
-  return table(caption, ['what', pending ? 'so far' : 'measured', ...(overlay ? ['second run'] : []), 'limit', 'paper', 'verdict'],
+  return table(caption, ['what', pending ? 'so far' : 'measured', ...others.map((other) => other.called), 'limit', 'paper', 'verdict'],
     run.meta.run.checks.map((c) => [c.label || c.name, measured(c),
-      ...(overlay ? [secondValue(other.get(`${c.name}|${c.label}`))] : []), c.limit ?? '', c.paper ?? '', verdict(c)]),
-    {numbers: overlay ? [1, 2] : [1]});
+      ...others.map((other) => otherValue(same(other, c))), c.limit ?? '', c.paper ?? '', verdict(c)]),
+    {numbers: [run, ...others].map((_, k) => k + 1)});
 }
 
-const secondValue = (check) => !check || check.measured === null ? '–' : withUnit(check.measured, check.unit);
+const otherValue = (check) => !check || check.measured === null ? '–' : withUnit(check.measured, check.unit);
 
 function assumptionTable(run) {
   const {assumptions} = run.meta.run;
@@ -68,11 +68,11 @@ function information(run, title) {
 }
 
 /** All tables below the plots. */
-export function tables(run, overlay) {
+export function tables(run, others) {
   const {components} = run.meta.run;
-  return [checkTable(run, overlay), assumptionTable(run), latencyFigure(components), latencyTable(components),
+  return [checkTable(run, others), assumptionTable(run), latencyFigure(components), latencyTable(components),
     channelTable(run), information(run, 'This run'),
-    overlay ? information(overlay, 'The second run') : ''].filter(Boolean);
+    ...others.map((other) => information(other, `The ${other.called}`))].filter(Boolean);
 }
 
 /** Those of a run in progress, and of its end; `refresh()` brings what the feed has told since. */
@@ -93,10 +93,10 @@ export function liveTables(run, feed) {
       }
       if (ended) {
         run.meta.run.ended = true;
-        place.replaceChildren(...tables(run));
+        place.replaceChildren(...tables(run, []));
         return;
       }
-      checks.replaceChildren(...(found.length ? [checkTable(run, undefined,
+      checks.replaceChildren(...(found.length ? [checkTable(run, [],
         `Checks up to ${formatNumber(run.timeOfTick(ticks))} s: pending until the run's end`)] : []));
       latencies.replaceChildren(...[latencyFigure(components), latencyTable(components)].filter(Boolean));
     },

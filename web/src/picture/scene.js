@@ -69,12 +69,12 @@ function contactSignals(run) {
 }
 
 export class SceneView extends View3D {
-  /** `host` is the element to fill; `overlay` a second run, drawn as a ghost, or undefined. */
-  constructor(host, run, overlay) {
+  /** `host` is the element to fill; `others` runs that are drawn as ghosts. */
+  constructor(host, run, others) {
     super(host, run.robot);
-    Object.assign(this, {run, overlay});
+    this.run = run;
+    this.ghosts = others.map((other) => ({run: other, samples: new Samples(), view: new RobotView(other.robot, {ghost: true})}));
     this.samples = new Samples();
-    this.overlaySamples = new Samples();
     this.row = 0;
     this.visible = true;
     this.leastLoad = lightLoad(run);
@@ -92,7 +92,7 @@ export class SceneView extends View3D {
     await Promise.all([
       this.samples.load(this.run, {...motionSignals(this.run), ...contactSignals(this.run)}),
       this.steps.load(),
-      this.overlay && this.overlaySamples.load(this.overlay, motionSignals(this.overlay)),
+      ...this.ghosts.map(({run, samples}) => samples.load(run, motionSignals(run))),
     ]);
     this.setRow(this.run.meta.live ? this.run.numRows - 1 : 0);
     this.look('free');
@@ -100,10 +100,7 @@ export class SceneView extends View3D {
 
   #build() {
     const {scene} = this;
-    if (this.overlay) {
-      this.ghost = new RobotView(this.overlay.robot, {ghost: true});
-      scene.add(this.ghost.object);
-    }
+    for (const {view} of this.ghosts) scene.add(view.object);
     const block = this.run.scenario.sim?.block;
     if (block) {
       this.block = new Block(block);
@@ -186,10 +183,9 @@ export class SceneView extends View3D {
     this.note.hidden = posed;
     this.note.textContent = this.posedAt === undefined ? 'no message tells the robot\'s pose'
       : `no message tells the pose at this time: it is that of ${this.posedAt.toFixed(3)} s`;
-    if (this.ghost) {
-      const other = this.overlay.rowAt(this.run.timeAt(row));
-      this.ghost.setPose(this.overlaySamples.pose('base', other),
-        this.overlaySamples.vector('joint', other, this.overlay.robot.joints.length));
+    for (const ghost of this.ghosts) {
+      const other = ghost.run.rowAt(this.run.timeAt(row));
+      ghost.view.setPose(ghost.samples.pose('base', other), ghost.samples.vector('joint', other, ghost.run.robot.joints.length));
     }
     if (this.block) this.block.setRise(blockRise(this.run.scenario.sim.block, this.run.timeAt(row)));
 
