@@ -83,6 +83,7 @@ int main(int argc, char** argv) {
   poise::AddGraphCommand(&app, &command);
   poise::AddRobotCommand(&app, &command);
   poise::AddListCommand(&app, &command);
+  poise::AddRunsCommand(&app, &command);
   poise::AddDoctorCommand(&app, &command);
   poise::AddDrivesCommand(&app, &command);
   poise::AddEstopCommand(&app, &command);

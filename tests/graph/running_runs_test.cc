@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 /// Runs of this test alone are known to the programs that this process starts.
 class OwnRegistry {
@@ -162,6 +164,98 @@ TEST_F(RunningRunsTest, AnActWithoutARunIsForTheOnlyOne) {
   // What was refused or meant for b has not reached a: its truth knows the last push alone.
   EXPECT_EQ(Pushes(a), (std::set<double>{-30, 0}));
   EXPECT_EQ(Pushes(b), (std::set<double>{-20, 0}));
+}
+
+/// Bytes of a run's files, of its reference's as well.
+int64_t Size(const fs::path& dir) {
+  int64_t size = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(dir)) {
+    if (entry.is_regular_file()) size += static_cast<int64_t>(entry.file_size());
+  }
+  return size;
+}
+
+/// Lets a run's record say that it began then.
+void Date(const std::string& run, const std::string& started_at) {
+  nlohmann::json summary = ReadSummary(run);
+  summary["started_at"] = started_at;
+  std::ofstream(run + "/summary.json") << summary;
+}
+
+TEST_F(RunningRunsTest, PastRunsAreListedFromTheirRecordsAndTheOldOnesGo) {
+  ASSERT_NE(std::freopen("/dev/null", "r", stdin), nullptr);  // there is nobody to ask
+  const auto listed = [] {
+    return nlohmann::json::parse(RunPoise({"list", "runs", "--json"}).output);
+  };
+  const auto run = [](const std::vector<std::string>& flags) {
+    std::vector<std::string> arguments = {"run", StandScenario(), "--inline", "--quiet"};
+    arguments.insert(arguments.end(), flags.begin(), flags.end());
+    EXPECT_NE(RunPoise(arguments).exit_code, 2);
+  };
+  EXPECT_TRUE(listed().empty());
+  run({"--duration", "0.1"});
+  const std::string first = listed()[0]["folder"];
+  const fs::path runs = fs::path(first).parent_path();
+  run({"--set", "task_controller.com.kp=190", "--without", "balancing", "--seed", "7"});
+  run({StandScenario(), "--duration", "0.1"});  // a folder of two
+  ASSERT_EQ(listed().size(), 4u);
+  std::string changed;
+  for (const nlohmann::json& one : listed()) {
+    const std::string dir = one["folder"];
+    const nlohmann::json summary = ReadSummary(dir);
+    EXPECT_EQ(one["started_at"], summary["started_at"]);
+    EXPECT_EQ(one["scenario"], "stand");
+    EXPECT_EQ(one["robot"], "dyros_legs");
+    EXPECT_EQ(one["bytes"], Size(dir));
+    const std::string verdict = summary["passed"].get<bool>() ? "passed: " : "FAILED: ";
+    EXPECT_THAT(one["outcome"].get<std::string>(), StartsWith(verdict));
+    if (one["flags"] == nlohmann::json::array({"--duration 0.1"})) continue;
+    EXPECT_EQ(one["flags"],
+              nlohmann::json::array(
+                  {"--without balancing", "--set task_controller.com.kp=190", "--seed 7"}));
+    changed = dir;
+  }
+  Date(first, "2020-01-01T00:00:00Z");
+  std::string several;
+  for (const nlohmann::json& one : listed()) {
+    const fs::path dir = one["folder"].get<std::string>();
+    if (dir.parent_path() == runs) continue;
+    several = dir.parent_path().string();
+    Date(dir.string(), "2021-01-01T00:00:00Z");
+  }
+  EXPECT_EQ(listed()[0]["folder"], changed);
+  EXPECT_EQ(listed()[3]["folder"], first);
+
+  // What no run has written, and what only looks like one.
+  std::ofstream(first + "/mine.txt") << "notes";
+  fs::create_directory(runs / "other");
+  std::ofstream(runs / "other/run_spec.pbtxt") << "nonsense";
+  const ProgramResult shown = RunPoise({"runs", "prune", "--keep", "1"});
+  EXPECT_EQ(shown.exit_code, 0) << shown.output;
+  EXPECT_THAT(shown.output, HasSubstr("nothing is deleted without --yes"));
+  EXPECT_THAT(RunPoise({"runs", "prune", "--keep", "0", "--days", "36500", "--yes"}).output,
+              HasSubstr("no run in "));
+  EXPECT_EQ(listed().size(), 4u);
+  const ProgramResult one = RunPoise({"runs", "prune", "--keep", "2", "--yes"});
+  EXPECT_EQ(one.exit_code, 0) << one.output;
+  EXPECT_THAT(one.output, HasSubstr("deleted " + first + ", "));
+  EXPECT_THAT(one.output, ContainsRegex("what no run has written stays\n[0-9.]+ .?B freed\n$"));
+  EXPECT_EQ(listed().size(), 3u);
+  EXPECT_EQ(ReadAll(first + "/mine.txt"), "notes");
+  EXPECT_EQ(Size(first), 5);
+
+  // A run in progress stays, whatever is asked for.
+  PoiseProgram going({"run", StandScenario(), "--inline", "--realtime", "--duration", "300"});
+  ASSERT_TRUE(WaitUntil([&] { return listed().size() == 4; }));
+  EXPECT_EQ(listed()[0]["outcome"], "goes on");
+  EXPECT_EQ(RunPoise({"runs", "prune", "--keep", "0", "--yes"}).exit_code, 0);
+  ASSERT_EQ(listed().size(), 1u);
+  EXPECT_EQ(listed()[0]["outcome"], "goes on");
+  EXPECT_FALSE(fs::exists(changed));
+  EXPECT_FALSE(fs::exists(several));
+  EXPECT_EQ(ReadAll(runs / "other/run_spec.pbtxt"), "nonsense");
+  kill(going.pid(), SIGINT);
+  going.Wait();
 }
 
 TEST_F(RunningRunsTest, ARunInsideOneProcessIsSaidToHaveNoBridge) {

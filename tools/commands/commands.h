@@ -34,6 +34,7 @@ void AddGraphCommand(CLI::App* app, Command* command);
 void AddRobotCommand(CLI::App* app, Command* command);
 /// `poise robot import`, a command of `robot`.
 void AddRobotImport(CLI::App* robot, Command* command);
+void AddRunsCommand(CLI::App* app, Command* command);
 void AddListCommand(CLI::App* app, Command* command);
 void AddDoctorCommand(CLI::App* app, Command* command);
 void AddDrivesCommand(CLI::App* app, Command* command);

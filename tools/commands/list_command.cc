@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/suggest.h"
@@ -17,6 +18,8 @@
 #include "tools/cli/plain_streams.h"
 #include "tools/commands/commands.h"
 #include "tools/reference/reference_text.h"
+#include "tools/run/run_dir.h"
+#include "tools/run/run_index.h"
 #include "tools/run/run_registry.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/graph_files.h"
@@ -59,6 +62,7 @@ struct ListRequest {
   std::string schema = "scenario";
   bool markdown = false;
   bool folders = false;
+  bool json = false;
 };
 
 size_t TextWidth() { return static_cast<size_t>(std::min(ScreenStyle().columns, 100)); }
@@ -150,6 +154,27 @@ void ListRunFolders() {
   }
 }
 
+/// The runs that have left a folder below runs/.
+void ListPastRuns(bool json) {
+  const std::vector<PastRun> runs = PastRuns();
+  if (json) {
+    auto list = nlohmann::ordered_json::array();
+    for (const PastRun& run : runs) {
+      list.push_back({{"folder", run.dir.string()},
+                      {"started_at", run.started_at},
+                      {"robot", run.robot},
+                      {"scenario", run.scenario},
+                      {"outcome", run.outcome},
+                      {"flags", run.flags},
+                      {"bytes", run.bytes}});
+    }
+    KeepUnicode();
+    fmt::print("{}\n", list.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  } else if (!runs.empty()) {
+    fmt::print("  of {}:\n{}", logging::ForTerminal(RunsDir().string()), FormatPastRuns(runs));
+  }
+}
+
 void ListRuns() {
   const std::vector<RunningRun> runs = RunningRuns();
   fmt::print("{}", runs.empty() ? "  none is going on\n" : FormatRuns(runs));
@@ -223,6 +248,7 @@ int List(const ListRequest& request) {
     ListRunFolders();
     return kExitOk;
   }
+  if (request.json && what != "runs") throw ConfigError("--json goes with `poise list runs`");
   if (request.markdown) KeepUnicode();
   if (what == "fields") return ListFields(request);
   if (what == "messages") return ListMessages(request);
@@ -301,7 +327,8 @@ int List(const ListRequest& request) {
                                  ScreenStyle().columns, 26));
     }
   }
-  if (wanted("runs")) ListRuns();
+  if (wanted("runs") && !request.json) ListRuns();
+  if (what == "runs") ListPastRuns(request.json);
   if (wanted("metrics")) {
     PrintMetrics();
   }
@@ -320,8 +347,9 @@ void AddListCommand(CLI::App* app, Command* command) {
   CLI::App* list = app->add_subcommand("list", "what there is to use, and what each field means");
   list->add_option(
           "what", request->what,
-          "scenarios, sweeps, robots, graphs, components, runs (that go on), metrics, fields or "
-          "messages; default: all but the last two")
+          "scenarios, sweeps, robots, graphs, components, runs (that go on, and those that "
+          "have left a folder below runs/), metrics, fields or messages; default: all but the last "
+          "two")
       ->check(CLI::IsMember({"scenarios", "sweeps", "robots", "graphs", "components", "runs",
                              "metrics", "fields", "messages"}));
   list->add_option("name", request->name,
@@ -334,6 +362,7 @@ void AddListCommand(CLI::App* app, Command* command) {
   list->add_flag("--markdown", request->markdown, "fields, messages or metrics as Markdown");
   list->add_flag("--folders", request->folders,
                  "of runs: only the folders of those that can be listened to, for scripts");
+  list->add_flag("--json", request->json, "of runs: those below runs/, for programs");
   list->callback([request, command] { *command = [request] { return List(*request); }; });
 }
 

@@ -192,6 +192,7 @@ std::string Truth(bool value) { return value ? "true" : "false"; }
 void ReadCellSummary(const std::filesystem::path& file, MatrixCell* cell) {
   std::ifstream in(file);
   const nlohmann::json summary = nlohmann::json::parse(in);
+  cell->started_at = summary.at("started_at").get<std::string>();
   cell->passed = summary.at("passed").get<bool>();
   cell->simulated_time = summary.at("simulated_time").get<double>();
   for (const nlohmann::json& event : summary.at("events")) {

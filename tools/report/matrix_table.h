@@ -22,6 +22,7 @@ struct MatrixCell {
   std::string folder;                  ///< its run's, below the matrix'
   bool must_pass = false;              ///< an experiment without ablation, with checks of its own
   std::optional<std::string> problem;  ///< why it could not be run; the rest is then empty
+  std::string started_at;              ///< ISO 8601 UTC
   bool passed = false;
   std::string outcome;            ///< "stands", "fell at 1.234 s", "stopped at 1.234 s: reason"
   std::optional<double> fell_at;  ///< s

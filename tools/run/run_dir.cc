@@ -11,6 +11,7 @@
 #include <ctime>
 
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/run.h"
 #include "fmt/chrono.h"
 #include "fmt/format.h"
 #include "logging/log_sums.h"
@@ -126,6 +127,28 @@ RunDir MakeRunDir(const std::string& out, const std::string& name, bool force) {
                   (RunsDir() / dated).string(), error.message()));
 }
 
+int64_t RemoveRun(const RunDir& run) {
+  const fs::path& dir = run.path();
+  std::vector<std::string> files(std::begin(kFiles), std::end(kFiles));
+  std::vector<std::string> processes = ProcessNames(ReadRunSpec(dir.string()).graph());
+  processes.insert(processes.end(), {"recorder", "ros2"});
+  for (const std::string& process : processes) files.push_back(process + ".log");
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(dir, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("branch_") && name.ends_with(".lcm")) files.push_back(name);
+  }
+  int64_t freed = 0;
+  for (const fs::path& part : {ReferenceDir(dir), dir}) {
+    for (const std::string& file : files) {
+      const auto size = fs::file_size(part / file, error);
+      if (!error && fs::remove(part / file, error)) freed += static_cast<int64_t>(size);
+    }
+    fs::remove(part, error);  // if it is empty
+  }
+  return freed;
+}
+
 fs::path ReferenceDir(const fs::path& dir) { return dir / "reference"; }
 
 void PointLatestTo(const fs::path& dir) {
@@ -173,6 +196,13 @@ RunSpec ReadRunSpec(const std::string& run) {
   RunSpec spec;
   ReadTextProto(path.string(), &spec);
   return spec;
+}
+
+std::string RobotNameOf(const RunSpec& spec) {
+  for (const Resource& resource : spec.resource()) {
+    if (resource.name() == "robot") return fs::path(resource.file()).stem().string();
+  }
+  return "";
 }
 
 }  // namespace poise

@@ -1,6 +1,7 @@
 // The folder that a run leaves.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -37,6 +38,10 @@ class RunDir {
 /// and leaves the rest. Throws ConfigError.
 RunDir MakeRunDir(const std::string& out, const std::string& name, bool force);
 
+/// Removes the files that runs write into `dir`, and the folder where nothing else is in it.
+/// Returns the bytes that this frees. Throws ConfigError when its run cannot be told.
+int64_t RemoveRun(const RunDir& dir);
+
 /// In a run's folder, the folder of the run that it is compared with.
 std::filesystem::path ReferenceDir(const std::filesystem::path& dir);
 
@@ -53,5 +58,8 @@ void WarnOfRunInfo(const std::filesystem::path& log);
 /// The run spec in a run's folder, or beside a log; empty `run`: of the latest run. It is there
 /// before the log is. Throws ConfigError.
 RunSpec ReadRunSpec(const std::string& run);
+
+/// Name of the robot's file, without ending; empty: the run has none.
+std::string RobotNameOf(const RunSpec& spec);
 
 }  // namespace poise

@@ -91,9 +91,7 @@ void Describe(RunningRun* run) {
     run->scenario = spec.scenario();
     run->run_id = spec.run_id();
     run->networked = spec.first_port() != 0;
-    for (const Resource& resource : spec.resource()) {
-      if (resource.name() == "robot") run->robot = fs::path(resource.file()).stem().string();
-    }
+    run->robot = RobotNameOf(spec);
   } catch (const ConfigError&) {
     run->readable = false;
   }
