@@ -11,6 +11,7 @@
 #include "components/framework/run.h"
 #include "fmt/format.h"
 #include "logging/replay/message_difference.h"
+#include "logging/run_log_writer.h"
 #include "logging/run_record.h"
 
 namespace poise::logging {
@@ -96,8 +97,8 @@ LogReplay::LogReplay(const std::string& path) : path_(path), messages_(path) {
 class ReplayedStages {
  public:
   ReplayedStages(const LogReplay& log, const RunSpec& spec, int index,
-                 const ComponentRegistry& registry)
-      : log_(log), spec_(spec), instance_(spec.graph().component(index)) {
+                 const ComponentRegistry& registry, ChangedMessages* changed)
+      : log_(log), spec_(spec), instance_(spec.graph().component(index)), changed_(changed) {
     const ComponentFactory* const factory = registry.Find(poise::TypeOf(instance_));
     if (factory == nullptr) {
       Fail(fmt::format("this program has no component type '{}'", poise::TypeOf(instance_)));
@@ -376,6 +377,7 @@ class ReplayedStages {
       ++channel.ticks;
       if (!SameBits(*lane(output.channel).type, logged, buffer_)) {
         AddDifferences(*lane(output.channel).type, logged, buffer_, tick.index, &channel);
+        if (changed_ != nullptr) (*changed_)[{channel.channel, tick.index}] = buffer_;
       }
     }
   }
@@ -396,6 +398,7 @@ class ReplayedStages {
   const LogReplay& log_;
   const RunSpec& spec_;
   const ComponentInstance& instance_;
+  ChangedMessages* changed_;
   ActInput* act_input_ = nullptr;
   std::vector<PlacedAct> placed_acts_;  // by tick
   int64_t acts_ = 0, unanswered_acts_ = 0;
@@ -407,8 +410,30 @@ class ReplayedStages {
 };
 
 ReplayedComponent LogReplay::Replay(const RunSpec& spec, int index,
-                                    const ComponentRegistry& registry) const {
-  return ReplayedStages(*this, spec, index, registry).Run();
+                                    const ComponentRegistry& registry,
+                                    ChangedMessages* changed) const {
+  return ReplayedStages(*this, spec, index, registry, changed).Run();
+}
+
+void LogReplay::Write(const std::string& to, const run_info_t& info,
+                      const ChangedMessages& changed) const {
+  EventLogWriter writer(to);
+  std::vector<uint8_t> bytes(static_cast<size_t>(info.getEncodedSize()));
+  info.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  writer.Write(kRunInfoChannel, 0, bytes);
+  LogReader reader(path_);
+  LogEvent event;
+  while (reader.Next(&event)) {
+    if (event.channel == kRunInfoChannel) continue;
+    const MessageType* const type = messages_.TypeOf(event);
+    const auto found =
+        type == nullptr || !type->has_header
+            ? changed.end()
+            : changed.find({std::string(event.channel), LogMessages::Tick(*type, event)});
+    writer.Write(event.channel, event.utime,
+                 found == changed.end() ? event.data : std::span(found->second));
+  }
+  writer.Close(/*sums=*/true);
 }
 
 }  // namespace poise::logging

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "components/framework/component_registry.h"
@@ -49,6 +51,9 @@ struct ReplayedComponent {
   bool equal() const;
 };
 
+/// Replayed messages with other bits than the logged, by channel and tick.
+using ChangedMessages = std::map<std::pair<std::string, int64_t>, std::vector<uint8_t>>;
+
 /// A log's messages by channel and tick. Wall time plays no part in it.
 class LogReplay {
  public:
@@ -57,11 +62,18 @@ class LogReplay {
 
   /// The run as the log tells it, configurations included.
   const RunSpec& spec() const { return messages_.spec(); }
+  const run_info_t& info() const { return messages_.info(); }
 
   /// Runs component `index` of `spec` (the log's, or one with other configurations) from tick 0 to
   /// its last logged output. Throws LogError naming channels and ticks that the log lacks for that;
-  /// ConfigError or GraphError from the component.
-  ReplayedComponent Replay(const RunSpec& spec, int index, const ComponentRegistry& registry) const;
+  /// ConfigError or GraphError from the component. What differs is added to `changed`, unless that
+  /// is nullptr.
+  ReplayedComponent Replay(const RunSpec& spec, int index, const ComponentRegistry& registry,
+                           ChangedMessages* changed = nullptr) const;
+
+  /// Writes the log as `to`, with those of `changed` in the place of its own, and `info`. Throws
+  /// LogError.
+  void Write(const std::string& to, const run_info_t& info, const ChangedMessages& changed) const;
 
  private:
   struct Lane {

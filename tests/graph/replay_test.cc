@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <random>
+#include <regex>
 
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/clock.h"
@@ -77,6 +78,40 @@ TEST_F(ReplayTest, ConfigurationsComeFromTheLog) {
   EXPECT_HAS(result, "task_controller: 200 ticks");
   EXPECT_HAS(result, "DIFFERENT");
   EXPECT_HAS(result, "first torque[");
+}
+
+TEST_F(ReplayTest, WhatWasReplayedIsARunsFolder) {
+  Run({"--inline"});
+  const std::string same = folder_ / "same", out = folder_ / "replayed";
+  const ProgramResult equal = Replay({"--component", "redistributor", "--out", same});
+  EXPECT_EQ(equal.exit_code, 0) << equal.output;
+  EXPECT_EQ(RunPoise({"compare", run_, same}).exit_code, 0);
+  EXPECT_EQ(ReadSummary(same)["checks"], ReadSummary(run_)["checks"]);
+
+  const std::vector<std::string> change = {
+      "--component", "task_controller", "--set", "task_controller.com.kp=190", "--out", out};
+  const ProgramResult result = Replay(change);
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  // What the comparison has counted is what the logs differ in, and all of it is the component's.
+  std::smatch counted, compared;
+  const std::string text = RunPoise({"compare", run_, out}).output;
+  ASSERT_TRUE(std::regex_search(result.output, counted,
+                                std::regex("TASK_TORQUE: (\\d+) of 200 messages differ")))
+      << result.output;
+  ASSERT_TRUE(std::regex_search(text, compared, std::regex("compared; (\\d+) differ"))) << text;
+  EXPECT_EQ(counted[1], compared[1]);
+  EXPECT_NE(text.find("TASK_TORQUE.torque["), std::string::npos) << text;
+  // Its record says with which configuration: that gives the same bits again.
+  EXPECT_EQ(Replay({"--component", "task_controller"}, out).exit_code, 0);
+  EXPECT_EQ(RunPoise({"log", "check", out}).exit_code, 0);
+  const nlohmann::json summary = ReadSummary(out);
+  EXPECT_EQ(summary["mode"], "replay");
+  EXPECT_EQ(summary["changes"].back()["set"], "task_controller.com.kp=190");
+  EXPECT_TRUE(std::filesystem::exists(out + "/report.html"));
+
+  EXPECT_EQ(Replay(change).exit_code, 2);  // there is one
+  EXPECT_EQ(Replay({"--out", run_, "--force"}).exit_code, 2);
+  EXPECT_EQ(RunPoise({"log", "check", run_}).exit_code, 0);
 }
 
 // The channel is FOOTSTEPS, which only a planner that steps writes.
@@ -257,6 +292,7 @@ TEST_F(ReplayTest, WrongUseIsAnErrorOfUse) {
         {"--to-bus", "--speed", "0"},
         {"--url", "udpm://239.255.76.67:7667?ttl=0"},
         {"--to-bus", "--url", "udpm:nowhere"},
+        {"--to-bus", "--out", folder_ / "bus"},
         {"--to-bus", "--component", "redistributor"}}) {
     const ProgramResult result = Replay(flags);
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(flags) << result.output;

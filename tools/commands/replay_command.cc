@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <regex>
 
 #include "components/framework/configuration/configuration.h"
@@ -14,16 +16,23 @@
 #include "logging/printable.h"
 #include "logging/replay/component_replay.h"
 #include "logging/replay/log_player.h"
+#include "tools/cli/output_place.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
+#include "tools/report/html_report.h"
+#include "tools/report/run_screen.h"
 #include "tools/run/run_dir.h"
+#include "tools/run/scenario_run.h"
 #include "tools/scenario/described_components.h"
+#include "tools/scenario/former_fields.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"
 
 namespace poise {
 namespace {
 
+namespace fs = std::filesystem;
 using logging::ForTerminal;
 
 // liblcm's default, where its tools listen without options.
@@ -33,6 +42,8 @@ struct ReplayOptions {
   std::string run;
   std::vector<std::string> components;
   std::vector<std::string> set;
+  std::string out;
+  bool force = false;
   bool to_bus = false;
   double speed = 1;
   std::string url;
@@ -113,10 +124,59 @@ std::string WhyNot(const RunSpec& spec, int component) {
   return "";
 }
 
+/// Makes a run's folder of what was replayed: its log, table and page.
+void WriteRun(const ReplayOptions& options, const std::string& log, const fs::path& dir,
+              const logging::LogReplay& replay, const RunSpec& spec,
+              const logging::ChangedMessages& changed) {
+  run_info_t info = replay.info();
+  RunSpec run_spec = replay.spec();  // its graph, which tells what the log holds
+  *run_spec.mutable_config() = spec.config();
+  google::protobuf::TextFormat::PrintToString(run_spec, &info.run_spec);
+  Scenario scenario;
+  ParseScenario(info.scenario, log + ": RUN_INFO.scenario", &scenario);
+  for (const std::string& set : options.set) {
+    const size_t equals = set.find('=');
+    SetField(&scenario, set.substr(0, equals), set.substr(equals + 1));
+    Applied::Change* const change = scenario.mutable_applied()->add_change();
+    change->set_by("--set");
+    change->set_set(set);
+  }
+  info.scenario = ScenarioText(scenario);
+  WriteFile(dir / "run_spec.pbtxt", info.run_spec);
+  WriteFile(dir / "scenario.pbtxt", info.scenario);
+  replay.Write(dir / "run.lcm", info, changed);
+  if (const fs::path reference = ReferenceDir(fs::path(log).parent_path());
+      fs::exists(reference / "run.lcm")) {
+    fs::copy(reference, ReferenceDir(dir), fs::copy_options::recursive);
+  }
+  StageLine line(/*quiet=*/false);
+  std::vector<ReportedRun> runs;
+  runs.push_back(ReadReportedRun(dir, &line));
+  const ReportedRun& run = runs.front();
+  RunSummary summary;
+  summary.mode = "replay";
+  summary.outcome.completed = true;
+  summary.checks = run.checks;
+  summary.events = logging::Events(run.record);
+  summary.passed = ChecksPass(run.checks);
+  WriteFile(dir / "summary.json", SummaryJson(run.scenario, run.record, summary));
+  fmt::print("\n{}\n{}",
+             FormatScreen({run.scenario, run.record, run.checks, summary.events, "", {}}),
+             FormatVerdictLines(run.scenario, run.checks, "", /*below_full_table=*/false));
+  WriteHtmlReport(dir / "report.html", runs);
+  fmt::print("\nWhat was replayed, step by step: {}\n", FileAddress(dir / "report.html"));
+}
+
 int CompareReplay(const ReplayOptions& options, const std::string& log) {
   const logging::LogReplay replay(log);
   RunSpec spec = replay.spec();
   ChangeConfigurations(options.set, &spec);
+  std::optional<RunDir> dir;
+  if (std::error_code error; fs::equivalent(options.out, fs::path(log).parent_path(), error)) {
+    throw ConfigError(fmt::format("--out {}: is the folder of the log itself", options.out));
+  }
+  if (!options.out.empty()) dir.emplace(MakeRunDir(options.out, spec.scenario(), options.force));
+  logging::ChangedMessages changed;
   const logging::LogMessages messages(log);
   bool equal = true, replayed = false;
   for (const int index : Wanted(spec, options.components)) {
@@ -125,12 +185,14 @@ int CompareReplay(const ReplayOptions& options, const std::string& log) {
       continue;
     }
     replayed = true;
-    const logging::ReplayedComponent component = replay.Replay(spec, index, Components());
+    const logging::ReplayedComponent component =
+        replay.Replay(spec, index, Components(), dir ? &changed : nullptr);
     Print(component, messages);
     equal = equal && component.equal();
   }
   // A comparison of nothing would say that all is equal.
   if (!replayed) fmt::print("nothing was replayed\n");
+  if (dir && replayed) WriteRun(options, log, dir->path(), replay, spec, changed);
   return equal && replayed ? kExitOk : kExitFailed;
 }
 
@@ -182,10 +244,15 @@ void AddReplayCommand(CLI::App* app, Command* command) {
           ->type_name("FIELD=VALUE")
           ->allow_extra_args(false)
           ->take_all();
+  CLI::Option* out =
+      replay->add_option("--out", options->out,
+                         "write a run's folder of it, new or empty: the log, with what came out "
+                         "otherwise in its place, its table and its page");
+  replay->add_flag("--force", options->force, "replace the run that --out holds")->needs(out);
   CLI::Option* to_bus = replay->add_flag(
       "--to-bus", options->to_bus,
       "send the messages to the run's public URL instead, for lcm-spy and the like");
-  to_bus->excludes(component)->excludes(set);
+  to_bus->excludes(component)->excludes(set)->excludes(out);
   replay->add_option("--speed", options->speed, "of --to-bus: times real time")
       ->check(CLI::Range(1e-3, 1e6))
       ->needs(to_bus)
