@@ -1,6 +1,6 @@
 // What the pages of docs/concepts show in Python runs: the blocks of a page, one after the other, in one process. No robot of theirs
-// falls or is stopped: then they would print figures of nothing, such as 0 steps. The moving picture of a short run is what
-// animate.py draws of the run of today.
+// falls or is stopped: then they would print figures of nothing, such as 0 steps. The moving pictures of the mathematics and
+// of short runs are what animate.py draws today.
 // Usage: node concepts_python_test.mjs --python PROGRAM --poise PROGRAM, with the module poise on PYTHONPATH
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -58,15 +58,23 @@ for (const [what, program] of [
   });
 }
 
-test('the moving picture of a push is what animate.py draws', (t) => {
+const isWhatIsDrawn = (...pictures) => {
+  const script = join(root, 'docs/concepts/pictures/animate.py');
+  const {status, stderr} = spawnSync(options.python, [script, '--check', ...pictures], {
+    encoding: 'utf8', timeout: LIMIT,
+    env: {...process.env, PYTHONDONTWRITEBYTECODE: '1', POISE_DEPLOY_DIR: join(root, 'deploy')}});
+  assert.equal(status, 0, `${stderr}\nRun docs/concepts/pictures/animate.py, and commit what it has written.`);
+};
+
+test('the moving pictures of the mathematics are what animate.py draws', () => {
+  isWhatIsDrawn('messages', 'oblique', 'answers', 'stick_slip', 'rounding');
+});
+
+test('the moving pictures of a push are what animate.py draws', (t) => {
   const OTHER_BUILD = 3;  // of `poise bits`: other bits, by a build of another compiler or library than the record's
   if (spawnSync(options.poise, ['bits', 'push_double_support'], {timeout: LIMIT}).status === OTHER_BUILD) {
     t.skip('this build computes other bits than those of the picture');
     return;
   }
-  const script = join(root, 'docs/concepts/pictures/animate.py');
-  const {status, stderr} = spawnSync(options.python, [script, '--check', 'push'], {
-    encoding: 'utf8', timeout: LIMIT,
-    env: {...process.env, PYTHONDONTWRITEBYTECODE: '1', POISE_DEPLOY_DIR: join(root, 'deploy')}});
-  assert.equal(status, 0, `${stderr}\nRun docs/concepts/pictures/animate.py, and commit what it has written.`);
+  isWhatIsDrawn('push', 'belief');
 });

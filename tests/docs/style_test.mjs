@@ -14,6 +14,7 @@ const MOST_PICTURE = 15_000;  // bytes: a picture is text of the repository
 const MOST_MOVING = 40_000;   // bytes: of one that moves
 const folder = repositoryFiles('docs/concepts');
 const pages = folder.filter((f) => f.endsWith('.md'));
+const moves = (picture) => readFileSync(join(root, picture), 'utf8').includes('<animate ');
 
 /** Lines that a page may have, by folder: the longest name that fits counts. */
 const LINES = {'': 125, 'docs/concepts': MOST.lines, 'docs/how-to': 50, 'docs/reference': 280, 'docs/reference/equations': 150,
@@ -30,7 +31,7 @@ for (const page of short) {
   });
 }
 
-test('every page but the index shows a picture and Python, and every picture is shown', () => {
+test('every page but the index shows a picture, one that moves, and Python, and every picture is shown', () => {
   const shown = new Set();
   for (const page of pages) {
     const text = readFileSync(join(root, page), 'utf8');
@@ -38,14 +39,14 @@ test('every page but the index shows a picture and Python, and every picture is 
     for (const picture of pictures) shown.add(`docs/concepts/${picture}`);
     if (page.endsWith('/README.md')) continue;
     assert.ok(pictures.length > 0, `${page} shows no picture`);
+    assert.ok(page.endsWith('/notation.md') || pictures.some((p) => moves(`docs/concepts/${p}`)), `${page} shows none that moves`);
     assert.match(text, /^```python$/m, `${page} has no Python`);
   }
   assert.deepEqual(folder.filter((f) => f.endsWith('.svg')).sort(), [...shown].sort());
 });
 
 test('the pictures are small, and what draw.py draws', () => {
-  const most = (f) => readFileSync(join(root, f), 'utf8').includes('<animate ') ? MOST_MOVING : MOST_PICTURE;
-  const large = folder.filter((f) => f.endsWith('.svg') && statSync(join(root, f)).size >= most(f));
+  const large = folder.filter((f) => f.endsWith('.svg') && statSync(join(root, f)).size >= (moves(f) ? MOST_MOVING : MOST_PICTURE));
   assert.deepEqual(large, []);
   const {status, stderr} = spawnSync('python3', [join(root, 'docs/concepts/pictures/draw.py'), '--check'], {encoding: 'utf8'});
   assert.equal(status, 0, `${stderr}\nRun docs/concepts/pictures/draw.py, and commit what it has written.`);

@@ -1,23 +1,27 @@
 #!/usr/bin/python3
-"""Draws the moving pictures of docs/concepts from runs that it makes: SVG that moves by itself, without a script.
+"""Draws the moving pictures of docs/concepts, from runs that it makes or from the mathematics: SVG that moves by itself.
 
     export PYTHONPATH=$PWD/build/release/python
     docs/concepts/pictures/animate.py [NAME...]       # writes the SVG files beside itself; without names: all
     docs/concepts/pictures/animate.py --check push    # writes nothing; exit code 1 where the file differs from what is drawn
 
-The true state of the simulated robot moves the links, through poise.Robot; the controller's messages give the rest.
+Of a run the true state of the simulated robot moves the links, through poise.Robot; the controller's messages give the
+rest.
 """
+import math
 import re
 import sys
 from collections import namedtuple
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 
 import poise
-from draw import Picture, keep, number
+from draw import HEIGHT, OMEGA, TICK, Axes, Picture, keep, number, span
 
 FRAMES = 12  # a second of the picture
-WIDTH, HEIGHT = 640, 330
+WIDTH, HEIGHT_OF_FILM = 640, 330
 FIGURE = (20, 300)  # pixels across, of the robot as one looks at it
 PLAN = (340, 620)  # of the soles from above
 FLOOR, TOP = 262, 44
@@ -53,20 +57,59 @@ class Placed:
         return self.position[:, None] + np.asarray(local) @ self.rotation.swapaxes(1, 2)
 
 
-class Scene:
+class Film:
+    """A picture in which things move, and begin again after `length` seconds."""
+
+    def __init__(self, name, title, length, height=HEIGHT_OF_FILM):
+        self.length, self.count = length, round(length * FRAMES) + 1
+        self.picture = Picture(name, title, WIDTH, height)
+        self.picture.add(f"<style>{STYLE}</style>")
+        self.at = np.linspace(0, length, self.count)  # s of each frame
+
+    def moving(self, tag, attributes, style, inside="", mode=""):
+        """An element whose attributes {name: a text a frame} change with time."""
+        first = " ".join(f'{name}="{texts[0]}"' for name, texts in attributes.items())
+        motion = "".join(f'<animate attributeName="{name}" dur="{self.length:g}s" repeatCount="indefinite"{mode} '
+                         f'values="{";".join(texts)}"/>' for name, texts in attributes.items() if len(set(texts)) > 1)
+        extra = ' r="4"' if tag == "circle" else ""
+        self.picture.add(f'<{tag} class="{style}" {first}{extra}>{inside}{motion}</{tag}>' if motion or inside
+                         else f'<{tag} class="{style}" {first}{extra}/>')
+
+    def shown(self, x, y, text, on, style="s", anchor="middle"):
+        """A text in the frames in which `on` is true."""
+        place = {name: [value] for name, value in (("x", number(x)), ("y", number(y)), ("text-anchor", anchor))}
+        self.moving("text", {**place, "opacity": [str(int(value)) for value in on]}, style, text, ' calcMode="discrete"')
+
+    def line(self, pixels, style="l", close=False):
+        """pixels: (frames, points, 2)"""
+        self.moving("polygon" if close else "polyline",
+                    {"points": [" ".join(f"{number(x)},{number(y)}" for x, y in frame) for frame in pixels]}, style)
+
+    def dot(self, pixels, style):
+        """pixels: (frames, 2)"""
+        self.moving("circle", {"cx": [number(x) for x in pixels[:, 0]], "cy": [number(y) for y in pixels[:, 1]]}, style)
+
+    def arrow(self, start, way, style):
+        """From start along way, pixels (frames, 2); nothing where way is short."""
+        length = np.linalg.norm(way, axis=-1, keepdims=True)
+        way = np.where(length > 3, way, 0)
+        along = way / np.maximum(length, 1e-9) * np.minimum(length / 2, 7)
+        side = np.stack([-along[:, 1], along[:, 0]], -1) / 2
+        end = start + way
+        self.line(np.stack([start, end, end - along + side, end, end - along - side], 1), style)
+
+
+class Scene(Film):
     """A run's ticks as frames of a picture, and where points of the world are in it."""
 
     def __init__(self, animation, run):
+        super().__init__(animation.name, animation.title, (animation.end - animation.start) / animation.speed)
         self.run, self.robot, self.animation = run, run.robot, animation
-        self.length = (animation.end - animation.start) / animation.speed  # s of the picture
-        count = round(self.length * FRAMES) + 1
-        self.times = np.linspace(animation.start, animation.end, count)
+        self.times = np.linspace(animation.start, animation.end, self.count)
         self.ticks = np.minimum(np.round(self.times / run.info["tick_period"]).astype(int), run.info["num_ticks"] - 1)
-        self.picture = Picture(animation.name, animation.title, WIDTH, HEIGHT)
-        self.picture.add(f"<style>{STYLE}</style>")
         self.truth, self.support, self.balance = run["GROUND_TRUTH"], run["SUPPORT_PLAN"], run["BALANCE_TORQUE"]
         self.feet = [Placed(self.truth.foot_pose, self.ticks, foot) for foot in (0, 1)]
-        self.legend = []
+        self.legend, self.above = [], "soles from above"
         half_length, half_width = np.array(self.robot.sole_size[0]) / 2
         self.sole = np.array([[half_length, half_width, 0], [half_length, -half_width, 0], [-half_length, -half_width, 0],
                               [-half_length, half_width, 0]])
@@ -90,33 +133,6 @@ class Scene:
         across, up = (x, y) if self.animation.view == "side" else (-y, x)
         return np.stack([sum(PLAN) / 2 + self.scale * across, (FLOOR + TOP) / 2 - self.scale * up], -1)
 
-    def moving(self, tag, attributes, style):
-        """An element whose attributes {name: a text a frame} change with time."""
-        first = " ".join(f'{name}="{texts[0]}"' for name, texts in attributes.items())
-        motion = "".join(f'<animate attributeName="{name}" dur="{self.length:g}s" repeatCount="indefinite" '
-                         f'values="{";".join(texts)}"/>' for name, texts in attributes.items() if len(set(texts)) > 1)
-        extra = ' r="4"' if tag == "circle" else ""
-        self.picture.add(f'<{tag} class="{style}" {first}{extra}>{motion}</{tag}>' if motion
-                         else f'<{tag} class="{style}" {first}{extra}/>')
-
-    def line(self, pixels, style="l", close=False):
-        """pixels: (frames, points, 2)"""
-        self.moving("polygon" if close else "polyline",
-                    {"points": [" ".join(f"{number(x)},{number(y)}" for x, y in frame) for frame in pixels]}, style)
-
-    def dot(self, pixels, style):
-        """pixels: (frames, 2)"""
-        self.moving("circle", {"cx": [number(x) for x in pixels[:, 0]], "cy": [number(y) for y in pixels[:, 1]]}, style)
-
-    def arrow(self, start, way, style):
-        """From start along way, pixels (frames, 2); nothing where way is short."""
-        length = np.linalg.norm(way, axis=-1, keepdims=True)
-        way = np.where(length > 3, way, 0)
-        along = way / np.maximum(length, 1e-9) * np.minimum(length / 2, 7)
-        side = np.stack([-along[:, 1], along[:, 0]], -1) / 2
-        end = start + way
-        self.line(np.stack([start, end, end - along + side, end, end - along - side], 1), style)
-
     def robot_lines(self):
         """The links as lines from joint to joint, hip to ankle, and the trunk as what its box looks like."""
         truth, ticks, view = self.truth, self.ticks, self.animation.view
@@ -139,7 +155,7 @@ class Scene:
 
     def clock(self, spans):
         """The run's time as a line with a mark that goes along; spans: (start, end, word, style)."""
-        left, right, y = 60, WIDTH - 60, HEIGHT - 24
+        left, right, y = 60, WIDTH - 60, self.picture.height - 24
         start, end = self.animation.start, self.animation.end
 
         def at(time):
@@ -259,6 +275,30 @@ def landing(scene):
             for span in scene.spans(state == value, word, style)]
 
 
+def belief(scene):
+    """The error of the estimated base, from above as the picture's robot stands, in the ellipse that holds it with 95 %."""
+    state, covariance = scene.run["ROBOT_STATE"], scene.run["ESTIMATOR_STATUS"].covariance[scene.ticks]
+    error = (state.base_position - scene.truth.base_position)[scene.ticks][:, :2]
+    root = np.linalg.cholesky(covariance[:, [[39, 40], [40, 42]]])  # of x and y; the upper triangle by rows
+    turn = 2 * math.pi * np.arange(20) / 20
+    edge = math.sqrt(-2 * math.log(0.05)) * (root @ np.stack([np.cos(turn), np.sin(turn)])).swapaxes(1, 2)
+    scale = 100 / np.abs(edge).max()
+    middle = np.array([sum(PLAN) / 2, (FLOOR + TOP) / 2])
+
+    def pixels(place):
+        return middle - scale * place[..., ::-1]
+
+    for x, y in ((120, 0), (0, 105)):
+        scene.picture.path([middle - (x, y), middle + (x, y)], "g")
+    scene.line(pixels(edge), "fs", close=True)
+    scene.dot(pixels(error), "fa")
+    unit = 1e-4  # m
+    scene.picture.path([(PLAN[1] - scale * unit, FLOOR - 6), (PLAN[1], FLOOR - 6)], "l")
+    scene.picture.text(PLAN[1] - scale * unit / 2, FLOOR - 11, f"{1e3 * unit:g} mm", "s", "middle")
+    scene.above = "error of the estimated base, from above"
+    scene.legend += [("error", "fa"), ("where the filter has it with 95 %", "fb")]
+
+
 def block(scene):
     """The block below the left foot as the scenario has it, unloaded."""
     text = re.search(r"\bblock \{(.*?)\}", scene.run.scenario, re.DOTALL)[1]
@@ -267,7 +307,7 @@ def block(scene):
     scene.line(scene.figure(np.array([sides])), "ff", close=True)
 
 
-MARKS = {mark.__name__: mark for mark in (com, forces, push, region, balancing, feet, capture, stepping, landing, block)}
+MARKS = {mark.__name__: mark for mark in (com, forces, push, region, balancing, feet, capture, stepping, landing, belief, block)}
 
 ANIMATIONS = (
     Animation("push", "Pushed from the right: the robot sways and stands", "push_double_support", {}, 0.3, 2.3, 0.4, "behind", 1.4,
@@ -278,6 +318,8 @@ ANIMATIONS = (
               {"variant": "step", "duration": 3}, 0.3, 2.3, 0.4, "side", 1.4, "com capture forces push stepping"),
     Animation("walk", "Walking ahead: capture point and centre of pressure from foot to foot", "walk", {"duration": 8},
               2, 7, 1, "side", 1.4, "com capture forces stepping"),
+    Animation("belief", "Pushed: soles that rock say less of where the body is, and the filter knows it", "push_double_support",
+              {"duration": 2.5}, 0.2, 2.2, 0.4, "behind", 1.4, "belief forces push"),
     Animation("unknown_ground", "The left foot comes down onto a soft block, lower than it was told", "unknown_surface",
               {"changes": {"sim.block.height": 0.06}, "duration": 32}, 24, 32, 1.6, "behind", 0.45, "block feet com forces landing"),
 )
@@ -286,8 +328,9 @@ ANIMATIONS = (
 def animation(what):
     scene = Scene(what, poise.run(what.scenario, **what.changes))
     scene.picture.path([(FIGURE[0], FLOOR), (FIGURE[1], FLOOR)], "g")
-    for foot in scene.feet:
-        scene.line(scene.plan(foot.points(scene.sole)), "ff", close=True)
+    if "belief" not in what.marks:
+        for foot in scene.feet:
+            scene.line(scene.plan(foot.points(scene.sole)), "ff", close=True)
     scene.robot_lines()
     spans = [span for mark in what.marks.split() for span in MARKS[mark](scene) or []]
     where = "from its right" if what.view == "side" else "from behind"
@@ -295,7 +338,7 @@ def animation(what):
     slowed, hurried = f", slowed {1 / what.speed:g} times", f", {what.speed:g} times as fast"
     pace = slowed if what.speed < 1 else hurried if what.speed > 1 else ""
     scene.picture.text(sum(FIGURE) / 2, 24, where + pace, "s", "middle")
-    scene.picture.text(sum(PLAN) / 2, 24, "soles from above", "s", "middle")
+    scene.picture.text(sum(PLAN) / 2, 24, scene.above, "s", "middle")
     x = PLAN[0]
     for text, style in scene.legend:
         scene.picture.dot(x, FLOOR + 14, style)
@@ -305,12 +348,219 @@ def animation(what):
     return scene.picture
 
 
+# Pictures from the mathematics, with the numbers of the still picture of the page.
+
+def pixels(axes, x, y):
+    """(frames, 2) of numbers in axes of draw.py."""
+    return np.array([axes.at(a, b) for a, b in zip(x, y)])
+
+
+def messages():
+    """Where each message of a tick goes, in the order of TICK."""
+    film = Film("messages", "One tick: each process computes as soon as it has all its inputs of this tick", 6)
+    places = {"sim": (75, 195), "hw_bridge": (210, 195), "state_estimator": (310, 90), "step_planner": (450, 90),
+              "task_controller": (575, 165), "contact_wrench_monitor": (480, 285), "redistributor": (310, 285)}
+    slot = film.length / (len(TICK) + 1)  # a message's; the last one is the robot's
+    for writer, _, readers in TICK:
+        for reader in readers:
+            film.picture.path([places[writer], places[reader]], "g")
+    lit = []  # process, when it begins to compute, how strongly it is shown
+    for i, (writer, message, readers) in enumerate(TICK):
+        lit.append((writer, i * slot, 0.8))
+        share = np.clip(film.at / slot - i - 0.4, 0, 0.6) / 0.6  # first it computes, then the message is on its way
+        away = (share > 0) & (share < 1)
+        for reader in readers:
+            start, end = (np.array(places[name]) for name in (writer, reader))
+            film.dot(start + (end - start) * share[:, None], "fa")
+        film.shown(20, 50, message, away, "", "start")
+        if message == "ROBOT_STATE":
+            lit += [(name, (i + 1) * slot, 0.3) for name in readers[1:]]  # the stage `prepare`
+    lit.append(("sim", len(TICK) * slot, 0.8))
+    for x, y in places.values():
+        film.picture.box(x - 50, y - 20, 100, 40, "bg", 4)
+    for name, begin, strength in lit:
+        on = (film.at >= begin) & (film.at < begin + (slot if begin == len(TICK) * slot else 0.4 * slot))
+        film.moving("rect", {**rectangle(places[name]), "opacity": [f"{strength * value:g}" for value in on.astype(int)]}, "fc",
+                    mode=DISCRETE)
+    for name, (x, y) in places.items():
+        film.picture.box(x - 50, y - 20, 100, 40, "l", 4)
+        head, _, tail = name.rpartition("_")
+        for line, text in enumerate([head + "_", tail] if head else [tail]):
+            film.picture.text(x, y + (-3 if head else 4) + 14 * line, text, "s", "middle")
+    film.picture.text(20, 28, "tick i", "s")
+    film.shown(20, 50, "the robot moves; then tick i + 1", film.at >= len(TICK) * slot, "", "start")
+    for x, strength, text in ((340, 0.8, "computes"), (440, 0.3, "prepares, from the state alone")):
+        film.picture.add(f'<rect class="fc" x="{x}" y="18" width="12" height="12" opacity="{strength}"/>')
+        film.picture.text(x + 18, 28, text, "s")
+    return film.picture
+
+
+DISCRETE = ' calcMode="discrete"'
+
+
+def rectangle(middle):
+    return {"x": [number(middle[0] - 50)], "y": [number(middle[1] - 20)], "width": ["100"], "height": ["40"], "rx": ["4"]}
+
+
+def oblique():
+    """The body of contact_dynamics.svg under a force that turns."""
+    film = Film("oblique", "A force turns, the floor answers: what is left stays on one oblique line", 6, 270)
+    a = np.array([[2.0, 0.9], [0.9, 1.0]])  # A; q = (x, z), J_c = (0, 1)
+    bar = np.linalg.inv(a)[1] / np.linalg.inv(a)[1, 1]  # (7)
+    angle = -math.pi / 2 + 0.9 * np.sin(2 * math.pi * film.at / film.length)
+    force = 2 * np.stack([np.cos(angle), np.sin(angle)], -1)  # Γ − g
+    contact = np.stack([0 * angle, force @ bar], -1)  # J_cᵀ f_c, (8)
+    left = force - contact  # N_cᵀ (Γ − g), (11)
+    acceleration = left @ np.linalg.inv(a)  # (9)
+    assert np.abs(acceleration[:, 1]).max() < 1e-12 and contact[:, 1].max() < 0  # the floor holds, and does not pull
+    origin, scale = np.array([190, 95]), 66 * np.array([1, -1])
+    film.picture.path([(40, 115), (370, 115)], "g")
+    film.picture.box(40, 115, 330, 145, "ff")
+    film.picture.box(158, 75, 64, 40, "l", 3)
+    way = left[np.argmax(left[:, 0])] * 1.15
+    film.picture.path([origin - way * scale, origin + way * scale], "g d")
+    start = np.tile(origin, (film.count, 1)).astype(float)
+    film.line(np.stack([origin + scale * left, origin + scale * force, origin + scale * contact], 1), "g d")
+    for vector, style, y, text in ((force, "l", 60, "Γ − g: it turns"), (contact, "a", 84, "J_cᵀ f_c: what the floor takes, (8)"),
+                                   (left, "b", 108, "N_cᵀ (Γ − g): what is left, (11)"),
+                                   (acceleration, "c", 132, "q̈: along the floor alone, (9)")):
+        film.arrow(start, vector * scale, style)
+        film.picture.path([(395, y - 4), (417, y - 4)], style)
+        film.picture.text(425, y, text, "s")
+    film.picture.text(395, 166, "dashed: the line of N_cᵀ,", "s")
+    film.picture.text(395, 182, "oblique, since A couples x and z", "s")
+    return film.picture
+
+
+def answers():
+    """The three pairs of gains.svg: errors that come back to 0."""
+    film = Film("answers", "Three pairs of gains bring a task back: one overshoots", 5, 290)
+    axes = Axes(film.picture, 390, 35, 230, 205, (0, 1.2), (-0.5, 1.0))
+    axes.curve([(0, 0), (1.2, 0)], "g")
+    axes.ticks([0, 0.4, 0.8, 1.2], [-0.5, 0, 0.5, 1], "time, s", "error of the task")
+    rest, time = 120, np.minimum(film.at / 4, 1.2)  # the last frames stand still
+    film.picture.path([(rest, 30), (rest, 245)], "g d")
+    film.picture.text(rest, 262, "where it shall be", "s", "middle")
+    film.picture.text(rest + 150, 262, "slowed 4 times", "s", "middle")
+    for lane, (kp, kd, style, name) in enumerate(((225, 10, "a", "225, 10 (the paper's)"), (99, 13.9, "b", "99, 13.9"),
+                                                  (99, 19.9, "c", "99, 19.9"))):
+        # ë + k_d ė + k_p e = 0 from e = 1 at rest, exactly.
+        root = np.emath.sqrt(kd ** 2 / 4 - kp)
+        one, two = -kd / 2 + root, -kd / 2 - root
+        error = lambda t: np.real((one * np.exp(two * t) - two * np.exp(one * t)) / (one - two))  # noqa: E731
+        axes.curve([(t, error(t)) for t in span(0, 1.2, 61)], style)
+        film.dot(pixels(axes, time, error(time)), f"f{style}")
+        y, x = 75 + 65 * lane, rest + 170 * error(time)
+        film.picture.text(340, y - 22, f"k_p, k_d: {name}", "s", "end")
+        film.picture.path([(40, y + 15), (340, y + 15)], "g")
+        film.moving("rect", {"x": [number(v - 15) for v in x], "y": [number(y - 15)], "width": ["30"], "height": ["30"], "rx": ["3"]},
+                    f"f{style}")
+    return film.picture
+
+
+def stick_slip():
+    """The friction of simulation.svg: a rotor pulled through a spring sticks and slips."""
+    film = Film("stick_slip", "Friction of a joint: pulled slowly through a spring it sticks, and slips", 6, 290)
+    coulomb, static, viscous, stribeck = 2.0, 2.4, 0.5, 0.05  # N·m, N·m, N·m·s/rad, rad/s, of simulation.svg
+    inertia, spring, wound, pull, step = 0.1, 8.0, 1.6, 0.12, 1e-4  # kg·m², N·m/rad, N·m, rad/s, s
+    place = speed = 0.0
+    course = []
+    for i in range(round(film.length / step) + 1):
+        torque = wound + spring * (pull * i * step - place)
+        slides = abs(speed) > 1e-9 or torque > static
+        friction = coulomb + (static - coulomb) * math.exp(-(speed / stribeck) ** 2) + viscous * speed if slides else torque
+        if i % 200 == 0:
+            course.append((i * step, place, speed, friction, torque))
+        speed = max(0.0, speed + step * (torque - friction) / inertia) if slides else 0.0
+        place += step * speed
+    course = np.array(course).T
+    time, place, speed, friction, torque = (np.interp(film.at, course[0], figures) for figures in course)
+    axes = Axes(film.picture, 410, 35, 210, 205, (0, 1), (0, 3.2))
+    axes.curve([(v, coulomb + (static - coulomb) * math.exp(-(v / stribeck) ** 2) + viscous * v)
+                for v in span(0, 0.15, 31) + span(0.17, 1, 12)], "a")
+    axes.curve([(0, 0), (0, static)], "b")
+    axes.ticks([0, 0.5, 1], [0, 2, 2.4], "velocity, rad/s", "friction, N·m")
+    film.dot(pixels(axes, speed, friction), "fa")
+    left, scale = 30, 220  # pixels, of a radian
+    x, hook = left + scale * place, left + 130 + scale * pull * time
+    film.picture.path([(20, 90), (365, 90)], "g")
+    film.moving("rect", {"x": [number(v) for v in x], "y": ["50"], "width": ["50"], "height": ["40"], "rx": ["3"]}, "ff")
+    zigzag = np.array([0, 0.08] + [0.08 + 0.84 * (k + 0.5) / 8 for k in range(8)] + [0.92, 1])
+    up = np.array([0, 0] + [7 * (-1) ** k for k in range(8)] + [0, 0])
+    film.line(np.stack([(x + 50)[:, None] + (hook - x - 50)[:, None] * zigzag, 70 + 0 * x[:, None] + up], -1), "l")
+    film.dot(np.stack([hook, 70 + 0 * x], -1), "fb")
+    film.picture.text(30, 34, "the blue end is pulled evenly; the rotor holds on, and slips", "s")
+    axes = Axes(film.picture, 60, 135, 290, 105, (0, film.length), (1.5, 2.6))
+    axes.curve(list(zip(course[0], course[3])), "a")
+    axes.curve(list(zip(course[0], course[4])), "b")
+    axes.ticks([0, 2, 4, 6], [1.5, 2, 2.4], "time, s", "torque of the spring (blue), and friction (red), N·m")
+    film.dot(pixels(axes, time, torque), "fb")
+    return film.picture
+
+
+def rounding():
+    """An inverted pendulum with one start, a·b + c rounded once or twice; and what a controller makes of it."""
+    film = Film("rounding", "The same start, rounded in two ways: two falls, but one way to stand", 6, 290)
+    step, end = 1 / 256, 13.0  # s; a power of two
+    rate = float(round(OMEGA ** 2 * 1024)) / 1024  # 1/s²
+
+    def fused(a, b, c):
+        return float(Fraction(a) * Fraction(b) + Fraction(c))
+
+    def separate(a, b, c):
+        return a * b + c
+
+    def run(add, x, stiffness, damping):
+        """Of the COM's place x: x'' = (ω² − k_p) x − k_d x', step by step."""
+        v, k = 0.0, rate - stiffness
+        if not stiffness:  # on the way that ends upright, but for rounding: both shrink by `share` a step
+            grown = Decimal(step * step * k)
+            share = 1 + grown / 2 - (grown + grown * grown / 4).sqrt()
+            v = float(Decimal(-x) * (1 - share) / (Decimal(step) * share))
+        places = []
+        for _ in range(round(end / step) + 1):
+            places.append(x)
+            if abs(x) < 1.2:  # it lies
+                v = add(step * k, x, v * (1 - step * damping))
+                x = add(step, v, x)
+        return np.array(places)
+
+    starts = (0.15 + k / 4096 for k in range(100))
+    start = next(x for x in starts if run(fused, x, 0, 0)[-1] * run(separate, x, 0, 0)[-1] < 0)  # the falls are to both sides
+    pairs = [[run(add, start, *gains) for add in (fused, separate)] for gains in ((0, 0), (99, 13.9))]
+    at = np.minimum(np.round(film.at * end / film.length / step).astype(int), len(pairs[0][0]) - 1)
+    for foot, pair, name in ((145, pairs[0], "it falls"), (305, pairs[1], "controlled")):
+        film.picture.path([(foot - 50, 240), (foot + 50, 240)], "g")
+        film.picture.text(foot, 262, name, "s", "middle")
+        for places, style in zip(pair, ("a", "b")):
+            lean = np.clip(places[at] / HEIGHT, -1.5, 1.5)  # rad
+            top = np.stack([foot + 120 * np.sin(lean), 240 - 120 * np.cos(lean)], -1)
+            film.line(np.stack([np.tile([foot, 240.0], (film.count, 1)), top], 1), style)
+            film.dot(top, f"f{style}")
+    film.picture.text(30, 28, "a·b + c rounded once", "s")
+    film.picture.path([(165, 24), (187, 24)], "a")
+    film.picture.text(215, 28, "and twice", "s")
+    film.picture.path([(278, 24), (300, 24)], "b")
+    axes = Axes(film.picture, 410, 35, 210, 205, (0, end), (1e-18, 1e1), log_y=True)
+    axes.ticks([0, 4, 8, 12], [1e-15, 1e-10, 1e-5, 1], "time, s; twice as fast", "difference of the two, m")
+    for (one, two), style in zip(pairs, ("a", "c")):
+        apart = np.clip(np.abs(one - two)[at], 1e-18, 1)
+        axes.curve(list(zip(at * step, apart)), style)
+        film.dot(pixels(axes, at * step, apart), f"f{style}")
+    axes.label(5, 1e-7, "it falls", "s", "end")
+    axes.label(9, 1e-17, "controlled", "s", "middle")
+    return film.picture
+
+
+FILMS = {film.__name__: film for film in (messages, oblique, answers, stick_slip, rounding)}
+
+
 def main():
     names = [name for name in sys.argv[1:] if name != "--check"]
-    chosen = [a for a in ANIMATIONS if not names or a.name in names]
-    if not chosen or {a.name for a in chosen} < set(names):
-        sys.exit("usage: animate.py [--check] [NAME...], of " + ", ".join(a.name for a in ANIMATIONS))
-    keep(map(animation, chosen), "--check" in sys.argv)
+    drawn = {**{a.name: lambda a=a: animation(a) for a in ANIMATIONS}, **FILMS}
+    if set(names) - set(drawn):
+        sys.exit("usage: animate.py [--check] [NAME...], of " + ", ".join(drawn))
+    keep((drawn[name]() for name in names or drawn), "--check" in sys.argv)
 
 
 if __name__ == "__main__":
