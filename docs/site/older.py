@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Says which figures of docs/results/ are older than the code that they speak of.
+"""Says which figures of docs/results/ are older than the code that they speak of, and reads the pages for deploy/results.
 
 A paragraph below each table names the commit that was measured and the folders that the figures depend on:
 "Measured: COMMIT, DATE, SEED, MACHINE, of `FOLDER/`, `FOLDER/`: COMMAND". They are older where git knows a later commit
@@ -14,7 +14,9 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-MEASURED = re.compile(r"^Measured: (\w{7})(?: to \w{7})?, (?:.+\n)*?.*?\bof\s+((?:`[\w/]+/`,?\s*)+):.*(?:\n.+)*", re.M)
+MEASURED = re.compile(r"^Measured: (\w{7})(?: to \w{7})?, (?:.+\n)*?.*?\bof\s+((?:`[\w/]+/`,?\s*)+):(.*(?:\n.+)*)", re.M)
+CELL = re.compile(r"(?<!\\)\|")  # what parts the cells of a table's line
+PROGRAM = re.compile(r"(?:[A-Z_]+=\S+ )*(?:poise|perf|git|node \S+|deploy/\S+|(?:build|tests)/\w+/\S+(?<!\.cc))(?: |$)")
 CODE = r"^[[:space:]]*[^/#[:space:]]"  # a line that is more than a comment
 
 
@@ -33,6 +35,62 @@ def tables(markdown, root=ROOT):
         commit = later(match[1], re.findall(r"`([^`]+)`", match[2]), root)
         if commit:
             yield match, commit
+
+
+class Claim:
+    """A table of a page: its heading, cells, and the commands that its paragraph "Measured:" tells."""
+
+    def __init__(self, page, lines, end, match):
+        """lines: of the page; end: the number of the paragraph's first line, right below the table."""
+        begin = end
+        while lines[begin - 1].startswith("|"):
+            begin -= 1
+        top = max(i for i in range(begin) if lines[i].startswith("#"))
+        self.heading = lines[top].lstrip("# ")
+        slug = re.sub(r"[^\w\- ]", "", self.heading.lower()).replace(" ", "-")  # GitHub's anchor
+        self.page, self.name = page, f"{os.path.basename(page)[:-3]}#{slug}"
+        self.header, *self.rows = [self.cells(line) for line in lines[begin:end] if not re.fullmatch(r"[|:\- ]+", line)]
+        self.first_row = begin + 2  # the number of its line, from 0
+        self.measured, self.commit = match[0], match[1]
+        self.machine = "any machine" if "any machine" in " ".join(match[0].split()) else "2 cores"
+        self.text = " ".join(match[3].split())
+        self.told = commands_of(self.text)
+        if not self.told and re.search(r"commands? (?:above|below)", self.text):
+            self.told = fenced(lines[top:begin])[-1:] or fenced(lines[end:])[:1]
+
+    @staticmethod
+    def cells(line):
+        return [cell.strip().replace("\\|", "|") for cell in CELL.split(line.strip())[1:-1]]
+
+    def commands(self):
+        """Those of the paragraph, then those of the rows."""
+        rows = [command for row in self.rows for cell in row for command in commands_of(cell)]
+        return list(dict.fromkeys(self.told + rows))
+
+
+def commands_of(text):
+    return [span for span in re.findall(r"`([^`]+)`", text) if PROGRAM.match(span)]
+
+
+def fenced(lines):
+    """The commands of indented blocks; one that ends with \\ goes on."""
+    text = "\n".join(line[4:] for line in lines if line.startswith("    "))
+    return [" ".join(c.split()) for c in text.replace("\\\n", " ").splitlines() if PROGRAM.match(c)]
+
+
+def claims(page):
+    """The tables of a page of docs/results that say how they were measured, in their order."""
+    with open(page, encoding="utf-8") as file:
+        text = file.read()
+    lines, found = text.split("\n"), []
+    for match in MEASURED.finditer(text):
+        line = text.count("\n", 0, match.start())
+        line -= lines[line - 1] == ""  # the paragraph stands below the table, with a line between them
+        found.append(Claim(page, lines, line, match))
+    for claim in found:  # "the commands above" of another table
+        if not claim.told and re.search(r"commands? above", claim.text):
+            claim.told = found[found.index(claim) - 1].told
+    return found
 
 
 def marked(markdown, root=ROOT):
