@@ -188,18 +188,5 @@ TEST(WalkRun, UpAndDownStairsItIsNotToldOfToAStandOnThem) {
   }
 }
 
-// What a scenario leaves open is filled for walking: with the rule's values for standing this
-// falls.
-TEST(WalkRun, AScenarioThatStandsWalksOnceItIsToldTo) {
-  const RunFolder folder;
-  const ProgramResult result = RunPoise(
-      {"run", "stand", "--inline", "--duration", "19", "--out", folder / "run", "--set",
-       "step_planner.walk.enabled=true", "--set", "step_planner.walk.command[0].time=4", "--set",
-       "step_planner.walk.command[0].vx=0.1", "--set", "step_planner.walk.command[1].time=14",
-       "--set", "step_planner.walk.command[1].stop=true"});
-  EXPECT_EQ(result.exit_code, 0) << result.output;
-  EXPECT_EQ(Measured(ReadSummary(folder / "run"), "fallen"), 0);
-}
-
 }  // namespace
 }  // namespace poise

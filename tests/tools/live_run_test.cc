@@ -45,7 +45,7 @@ class LiveRunTest : public ::testing::Test {
     std::ofstream(folder.path("run_spec.pbtxt")) << text;
   }
   void StartOnTheBus() {
-    source.emplace(ChoosePorts(&spec));
+    source.emplace(ChoosePorts(Scenario(), &spec));
     WriteSpec();
     Start();
   }

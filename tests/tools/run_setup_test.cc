@@ -36,15 +36,14 @@ struct Change {
   std::vector<std::string> set;
 };
 
-// Walking fills in what the scenario leaves open, of other components too, and has a channel more.
+// A planner that walks or recovers has a channel more.
 TEST(ChangeConfigurations, GiveWhatARunWithTheSameSettingsHas) {
   const std::vector<Change> all{
       {"stand", {"task_controller.com.kp=150"}},
       {"stand", {"step_planner.walk.enabled=true"}},
-      {"stand", {"step_planner.walk.enabled=true", "state_estimator.joint_velocity_cutoff=35"}},
       {"stand",
-       {"step_planner.walk.enabled=true", "task_controller.foot.kp=700",
-        "task_controller.foot.kd=60"}},
+       {"task_controller.foot.kp=700", "step_planner.walk.enabled=true",
+        "task_controller.foot.kd=60", "sim.ground.friction=0.5", "ode.contact_erp=0.3"}},
       {"stand", {"step_planner.recovery.enabled=true"}},
       {"walk", {"step_planner.walk.command[0].vx=0.05"}},
   };

@@ -64,7 +64,7 @@ Finding CheckMulticast(const RunSpec& spec) {
 
 Finding CheckPorts(RunSpec* spec) {
   try {
-    const RunSource source = ChoosePorts(spec);
+    const RunSource source = ChoosePorts(Scenario(), spec);
     return {Level::kGood, "ports", fmt::format("a free block at {}", spec->first_port()), ""};
   } catch (const std::exception& error) {
     return {Level::kBad, "ports", error.what(), "see what holds them: ss -ulpn"};

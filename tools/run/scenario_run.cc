@@ -221,7 +221,7 @@ LogSizes ScenarioRun::log_sizes() const {
 RunResult ScenarioRun::Run(const std::string& out, bool latest) {
   const Scenario& scenario = main_.loaded.scenario;
   std::optional<RunSource> source;
-  if (!options_.in_process) source.emplace(ChoosePorts(&main_.spec));
+  if (!options_.in_process) source.emplace(ChoosePorts(main_.loaded.scenario, &main_.spec));
   RunResult result;
   const std::string space =
       CheckSpace(out.empty() ? RunsDir() : fs::path(out), log_sizes(), options_.force);
@@ -312,7 +312,7 @@ RunResult ScenarioRun::Run(const std::string& out, bool latest) {
 
 RunOutcome ScenarioRun::RunOnly(const std::string& out) {
   std::optional<RunSource> source;
-  if (!options_.in_process) source.emplace(ChoosePorts(&main_.spec));
+  if (!options_.in_process) source.emplace(ChoosePorts(main_.loaded.scenario, &main_.spec));
   const RunDir dir = MakeRunDir(out, name(), options_.force);
   WriteFiles(main_, dir.path());
   CatchStopSignals();

@@ -8,7 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <random>
 #include <utility>
@@ -56,36 +57,43 @@ std::vector<std::string> SectionsOf(const std::string& type) {
   return sections.empty() ? std::vector<std::string>{type} : sections;
 }
 
-/// The configuration of a component of this type.
-std::string ConfigText(const Scenario& scenario, const std::string& type) {
+/// The message whose text is the configuration of a component of this type: its section, made where
+/// `scenario` has none yet; of several sections a scenario that has these alone. nullptr: none.
+google::protobuf::Message* ConfigIn(Scenario* scenario, const std::string& type) {
   const std::vector<std::string> sections = SectionsOf(type);
+  if (sections.size() > 1) return scenario;
+  const FieldDescriptor* field = ConfigField(sections[0]);
+  return field == nullptr ? nullptr : scenario->GetReflection()->MutableMessage(scenario, field);
+}
+
+/// The configuration of a component of this type, as it will read it.
+std::string ConfigText(const Scenario& scenario, const std::string& type) {
   const google::protobuf::Reflection& reflection = *scenario.GetReflection();
-  Scenario own;  // its sections alone
-  for (const std::string& section : sections) {
+  Scenario own;
+  for (const std::string& section : SectionsOf(type)) {
     const FieldDescriptor* field = ConfigField(section);
     if (field == nullptr || !reflection.HasField(scenario, field)) continue;
     reflection.MutableMessage(&own, field)->CopyFrom(reflection.GetMessage(scenario, field));
   }
-  const FieldDescriptor* field = ConfigField(sections[0]);
-  std::string text;
-  if (sections.size() > 1) {
-    text = TextOf(own);
-  } else if (field != nullptr) {
-    text = TextOf(reflection.GetMessage(own, field));
-  }
-  return text;
+  const google::protobuf::Message* const config = ConfigIn(&own, type);
+  return config == nullptr ? "" : TextOf(*config);
 }
 
-/// ConfigText's inverse: the sections alone.
-Scenario ParseConfig(const ComponentConfig& config, const std::string& type) {
-  const std::vector<std::string> sections = SectionsOf(type);
-  const std::string source = "configuration of " + config.component();
+/// Writes the configuration of every component of the run's graph.
+void WriteConfigs(const Scenario& scenario, RunSpec* spec) {
+  spec->clear_config();
+  for (const ComponentInstance& instance : spec->graph().component()) {
+    ComponentConfig* config = spec->add_config();
+    config->set_component(instance.name());
+    config->set_text(ConfigText(scenario, TypeOf(instance)));
+  }
+}
+
+/// ConfigText's inverse, for a run that a log holds: the sections alone.
+Scenario ReadConfig(const ComponentConfig& config, const std::string& type) {
   Scenario own;
-  const FieldDescriptor* field = ConfigField(sections[0]);
-  if (sections.size() > 1) {
-    ParseTextProto(config.text(), source, &own);
-  } else if (field != nullptr) {
-    ParseTextProto(config.text(), source, own.GetReflection()->MutableMessage(&own, field));
+  if (google::protobuf::Message* const message = ConfigIn(&own, type)) {
+    ParseTextProto(config.text(), "configuration of " + config.component(), message);
   }
   return own;
 }
@@ -187,14 +195,22 @@ void ChooseEngine(const LoadedScenario& loaded, Graph* graph) {
   }
 }
 
+/// The ends of drives that components of the graph use.
+std::vector<DriveLink> DriveLinksOf(const Graph& graph, const Scenario& scenario) {
+  std::vector<DriveLink> used;
+  for (const ComponentInstance& instance : graph.component()) {
+    std::ranges::copy_if(Components().TraitsOf(TypeOf(instance)).drive_links,
+                         std::back_inserter(used),
+                         [&](const DriveLink& end) { return HasField(scenario, end.group); });
+  }
+  return used;
+}
+
 /// Refuses a graph without what emulates the drives of --drives: its bridge would look for a robot.
 void CheckDrivesOf(const RunChanges& changes, const LoadedScenario& loaded, const Graph& graph) {
   if (changes.drives.empty()) return;
-  for (const ComponentInstance& instance : graph.component()) {
-    for (const DriveLink& end : Components().TraitsOf(TypeOf(instance)).drive_links) {
-      if (end.drives && HasField(loaded.scenario, end.group)) return;
-    }
-  }
+  const std::vector<DriveLink> ends = DriveLinksOf(graph, loaded.scenario);
+  if (std::ranges::any_of(ends, &DriveLink::drives)) return;
   const fs::path overlay = FindFile("drives", changes.drives, fs::current_path());
   Scenario drives;
   ReadTextProto(overlay.string(), &drives);
@@ -316,35 +332,9 @@ std::string EngineOfField(const std::string& field) {
   return "";
 }
 
-namespace {
-
-/// Walking needs other values than standing where the scenario leaves them open
-/// (docs/reference/walking.md): with those of the rule for standing the paper's robot falls after
-/// some 15 s.
-void FillForWalking(Scenario* scenario) {
-  TaskControllerConfig& tasks = *scenario->mutable_task_controller();
-  // It has no lag while it stands, either: a walk that begins takes none over.
-  if (!tasks.has_base_velocity_cutoff()) tasks.set_base_velocity_cutoff(0);
-  if (!tasks.has_foot()) {
-    // The rule's swing foot comes down late.
-    tasks.mutable_foot()->set_kp(625);
-    tasks.mutable_foot()->set_kd(50);
-  }
-  StateEstimatorConfig& estimator = *scenario->mutable_state_estimator();
-  // Hz; heron falls with the 12.9 Hz that its gears ask for.
-  if (!estimator.has_joint_velocity_cutoff()) estimator.set_joint_velocity_cutoff(20);
-  ContactWrenchMonitorConfig& monitor = *scenario->mutable_contact_wrench_monitor();
-  if (!monitor.has_region()) monitor.set_region(ContactWrenchMonitorConfig::POLYGON);
-}
-
-bool Walks(const Scenario& scenario) { return scenario.step_planner().walk().enabled(); }
-
-}  // namespace
-
 RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
                     std::vector<std::string>* warnings) {
-  Scenario scenario = loaded.scenario;
-  if (Walks(scenario)) FillForWalking(&scenario);
+  const Scenario& scenario = loaded.scenario;
   RunSpec spec;
   std::random_device random;
   spec.set_run_id(static_cast<int64_t>((uint64_t{random()} << 32 | random()) >> 1));
@@ -362,11 +352,7 @@ RunSpec MakeRunSpec(const LoadedScenario& loaded, const RunChanges& changes,
   spec.set_lead_ticks(std::llround(scenario.lead() * scenario.tick_rate()));
   spec.set_num_ticks(spec.lead_ticks() + std::max<int64_t>(1, std::llround(scenario.duration() *
                                                                            scenario.tick_rate())));
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    ComponentConfig* config = spec.add_config();
-    config->set_component(instance.name());
-    config->set_text(ConfigText(scenario, TypeOf(instance)));
-  }
+  WriteConfigs(scenario, &spec);
   Robot robot;
   ReadTextProto(loaded.robot_file, &robot);
   const robot::RobotModel model = robot::LoadRobotFiles(loaded.robot_file);
@@ -430,113 +416,70 @@ void CheckGraphFile(const std::string& path) {
   }
 }
 
-namespace {
-
-void ChangeConfiguration(const std::string& change, RunSpec* spec) {
-  const std::string section = change.substr(0, change.find_first_of(".[="));
-  std::vector<std::string> names;
-  bool changed = false;
-  const size_t equals = change.find('=');
-  if (equals == std::string::npos || equals == 0) {
-    throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
-  }
-  for (ComponentInstance& instance : *spec->mutable_graph()->mutable_component()) {
-    const std::string& type = TypeOf(instance);
-    const std::vector<std::string> sections = SectionsOf(type);
-    names.insert(names.end(), sections.begin(), sections.end());
-    const bool takes = std::find(sections.begin(), sections.end(), section) != sections.end();
-    if (!takes || ConfigField(section) == nullptr) continue;
-    const int config = ConfigIndex(*spec, instance);
-    if (config < 0) {
-      throw ConfigError(
-          fmt::format("--set {}: the run has no configuration of {}", change, instance.name()));
-    }
-    Scenario own = ParseConfig(spec->config(config), type);
-    try {
-      SetField(&own, change.substr(0, equals), change.substr(equals + 1));
-    } catch (const ConfigError& error) {
-      throw ConfigError(fmt::format("--set {}", error.what()));
-    }
-    spec->mutable_config(config)->set_text(ConfigText(own, type));
-    ConnectWhere(own, &instance, spec->mutable_graph());
-    changed = true;
-  }
-  if (!changed) {
-    throw ConfigError(fmt::format("--set {}: no component of the run has a configuration '{}'; {}",
-                                  change, section, Suggest(section, names)));
-  }
-}
-
-}  // namespace
-
 void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec) {
-  for (const std::string& change : changes) ChangeConfiguration(change, spec);
-  bool walks = false;
-  for (const ComponentInstance& instance : spec->graph().component()) {
-    const std::string& type = TypeOf(instance);
-    const int config = ConfigIndex(*spec, instance);
-    const std::vector<std::string> sections = SectionsOf(type);
-    if (config < 0 || std::ranges::find(sections, "step_planner") == sections.end()) continue;
-    walks = walks || Walks(ParseConfig(spec->config(config), type));
+  Graph& graph = *spec->mutable_graph();
+  std::map<int, Scenario> changed;  // by component of the graph: its configuration
+  for (const std::string& change : changes) {
+    const std::string section = change.substr(0, change.find_first_of(".[="));
+    const size_t equals = change.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw ConfigError(fmt::format("--set {}: must be field.path=value", change));
+    }
+    std::vector<std::string> names;
+    bool taken = false;
+    for (int i = 0; i < graph.component_size(); ++i) {
+      const ComponentInstance& instance = graph.component(i);
+      const std::vector<std::string> sections = SectionsOf(TypeOf(instance));
+      names.insert(names.end(), sections.begin(), sections.end());
+      if (std::ranges::find(sections, section) == sections.end()) continue;
+      if (ConfigField(section) == nullptr) continue;
+      taken = true;
+      const int config = ConfigIndex(*spec, instance);
+      if (config < 0) {
+        throw ConfigError(
+            fmt::format("--set {}: the run has no configuration of {}", change, instance.name()));
+      }
+      if (!changed.contains(i)) changed[i] = ReadConfig(spec->config(config), TypeOf(instance));
+      try {
+        SetField(&changed[i], change.substr(0, equals), change.substr(equals + 1));
+      } catch (const ConfigError& error) {
+        throw ConfigError(fmt::format("--set {}", error.what()));
+      }
+    }
+    if (!taken) {
+      throw ConfigError(
+          fmt::format("--set {}: no component of the run has a configuration '{}'; {}", change,
+                      section, Suggest(section, names)));
+    }
   }
-  if (!walks) return;
-  for (const ComponentInstance& instance : spec->graph().component()) {
-    const std::string& type = TypeOf(instance);
-    const int config = ConfigIndex(*spec, instance);
-    if (config < 0 || ConfigField(SectionsOf(type)[0]) == nullptr) continue;
-    Scenario own = ParseConfig(spec->config(config), type);
-    FillForWalking(&own);
-    spec->mutable_config(config)->set_text(ConfigText(own, type));
+  for (const auto& [i, own] : changed) {
+    ComponentInstance* const instance = graph.mutable_component(i);
+    spec->mutable_config(ConfigIndex(*spec, *instance))
+        ->set_text(ConfigText(own, TypeOf(*instance)));
+    ConnectWhere(own, instance, &graph);
   }
 }
 
 namespace {
 
-/// The port of EtherCAT over UDP, for the components at both of its ends.
-void SetEthercatPort(int port, RunSpec* spec) {
-  for (const ComponentInstance& instance : spec->graph().component()) {
-    const std::string& type = TypeOf(instance);
-    const int config = ConfigIndex(*spec, instance);
-    if (config < 0) continue;
-    for (const DriveLink& end : Components().TraitsOf(type).drive_links) {
-      const std::string udp = end.link + ".udp";
-      if (end.link.empty()) continue;
-      Scenario own = ParseConfig(spec->config(config), type);
-      if (!HasField(own, udp) || HasField(own, udp + ".port")) continue;
-      SetField(&own, udp + ".port", std::to_string(port));
-      spec->mutable_config(config)->set_text(ConfigText(own, type));
+/// Gives the ends of drives what keeps them apart from those of other runs: a port to EtherCAT over
+/// UDP, and a tag to a run whose drives are emulated, which so keeps apart from robots, too.
+void SeparateDrives(int port, Scenario scenario, RunSpec* spec) {
+  // A component has its group of fields also where the scenario says nothing of it.
+  for (const ComponentInstance& each : spec->graph().component()) ConfigIn(&scenario, TypeOf(each));
+  const std::vector<DriveLink> ends = DriveLinksOf(spec->graph(), scenario);
+  const bool emulated = std::ranges::any_of(ends, &DriveLink::drives);
+  const auto set = [&](const std::string& field, const std::string& value) {
+    if (!HasField(scenario, field)) SetField(&scenario, field, value);
+  };
+  for (const DriveLink& end : ends) {
+    const std::string udp = end.link + ".udp";
+    if (!end.link.empty() && HasField(scenario, udp)) set(udp + ".port", std::to_string(port));
+    if (!end.tag.empty() && emulated) {
+      set(end.tag, fmt::format("poise-{}-{}", spec->run_id(), spec->first_port()));
     }
   }
-}
-
-/// Calls `act` with each end of drives that a component of the run uses, and its configuration.
-void ForEachDriveLink(
-    const RunSpec& spec,
-    const std::function<void(int config, const std::string& type, const DriveLink&)>& act) {
-  for (const ComponentInstance& instance : spec.graph().component()) {
-    const std::string& type = TypeOf(instance);
-    const int config = ConfigIndex(spec, instance);
-    if (config < 0) continue;
-    for (const DriveLink& end : Components().TraitsOf(type).drive_links) {
-      if (HasField(ParseConfig(spec.config(config), type), end.group)) act(config, type, end);
-    }
-  }
-}
-
-/// A run whose drives are emulated keeps apart from others, and from robots.
-void SetDriveTags(RunSpec* spec) {
-  bool emulated = false;
-  ForEachDriveLink(*spec, [&](int, const std::string&, const DriveLink& end) {
-    emulated = emulated || end.drives;
-  });
-  if (!emulated) return;
-  ForEachDriveLink(*spec, [&](int config, const std::string& type, const DriveLink& end) {
-    if (end.tag.empty()) return;
-    Scenario own = ParseConfig(spec->config(config), type);
-    if (HasField(own, end.tag)) return;
-    SetField(&own, end.tag, fmt::format("poise-{}-{}", spec->run_id(), spec->first_port()));
-    spec->mutable_config(config)->set_text(ConfigText(own, type));
-  });
+  if (!ends.empty()) WriteConfigs(scenario, spec);
 }
 
 /// Empty: somebody has its port.
@@ -555,13 +498,12 @@ bool SpeaksToDrives(const RunSpec& spec, int component) {
   const ComponentInstance& instance = spec.graph().component(component);
   const int config = ConfigIndex(spec, instance);
   if (config < 0) return false;
-  const Scenario own = ParseConfig(spec.config(config), TypeOf(instance));
-  const std::vector<DriveLink>& ends = Components().TraitsOf(TypeOf(instance)).drive_links;
-  return std::any_of(ends.begin(), ends.end(),
-                     [&](const DriveLink& end) { return HasField(own, end.group); });
+  const Scenario own = ReadConfig(spec.config(config), TypeOf(instance));
+  return std::ranges::any_of(Components().TraitsOf(TypeOf(instance)).drive_links,
+                             [&](const DriveLink& end) { return HasField(own, end.group); });
 }
 
-RunSource ChoosePorts(RunSpec* spec) {
+RunSource ChoosePorts(const Scenario& scenario, RunSpec* spec) {
   // The last two: what all send from, EtherCAT over UDP.
   const int count = 4 + spec->graph().channel_size();
   std::mt19937_64 random(static_cast<uint64_t>(spec->run_id()));
@@ -572,8 +514,7 @@ RunSource ChoosePorts(RunSpec* spec) {
     spec->set_first_port(port);
     std::optional<RunSource> source = TakeSource(*spec);
     if (!source) continue;
-    SetEthercatPort(port + count - 1, spec);
-    SetDriveTags(spec);
+    SeparateDrives(port + count - 1, scenario, spec);
     return std::move(*source);
   }
   throw ConfigError(

@@ -1,4 +1,6 @@
-// From a scenario to a checked run.
+// From a scenario to a checked run, in one direction: LoadScenario reads the files and changes the
+// scenario as a message, MakeRunSpec writes of it the text that each component reads, and CheckRun
+// has each read it. Only what a log holds is text to begin with (ChangeConfigurations).
 #pragma once
 
 #include <string>
@@ -34,16 +36,16 @@ void CheckGraphFile(const std::string& path);
 bool IsThere(const OptionalPort& port, const Scenario& scenario);
 
 /// Changes fields of the components' configurations in a run, "task_controller.com.kp=200", in
-/// order, then fills in what MakeRunSpec does for such a configuration. What it once filled in for
-/// another one stays. Throws ConfigError.
+/// order. Throws ConfigError.
 void ChangeConfigurations(const std::vector<std::string>& changes, RunSpec* spec);
 
 /// Whether a component is at one of the ends of what passes between a bridge and drives, which no
 /// log holds.
 bool SpeaksToDrives(const RunSpec& spec, int component);
 
-/// A block of free UDP ports for the run's channels, and its source port taken. Throws ConfigError
-/// when none is found; BusError when multicast is not routed.
-RunSource ChoosePorts(RunSpec* spec);
+/// A block of free UDP ports for the channels of the scenario's run, and its source port taken. The
+/// ends of drives are configured anew, apart from those of other runs. Throws ConfigError when none
+/// is found; BusError when multicast is not routed.
+RunSource ChoosePorts(const Scenario& scenario, RunSpec* spec);
 
 }  // namespace poise
