@@ -12,6 +12,12 @@ namespace {
 
 // No sensor of a robot reports more, in A, rad/s, m/s², N or N·m: products of readings stay finite.
 constexpr double kImplausible = 1e9;
+// From one cycle to the next no joint moves further than this many times velocity_limit × period: a
+// fall or an impact may exceed the limit itself for a while; five times it is a broken encoder.
+constexpr double kVelocityMargin = 5;
+// s: by then a torque beyond friction has moved a joint by a count, with the readings' delay and a
+// rotor of 0.5 kg·m² on the coarsest encoder at the joint.
+constexpr double kResponseTime = 0.02;
 
 bool Plausible(double value) { return std::abs(value) <= kImplausible; }  // false for NaN
 
@@ -26,25 +32,26 @@ bool Plausible(const wrench_t& wrench) {
   return AllPlausible(wrench.force) && AllPlausible(wrench.moment);
 }
 
-FeedbackMonitor::FeedbackMonitor(const FeedbackMonitorConfig& config,
-                                 std::span<const robot::MotorModel> motors)
+FeedbackMonitor::FeedbackMonitor(const SupervisorConfig& config)
     : config_(config),
-      motors_(motors.begin(), motors.end()),
-      velocity_gain_(1 - std::exp(-2 * std::numbers::pi * config.velocity_cutoff * config.period)),
-      counts_(motors.size(), 0),
-      velocity_(motors.size(), 0.0),
-      raw_velocity_(motors.size(), 0.0),
+      frozen_cycles_(std::max(1, config.Cycles(config.settings.frozen_time()))),
+      response_cycles_(std::max(1, config.Cycles(kResponseTime))),
+      velocity_gain_(
+          1 - std::exp(-2 * std::numbers::pi * config.settings.velocity_cutoff() * config.period)),
+      counts_(config.motors.size(), 0),
+      velocity_(config.motors.size(), 0.0),
+      raw_velocity_(config.motors.size(), 0.0),
       commanded_(static_cast<size_t>(std::max(1, config.current_cycles)),
-                 std::vector<double>(motors.size(), 0.0)),
-      enabled_(motors.size(), 0),
-      still_cycles_(motors.size(), 0),
-      changed_cycles_(motors.size(), 0),
-      error_cycles_(motors.size(), 0),
-      least_torque_(motors.size(), 0.0),
-      greatest_torque_(motors.size(), 0.0) {}
+                 std::vector<double>(config.motors.size(), 0.0)),
+      enabled_(config.motors.size(), 0),
+      still_cycles_(config.motors.size(), 0),
+      changed_cycles_(config.motors.size(), 0),
+      error_cycles_(config.motors.size(), 0),
+      least_torque_(config.motors.size(), 0.0),
+      greatest_torque_(config.motors.size(), 0.0) {}
 
 FeedbackMonitor::Problem FeedbackMonitor::Find(const drive_feedback_t& feedback) const {
-  const size_t n = motors_.size();
+  const size_t n = config_.motors.size();
   const Problem unusable{bridge_status_t::REASON_FEEDBACK_NOT_FINITE, -1};
   if (feedback.position_counts.size() != n || feedback.velocity.size() != n ||
       feedback.current.size() != n || feedback.drive_status.size() != n ||
@@ -73,27 +80,27 @@ int FeedbackMonitor::FindJump(const drive_feedback_t& feedback) const {
     // As doubles: the difference of two 64-bit counts may not fit 64 bits.
     const double change =
         static_cast<double>(feedback.position_counts[j]) - static_cast<double>(counts_[j]);
-    const double most = config_.velocity_margin * config_.velocity_limit[j] * config_.period;
-    if (std::abs(change) / CountsPerRadian(motors_[j]) > most) return static_cast<int>(j);
+    const double most = kVelocityMargin * config_.velocity_limit[j] * config_.period;
+    if (std::abs(change) / CountsPerRadian(config_.motors[j]) > most) return static_cast<int>(j);
   }
   return -1;
 }
 
 FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feedback) {
-  for (size_t j = 0; j < motors_.size(); ++j) {
-    const double torque = JointTorque(motors_[j], commanded_.front()[j]);
+  for (size_t j = 0; j < config_.motors.size(); ++j) {
+    const double torque = JointTorque(config_.motors[j], commanded_.front()[j]);
     if (enabled_[j] == 0 || !consecutive_ || feedback.position_counts[j] != counts_[j]) {
       still_cycles_[j] = changed_cycles_[j] = 0;
     } else {
       if (still_cycles_[j] == 0) least_torque_[j] = greatest_torque_[j] = torque;
-      still_cycles_[j] = std::min(still_cycles_[j] + 1, config_.frozen_cycles);
+      still_cycles_[j] = std::min(still_cycles_[j] + 1, frozen_cycles_);
       least_torque_[j] = std::min(least_torque_[j], torque);
       greatest_torque_[j] = std::max(greatest_torque_[j], torque);
-      const bool changed = greatest_torque_[j] - least_torque_[j] > config_.frozen_torque;
-      changed_cycles_[j] = changed ? std::min(changed_cycles_[j] + 1, config_.response_cycles) : 0;
+      const bool changed =
+          greatest_torque_[j] - least_torque_[j] > config_.thresholds.frozen_torque;
+      changed_cycles_[j] = changed ? std::min(changed_cycles_[j] + 1, response_cycles_) : 0;
     }
-    if (still_cycles_[j] >= config_.frozen_cycles &&
-        changed_cycles_[j] >= config_.response_cycles) {
+    if (still_cycles_[j] >= frozen_cycles_ && changed_cycles_[j] >= response_cycles_) {
       return {bridge_status_t::REASON_ENCODER_FROZEN, static_cast<int>(j)};
     }
     double least = commanded_.front()[j], greatest = least;
@@ -102,10 +109,12 @@ FeedbackMonitor::Problem FeedbackMonitor::FindFault(const drive_feedback_t& feed
       greatest = std::max(greatest, commanded[j]);
     }
     const double beyond = feedback.current[j] - std::clamp(feedback.current[j], least, greatest);
-    const bool differs = motors_[j].current_sensor && enabled_[j] != 0 &&
-                         std::abs(JointTorque(motors_[j], beyond)) > config_.torque_error;
-    error_cycles_[j] = differs ? std::min(error_cycles_[j] + 1, config_.torque_error_cycles) : 0;
-    if (differs && error_cycles_[j] >= config_.torque_error_cycles) {
+    const bool differs =
+        config_.motors[j].current_sensor && enabled_[j] != 0 &&
+        std::abs(JointTorque(config_.motors[j], beyond)) > config_.thresholds.torque_error;
+    error_cycles_[j] =
+        differs ? std::min(error_cycles_[j] + 1, config_.settings.torque_error_cycles()) : 0;
+    if (differs && error_cycles_[j] >= config_.settings.torque_error_cycles()) {
       return {bridge_status_t::REASON_TORQUE_IMPLAUSIBLE, static_cast<int>(j)};
     }
   }
@@ -120,7 +129,7 @@ FeedbackMonitor::Problem FeedbackMonitor::Update(const drive_feedback_t& feedbac
     const int64_t counts = feedback.position_counts[j];
     if (consecutive_) {
       const double change = static_cast<double>(counts) - static_cast<double>(counts_[j]);
-      raw_velocity_[j] = change / CountsPerRadian(motors_[j]) / config_.period;
+      raw_velocity_[j] = change / CountsPerRadian(config_.motors[j]) / config_.period;
       velocity_[j] += velocity_gain_ * (raw_velocity_[j] - velocity_[j]);
     }
     counts_[j] = counts;

@@ -2,35 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
-#include "components/robot/robot_model.h"
+#include "hw_bridge/supervisor_config.h"
 #include "poise/drive_feedback_t.hpp"
 
 namespace poise {
-
-struct FeedbackMonitorConfig {
-  std::vector<double> velocity_limit;  ///< rad/s, by joint; empty: jumps are not looked for
-  /// From one cycle to the next no joint moves further than this many times velocity_limit ×
-  /// period: a fall or an impact may exceed the limit itself for a while; five times it is a broken
-  /// encoder.
-  double velocity_margin = 5;
-  double velocity_cutoff = 60;  ///< Hz
-  int num_feet = 2;
-  double period = 0.002;  ///< s, of a cycle
-  /// An encoder is frozen when it has not moved by a count for `frozen_cycles`, the last
-  /// `response_cycles` of them after the torque has changed by more than `frozen_torque`, N·m: a
-  /// joint that stands still takes some time until such a change has moved it.
-  int frozen_cycles = 50, response_cycles = 10;
-  double frozen_torque = std::numeric_limits<double>::infinity();
-  /// A torque is implausible when it has differed by more than `torque_error`, N·m, from all that
-  /// was commanded in the last `current_cycles`, as old as a reading may be, for
-  /// `torque_error_cycles` in a row.
-  int torque_error_cycles = 10, current_cycles = 1;
-  double torque_error = std::numeric_limits<double>::infinity();
-};
 
 /// Whether a sensor of a robot can read this: false for what is no number, or beyond all reason.
 bool Plausible(const wrench_t& wrench);
@@ -38,7 +16,7 @@ bool Plausible(const wrench_t& wrench);
 /// Never allocates after construction, never throws.
 class FeedbackMonitor {
  public:
-  FeedbackMonitor(const FeedbackMonitorConfig& config, std::span<const robot::MotorModel> motors);
+  explicit FeedbackMonitor(const SupervisorConfig& config);
 
   struct Problem {
     int8_t reason = 0;  ///< bridge_status_t::REASON_*; REASON_NONE: the feedback can be used
@@ -65,8 +43,8 @@ class FeedbackMonitor {
   int FindJump(const drive_feedback_t& feedback) const;
   Problem FindFault(const drive_feedback_t& feedback);
 
-  FeedbackMonitorConfig config_;
-  std::vector<robot::MotorModel> motors_;
+  SupervisorConfig config_;
+  int frozen_cycles_, response_cycles_;
   double velocity_gain_;  // of the first-order low-pass, per cycle
   std::vector<int64_t> counts_;
   std::vector<double> velocity_, raw_velocity_;

@@ -17,45 +17,16 @@ namespace poise {
 std::string_view hw_bridge_proto_schema();  // generated
 namespace {
 
-// s: by then a torque beyond friction has moved a joint by a count, with the readings' delay and a
-// rotor of 0.5 kg·m² on the coarsest encoder at the joint.
-constexpr double kResponseTime = 0.02;
-
-/// Cycles of a time, at least the time.
-int Cycles(double seconds, double period) {
-  return static_cast<int>(std::ceil(seconds / period - 1e-9));
-}
-
-/// `value` for every joint where it is given.
-std::vector<double> ByJoint(bool given, double value, const std::vector<double>& derived) {
-  return given ? std::vector<double>(derived.size(), value) : derived;
-}
-
-FeedbackMonitorConfig MakeMonitorConfig(const HwBridgeConfig& config,
-                                        const robot::RobotModel& model,
-                                        const RobotThresholds& derived, double period) {
-  FeedbackMonitorConfig result;
-  for (const robot::Joint& joint : model.joints()) {
-    result.velocity_limit.push_back(joint.velocity_limit);
-  }
-  result.velocity_cutoff = config.velocity_cutoff();
-  result.num_feet = static_cast<int>(model.feet().size());
-  result.period = period;
-  result.frozen_cycles = std::max(1, Cycles(config.frozen_time(), period));
-  result.frozen_torque =
-      config.has_frozen_torque() ? config.frozen_torque() : derived.frozen_torque;
-  result.response_cycles = std::max(1, Cycles(kResponseTime, period));
-  result.torque_error_cycles = config.torque_error_cycles();
-  // What was commanded a cycle ago is read as old as the readings are, and settles in a cycle more.
-  const double delay = model.drive_train().sensor_delay;
-  result.current_cycles = delay > 0 ? 2 + Cycles(delay, period) : 1;
-  result.torque_error = config.has_torque_error() ? config.torque_error() : derived.torque_error;
-  return result;
+/// `value` for every joint, where it is given, in place of what follows from the robot.
+void Replace(bool given, double value, std::vector<double>* derived) {
+  if (given) derived->assign(derived->size(), value);
 }
 
 SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot::RobotModel& model,
                                       double period) {
   SupervisorConfig result;
+  result.settings = config;
+  result.period = period;
   result.motors = model.motors();
   for (int j = 0; j < model.num_joints(); ++j) {
     const robot::Joint& joint = model.joints()[static_cast<size_t>(j)];
@@ -77,39 +48,21 @@ SupervisorConfig MakeSupervisorConfig(const HwBridgeConfig& config, const robot:
     result.torque_limit.push_back(limit);
     result.lower.push_back(joint.lower);
     result.upper.push_back(joint.upper);
+    result.velocity_limit.push_back(joint.velocity_limit);
   }
-  const RobotThresholds derived = DeriveThresholds(model);
-  result.monitor = MakeMonitorConfig(config, model, derived, period);
-  result.soft_range = config.soft_range();
-  result.position_margin = config.position_margin();
-  result.velocity_trip = config.velocity_trip();
-  result.tilt_limit = config.tilt_limit();
-  result.tilt_time = config.tilt_time();
+  result.num_feet = static_cast<int>(model.feet().size());
   result.upright = model.imu().pose.linear().transpose() * Eigen::Vector3d::UnitZ();
-  result.start_velocity = config.start_velocity();
-  result.enable_cycles = config.enable_cycles();
-  result.first_command_ramp = Cycles(config.first_command_ramp(), period);
-  result.damping_after_cycles = config.damping_after_cycles();
-  result.stop_after_cycles = config.stop_after_cycles();
-  result.damping = ByJoint(config.has_damping(), config.damping(), derived.damping);
-  result.stop_ramp = config.stop_ramp();
-  if (config.on_lost_command() == HwBridgeConfig::HOLD) {
-    result.hold_cycles = Cycles(config.hold_time(), period);
-  }
-  result.hold_before_command = config.hold_before_command();
-  result.hold_stiffness =
-      ByJoint(config.has_hold_stiffness(), config.hold_stiffness(), derived.hold_stiffness);
-  result.hold_damping =
-      ByJoint(config.has_hold_damping(), config.hold_damping(), derived.hold_damping);
-  result.resume_cycles = Cycles(config.resume_time(), period);
-  result.drives_hold = config.drives_hold();
-  result.stiffness_limit = derived.stiffness_limit;
-  result.damping_limit = derived.damping_limit;
-  result.slew_limit = config.has_slew_limit() ? config.slew_limit() : derived.slew_limit;
-  result.overload_time = config.overload_time();
-  result.overrun_lateness = config.overrun_lateness() * period;
-  result.overruns_in_a_row = config.overruns_in_a_row();
-  result.overruns_in_100 = config.overruns_in_100();
+  // What was commanded a cycle ago is read as old as the readings are, and settles in a cycle more.
+  const double delay = model.drive_train().sensor_delay;
+  result.current_cycles = delay > 0 ? 2 + result.Cycles(delay) : 1;
+  RobotThresholds& thresholds = result.thresholds;
+  thresholds = DeriveThresholds(model);
+  Replace(config.has_damping(), config.damping(), &thresholds.damping);
+  Replace(config.has_hold_stiffness(), config.hold_stiffness(), &thresholds.hold_stiffness);
+  Replace(config.has_hold_damping(), config.hold_damping(), &thresholds.hold_damping);
+  if (config.has_slew_limit()) thresholds.slew_limit = config.slew_limit();
+  if (config.has_frozen_torque()) thresholds.frozen_torque = config.frozen_torque();
+  if (config.has_torque_error()) thresholds.torque_error = config.torque_error();
   return result;
 }
 

@@ -48,10 +48,15 @@ int8_t DriveStateOf(int32_t drive_status) {
 
 Supervisor::Supervisor(const SupervisorConfig& config)
     : config_(config),
-      gate_(static_cast<int>(config.motors.size()), config.damping_after_cycles),
-      monitor_(config.monitor, config.motors),
-      tilt_(config.upright, config.tilt_time),
-      stop_ramp_cycles_(std::llround(std::ceil(config.stop_ramp / config.monitor.period - 1e-9))),
+      gate_(static_cast<int>(config.motors.size()), config.settings.damping_after_cycles()),
+      monitor_(config),
+      tilt_(config.upright, config.settings.tilt_time()),
+      stop_ramp_cycles_(config.Cycles(config.settings.stop_ramp())),
+      first_ramp_cycles_(config.Cycles(config.settings.first_command_ramp())),
+      resume_cycles_(config.Cycles(config.settings.resume_time())),
+      hold_cycles_(config.settings.on_lost_command() == HwBridgeConfig::HOLD
+                       ? config.Cycles(config.settings.hold_time())
+                       : 0),
       torque_(config.motors.size(), 0.0),
       impedance_(config.motors.size()),
       current_(config.motors.size(), 0.0),
@@ -66,7 +71,7 @@ Supervisor::Supervisor(const SupervisorConfig& config)
     const robot::MotorModel& motor = config.motors[j];
     config_.torque_limit[j] =
         std::min(config.torque_limit[j], JointTorque(motor, motor.peak_current));
-    thermal_.emplace_back(motor.rated_current, motor.peak_current, config.overload_time);
+    thermal_.emplace_back(motor.rated_current, motor.peak_current, config.settings.overload_time());
   }
 }
 
@@ -122,21 +127,23 @@ void Supervisor::CheckDrives(const drive_feedback_t& feedback,
 
 void Supervisor::CheckMotion(const drive_feedback_t& feedback) {
   tilt_.Update(Eigen::Map<const Eigen::Vector3d>(feedback.imu_angular_velocity),
-               Eigen::Map<const Eigen::Vector3d>(feedback.imu_acceleration),
-               config_.monitor.period);
+               Eigen::Map<const Eigen::Vector3d>(feedback.imu_acceleration), config_.period);
   if (!active()) return;
   for (size_t j = 0; j < faulted_.size(); ++j) {
     const auto joint = static_cast<int>(j);
-    if (!config_.lower.empty() && (Position(j) < config_.lower[j] - config_.position_margin ||
-                                   Position(j) > config_.upper[j] + config_.position_margin)) {
+    if (!config_.lower.empty() &&
+        (Position(j) < config_.lower[j] - config_.settings.position_margin() ||
+         Position(j) > config_.upper[j] + config_.settings.position_margin())) {
       Latch(Status::STATE_STOPPING, Status::REASON_JOINT_POSITION, joint);
     }
-    if (!config_.monitor.velocity_limit.empty() &&
-        std::abs(joint_velocity()[j]) > config_.velocity_trip * config_.monitor.velocity_limit[j]) {
+    if (!config_.velocity_limit.empty() &&
+        std::abs(joint_velocity()[j]) >
+            config_.settings.velocity_trip() * config_.velocity_limit[j]) {
       Latch(Status::STATE_STOPPING, Status::REASON_JOINT_VELOCITY, joint);
     }
   }
-  if (tilt_.tilt() > config_.tilt_limit) Latch(Status::STATE_STOPPING, Status::REASON_BODY_TILT);
+  if (tilt_.tilt() > config_.settings.tilt_limit())
+    Latch(Status::STATE_STOPPING, Status::REASON_BODY_TILT);
 }
 
 void Supervisor::ReadBus(const BusHealth& health) {
@@ -153,12 +160,12 @@ void Supervisor::ReadBus(const BusHealth& health) {
 
 void Supervisor::CountLateness(double lateness) {
   lateness_ = lateness;
-  const bool late = lateness > config_.overrun_lateness;
+  const bool late = lateness > config_.settings.overrun_lateness() * config_.period;
   late_[static_cast<size_t>(cycles_++ % 100)] = late;
   overruns_ += late ? 1 : 0;
   overruns_in_a_row_ = late ? overruns_in_a_row_ + 1 : 0;
-  if (overruns_in_a_row_ >= config_.overruns_in_a_row ||
-      static_cast<int>(late_.count()) >= config_.overruns_in_100) {
+  if (overruns_in_a_row_ >= config_.settings.overruns_in_a_row() ||
+      static_cast<int>(late_.count()) >= config_.settings.overruns_in_100()) {
     Latch(Status::STATE_STOPPING, Status::REASON_CYCLE_OVERRUN);
   }
 }
@@ -175,10 +182,10 @@ bool Supervisor::MayStart() {
     return false;
   }
   for (size_t j = 0; j < torque_.size(); ++j) {
-    const bool inside =
-        config_.lower.empty() || (Position(j) >= config_.lower[j] - config_.position_margin &&
-                                  Position(j) <= config_.upper[j] + config_.position_margin);
-    const bool at_rest = std::abs(joint_velocity()[j]) <= config_.start_velocity;
+    const bool inside = config_.lower.empty() ||
+                        (Position(j) >= config_.lower[j] - config_.settings.position_margin() &&
+                         Position(j) <= config_.upper[j] + config_.settings.position_margin());
+    const bool at_rest = std::abs(joint_velocity()[j]) <= config_.settings.start_velocity();
     if (inside && at_rest) continue;
     reason_ = inside ? Status::REASON_START_VELOCITY : Status::REASON_START_POSITION;
     reason_joint_ = static_cast<int>(j);
@@ -206,7 +213,7 @@ void Supervisor::Reset(const joint_command_t* command) {
   bus_ = {};
   late_.reset();
   overruns_in_a_row_ = 0;
-  fault_grace_ = config_.enable_cycles;
+  fault_grace_ = config_.settings.enable_cycles();
   reset_ = true;
   ++resets_;
 }
@@ -250,7 +257,7 @@ void Supervisor::UpdateState(int64_t cycle, const joint_command_t* command) {
 /// The states of a bridge that has accepted a command, which is `age` cycles old.
 void Supervisor::Follow(int64_t age) {
   const bool first = AwaitsFirst();
-  const bool fresh = !first && age <= config_.damping_after_cycles;
+  const bool fresh = !first && age <= config_.settings.damping_after_cycles();
   if (state_ == Status::STATE_ENABLING) {
     if (!fresh && !first) {  // nothing to follow: down again
       state_ = Status::STATE_INIT;
@@ -261,7 +268,7 @@ void Supervisor::Follow(int64_t age) {
     const auto waiting = std::find(enabled_.begin(), enabled_.end(), 0);
     if (waiting != enabled_.end()) {
       reason_joint_ = static_cast<int>(waiting - enabled_.begin());
-      if (++enabling_cycles_ > config_.enable_cycles) {
+      if (++enabling_cycles_ > config_.settings.enable_cycles()) {
         faulted_[static_cast<size_t>(reason_joint_)] = 1;
         Latch(Status::STATE_STOPPING, Status::REASON_DRIVE_NOT_ENABLED, reason_joint_);
       }
@@ -270,7 +277,7 @@ void Supervisor::Follow(int64_t age) {
     std::fill(applied_.begin(), applied_.end(), 0.0);
   } else if (fresh && state_ != Status::STATE_RUNNING) {
     resume_from_ = applied_;
-    resume_left_ = config_.resume_cycles;
+    resume_left_ = resume_cycles_;
   }
   if (first) {
     HoldStart();
@@ -296,7 +303,7 @@ void Supervisor::HoldStart() {
 }
 
 void Supervisor::UpdateLoss(int64_t age) {
-  const int64_t damping_after = int64_t{config_.damping_after_cycles} + config_.hold_cycles;
+  const int64_t damping_after = int64_t{config_.settings.damping_after_cycles()} + hold_cycles_;
   if (age <= damping_after) {
     if (state_ == Status::STATE_RUNNING) {
       hold_torque_ = applied_;
@@ -304,7 +311,7 @@ void Supervisor::UpdateLoss(int64_t age) {
     }
     state_ = Status::STATE_HOLDING;
     reason_ = last_refusal_;
-  } else if (age <= damping_after + config_.stop_after_cycles) {
+  } else if (age <= damping_after + config_.settings.stop_after_cycles()) {
     state_ = Status::STATE_DAMPING;
     reason_ = last_refusal_;
   } else {
@@ -313,7 +320,8 @@ void Supervisor::UpdateLoss(int64_t age) {
 }
 
 double Supervisor::DampingTorque(size_t joint, double share) const {
-  return monitor_.updated() ? -share * config_.damping[joint] * joint_velocity()[joint] : 0.0;
+  return monitor_.updated() ? -share * config_.thresholds.damping[joint] * joint_velocity()[joint]
+                            : 0.0;
 }
 
 double Supervisor::WantedTorque(size_t joint) const {
@@ -325,11 +333,11 @@ double Supervisor::WantedTorque(size_t joint) const {
         torque +=
             FollowedImpedance(joint, &limits).Torque(Position(joint), joint_velocity()[joint]);
       }
-      if (start_ramp_ < config_.first_command_ramp) {
-        torque *= static_cast<double>(start_ramp_ + 1) / (config_.first_command_ramp + 1);
+      if (start_ramp_ < first_ramp_cycles_) {
+        torque *= static_cast<double>(start_ramp_ + 1) / (first_ramp_cycles_ + 1);
       }
       if (resume_left_ > 0) {
-        const double old = static_cast<double>(resume_left_) / (config_.resume_cycles + 1);
+        const double old = static_cast<double>(resume_left_) / (resume_cycles_ + 1);
         torque += old * (resume_from_[joint] - torque);
       }
       return torque;
@@ -339,8 +347,8 @@ double Supervisor::WantedTorque(size_t joint) const {
                             static_cast<double>(monitor_.counts()[joint])) /
                            CountsPerRadian(config_.motors[joint]);
       const double rate = monitor_.updated() ? joint_velocity()[joint] : 0.0;
-      return hold_torque_[joint] + config_.hold_stiffness[joint] * error -
-             config_.hold_damping[joint] * rate;
+      return hold_torque_[joint] + config_.thresholds.hold_stiffness[joint] * error -
+             config_.thresholds.hold_damping[joint] * rate;
     }
     case Status::STATE_DAMPING:
       return DampingTorque(joint, 1);
@@ -358,18 +366,19 @@ double Supervisor::WantedTorque(size_t joint) const {
 Impedance Supervisor::FollowedImpedance(size_t joint, int8_t* limits) const {
   Impedance result = impedance_[joint];
   bool confined = false;
-  if (!config_.stiffness_limit.empty()) {
-    confined |= Confine(0, config_.stiffness_limit[joint], &result.stiffness);
+  if (!config_.thresholds.stiffness_limit.empty()) {
+    confined |= Confine(0, config_.thresholds.stiffness_limit[joint], &result.stiffness);
   }
-  if (!config_.damping_limit.empty()) {
-    confined |= Confine(0, config_.damping_limit[joint], &result.damping);
+  if (!config_.thresholds.damping_limit.empty()) {
+    confined |= Confine(0, config_.thresholds.damping_limit[joint], &result.damping);
   }
   if (!config_.lower.empty()) {
-    confined |= Confine(config_.lower[joint] - config_.position_margin,
-                        config_.upper[joint] + config_.position_margin, &result.position);
+    confined |=
+        Confine(config_.lower[joint] - config_.settings.position_margin(),
+                config_.upper[joint] + config_.settings.position_margin(), &result.position);
   }
-  if (!config_.monitor.velocity_limit.empty()) {
-    const double most = config_.monitor.velocity_limit[joint];
+  if (!config_.velocity_limit.empty()) {
+    const double most = config_.velocity_limit[joint];
     confined |= Confine(-most, most, &result.velocity);
   }
   confined |=
@@ -380,11 +389,11 @@ Impedance Supervisor::FollowedImpedance(size_t joint, int8_t* limits) const {
 
 double Supervisor::FadeIn() const {
   double share = 1;
-  if (start_ramp_ < config_.first_command_ramp) {
-    share = static_cast<double>(start_ramp_ + 1) / (config_.first_command_ramp + 1);
+  if (start_ramp_ < first_ramp_cycles_) {
+    share = static_cast<double>(start_ramp_ + 1) / (first_ramp_cycles_ + 1);
   }
   if (resume_left_ > 0) {
-    share *= 1 - static_cast<double>(resume_left_) / (config_.resume_cycles + 1);
+    share *= 1 - static_cast<double>(resume_left_) / (resume_cycles_ + 1);
   }
   return share;
 }
@@ -398,20 +407,20 @@ Impedance Supervisor::WantedImpedance(size_t joint, int8_t* limits) const {
     result.Scale(FadeIn());
     return result;
   }
-  if (!config_.drives_hold) return result;
+  if (!config_.settings.drives_hold()) return result;
   switch (state_) {
     case Status::STATE_HOLDING:
-      result.stiffness = config_.hold_stiffness[joint];
-      result.damping = config_.hold_damping[joint];
+      result.stiffness = config_.thresholds.hold_stiffness[joint];
+      result.damping = config_.thresholds.hold_damping[joint];
       result.position = JointPositionOf(config_.motors[joint], hold_counts_[joint]);
       break;
     case Status::STATE_DAMPING:
-      result.damping = config_.damping[joint];
+      result.damping = config_.thresholds.damping[joint];
       break;
     case Status::STATE_STOPPING:
     case Status::STATE_ESTOP:
       if (ramp_left_ > 0) {
-        result.damping = config_.damping[joint] * static_cast<double>(ramp_left_) /
+        result.damping = config_.thresholds.damping[joint] * static_cast<double>(ramp_left_) /
                          static_cast<double>(stop_ramp_cycles_);
       }
       break;
@@ -462,10 +471,12 @@ double Supervisor::OrderedTorque(size_t joint, const drive_command_t& command) c
 
 /// Near a soft limit torque that leads further out fades to nothing at the limit.
 double Supervisor::FadePosition(size_t joint, double torque) const {
-  if (config_.lower.empty() || config_.soft_range <= 0) return torque;
+  if (config_.lower.empty() || config_.settings.soft_range() <= 0) return torque;
   const double room =
       torque > 0 ? config_.upper[joint] - Position(joint) : Position(joint) - config_.lower[joint];
-  return room >= config_.soft_range ? torque : torque * std::max(0.0, room / config_.soft_range);
+  return room >= config_.settings.soft_range()
+             ? torque
+             : torque * std::max(0.0, room / config_.settings.soft_range());
 }
 
 double Supervisor::Limit(size_t joint, double wanted, int8_t* limits) const {
@@ -478,7 +489,7 @@ double Supervisor::Limit(size_t joint, double wanted, int8_t* limits) const {
   if (follows) {
     torque = apply(torque, FadePosition(joint, torque), Status::LIMIT_POSITION);
     if (slew_known_) {
-      const double step = config_.slew_limit * config_.monitor.period;
+      const double step = config_.thresholds.slew_limit * config_.period;
       torque = apply(torque, std::clamp(torque, applied_[joint] - step, applied_[joint] + step),
                      Status::LIMIT_SLEW);
     }
@@ -499,7 +510,7 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
   for (size_t j = 0; j < torque_.size(); ++j) {
     int8_t limits = 0;
     Command(j, enabled && faulted_[j] == 0, drives, &limits);
-    thermal_[j].Advance(current_[j], config_.monitor.period);
+    thermal_[j].Advance(current_[j], config_.period);
     status->applied_torque[j] = applied_[j];
     status->saturated[j] = follows ? limits : int8_t{0};
     saturations_ += status->saturated[j] != 0 ? 1 : 0;
@@ -509,7 +520,7 @@ void Supervisor::Cycle(int64_t cycle, const joint_command_t* command, drive_comm
   slew_known_ = follows;
   if (ramp_left_ > 0) --ramp_left_;
   if (state_ == Status::STATE_RUNNING) {
-    start_ramp_ = std::min(start_ramp_ + 1, config_.first_command_ramp);
+    start_ramp_ = std::min(start_ramp_ + 1, first_ramp_cycles_);
     if (resume_left_ > 0) --resume_left_;
   }
   monitor_.EndCycle(current_, drives->enabled);

@@ -2,18 +2,16 @@
 // that leave are finite, within limits, and zero once the bridge has stopped.
 #pragma once
 
-#include <Eigen/Core>
 #include <bitset>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
-#include "components/robot/robot_model.h"
 #include "hw_bridge/command_gate.h"
 #include "hw_bridge/drive/drive_bus.h"
 #include "hw_bridge/feedback_monitor.h"
 #include "hw_bridge/impedance.h"
+#include "hw_bridge/supervisor_config.h"
 #include "hw_bridge/thermal_budget.h"
 #include "hw_bridge/tilt_filter.h"
 #include "poise/bridge_status_t.hpp"
@@ -21,47 +19,6 @@
 #include "poise/drive_feedback_t.hpp"
 
 namespace poise {
-
-struct SupervisorConfig {
-  std::vector<robot::MotorModel> motors;  ///< by joint
-  std::vector<double> torque_limit;       ///< N·m, by joint, > 0; the peak current limits too
-  FeedbackMonitorConfig monitor;          ///< its period is the cycle's
-  /// rad, by joint; empty: not limited.
-  std::vector<double> lower, upper;
-  double soft_range = 0;       ///< rad before a limit in which torque towards it fades out
-  double position_margin = 0;  ///< rad beyond a limit that trips
-  double velocity_trip = std::numeric_limits<double>::infinity();  ///< times velocity_limit
-  double tilt_limit = std::numeric_limits<double>::infinity();     ///< rad
-  double tilt_time = 1;                                            ///< s, see TiltFilter
-  Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< up in the IMU's frame when standing
-  double start_velocity = std::numeric_limits<double>::infinity();  ///< rad/s, greatest at start
-
-  /// Cycles that a drive may take to report itself enabled after it has been told to.
-  int enable_cycles = 0;
-  int first_command_ramp = 0;    ///< cycles in which torque is faded in after the start; 0: at once
-  int damping_after_cycles = 0;  ///< age of the last command beyond which it is not followed
-  int stop_after_cycles = 0;     ///< cycles of damping before the bridge stops
-  std::vector<double> damping;   ///< N·m·s/rad, by joint
-  double stop_ramp = 0;          ///< s
-  /// Cycles of holding between the last command's end and damping; 0: none.
-  int hold_cycles = 0;
-  bool hold_before_command = false;    ///< hold from the start until the first command, without end
-  std::vector<double> hold_stiffness;  ///< N·m/rad, by joint
-  std::vector<double> hold_damping;    ///< N·m·s/rad, by joint
-  int resume_cycles = 0;               ///< cycles in which a command that is back is faded in
-
-  /// The drives close stiffness and damping by themselves; else both become torque here.
-  bool drive_impedance = false;
-  /// Those of holding and damping too.
-  bool drives_hold = false;
-  /// N·m/rad, N·m·s/rad, greatest of a command, by joint; empty: not limited.
-  std::vector<double> stiffness_limit, damping_limit;
-
-  double slew_limit = std::numeric_limits<double>::infinity();  ///< N·m/s, of a followed command
-  double overload_time = 2;                                     ///< s at the peak current
-  double overrun_lateness = std::numeric_limits<double>::infinity();  ///< s
-  int overruns_in_a_row = 25, overruns_in_100 = 50;                   ///< that stop
-};
 
 /// States of bridge_status_t:
 ///   INIT      no command accepted yet: motors free; with hold_before_command only until the
@@ -140,7 +97,9 @@ class Supervisor {
   void HoldStart();
   void UpdateLoss(int64_t age);
   /// The first command is waited for with the joints held.
-  bool AwaitsFirst() const { return config_.hold_before_command && !gate_.any_accepted(); }
+  bool AwaitsFirst() const {
+    return config_.settings.hold_before_command() && !gate_.any_accepted();
+  }
   void Follow(int64_t age);
   double Position(size_t joint) const;
   double DampingTorque(size_t joint, double share) const;
@@ -162,7 +121,8 @@ class Supervisor {
   FeedbackMonitor monitor_;
   TiltFilter tilt_;
   std::vector<ThermalBudget> thermal_;
-  int64_t stop_ramp_cycles_;
+  int stop_ramp_cycles_, first_ramp_cycles_, resume_cycles_;
+  int hold_cycles_;                      // between the last command's end and damping
   std::vector<double> torque_;           // N·m, last accepted command
   std::vector<Impedance> impedance_;     // likewise
   std::vector<double> current_;          // A, that the drives give as of the last reading
@@ -178,7 +138,7 @@ class Supervisor {
   int8_t last_refusal_ = bridge_status_t::REASON_NO_COMMAND;  // since the last accepted command
   int64_t ramp_left_ = 0;                                     // cycles of the stop
   int enabling_cycles_ = 0;                                   // so far
-  int start_ramp_ = 0;   // cycles since RUNNING began, up to first_command_ramp
+  int start_ramp_ = 0;   // cycles since RUNNING began, up to first_ramp_cycles_
   int resume_left_ = 0;  // cycles of fading in
   int fault_grace_ = 0;  // cycles in which a reset may still be under way
   bool reset_requested_ = false, reset_ = false;

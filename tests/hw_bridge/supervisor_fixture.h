@@ -30,13 +30,20 @@ inline SupervisorConfig ThreeJoints() {
     config.motors.push_back(motor);
     config.torque_limit.push_back(limit[j]);
   }
-  config.monitor.period = 0.002;
-  config.enable_cycles = 2;
-  config.damping_after_cycles = 3;
-  config.stop_after_cycles = 13;
-  config.damping.assign(config.motors.size(), 20);
-  config.stop_ramp = 0.1;
-  config.monitor.velocity_cutoff = 60;
+  config.period = 0.002;
+  // A test gives the limits that it is about; what is not given here is as it is shipped.
+  config.settings.set_velocity_trip(kInfinity);
+  config.settings.set_tilt_limit(kInfinity);
+  config.settings.set_start_velocity(kInfinity);
+  config.settings.set_resume_time(0);
+  config.settings.set_enable_cycles(2);
+  config.settings.set_damping_after_cycles(3);
+  config.settings.set_stop_after_cycles(13);
+  config.settings.set_stop_ramp(0.1);
+  config.thresholds.slew_limit = kInfinity;
+  config.thresholds.frozen_torque = kInfinity;
+  config.thresholds.torque_error = kInfinity;
+  config.thresholds.damping.assign(config.motors.size(), 20);
   return config;
 }
 
@@ -72,7 +79,7 @@ class Bench {
 
   /// Feedback of the next cycle: all joints turn on at `velocity`, rad/s.
   drive_feedback_t& Turn(double velocity) {
-    position_ += velocity * config_.monitor.period;
+    position_ += velocity * config_.period;
     for (size_t j = 0; j < kJoints; ++j) {
       feedback_.position_counts[j] = EncoderCounts(config_.motors[j], position_);
     }

@@ -12,10 +12,11 @@ using Status = bridge_status_t;
 
 SupervisorConfig Holding() {
   SupervisorConfig config = ThreeJoints();
-  config.hold_cycles = 100;
-  config.hold_stiffness.assign(config.motors.size(), 600);
-  config.hold_damping.assign(config.motors.size(), 10);
-  config.resume_cycles = 10;
+  config.settings.set_on_lost_command(HwBridgeConfig::HOLD);
+  config.settings.set_hold_time(0.2);  // 100 cycles
+  config.thresholds.hold_stiffness.assign(config.motors.size(), 600);
+  config.thresholds.hold_damping.assign(config.motors.size(), 10);
+  config.settings.set_resume_time(0.02);  // 10 cycles
   return config;
 }
 
@@ -116,8 +117,8 @@ TEST(SupervisorHold, WithoutFeedbackTheSpringKeepsItsLastLength) {
 
 SupervisorConfig HoldingFromTheStart() {
   SupervisorConfig config = Holding();
-  config.hold_before_command = true;
-  config.start_velocity = 0.5;
+  config.settings.set_hold_before_command(true);
+  config.settings.set_start_velocity(0.5);
   return config;
 }
 
@@ -132,7 +133,7 @@ TEST(SupervisorHold, WithoutItMotorsAreFreeUntilTheFirstCommand) {
 
 TEST(SupervisorHold, BeforeTheFirstCommandIsASpringAboutTheStartForAsLongAsItTakes) {
   Bench bench(HoldingFromTheStart());
-  for (int i = 0; i < 1000; ++i) {  // ten times hold_cycles
+  for (int i = 0; i < 1000; ++i) {  // ten times hold_time
     bench.Step(nullptr);
     ASSERT_EQ(bench.status().state, Status::STATE_HOLDING);
     ASSERT_EQ(bench.status().reason, Status::REASON_NO_COMMAND);

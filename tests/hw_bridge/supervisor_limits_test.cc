@@ -17,8 +17,8 @@ TEST(SupervisorStart, WaitsForJointsInTheirRangeAndAtRest) {
   SupervisorConfig config = ThreeJoints();
   config.lower.assign(kJoints, -0.5);
   config.upper.assign(kJoints, 0.5);
-  config.position_margin = 0.05;
-  config.start_velocity = 0.5;
+  config.settings.set_position_margin(0.05);
+  config.settings.set_start_velocity(0.5);
   Bench bench(config);
   bench.Step(nullptr, 0.6 / 0.002);  // to 0.6 rad
   for (int i = 0; i < 20; ++i) {
@@ -37,7 +37,7 @@ TEST(SupervisorStart, WaitsForJointsInTheirRangeAndAtRest) {
 
 TEST(SupervisorStart, FadesTheFirstCommandIn) {
   SupervisorConfig config = ThreeJoints();
-  config.first_command_ramp = 9;
+  config.settings.set_first_command_ramp(9 * config.period);
   Bench bench(config);
   for (int i = 1; i <= 12; ++i) {
     bench.Step(50.0);
@@ -47,7 +47,7 @@ TEST(SupervisorStart, FadesTheFirstCommandIn) {
 
 TEST(SupervisorLimits, SlewIsLimited) {
   SupervisorConfig config = ThreeJoints();
-  config.slew_limit = 5000;  // 10 N·m in a cycle
+  config.thresholds.slew_limit = 5000;  // 10 N·m in a cycle
   Bench bench(config);
   bench.Run(5, 20, 0);
   bench.Step(50.0);
@@ -65,7 +65,7 @@ TEST(SupervisorLimits, HeatHoldsTheCurrentToTheRating) {
   SupervisorConfig config = ThreeJoints();
   for (robot::MotorModel& motor : config.motors) motor.rated_current = motor.peak_current / 2;
   config.torque_limit.assign(kJoints, 1e6);
-  config.overload_time = 2;
+  config.settings.set_overload_time(2);
   Bench bench(config);
   int at_peak = 0;
   double squares = 0;
@@ -90,8 +90,8 @@ SupervisorConfig Ranged() {
   SupervisorConfig config = ThreeJoints();
   config.lower.assign(kJoints, -0.5);
   config.upper.assign(kJoints, 0.5);
-  config.soft_range = 0.1;
-  config.position_margin = 0.05;
+  config.settings.set_soft_range(0.1);
+  config.settings.set_position_margin(0.05);
   return config;
 }
 
@@ -117,8 +117,8 @@ TEST(SupervisorTrips, BeyondTheRange) {
 
 TEST(SupervisorTrips, TooFast) {
   SupervisorConfig config = ThreeJoints();
-  config.monitor.velocity_limit = {9, 2, 9};
-  config.velocity_trip = 1.5;
+  config.velocity_limit = {9, 2, 9};
+  config.settings.set_velocity_trip(1.5);
   Bench bench(config);
   bench.Run(50, 0, 2.9);
   EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);
@@ -130,7 +130,7 @@ TEST(SupervisorTrips, TooFast) {
 /// The readings of a body that tips about y at `rate` for `cycles`, then stays.
 int CyclesToTilt(double rate, double limit, double* tilt) {
   SupervisorConfig config = ThreeJoints();
-  config.tilt_limit = limit;
+  config.settings.set_tilt_limit(limit);
   Bench bench(config);
   *tilt = 0;
   for (int cycle = 0; cycle < 3000; ++cycle) {
@@ -156,7 +156,7 @@ TEST(SupervisorTrips, TiltedBody) {
 // The accelerometer corrects the gyro's drift: 0.02 rad/s of bias stay 0.02 rad with 1 s.
 TEST(SupervisorTrips, GyroBiasIsNoTilt) {
   SupervisorConfig config = ThreeJoints();
-  config.tilt_limit = 0.03;
+  config.settings.set_tilt_limit(0.03);
   Bench bench(config);
   bench.feedback().imu_acceleration[2] = kGravity;
   bench.feedback().imu_angular_velocity[0] = 0.02;
@@ -166,8 +166,8 @@ TEST(SupervisorTrips, GyroBiasIsNoTilt) {
 
 TEST(SupervisorTrips, AnEncoderThatStandsStillWhileTorqueChangesIsFrozen) {
   SupervisorConfig config = ThreeJoints();
-  config.monitor.frozen_cycles = 50;
-  config.monitor.frozen_torque = 20;
+  config.settings.set_frozen_time(50 * config.period);
+  config.thresholds.frozen_torque = 20;
   Bench bench(config);
   bench.Run(200, 10, 0);
   EXPECT_EQ(bench.status().state, Status::STATE_RUNNING);  // a joint that stands still
@@ -188,8 +188,8 @@ TEST(SupervisorTrips, AnEncoderThatStandsStillWhileTorqueChangesIsFrozen) {
 // than frozen_time without a count; two cycles later they move.
 TEST(SupervisorTrips, AJointThatAStepInItsTorqueMovesIsNotFrozen) {
   SupervisorConfig config = ThreeJoints();
-  config.monitor.frozen_cycles = 50;
-  config.monitor.frozen_torque = 20;
+  config.settings.set_frozen_time(50 * config.period);
+  config.thresholds.frozen_torque = 20;
   Bench bench(config);
   bench.Run(200, 10, 0);
   bench.Run(2, 35, 0);
@@ -201,9 +201,9 @@ TEST(SupervisorTrips, AJointThatAStepInItsTorqueMovesIsNotFrozen) {
 TEST(SupervisorTrips, AnOldReadingOfATorqueThatChangesIsPlausible) {
   for (const int cycles : {1, 3}) {
     SupervisorConfig config = ThreeJoints();
-    config.monitor.torque_error = 15;
-    config.monitor.torque_error_cycles = 10;
-    config.monitor.current_cycles = cycles;
+    config.thresholds.torque_error = 15;
+    config.settings.set_torque_error_cycles(10);
+    config.current_cycles = cycles;
     Bench bench(config);
     double old = 0, last = 0;
     for (int i = 0; i < 40; ++i) {
@@ -220,8 +220,8 @@ TEST(SupervisorTrips, AnOldReadingOfATorqueThatChangesIsPlausible) {
 
 TEST(SupervisorTrips, ATorqueThatIsNotTheCommandedOneForTenCycles) {
   SupervisorConfig config = ThreeJoints();
-  config.monitor.torque_error = 15;
-  config.monitor.torque_error_cycles = 10;
+  config.thresholds.torque_error = 15;
+  config.settings.set_torque_error_cycles(10);
   Bench bench(config);
   const auto follow = [&](double torque) {
     for (size_t j = 0; j < kJoints; ++j) {
@@ -263,9 +263,9 @@ TEST(SupervisorTrips, ABusThatIsNoLongerUsable) {
 
 TEST(SupervisorTrips, OverrunsInARowOrOfAHundred) {
   SupervisorConfig config = ThreeJoints();
-  config.overrun_lateness = 0.001;
-  config.overruns_in_a_row = 5;
-  config.overruns_in_100 = 20;
+  config.settings.set_overrun_lateness(0.5);  // of 2 ms
+  config.settings.set_overruns_in_a_row(5);
+  config.settings.set_overruns_in_100(20);
   for (const int every : {1, 4, 6}) {
     Bench bench(config);
     int cycles = 0;

@@ -334,12 +334,12 @@ TEST(Supervisor, FeedbackThatIsNotFiniteStops) {
 
 TEST(Supervisor, AnEncoderThatJumpsStops) {
   SupervisorConfig config = ThreeJoints();
-  config.monitor.velocity_limit = {9, 9, 9};
-  const double most = 5 * 9 * config.monitor.period;  // rad in a cycle
+  config.velocity_limit = {9, 9, 9};
+  const double most = 5 * 9 * config.period;  // rad in a cycle
   for (const double share : {-1.01, -0.99, 0.99, 1.01}) {
     Bench bench(config);
     bench.Run(10, 10, 0);
-    bench.Step(10.0, share * most / config.monitor.period);
+    bench.Step(10.0, share * most / config.period);
     const bool stops = std::abs(share) > 1;
     EXPECT_EQ(bench.status().state, stops ? Status::STATE_STOPPING : Status::STATE_RUNNING);
     EXPECT_EQ(bench.status().reason, stops ? Status::REASON_ENCODER_JUMP : Status::REASON_NONE);
