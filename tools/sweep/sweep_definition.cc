@@ -17,6 +17,7 @@
 #include "components/framework/modules.h"
 #include "fmt/format.h"
 #include "logging/metrics/metrics.h"
+#include "tools/cli/output_place.h"
 #include "tools/cli/text_table.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/library_versions.h"
@@ -322,11 +323,13 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
 
   std::optional<double> first_limit;
   if (limit) first_limit = sweep.limit().min();
-  CheckFields(source, LoadScenario(scenario_, changes_).scenario, first_limit);
+  Scenario base = LoadScenario(scenario_, changes_).scenario;
+  CheckFields(source, base, first_limit);
   const RunChanges first = ChangesOf(0, first_limit);
   const LoadedScenario loaded = LoadScenario(scenario_, first);
   RunSpec spec = MakeRunSpec(loaded, first, nullptr);
   CheckRun(loaded, &spec);
+  log_size_ = ExpectedLogSize(spec);
 
   SetColumns(source, loaded.scenario);
   CheckRequired(source, loaded.scenario);
@@ -336,7 +339,6 @@ SweepDefinition::SweepDefinition(const SweepArguments& arguments, bool limit)
   definition.clear_scenario();  // its text stands below
   std::string all;
   google::protobuf::TextFormat::PrintToString(definition, &all);
-  Scenario base = LoadScenario(scenario_, changes_).scenario;
   base.clear_applied();
   all += ScenarioText(base);
   google::protobuf::TextFormat::Printer printer;

@@ -47,6 +47,8 @@ class SweepDefinition {
   /// A digest of all that a run's figures depend on but the program: the same for the same sweep of
   /// the same scenario, robot and graph, wherever their files are.
   const std::string& digest() const { return digest_; }
+  /// Bytes that the first run's log takes (ExpectedLogSize).
+  int64_t log_size() const { return log_size_; }
 
  private:
   struct Source;
@@ -62,6 +64,7 @@ class SweepDefinition {
   RunChanges changes_;
   std::vector<std::string> columns_;
   std::string digest_;
+  int64_t log_size_ = 0;
 };
 
 /// A digest of this program's file, Poise's library, the modules with the libraries they bring, the
