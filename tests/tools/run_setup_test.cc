@@ -1,4 +1,4 @@
-// What a replay's --set makes of a run's configuration, beside a run that began with it.
+// What a run's components are configured with: by its scenario, by its ports, by a replay's --set.
 #include "tools/scenario/run_setup.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "fmt/format.h"
 #include "tools/scenario/scenario_loading.h"
 
 namespace poise {
@@ -28,6 +29,31 @@ TEST(MakeRunSpec, WarnsOfAPushAfterTheRunsEnd) {
     const bool said = std::ranges::any_of(
         warnings, [](const std::string& text) { return text.starts_with("sim.push[0].start: "); });
     EXPECT_EQ(said, warned) << start;
+  }
+}
+
+// Else emulated drives of two runs would answer each other's bridge, or a robot's.
+TEST(ChoosePorts, GivesBothEndsOfEmulatedDrivesWhatIsThisRunsAlone) {
+  for (const std::string drives : {"ethercat", "unitree"}) {
+    RunChanges changes;
+    changes.drives = drives;
+    const LoadedScenario loaded = LoadScenario("stand", changes);
+    RunSpec spec = MakeRunSpec(loaded, changes, nullptr);
+    const RunSpec before = spec;
+    const RunSource source = ChoosePorts(loaded.scenario, &spec);
+    const std::string own =
+        drives == "ethercat"
+            ? fmt::format("port: {}\n", spec.first_port() + 3 + spec.graph().channel_size())
+            : fmt::format("tag: \"poise-{}-{}\"\n", spec.run_id(), spec.first_port());
+    ASSERT_EQ(spec.config_size(), before.config_size());
+    int ends = 0;
+    for (int i = 0; i < spec.config_size(); ++i) {
+      const std::string& text = spec.config(i).text();
+      const bool end = text.find(own) != std::string::npos;
+      ends += end ? 1 : 0;
+      EXPECT_EQ(text == before.config(i).text(), !end) << spec.config(i).component();
+    }
+    EXPECT_EQ(ends, 2) << drives;
   }
 }
 
