@@ -10,7 +10,7 @@
 #include "tests/test_seed.h"
 #include "tools/live/control_desk.h"
 #include "tools/live/view_access.h"
-#include "tools/run/loopback.h"
+#include "tools/run/local_server.h"
 
 namespace poise {
 namespace {

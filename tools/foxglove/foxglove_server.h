@@ -11,7 +11,7 @@
 namespace poise {
 
 /// On 127.0.0.1, for programs of this machine and for pages of the origins below; clients listen
-/// and publish nothing. Each connection is bounded as FoxgloveClient says. Runs on the caller's
+/// and publish nothing. All that is received and all that waits is bounded. Runs on the caller's
 /// thread, no error of a client throws.
 class FoxgloveServer {
  public:
