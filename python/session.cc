@@ -14,7 +14,6 @@
 #include "fmt/format.h"
 #include "logging/events/bridge_words.h"
 #include "poise/bridge_status_t.hpp"
-#include "sim/push.h"
 #include "tools/cli/output_place.h"
 #include "tools/scenario/described_components.h"
 #include "tools/scenario/registry.h"
@@ -172,10 +171,6 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     if (auto* const foreign = dynamic_cast<ForeignComponent*>(component)) {
       foreign_.push_back(foreign);
     }
-    if (auto* const sim = dynamic_cast<SimComponent*>(component)) {
-      sim_ = sim;
-      sim_index_ = i;
-    }
   }
   std::string robot, urdf;
   for (const Resource& resource : spec_.resource()) {
@@ -233,6 +228,10 @@ Session::Session(SessionOptions options) : keep_(options.keep) {
     if (store_) store_->Add(channel, tick.index, output);
     if (record_) record_->Add(channel, output, tick);
   });
+  runner_->set_external_tap([this](int channel, std::span<const uint8_t> data) {
+    if (recorder_) recorder_->AddExternal(channel, data);
+    if (port_) port_->Hear(channel, data);
+  });
 }
 
 Session::~Session() = default;
@@ -256,37 +255,23 @@ int64_t Session::Step(int64_t ticks) {
 void Session::Push(const std::string& body, const Eigen::Vector3d& force,
                    const Eigen::Vector3d& point, int64_t ticks) {
   const Lock lock(this);
-  if (sim_ == nullptr) throw ConfigError("nothing is simulated here that could be pushed");
-  if (!force.allFinite() || !point.allFinite()) {
-    throw ConfigError("push: force and point must be finite numbers");
+  if (!port_) {
+    port_ = std::make_unique<InlinePort>(spec_);
+    port_->SetRunner(runner_.get());
   }
-  const int index = body.empty() ? 0 : FindBody(*model_, body, "body");
-  operate::act_t act{};
-  act.run_id = spec_.run_id();
-  act.tick = runner_->ticks_completed() + (runner_->begun() ? 1 : 0);
+  OperatorAct act;
+  act.kind = OperatorAct::Kind::kPush;
   act.id = next_act_++;
-  act.component = sim_index_;
-  act.kind = operate::act_t::KIND_PUSH;
-  act.body = index;
-  for (int i = 0; i < 3; ++i) {
-    act.force[i] = force[i];
-    act.point[i] = point[i];
-  }
-  act.duration = ticks < 0 ? -1 : ticks;
-  std::vector<uint8_t> bytes(static_cast<size_t>(act.getEncodedSize()));
-  act.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  std::string channel;
-  for (const Connection& input : spec_.graph().component(sim_index_).input()) {
-    for (const Channel& each : spec_.graph().channel()) {
-      if (each.name() == input.channel() && each.type() == kActType) channel = each.name();
+  act.name = body;
+  act.force = force;
+  act.point = point;
+  act.duration = static_cast<double>(ticks) * spec_.tick_period();
+  port_->Do(act);
+  for (const OperatorAct& answer : port_->TakeAnswers()) {
+    if (answer.id == act.id && answer.state == OperatorAct::State::kRefused) {
+      throw ConfigError("push: " + answer.reason);
     }
   }
-  if (channel.empty()) {
-    throw ConfigError(fmt::format(
-        "graph {}: {} has no input of type {}; connect its port operator to an external channel",
-        spec_.graph().name(), spec_.graph().component(sim_index_).name(), kActType));
-  }
-  if (!runner_->Inject(channel, bytes)) throw ConfigError("push: the simulator refused it");
 }
 
 void Session::OverrideTorque(int joint, std::optional<double> torque) {

@@ -19,7 +19,7 @@
 #include "poise/bridge_status_t.hpp"
 #include "poise/joint_command_t.hpp"
 #include "python/run_store.h"
-#include "sim/sim_component.h"
+#include "tools/operator/inline_port.h"
 #include "tools/run/run_dir.h"
 #include "tools/scenario/scenario_loading.h"
 
@@ -54,7 +54,7 @@ class Session {
 
   /// N, world axes, at `point` (m, body frame) of a body from the next tick on, for `ticks` ticks,
   /// or until set again (-1). Throws ConfigError: no such body, numbers that are not finite, no
-  /// simulated robot.
+  /// simulated robot, the run has ended.
   void Push(const std::string& body, const Eigen::Vector3d& force, const Eigen::Vector3d& point,
             int64_t ticks);
   /// The joint's commanded torque (N·m) in place of the redistributor's; empty: no longer. Throws
@@ -109,10 +109,9 @@ class Session {
   ComponentRegistry registry_;
   std::unique_ptr<InlineRunner> runner_;
   std::vector<ForeignComponent*> foreign_;
-  SimComponent* sim_ = nullptr;
   std::shared_ptr<const robot::RobotModel> model_;
   std::vector<std::unique_ptr<MessageLayout>> layouts_;  // by channel; nullptr: none
-  int sim_index_ = -1;                                   // in the graph
+  std::unique_ptr<InlinePort> port_;                     // made with the first push
   int64_t next_act_ = 1;
   std::vector<double> override_;  // by joint; NaN: none
   bool overrides_ = false;

@@ -109,7 +109,7 @@ TEST_F(OperatorTest, APushAndASettingAreRepeatedToTheBit) {
            {{"set", "task_controller.com.kp"}, "is no FIELD=VALUE"},
            {{"push", "--force", "1,2"}, "--force: needs 3 numbers"},
            {{"push", "--force", "nan,0,0"}, "must be finite"},
-           {{"push", "--force", "1,0,0", "--body", "tail"}, "no moving body 'tail'"},
+           {{"push", "--force", "1,0,0", "--body", "tail"}, "no moving link 'tail'"},
            {{"push", "--force", "0,99999,0"}, "10 times the robot's weight"},
            {{"step", "--foot", "third"}, "no foot 'third'"},
            {{"walk", "--velocity", "9,0"}, "between -1 and 1"},

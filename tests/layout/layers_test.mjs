@@ -43,7 +43,7 @@ const BELOW = {
   'logging/events': [...BUS, 'logging', 'logging/metrics'],
   'logging/export': [...BUS, 'logging'],
   'logging/replay': [...BUS, 'logging'],
-  'python': [...BUS, 'python', 'sim', 'logging', 'logging/events', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/run'],
+  'python': [...BUS, 'python', 'logging', 'logging/events', 'logging/metrics', 'logging/recording', 'tools/cli', 'tools/scenario', 'tools/report', 'tools/operator', 'tools/run'],
   'python/bindings': [...BUS, 'python', 'python/bindings', 'sim', 'logging', 'logging/metrics', 'tools/scenario', 'tools/report', 'tools/run'],
 };
 /** The libraries of `poise`, each of which uses only those before it. */

@@ -12,7 +12,7 @@
 #include "components/framework/operator_acts.h"
 #include "components/framework/run.h"
 #include "fmt/format.h"
-#include "tools/operator/operator_line.h"
+#include "tools/operator/act_port.h"
 #include "tools/scenario/catalog.h"
 #include "tools/scenario/registry.h"
 #include "tools/scenario/run_setup.h"

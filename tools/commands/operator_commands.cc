@@ -7,12 +7,13 @@
 
 #include "components/framework/bus/udp_bus.h"
 #include "components/framework/configuration/configuration.h"
+#include "components/framework/run.h"
 #include "fmt/format.h"
 #include "tools/cli/cli_checks.h"
 #include "tools/cli/terminal.h"
 #include "tools/cli/text_table.h"
 #include "tools/commands/commands.h"
-#include "tools/operator/operator_line.h"
+#include "tools/operator/bus_port.h"
 #include "tools/run/live_run.h"
 #include "tools/run/run_dir.h"
 #include "tools/run/run_registry.h"
@@ -20,7 +21,10 @@
 namespace poise {
 namespace {
 
+using ActKind = OperatorAct::Kind;
+
 constexpr char kWhichRun[] = "folder or name of the run; default: the only one that goes on";
+constexpr double kMostWeights = 10;  // a push beyond is a slip of the hand: no robot withstands one
 
 double NumberOf(std::string_view text, const std::string& flag) {
   double value = 0;
@@ -53,10 +57,17 @@ Eigen::Vector3d VectorOf(const std::string& text, const std::string& flag) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
+OperatorAct ActOf(ActKind kind, const std::string& name = {}) {
+  OperatorAct act;
+  act.kind = kind;
+  act.name = name;
+  return act;
+}
+
 /// The run that is acted on.
 struct ActedRun {
   std::filesystem::path dir;
-  OperatorLine line;
+  std::unique_ptr<BusPort> port;
 };
 
 /// `command`: "poise push". Says which run it is where `run` did not, before anything is done to
@@ -72,7 +83,10 @@ ActedRun FindActedRun(const std::string& run, const std::string& command) {
     dir = RunNamed(run, naming);
   }
   try {
-    return {dir, OperatorLine(ReadRunSpec(dir.string()))};
+    auto port = std::make_unique<BusPort>(ReadRunSpec(dir.string()));
+    port->fields();  // throws where the run takes no acts
+    port->Join();
+    return {dir, std::move(port)};
   } catch (const BusError&) {
     if (RunInProgress(dir)) throw;
     throw std::runtime_error(fmt::format("{}: this run has ended", dir.string()));
@@ -80,15 +94,20 @@ ActedRun FindActedRun(const std::string& run, const std::string& command) {
 }
 
 /// Says what became of `what`; the exit code.
-int SayOutcome(ActedRun& run, int64_t id, const std::string& what) {
-  const ActOutcome outcome = run.line.Wait(id);
-  if (outcome.done) {
-    fmt::print("{}: from tick {} on ({:.3f} s)\n", what, outcome.tick, outcome.time);
+int SayOutcome(const ActedRun& run, const OperatorAct& act, const std::string& what) {
+  const RunSpec& spec = run.port->spec();
+  if (act.state == OperatorAct::State::kAccepted) {
+    fmt::print("{}: from tick {} on ({:.3f} s)\n", what, act.tick,
+               MakeTick(act.tick, spec.tick_period(), spec.lead_ticks()).time);
     return kExitOk;
   }
-  const bool ended = outcome.verdict == 0 && !RunInProgress(run.dir);
-  fmt::print(stderr, "poise: {}: {}\n", what, ended ? "this run has ended" : outcome.text);
+  const bool ended = act.tick < 0 && !RunInProgress(run.dir);
+  fmt::print(stderr, "poise: {}: {}\n", what, ended ? "this run has ended" : act.reason);
   return kExitFailed;
+}
+
+int DoAct(const ActedRun& run, const OperatorAct& act, const std::string& what) {
+  return SayOutcome(run, run.port->Wait({act}).front(), what);
 }
 
 struct LiveSetOptions {
@@ -97,14 +116,13 @@ struct LiveSetOptions {
   bool list = false;
 };
 
-int ListLiveFields(ActedRun& run) {
-  OperatorLine& line = run.line;
+int ListLiveFields(const ActedRun& run) {
   std::vector<TableRow> rows{{"field", "now", "unit", "from", "to", "meaning"}};
   int exit_code = kExitOk;
-  for (const LiveField& field : line.fields()) {
-    const ActOutcome now = line.Wait(line.Ask(field.path));
-    if (!now.done) {
-      fmt::print(stderr, "poise: {}: {}\n", field.path, now.text);
+  for (const LiveField& field : run.port->fields()) {
+    const OperatorAct now = run.port->Wait({ActOf(ActKind::kAsk, field.path)}).front();
+    if (now.state != OperatorAct::State::kAccepted) {
+      fmt::print(stderr, "poise: {}: {}\n", field.path, now.reason);
       exit_code = kExitFailed;
       break;  // the others would be waited for as long
     }
@@ -119,24 +137,20 @@ int SetLiveFields(const LiveSetOptions& options) {
   if (options.list == !options.assignments.empty()) {
     throw ConfigError("set: needs FIELD=VALUE, or --list");
   }
-  std::vector<std::pair<std::string, double>> values;
+  std::vector<OperatorAct> acts;
   for (const std::string& assignment : options.assignments) {
     const size_t equals = assignment.find('=');
     if (equals == std::string::npos) {
       throw ConfigError(fmt::format("set: '{}' is no FIELD=VALUE", assignment));
     }
-    values.emplace_back(
-        assignment.substr(0, equals),
-        NumberOf(std::string_view(assignment).substr(equals + 1), assignment.substr(0, equals)));
+    acts.push_back(ActOf(ActKind::kSet, assignment.substr(0, equals)));
+    acts.back().value = NumberOf(std::string_view(assignment).substr(equals + 1), acts.back().name);
   }
-  ActedRun run = FindActedRun(options.run, "poise set");
+  const ActedRun run = FindActedRun(options.run, "poise set");
   if (options.list) return ListLiveFields(run);
-  std::vector<int64_t> ids;
-  for (const auto& [field, value] : values) ids.push_back(run.line.Set(field, value));
   int exit_code = kExitOk;
-  for (size_t i = 0; i < ids.size(); ++i) {
-    const int code =
-        SayOutcome(run, ids[i], fmt::format("{}={}", values[i].first, values[i].second));
+  for (const OperatorAct& act : run.port->Wait(std::move(acts))) {
+    const int code = SayOutcome(run, act, fmt::format("{}={}", act.name, act.value));
     if (code != kExitOk) exit_code = code;
   }
   return exit_code;
@@ -148,12 +162,20 @@ struct RobotPushOptions {
 };
 
 int PushRobot(const RobotPushOptions& options) {
-  const Eigen::Vector3d force = VectorOf(options.force, "--force");
-  const Eigen::Vector3d point = VectorOf(options.point, "--point");
-  ActedRun run = FindActedRun(options.run, "poise push");
-  const int64_t id = run.line.Push(options.body, force, point, options.duration);
-  return SayOutcome(run, id,
-                    fmt::format("push of {:.4g} N for {:.4g} s", force.norm(), options.duration));
+  OperatorAct push = ActOf(ActKind::kPush, options.body);
+  push.force = VectorOf(options.force, "--force");
+  push.point = VectorOf(options.point, "--point");
+  push.duration = options.duration;
+  const ActedRun run = FindActedRun(options.run, "poise push");
+  const double most = kMostWeights * run.port->weight();
+  if (push.force.norm() > most) {
+    throw ConfigError(
+        fmt::format("push: {:.6g} N is more than {:.0f} N, {:.0f} times the robot's "
+                    "weight",
+                    push.force.norm(), most, kMostWeights));
+  }
+  return DoAct(run, push,
+               fmt::format("push of {:.4g} N for {:.4g} s", push.force.norm(), push.duration));
 }
 
 struct RobotWalkOptions {
@@ -168,9 +190,11 @@ int WalkRobot(const RobotWalkOptions& options, bool turns) {
   }
   std::vector<double> velocity{0, 0};
   if (!options.velocity.empty()) velocity = NumbersOf(options.velocity, 2, "--velocity");
-  ActedRun run = FindActedRun(options.run, "poise walk");
-  if (options.stop) return SayOutcome(run, run.line.Stand(), "stop walking");
-  return SayOutcome(run, run.line.Walk(velocity[0], velocity[1], options.turn), "walk");
+  const ActedRun run = FindActedRun(options.run, "poise walk");
+  if (options.stop) return DoAct(run, ActOf(ActKind::kStopWalking), "stop walking");
+  OperatorAct walk = ActOf(ActKind::kWalk);
+  walk.velocity = {velocity[0], velocity[1], options.turn};
+  return DoAct(run, walk, "walk");
 }
 
 }  // namespace
@@ -217,15 +241,15 @@ void AddOperatorCommands(CLI::App* app, Command* command) {
   both->excludes("--foot");
   step->callback([run, foot, next, together, command] {
     *command = [run, foot, next, together] {
-      ActedRun acted = FindActedRun(*run, "poise step");
+      const ActedRun acted = FindActedRun(*run, "poise step");
       if (*together) {
-        const int code = SayOutcome(acted, acted.line.Stand(), "feet together");
+        const int code = DoAct(acted, ActOf(ActKind::kStopWalking), "feet together");
         // The planner's answer does not tell whether there is anything to do.
         if (code == kExitOk) fmt::print("feet that stand side by side already stay\n");
         return code;
       }
-      return *next ? SayOutcome(acted, acted.line.NextPhase(), "next phase")
-                   : SayOutcome(acted, acted.line.Step(*foot), "step");
+      return *next ? DoAct(acted, ActOf(ActKind::kNextPhase), "next phase")
+                   : DoAct(acted, ActOf(ActKind::kStep, *foot), "step");
     };
   });
 

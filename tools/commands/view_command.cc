@@ -12,7 +12,6 @@
 #include "tools/cli/signals.h"
 #include "tools/commands/commands.h"
 #include "tools/foxglove/live_foxglove.h"
-#include "tools/live/bus_operator.h"
 #include "tools/live/control_desk.h"
 #include "tools/live/live_page.h"
 #include "tools/live/live_start.h"
@@ -20,6 +19,7 @@
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_access.h"
 #include "tools/live/view_server.h"
+#include "tools/operator/bus_port.h"
 #include "tools/report/html_report.h"
 #include "tools/run/live_run.h"
 
@@ -53,12 +53,13 @@ class Viewer {
       : live_(live),
         keep_(options.keep),
         run_id_(std::to_string(live->spec().run_id())),
-        operator_(options.control ? std::make_unique<BusOperator>(live->spec()) : nullptr),
-        desk_(operator_ ? std::make_unique<ControlDesk>(operator_.get()) : nullptr),
+        port_(options.control ? std::make_unique<BusPort>(live->spec()) : nullptr),
+        desk_(port_ ? std::make_unique<ControlDesk>(port_.get()) : nullptr),
         ring_(live->spec(), TicksOf(options.keep, live->spec().tick_period())),
         server_(options.port, LiveHtml(record, scenario, ChannelsJson(ring_), ring_.capacity()),
                 &ring_, Control()),
         status_((live->dir() / "run.lcm").string(), scenario) {
+    if (port_) port_->FollowSettings();
     if (options.foxglove == 0) return;
     foxglove_ = std::make_unique<LiveFoxglove>(options.foxglove, options.foxglove_origins, record,
                                                scenario);
@@ -104,10 +105,9 @@ class Viewer {
     live_->Spin(0, [&](const LiveMessage& message) {
       ring_.Add(message);
       if (foxglove_) foxglove_->Add(message);
-      if (operator_) operator_->Hear(message);
       last_message_ = now;
     });
-    if (operator_) operator_->Update();
+    if (port_) port_->Update(0);
     if (now > last_message_ + kViewSilence) {
       last_message_ = now;
       if (!live_->InProgress()) {
@@ -152,7 +152,7 @@ class Viewer {
   double keep_;    // s
   std::string run_id_;
   int64_t dropped_ = 0;
-  std::unique_ptr<BusOperator> operator_;  // nullptr: pages only look
+  std::unique_ptr<BusPort> port_;  // nullptr: pages only look
   std::unique_ptr<ControlDesk> desk_;
   TickRing ring_;
   ViewServer server_;

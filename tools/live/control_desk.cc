@@ -1,23 +1,44 @@
 #include "tools/live/control_desk.h"
 
 #include <algorithm>
+#include <cmath>
+
+#include "components/framework/configuration/configuration.h"
+#include "fmt/format.h"
 
 namespace poise {
 namespace {
 
 using Json = nlohmann::ordered_json;
+using ActKind = OperatorAct::Kind;
+using ActState = OperatorAct::State;
 
 constexpr size_t kShown = 24;  // acts that pages are told of
-
-Json VectorJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+// Of the robot's weight, what a page may push with: more than any robot here stands, and no slip of
+// a hand tears one apart.
+constexpr double kPushShare = 0.5;
+constexpr double kLongestPush = 2;    // s: a page that wants more asks again
+constexpr double kFastestWalk = 0.5;  // m/s and rad/s: what a page offers
 
 }  // namespace
 
-ControlDesk::Entry* ControlDesk::Find(int64_t client, int64_t id) {
-  const auto found = std::find_if(acts_.rbegin(), acts_.rend(), [&](const Entry& entry) {
-    return entry.act.client == client && entry.act.id == id;
-  });
-  return found == acts_.rend() ? nullptr : &*found;
+ControlDesk::ControlDesk(ActPort* port)
+    : port_(port), push_limit_(std::round(kPushShare * port->weight())) {
+  port_->fields();
+}
+
+std::string ControlDesk::BeyondPage(const OperatorAct& act) const {
+  if (act.kind != ActKind::kPush) return {};
+  // A rounding beyond the limit is no attack.
+  if (act.force.norm() > push_limit_ * (1 + 1e-9)) {
+    return fmt::format("{:.0f} N are more than a page may push with, {:.0f} N", act.force.norm(),
+                       push_limit_);
+  }
+  if (act.duration > kLongestPush) {
+    return fmt::format("{:.3g} s are longer than a page may push, {:.3g} s", act.duration,
+                       kLongestPush);
+  }
+  return {};
 }
 
 bool ControlDesk::Receive(std::string_view text) {
@@ -29,64 +50,69 @@ bool ControlDesk::Receive(std::string_view text) {
   }
   ++received_;
   // A hand on the robot sends thirty pushes a second: the last one stands for them.
-  if (act.kind == OperatorAct::Kind::kPush && !acts_.empty()) {
-    const Entry& last = acts_.back();
-    if (last.act.kind == act.kind && last.act.client == act.client && last.act.name == act.name &&
-        last.state == Entry::State::kAccepted) {
+  if (act.kind == ActKind::kPush && !acts_.empty()) {
+    const OperatorAct& last = acts_.back();
+    if (last.kind == act.kind && last.client == act.client && last.name == act.name &&
+        last.state == ActState::kAccepted) {
       acts_.pop_back();
     }
   }
-  acts_.push_back({act, Entry::State::kSent, -1, {}});
+  acts_.push_back(act);
   while (acts_.size() > kShown) acts_.pop_front();
-  sink_->Do(act);
+  act.reason = BeyondPage(act);
+  try {
+    if (act.reason.empty()) port_->Do(act);
+  } catch (const ConfigError& error) {
+    act.reason = error.what();
+  }
+  if (!act.reason.empty()) {
+    act.state = ActState::kRefused;
+    acts_.back() = std::move(act);
+  }
   return true;
 }
 
-Json ControlDesk::EntryJson(const Entry& entry) {
-  constexpr const char* kStates[] = {"sent", "accepted", "refused"};
-  const OperatorAct& act = entry.act;
-  Json json = {{"client", act.client},
-               {"id", act.id},
-               {"do", ActName(act.kind)},
-               {"state", kStates[static_cast<int>(entry.state)]}};
-  if (entry.tick >= 0) json["tick"] = entry.tick;
-  if (!entry.reason.empty()) json["reason"] = entry.reason;
-  if (!act.name.empty()) json["name"] = act.name;
-  switch (act.kind) {
-    case OperatorAct::Kind::kPush:
-      json["force"] = VectorJson(act.force);
-      json["point"] = VectorJson(act.point);
-      json["duration"] = act.duration;
-      break;
-    case OperatorAct::Kind::kWalk:
-      json["velocity"] = VectorJson(act.velocity);
-      break;
-    case OperatorAct::Kind::kSet:
-    case OperatorAct::Kind::kSpeed:
-      json["value"] = act.value;
-      break;
-    case OperatorAct::Kind::kTick:
-    case OperatorAct::Kind::kBack:
-      json["ticks"] = act.ticks;
-      break;
-    default:
-      break;
+Json ControlDesk::Standing() const {
+  const std::map<std::string, double> in_force = port_->InForce();
+  Json settings = Json::array();
+  for (const LiveField& field : port_->fields()) {
+    const auto value = in_force.find(field.path);
+    if (value == in_force.end()) continue;  // its component has told nothing yet
+    settings.push_back({{"field", field.path},
+                        {"unit", field.unit},
+                        {"text", field.meaning},
+                        {"low", field.least},
+                        {"high", field.most},
+                        {"ramp", field.ramp},
+                        {"value", value->second}});
+  }
+  const Json fast = {kFastestWalk, kFastestWalk, kFastestWalk};
+  const Json slow = {-kFastestWalk, -kFastestWalk, -kFastestWalk};
+  Json can = Json::array();
+  for (const ActKind kind : PageActs()) {
+    if (port_->WhyNot(kind).empty()) can.push_back(ActName(kind));
+  }
+  Json json = {{"settings", std::move(settings)}, {"push_limit", push_limit_},
+               {"push_longest", kLongestPush},    {"walk", {{"low", slow}, {"high", fast}}},
+               {"can", std::move(can)},           {"stopped", port_->stopped()}};
+  if (const OperatorAct* const push = port_->push()) {
+    json["push"] = {{"body", push->name},
+                    {"force", {push->force.x(), push->force.y(), push->force.z()}}};
   }
   return json;
 }
 
 std::optional<std::string> ControlDesk::Take(std::string_view run_id, const Json& run) {
-  for (OperatorSink::Answer& answer : sink_->TakeAnswers()) {
-    Entry* const entry = Find(answer.client, answer.id);
-    if (entry == nullptr) continue;  // many have come since
-    entry->state = answer.accepted ? Entry::State::kAccepted : Entry::State::kRefused;
-    entry->tick = answer.tick;
-    entry->reason = std::move(answer.reason);
+  for (OperatorAct& answer : port_->TakeAnswers()) {
+    const auto act = std::find_if(acts_.rbegin(), acts_.rend(), [&](const OperatorAct& each) {
+      return each.client == answer.client && each.id == answer.id;
+    });
+    if (act != acts_.rend()) *act = std::move(answer);  // else many have come since
   }
-  Json control = sink_->Standing();
+  Json control = Standing();
   if (!run.is_null()) control["run"] = run;
   Json acts = Json::array();
-  for (const Entry& entry : acts_) acts.push_back(EntryJson(entry));
+  for (const OperatorAct& act : acts_) acts.push_back(ActJson(act));
   control["acts"] = std::move(acts);
   std::string text = Json({{"run_id", run_id}, {"control", std::move(control)}})
                          .dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -3,11 +3,12 @@
 
 #include <cstdint>
 #include <deque>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include "tools/live/operator_sink.h"
+#include "tools/operator/act_port.h"
 
 namespace poise {
 
@@ -15,8 +16,8 @@ namespace poise {
 /// Memory is bounded: the last acts alone are kept.
 class ControlDesk {
  public:
-  /// `sink` must outlive it.
-  explicit ControlDesk(OperatorSink* sink) : sink_(sink) {}
+  /// `port` must outlive it. Throws ConfigError, where the run takes no acts too, or RobotError.
+  explicit ControlDesk(ActPort* port);
 
   /// A text of a page. False when it is no act: then its sender is none of our pages.
   bool Receive(std::string_view text);
@@ -29,17 +30,15 @@ class ControlDesk {
   int64_t refused() const { return refused_; }    ///< texts that are none
 
  private:
-  struct Entry {
-    OperatorAct act;
-    enum class State : uint8_t { kSent, kAccepted, kRefused } state = State::kSent;
-    int64_t tick = -1;
-    std::string reason;
-  };
-  static nlohmann::ordered_json EntryJson(const Entry& entry);
-  Entry* Find(int64_t client, int64_t id);
+  /// Why an act is beyond what a page may ask for; empty: it is not.
+  std::string BeyondPage(const OperatorAct& act) const;
+  /// What can be done and what is in force, as receivers have told: keys as in
+  /// docs/interactive.md#what-a-page-is-told.
+  nlohmann::ordered_json Standing() const;
 
-  OperatorSink* sink_;
-  std::deque<Entry> acts_;
+  ActPort* port_;
+  double push_limit_;  // N
+  std::deque<OperatorAct> acts_;
   std::string told_;
   int64_t received_ = 0;
   int64_t refused_ = 0;

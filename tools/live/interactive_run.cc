@@ -16,11 +16,11 @@
 #include "tools/cli/signals.h"
 #include "tools/live/control_desk.h"
 #include "tools/live/live_page.h"
-#include "tools/live/local_operator.h"
 #include "tools/live/run_status.h"
 #include "tools/live/tick_ring.h"
 #include "tools/live/view_access.h"
 #include "tools/live/view_server.h"
+#include "tools/operator/inline_port.h"
 #include "tools/report/html_report.h"
 #include "tools/scenario/registry.h"
 
@@ -47,8 +47,8 @@ class InteractiveRun {
         info_(logging::MakeRunInfo(spec, scenario_text)),
         log_(std::move(log)),
         run_id_(std::to_string(spec.run_id())),
-        operator_(spec, [this](const OperatorAct& act) { return Pace(act); }),
-        desk_(&operator_),
+        port_(spec, [this](const OperatorAct& act) { return Pace(act); }),
+        desk_(&port_),
         ring_(spec, TicksOf(options.keep, spec.tick_period())) {
     Open();
     recorder_->Flush();
@@ -99,19 +99,19 @@ class InteractiveRun {
     recorder_.reset();  // which the runner's taps call
     runner_ = std::make_unique<InlineRunner>(spec_, Components());
     recorder_ = std::make_unique<logging::InlineRecorder>(log_, spec_, info_, runner_.get());
-    operator_.SetRunner(runner_.get());
+    port_.SetRunner(runner_.get());
     runner_->set_tap([this](int channel, const OutputPort& output, const Tick& tick) {
       recorder_->Add(channel, output, tick);
       const bool shown = tick.index >= shown_from_;
-      if (!shown && !operator_.Hears(channel)) return;
+      if (!shown && !port_.Hears(channel)) return;
       bytes_.resize(static_cast<size_t>(output.encoded_size()));
       output.Encode(bytes_.data(), static_cast<int>(bytes_.size()));
-      operator_.Hear(channel, bytes_);
+      port_.Hear(channel, bytes_);
       if (shown) Show(channel, tick.index, bytes_);
     });
     runner_->set_external_tap([this](int channel, std::span<const uint8_t> data) {
       recorder_->AddExternal(channel, data);
-      operator_.Hear(channel, data);
+      port_.Hear(channel, data);
       if (runner_->ticks_completed() >= shown_from_) Show(channel, 0, data);
     });
   }
@@ -203,14 +203,14 @@ class InteractiveRun {
     std::error_code ignored;  // of one that somebody has removed
     fs::rename(log_, name(branch_), ignored);
     if (branch_ > kMostBranches) fs::remove(name(branch_ - kMostBranches), ignored);
-    operator_.Forget(tick);
+    port_.Forget(tick);
     ring_ = TickRing(spec_, ring_.capacity());
     shown_from_ = std::max<int64_t>(0, tick - ring_.capacity());
     Open();
     server_->Restart();
     auto next_picture = Clock::now();
     while (runner_->ticks_completed() < tick && StopSignal() == 0) {
-      operator_.Repeat(runner_->ticks_completed());
+      port_.Repeat(runner_->ticks_completed());
       if (!runner_->Step()) break;
       if (Clock::now() < next_picture) continue;
       ShowPicture();
@@ -234,6 +234,7 @@ class InteractiveRun {
                                               {"end_tick", ring_.end_tick()},
                                               {"branch", branch_}})
                           .dump());
+    port_.Update(0);
     if (const std::optional<std::string> text = desk_.Take(run_id_, RunJson())) {
       server_->SetControl(*text);
     }
@@ -260,7 +261,7 @@ class InteractiveRun {
   const run_info_t info_;
   const std::string log_;
   const std::string run_id_;
-  LocalOperator operator_;
+  InlinePort port_;
   ControlDesk desk_;
   TickRing ring_;
   std::unique_ptr<InlineRunner> runner_;
