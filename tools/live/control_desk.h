@@ -33,7 +33,7 @@ class ControlDesk {
   /// Why an act is beyond what a page may ask for; empty: it is not.
   std::string BeyondPage(const OperatorAct& act) const;
   /// What can be done and what is in force, as receivers have told: keys as in
-  /// docs/interactive.md#what-a-page-is-told.
+  /// docs/reference/interactive.md#what-a-page-is-told.
   nlohmann::ordered_json Standing() const;
 
   ActPort* port_;

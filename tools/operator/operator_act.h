@@ -58,7 +58,7 @@ const std::vector<OperatorAct::Kind>& PageActs();
 /// allowed: what is none gives false and says why in `problem`. All numbers are finite, names short
 /// and printable.
 bool ReadAct(std::string_view text, OperatorAct* act, std::string* problem);
-/// The act as a page is told of it (docs/interactive.md#what-a-page-is-told).
+/// The act as a page is told of it (docs/reference/interactive.md#what-a-page-is-told).
 nlohmann::ordered_json ActJson(const OperatorAct& act);
 
 }  // namespace poise

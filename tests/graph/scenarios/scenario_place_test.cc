@@ -183,10 +183,10 @@ TEST_F(ScenarioPlaceTest, AGraphLeavesOutWhatItNamesOfItsBase) {
 
 // The recipe has it (docs/how-to/unitree_robot.md).
 TEST_F(ScenarioPlaceTest, AGraphForARealRobotIsBalanceWithoutItsSimulator) {
-  const std::string page = ReadFile(POISE_SOURCE_DIR "/docs/unitree.md");
+  const std::string page = ReadFile(POISE_SOURCE_DIR "/docs/how-to/unitree_robot.md");
   const size_t begin = page.find("    base: \"balance\"\n");
   ASSERT_NE(begin, std::string::npos);
-  Write("own/g1.pbtxt", page.substr(begin, page.find("\n\nWith", begin) - begin));
+  Write("own/g1.pbtxt", page.substr(begin, page.find("\n\nIn a file", begin) - begin));
   ExpectGood("own/g1.pbtxt", "names, types and connections are good");
 }
 
