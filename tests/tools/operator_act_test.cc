@@ -37,7 +37,9 @@ std::string ProblemOf(const std::string& text) {
 RunSpec StandSpec() {
   const LoadedScenario loaded = LoadScenario("stand", {});
   std::vector<std::string> warnings;
-  return MakeRunSpec(loaded, {}, &warnings);
+  RunSpec spec = MakeRunSpec(loaded, {}, &warnings);
+  CheckRun(loaded, &spec);
+  return spec;
 }
 
 template <class Message>
