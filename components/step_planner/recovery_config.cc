@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
+#include "components/balance/gains/gain_rule.h"
 #include "components/balance/tasks/centroidal_momentum.h"
 #include "components/framework/configuration/configuration.h"
 #include "components/framework/configuration/field_rules.h"
@@ -30,9 +32,13 @@ constexpr double kSoleMargin = 0.02;
 constexpr double kOvershoot = 0.04;
 // m of the capture point inside the new support, beyond which a foothold is no better.
 constexpr double kAmpleMargin = 0.04;
-// Share of the hip joints' effort that swings the leg. Of 96 pushes G1 stands 75 with 0.35, 80 with
-// 0.6 and 86 with 0.9 (docs/lab/steps): sooner down is worth more than what the foot lags behind.
-constexpr double kSwingEffort = 0.9;
+// Shares of the hip joints' effort that swings the leg, at least and at most. Of 96 pushes G1 stands
+// 75 with 0.35, 80 with 0.6 and 86 with 0.9 (docs/lab/steps): sooner down is worth more than what
+// the foot lags behind.
+constexpr double kLeastSwingEffort = 0.35, kSwingEffort = 0.9;
+// m/s by which the filter of the joints' velocities, as fast as the gears let it be, may misjudge a
+// foot meanwhile. Fitted: heron, whose gears are soft, stands fewer pushes with faster swings.
+constexpr double kSpeedError = 0.08;
 // m/s downward at which the sole meets the ground: sooner down is a larger push, harder a bounce.
 constexpr double kTouchSpeed = 0.25;
 // s before touch-down in which the foothold stays: a move within less would jerk the leg.
@@ -150,7 +156,11 @@ stepping::StepChoice MakeStepChoice(const RecoveryConfig& config, const robot::R
   }
   stepping::StepLimits limits;
   limits.sole_margin = kSoleMargin;
-  limits.acceleration = SwingAcceleration(model, kSwingEffort);
+  // A second-order Butterworth filter delays by √2/ω_c.
+  const double followed = kSpeedError * std::numbers::sqrt2 * std::numbers::pi *
+                          balance::MostVelocityCutoff(model);
+  const double full = SwingAcceleration(model, 1);
+  limits.acceleration = std::clamp(followed, kLeastSwingEffort * full, kSwingEffort * full);
   limits.least_swing = motion.swing();
   limits.unload = motion.unload();
   limits.overshoot = kOvershoot;

@@ -40,7 +40,8 @@ TEST(Imu, FeelsTheAccelerationOfItsOwnPlace) {
     pose->set_roll(0.4);
     pose->set_yaw(-1.1);
   });
-  EngineSimulation simulation(model, config, kTick, 1);
+  // The period over which the IMU's acceleration is a mean is one step.
+  EngineSimulation simulation(model, config, config.step(), 1);
   robot::RobotState state = simulation.truth().state;
   state.base_position.z() += 5;
   state.base_angular_velocity = Vector3d(1, -2, 3);
