@@ -287,8 +287,7 @@ void InvariantEstimator::Propagate(double dt) {
   const Vector3d turn = gyro_ - last_gyro_, push = force_ - last_force_;
   ImuStep imu;
   imu.angular_velocity = 0.5 * (last_gyro_ + gyro_);
-  // What the body has gained since the last reading: an IMU integrates, or passes it low.
-  imu.acceleration = force_;
+  imu.acceleration = 0.5 * (last_force_ + force_);
   // A step at an unknown instant between two readings: uniform over their difference.
   imu.angular_velocity_noise =
       Square(config_.gyro_noise()) * Matrix3d::Identity() + turn * turn.transpose() / 12;

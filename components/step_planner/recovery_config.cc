@@ -38,7 +38,7 @@ constexpr double kAmpleMargin = 0.04;
 constexpr double kLeastSwingEffort = 0.35, kSwingEffort = 0.9;
 // m/s by which the filter of the joints' velocities, as fast as the gears let it be, may misjudge a
 // foot meanwhile. Fitted: heron, whose gears are soft, stands fewer pushes with faster swings.
-constexpr double kSpeedError = 0.08;
+constexpr double kSpeedError = 0.11;
 // m/s downward at which the sole meets the ground: sooner down is a larger push, harder a bounce.
 constexpr double kTouchSpeed = 0.25;
 // s before touch-down in which the foothold stays: a move within less would jerk the leg.

@@ -143,12 +143,6 @@ void BaseMotion::Next() {
                          .toRotationMatrix()) /
       two_steps;
   now_.joint_velocity = (after_.state.joint_position - before_.state.joint_position) / two_steps;
-
-  const Vector3d last = acceleration_;
-  acceleration_ =
-      (after_.imu_position - 2 * at_.imu_position + before_.imu_position) / (kGrid * kGrid);
-  // An IMU tells what the body has gained since the last sample.
-  mean_acceleration_ = 0.5 * ((sample_ == 0 ? acceleration_ : last) + acceleration_);
 }
 
 Vector3d BaseMotion::com() const {
@@ -172,7 +166,9 @@ BaseSensors BaseMotion::sensors() {
   }
   const Vector3d rate =
       RotationVector(after_.imu_rotation * before_.imu_rotation.transpose()) / (2 * kGrid);
-  const Vector3d specific_force = mean_acceleration_ + robot::kGravity * Vector3d::UnitZ();
+  const Vector3d acceleration =
+      (after_.imu_position - 2 * at_.imu_position + before_.imu_position) / (kGrid * kGrid);
+  const Vector3d specific_force = acceleration + robot::kGravity * Vector3d::UnitZ();
   const Vector3d gyro =
       at_.imu_rotation.transpose() * rate + errors_.gyro_bias + errors_.gyro_noise * noise();
   const Vector3d accelerometer = at_.imu_rotation.transpose() * specific_force +

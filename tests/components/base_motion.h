@@ -76,8 +76,6 @@ class BaseMotion {
   SensorErrors errors_;
   std::mt19937_64 random_{TestSeed(1)};
   Sample before_, at_, after_;  // one grid step apart
-  // m/s², of the IMU's place: at the sample, and on average since the last.
-  Eigen::Vector3d acceleration_ = Eigen::Vector3d::Zero(), mean_acceleration_ = acceleration_;
   int64_t sample_ = -1;
   Eigen::VectorXd reading_;
 };

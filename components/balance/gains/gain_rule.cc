@@ -18,9 +18,9 @@ constexpr double kVelocityCutoff = 20;  // Hz
 // The cutoff is this share of the lowest frequency at which a rotor rings on its gear: a
 // second-order low-pass leaves a sixteenth of the ringing.
 constexpr double kGearShare = 0.25;
-// What a step stands, whose legs are seldom at rest: heron, whose gears ring at 52 Hz, steps with 20
-// Hz and falls with 60.
-constexpr double kMostGearShare = 0.4;
+// What a step stands, whose legs are seldom at rest: heron, whose gears ring at 52 Hz, steps with
+// kVelocityCutoff and falls with 60 Hz.
+constexpr double kMostGearShare = 0.3;
 
 /// Hz, of the lowest at which a rotor rings on its gear; infinite where gears are rigid.
 double GearFrequency(const robot::RobotModel& model) {
@@ -56,7 +56,7 @@ double VelocityCutoff(const robot::RobotModel& model) {
 }
 
 double MostVelocityCutoff(const robot::RobotModel& model) {
-  return kMostGearShare * GearFrequency(model);
+  return std::max(kVelocityCutoff, kMostGearShare * GearFrequency(model));
 }
 
 StandingGains GainsByRule(const robot::RobotModel& model, double period) {
