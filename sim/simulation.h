@@ -41,8 +41,8 @@ struct SimulationTruth {
   Eigen::VectorXd motor_torque;          ///< N·m at the joint, likewise
   Eigen::VectorXd friction_torque;       ///< N·m on the joint, likewise
   Eigen::Vector3d imu_angular_velocity;  ///< rad/s, IMU frame
-  /// m/s², IMU frame: velocity gained over the last control period divided by it, minus gravity. An
-  /// IMU's low-pass or its increments of velocity lose no impact either.
+  /// m/s², IMU frame: velocity gained over the last control period divided by it, minus gravity. So
+  /// no impact is lost, as a real IMU's low-pass loses none.
   Eigen::Vector3d imu_specific_force;
   Eigen::Quaterniond imu_orientation;  ///< IMU to world
   Eigen::Vector3d push_force;          ///< N, world, sum of the pushes and hands at this instant

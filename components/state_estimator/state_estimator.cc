@@ -20,6 +20,7 @@ using Eigen::Vector3d;
 using robot::Foot;
 using robot::kFeet;
 
+constexpr double kStepCutoff = 60;      // Hz: G1 stands fewer pushes with 80 (docs/lab/steps)
 constexpr double kLongestDelay = 0.05;  // s
 
 void CheckConfig(const StateEstimatorConfig& config, const robot::RobotModel& model) {
@@ -64,10 +65,10 @@ void StateEstimator::Configure(const ComponentContext& context, Wiring* wiring) 
   auto config = context.config<StateEstimatorConfig>();
   const std::shared_ptr<const robot::RobotModel> model = LoadRobot(context);
   if (!config.has_joint_velocity_cutoff()) {
-    config.set_joint_velocity_cutoff(balance::VelocityCutoff(*model));
+    config.set_joint_velocity_cutoff(config.steps()
+                                         ? std::min(kStepCutoff, balance::StepCutoff(*model))
+                                         : balance::VelocityCutoff(*model));
   }
-  config.set_joint_velocity_cutoff(
-      std::min(config.joint_velocity_cutoff(), balance::MostVelocityCutoff(*model)));
   CheckConfig(config, *model);
   wrenches_ = std::make_unique<FootWrenches>(model, config);
   calibrator_ = std::make_unique<Calibrator>(

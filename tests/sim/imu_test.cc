@@ -1,6 +1,7 @@
 // The true motion that the IMU measures, on the simulated robot.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 
 #include "tests/sim/engine.h"
@@ -27,6 +28,34 @@ TEST(Imu, ReadsNothingInFreeFall) {
   simulation.SetState(state);
   for (int i = 0; i < 100; ++i) simulation.Advance();
   EXPECT_LT(simulation.truth().imu_specific_force.norm(), 1e-8);
+}
+
+// The robot drops onto its soles. All that the accelerometer has told, less gravity, is the
+// velocity that its place has gained, whichever step of the engine an impact falls into.
+TEST(Imu, LosesNoImpact) {
+  const robot::RobotModel model = PaperRobot();
+  EngineSimulation simulation(model, BareConfig(), kTick, 1);
+  robot::RobotState state = simulation.truth().state;
+  state.base_position.z() += 0.02;
+  simulation.SetState(state);
+  const robot::ImuModel& imu = model.imu();
+  ASSERT_EQ(imu.body, 0);
+  Vector3d told = Vector3d::Zero();
+  double hardest = 0;
+  for (int i = 0; i < 100; ++i) {
+    simulation.Advance();
+    const SimulationTruth& truth = simulation.truth();
+    const Vector3d acceleration =
+        truth.imu_orientation * truth.imu_specific_force - Vector3d(0, 0, robot::kGravity);
+    hardest = std::max(hardest, acceleration.norm());
+    told += kTick * acceleration;
+    const robot::RobotState& now = truth.state;
+    const Vector3d gained =
+        now.base_linear_velocity +
+        now.base_angular_velocity.cross(now.base_orientation * imu.pose.translation());
+    EXPECT_LT((told - gained).norm(), 1e-9) << i;
+  }
+  EXPECT_GT(hardest, 2 * robot::kGravity) << "nothing hit the ground";
 }
 
 // In flight with spin and moving joints, against second differences of where the IMU is.

@@ -12,8 +12,8 @@ double PendulumFrequency(const robot::RobotModel& model);
 
 /// Hz, of the low-pass on joint velocities: well below every rotor on its gear, √(k/J).
 double VelocityCutoff(const robot::RobotModel& model);
-/// Hz, that the same may be set to at most; infinite where gears are rigid.
-double MostVelocityCutoff(const robot::RobotModel& model);
+/// Hz, the highest of that low-pass with which the robot steps; infinite where gears are rigid.
+double StepCutoff(const robot::RobotModel& model);
 
 /// s, from a joint's motion to the torque that answers it: velocity filter, delay, current loop,
 /// half a tick.

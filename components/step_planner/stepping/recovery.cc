@@ -115,9 +115,7 @@ bool Recovery::Update(const StepInput& input) {
       if (time >= since_ + UnloadTime() - kTimeTolerance) LiftOff(input);
       break;
     case Stage::kSwinging:
-      if (Touches(input)) {
-        Land(input);
-      }
+      if (Touches(input)) Land(input);
       break;
     case Stage::kLoading:
       if (StepOn(input, state)) break;
@@ -290,7 +288,8 @@ void Recovery::Land(const StepInput& input) {
 bool Recovery::StepOn(const StepInput& input, const StepState& state) {
   if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return false;
   const Foot other = Other(plan_.foot);
-  // A foot that has tapped the ground carries nothing yet: were the other one to leave, it fell.
+  // A foot that has only tapped the ground carries nothing: the robot would fall from the other
+  // one.
   if (!(input.load[plan_.foot] > input.load[other])) return false;
   const double margin = balance::SignedDistance(Soles(state, choice_.limits().sole_margin),
                                                 state.pendulum.capture_point());
