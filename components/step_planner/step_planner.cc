@@ -61,13 +61,14 @@ void StepPlanner::Configure(const ComponentContext& context, Wiring* wiring) {
   landing_ = robot::FootArray<Landing>(Landing(contact_));
   contact_loss_ = robot::FootArray<ContactLoss>(ContactLoss(contact_));
   step_ = StepDetector(kNeededExcess, kNeededPersistence);
-  recovers_ = config.recovery().enabled();
+  strides_ = config.walk().enabled() && config.walk().dynamic();
+  recovers_ = config.recovery().enabled() || strides_;
   if (recovers_) {
     const HipStrategyConfig& hip = config.hip_strategy();
     recovery_ = MakeRecovery(config.recovery(), config.contact(), *model_,
                              hip.enabled() ? hip.start() : -1);
   }
-  walks_ = config.walk().enabled();
+  walks_ = config.walk().enabled() && !strides_;
   if (walks_) walk_ = MakeWalk(config.walk(), config.contact(), *model_);
   footstep_report_ = FootstepReport(recovers_ ? &recovery_ : nullptr, walks_ ? &walk_ : nullptr);
   walk_commands_ = WalkCommands(config.walk());
@@ -146,7 +147,7 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
   using operate::answer_t;
   switch (act.kind) {
     case act_t::KIND_WALK:
-      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_ && !strides_) return answer_t::VERDICT_NOT_ABLE;
       for (int i = 0; i < 3; ++i) {
         if (!(std::abs(act.velocity[i]) <= kFastestWalk)) return answer_t::VERDICT_RANGE;
       }
@@ -158,17 +159,17 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
       if (recovers_ && owner_ != FeetOwner::kWalk) {
         const bool stands = Count(in_contact_) == 2 && last_controlled_;
         const bool rests = stands && owner_ != FeetOwner::kRecovery;
-        if (!walks_ && !rests) return answer_t::VERDICT_NOT_NOW;
+        if (!walks_ && !rests && !recovery_.command().stepping) return answer_t::VERDICT_NOT_NOW;
         if (rests) recovery_.BringTogether();
       }
       operator_walk_ = {.given = true};
       return answer_t::VERDICT_DONE;
     case act_t::KIND_STEP: {
-      if (!walks_) return answer_t::VERDICT_NOT_ABLE;
+      if (!walks_ && !strides_) return answer_t::VERDICT_NOT_ABLE;
       if (act.foot >= static_cast<int>(kFeet.size())) return answer_t::VERDICT_UNKNOWN;
       const bool stands = Count(in_contact_) == 2 && last_controlled_;
       if (!stands || Steps() != nullptr) return answer_t::VERDICT_NOT_NOW;
-      operator_walk_ = {.given = true, .one_step = true, .steps_before = walk_.num_steps()};
+      operator_walk_ = {.given = true, .one_step = true, .steps_before = NumSteps()};
       // Walking begins with the foot of the side that it goes to.
       if (robot::FootAt(act.foot) == Foot::kLeft) operator_walk_.velocity[1] = kLeftFirst;
       return answer_t::VERDICT_DONE;
@@ -182,10 +183,12 @@ int8_t StepPlanner::Act(const operate::act_t& act, double time) {
 }
 
 stepping::WalkCommand StepPlanner::WalkCommandAt(double time) const {
-  if (!operator_walk_.given) return walk_commands_.At(time, walk_.num_begun());
+  const int begun = strides_ ? recovery_.num_steps() : walk_.num_begun();
+  if (!operator_walk_.given) return walk_commands_.At(time, begun);
   const double* const v = operator_walk_.velocity;
   bool stepping = operator_walk_.stepping;
-  if (operator_walk_.one_step && walk_.num_steps() == operator_walk_.steps_before) {
+  // A recovery counts a step as it begins, a walk as it ends.
+  if (operator_walk_.one_step && NumSteps() == operator_walk_.steps_before) {
     const stepping::WalkStage stage = walk_.stage();
     stepping = stage != stepping::WalkStage::kSwinging && stage != stepping::WalkStage::kTouching;
   }
@@ -262,7 +265,9 @@ void StepPlanner::HandOver(FeetOwner to, double time) {
       from == FeetOwner::kRecovery || (from == FeetOwner::kWalk && to != FeetOwner::kRecovery);
   if (ends) EndSteps(*Steps(), time);
   // The body stays where the walk has turned it.
-  if (from == FeetOwner::kWalk) generator_->HoldBody(untilted_);
+  if (from == FeetOwner::kWalk || (from == FeetOwner::kRecovery && recovery_.turns())) {
+    generator_->HoldBody(untilted_);
+  }
   owner_ = to;
 }
 
@@ -287,6 +292,7 @@ stepping::StepInput StepPlanner::SeeSteps(double time, const robot::FootArray<do
   input.com_height = references_.com.position.z();
   input.step_needed = support_plan_->step_needed != 0;
   input.allowed = last_controlled_;
+  if (strides_) input.command = WalkCommandAt(time);
   for (const Foot f : kFeet) {
     if (in_contact_[f]) continue;
     input.free_foot = references_.foot[f];
@@ -374,6 +380,7 @@ void StepPlanner::Report(double time, const Capture& capture) {
     ReportCapture(time, capture.frame_o, soles, capture.pendulum, &step_, plan);
   }
   if (recovers_) ReportStepping(recovery_, time, estimate.sole, plan);
+  if (strides_) ReportCommand(recovery_.command(), plan);
   if (walks_ && owner_ != FeetOwner::kRecovery) ReportWalking(walk_, time, estimate.sole, plan);
   plan->num_steps = recovery_.num_steps() + walk_.num_begun();
   if (!recovers_ && !walks_) return;
@@ -417,7 +424,8 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
       references_.foot[f] = steps->swing;
       references_.foot_rotation[f] = steps->swing_rotation;
     }
-    if (owner_ == FeetOwner::kWalk) TurnBody();
+    if (owner_ == FeetOwner::kWalk) TurnBody(walk_.body_yaw());
+    if (owner_ == FeetOwner::kRecovery && recovery_.turns()) TurnBody(recovery_.body_yaw());
     untilted_ = references_.body.rotation;
     if (hip_strategy_->enabled()) TiltBody(time, capture);
     return;
@@ -436,8 +444,7 @@ void StepPlanner::UpdateReferences(double time, const Capture& capture) {
   if (hip_strategy_->enabled()) TiltBody(time, capture);
 }
 
-void StepPlanner::TurnBody() {
-  const stepping::Quintic::Point& yaw = walk_.body_yaw();
+void StepPlanner::TurnBody(const stepping::Quintic::Point& yaw) {
   const Eigen::AngleAxisd turn(yaw.position, Eigen::Vector3d::UnitZ());
   references_.body.rotation = turn * references_.body.rotation;
   references_.body.angular_velocity.z() += yaw.velocity;

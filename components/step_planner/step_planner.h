@@ -60,6 +60,8 @@ class StepPlanner : public Component, public Operated {
   int8_t Act(const operate::act_t& act, double time);
   /// The scenario's, until an operator has commanded another.
   stepping::WalkCommand WalkCommandAt(double time) const;
+  /// Steps of what walks here.
+  int NumSteps() const { return strides_ ? recovery_.num_steps() : walk_.num_steps(); }
   /// STATUS_* of the plan.
   int8_t Plan(double time);
   /// What the robot says to the schedule.
@@ -77,7 +79,7 @@ class StepPlanner : public Component, public Operated {
   /// The schedule waits.
   bool Held() const { return owner_ != FeetOwner::kPhases; }
   /// The body's heading follows the feet.
-  void TurnBody();
+  void TurnBody(const stepping::Quintic::Point& yaw);
   /// Contacts, references and landings of a phase's first tick.
   void BeginPhase(double time);
   Capture ComputeCapture() const;
@@ -116,7 +118,8 @@ class StepPlanner : public Component, public Operated {
   StepDetector step_;
   bool recovers_ = false;  // steps are made
   stepping::Recovery recovery_;
-  bool walks_ = false;  // where it is told to
+  bool walks_ = false;    // where it is told to, with steps of fixed times
+  bool strides_ = false;  // the same with the recovery's steps
   stepping::Walk walk_;
   WalkCommands walk_commands_;
   FootstepReport footstep_report_;

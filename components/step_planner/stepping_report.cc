@@ -105,7 +105,10 @@ void ReportWalking(const stepping::Walk& walk, double time,
   plan->step_foot = static_cast<int8_t>(foot);
   SetVector3({foothold.x(), foothold.y(), ground}, plan->foothold);
   plan->touch_down_time = swings ? std::max(0.0, walk.touch_down() - time) : 0;
-  const stepping::WalkCommand& command = walk.command();
+  ReportCommand(walk.command(), plan);
+}
+
+void ReportCommand(const stepping::WalkCommand& command, support_plan_t* plan) {
   SetVector3({command.velocity.x(), command.velocity.y(), command.turn_rate}, plan->walk_velocity);
 }
 

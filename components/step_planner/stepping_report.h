@@ -23,4 +23,7 @@ void ReportStepping(const stepping::Recovery& recovery, double time,
 void ReportWalking(const stepping::Walk& walk, double time,
                    const robot::FootArray<Eigen::Isometry3d>& sole, support_plan_t* plan);
 
+/// What is walked, into `plan`.
+void ReportCommand(const stepping::WalkCommand& command, support_plan_t* plan);
+
 }  // namespace poise

@@ -14,6 +14,7 @@
 #include "components/robot/posture.h"
 #include "components/robot/sole.h"
 #include "components/step_planner/leg_limits.h"
+#include "components/step_planner/recovery_config.h"
 
 namespace poise {
 namespace {
@@ -159,6 +160,35 @@ void CheckLegs(const WalkConfig& given, const StepMotion& motion, const robot::R
   }
 }
 
+/// What a step of a walk comes to at most.
+struct StrideSize {
+  double longest, widest, most_turn;  ///< m, m, rad
+  double period;                      ///< s
+  std::array<const char*, 3> limit;   ///< what says so, of each
+};
+
+StrideSize FixedStride(const WalkConfig& config, const robot::RobotModel& model) {
+  const RobotScale scale(model);
+  const StepSize size(config, scale);
+  return {size.longest,
+          size.widest,
+          config.most_turn(),
+          Period(WalkMotion(config, scale)),
+          {"`longest` allows", "`widest` allows", "`most_turn` allows"}};
+}
+
+StrideSize DynamicStride(const robot::RobotModel& model) {
+  const RecoveryConfig recovery;
+  const stepping::StepLimits limits = MakeStepChoice(recovery, model).limits();
+  const double frequency = std::sqrt(robot::kGravity / robot::StandingHeight(model));
+  const double stride = MakeRecoverySpec(recovery, ContactConfirmation(), model, -1).stride;
+  return {limits.longest,
+          limits.widest,
+          limits.most_turn,
+          stride / frequency,
+          {"the legs span", "the legs span", "a foot turns"}};
+}
+
 void CheckCommands(const WalkConfig& config) {
   double last = -std::numeric_limits<double>::infinity();
   int last_steps = 0;
@@ -298,34 +328,26 @@ std::vector<std::string> WalkWarnings(const WalkConfig& config, const robot::Rob
     }
     return warnings;
   }
-  const RobotScale scale(model);
-  const StepSize size(config, scale);
-  const double period = Period(WalkMotion(config, scale));
-  const double fastest = size.longest / period;
+  const StrideSize size = config.dynamic() ? DynamicStride(model) : FixedStride(config, model);
   for (int i = 0; i < config.command_size(); ++i) {
     const WalkCommandConfig& command = config.command(i);
     if (command.stop()) continue;
     // Aside and in a turn only every second step goes out (stepping::NextFootstep).
     const struct {
       const char* name;
-      double value, most;  // m/s or rad/s
-      const char* unit;
-      const char* limit;
-      double in_a_step;  // m or rad
-      const char* steps;
-      double time;  // s
-    } parts[] = {{"vx", command.vx(), fastest, "m", "longest", size.longest, "a step", period},
-                 {"vy", command.vy(), size.widest / (2 * period), "m", "widest", size.widest,
-                  "two steps", 2 * period},
-                 {"wz", command.wz(), config.most_turn() / (2 * period), "rad", "most_turn",
-                  config.most_turn(), "two steps", 2 * period}};
+      double value, in_a_step;  // m/s or rad/s; m or rad
+      const char *unit, *limit, *steps;
+      int count;  // of steps
+    } parts[] = {{"vx", command.vx(), size.longest, "m", size.limit[0], "a step", 1},
+                 {"vy", command.vy(), size.widest, "m", size.limit[1], "two steps", 2},
+                 {"wz", command.wz(), size.most_turn, "rad", size.limit[2], "two steps", 2}};
     for (const auto& part : parts) {
-      if (!(std::abs(part.value) > part.most * (1 + kRounding))) continue;
+      const double time = part.count * size.period, most = part.in_a_step / time;
+      if (!(std::abs(part.value) > most * (1 + kRounding))) continue;
       warnings.push_back(fmt::format(
-          "walk.command[{}].{}={} is walked at {:.3g} {}/s: `{}` "
-          "allows {:.3g} {} in {}, which {} {:.3g} s",
-          i, part.name, part.value, std::copysign(part.most, part.value), part.unit, part.limit,
-          part.in_a_step, part.unit, part.steps, &part == &parts[0] ? "takes" : "take", part.time));
+          "walk.command[{}].{}={} is walked at {:.3g} {}/s: {} {:.3g} {} in {}, which {} {:.3g} s",
+          i, part.name, part.value, std::copysign(most, part.value), part.unit, part.limit,
+          part.in_a_step, part.unit, part.steps, part.count == 1 ? "takes" : "take", time));
     }
   }
   if (config.slowest_swing() > 1 && !config.quasi_static()) {

@@ -208,6 +208,32 @@ TEST_F(OperatorTest, FeetTogetherIsTakenWhereTheRobotStepsWhenPushed) {
   EXPECT_EQ(replay.exit_code, 0) << replay.output;
 }
 
+TEST_F(OperatorTest, WhoWalksByTheStepsOfARecoveryIsStoppedAndLedOn) {
+  const std::vector<std::string> still = {"--set", "step_planner.walk.command="};
+  std::vector<std::string> arguments = {"run",     "walk_dynamic", "--duration", "600",
+                                        "--quiet", "--force",      "--out",      run_};
+  arguments.insert(arguments.end(), still.begin(), still.end());
+  program_ = std::make_unique<PoiseProgram>(arguments);
+  ASSERT_TRUE(WaitForLog(run_, kUnderWay));
+  for (const std::vector<std::string>& act : std::vector<std::vector<std::string>>{
+           {"walk", "--velocity", "0.3,0", "--turn", "0.3"}, {"walk", "--stop"}}) {
+    const ProgramResult taken = Poise(act);
+    EXPECT_EQ(taken.exit_code, 0) << taken.output;
+    // Some seconds: a tick is some 10 kB.
+    ASSERT_TRUE(WaitForLog(run_, act.size() > 2 ? 25'000'000 : 120'000'000));
+  }
+  const ProgramResult step = Poise({"step", "--foot", "left"});
+  EXPECT_EQ(step.exit_code, 0) << step.output;
+  Stop();
+  const ProgramResult replay = RunPoise({"replay", run_});
+  EXPECT_EQ(replay.exit_code, 0) << replay.output;
+  for (const nlohmann::json& check : ReadSummary(run_)["checks"]) {
+    if (check["name"] == "fallen" || check["name"] == "bridge_not_running_ticks") {
+      EXPECT_EQ(check["measured"], 0) << check;
+    }
+  }
+}
+
 TEST_F(OperatorTest, ARunInOneProcessSaysThatItHearsNobody) {
   Start({"--inline", "--realtime"});
   const ProgramResult push = Poise({"push", "--force", "1,0,0"});

@@ -54,6 +54,45 @@ TEST(WalkRun, TenStepsAndAStopInEachEngine) {
   }
 }
 
+// Ahead at 0.4 m/s, which steps of fixed times do not reach, in a curve, aside and back.
+TEST(WalkRun, ByTheStepsOfARecoveryInEachEngine) {
+  for (const std::string engine : {"mujoco", "ode"}) {
+    const RunFolder folder;
+    const ProgramResult result =
+        RunPoise({"run", "walk_dynamic", "--inline", "--world", engine, "--out", folder / "run"});
+    EXPECT_EQ(result.exit_code, 0) << engine << result.output;
+    const nlohmann::json summary = ReadSummary(folder / "run");
+    EXPECT_EQ(Measured(summary, "fallen"), 0) << engine;
+    EXPECT_GT(Measured(summary, "walk_speed_max"), 0.3) << engine;
+    EXPECT_GT(Measured(summary, "walk_turn_share"), 60) << engine;
+    if (engine == "ode") continue;
+    const ProgramResult replay = RunPoise({"replay", folder / "run"});
+    EXPECT_EQ(replay.exit_code, 0) << replay.output;
+  }
+}
+
+// What stands 31 of 32 times on G1: the paper's robot is pushed as hard, from all sides.
+TEST(WalkRun, APushInAWalkMovesTheFeet) {
+  for (const char* side : {"1,0", "0,1", "-1,0", "0,-1"}) {
+    const std::string direction = side;
+    const size_t comma = direction.find(',');
+    const RunFolder folder;
+    const ProgramResult result =
+        RunPoise({"run",       "walk_dynamic",
+                  "--variant", "ahead",
+                  "--inline",  "--no-reference",
+                  "--out",     folder / "run",
+                  "--set",     "sim.push[0].start=5",
+                  "--set",     "sim.push[0].duration=0.1",
+                  "--set",     "sim.push[0].at_body=true",
+                  "--set",     "sim.push[0].profile=HALF_SINE",
+                  "--set",     "sim.push[0].scaled_impulse=0.08",
+                  "--set",     "sim.push[0].direction_x=" + direction.substr(0, comma),
+                  "--set",     "sim.push[0].direction_y=" + direction.substr(comma + 1)});
+    EXPECT_EQ(result.exit_code, 0) << side << result.output;
+  }
+}
+
 /// rad, of the true sole against the ground.
 double Tilt(const pose_t& sole) {
   const double* const q = sole.orientation;

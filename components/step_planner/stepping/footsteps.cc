@@ -33,6 +33,20 @@ Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& comm
   return step;
 }
 
+Stride NominalStride(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+                     double frequency, const FootstepLimits& limits) {
+  const double growth = std::exp(frequency * period);
+  Stride stride;
+  stride.next = NextFootstep(stance, foot, command, period, limits);
+  const Footstep after = NextFootstep(stride.next, Other(foot), command, period, limits);
+  const Vector2d first = stride.next.position - stance.position;
+  const Vector2d second = after.position - stride.next.position;
+  const double whole = growth * growth - 1;
+  stride.begin = (growth * first + second) / whole;
+  stride.end = (growth * second + first) / whole;
+  return stride;
+}
+
 Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,
                  Foot foot, const FootstepLimits& limits) {
   const double side = Side(foot);

@@ -36,6 +36,18 @@ struct FootstepLimits {
 Footstep NextFootstep(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
                       const FootstepLimits& limits);
 
+/// A step of a walk that goes on as it is commanded; m, world.
+struct Stride {
+  Footstep next;  ///< where the foot comes down
+  /// From the stance sole to the capture point as the other foot leaves the ground, and from the
+  /// next one as that carries.
+  Eigen::Vector2d begin = Eigen::Vector2d::Zero(), end = Eigen::Vector2d::Zero();
+};
+/// Each sole carries alone for `period` s, by its middle. Two steps L₁ and L₂ that come again and
+/// again have ξ − p = (e L₁ + L₂)/(e² − 1) as the first begins, e = exp(ω `period`).
+Stride NominalStride(const Footstep& stance, Foot foot, const WalkCommand& command, double period,
+                     double frequency, const FootstepLimits& limits);
+
 /// `step`, beside `stance`, moved towards `wanted` by at most `most`, m and rad; the soles do not
 /// touch.
 Footstep Towards(const Footstep& step, const Footstep& wanted, double most, const Footstep& stance,

@@ -32,6 +32,7 @@ struct StepInput {
   double com_height = 0;     ///< m, world, of the COM's reference; likewise
   bool step_needed = false;  ///< the capture point has stayed beyond the soles
   bool allowed = true;       ///< a first step may begin
+  WalkCommand command;       ///< of a planner that is told to walk
 };
 
 /// What the plan takes over while steps are made.

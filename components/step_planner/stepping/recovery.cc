@@ -44,6 +44,14 @@ constexpr double kTogetherShift = 1.5, kMostShifts = 2.5;
 constexpr double kTogetherRamp = 0.2, kTogetherSwing = 0.7;
 constexpr double kTogetherGain = 1;
 constexpr double kTogetherDistance = 0.03;  // m from side by side that is side by side
+// s in which a walk that begins brings the capture point to where its first step starts.
+constexpr double kSetOff = 0.5;
+// Share of the standing height by which the COM walks lower, so that knees can give. Fitted: with
+// none iCub and heron fall as they step in place, with 0.09 iCub does.
+constexpr double kWalkLowering = 0.06;
+// m by which a walk's foothold may miss its place before a recovery's step is looked for.
+constexpr double kMostMissed = 0.05;
+constexpr double kTurnShare = 0.5;  // of the way between the soles' headings that the body takes
 // Time constant, as a share of the settling, with which a foot that touches is let go.
 constexpr double kLetGo = 0.25;
 
@@ -76,9 +84,18 @@ bool Recovery::Update(const StepInput& input) {
   StepState state = Observe(input, active() ? in_contact_ : input.in_contact, kMomentumShare);
   const double excess = Excess(state);
   Watch(time, excess);
+  const double period = TickPeriod(time - time_);
+  command_ = Approach(command_, input.command, period * spec_.acceleration,
+                      period * spec_.turn_acceleration);
   switch (stage_) {
     case Stage::kIdle: {
+      turns_ = false;
       const StepReason need = NeedOfFirstStep(input, state, excess);
+      if (need == StepReason::kNone && command_.stepping && input.allowed && input.in_contact[0] &&
+          input.in_contact[1]) {
+        SetOff(input, state);
+        break;
+      }
       if (StepPlan plan; need == StepReason::kNone && TogetherNow(input, state, &plan)) {
         together_asked_ = false;
         together_at_ = -1;
@@ -125,12 +142,24 @@ bool Recovery::Update(const StepInput& input) {
       }
       break;
     case Stage::kCatching:
-      if (stays_outside_ && steps_now_ < kMostSteps) {
+      if (command_.stepping) {
+        steps_now_ = 0;
+        BeginTurning(state);
+        const Vector2d way = state.pendulum.capture_point() - Goal(state);
+        // The foot that the capture point is nearer to stays.
+        const double left = std::cos(state.yaw) * way.y() - std::sin(state.yaw) * way.x();
+        StepReason reason = StepReason::kWalk;
+        const StepPlan plan =
+            WalkOn(state, left > 0 ? Foot::kRight : Foot::kLeft, choice_.limits().unload, &reason);
+        BeginStep(input, plan, reason);
+      } else if (stays_outside_ && steps_now_ < kMostSteps) {
         BeginStep(input, choice_.Choose(state), StepReason::kAgain);
       } else if (AtRest(input, state)) {
         stage_ = Stage::kIdle;
         const bool caught = reason_ != StepReason::kTogether;
         if (caught && spec_.together_after > 0) together_at_ = time + spec_.together_after;
+        // A walk ends with the feet side by side.
+        if (caught && turns_) together_at_ = time;
       }
       break;
   }
@@ -196,7 +225,79 @@ bool Recovery::TogetherNow(const StepInput& input, const StepState& state, StepP
   return plan->possible;
 }
 
+Gait Recovery::gait(const StepState& state) const {
+  return {command_, spec_.stride / state.pendulum.frequency, 0.5 * spec_.load, spec_.gain};
+}
+
+StepPlan Recovery::WalkOn(const StepState& state, Foot foot, double unload,
+                          StepReason* reason) const {
+  StepPlan plan = choice_.Stride(state, foot, gait(state), unload);
+  *reason = StepReason::kWalk;
+  if (std::isfinite(plan.margin) && plan.missed < kMostMissed) return plan;
+  const StepPlan caught = choice_.Next(state, foot);
+  if (!caught.possible || !(caught.margin > plan.margin)) return plan;
+  *reason = StepReason::kAgain;
+  return caught;
+}
+
+Vector2d Recovery::WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
+                                const balance::ConvexPolygon& support, double left) const {
+  const Vector2d body = ForBody(input, kSwingBudget);
+  StepState with = state;
+  with.pendulum.com += body / (1 + spec_.gain);
+  return choice_.StridePoint(with, stance, gait(state), left, support) - body;
+}
+
+void Recovery::SetOff(const StepInput& input, const StepState& state) {
+  // The foot of the side that it goes to is the first.
+  const double out = command_.velocity.y() != 0 ? command_.velocity.y() : command_.turn_rate;
+  plan_ = StepPlan();
+  plan_.foot = out > 0 ? Foot::kLeft : Foot::kRight;
+  reason_ = StepReason::kWalk;
+  if (num_steps_ == 0) standing_height_ = input.com_height - input.sole[0].translation().z();
+  height_.Begin(input.com_height);
+  steps_now_ = 0;
+  in_contact_ = input.in_contact;
+  shift_from_ = state.pendulum.capture_point();
+  cop_from_ = output_.cop = shift_from_;
+  since_ = input.time;
+  stage_ = Stage::kShifting;
+  BeginTurning(state);
+}
+
+void Recovery::BeginTurning(const StepState& state) {
+  if (turns_) return;
+  turns_ = true;
+  start_yaw_ = state.yaw;
+  body_yaw_.Begin(0);
+}
+
+void Recovery::TurnBody(const StepState& state, double period) {
+  if (!turns_) return;
+  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+  const Foot s = Other(plan_.foot);
+  const double other = steps ? plan_.yaw : state.sole_yaw[plan_.foot];
+  const double heading =
+      state.sole_yaw[s] + kTurnShare * std::remainder(other - state.sole_yaw[s], 2 * M_PI);
+  const double yaw = body_yaw_.point().position;
+  body_yaw_.Follow(yaw + std::remainder(heading - start_yaw_ - yaw, 2 * M_PI), period);
+}
+
 void Recovery::Shift(const StepInput& input, const StepState& state, double excess) {
+  if (reason_ == StepReason::kWalk) {
+    if (excess > kLeastExcess) {
+      BeginStep(input, choice_.Choose(state), StepReason::kSure);
+    } else if (!command_.stepping) {
+      stage_ = Stage::kCatching;
+      since_ = moving_since_ = input.time;
+      cop_from_ = output_.cop;
+    } else if (input.time >= since_ + kSetOff - kTimeTolerance) {
+      StepReason reason = StepReason::kWalk;
+      const StepPlan plan = WalkOn(state, plan_.foot, choice_.limits().unload, &reason);
+      BeginStep(input, plan, reason);
+    }
+    return;
+  }
   const Foot stance = Other(plan_.foot);
   const Foot s = stance;
   const balance::ConvexPolygon sole =
@@ -286,11 +387,20 @@ void Recovery::Land(const StepInput& input) {
 }
 
 bool Recovery::StepOn(const StepInput& input, const StepState& state) {
+  if (command_.stepping) steps_now_ = 0;
   if (reason_ == StepReason::kTogether || steps_now_ >= kMostSteps) return false;
   const Foot other = Other(plan_.foot);
   // A foot that has only tapped the ground carries nothing: the robot would fall from the other
   // one.
   if (!(input.load[plan_.foot] > input.load[other])) return false;
+  if (command_.stepping) {
+    StepReason reason = StepReason::kWalk;
+    const StepPlan next = WalkOn(state, other, 0, &reason);
+    if (!next.possible) return false;
+    BeginStep(input, next, reason);
+    LiftOff(input);
+    return true;
+  }
   const double margin = balance::SignedDistance(Soles(state, choice_.limits().sole_margin),
                                                 state.pendulum.capture_point());
   if (margin > kStepOnShare * choice_.limits().ample_margin) return false;
@@ -319,7 +429,11 @@ void Recovery::Swings(const StepInput& input, const StepState& state) {
     Hurry(state, input.time);
   }
   const double left = touch_down_ - input.time;
-  if (left > spec_.swing.freeze) {
+  if (left > spec_.swing.freeze && reason_ == StepReason::kWalk) {
+    const StepPlan next = choice_.StrideAt(state, plan_.foot, gait(state), left);
+    if (std::isfinite(next.margin)) plan_ = next;
+    if (stage_ == Stage::kSwinging) swing_.Move(plan_.foothold, input.time, touch_down_);
+  } else if (left > spec_.swing.freeze) {
     const bool around = stage_ == Stage::kSwinging && swing_.around();
     const StepPlan next = choice_.At(state, plan_.foot, left, plan_.place);
     // A foothold that the way under way does not lead to is none.
@@ -377,15 +491,29 @@ Vector2d Recovery::BrakingPoint(const StepInput& input, const StepState& state) 
                            state.sole_yaw[s]),
                     state.sole[s], Vector2d::Zero(), kSwingBudget);
   }
-  const Vector2d body = ForBody(input, kSwingBudget);
   const balance::ConvexPolygon sole =
       SoleAt(choice_.foot(stance), choice_.limits().sole_margin, state.sole[s], state.sole_yaw[s]);
+  if (reason_ == StepReason::kWalk) {
+    return WalkingPoint(input, state, stance, sole,
+                        touch_down_ + gait(state).transfer - input.time);
+  }
+  const Vector2d body = ForBody(input, kSwingBudget);
   return balance::NearestPoint(sole, state.pendulum.capture_point() + body) - body;
 }
 
 Vector2d Recovery::CatchingPoint(const StepInput& input, const StepState& state) const {
   Vector2d goal = Goal(state), velocity = Vector2d::Zero();
-  if (stage_ == Stage::kShifting) {
+  const bool walks = command_.stepping && reason_ == StepReason::kWalk;
+  if (walks && stage_ != Stage::kShifting) {
+    return WalkingPoint(input, state, plan_.foot, Soles(state, choice_.limits().sole_margin),
+                        gait(state).period);
+  }
+  if (stage_ == Stage::kShifting && walks) {
+    const Vector2d way = choice_.StrideBegin(state, Other(plan_.foot), gait(state)) - shift_from_;
+    const balance::MinimumJerk shift(input.time - since_, kSetOff);
+    goal = shift_from_ + shift.position * way;
+    velocity = shift.speed * way;
+  } else if (stage_ == Stage::kShifting) {
     const Vector2d way = state.sole[Other(plan_.foot)] - shift_from_;
     const balance::MinimumJerk shift(input.time - since_, kTogetherShift);
     goal = shift_from_ + shift.position * way;
@@ -403,16 +531,22 @@ bool Recovery::AtRest(const StepInput& input, const StepState& state) {
 }
 
 double Recovery::LoweringShare(const StepState& state) const {
-  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
-  FootArray<Vector2d> offset;
-  const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
-  // Where both soles and the COM will be.
-  const Vector2d com = steps ? plan_.com : state.pendulum.com;
-  for (const Foot foot : kFeet) {
-    const bool swings = steps && foot == plan_.foot;
-    offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
+  double share = 0;
+  if (command_.stepping) share = kWalkLowering * standing_height_ / choice_.reach().lowering();
+  // A walk keeps its height: a COM that comes down with each step brings its foot down too soon.
+  if (!command_.stepping || reason_ != StepReason::kWalk) {
+    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(-state.yaw).toRotationMatrix();
+    FootArray<Vector2d> offset;
+    const bool steps = stage_ == Stage::kUnloading || stage_ == Stage::kSwinging;
+    // Where both soles and the COM will be.
+    const Vector2d com = steps ? plan_.com : state.pendulum.com;
+    for (const Foot foot : kFeet) {
+      const bool swings = steps && foot == plan_.foot;
+      offset[foot] = turn * ((swings ? plan_.foothold : state.sole[foot]) - com);
+    }
+    share = std::max(share, choice_.reach().LoweringShare(offset));
   }
-  return std::min(choice_.reach().LoweringShare(offset), 1.0);
+  return std::min(share, 1.0);
 }
 
 void Recovery::LeadCom(const StepInput& input, const StepState& state) {
@@ -426,6 +560,7 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
   const double wanted =
       ground + standing_height_ - LoweringShare(state) * choice_.reach().lowering();
   height_.Follow(wanted, period);
+  TurnBody(state, period);
 
   double share = 1;
   Vector2d cop = output_.cop;
@@ -456,8 +591,8 @@ void Recovery::LeadCom(const StepInput& input, const StepState& state) {
 void Recovery::Archive(StateArchive* archive) {
   archive->Show(stage_, reason_, num_steps_, steps_now_, in_contact_);
   archive->Show(plan_.possible, plan_.foot, plan_.time, plan_.foothold, plan_.yaw, plan_.cop,
-                plan_.capture_point, plan_.com, plan_.margin, plan_.place, plan_.around,
-                plan_.corner);
+                plan_.capture_point, plan_.com, plan_.margin, plan_.missed, plan_.place,
+                plan_.around, plan_.corner);
   swing_.Archive(archive);
   height_.Archive(archive);
   outside_.Archive(archive);
@@ -465,6 +600,8 @@ void Recovery::Archive(StateArchive* archive) {
   archive->Show(time_, since_, ramp_from_, touched_since_, touch_down_, stays_outside_,
                 stays_near_edge_, excess_at_edge_, moving_since_, cop_from_, standing_height_,
                 together_asked_, together_at_, shift_from_, step_helps_);
+  archive->Show(command_.velocity, command_.turn_rate, command_.stepping, start_yaw_, turns_);
+  body_yaw_.Archive(archive);
   output_.Archive(archive);
 }
 

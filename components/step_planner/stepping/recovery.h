@@ -30,6 +30,9 @@ struct RecoverySpec {
   /// m inside the soles, within which is known whether a step helps; < 0: nowhere.
   double watched_margin = -1;
   double together_after = 0;  ///< s at rest until the feet are put side by side; 0: when asked
+  double stride = 0;          ///< of a walk's step, its time times ω
+  double acceleration = 0, turn_acceleration = 0;  ///< m/s², rad/s², of what is walked
+  double yaw_rate = 0;  ///< 1/s, with which the body's heading follows the feet's
 };
 
 enum class Stage { kIdle, kShifting, kUnloading, kSwinging, kLoading, kCatching };
@@ -50,7 +53,7 @@ class Recovery {
  public:
   Recovery() = default;
   Recovery(const StepChoice& choice, const RecoverySpec& spec)
-      : choice_(choice), spec_(spec), height_(spec.height_rate) {}
+      : choice_(choice), spec_(spec), height_(spec.height_rate), body_yaw_(spec.yaw_rate) {}
 
   /// Once a tick. False: idle, `output` is not to be used.
   bool Update(const StepInput& input);
@@ -67,6 +70,12 @@ class Recovery {
   const StepPlan& plan() const { return plan_; }     ///< of the step under way
   double touch_down() const { return touch_down_; }  ///< s, planned, of the step under way
   const StepChoice& choice() const { return choice_; }
+  /// What is walked now: the command, approached without haste.
+  const WalkCommand& command() const { return command_; }
+  /// The body heads where the feet do: it has walked since it last stood.
+  bool turns() const { return turns_; }
+  /// rad, rad/s, rad/s² about the vertical, of the body since it stood.
+  const Quintic::Point& body_yaw() const { return body_yaw_.point(); }
   void Archive(StateArchive* archive);
 
  private:
@@ -99,6 +108,18 @@ class Recovery {
   Eigen::Vector2d BrakingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d CatchingPoint(const StepInput& input, const StepState& state) const;
   Eigen::Vector2d Goal(const StepState& state) const;
+  Gait gait(const StepState& state) const;
+  /// The step of a walk, or of a recovery where the walk's misses its place.
+  StepPlan WalkOn(const StepState& state, Foot foot, double unload, StepReason* reason) const;
+  /// The centre of pressure of a walk on `stance`, within `support`, `left` s before the other sole
+  /// carries.
+  Eigen::Vector2d WalkingPoint(const StepInput& input, const StepState& state, Foot stance,
+                               const balance::ConvexPolygon& support, double left) const;
+  /// From rest: the capture point goes to where the first step begins.
+  void SetOff(const StepInput& input, const StepState& state);
+  /// The body's heading follows the feet's from now on.
+  void BeginTurning(const StepState& state);
+  void TurnBody(const StepState& state, double period);
   /// It is time for the feet to be put side by side, and `plan` does it.
   bool TogetherNow(const StepInput& input, const StepState& state, StepPlan* plan);
   /// The COM on its way above the foot that stays; then the other one leaves the ground.
@@ -139,6 +160,10 @@ class Recovery {
   Eigen::Vector2d shift_from_ = Eigen::Vector2d::Zero();  // m, the capture point before it shifts
   double standing_height_ = 0;  // m, above the soles, before the first step
   HeightLead height_;           // m, world, of the COM's reference
+  WalkCommand command_;
+  HeightLead body_yaw_;   // rad, since it stood
+  double start_yaw_ = 0;  // rad
+  bool turns_ = false;
   StepOutput output_;
 };
 

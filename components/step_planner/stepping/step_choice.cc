@@ -29,7 +29,9 @@ constexpr double kLongest = 4;
 constexpr double kLeastGain = 0.02;
 constexpr int kStepsAhead = 2;        // after the one that is chosen
 constexpr double kCostOfStep = 0.01;  // m of margin that a step must be worth
-constexpr int kHalvings = 5;          // of a foothold's way back to where the legs are clear
+// m that a stride's foothold may be off before the foot comes down sooner, by so many s at a time.
+constexpr double kMissed = 0.01, kSooner = 0.02;
+constexpr int kHalvings = 5;  // of a foothold's way back to where the legs are clear
 
 /// The segment keeps out of |x| < half.x, y < half.y, where the stance leg is, and beyond it, where
 /// the swing leg does not get around it.
@@ -104,19 +106,24 @@ bool StepChoice::WayAround(double side, const Vector2d& from, const Vector2d& to
   return false;
 }
 
-StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place place) const {
-  const Foot stance = Other(foot);
-  const Foot s = stance;
-  const double w = state.pendulum.frequency;
+StepPlan StepChoice::Until(const StepState& state, Foot foot, double time,
+                           const Vector2d& cop) const {
   StepPlan plan;
   plan.possible = true;
   plan.foot = foot;
   plan.time = time;
   plan.yaw = state.yaw;
-  plan.cop = BrakingPoint(state, stance);
-  plan.capture_point = CapturePointAfter(state.pendulum.capture_point(), plan.cop, w, time);
-  plan.com = After(state.pendulum, plan.cop, time).com;
+  plan.cop = cop;
+  plan.capture_point =
+      CapturePointAfter(state.pendulum.capture_point(), cop, state.pendulum.frequency, time);
+  plan.com = After(state.pendulum, cop, time).com;
+  return plan;
+}
 
+StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place place) const {
+  const Foot s = Other(foot);
+  StepPlan plan = Until(state, foot, time, BrakingPoint(state, s));
+  plan.place = place;
   // From here on in axes of the heading, from the stance sole.
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
   const auto local = [&](const Vector2d& point) -> Vector2d {
@@ -128,7 +135,6 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place pl
   Vector2d wanted = caught;
   if (distance > 0) wanted += limits_.overshoot / distance * away;
   const double side = Side(foot);
-  plan.place = place;
   if (place == Place::kBeside) {
     // Side by side as when standing, and nearer where the capture point is on the stance foot's
     // side.
@@ -141,10 +147,22 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place pl
         std::max(0.0, 0.5 * feet_[foot].width - limits_.sole_margin - limits_.ample_margin);
     wanted.y() = std::clamp(side * limits_.spacing, wanted.y() - room, wanted.y() + room);
   }
-  const Vector2d com = local(plan.com);
-  plan.follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
+  PutDown(state, wanted, &plan);
+  return plan;
+}
+
+void StepChoice::PutDown(const StepState& state, const Vector2d& wanted, StepPlan* plan) const {
+  const Foot foot = plan->foot, stance = Other(foot);
+  const Foot s = stance;
+  const Place place = plan->place;
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(state.yaw).toRotationMatrix();
+  const auto local = [&](const Vector2d& point) -> Vector2d {
+    return turn.transpose() * (point - state.sole[s]);
+  };
+  const Vector2d com = local(plan->com);
+  plan->follows = balance::SignedDistance(reach_.Leg(stance, 1), Vector2d(-com));
   const balance::ConvexPolygon footholds = reach_.Footholds(foot, com, place);
-  Vector2d foothold(0, side * limits_.spacing);
+  Vector2d foothold(0, Side(foot) * limits_.spacing);
   bool reached = footholds.num_corners > 0;
   if (reached) foothold = balance::NearestPoint(footholds, wanted);
   if (place != Place::kBeside && reached) {
@@ -152,17 +170,78 @@ StepPlan StepChoice::At(const StepState& state, Foot foot, double time, Place pl
               balance::SignedDistance(footholds, foothold) >= -kOffReach;
   }
   if (limits_.leg_distance > 0) {
-    reached = WayAround(side, local(state.sole[foot]), foothold, &plan) && reached;
-    plan.corner = state.sole[s] + turn * plan.corner;
+    reached = WayAround(Side(foot), local(state.sole[foot]), foothold, plan) && reached;
+    plan->corner = state.sole[s] + turn * plan->corner;
   }
-  plan.foothold = state.sole[s] + turn * foothold;
+  plan->missed = (foothold - wanted).norm();
+  plan->foothold = state.sole[s] + turn * foothold;
   const balance::ConvexPolygon soles =
       HullOf(SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]),
-             SoleAt(feet_[foot], limits_.sole_margin, plan.foothold, plan.yaw));
-  plan.margin = balance::SignedDistance(soles, plan.capture_point);
+             SoleAt(feet_[foot], limits_.sole_margin, plan->foothold, plan->yaw));
+  plan->margin = balance::SignedDistance(soles, plan->capture_point);
   // A COM that the stance leg cannot follow is as bad as a capture point outside.
-  plan.margin = std::min(plan.margin, plan.margin + plan.follows);
-  if (!reached) plan.margin = -std::numeric_limits<double>::infinity();
+  plan->margin = std::min(plan->margin, plan->margin + plan->follows);
+  if (!reached) plan->margin = -std::numeric_limits<double>::infinity();
+}
+
+FootstepLimits StepChoice::StrideLimits() const {
+  return {limits_.spacing, reach_.least_spacing(), limits_.longest, limits_.widest,
+          limits_.most_turn};
+}
+
+Vector2d StepChoice::StrideBegin(const StepState& state, Foot stance, const Gait& gait) const {
+  const auto stride =
+      NominalStride({state.sole[stance], state.sole_yaw[stance]}, Other(stance), gait.command,
+                    gait.period, state.pendulum.frequency, StrideLimits());
+  return state.sole[stance] + stride.begin;
+}
+
+Vector2d StepChoice::StridePoint(const StepState& state, Foot stance, const Gait& gait, double left,
+                                 const balance::ConvexPolygon& support) const {
+  const double w = state.pendulum.frequency;
+  const Vector2d& sole = state.sole[stance];
+  const auto stride = NominalStride({sole, state.sole_yaw[stance]}, Other(stance), gait.command,
+                                    gait.period, w, StrideLimits());
+  const Vector2d then = stride.next.position - sole + stride.end;
+  const Vector2d error =
+      state.pendulum.capture_point() - sole - std::exp(-w * std::max(left, 0.0)) * then;
+  return balance::NearestPoint(support, sole + (1 + gait.gain) * error);
+}
+
+StepPlan StepChoice::StrideAt(const StepState& state, Foot foot, const Gait& gait,
+                              double time) const {
+  const Foot s = Other(foot);
+  const auto stride = NominalStride({state.sole[s], state.sole_yaw[s]}, foot, gait.command,
+                                    gait.period, state.pendulum.frequency, StrideLimits());
+  const balance::ConvexPolygon sole =
+      SoleAt(feet_[s], limits_.sole_margin, state.sole[s], state.sole_yaw[s]);
+  const double carries = time + gait.transfer;
+  StepPlan plan = Until(state, foot, carries, StridePoint(state, s, gait, carries, sole));
+  plan.time = time;
+  plan.yaw = stride.next.yaw;
+  const Vector2d wanted = plan.capture_point - stride.end - state.sole[s];
+  PutDown(state, Eigen::Rotation2Dd(-state.yaw) * wanted, &plan);
+  return plan;
+}
+
+StepPlan StepChoice::Stride(const StepState& state, Foot foot, const Gait& gait,
+                            double unload) const {
+  const auto least = [&](const StepPlan& plan) {
+    return unload +
+           std::max(limits_.least_swing,
+                    SwingTime((plan.foothold - state.sole[foot]).norm(), limits_.acceleration));
+  };
+  double time = unload + gait.period - gait.transfer;
+  StepPlan plan = StrideAt(state, foot, gait, time);
+  if (const double needed = least(plan); needed > time) {
+    return StrideAt(state, foot, gait, needed);
+  }
+  while (plan.missed > kMissed && time - kSooner >= least(plan)) {
+    time -= kSooner;
+    const StepPlan sooner = StrideAt(state, foot, gait, time);
+    if (!(sooner.missed < plan.missed)) break;
+    plan = sooner;
+  }
   return plan;
 }
 

@@ -6,6 +6,7 @@
 
 #include "components/balance/convex_polygon.h"
 #include "components/robot/robot_model.h"
+#include "components/step_planner/stepping/footsteps.h"
 #include "components/step_planner/stepping/legs.h"
 #include "components/step_planner/stepping/pendulum.h"
 #include "components/step_planner/stepping/reach.h"
@@ -19,7 +20,9 @@ struct StepLimits {
   double unload = 0;        ///< s, from the decision until a loaded foot leaves the ground
   double overshoot = 0;     ///< m beyond the capture point that a sole's centre comes down
   double ample_margin = 0;  ///< m of the capture point inside the new support; more is no better
-  double spacing = 0;       ///< m, sideways between the soles' centres, when nothing asks for more
+  double longest = 0, widest = 0;  ///< m of a walk's step ahead, and aside beyond `spacing`
+  double most_turn = 0;            ///< rad of a walk's step
+  double spacing = 0;  ///< m, sideways between the soles' centres, when nothing asks for more
   /// m between the legs' lines at a foothold ahead of the stance sole or behind it; 0: there is
   /// none
   double leg_distance = 0;
@@ -49,9 +52,18 @@ struct StepPlan {
   double margin = 0;
   /// m, of the COM at touch-down inside the stance leg's reach; negative: the leg cannot follow.
   double follows = 0;
+  double missed = 0;  ///< m from where the foot was wanted to the foothold
   Place place = Place::kBeside;
   bool around = false;  ///< the way goes around the stance leg, by `corner`, m
   Eigen::Vector2d corner = Eigen::Vector2d::Zero();
+};
+
+/// A walk that a step is part of.
+struct Gait {
+  WalkCommand command;
+  double period = 1;    ///< s from one touch-down to the next
+  double transfer = 0;  ///< s from a touch-down until the foot carries
+  double gain = 0;      ///< of the capture point's error in the centre of pressure
 };
 
 /// Least time of a quintic over `distance`, m, whose acceleration stays below `acceleration`, m/s².
@@ -81,6 +93,18 @@ class StepChoice {
   /// stance sole's point nearest to the capture point. Within what both legs span, also
   /// where the COM has left it.
   StepPlan At(const StepState& state, Foot foot, double time, Place place = Place::kBeside) const;
+  /// The step of `foot` that goes on with `gait`, its touch-down `time` s from now: where the
+  /// capture point has its nominal place from the sole.
+  StepPlan StrideAt(const StepState& state, Foot foot, const Gait& gait, double time) const;
+  /// The same, whose time is the gait's, sooner where the legs do not reach so far, later where the
+  /// swing takes longer. `unload`: s, until the foot leaves the ground.
+  StepPlan Stride(const StepState& state, Foot foot, const Gait& gait, double unload) const;
+  /// m, world: the capture point as the other foot leaves the ground.
+  Eigen::Vector2d StrideBegin(const StepState& state, Foot stance, const Gait& gait) const;
+  /// m, world: the centre of pressure within `support` that leads the capture point to where the
+  /// gait has it from the sole of `stance` with `left` s until the other one carries.
+  Eigen::Vector2d StridePoint(const StepState& state, Foot stance, const Gait& gait, double left,
+                              const balance::ConvexPolygon& support) const;
   /// The step of `foot` that puts it beside the other one, as when standing, with the COM above
   /// that.
   StepPlan Beside(const StepState& state, Foot foot, double time) const;
@@ -95,6 +119,11 @@ class StepChoice {
   const robot::FootModel& foot(Foot foot) const { return feet_[foot]; }
 
  private:
+  FootstepLimits StrideLimits() const;
+  /// The step until its touch-down with the centre of pressure at `cop`.
+  StepPlan Until(const StepState& state, Foot foot, double time, const Eigen::Vector2d& cop) const;
+  /// The foothold nearest to `wanted`, in axes of the heading from the stance sole, and its margin.
+  void PutDown(const StepState& state, const Eigen::Vector2d& wanted, StepPlan* plan) const;
   /// m that the capture point is outside after `plan` and up to `more` steps after it, and what
   /// those cost.
   double CostAfter(const StepState& state, const StepPlan& plan, int more) const;

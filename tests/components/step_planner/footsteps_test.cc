@@ -63,6 +63,36 @@ TEST(CapturePlan, IsClosedFormOnOneFootAndHeldAtItsEnds) {
 
 FootstepLimits Limits() { return {0.21, 0.17, 0.3, 0.15, 0.4}; }
 
+// By Runge and Kutta, on one sole after the other: where a stride ends the next one begins.
+TEST(Footsteps, TheCapturePointComesAgainWithEveryTwoStrides) {
+  const double w = 3.7, period = 0.35;
+  const int parts = 200;
+  for (const Vector2d& velocity : {Vector2d(0, 0), Vector2d(0.5, 0), Vector2d(-0.3, 0),
+                                   Vector2d(0, 0.2), Vector2d(0.4, -0.1)}) {
+    const WalkCommand command{velocity, 0, true};
+    Footstep stance{{0.3, -0.1}, 0};
+    Foot foot = Foot::kLeft;
+    Vector2d point =
+        stance.position + NominalStride(stance, foot, command, period, w, Limits()).begin;
+    for (int step = 0; step < 6; ++step) {
+      const Stride stride = NominalStride(stance, foot, command, period, w, Limits());
+      EXPECT_LT((point - stance.position - stride.begin).norm(), 1e-6) << step;
+      for (int i = 0; i < parts; ++i) {
+        const double h = period / parts;
+        const auto rate = [&](const Vector2d& x) -> Vector2d { return w * (x - stance.position); };
+        const Vector2d k1 = rate(point), k2 = rate(point + 0.5 * h * k1);
+        const Vector2d k3 = rate(point + 0.5 * h * k2), k4 = rate(point + h * k3);
+        point += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+      }
+      EXPECT_LT((point - stride.next.position - stride.end).norm(), 1e-6) << step;
+      // Rounding grows by e^{ωT} in a step.
+      point = stride.next.position + stride.end;
+      stance = stride.next;
+      foot = Other(foot);
+    }
+  }
+}
+
 TEST(Footsteps, TurningOnTheSpotComesBackToWhereItBegan) {
   // 16 pairs of steps, each a sixteenth of a turn.
   const double turn = 2 * std::numbers::pi / 16;

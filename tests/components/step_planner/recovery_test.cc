@@ -59,6 +59,8 @@ class World {
     sole_[1].translation().z() = z;
     in_contact_ = {true, false};
   }
+  void Walk(const Vector2d& velocity) { command_ = {velocity, 0, true}; }
+  void Stop() { command_ = {}; }
   void Push(const Vector2d& impulse) { velocity_.head<2>() += impulse / model_.total_mass(); }
 
   void Tick() {
@@ -71,6 +73,7 @@ class World {
     input.in_contact = in_contact_;
     input.free_foot = {.position = sole_[1].translation()};
     input.com_height = height_;
+    input.command = command_;
     const Stage before = recovery_.stage();
     const bool active = recovery_.Update(input);
     Vector3d acceleration;
@@ -122,6 +125,7 @@ class World {
            velocity_.norm() < 0.1;
   }
 
+  const Vector3d& com() const { return com_; }
   Vector2d CapturePoint() const { return com_.head<2>() + velocity_.head<2>() / Frequency(); }
   double Frequency() const { return std::sqrt(robot::kGravity / com_.z()); }
   const std::array<Eigen::Isometry3d, 2>& soles() const { return sole_; }
@@ -195,6 +199,7 @@ class World {
   Vector3d com_, velocity_ = Vector3d::Zero();
   std::array<Eigen::Isometry3d, 2> sole_;
   std::array<bool, 2> in_contact_{true, true};
+  WalkCommand command_;
   Vector2d last_cop_ = Vector2d::Zero();
   double nearest_ = 1, largest_jump_ = 0, touched_ = -1, decided_ = -1;
   int last_steps_ = 0;
@@ -472,6 +477,52 @@ TEST_P(RecoveryCase, APushWhileTheFeetComeTogetherJumpsNoLoad) {
 }
 
 // The ground is 3 cm higher or 4 cm lower than the stance sole: the load says where it is.
+TEST_P(RecoveryCase, WalksWhereItIsTold) {
+  const World shape(GetParam());
+  const double speed = std::sqrt(robot::kGravity * shape.height());
+  for (const Vector2d& share : {Vector2d(0, 0), Vector2d(0.2, 0), Vector2d(-0.1, 0),
+                                Vector2d(0, 0.05), Vector2d(0.1, -0.03)}) {
+    World world(GetParam());
+    world.Walk(speed * share);
+    ASSERT_TRUE(world.Run(5)) << share.transpose();
+    const Vector2d from = world.com().head<2>();
+    const double since = world.time();
+    const int steps = world.recovery().num_steps();
+    ASSERT_TRUE(world.Run(5)) << share.transpose();
+    const Vector2d velocity = (world.com().head<2>() - from) / (world.time() - since);
+    EXPECT_LT((velocity - speed * share).norm(), 0.15 * speed * share.norm() + 0.02)
+        << velocity.transpose() << " of " << (speed * share).transpose();
+    // ωT = 1.3 a step, and no more than loading and unloading later: here both soles carry alike,
+    // so that no foot leaves before its ramp ends.
+    const double stride = shape.Frequency() * 5 / (world.recovery().num_steps() - steps);
+    EXPECT_GT(stride, 1.2);
+    EXPECT_LT(stride, 1.3 + shape.Frequency() * 0.1);
+    world.Stop();
+    ASSERT_TRUE(world.Run(10)) << share.transpose();
+    EXPECT_TRUE(world.Rests()) << share.transpose();
+    const Vector3d apart = world.soles()[1].translation() - world.soles()[0].translation();
+    EXPECT_NEAR(apart.x(), 0, 0.04) << share.transpose();
+    EXPECT_NEAR(apart.y(), robot::StandingSpacing(world.model()), 0.04) << share.transpose();
+  }
+}
+
+TEST_P(RecoveryCase, CatchesAPushAsItWalks) {
+  const World shape(GetParam());
+  const double speed = std::sqrt(robot::kGravity * shape.height());
+  for (int direction = 0; direction < 8; ++direction) {
+    for (const double moment : {4.0, 4.1, 4.2, 4.3}) {
+      World world(GetParam());
+      world.Walk({0.15 * speed, 0});
+      ASSERT_TRUE(world.Run(moment));
+      world.Push(0.08 * world.mass() * speed * Direction(45 * direction));
+      EXPECT_TRUE(world.Run(5)) << direction << ' ' << moment;
+      const double before = world.com().x();
+      EXPECT_TRUE(world.Run(2)) << direction << ' ' << moment;
+      EXPECT_NEAR((world.com().x() - before) / 2, 0.15 * speed, 0.05 * speed);
+    }
+  }
+}
+
 TEST_P(RecoveryCase, LandsWhereTheGroundIs) {
   const World still(GetParam());
   const double push = 1.15 * still.mass() * still.Frequency() * EdgeDistance(still, {1, 0}, 0);
